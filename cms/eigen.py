@@ -1,0 +1,242 @@
+"""Lowest modes of K phi = w^2 M phi, each with a bound on its error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigsh
+
+from cms.component import FloatArray, Pencil, SparseMatrix, times
+from cms.errors import ReductionError
+from cms.factor import DENSE_LIMIT, Factor, factorise
+
+EPS = float(np.finfo(np.float64).eps)
+SUSPECT_PIVOT = 1e-8
+RIGID_TOLERANCE = 64 * EPS
+ERROR_TOLERANCE = 1e-8
+GUARD_MODES = 2
+DENSE_AT_MOST = 6000
+
+
+@dataclass(frozen=True, eq=False)
+class Shifted:
+    """K + shift M, factorised; the shift (rad^2/s^2) is zero unless K may be singular."""
+
+    factor: Factor
+    shift: float
+    fastest: float
+
+    @property
+    def suspect(self) -> bool:
+        """Whether K alone is singular or close to it."""
+        return self.shift > 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Mass-normalised modes (N, k), their w^2 (k,) and a relative error bound for each (k,)."""
+
+    squares: FloatArray
+    vectors: FloatArray
+    errors: FloatArray
+
+
+def fastest_square(pencil: Pencil) -> float:
+    """Largest K_ii / M_ii: a lower bound of the largest w^2 and the scale of its rounding."""
+    mass = pencil.mass.diagonal()
+    heavy = mass > 0.0
+    if not np.any(heavy):
+        raise ReductionError("the mass matrix has no positive diagonal entry.")
+    return float(np.max(pencil.stiffness.diagonal()[heavy] / mass[heavy]))
+
+
+def shifted_factor(pencil: Pencil) -> Shifted:
+    """Factorise K, or K plus a small multiple of M where K alone is (nearly) singular.
+
+    Raises
+    ------
+    ReductionError
+        If even the shifted matrix is not positive definite.
+    """
+    fastest = fastest_square(pencil)
+    factor = factorise(pencil.stiffness)
+    if factor is not None and factor.smallest_pivot > SUSPECT_PIVOT:
+        return Shifted(factor, 0.0, fastest)
+    shift = np.sqrt(EPS) * (fastest if fastest > 0.0 else 1.0)
+    factor = factorise(pencil.stiffness + shift * pencil.mass)
+    if factor is None:
+        raise ReductionError(
+            "the stiffness or the mass matrix is indefinite, or a dof has neither: "
+            f"K + {shift:.3g} M is not positive definite."
+        )
+    return Shifted(factor, shift, fastest)
+
+
+def lowest_modes(pencil: Pencil, shifted: Shifted, count: int) -> Modes:
+    """The ``count`` modes of lowest frequency.
+
+    Parameters
+    ----------
+    pencil : Pencil
+        K and M, (N, N).
+    shifted : Shifted
+        The factorised K + shift M.
+    count : int
+        How many; 0 gives empty arrays.
+
+    Returns
+    -------
+    Modes
+        Ascending; frequencies at rounding level are set to exactly zero (rigid-body modes).
+
+    Raises
+    ------
+    ReductionError
+        If the eigen-solver does not converge or a mode fails its residual check.
+
+    Notes
+    -----
+    The inverse problem ``M phi = nu (K + s M) phi`` is solved, because the largest ``nu`` are the
+    lowest frequencies and come out to full relative accuracy. Dense LAPACK up to 1500 degrees of
+    freedom, above that Lanczos with the sparse factorisation (ARPACK through scipy's ``eigsh``).
+    """
+    if count == 0:
+        return Modes(np.zeros(0), np.zeros((pencil.size, 0)), np.zeros(0))
+    if pencil.size <= DENSE_LIMIT or count > pencil.size // 4:
+        squares, vectors = dense_modes(pencil, shifted, count)
+    else:
+        squares, vectors = lanczos_modes(pencil, shifted, count)
+    vectors = mass_orthonormal(vectors, pencil.mass)
+    squares = np.where(np.abs(squares) <= RIGID_TOLERANCE * shifted.fastest, 0.0, squares)
+    if squares[0] < 0.0:
+        raise ReductionError(
+            f"the stiffness matrix is not positive: its lowest w^2 is {squares[0]:.3g} rad^2/s^2."
+        )
+    errors = mode_errors(pencil, shifted, squares, vectors)
+    check_errors(errors, squares, shifted)
+    return Modes(squares, vectors, errors)
+
+
+def modes_up_to(pencil: Pencil, shifted: Shifted, cutoff: float) -> Modes:
+    """All modes with w^2 (rad^2/s^2) not above ``cutoff``; see :func:`lowest_modes`."""
+    count = min(8, pencil.size)
+    while True:
+        modes = lowest_modes(pencil, shifted, count)
+        if modes.squares[-1] > cutoff or count == pencil.size:
+            return first_modes(modes, int(np.searchsorted(modes.squares, cutoff, side="right")))
+        count = min(2 * count, pencil.size)
+
+
+def first_modes(modes: Modes, count: int) -> Modes:
+    """The first ``count`` of some modes."""
+    return Modes(modes.squares[:count], modes.vectors[:, :count], modes.errors[:count])
+
+
+def dense_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatArray, FloatArray]:
+    """w^2 (k,) and modes (N, k) by LAPACK."""
+    size = pencil.size
+    if size > DENSE_AT_MOST:
+        raise ReductionError(
+            f"{count} modes are more than a quarter of the component's {size} degrees of "
+            f"freedom, which is done only up to {DENSE_AT_MOST} degrees of freedom."
+        )
+    mass, matrix = pencil.mass.toarray(), shifted.factor.matrix.toarray()
+    nu, vectors = linalg.eigh(mass, matrix, subset_by_index=[size - count, size - 1])
+    nu, vectors = nu[::-1], vectors[:, ::-1]
+    positive = nu > size * EPS * nu[0]
+    if np.all(positive) and nu[-1] > 1e-6 * nu[0]:
+        return 1.0 / nu - shifted.shift, vectors / np.sqrt(nu)
+    if factorise(pencil.mass) is None:
+        massive = nu > 1e-12 * nu[0]
+        if not np.all(massive):
+            raise ReductionError(
+                f"{count} modes are asked for, but only {np.count_nonzero(massive)} have mass."
+            )
+        return 1.0 / nu - shifted.shift, vectors / np.sqrt(nu)
+    return with_fast_modes(pencil, shifted, nu, vectors)
+
+
+def with_fast_modes(
+    pencil: Pencil, shifted: Shifted, nu: FloatArray, vectors: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Take the fast modes from the direct problem, whose rounding error is small there.
+
+    The inverse problem has the relative error eps w_i^2 / w_1^2, the direct one
+    eps w_n^2 / w_i^2; they cross at the geometric mean.
+    """
+    count = nu.size
+    direct, direct_vectors = linalg.eigh(
+        pencil.stiffness.toarray(), pencil.mass.toarray(), subset_by_index=[0, count - 1]
+    )
+    slowest = 1.0 / nu[0]
+    crossing = np.sqrt(slowest * shifted.fastest)
+    slow = direct + shifted.shift <= crossing
+    with np.errstate(divide="ignore", invalid="ignore"):
+        squares = np.where(slow, 1.0 / nu - shifted.shift, direct)
+        modes = np.where(slow, vectors / np.sqrt(np.abs(nu)), direct_vectors)
+    return squares, modes
+
+
+def lanczos_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatArray, FloatArray]:
+    """w^2 (k,) and modes (N, k) by shift-invert Lanczos at -shift."""
+    size = pencil.size
+    wanted = min(count + GUARD_MODES, size - 1)
+    inverse = LinearOperator((size, size), matvec=shifted.factor.solve, dtype=np.float64)
+    start = np.random.default_rng(0).standard_normal(size)
+    try:
+        squares, vectors = eigsh(
+            pencil.stiffness,
+            k=wanted,
+            M=pencil.mass,
+            sigma=-shifted.shift,
+            OPinv=inverse,
+            v0=times(pencil.mass, start),
+            ncv=min(size, max(2 * wanted + 1, 20)),
+        )
+    except (ArpackNoConvergence, ArpackError) as error:
+        raise ReductionError(f"the eigen-solver did not converge to {count} modes.") from error
+    order = np.argsort(squares)[:count]
+    return squares[order], vectors[:, order]
+
+
+def mass_orthonormal(vectors: FloatArray, mass: SparseMatrix) -> FloatArray:
+    """The vectors nearest to those given with ``V^T M V = I`` (one Newton step, symmetric)."""
+    gram = vectors.T @ times(mass, vectors)
+    return vectors @ (1.5 * np.eye(gram.shape[0]) - 0.5 * gram)
+
+
+def mass_norms(vectors: FloatArray, mass: SparseMatrix) -> FloatArray:
+    """``sqrt(v^T M v)`` of each column, (k,)."""
+    return np.asarray(np.sqrt(np.abs(np.sum(vectors * times(mass, vectors), axis=0))))
+
+
+def mode_errors(
+    pencil: Pencil, shifted: Shifted, squares: FloatArray, vectors: FloatArray
+) -> FloatArray:
+    r"""Relative residual of each mode, which bounds the relative error of its w^2.
+
+    Returns
+    -------
+    (k,) array
+        ``|| (K + s M)^-1 (K phi - w^2 M phi) ||_M`` for mass-normalised phi. There is an exact
+        eigenvalue within this relative distance of ``w^2 + s`` (the residual bound for the
+        operator ``(K + s M)^-1 M``, self-adjoint in the M inner product).
+    """
+    residual = times(pencil.stiffness, vectors) - times(pencil.mass, vectors) * squares
+    solved = shifted.factor.solve(residual)
+    return mass_norms(solved, pencil.mass)
+
+
+def check_errors(errors: FloatArray, squares: FloatArray, shifted: Shifted) -> None:
+    """Raise ReductionError where a mode's error is above what rounding explains."""
+    rounding = 1e3 * EPS * shifted.fastest / (squares + shifted.shift)
+    allowed = np.maximum(ERROR_TOLERANCE, rounding)
+    failed = np.flatnonzero(~(errors <= allowed))
+    if failed.size:
+        worst = int(failed[0])
+        raise ReductionError(
+            f"mode {worst + 1} of the component fails its residual check "
+            f"({errors[worst]:.1e} > {allowed[worst]:.1e})."
+        )
