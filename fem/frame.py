@@ -1,0 +1,209 @@
+"""Assembly of a plane frame of Euler-Bernoulli beams."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from fem.elements import local_matrices, turn
+from fem.errors import ModelError
+from fem.mesh import FloatArray, IntArray
+from fem.model import DIRECTIONS, FrameModel
+
+SparseArray = sparse.csr_array
+
+
+@dataclass(frozen=True, eq=False)
+class Component:
+    """An assembled frame: N free degrees of freedom, two matrices and named interfaces.
+
+    Parameters
+    ----------
+    stiffness, mass
+        K in N/m (N m/rad, ...) and M in kg (kg m², ...), sparse and symmetric, shape (N, N).
+    interfaces
+        A vector of shape (N,) by name: a load f at the interface is `vector * f` and its
+        displacement is `vector @ u`.
+    model
+        The frame that was assembled.
+    free
+        Indices of the free degrees of freedom among all, shape (N,).
+    element_dofs
+        Indices among all degrees of freedom of (ux, uy, rotation) at the first and the second
+        end of every element, shape (e, 6). Node i has 3i, 3i + 1, 3i + 2; the own rotations of
+        hinged parts follow after the nodes.
+    """
+
+    stiffness: SparseArray
+    mass: SparseArray
+    interfaces: Mapping[str, FloatArray]
+    model: FrameModel
+    free: IntArray
+    element_dofs: IntArray
+
+    def shape(self, u: FloatArray) -> FloatArray:
+        """Translations and rotation (ux, uy, rotation) of every node of the mesh.
+
+        Parameters
+        ----------
+        u
+            Displacements of the free degrees of freedom, shape (N,).
+
+        Returns
+        -------
+        ndarray
+            Shape (n, 3); zero where supported. At a hinge it is the rotation of the parts that
+            are not hinged; `element_shape` has both.
+        """
+        return self._all(u)[: 3 * len(self.model.mesh.points)].reshape(-1, 3)
+
+    def element_shape(self, u: FloatArray) -> FloatArray:
+        """(ux, uy, rotation) at both ends of every element, with hinges, shape (e, 2, 3)."""
+        return self._all(u)[self.element_dofs].reshape(-1, 2, 3)
+
+    def _all(self, u: FloatArray) -> FloatArray:
+        u = np.asarray(u, dtype=np.float64)
+        if u.shape != self.free.shape:
+            raise ModelError(
+                f"{self.model.mesh.source}: a displacement of the component has shape"
+                f" {self.free.shape}, not {u.shape}"
+            )
+        values = np.zeros(_dof_count(self.model))
+        values[self.free] = u
+        return values
+
+
+def assemble(model: FrameModel) -> Component:
+    """Assemble stiffness and consistent mass of a plane frame.
+
+    Parameters
+    ----------
+    model
+        The frame. It may float freely or be a mechanism.
+
+    Returns
+    -------
+    Component
+        Matrices of the free degrees of freedom and the interface vectors.
+
+    Raises
+    ------
+    ModelError
+        If the supports leave nothing free.
+
+    Notes
+    -----
+    Euler-Bernoulli beams: cubic Hermite bending, linear stretching, no shear, no rotary inertia
+    of the cross-section [1]_. The error of a frequency falls with the fourth power of the element
+    length as long as stretching does not matter, else with the second.
+
+    .. [1] M. Petyt, Introduction to Finite Element Vibration Analysis, 2nd ed., Cambridge
+       University Press, 2010, sections 3.2, 3.4 and 3.5.
+
+    Examples
+    --------
+    The tip of a cantilever under 1 N moves by L³/(3 E I):
+
+    >>> import fem
+    >>> from scipy.sparse.linalg import spsolve
+    >>> mesh = fem.frame_mesh({"root": (0, 0), "tip": (2, 0)}, [("arm", "root", "tip", 3)])
+    >>> component = fem.assemble(fem.FrameModel(
+    ...     mesh,
+    ...     parts={"arm": fem.BeamPart(fem.Material(2e11, 7800.0), fem.Section(1e-3, 1e-8))},
+    ...     supports=[fem.Support("root", ("x", "y", "rotation"))],
+    ...     interfaces={"tip": fem.Interface("tip", "y")},
+    ... ))
+    >>> tip = component.interfaces["tip"]
+    >>> bool(abs(tip @ spsolve(component.stiffness, tip) / (8 / (3 * 2e11 * 1e-8)) - 1) < 1e-12)
+    True
+    """
+    element_dofs = number_dofs(model)
+    free = _free_dofs(model)
+    stiffness, mass = _element_matrices(model)
+    K = _scatter(stiffness, element_dofs, _spring_diagonal(model), free)
+    M = _scatter(mass, element_dofs, _mass_diagonal(model), free)
+    return Component(K, M, _interface_vectors(model, free), model, free, element_dofs)
+
+
+def number_dofs(model: FrameModel) -> IntArray:
+    """Degrees of freedom of both ends of every element, shape (e, 6); hinges add rotations."""
+    mesh = model.mesh
+    dofs = (3 * mesh.lines[:, :, None] + np.arange(3)).astype(np.int64)
+    for extra, hinge in enumerate(model.hinges):
+        elements = mesh.part(hinge.part)
+        at_point = mesh.lines[elements] == mesh.node(hinge.point)
+        rotation = dofs[elements, :, 2]
+        rotation[at_point] = 3 * len(mesh.points) + extra
+        dofs[elements, :, 2] = rotation
+    return dofs.reshape(-1, 6)
+
+
+def _dof_count(model: FrameModel) -> int:
+    return 3 * len(model.mesh.points) + len(model.hinges)
+
+
+def _dof(model: FrameModel, point: str, direction: str) -> int:
+    return 3 * model.mesh.node(point) + DIRECTIONS.index(direction)
+
+
+def _free_dofs(model: FrameModel) -> IntArray:
+    held = [_dof(model, s.point, direction) for s in model.supports for direction in s.directions]
+    free = np.setdiff1d(np.arange(_dof_count(model)), held)
+    if len(free) == 0:
+        raise ModelError(f"{model.mesh.source}: the supports hold every degree of freedom")
+    return free
+
+
+def _element_matrices(model: FrameModel) -> tuple[FloatArray, FloatArray]:
+    mesh = model.mesh
+    EA, EI, rhoA = (np.zeros(len(mesh.lines)) for _ in range(3))
+    for name, elements in model.element_parts().items():
+        material, section = model.parts[name].material, model.parts[name].section
+        EA[elements] = material.youngs_modulus * section.area
+        EI[elements] = material.youngs_modulus * section.second_moment
+        rhoA[elements] = material.density * section.area
+    directions = mesh.spans[:, :2] / mesh.lengths[:, None]
+    stiffness, mass = local_matrices(mesh.lengths, EA, EI, rhoA)
+    return turn(stiffness, directions), turn(mass, directions)
+
+
+def _spring_diagonal(model: FrameModel) -> FloatArray:
+    diagonal = np.zeros(_dof_count(model))
+    for spring in model.springs:
+        diagonal[_dof(model, spring.point, spring.direction)] += spring.stiffness
+    return diagonal
+
+
+def _mass_diagonal(model: FrameModel) -> FloatArray:
+    diagonal = np.zeros(_dof_count(model))
+    for lump in model.point_masses:
+        for direction, value in zip(
+            DIRECTIONS, (lump.mass, lump.mass, lump.rotary_inertia), strict=True
+        ):
+            diagonal[_dof(model, lump.point, direction)] += value
+    return diagonal
+
+
+def _scatter(
+    matrices: FloatArray, element_dofs: IntArray, diagonal: FloatArray, free: IntArray
+) -> SparseArray:
+    rows = np.repeat(element_dofs, 6, axis=1).ravel()
+    columns = np.tile(element_dofs, (1, 6)).ravel()
+    count = len(diagonal)
+    full = sparse.coo_array((matrices.ravel(), (rows, columns)), shape=(count, count)).tocsr()
+    full = sparse.csr_array(full + sparse.diags_array(diagonal, format="csr"))
+    part = sparse.csr_array(full[free][:, free])
+    part.eliminate_zeros()
+    return part
+
+
+def _interface_vectors(model: FrameModel, free: IntArray) -> dict[str, FloatArray]:
+    vectors = {}
+    for name, interface in model.interfaces.items():
+        vector = (free == _dof(model, interface.point, interface.direction)).astype(np.float64)
+        vector.setflags(write=False)
+        vectors[name] = vector
+    return vectors

@@ -1,0 +1,230 @@
+"""Line meshes of frames: points, two-node lines, named parts and named points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from fem.errors import ModelError, quoted
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class FrameMesh:
+    """A mesh of straight two-node lines.
+
+    Parameters
+    ----------
+    points
+        Coordinates in m, shape (n, 3).
+    lines
+        Node indices of the two ends of every element, shape (e, 2).
+    parts
+        Element indices by name. Groups may overlap here; a `FrameModel` picks those that it uses.
+    point_sets
+        Node indices by name. A set that a model uses as a point holds one node.
+    source
+        Where the mesh comes from; error texts begin with it.
+
+    Raises
+    ------
+    ModelError
+        For an empty mesh, coordinates that are not finite, indices out of range, a node on no
+        element, an element of zero length or one that appears twice.
+
+    Examples
+    --------
+    >>> mesh = FrameMesh([[0, 0, 0], [1, 0, 0]], [[0, 1]], {"rod": [0]}, {"tip": [1]})
+    >>> mesh.lengths
+    array([1.])
+    >>> mesh.node("tip")
+    1
+    """
+
+    points: FloatArray
+    lines: IntArray
+    parts: Mapping[str, IntArray] = field(default_factory=dict)
+    point_sets: Mapping[str, IntArray] = field(default_factory=dict)
+    source: str = "mesh"
+
+    def __post_init__(self) -> None:
+        points = _frozen(self.points, np.float64)
+        lines = _frozen(self.lines, np.int64)
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "lines", lines)
+        object.__setattr__(self, "parts", _index_sets(self.parts))
+        object.__setattr__(self, "point_sets", _index_sets(self.point_sets))
+        self._check_arrays()
+        self._check_elements()
+
+    @property
+    def spans(self) -> FloatArray:
+        """Vectors in m from the first to the second end of every element, shape (e, 3)."""
+        return self.points[self.lines[:, 1]] - self.points[self.lines[:, 0]]
+
+    @property
+    def lengths(self) -> FloatArray:
+        """Element lengths in m, shape (e,)."""
+        return np.asarray(np.linalg.norm(self.spans, axis=1), dtype=np.float64)
+
+    def part(self, name: str) -> IntArray:
+        """Element indices of a part; a `ModelError` lists the parts if the name is unknown."""
+        if name not in self.parts:
+            raise ModelError(
+                f"{self.source}: there is no part {name!r}; there are {quoted(self.parts)}"
+            )
+        return self.parts[name]
+
+    def node(self, name: str) -> int:
+        """Index of the one node of a named point.
+
+        Raises
+        ------
+        ModelError
+            If there is no point set of the name, or it does not hold exactly one node.
+        """
+        if name not in self.point_sets:
+            raise ModelError(
+                f"{self.source}: there is no point {name!r}; there are {quoted(self.point_sets)}"
+            )
+        nodes = self.point_sets[name]
+        if len(nodes) != 1:
+            raise ModelError(
+                f"{self.source}: point {name!r} must hold exactly one node of the frame"
+                f" but holds {len(nodes)}"
+            )
+        return int(nodes[0])
+
+    def with_points(self, points: npt.ArrayLike) -> FrameMesh:
+        """The same elements and names on other coordinates, shape (n, 3) in m.
+
+        Examples
+        --------
+        >>> mesh = frame_mesh({"a": (0, 0), "b": (1, 0)}, [("rod", "a", "b", 2)])
+        >>> float(mesh.with_points(2 * mesh.points).lengths.sum())
+        2.0
+        """
+        return replace(self, points=np.asarray(points, dtype=np.float64))
+
+    def _check_arrays(self) -> None:
+        if self.points.ndim != 2 or self.points.shape[1] != 3:
+            raise ModelError(
+                f"{self.source}: points must have shape (n, 3), not {self.points.shape}"
+            )
+        if len(self.points) == 0 or self.lines.size == 0:
+            raise ModelError(f"{self.source}: the mesh is empty (no line elements)")
+        if self.lines.ndim != 2 or self.lines.shape[1] != 2:
+            raise ModelError(f"{self.source}: lines must have shape (e, 2), not {self.lines.shape}")
+        bad = np.flatnonzero(~np.isfinite(self.points).all(axis=1))
+        if len(bad):
+            raise ModelError(
+                f"{self.source}: the coordinates of node {bad[0]} are not finite numbers"
+            )
+        self._check_range("lines", self.lines, len(self.points))
+        for name, elements in self.parts.items():
+            self._check_range(f"part {name!r}", elements, len(self.lines))
+        for name, nodes in self.point_sets.items():
+            self._check_range(f"point {name!r}", nodes, len(self.points))
+
+    def _check_range(self, what: str, indices: IntArray, count: int) -> None:
+        if indices.size and not (indices.min() >= 0 and indices.max() < count):
+            raise ModelError(f"{self.source}: {what} has an index outside 0 to {count - 1}")
+
+    def _check_elements(self) -> None:
+        size = float(np.ptp(self.points, axis=0).max())
+        short = np.flatnonzero(self.lengths <= 1e-12 * size)
+        if len(short):
+            raise ModelError(f"{self.source}: element {short[0]} has zero length")
+        _, first, count = np.unique(
+            np.sort(self.lines, axis=1), axis=0, return_index=True, return_counts=True
+        )
+        if count.max() > 1:
+            twice = first[np.argmax(count > 1)]
+            raise ModelError(
+                f"{self.source}: element {twice} appears twice between the same two nodes"
+                " (is a line in two physical groups?)"
+            )
+        loose = np.setdiff1d(np.arange(len(self.points)), self.lines)
+        if len(loose):
+            raise ModelError(f"{self.source}: node {loose[0]} is on no line element")
+
+
+def frame_mesh(
+    points: Mapping[str, Sequence[float]],
+    members: Sequence[tuple[str, str, str, int]],
+    source: str = "frame_mesh",
+) -> FrameMesh:
+    """Build a mesh of straight members between named points.
+
+    Parameters
+    ----------
+    points
+        Coordinates (x, y) or (x, y, z) in m by name; each becomes a point set of one node.
+    members
+        (part, from point, to point, number of elements); several may belong to one part.
+    source
+        Name of the mesh in error texts.
+
+    Raises
+    ------
+    ModelError
+        For an unknown point, a number of elements below one, and whatever `FrameMesh` refuses.
+
+    Examples
+    --------
+    >>> mesh = frame_mesh(
+    ...     {"corner": (0, 0), "middle": (0.66, 0), "foot": (0, -0.113)},
+    ...     [("beam", "corner", "middle", 4), ("leaf", "corner", "foot", 2)],
+    ... )
+    >>> mesh.points.shape, {name: len(part) for name, part in mesh.parts.items()}
+    ((7, 3), {'beam': 4, 'leaf': 2})
+    """
+    ends = {name: _coordinates(source, name, xyz) for name, xyz in points.items()}
+    index = {name: i for i, name in enumerate(ends)}
+    nodes = list(ends.values())
+    lines: list[tuple[int, int]] = []
+    parts: dict[str, list[int]] = {}
+    for part, start, stop, count in members:
+        for name in (start, stop):
+            if name not in ends:
+                raise ModelError(f"{source}: a member of part {part!r} ends at no point {name!r}")
+        if count < 1:
+            raise ModelError(f"{source}: a member of part {part!r} has {count} elements")
+        steps = np.arange(1, count)[:, None] / count
+        inner = ends[start] + steps * (ends[stop] - ends[start])
+        chain = [index[start], *range(len(nodes), len(nodes) + count - 1), index[stop]]
+        parts.setdefault(part, []).extend(range(len(lines), len(lines) + count))
+        lines.extend(pairwise(chain))
+        nodes.extend(inner)
+    return FrameMesh(
+        np.array(nodes, dtype=np.float64).reshape(-1, 3),
+        np.array(lines, dtype=np.int64).reshape(-1, 2),
+        {name: np.array(elements, dtype=np.int64) for name, elements in parts.items()},
+        {name: np.array([i], dtype=np.int64) for name, i in index.items()},
+        source,
+    )
+
+
+def _coordinates(source: str, name: str, xyz: Sequence[float]) -> FloatArray:
+    if len(xyz) not in (2, 3):
+        raise ModelError(f"{source}: point {name!r} needs two or three coordinates, not {len(xyz)}")
+    return np.array([*xyz, 0.0][:3], dtype=np.float64)
+
+
+def _frozen(values: npt.ArrayLike, dtype: type[np.generic]) -> npt.NDArray[np.generic]:
+    array = np.array(values, dtype=dtype)
+    array.setflags(write=False)
+    return array
+
+
+def _index_sets(sets: Mapping[str, npt.ArrayLike]) -> dict[str, IntArray]:
+    return {
+        str(name): np.asarray(_frozen(np.unique(np.asarray(indices, dtype=np.int64)), np.int64))
+        for name, indices in sets.items()
+    }

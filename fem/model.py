@@ -1,0 +1,368 @@
+"""What a plane frame is made of: materials, sections, supports, masses, springs, hinges."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from fem.errors import ModelError, quoted
+from fem.mesh import FrameMesh, IntArray
+
+DIRECTIONS = ("x", "y", "rotation")
+
+
+def _positive(owner: object, **values: float) -> None:
+    for name, value in values.items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise ModelError(f"{owner}: {name} must be positive and finite, not {value!r}")
+
+
+def _known_direction(owner: str, direction: str) -> None:
+    if direction not in DIRECTIONS:
+        raise ModelError(f"{owner}: there is no direction {direction!r}; use {quoted(DIRECTIONS)}")
+
+
+@dataclass(frozen=True)
+class Material:
+    """A linear elastic material.
+
+    Parameters
+    ----------
+    youngs_modulus
+        E in N/m².
+    density
+        rho in kg/m³.
+
+    Examples
+    --------
+    >>> Material(2.1e11, 7746.0).density
+    7746.0
+    """
+
+    youngs_modulus: float
+    density: float
+
+    def __post_init__(self) -> None:
+        _positive("material", youngs_modulus=self.youngs_modulus, density=self.density)
+
+
+class CrossSection(Protocol):
+    """Anything with an area in m² and a second moment of area in m⁴ for bending in the plane."""
+
+    @property
+    def area(self) -> float:
+        """Area in m²."""
+
+    @property
+    def second_moment(self) -> float:
+        """Second moment of area in m⁴ about the axis normal to the plane of the frame."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A cross-section given by its area in m² and its second moment of area in m⁴.
+
+    Examples
+    --------
+    >>> Section(area=2.85e-3, second_moment=1.94e-5).area   # IPE 200
+    0.00285
+    """
+
+    area: float
+    second_moment: float
+
+    def __post_init__(self) -> None:
+        _positive("section", area=self.area, second_moment=self.second_moment)
+
+
+@dataclass(frozen=True)
+class RectangularSection:
+    """A rectangle: `width` in m normal to the plane of the frame, `height` in m within it.
+
+    Examples
+    --------
+    >>> section = RectangularSection(width=0.09, height=0.01)
+    >>> round(section.area, 6), round(section.second_moment * 1e9, 6)
+    (0.0009, 7.5)
+    """
+
+    width: float
+    height: float
+
+    def __post_init__(self) -> None:
+        _positive("rectangular section", width=self.width, height=self.height)
+
+    @property
+    def area(self) -> float:
+        """Area in m²."""
+        return self.width * self.height
+
+    @property
+    def second_moment(self) -> float:
+        """Second moment of area in m⁴: width height³ / 12."""
+        return self.width * self.height**3 / 12.0
+
+
+@dataclass(frozen=True)
+class CircularSection:
+    """A round bar, or a tube if `bore` is not zero; both diameters in m.
+
+    Examples
+    --------
+    >>> round(CircularSection(0.02).area * 1e6, 3)
+    314.159
+    """
+
+    diameter: float
+    bore: float = 0.0
+
+    def __post_init__(self) -> None:
+        _positive("circular section", diameter=self.diameter)
+        if not 0.0 <= self.bore < self.diameter:
+            raise ModelError(
+                f"circular section: bore must be at least 0 and less than the diameter"
+                f" {self.diameter!r}, not {self.bore!r}"
+            )
+
+    @property
+    def area(self) -> float:
+        """Area in m²."""
+        return math.pi / 4.0 * (self.diameter**2 - self.bore**2)
+
+    @property
+    def second_moment(self) -> float:
+        """Second moment of area in m⁴: pi (diameter⁴ - bore⁴) / 64."""
+        return math.pi / 64.0 * (self.diameter**4 - self.bore**4)
+
+
+@dataclass(frozen=True)
+class BeamPart:
+    """Material and cross-section of a part of the mesh."""
+
+    material: Material
+    section: CrossSection
+
+    def __post_init__(self) -> None:
+        _positive("section", area=self.section.area, second_moment=self.section.second_moment)
+
+
+@dataclass(frozen=True)
+class Support:
+    """Directions of a point that are held: any of "x", "y", "rotation".
+
+    A clamp holds all three; a plane of symmetry normal to x holds ("x", "rotation").
+
+    Examples
+    --------
+    >>> Support("foot", ("x", "y", "rotation")).directions
+    ('x', 'y', 'rotation')
+    >>> Support("end", "y").directions
+    ('y',)
+    """
+
+    point: str
+    directions: Sequence[str]
+
+    def __post_init__(self) -> None:
+        names = (self.directions,) if isinstance(self.directions, str) else tuple(self.directions)
+        object.__setattr__(self, "directions", names)
+        if not names:
+            raise ModelError(f"support at {self.point!r}: no direction is held")
+        for name in names:
+            _known_direction(f"support at {self.point!r}", name)
+
+
+@dataclass(frozen=True)
+class PointMass:
+    """A lumped mass in kg at a point, with an optional rotary inertia in kg m²."""
+
+    point: str
+    mass: float
+    rotary_inertia: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in (("mass", self.mass), ("rotary inertia", self.rotary_inertia)):
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ModelError(
+                    f"point mass at {self.point!r}: {name} must be finite and not negative,"
+                    f" not {value!r}"
+                )
+        if self.mass == 0.0 and self.rotary_inertia == 0.0:
+            raise ModelError(f"point mass at {self.point!r}: mass and rotary inertia are both zero")
+
+
+@dataclass(frozen=True)
+class PointSpring:
+    """A spring from a point to the ground: N/m along "x" or "y", N m/rad for "rotation"."""
+
+    point: str
+    direction: str
+    stiffness: float
+
+    def __post_init__(self) -> None:
+        _known_direction(f"spring at {self.point!r}", self.direction)
+        _positive(f"spring at {self.point!r}", stiffness=self.stiffness)
+
+
+@dataclass(frozen=True)
+class Hinge:
+    """A rotary joint: the named part keeps its own rotation at the point.
+
+    The parts without a hinge there share the rotation of the point, on which supports, springs,
+    inertias and interfaces act.
+    """
+
+    point: str
+    part: str
+
+
+@dataclass(frozen=True)
+class Interface:
+    """A point and direction ("x", "y" or "rotation") at which others may push and watch."""
+
+    point: str
+    direction: str
+
+    def __post_init__(self) -> None:
+        _known_direction(f"interface at {self.point!r}", self.direction)
+
+
+@dataclass(frozen=True, eq=False)
+class FrameModel:
+    """A plane frame in the x-y plane: a mesh and everything attached to it.
+
+    Parameters
+    ----------
+    mesh
+        The line mesh; z must be the same at all nodes.
+    parts
+        Material and section by the name of the mesh part. Every element belongs to one of them.
+    supports, point_masses, springs, hinges
+        What holds, loads and joins the named points of the mesh.
+    interfaces
+        The named directions that a reduction keeps and a load may act on.
+
+    Raises
+    ------
+    ModelError
+        If a name is not in the mesh, an element belongs to no part or to two, z varies, a hinge
+        joins nothing, or an interface is on a supported direction.
+
+    Examples
+    --------
+    >>> import fem
+    >>> mesh = fem.frame_mesh({"root": (0, 0), "tip": (1, 0)}, [("arm", "root", "tip", 4)])
+    >>> model = fem.FrameModel(
+    ...     mesh,
+    ...     parts={"arm": fem.BeamPart(fem.Material(2.1e11, 7800.0), fem.CircularSection(0.02))},
+    ...     supports=[fem.Support("root", ("x", "y", "rotation"))],
+    ...     interfaces={"tip": fem.Interface("tip", "y")},
+    ... )
+    >>> fem.assemble(model).stiffness.shape
+    (12, 12)
+    """
+
+    mesh: FrameMesh
+    parts: Mapping[str, BeamPart]
+    supports: Sequence[Support] = ()
+    point_masses: Sequence[PointMass] = ()
+    springs: Sequence[PointSpring] = ()
+    hinges: Sequence[Hinge] = ()
+    interfaces: Mapping[str, Interface] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("supports", "point_masses", "springs", "hinges"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        for name in ("parts", "interfaces"):
+            object.__setattr__(self, name, dict(getattr(self, name)))
+        self._check_plane()
+        self._check_points()
+        self._check_parts()
+        self._check_hinges()
+        self._check_interfaces()
+
+    def element_parts(self) -> dict[str, IntArray]:
+        """Element indices of every part of the model."""
+        return {name: self.mesh.part(name) for name in self.parts}
+
+    def _check_plane(self) -> None:
+        z = self.mesh.points[:, 2]
+        if np.ptp(z) > 1e-9 * np.ptp(self.mesh.points, axis=0).max():
+            raise ModelError(
+                f"{self.mesh.source}: a plane frame needs one z at all nodes,"
+                f" but z runs from {z.min():g} to {z.max():g}"
+            )
+
+    def _check_points(self) -> None:
+        names = [support.point for support in self.supports]
+        names += [lump.point for lump in self.point_masses]
+        names += [spring.point for spring in self.springs]
+        names += [hinge.point for hinge in self.hinges]
+        names += [interface.point for interface in self.interfaces.values()]
+        for name in names:
+            self.mesh.node(name)
+
+    def _check_parts(self) -> None:
+        groups = self.element_parts()
+        owners = np.zeros(len(self.mesh.lines), dtype=np.int64)
+        for elements in groups.values():
+            owners[elements] += 1
+        bare = np.flatnonzero(owners == 0)
+        if len(bare):
+            raise ModelError(
+                f"{self.mesh.source}: element {bare[0]} is in no part of the model,"
+                f" whose parts are {quoted(groups)} (the mesh has {quoted(self.mesh.parts)})"
+            )
+        shared = np.flatnonzero(owners > 1)
+        if len(shared):
+            both = [name for name, elements in groups.items() if shared[0] in elements]
+            raise ModelError(
+                f"{self.mesh.source}: element {shared[0]} is in more than one part: {quoted(both)}"
+            )
+
+    def _check_hinges(self) -> None:
+        twice = [hinge for hinge, count in Counter(self.hinges).items() if count > 1]
+        if twice:
+            raise ModelError(
+                f"{self.mesh.source}: the hinge of part {twice[0].part!r}"
+                f" at {twice[0].point!r} is given twice"
+            )
+        for hinge in self.hinges:
+            self._check_hinge(hinge)
+
+    def _check_hinge(self, hinge: Hinge) -> None:
+        meeting = self._parts_at(hinge.point)
+        if hinge.part not in meeting:
+            raise ModelError(
+                f"{self.mesh.source}: no part {hinge.part!r} of the model meets the hinge"
+                f" at {hinge.point!r}; there are {quoted(meeting)}"
+            )
+        hinged = {other.part for other in self.hinges if other.point == hinge.point}
+        if not set(meeting) - hinged:
+            raise ModelError(
+                f"{self.mesh.source}: all parts at {hinge.point!r} are hinged there"
+                f" ({quoted(meeting)}), so that none is left to turn with the point"
+            )
+
+    def _parts_at(self, point: str) -> list[str]:
+        node = self.mesh.node(point)
+        return [
+            name
+            for name, elements in self.element_parts().items()
+            if (self.mesh.lines[elements] == node).any()
+        ]
+
+    def _check_interfaces(self) -> None:
+        held = {(self.mesh.node(s.point), name) for s in self.supports for name in s.directions}
+        for name, interface in self.interfaces.items():
+            if (self.mesh.node(interface.point), interface.direction) in held:
+                raise ModelError(
+                    f"{self.mesh.source}: interface {name!r} is on direction"
+                    f" {interface.direction!r} of point {interface.point!r},"
+                    " which a support holds"
+                )

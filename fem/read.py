@@ -1,0 +1,173 @@
+"""Read frame meshes from Gmsh, VTK and Abaqus files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import meshio
+import numpy as np
+
+from fem.abaqus import read_abaqus
+from fem.errors import ModelError, quoted
+from fem.mesh import FloatArray, FrameMesh, IntArray
+
+SET_PREFIX = "set:"
+READERS: dict[str, tuple[str, Callable[[Path], meshio.Mesh]]] = {
+    ".msh": ("Gmsh", meshio.gmsh.read),
+    ".vtu": ("VTK", meshio.vtu.read),
+    ".inp": ("Abaqus", read_abaqus),
+}
+
+
+def read_mesh(path: str | Path) -> FrameMesh:
+    """Read a line mesh with its named parts and points.
+
+    Parameters
+    ----------
+    path
+        A file whose extension says what it is:
+
+        - ``.msh``: Gmsh 2.2 or 4.1, ASCII or binary. Physical curves are the parts, physical
+          points the points; a group without a name goes by its number.
+        - ``.vtu``: VTK unstructured grid. Neither cell sets nor point sets exist in VTK, so a
+          cell array ``set:NAME`` that is not zero on the elements of a part names the part, and
+          a point array ``set:NAME`` that is not zero at one node names a point.
+        - ``.inp``: Abaqus input. ELSET and NSET, also those given on ``*ELEMENT`` and ``*NODE``.
+
+    Returns
+    -------
+    FrameMesh
+        All coordinates as in the file. Surfaces, volumes and the nodes that are on no line are
+        left out.
+
+    Raises
+    ------
+    ModelError
+        If the file does not exist, has another extension or another content, or if it has no
+        line elements, second-order lines, coordinates that are not finite, or whatever
+        `FrameMesh` refuses.
+
+    Examples
+    --------
+    >>> import fem
+    >>> mesh = fem.read_mesh("meshes/half_beam.msh")
+    >>> sorted(mesh.parts), sorted(mesh.point_sets)
+    (['beam', 'leaf'], ['corner', 'foot', 'middle'])
+    """
+    path = Path(path)
+    if path.suffix.lower() not in READERS:
+        raise ModelError(
+            f"{path}: unknown mesh extension {path.suffix!r}; known are {quoted(READERS)}"
+        )
+    if not path.is_file():
+        raise ModelError(f"{path}: there is no such mesh file")
+    kind, read = READERS[path.suffix.lower()]
+    try:
+        content = read(path)
+    except ModelError:
+        raise
+    except (Exception, SystemExit) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise ModelError(f"{path}: cannot be read as a {kind} mesh ({reason})") from error
+    return from_meshio(content, str(path))
+
+
+def from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> FrameMesh:
+    """Take lines, parts and points out of a `meshio.Mesh`; see `read_mesh` for the conventions.
+
+    Examples
+    --------
+    >>> import meshio
+    >>> content = meshio.Mesh(
+    ...     [[0.0, 0.0], [1.0, 0.0]], [("line", [[0, 1]])],
+    ...     cell_data={"set:rod": [[1]]}, point_data={"set:tip": [0, 1]},
+    ... )
+    >>> from_meshio(content).parts
+    {'rod': array([0])}
+    """
+    points = _three_coordinates(content, source)
+    lines, parts = _lines_and_parts(content, source)
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(bad):
+        raise ModelError(
+            f"{source}: the coordinates of node {bad[0]} (counted from 0) are not finite numbers"
+        )
+    used = np.unique(lines)
+    number = np.full(len(points), -1)
+    number[used] = np.arange(len(used))
+    sets = {name: number[nodes] for name, nodes in _point_sets(content).items()}
+    return FrameMesh(
+        points[used],
+        number[lines],
+        {name: elements for name, elements in parts.items() if len(elements)},
+        {name: nodes[nodes >= 0] for name, nodes in sets.items()},
+        source,
+    )
+
+
+def _three_coordinates(content: meshio.Mesh, source: str) -> FloatArray:
+    points = np.asarray(content.points, dtype=np.float64)
+    if points.ndim != 2 or not 1 <= points.shape[1] <= 3:
+        raise ModelError(f"{source}: the mesh is empty (no points)")
+    return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
+
+
+def _lines_and_parts(content: meshio.Mesh, source: str) -> tuple[IntArray, dict[str, IntArray]]:
+    curved = sorted({b.type for b in content.cells if b.type.startswith("line")} - {"line"})
+    if curved:
+        raise ModelError(
+            f"{source}: elements of type {quoted(curved)} are not straight two-node lines;"
+            " make the mesh of first order"
+        )
+    lines: list[IntArray] = []
+    parts: dict[str, list[IntArray]] = {}
+    first = 0
+    for index, block in enumerate(content.cells):
+        if block.type == "line" and len(block.data):
+            for name, elements in _groups(content, index, 1):
+                parts.setdefault(name, []).append(elements + first)
+            lines.append(np.asarray(block.data, dtype=np.int64))
+            first += len(block.data)
+    if not lines:
+        found = sorted({block.type for block in content.cells if len(block.data)})
+        raise ModelError(f"{source}: the mesh has no line elements (its cells are {quoted(found)})")
+    return np.concatenate(lines), {name: np.concatenate(p) for name, p in parts.items()}
+
+
+def _point_sets(content: meshio.Mesh) -> dict[str, IntArray]:
+    sets: dict[str, list[IntArray]] = {}
+    for name, nodes in content.point_sets.items():
+        sets.setdefault(str(name), []).append(np.asarray(nodes, dtype=np.int64))
+    for name, values in content.point_data.items():
+        if name.startswith(SET_PREFIX):
+            sets.setdefault(_set_name(name), []).append(np.flatnonzero(values))
+    for index, block in enumerate(content.cells):
+        if block.type == "vertex":
+            for name, vertices in _groups(content, index, 0):
+                sets.setdefault(name, []).append(block.data[vertices].ravel())
+    return {name: np.unique(np.concatenate(nodes)) for name, nodes in sets.items()}
+
+
+def _groups(content: meshio.Mesh, index: int, dimension: int) -> Iterator[tuple[str, IntArray]]:
+    """Names and cell indices of all groups in one block of cells."""
+    for name, blocks in content.cell_sets.items():
+        if not name.startswith("gmsh:") and index < len(blocks) and len(blocks[index]):
+            yield str(name), np.asarray(blocks[index], dtype=np.int64)
+    for name, blocks in content.cell_data.items():
+        if name.startswith(SET_PREFIX):
+            yield _set_name(name), np.flatnonzero(blocks[index])
+    tags = np.asarray(content.cell_data.get("gmsh:physical", {index: []})[index])
+    for tag in np.unique(tags[tags != 0]):
+        yield _physical_name(content, int(tag), dimension), np.flatnonzero(tags == tag)
+
+
+def _physical_name(content: meshio.Mesh, tag: int, dimension: int) -> str:
+    for name, (number, its_dimension) in content.field_data.items():
+        if (number, its_dimension) == (tag, dimension):
+            return str(name)
+    return str(tag)
+
+
+def _set_name(array: str) -> str:
+    return array.removeprefix(SET_PREFIX)
