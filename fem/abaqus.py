@@ -18,8 +18,8 @@ import numpy as np
 from fem.errors import ModelError
 from fem.mesh import IntArray
 
-TWO_NODE_LINES = ("B21", "B23", "B31", "B31OS", "B33", "FRAME2D", "FRAME3D", "PIPE21", "PIPE31")
-TWO_NODE_LINES += ("T2D2", "T3D2")
+TWO_NODE_LINES: tuple[str, ...] = ("B21", "B23", "B31", "B31OS", "B33", "FRAME2D", "FRAME3D")
+TWO_NODE_LINES += ("PIPE21", "PIPE31", "T2D2", "T3D2")
 THREE_NODE_LINES = ("B22", "B32", "B32OS", "PIPE22", "PIPE32", "T2D3", "T3D3")
 
 

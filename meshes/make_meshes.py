@@ -31,7 +31,7 @@ CLAMP = ("x", "y", "rotation")
 BEAM_ELEMENTS = 72
 """Elements of half the beam; with `LEAF_ELEMENTS` the three lowest frequencies of the half
 beam are within 1e-7 of those of the continuous beam."""
-LEAF_ELEMENTS = 40
+LEAF_ELEMENTS = 20
 
 
 @dataclass(frozen=True)
