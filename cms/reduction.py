@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 
 from cms.component import ComponentLike, FloatArray, Pencil, checked_pencil
-from cms.eigen import Modes, Shifted, lowest_modes, mode_errors, modes_up_to
-from cms.eigen import shifted_factor as factorised
+from cms.eigen import Modes, Shifted, lowest_modes, mode_errors, modes_up_to, shifted_factor
 from cms.errors import ReductionError
-from cms.factor import Factor, factorise
 from cms.model import ReducedModel
 from cms.residual import residual_modes
 
@@ -109,13 +107,15 @@ def reduce(
     check_request(modes, cutoff_hz)
     pencil = checked_pencil(component)
     check_count(modes, residual, pencil)
-    shifted = factorised(pencil)
+    shifted = shifted_factor(pencil)
+    if residual:
+        check_held(shifted)
     kept = kept_modes(pencil, shifted, modes, cutoff_hz)
     if not residual:
         if kept.squares.size == 0:
             raise ReductionError(nothing_kept(cutoff_hz))
         return assembled(pencil, kept, 0)
-    extra = residual_modes(pencil, static_factor(pencil, shifted), kept.vectors)
+    extra = residual_modes(pencil, shifted.factor, kept.vectors)
     if kept.squares.size + extra.squares.size == 0:
         raise ReductionError(nothing_kept(cutoff_hz))
     errors = mode_errors(pencil, shifted, extra.squares, extra.vectors)
@@ -165,30 +165,14 @@ def kept_modes(
     return modes_up_to(pencil, shifted, (2.0 * np.pi * float(cutoff_hz)) ** 2)
 
 
-def static_factor(pencil: Pencil, shifted: Shifted) -> Factor:
-    """The factorised K, for static solutions.
-
-    Raises
-    ------
-    ReductionError
-        If the component floats: K is singular.
-    """
-    if not shifted.suspect:
-        return shifted.factor
-    rigid = rigid_body_modes(pencil, shifted)
-    factor = factorise(pencil.stiffness) if rigid == 0 else None
-    if factor is None:
+def check_held(shifted: Shifted) -> None:
+    """Raise ReductionError where the component floats, so that K has no inverse."""
+    if shifted.rigid:
         raise ReductionError(
-            f"the component floats ({max(rigid, 1)} rigid-body mode{'s' if rigid > 1 else ''}): "
-            "residual flexibility needs supports that hold it, or use residual=False."
+            f"the component floats ({shifted.rigid} rigid-body "
+            f"mode{'s' if shifted.rigid > 1 else ''}): residual flexibility needs supports "
+            "that hold it, or use residual=False."
         )
-    return factor
-
-
-def rigid_body_modes(pencil: Pencil, shifted: Shifted) -> int:
-    """Number of modes of zero frequency, of the first six."""
-    few = lowest_modes(pencil, shifted, min(6, pencil.size))
-    return int(np.count_nonzero(few.squares == 0.0))
 
 
 def assembled(
