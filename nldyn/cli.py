@@ -1,0 +1,164 @@
+"""The command line: ``nldyn run``, ``check``, ``render`` and ``paper``.
+
+Exit codes: 0 done, 2 something in the scene or on the command line is wrong, 3 a picture needs a
+graphics library that is not installed, 130 stopped with Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from nldyn.diagram import Diagram
+    from nldyn.elements import Stop
+    from nldyn.system import System
+
+BAD_INPUT, NO_GRAPHICS, INTERRUPTED = 2, 3, 130
+
+scene_argument = click.argument("scene", type=click.Path(path_type=Path), metavar="SCENE.toml")
+out_option = click.option(
+    "--out",
+    required=True,
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Directory for the results: new, empty, or of an earlier run.",
+)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="nldyn", message="%(prog)s %(version)s")
+def main() -> None:
+    """Bifurcation diagrams of structures that hit a stop, from a mesh or from modal data."""
+
+
+@main.command()
+@scene_argument
+@out_option
+@click.option("--quiet", is_flag=True, help="Show no progress bar.")
+def run(scene: Path, out: Path, quiet: bool) -> None:
+    """Compute the branches of a scene, and write tables and a diagram."""
+    with plain_errors():
+        from nldyn.result_directory import check_directory
+        from nldyn.scene import compute, load_scene
+
+        start = time.perf_counter()
+        loaded = load_scene(scene)
+        check_directory(out)
+        with progress_bar(quiet) as report:
+            diagram = compute(loaded, report)
+        from nldyn.output import write_results
+
+        write_results(diagram, out, loaded)
+        click.echo(describe(diagram, time.perf_counter() - start, out))
+
+
+@main.command()
+@scene_argument
+def check(scene: Path) -> None:
+    """Check a scene, and print the modes of its structure."""
+    with plain_errors():
+        from nldyn.scene import build_system, load_scene
+
+        loaded = load_scene(scene)
+        click.echo(describe_system(build_system(loaded)))
+        click.echo(f"{scene}: no fault found")
+
+
+@main.command()
+@out_option
+def paper(out: Path) -> None:
+    """Reproduce the figures and numbers of the paper."""
+    with plain_errors():
+        from nldyn.paper import main as reproduce
+
+        reproduce(out)
+
+
+@contextmanager
+def plain_errors() -> Iterator[None]:
+    """Tell the user's errors in one line on stderr, without a traceback, and exit."""
+    from nldyn.errors import SceneError, SystemModelError
+    from nldyn.result_directory import OutputError
+
+    try:
+        yield
+    except (SceneError, SystemModelError, OutputError) as error:
+        click.echo(f"nldyn: {error}", err=True)
+        sys.exit(BAD_INPUT)
+    except KeyboardInterrupt:
+        click.echo("nldyn: stopped by Ctrl-C, nothing is written", err=True)
+        sys.exit(INTERRUPTED)
+
+
+@contextmanager
+def progress_bar(quiet: bool) -> Iterator[Callable[[float, str], None]]:
+    """Show the fraction done and what is being computed, on stderr."""
+    from tqdm import tqdm
+
+    shape = "{percentage:3.0f}%|{bar}| {elapsed} {desc}"
+    with tqdm(total=1.0, bar_format=shape, disable=quiet, leave=False, file=sys.stderr) as bar:
+
+        def report(fraction: float, text: str) -> None:
+            bar.set_description_str(text, refresh=False)
+            bar.update(max(min(fraction, 1.0) - bar.n, 0.0))
+
+        yield report
+
+
+def describe(diagram: Diagram, seconds: float, out: Path) -> str:
+    """Say in a few lines what was computed."""
+    branches = diagram.branches
+    kinds = Counter(str(point.kind) for branch in branches for point in branch.special_points)
+    found = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())) or "none"
+    points = sum(len(branch.points) for branch in branches)
+    return (
+        f"{len(branches)} branches with {points} points in {seconds:.1f} s\n"
+        f"special points: {found}\n"
+        f"written to {out}"
+    )
+
+
+def describe_system(system: System) -> str:
+    """Tabulate frequencies and participation of the modes, and the static flexibility."""
+    names = list(system.interfaces)
+    width = max(14, *(len(name) + 2 for name in names))
+    lines = ["mode   frequency (Hz)   participation (1/sqrt(kg)) at"]
+    lines.append(" " * 23 + "".join(f"{name:>{width}}" for name in names))
+    for mode, hz in enumerate(system.frequencies_hz):
+        values = "".join(f"{system.participation[name][mode]:>{width}.6g}" for name in names)
+        lines.append(f"{mode + 1:>4}{hz:>19.6f}{values}")
+    flexibility = "".join(f"{static_flexibility(system, name):>{width}.6g}" for name in names)
+    lines.append(f"{'static flexibility m/N':<23}{flexibility}")
+    lines += [describe_stop(stop) for stop in system.stops]
+    return "\n".join(lines)
+
+
+def describe_stop(stop: Stop) -> str:
+    """Say in a line where a stop is and what it does."""
+    unit = "N/m" if stop.exponent == 1.0 else f"N/m^{stop.exponent:g}"
+    where = f"at '{stop.at}'" + (f" against '{stop.against}'" if stop.against else "")
+    return (
+        f"stop {where}: {stop.stiffness:.6g} {unit}, gap {stop.gap:g} m, "
+        f"direction {stop.direction:+d}"
+    )
+
+
+def static_flexibility(system: System, interface: str) -> float:
+    """Displacement in m at an interface for a steady force of 1 N there; inf if nothing holds."""
+    shares = system.participation[interface] ** 2
+    squares = system.natural_frequencies**2
+    if any(shares[squares == 0.0]):
+        return float("inf")
+    return float(sum(shares[squares > 0.0] / squares[squares > 0.0]))
+
+
+if __name__ == "__main__":
+    main()

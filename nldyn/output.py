@@ -1,0 +1,163 @@
+"""Write branches, special points and diagrams to a directory.
+
+``branches.csv`` and ``special_points.csv`` hold every number to the last digit, in SI units.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Iterable, Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nldyn.result_directory import result_directory
+
+if TYPE_CHECKING:
+    from nldyn.branch import Branch
+    from nldyn.diagram import Diagram
+    from nldyn.orbit import Orbit
+    from nldyn.scene_schema import Scene
+
+BRANCH_COLUMNS = (
+    "branch",
+    "point",
+    "period",
+    "frequency_hz",
+    "max_abs_displacement_m",
+    "max_penetration_m",
+    "impacts",
+    "stable",
+    "largest_multiplier",
+)
+SPECIAL_COLUMNS = (
+    "branch",
+    "period",
+    "type",
+    "frequency_hz",
+    "max_abs_displacement_m",
+    "impacts",
+)
+
+
+def write_results(diagram: Diagram, directory: str | Path, scene: Scene | None = None) -> Path:
+    """Write a diagram as tables and pictures, all of them or nothing.
+
+    Parameters
+    ----------
+    diagram : Diagram
+        What `nldyn.scene.compute` gave.
+    directory : str or Path
+        New, empty, or written by an earlier run, whose files are replaced; other files in it
+        are kept. Gets ``branches.csv``, ``special_points.csv``, ``diagram.png``,
+        ``diagram.svg``, ``summary.json`` and, with a scene, ``scene.toml``.
+    scene : Scene, optional
+        The scene it was computed from; its text is copied.
+
+    Returns
+    -------
+    Path
+        The directory.
+
+    Raises
+    ------
+    OutputError
+        If the directory holds only other people's files or cannot be written.
+    """
+    from nldyn.plot import save_diagram
+
+    with result_directory(directory, "run") as folder:
+        write_table(folder / "branches.csv", BRANCH_COLUMNS, branch_rows(diagram))
+        write_table(folder / "special_points.csv", SPECIAL_COLUMNS, special_rows(diagram))
+        save_diagram(diagram, folder, title=scene.title if scene else "")
+        text = json.dumps(summary(diagram), indent=1, allow_nan=False)
+        (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
+        if scene is not None:
+            (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
+    return Path(directory)
+
+
+def branch_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
+    """Give the rows of ``branches.csv``, one for each point of each branch."""
+    for branch in diagram.branches:
+        for number, orbit in enumerate(branch.points):
+            yield (
+                branch.name,
+                number,
+                orbit.period,
+                float(orbit.frequency_hz),
+                float(orbit.max_abs_displacement),
+                float(orbit.max_penetration),
+                int(orbit.impacts),
+                int(orbit.stable),
+                largest_multiplier(orbit),
+            )
+
+
+def special_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
+    """Give the rows of ``special_points.csv``, branch by branch."""
+    for branch in diagram.branches:
+        for point in branch.special_points:
+            orbit = point.orbit
+            yield (
+                branch.name,
+                orbit.period,
+                str(point.kind),
+                float(orbit.frequency_hz),
+                float(orbit.max_abs_displacement),
+                int(orbit.impacts),
+            )
+
+
+def largest_multiplier(orbit: Orbit) -> float:
+    """Give the modulus of the multiplier that is farthest from the origin."""
+    return float(np.abs(orbit.multipliers).max())
+
+
+def write_table(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
+    """Write a CSV file; floats keep every digit (``repr``)."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(rows)
+
+
+def software_version() -> str:
+    """Give the version of the installed package."""
+    try:
+        return version("nldyn")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def summary(diagram: Diagram) -> Mapping[str, object]:
+    """Say what was computed and how exactly, as plain numbers for ``summary.json``."""
+    orbits = [orbit for branch in diagram.branches for orbit in branch.points]
+    return {
+        "software": f"nldyn {software_version()}",
+        "points": len(orbits),
+        "largest_residual": worst(orbit.residual for orbit in orbits),
+        "branches": [_branch_summary(branch) for branch in diagram.branches],
+    }
+
+
+def _branch_summary(branch: Branch) -> dict[str, object]:
+    hz = [float(orbit.frequency_hz) for orbit in branch.points]
+    return {
+        "name": branch.name,
+        "period": branch.period,
+        "points": len(hz),
+        "range_hz": [min(hz), max(hz)] if hz else None,
+        "special_points": len(branch.special_points),
+        "stop_reason": str(branch.stop_reason),
+    }
+
+
+def worst(values: Iterable[float]) -> float | None:
+    """Give the largest of some error figures; none if there are none or one is not finite."""
+    largest = max((float(value) for value in values), default=math.nan)
+    return largest if math.isfinite(largest) else None

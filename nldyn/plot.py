@@ -1,0 +1,318 @@
+"""Draw branches against the excitation frequency, and orbits over time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from nldyn.branch import Branch, SpecialPoint
+    from nldyn.diagram import Diagram
+    from nldyn.orbit import Orbit
+
+STABLE: Literal["-"] = "-"
+UNSTABLE = (0.0, (1.0, 1.4))
+# Okabe and Ito's colours, told apart by colour-blind readers; dark ones first.
+PERIOD_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#5D4E9C")
+MARKERS = {"LP": "o", "PD": "s", "NS": "D", "BP": "^", "GR": "x"}
+MARKER_NAMES = {
+    "LP": "cyclic fold",
+    "PD": "flip",
+    "NS": "Neimark-Sacker",
+    "BP": "branch point",
+    "GR": "grazing",
+}
+PREFIXES = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
+SVG_SALT = "nldyn"
+
+
+@dataclass(frozen=True)
+class Run:
+    """Consecutive points ``start`` to ``stop - 1`` of a branch, to be drawn in one style."""
+
+    start: int
+    stop: int
+    stable: bool
+
+
+def stability_runs(stable: ArrayLike) -> list[Run]:
+    """Split a branch into runs to be drawn as stable or unstable.
+
+    Parameters
+    ----------
+    stable : (n,) array_like of bool
+        Stability of each point.
+
+    Returns
+    -------
+    list of Run
+        They cover the branch without gaps: two neighbours share one point, the last one of the
+        stable side, so that a stable line ends at a stable orbit.
+
+    Examples
+    --------
+    >>> for run in stability_runs([True, True, False, True]):
+    ...     print(run.start, run.stop, run.stable)
+    0 2 True
+    1 4 False
+    3 4 True
+    """
+    flags = np.asarray(stable, dtype=bool)
+    if flags.size == 0:
+        return []
+    changes = np.flatnonzero(flags[1:] != flags[:-1]) + 1
+    edges = [0, *changes.tolist(), flags.size]
+    runs = []
+    for first, last in pairwise(edges):
+        if flags[first]:
+            runs.append(Run(first, last, True))
+        else:
+            runs.append(Run(max(first - 1, 0), min(last + 1, flags.size), False))
+    return runs
+
+
+def length_unit(largest: float) -> tuple[float, str]:
+    """Choose the unit for an axis that reaches up to ``largest`` metres.
+
+    Examples
+    --------
+    >>> length_unit(2.3e-4)
+    (1e-06, 'µm')
+    """
+    size = abs(largest)
+    for factor, name in PREFIXES:
+        if size >= 0.5 * factor:
+            return factor, name
+    return PREFIXES[-1] if 0.0 < size < math.inf else PREFIXES[0]
+
+
+def period_name(period: int) -> str:
+    """Name a branch by the period of its orbits: ``harmonic``, ``1/2 subharmonic``, ...
+
+    Examples
+    --------
+    >>> period_name(3)
+    '1/3 subharmonic'
+    """
+    return "harmonic" if period == 1 else f"1/{period} subharmonic"
+
+
+def plot_diagram(
+    diagram: Diagram | Iterable[Branch],
+    ax: Axes | None = None,
+    *,
+    yscale: Literal["linear", "log"] = "linear",
+    special_points: Sequence[str] = tuple(MARKERS),
+    unit: str | None = None,
+    legend: bool = True,
+) -> Axes:
+    """Draw the largest displacement of each orbit against its excitation frequency.
+
+    Parameters
+    ----------
+    diagram : Diagram or iterable of Branch
+        Branches to draw.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure, free of pyplot, unless given.
+    yscale : {"linear", "log"}
+        Scale of the displacement axis.
+    special_points : sequence of str
+        Kinds to mark, out of LP, PD, NS, BP and GR.
+    unit : {"m", "mm", "µm", "nm"}, optional
+        Unit of the displacement axis; chosen by the largest value unless given.
+    legend : bool
+        Whether to explain colours, lines and marks.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        ``ax.figure.savefig(...)`` saves the picture.
+
+    Raises
+    ------
+    ValueError
+        For a unit that is not one of the four.
+    """
+    branches = list(getattr(diagram, "branches", diagram))
+    ax = ax if ax is not None else new_axes()
+    factor, unit = _unit_of(branches, unit)
+    colours = period_colours(branch.period for branch in branches)
+    for branch in branches:
+        _draw_branch(ax, branch, colours[branch.period], factor)
+    marked = [kind for kind in special_points if _draw_marks(ax, branches, kind, factor)]
+    ax.set_xlabel("excitation frequency (Hz)")
+    ax.set_ylabel(f"max |y| ({unit})")
+    ax.set_yscale(yscale)
+    if yscale == "linear":
+        ax.set_ylim(bottom=0.0)
+    if legend and branches:
+        _draw_legend(ax, colours, branches, marked)
+    return ax
+
+
+def plot_orbit(
+    orbit: Orbit, axes: tuple[Axes, Axes] | None = None, *, points: int = 2001
+) -> tuple[Axes, Axes]:
+    """Draw displacement and contact force of an orbit over one of its periods.
+
+    Parameters
+    ----------
+    orbit : Orbit
+        A periodic orbit.
+    axes : pair of matplotlib.axes.Axes, optional
+        Where to draw displacement and force; a new figure unless given.
+    points : int
+        Number of equally spaced instants.
+
+    Returns
+    -------
+    pair of matplotlib.axes.Axes
+        Those for the displacement, with every impact marked, and for the contact force.
+    """
+    history = orbit.history(points)
+    upper, lower = axes if axes is not None else new_axes_pair()
+    time = np.asarray(history.time)
+    _draw_displacement(upper, time, np.asarray(history.displacement))
+    _draw_force(lower, time, np.asarray(history.contact_force))
+    _mark_impacts((upper, lower), np.asarray(history.impact_times))
+    name = period_name(orbit.period)
+    upper.set_title(f"{name} orbit at {orbit.frequency_hz:.6g} Hz")
+    lower.set_xlabel("time (s)")
+    return upper, lower
+
+
+def save_diagram(
+    diagram: Diagram,
+    directory: str | Path,
+    *,
+    title: str = "",
+    yscale: Literal["linear", "log"] = "linear",
+) -> None:
+    """Write ``diagram.png`` and ``diagram.svg`` to a directory that exists."""
+    ax = plot_diagram(diagram, yscale=yscale)
+    ax.set_title(title)
+    save_figure(ax, Path(directory) / "diagram")
+
+
+def save_figure(ax: Axes, stem: Path) -> None:
+    """Write the figure of some axes as ``stem.png`` and ``stem.svg``, the same on every run."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    with mpl.rc_context({"svg.hashsalt": SVG_SALT}):
+        figure.savefig(stem.with_suffix(".png"), dpi=150)
+        figure.savefig(stem.with_suffix(".svg"), metadata={"Date": None})
+
+
+def new_axes(width: float = 9.0, height: float = 5.5) -> Axes:
+    """Make the axes of a figure of its own, in inches, without pyplot."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure.add_subplot()
+
+
+def new_axes_pair(width: float = 9.0, height: float = 6.0) -> tuple[Axes, Axes]:
+    """Make two axes one above the other that share the time axis."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
+    return upper, lower
+
+
+def period_colours(periods: Iterable[int]) -> dict[int, str]:
+    """Give each period its colour: the same for 1, 2 and 3 in every picture."""
+    present = sorted(set(periods) | {1, 2, 3})
+    return {p: PERIOD_COLOURS[i % len(PERIOD_COLOURS)] for i, p in enumerate(present)}
+
+
+def _draw_branch(ax: Axes, branch: Branch, colour: str, factor: float) -> None:
+    hz = np.asarray(branch.frequency_hz)
+    y = np.asarray(branch.max_abs_displacement) / factor
+    for run in stability_runs(branch.stable):
+        part = slice(run.start, run.stop)
+        style = STABLE if run.stable else UNSTABLE
+        ax.plot(hz[part], y[part], color=colour, linewidth=1.4, linestyle=style)
+
+
+def _draw_marks(ax: Axes, branches: Sequence[Branch], kind: str, factor: float) -> bool:
+    points = [point for point in _special_points(branches) if str(point.kind) == kind]
+    if not points:
+        return False
+    hz = [float(point.orbit.frequency_hz) for point in points]
+    y = [float(point.orbit.max_abs_displacement) / factor for point in points]
+    ax.plot(hz, y, **_mark_style(kind))
+    return True
+
+
+def _mark_style(kind: str) -> dict[str, Any]:
+    return {
+        "linestyle": "none",
+        "marker": MARKERS[kind],
+        "markersize": 4.5,
+        "markerfacecolor": "white",
+        "markeredgecolor": "black",
+        "markeredgewidth": 0.8,
+        "zorder": 4,
+    }
+
+
+def _draw_legend(
+    ax: Axes, colours: dict[int, str], branches: Sequence[Branch], marked: Sequence[str]
+) -> None:
+    periods = sorted({branch.period for branch in branches})
+    entries = [Line2D([], [], color=colours[p], label=period_name(p)) for p in periods]
+    entries += [
+        Line2D([], [], color="0.3", linestyle=STABLE, label="stable"),
+        Line2D([], [], color="0.3", linestyle=UNSTABLE, label="unstable"),
+    ]
+    for kind in marked:
+        label = f"{MARKER_NAMES[kind]} ({kind})"
+        entries.append(Line2D([], [], label=label, **_mark_style(kind)))
+    ax.legend(handles=entries, fontsize="small", loc="best", framealpha=0.9)
+
+
+def _draw_displacement(ax: Axes, time: NDArray[np.float64], y: NDArray[np.float64]) -> None:
+    factor, unit = length_unit(float(np.abs(y).max()))
+    ax.axhline(0.0, color="0.6", linewidth=0.6)
+    ax.plot(time, y / factor, color=PERIOD_COLOURS[0], linewidth=1.4)
+    ax.set_ylabel(f"displacement ({unit})")
+
+
+def _draw_force(ax: Axes, time: NDArray[np.float64], force: NDArray[np.float64]) -> None:
+    ax.plot(time, force, color=PERIOD_COLOURS[1], linewidth=1.2)
+    ax.set_ylabel("contact force (N)")
+    ax.set_ylim(bottom=0.0)
+
+
+def _mark_impacts(axes: Sequence[Axes], times: NDArray[np.float64]) -> None:
+    for ax in axes:
+        for number, instant in enumerate(times):
+            label = "impact" if number == 0 else None
+            ax.axvline(float(instant), color="0.35", linewidth=0.8, linestyle="--", label=label)
+    if times.size:
+        axes[0].legend(fontsize="small", loc="upper right")
+
+
+def _special_points(branches: Iterable[Branch]) -> list[SpecialPoint]:
+    return [point for branch in branches for point in branch.special_points]
+
+
+def _unit_of(branches: Sequence[Branch], unit: str | None) -> tuple[float, str]:
+    if unit is None:
+        largest = [float(np.max(b.max_abs_displacement)) for b in branches if len(b.points)]
+        return length_unit(max(largest, default=1.0))
+    for factor, name in PREFIXES:
+        if name == unit:
+            return factor, name
+    raise ValueError(f"'{unit}' is not a unit of the displacement axis; use m, mm, µm or nm")

@@ -1,0 +1,160 @@
+"""Directories of results that appear whole or not at all.
+
+Files are written into a hidden directory beside the wanted one, which takes its place by renaming
+when all is well. A directory that was written before is replaced; what somebody else put there
+is kept, and a directory that holds only other people's files is refused.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+MANIFEST = ".nldyn.json"
+
+
+class OutputError(ValueError):
+    """A directory that results cannot be written to; one sentence says why."""
+
+
+def check_directory(directory: str | Path) -> Path:
+    """Check that results may be written to a directory, before the work that makes them.
+
+    Parameters
+    ----------
+    directory : str or Path
+        A directory that does not exist, is empty, or holds results written before.
+
+    Returns
+    -------
+    Path
+        The absolute path, symbolic links resolved.
+
+    Raises
+    ------
+    OutputError
+        If it is a file, holds only other files, or cannot be written to.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> check_directory(tempfile.mkdtemp()).is_dir()
+    True
+    """
+    target = Path(directory).resolve()
+    if target.exists() and not target.is_dir():
+        raise OutputError(f"{directory}: is a file, not a directory for results")
+    if target.is_dir() and any(target.iterdir()) and not (target / MANIFEST).is_file():
+        raise OutputError(
+            f"{directory}: holds files that were not written by nldyn; choose another directory"
+        )
+    parent = next(folder for folder in target.parents if folder.exists())
+    if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
+        raise OutputError(f"{directory}: cannot be made, {parent} is not a folder to write in")
+    return target
+
+
+@contextmanager
+def result_directory(directory: str | Path, kind: str) -> Iterator[Path]:
+    """Give a directory to write results in, and move it to its place at the end.
+
+    Parameters
+    ----------
+    directory : str or Path
+        Where the results shall be.
+    kind : str
+        Name of what is written. Files that the same kind left before are replaced; all others
+        in a directory of results are kept.
+
+    Yields
+    ------
+    Path
+        An empty directory to write in.
+
+    Raises
+    ------
+    OutputError
+        As `check_directory`. After any exception, also one of the caller's own, the directory is
+        as it was before.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> place = Path(tempfile.mkdtemp()) / "results"
+    >>> with result_directory(place, "run") as folder:
+    ...     _ = (folder / "table.csv").write_text("1")
+    >>> (place / "table.csv").read_text()
+    '1'
+    """
+    target = check_directory(directory)
+    made = [folder for folder in target.parents if not folder.exists()]
+    new = target.with_name(f".{target.name}.{secrets.token_hex(4)}.new")
+    try:
+        new.mkdir(parents=True)
+        yield new
+        _complete(new, target, kind)
+        _swap(new, target)
+    except BaseException as error:
+        shutil.rmtree(new, ignore_errors=True)
+        for folder in made:
+            with suppress(OSError):
+                folder.rmdir()
+        if isinstance(error, OSError):
+            raise OutputError(f"{directory}: cannot be written: {error}") from error
+        raise
+
+
+def _complete(new: Path, target: Path, kind: str) -> None:
+    """Write the manifest, and carry over what is not replaced."""
+    manifest = _read_manifest(target)
+    written = sorted(entry.name for entry in new.iterdir())
+    replaced = {MANIFEST, *written, *manifest.get(kind, [])}
+    if target.is_dir():
+        for entry in target.iterdir():
+            if entry.name not in replaced:
+                _link(entry, new / entry.name)
+    kept = {other: [n for n in names if n not in written] for other, names in manifest.items()}
+    (new / MANIFEST).write_text(json.dumps({**kept, kind: written}, indent=1) + "\n")
+
+
+def _read_manifest(target: Path) -> dict[str, list[str]]:
+    try:
+        manifest = json.loads((target / MANIFEST).read_text())
+    except (OSError, ValueError):
+        return {}
+    return manifest if isinstance(manifest, dict) else {}
+
+
+def _link(source: Path, copy: Path) -> None:
+    """Carry over a file or a folder, without copying its bytes where the file system allows."""
+
+    def link(old: str, new: str) -> None:
+        try:
+            os.link(old, new, follow_symlinks=False)
+        except OSError:
+            shutil.copy2(old, new, follow_symlinks=False)
+
+    if source.is_dir() and not source.is_symlink():
+        shutil.copytree(source, copy, symlinks=True, copy_function=link)
+    else:
+        link(str(source), str(copy))
+
+
+def _swap(new: Path, target: Path) -> None:
+    """Put the new directory in the place of the old one, or leave the old one where it was."""
+    if not target.exists():
+        new.rename(target)
+        return
+    old = target.with_name(f".{target.name}.{secrets.token_hex(4)}.old")
+    target.rename(old)
+    try:
+        new.rename(target)
+    except BaseException:
+        old.rename(target)
+        raise
+    shutil.rmtree(old, ignore_errors=True)

@@ -1,0 +1,349 @@
+"""From a scene file to a component, a reduced model, a system and its branches.
+
+This module alone joins `fem`, `cms` and `nldyn`.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from nldyn.errors import SceneError, SystemModelError
+from nldyn.scene_checks import check_computable, check_mesh_names, check_ratio_count, check_scene
+from nldyn.scene_messages import KeyPath, from_validation, scene_error
+from nldyn.scene_schema import ExcitationTable, PartTable, Scene, StopTable
+
+if TYPE_CHECKING:
+    import cms
+    import fem
+    from nldyn.diagram import Diagram
+    from nldyn.elements import Excitation, Stop
+    from nldyn.system import System
+
+__all__ = [
+    "Scene",
+    "SceneError",
+    "build_component",
+    "build_reduced",
+    "build_system",
+    "compute",
+    "load_scene",
+    "parse_scene",
+]
+
+
+def load_scene(path: str | Path) -> Scene:
+    """Read and check a scene file.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file; ``docs/scene.md`` describes its keys. Its mesh is looked for relative to the
+        folder of the file.
+
+    Returns
+    -------
+    Scene
+        The checked scene; nothing is computed yet.
+
+    Raises
+    ------
+    SceneError
+        If the file cannot be read or a key in it is unknown, missing or out of range.
+
+    Examples
+    --------
+    >>> from nldyn.resources import example
+    >>> load_scene(example("one_dof.toml")).continuation.range_hz
+    [5.0, 90.0]
+    """
+    file = Path(path)
+    try:
+        text = file.read_bytes().decode("utf-8")
+    except FileNotFoundError:
+        raise SceneError(f"{file}: there is no such file") from None
+    except IsADirectoryError:
+        raise SceneError(f"{file}: is a folder, not a scene file") from None
+    except UnicodeDecodeError:
+        raise SceneError(f"{file}: is not a TOML file (its text is not UTF-8)") from None
+    except OSError as error:
+        raise SceneError(f"{file}: cannot be read: {error.strerror}") from None
+    return parse_scene(text, file)
+
+
+def parse_scene(text: str, file: str | Path = "scene.toml") -> Scene:
+    """Check the text of a scene.
+
+    Parameters
+    ----------
+    text : str
+        TOML.
+    file : str or Path
+        Name used in errors; its folder is where the mesh is looked for.
+
+    Raises
+    ------
+    SceneError
+        As for `load_scene`.
+
+    Examples
+    --------
+    >>> parse_scene('''
+    ... [modal]
+    ... frequencies_hz = [13.1]
+    ... participation.tip = [0.6]
+    ... ''').interface_names
+    ['tip']
+    """
+    file = Path(file)
+    try:
+        scene = Scene.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{file}: is not valid TOML: {_lower_first(str(error))}") from None
+    except ValidationError as error:
+        raise from_validation(file, Scene, error) from None
+    scene._file, scene._text = file, text
+    check_scene(scene, file)
+    return scene
+
+
+def build_component(scene: Scene) -> fem.Component:
+    """Assemble the mesh of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with a ``[mesh]``.
+
+    Returns
+    -------
+    fem.Component
+        Sparse stiffness (N/m) and mass (kg), and the interfaces.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no mesh, or the mesh is unreadable, empty or lacks a name used.
+
+    Examples
+    --------
+    >>> from nldyn.resources import example
+    >>> list(build_component(load_scene(example("two_dof_xi_0.01.toml"))).interfaces)
+    ['middle']
+    """
+    import fem
+
+    if scene.mesh is None:
+        raise scene_error(scene.file, ("mesh",), "is missing: the structure is not given by a mesh")
+    path = scene.file.parent / scene.mesh.file
+    if not path.is_file():
+        raise scene_error(scene.file, ("mesh", "file"), f"names {path}, which does not exist")
+    with _told_as(scene, ("mesh", "file"), fem.ModelError):
+        mesh = fem.read_mesh(path)
+    check_mesh_names(scene, mesh, scene.file)
+    with _told_as(scene, (), fem.ModelError):
+        return fem.assemble(_frame_model(scene, mesh))
+
+
+def build_reduced(scene: Scene, component: fem.Component | None = None) -> cms.ReducedModel:
+    """Reduce the mesh of a scene to the modes that it asks for.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with a ``[mesh]`` and a ``[reduction]``.
+    component : fem.Component, optional
+        What `build_component` gave for this scene, if it is at hand.
+
+    Returns
+    -------
+    cms.ReducedModel
+        Modes with frequencies in Hz.
+
+    Raises
+    ------
+    SceneError
+        As for `build_component`, and if there are not as many modes as asked for.
+
+    Examples
+    --------
+    >>> from nldyn.resources import example
+    >>> reduced = build_reduced(load_scene(example("two_dof_xi_0.01.toml")))
+    >>> len(reduced.frequencies_hz)
+    2
+    """
+    import cms
+
+    component = component or build_component(scene)
+    table = scene.reduction
+    assert table is not None
+    with _told_as(scene, ("reduction",), cms.ReductionError):
+        return cms.reduce(
+            component, modes=table.modes, cutoff_hz=table.cutoff_hz, residual=table.residual
+        )
+
+
+def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> System:
+    """Build the system with its stops, dampers and excitation.
+
+    Parameters
+    ----------
+    scene : Scene
+        Any scene.
+    reduced : cms.ReducedModel, optional
+        What `build_reduced` gave for this scene, if it is at hand.
+
+    Returns
+    -------
+    System
+        The equations in modal form, with the observed interface first.
+
+    Raises
+    ------
+    SceneError
+        As for `build_reduced`, and if the parts do not make a system.
+
+    Examples
+    --------
+    >>> from nldyn.resources import example
+    >>> f"{build_system(load_scene(example('one_dof.toml'))).frequencies_hz[0]:.4f}"
+    '13.1293'
+    """
+    from nldyn.elements import Damper
+    from nldyn.system import System
+
+    with _told_as(scene, (), SystemModelError):
+        acting: dict[str, Any] = {
+            "modal_damping": scene.damping.modal_ratio,
+            "stops": [_stop(stop) for stop in scene.stops],
+            "dampers": [Damper(damper.at, damper.coefficient) for damper in scene.dampers],
+            "excitation": [_excitation(table) for table in scene.excitation],
+        }
+        if scene.modal is not None:
+            hz = scene.modal.frequencies_hz
+            check_ratio_count(scene, len(hz), scene.file)
+            first = _observed_first(scene, scene.modal.participation)
+            return System.from_modal(hz, first, **acting)
+        if scene.matrices is not None:
+            table = scene.matrices
+            check_ratio_count(scene, len(table.mass), scene.file)
+            first = _observed_first(scene, table.interfaces)
+            return System.from_matrices(
+                table.mass, table.stiffness, first, damping=table.damping, **acting
+            )
+        reduced = reduced or build_reduced(scene)
+        check_ratio_count(scene, len(reduced.frequencies_hz), scene.file)
+        return System.from_modal(
+            reduced.frequencies_hz, _observed_first(scene, reduced.participation), **acting
+        )
+
+
+def compute(scene: Scene, progress: Callable[[float, str], None] | None = None) -> Diagram:
+    """Compute all branches that a scene asks for.
+
+    The whole scene is built and checked before the first orbit is sought.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with an ``[[excitation]]`` and a ``[continuation]``.
+    progress : callable, optional
+        Called now and then with the fraction done (0 to 1) and what is being computed.
+
+    Returns
+    -------
+    Diagram
+        Branches with their points and special points.
+
+    Raises
+    ------
+    SceneError
+        As for `build_system`, and if the scene has nothing to compute.
+    """
+    check_computable(scene, scene.file)
+    system = build_system(scene)
+    from nldyn.diagram import diagram
+
+    table = scene.continuation
+    assert table is not None
+    return diagram(
+        system,
+        range_hz=(table.range_hz[0], table.range_hz[1]),
+        periods=table.periods,
+        seeds=[(seed.period, seed.near_hz) for seed in scene.subharmonics],
+        progress=progress,
+    )
+
+
+def _frame_model(scene: Scene, mesh: fem.FrameMesh) -> fem.FrameModel:
+    import fem
+
+    return fem.FrameModel(
+        mesh,
+        parts={name: _part(table) for name, table in scene.parts.items()},
+        supports=[fem.Support(s.at, tuple(s.fixed)) for s in scene.supports],
+        point_masses=[fem.PointMass(m.at, m.mass, m.rotary_inertia) for m in scene.point_masses],
+        springs=[fem.PointSpring(s.at, s.direction, s.stiffness) for s in scene.springs],
+        hinges=[fem.Hinge(h.at, h.part) for h in scene.hinges],
+        interfaces={name: fem.Interface(i.at, i.direction) for name, i in scene.interfaces.items()},
+    )
+
+
+def _part(table: PartTable) -> fem.BeamPart:
+    import fem
+
+    material = fem.Material(table.youngs_modulus, table.density)
+    section: fem.CrossSection
+    if table.width is not None and table.height is not None:
+        section = fem.RectangularSection(table.width, table.height)
+    elif table.diameter is not None:
+        section = fem.CircularSection(table.diameter, table.bore or 0.0)
+    else:
+        assert table.area is not None and table.second_moment is not None
+        section = fem.Section(table.area, table.second_moment)
+    return fem.BeamPart(material, section)
+
+
+def _stop(table: StopTable) -> Stop:
+    from nldyn.elements import Stop, hertz_stiffness
+
+    stiffness = table.stiffness
+    if stiffness is None:
+        assert table.radius is not None and table.youngs_modulus is not None
+        ratio = 0.3 if table.poissons_ratio is None else table.poissons_ratio
+        stiffness = hertz_stiffness(table.radius, table.youngs_modulus, ratio)
+    exponent = 1.0 if table.law == "linear" else table.exponent or 1.5
+    return Stop(table.at, stiffness, exponent, table.gap, table.direction, table.against)
+
+
+def _excitation(table: ExcitationTable) -> Excitation:
+    from nldyn.elements import HarmonicForce, Unbalance
+
+    if table.mass_times_radius is not None:
+        return Unbalance(table.at, table.mass_times_radius, table.phase_deg)
+    assert table.amplitude is not None
+    return HarmonicForce(table.at, table.amplitude, table.phase_deg)
+
+
+def _observed_first(scene: Scene, interfaces: Any) -> dict[str, Any]:
+    """Put the observed interface first: orbits report the displacement of the first one."""
+    names = sorted(interfaces, key=lambda name: name != scene.observed)
+    return {name: interfaces[name] for name in names}
+
+
+@contextmanager
+def _told_as(scene: Scene, key: KeyPath, *kinds: type[ValueError]) -> Iterator[None]:
+    """Tell an error of a lower layer as one of this scene's."""
+    try:
+        yield
+    except kinds as error:
+        raise scene_error(scene.file, key, str(error), sep=": ") from error
+
+
+def _lower_first(text: str) -> str:
+    return text[:1].lower() + text[1:]

@@ -1,0 +1,156 @@
+"""Checks of a scene that need two of its tables, or its mesh, at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from nldyn.errors import SceneError
+from nldyn.scene_messages import KeyPath, scene_error, show, unknown_name
+from nldyn.scene_schema import Matrix, Scene
+
+Report = Callable[[KeyPath, str], SceneError]
+MESH_ONLY = ("parts", "supports", "point_masses", "springs", "hinges", "interfaces", "reduction")
+
+
+class TaggedMesh(Protocol):
+    """What the checks need of a mesh: the names of its parts and of its point sets."""
+
+    @property
+    def parts(self) -> Mapping[str, object]:
+        """Parts by name."""
+
+    @property
+    def point_sets(self) -> Mapping[str, object]:
+        """Point sets by name."""
+
+
+def check_scene(scene: Scene, file: Path) -> None:
+    """Check what joins the tables of a scene; raise `SceneError` at the first fault."""
+
+    def report(key: KeyPath, fault: str) -> SceneError:
+        return scene_error(file, key, fault)
+
+    _check_structure(scene, report)
+    _check_modal(scene, report)
+    _check_matrices(scene, report)
+    _check_interface_names(scene, report)
+
+
+def check_mesh_names(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
+    """Check that every part and point set named in the scene is in the mesh."""
+    assert scene.mesh is not None
+    source = scene.mesh.file
+    for name in scene.parts:
+        _require(name, mesh.parts, f"a part of the mesh {source}", file, ("parts", name))
+    for key, name in _points_used(scene):
+        _require(name, mesh.point_sets, f"a point set of the mesh {source}", file, key)
+    for number, hinge in enumerate(scene.hinges):
+        key = ("hinges", number, "part")
+        _require(hinge.part, mesh.parts, f"a part of the mesh {source}", file, key)
+
+
+def check_computable(scene: Scene, file: Path) -> None:
+    """Check that the scene says what excites the structure and which range to follow."""
+    if not scene.excitation:
+        raise scene_error(file, ("excitation",), "is missing: nothing moves the structure")
+    if scene.continuation is None:
+        fault = "is missing: give the frequency range, range_hz = [lowest, highest]"
+        raise scene_error(file, ("continuation",), fault)
+
+
+def check_ratio_count(scene: Scene, count: int, file: Path) -> None:
+    """Check that a list of damping ratios has one entry for each of ``count`` modes."""
+    ratios = scene.damping.modal_ratio
+    if isinstance(ratios, list) and len(ratios) != count:
+        fault = f"has {len(ratios)} entries for a model with {count} modes"
+        raise scene_error(file, ("damping", "modal_ratio"), fault)
+
+
+def _check_structure(scene: Scene, report: Report) -> None:
+    kinds = [kind for kind in ("mesh", "modal", "matrices") if getattr(scene, kind) is not None]
+    if not kinds:
+        raise report((), "gives no structure; it needs one of [mesh], [modal] and [matrices]")
+    if len(kinds) > 1:
+        raise report((kinds[1],), f"cannot stand beside [{kinds[0]}]; keep one of them")
+    if scene.mesh is None:
+        for key in MESH_ONLY:
+            if getattr(scene, key):
+                raise report(
+                    (key,), f"describes a mesh, but the structure is given by [{kinds[0]}]"
+                )
+        return
+    for key in ("parts", "interfaces", "reduction"):
+        if not getattr(scene, key):
+            raise report((key,), "is missing: a mesh needs it")
+
+
+def _check_modal(scene: Scene, report: Report) -> None:
+    if scene.modal is None:
+        return
+    count = len(scene.modal.frequencies_hz)
+    for name, values in scene.modal.participation.items():
+        _check_length(values, count, "mode", ("modal", "participation", name), report)
+
+
+def _check_matrices(scene: Scene, report: Report) -> None:
+    table = scene.matrices
+    if table is None:
+        return
+    count = len(table.mass)
+    for key, matrix in (("mass", table.mass), ("stiffness", table.stiffness)):
+        _check_square(matrix, count, ("matrices", key), report)
+    if table.damping is not None:
+        _check_square(table.damping, count, ("matrices", "damping"), report)
+    if np.linalg.eigvalsh(np.array(table.mass))[0] <= 0:
+        raise report(("matrices", "mass"), "must be positive definite")
+    for name, values in table.interfaces.items():
+        _check_length(values, count, "degree of freedom", ("matrices", "interfaces", name), report)
+
+
+def _check_square(matrix: Matrix, count: int, key: KeyPath, report: Report) -> None:
+    if len(matrix) != count or any(len(row) != count for row in matrix):
+        raise report(key, f"must have {count} rows of {count} numbers, as many as the mass matrix")
+    values = np.array(matrix)
+    if not np.allclose(values, values.T, rtol=1e-9, atol=1e-12 * np.abs(values).max()):
+        raise report(key, "must be symmetric")
+
+
+def _check_length(values: list[float], count: int, unit: str, key: KeyPath, report: Report) -> None:
+    if len(values) != count:
+        raise report(key, f"must have {count} numbers, one per {unit}, not {show(values)}")
+    if not any(values):
+        raise report(key, "must not be zero throughout: nothing could move there")
+
+
+def _check_interface_names(scene: Scene, report: Report) -> None:
+    for key, name in _interfaces_used(scene):
+        if name not in scene.interface_names:
+            raise report(key, unknown_name(name, scene.interface_names, "an interface"))
+
+
+def _interfaces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
+    for table in ("dampers", "stops", "excitation"):
+        for number, entry in enumerate(getattr(scene, table)):
+            yield (table, number, "at"), entry.at
+    for number, stop in enumerate(scene.stops):
+        if stop.against is not None:
+            yield ("stops", number, "against"), stop.against
+    if scene.observe is not None:
+        yield ("observe", "at"), scene.observe.at
+
+
+def _points_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
+    for table in ("supports", "point_masses", "springs", "hinges"):
+        for number, entry in enumerate(getattr(scene, table)):
+            yield (table, number, "at"), entry.at
+    for name, interface in scene.interfaces.items():
+        yield ("interfaces", name, "at"), interface.at
+
+
+def _require(name: str, known: Mapping[str, object], what: str, file: Path, key: KeyPath) -> None:
+    if name not in known:
+        raise scene_error(file, key, unknown_name(name, known, what))

@@ -1,0 +1,323 @@
+"""What may stand in a scene file: one class per table, one attribute per key.
+
+Every key is described with its unit and its default in ``docs/scene.md``. A class here checks
+what can be judged inside one table; what joins two tables is checked in ``nldyn.scene_checks``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator, model_validator
+
+from nldyn.scene_messages import quoted, show
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Matrix = list[list[float]]
+
+
+class Table(BaseModel):
+    """A TOML table: no unknown keys, no conversions between types, finite numbers only."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+class MeshTable(Table):
+    """``[mesh]``: the file of the finite element mesh."""
+
+    file: str
+
+
+class PartTable(Table):
+    """``[parts.NAME]``: material of one part of the mesh, and a section of one of three kinds."""
+
+    youngs_modulus: Positive
+    density: Positive
+    width: Positive | None = None
+    height: Positive | None = None
+    diameter: Positive | None = None
+    bore: Positive | None = None
+    area: Positive | None = None
+    second_moment: Positive | None = None
+
+    @property
+    def section_kind(self) -> Literal["rectangle", "circle", "general"]:
+        """Which section the keys describe."""
+        if self.width is not None:
+            return "rectangle"
+        return "circle" if self.diameter is not None else "general"
+
+    @model_validator(mode="after")
+    def _one_section(self) -> PartTable:
+        keys = ("width", "height", "diameter", "bore", "area", "second_moment")
+        given = {key for key in keys if getattr(self, key) is not None}
+        wanted = ({"width", "height"}, {"diameter"}, {"diameter", "bore"})
+        if given not in (*wanted, {"area", "second_moment"}):
+            raise ValueError(
+                "needs one section: 'width' and 'height', or 'diameter' (and 'bore'), or 'area' "
+                f"and 'second_moment'; given: {quoted(key for key in keys if key in given)}"
+            )
+        if self.bore and self.diameter and self.bore >= self.diameter:
+            raise ValueError(f"has a 'bore' of {self.bore:g}, not less than its 'diameter'")
+        return self
+
+
+class SupportTable(Table):
+    """``[[supports]]``: directions in which the nodes of a point set cannot move."""
+
+    at: str
+    fixed: Annotated[list[Literal["x", "y", "rotation"]], Field(min_length=1)]
+
+
+class PointMassTable(Table):
+    """``[[point_masses]]``: a lumped mass at a point set."""
+
+    at: str
+    mass: NotNegative
+    rotary_inertia: NotNegative = 0.0
+
+    @model_validator(mode="after")
+    def _some(self) -> PointMassTable:
+        if self.mass == 0.0 and self.rotary_inertia == 0.0:
+            raise ValueError("needs a 'mass' or a 'rotary_inertia' above 0")
+        return self
+
+
+class SpringTable(Table):
+    """``[[springs]]``: a linear spring between a point set and the ground."""
+
+    at: str
+    direction: Literal["x", "y", "rotation"]
+    stiffness: Positive
+
+
+class HingeTable(Table):
+    """``[[hinges]]``: a rotary joint, at which one part keeps a rotation of its own."""
+
+    at: str
+    part: str
+
+
+class InterfaceTable(Table):
+    """``[interfaces.NAME]``: a point and direction where something acts or is observed."""
+
+    at: str
+    direction: Literal["x", "y", "rotation"]
+
+
+class ReductionTable(Table):
+    """``[reduction]``: which modes of the mesh's model are kept."""
+
+    modes: Annotated[int, Field(ge=1)] | None = None
+    cutoff_hz: Positive | None = None
+    residual: bool = True
+
+    @model_validator(mode="after")
+    def _one_choice(self) -> ReductionTable:
+        _exactly_one(self, "modes", "cutoff_hz")
+        return self
+
+
+class ModalTable(Table):
+    """``[modal]``: a structure given by its modes instead of a mesh."""
+
+    frequencies_hz: Annotated[list[NotNegative], Field(min_length=1)]
+    participation: Annotated[dict[str, list[float]], Field(min_length=1)]
+
+
+class MatricesTable(Table):
+    """``[matrices]``: a structure given by its matrices instead of a mesh."""
+
+    mass: Annotated[Matrix, Field(min_length=1)]
+    stiffness: Annotated[Matrix, Field(min_length=1)]
+    damping: Matrix | None = None
+    interfaces: Annotated[dict[str, list[float]], Field(min_length=1)]
+
+
+class DampingTable(Table):
+    """``[damping]``: the damping ratio of the modes, one number or one per mode."""
+
+    modal_ratio: float | list[float] = 0.0
+
+    @field_validator("modal_ratio", mode="plain")
+    @classmethod
+    def _ratios(cls, value: Any) -> float | list[float]:
+        numbers = value if isinstance(value, list) else [value]
+        for number in numbers:
+            plain = isinstance(number, int | float) and not isinstance(number, bool)
+            if not plain or not 0 <= number < 1:
+                raise ValueError(
+                    f"must be a number from 0 to below 1, or one per mode, not {show(number)}"
+                )
+        return [float(n) for n in numbers] if isinstance(value, list) else float(value)
+
+
+class DamperTable(Table):
+    """``[[dampers]]``: a linear damper between an interface and the ground."""
+
+    at: str
+    coefficient: NotNegative
+
+
+class StopTable(Table):
+    """``[[stops]]``: an elastic stop that an interface hits."""
+
+    at: str
+    law: Literal["hertz", "linear"] = "hertz"
+    stiffness: Positive | None = None
+    exponent: Annotated[float, Field(ge=1, le=4)] | None = None
+    radius: Positive | None = None
+    youngs_modulus: Positive | None = None
+    poissons_ratio: Annotated[float, Field(gt=-1, le=0.5)] | None = None
+    gap: float = 0.0
+    direction: Literal[1, -1] = 1
+    against: str | None = None
+
+    @property
+    def from_sphere(self) -> bool:
+        """Whether the stiffness follows from a sphere's radius and elastic constants."""
+        return self.radius is not None
+
+    @model_validator(mode="after")
+    def _complete(self) -> StopTable:
+        sphere = ("radius", "youngs_modulus", "poissons_ratio")
+        if self.law == "linear":
+            _refuse(self, (*sphere, "exponent"), "a linear stop")
+            if self.stiffness is None:
+                raise ValueError("needs 'stiffness' (N/m)")
+        elif self.stiffness is not None:
+            _refuse(self, sphere, "a stop whose 'stiffness' is given")
+        elif self.radius is None or self.youngs_modulus is None:
+            raise ValueError(
+                "needs 'stiffness' (N/m^exponent), or 'radius' and 'youngs_modulus' of a sphere"
+            )
+        else:
+            _refuse(self, ("exponent",), "a stop given by its radius (it is 1.5)")
+        return self
+
+
+class ExcitationTable(Table):
+    """``[[excitation]]``: a rotating unbalance or a harmonic force at an interface."""
+
+    at: str
+    kind: Literal["unbalance", "harmonic"]
+    mass_times_radius: Positive | None = None
+    amplitude: Positive | None = None
+    phase_deg: float = 0.0
+
+    @model_validator(mode="after")
+    def _complete(self) -> ExcitationTable:
+        wanted, other = ("mass_times_radius", "amplitude")
+        if self.kind == "harmonic":
+            wanted, other = other, wanted
+        _refuse(self, (other,), f"kind '{self.kind}'; use '{wanted}'")
+        if getattr(self, wanted) is None:
+            raise ValueError(f"needs '{wanted}' for kind '{self.kind}'")
+        return self
+
+
+class ObserveTable(Table):
+    """``[observe]``: the interface whose displacement is reported and drawn."""
+
+    at: str
+
+
+class ContinuationTable(Table):
+    """``[continuation]``: which branches of periodic orbits are followed, and how far."""
+
+    range_hz: list[Positive]
+    periods: Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=1)] = [1, 2, 3]
+    max_step_hz: Positive | None = None
+    follow_doublings: Annotated[int, Field(ge=0)] = 1
+
+    @field_validator("range_hz")
+    @classmethod
+    def _ordered(cls, value: list[float]) -> list[float]:
+        if len(value) != 2:
+            raise ValueError(f"must be two frequencies, [lowest, highest], not {show(value)}")
+        if value[0] >= value[1]:
+            raise ValueError(f"must run from the lower to the higher frequency, not {show(value)}")
+        return value
+
+
+class SeedTable(Table):
+    """``[[subharmonics]]``: where to look for the start of a branch by time simulation."""
+
+    period: Annotated[int, Field(ge=1)]
+    near_hz: Positive
+
+
+class Scene(Table):
+    """A whole scene: a structure, what acts on it, and what to compute.
+
+    Read one with `nldyn.load_scene`. Units are SI; keys that end in ``_hz`` are in Hz.
+
+    Examples
+    --------
+    >>> from nldyn.resources import example
+    >>> from nldyn.scene import load_scene
+    >>> scene = load_scene(example("one_dof.toml"))
+    >>> scene.stops[0].stiffness
+    5170000000.0
+    """
+
+    title: str = ""
+    mesh: MeshTable | None = None
+    parts: dict[str, PartTable] = {}
+    supports: list[SupportTable] = []
+    point_masses: list[PointMassTable] = []
+    springs: list[SpringTable] = []
+    hinges: list[HingeTable] = []
+    interfaces: dict[str, InterfaceTable] = {}
+    reduction: ReductionTable | None = None
+    modal: ModalTable | None = None
+    matrices: MatricesTable | None = None
+    damping: DampingTable = DampingTable()
+    dampers: list[DamperTable] = []
+    stops: list[StopTable] = []
+    excitation: list[ExcitationTable] = []
+    observe: ObserveTable | None = None
+    continuation: ContinuationTable | None = None
+    subharmonics: list[SeedTable] = []
+
+    _file: Path = PrivateAttr(default=Path("scene.toml"))
+    _text: str = PrivateAttr(default="")
+
+    @property
+    def file(self) -> Path:
+        """Where the scene was read from."""
+        return self._file
+
+    @property
+    def text(self) -> str:
+        """The text of the file, word for word."""
+        return self._text
+
+    @property
+    def interface_names(self) -> list[str]:
+        """Names of the interfaces, in the order of the file."""
+        if self.modal is not None:
+            return list(self.modal.participation)
+        if self.matrices is not None:
+            return list(self.matrices.interfaces)
+        return list(self.interfaces)
+
+    @property
+    def observed(self) -> str:
+        """The interface whose displacement is reported: ``observe.at``, else the first one."""
+        return self.observe.at if self.observe else self.interface_names[0]
+
+
+def _exactly_one(table: BaseModel, first: str, second: str) -> None:
+    given = [name for name in (first, second) if getattr(table, name) is not None]
+    if len(given) != 1:
+        fault = "has both" if given else "needs one of"
+        raise ValueError(f"{fault} '{first}' and '{second}'" + ("; keep one" if given else ""))
+
+
+def _refuse(table: BaseModel, names: tuple[str, ...], of: str) -> None:
+    for name in names:
+        if getattr(table, name) is not None:
+            raise ValueError(f"has '{name}', which is not a key of {of}")
