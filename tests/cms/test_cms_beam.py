@@ -1,7 +1,6 @@
-"""The paper's beam: the reduced models' published frequencies.
+"""The half beam: the reduced models' published frequencies.
 
-Periodic solutions of a multi-DOF beam system with impact (van de Vorst, van Campen, de Kraker and
-Fey, Journal of Sound and Vibration 192(5), 1996), sections 4 and 5.
+"Periodic solutions of a multi-DOF beam system with impact", sections 4 and 5.
 """
 
 from __future__ import annotations
