@@ -342,7 +342,7 @@ def _told_as(scene: Scene, key: KeyPath, *kinds: type[ValueError]) -> Iterator[N
     try:
         yield
     except kinds as error:
-        raise scene_error(scene.file, key, str(error), sep=": ") from error
+        raise scene_error(scene.file, key, str(error).rstrip("."), sep=": ") from error
 
 
 def _lower_first(text: str) -> str:

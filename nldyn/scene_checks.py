@@ -45,7 +45,7 @@ def check_mesh_names(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
     assert scene.mesh is not None
     source = scene.mesh.file
     for name in scene.parts:
-        _require(name, mesh.parts, f"a part of the mesh {source}", file, ("parts", name))
+        _require(name, mesh.parts, f"a part of the mesh {source}", file, ("parts",))
     for key, name in _points_used(scene):
         _require(name, mesh.point_sets, f"a point set of the mesh {source}", file, key)
     for number, hinge in enumerate(scene.hinges):

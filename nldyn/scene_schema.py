@@ -110,7 +110,7 @@ class InterfaceTable(Table):
 class ReductionTable(Table):
     """``[reduction]``: which modes of the mesh's model are kept."""
 
-    modes: Annotated[int, Field(ge=1)] | None = None
+    modes: Annotated[int, Field(ge=0)] | None = None
     cutoff_hz: Positive | None = None
     residual: bool = True
 

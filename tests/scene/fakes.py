@@ -1,0 +1,76 @@
+"""Orbits, branches and diagrams that look computed."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class FakeHistory:
+    time: np.ndarray
+    displacement: np.ndarray
+    contact_force: np.ndarray
+    impact_times: np.ndarray
+
+
+@dataclass(frozen=True)
+class FakeOrbit:
+    frequency_hz: float
+    max_abs_displacement: float
+    period: int = 1
+    stable: bool = True
+    impacts: int = 1
+    max_penetration: float = 1e-7
+    residual: float = 1e-14
+    multipliers: np.ndarray = field(default_factory=lambda: np.array([0.5 + 0.2j, 0.5 - 0.2j]))
+
+
+@dataclass(frozen=True)
+class FakeSpecialPoint:
+    kind: str
+    orbit: FakeOrbit
+
+
+@dataclass(frozen=True)
+class FakeBranch:
+    name: str
+    period: int
+    points: list
+    special_points: list
+    stop_reason: str = "end of range"
+
+    @property
+    def frequency_hz(self):
+        return np.array([orbit.frequency_hz for orbit in self.points])
+
+    @property
+    def max_abs_displacement(self):
+        return np.array([orbit.max_abs_displacement for orbit in self.points])
+
+    @property
+    def stable(self):
+        return np.array([orbit.stable for orbit in self.points])
+
+
+@dataclass(frozen=True)
+class FakeDiagram:
+    branches: list
+
+
+def resonance(period=1, low=5.0, high=90.0, count=600, unstable=(30.0, 40.0)):
+    hz = np.linspace(low, high, count)
+    peak = 25.3 * period
+    y = 1e-4 / np.sqrt((1 - (hz / peak) ** 2) ** 2 + (0.05 * hz / peak) ** 2)
+    orbits = [
+        FakeOrbit(f, a, period, stable=not unstable[0] < f < unstable[1])
+        for f, a in zip(hz.tolist(), y.tolist(), strict=True)
+    ]
+    special = [
+        FakeSpecialPoint(kind, min(orbits, key=lambda o, f=f: abs(o.frequency_hz - f)))
+        for kind, f in (("PD", unstable[0]), ("PD", unstable[1]), ("LP", high - 10), ("GR", 60.0))
+    ]
+    return FakeBranch(f"p{period}", period, orbits, special)
+
+
+def diagram():
+    return FakeDiagram([resonance(1), resonance(2, 30.0, 70.0, 300), resonance(3, 60.0, 90.0, 200)])

@@ -1,0 +1,96 @@
+"""What a diagram shows: stable and unstable parts, colours by period, marks."""
+
+import sys
+
+import numpy as np
+import pytest
+from fakes import FakeHistory, FakeOrbit, diagram, resonance
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nldyn.plot import length_unit, plot_diagram, plot_orbit, stability_runs
+
+
+@given(st.lists(st.booleans(), max_size=30))
+def test_runs_cover_the_branch_and_stable_ones_hold_stable_orbits_only(flags):
+    runs = stability_runs(flags)
+    drawn = np.zeros(max(len(flags) - 1, 0), dtype=int)
+    for run in runs:
+        assert 0 <= run.start < run.stop <= len(flags)
+        assert not run.stable or all(flags[run.start : run.stop])
+        drawn[run.start : run.stop - 1] += 1
+    assert np.all(drawn == 1)
+    assert {i for run in runs for i in range(run.start, run.stop)} == set(range(len(flags)))
+
+
+def test_runs_alternate():
+    runs = stability_runs([True, True, False, False, True])
+    assert [(r.start, r.stop, r.stable) for r in runs] == [
+        (0, 2, True),
+        (1, 5, False),
+        (4, 5, True),
+    ]
+
+
+def test_lines_are_split_where_stability_changes():
+    ax = plot_diagram([resonance(unstable=(30.0, 40.0))], special_points=())
+    solid, dotted, after = ax.lines
+    assert solid.get_linestyle() == after.get_linestyle() == "-"
+    assert dotted.get_linestyle() != "-"
+    assert solid.get_xdata()[-1] == dotted.get_xdata()[0] <= 30.0
+    assert after.get_xdata()[0] == dotted.get_xdata()[-1] >= 40.0
+
+
+def test_diagram_names_units_and_marks():
+    ax = plot_diagram(diagram(), yscale="log")
+    assert ax.get_xlabel() == "excitation frequency (Hz)"
+    assert ax.get_ylabel() == "max |y| (mm)"
+    assert ax.get_yscale() == "log"
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert texts == [
+        "harmonic",
+        "1/2 subharmonic",
+        "1/3 subharmonic",
+        "stable",
+        "unstable",
+        "cyclic fold (LP)",
+        "flip (PD)",
+        "grazing (GR)",
+    ]
+
+
+def test_axes_of_the_caller_are_used():
+    ax = plot_diagram([resonance()], special_points=())
+    assert plot_diagram([resonance()], ax, unit="µm", special_points=()) is ax
+    assert len(ax.lines) == 6
+    assert ax.get_ylabel() == "max |y| (µm)"
+    with pytest.raises(ValueError, match="not a unit"):
+        plot_diagram([resonance()], unit="inch")
+
+
+@pytest.mark.parametrize(
+    ("size", "unit"), [(2.0, "m"), (2e-3, "mm"), (2.3e-4, "µm"), (0.0, "m"), (1e-12, "nm")]
+)
+def test_unit(size, unit):
+    assert length_unit(size)[1] == unit
+
+
+class OrbitWithHistory(FakeOrbit):
+    def history(self, n):
+        time = np.linspace(0.0, 1 / 25.3, n)
+        y = 1e-4 * (np.sin(2 * np.pi * 25.3 * time) - 0.9)
+        return FakeHistory(time, y, 1e3 * np.maximum(y, 0), np.array([0.0071]))
+
+
+def test_orbit_shows_displacement_impacts_and_force():
+    upper, lower = plot_orbit(OrbitWithHistory(25.3, 2e-4))
+    assert upper.get_ylabel() == "displacement (µm)"
+    assert lower.get_ylabel() == "contact force (N)"
+    assert upper.get_legend().get_texts()[0].get_text() == "impact"
+
+
+def test_library_functions_leave_pyplot_alone():
+    assert (
+        "matplotlib.pyplot" not in sys.modules
+        or __import__("matplotlib.pyplot").pyplot.get_fignums() == []
+    )

@@ -1,0 +1,129 @@
+"""Results appear whole or not at all, and nobody's files are lost."""
+
+import os
+
+import pytest
+
+from nldyn.result_directory import OutputError, check_directory, result_directory
+
+
+def write(place, kind="run", **files):
+    with result_directory(place, kind) as folder:
+        for name, text in files.items():
+            (folder / name).write_text(text)
+
+
+def visible(place):
+    return {p.name: p.read_text() for p in place.iterdir() if not p.name.startswith(".")}
+
+
+def leftovers(place):
+    return [p.name for p in place.parent.iterdir() if p != place]
+
+
+def test_new_directory_with_parents(tmp_path):
+    place = tmp_path / "a" / "b" / "results"
+    write(place, table="1")
+    assert visible(place) == {"table": "1"}
+    assert leftovers(place) == []
+
+
+def test_nothing_is_there_before_the_end(tmp_path):
+    place = tmp_path / "results"
+    with result_directory(place, "run") as folder:
+        (folder / "table").write_text("1")
+        assert not place.exists()
+    assert place.exists()
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt, SystemExit])
+def test_failure_midway_leaves_nothing(tmp_path, error):
+    place = tmp_path / "a" / "results"
+    with pytest.raises(error), result_directory(place, "run") as folder:
+        (folder / "table").write_text("1")
+        raise error
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_failure_midway_leaves_the_earlier_results(tmp_path):
+    place = tmp_path / "results"
+    write(place, table="1")
+    with pytest.raises(RuntimeError), result_directory(place, "run") as folder:
+        (folder / "table").write_text("2")
+        raise RuntimeError
+    assert visible(place) == {"table": "1"}
+    assert leftovers(place) == []
+
+
+def test_failure_of_the_last_rename_puts_the_old_results_back(tmp_path, monkeypatch):
+    place = tmp_path / "results"
+    write(place, table="1")
+    rename = os.rename
+    monkeypatch.setattr(
+        "pathlib.Path.rename",
+        lambda self, to: rename(self, to) if not self.name.endswith(".new") else os.stat("/none"),
+    )
+    with pytest.raises(OutputError, match="cannot be written"):
+        write(place, table="2")
+    assert visible(place) == {"table": "1"}
+    assert leftovers(place) == []
+
+
+def test_second_run_replaces_the_first(tmp_path):
+    place = tmp_path / "results"
+    write(place, table="1", old="1")
+    write(place, table="2")
+    assert visible(place) == {"table": "2"}
+
+
+def test_other_files_and_other_kinds_are_kept(tmp_path):
+    place = tmp_path / "results"
+    write(place, table="1")
+    write(place, "render", picture="1")
+    (place / "notes").write_text("mine")
+    (place / "more").mkdir()
+    (place / "more" / "deep").write_text("mine too")
+    write(place, table="2")
+    write(place, "render", picture="2")
+    assert (place / "more" / "deep").read_text() == "mine too"
+    (place / "more" / "deep").unlink()
+    (place / "more").rmdir()
+    assert visible(place) == {"table": "2", "picture": "2", "notes": "mine"}
+
+
+def test_empty_directory_is_used(tmp_path):
+    place = tmp_path / "results"
+    place.mkdir()
+    write(place, table="1")
+    assert visible(place) == {"table": "1"}
+
+
+def test_link_to_a_directory_stays_a_link(tmp_path):
+    (tmp_path / "real").mkdir()
+    place = tmp_path / "link"
+    place.symlink_to("real")
+    write(place, table="1")
+    assert place.is_symlink()
+    assert visible(tmp_path / "real") == {"table": "1"}
+
+
+def test_somebody_elses_directory_is_refused(tmp_path):
+    (tmp_path / "notes").write_text("mine")
+    with pytest.raises(OutputError, match="not written by nldyn"):
+        write(tmp_path, table="1")
+    assert visible(tmp_path) == {"notes": "mine"}
+
+
+def test_file_is_refused(tmp_path):
+    place = tmp_path / "results"
+    place.write_text("")
+    with pytest.raises(OutputError, match="is a file"):
+        check_directory(place)
+    with pytest.raises(OutputError, match="not a folder"):
+        check_directory(place / "below")
+
+
+def test_permissions_are_those_of_any_new_directory(tmp_path):
+    (tmp_path / "plain").mkdir()
+    write(tmp_path / "results", table="1")
+    assert (tmp_path / "results").stat().st_mode == (tmp_path / "plain").stat().st_mode

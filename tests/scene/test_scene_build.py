@@ -1,0 +1,134 @@
+"""Scenes become components, reduced models and systems."""
+
+import math
+
+import numpy as np
+import pytest
+
+from nldyn.resources import example, examples, mesh
+from nldyn.scene import build_component, build_reduced, build_system, load_scene, parse_scene
+
+MODAL = """
+[modal]
+frequencies_hz = [13.1, 125.1]
+participation.a = [0.6, 0.5]
+participation.b = [0.4, -0.2]
+"""
+
+
+def test_one_dof_is_equation_3_1():
+    system = build_system(load_scene(example("one_dof.toml")))
+    assert system.natural_frequencies[0] ** 2 == pytest.approx(16877 / 2.48, rel=1e-14)
+    assert 1 / system.participation["middle"][0] ** 2 == pytest.approx(2.48, rel=1e-14)
+    damping = system.total_damping[0, 0] * 2.48
+    assert damping == pytest.approx(2 * 0.0142 * math.sqrt(2.48 * 16877), rel=1e-14)
+    (stop,) = system.stops
+    assert (stop.stiffness, stop.exponent, stop.gap, stop.direction) == (5.17e9, 1.5, 0.0, 1)
+    assert system.excitation[0].mass_times_radius == 4.92e-6
+
+
+@pytest.mark.parametrize(
+    ("name", "published"),
+    [
+        ("two_dof_xi_0.01.toml", [13.1, 125.1]),
+        ("four_dof_xi_0.001.toml", [13.1, 117.5, 326.5, 749.5]),
+    ],
+)
+def test_beam_scenes_meet_the_published_frequencies(name, published):
+    system = build_system(load_scene(example(name)))
+    np.testing.assert_allclose(system.frequencies_hz, published, rtol=3e-3)
+    assert 1 / system.participation["middle"][0] ** 2 == pytest.approx(2.48, rel=3e-3)
+
+
+def test_beam_scenes_share_one_structure():
+    systems = [build_system(load_scene(example(n))) for n in examples() if "two_dof" in n]
+    assert len(systems) == 2
+    np.testing.assert_array_equal(systems[0].frequencies_hz, systems[1].frequencies_hz)
+    assert systems[0].damping[0, 0] != systems[1].damping[0, 0]
+
+
+def test_damper_of_beam_scenes_is_that_of_equation_3_1():
+    for name in examples():
+        if "_xi_" in name:
+            (damper,) = load_scene(example(name)).dampers
+            assert damper.coefficient == pytest.approx(
+                2 * 0.0142 * math.sqrt(2.48 * 16877), abs=1e-5
+            )
+
+
+def test_component_can_be_handed_on():
+    scene = load_scene(example("two_dof_xi_0.01.toml"))
+    component = build_component(scene)
+    reduced = build_reduced(scene, component)
+    system = build_system(scene, reduced)
+    np.testing.assert_array_equal(system.frequencies_hz, reduced.frequencies_hz)
+
+
+def test_cutoff_gives_the_same_model_as_the_mode_count():
+    scene = load_scene(example("four_dof_xi_0.01.toml"))
+    other = parse_scene(scene.text.replace("modes = 3", "cutoff_hz = 400.0"), scene.file)
+    np.testing.assert_allclose(
+        build_reduced(other).frequencies_hz, build_reduced(scene).frequencies_hz, rtol=1e-8
+    )
+
+
+def test_sections_of_every_kind(tmp_path):
+    scene = load_scene(example("two_dof_xi_0.01.toml"))
+    rectangle = "width = 0.09               # m, out of the plane\nheight = 0.01 "
+    assert rectangle in scene.text
+    general = scene.text.replace(rectangle, "area = 0.0009\nsecond_moment = 7.5e-9")
+    np.testing.assert_allclose(
+        build_reduced(parse_scene(general, scene.file)).frequencies_hz,
+        build_reduced(scene).frequencies_hz,
+        rtol=1e-8,
+    )
+    tube = scene.text.replace(rectangle, "diameter = 0.03\nbore = 0.02")
+    assert build_reduced(parse_scene(tube, scene.file)).frequencies_hz[0] > 0
+
+
+def test_mesh_is_sought_beside_the_scene(tmp_path):
+    scene = load_scene(example("two_dof_xi_0.01.toml"))
+    (tmp_path / "half_beam.msh").write_bytes(mesh("half_beam.msh").read_bytes())
+    moved = tmp_path / "moved.toml"
+    moved.write_text(scene.text.replace("../../meshes/", ""))
+    assert build_component(load_scene(moved)).stiffness.shape[0] > 0
+
+
+def test_hertz_stop_from_a_sphere():
+    scene = parse_scene(
+        MODAL + "[[stops]]\nat='a'\nradius=0.005\nyoungs_modulus=2.1e11\npoissons_ratio=0.25\n"
+    )
+    (stop,) = build_system(scene).stops
+    effective = 2.1e11 / (2 * (1 - 0.25**2))
+    assert stop.stiffness == pytest.approx(4 / 3 * effective * math.sqrt(0.005), rel=1e-12)
+    assert stop.exponent == 1.5
+
+
+def test_stop_gap_direction_law_and_other_side():
+    text = "[[stops]]\nat='a'\nlaw='linear'\nstiffness=1e7\ngap=-1e-5\ndirection=-1\nagainst='b'\n"
+    (stop,) = build_system(parse_scene(MODAL + text)).stops
+    assert (stop.exponent, stop.gap, stop.direction, stop.against) == (1.0, -1e-5, -1, "b")
+
+
+def test_observed_interface_comes_first():
+    assert build_system(parse_scene(MODAL)).interfaces == ("a", "b")
+    assert build_system(parse_scene(MODAL + "[observe]\nat='b'")).interfaces == ("b", "a")
+
+
+def test_harmonic_force():
+    text = "[[excitation]]\nat='b'\nkind='harmonic'\namplitude=2.0\nphase_deg=90.0\n"
+    (force,) = build_system(parse_scene(MODAL + text)).excitation
+    assert (force.at, force.amplitude, force.phase_deg) == ("b", 2.0, 90.0)
+
+
+def test_damping_of_each_mode():
+    system = build_system(parse_scene(MODAL + "[damping]\nmodal_ratio=[0.01, 0.02]"))
+    ratios = np.diag(system.damping) / (2 * system.natural_frequencies)
+    np.testing.assert_allclose(ratios, [0.01, 0.02])
+
+
+def test_matrices_with_damping_matrix():
+    text = "[matrices]\nmass=[[2.0]]\nstiffness=[[8e4]]\ndamping=[[6.0]]\ninterfaces.a=[1.0]\n"
+    system = build_system(parse_scene(text))
+    assert system.natural_frequencies[0] == pytest.approx(200.0)
+    assert system.damping[0, 0] == pytest.approx(3.0)

@@ -1,0 +1,304 @@
+"""Every fault of a scene is told in one sentence, with the file, the key and exit code 2."""
+
+import re
+
+import pytest
+from click.testing import CliRunner
+
+from nldyn.cli import main
+from nldyn.resources import example, mesh
+
+MODAL = """
+[modal]
+frequencies_hz = [13.1, 125.1]
+participation.middle = [0.6, 0.5]
+[[stops]]
+at = "middle"
+stiffness = 5e9
+[[excitation]]
+at = "middle"
+kind = "unbalance"
+mass_times_radius = 4.92e-6
+[continuation]
+range_hz = [5.0, 90.0]
+"""
+BEAM = (
+    example("two_dof_xi_0.01.toml")
+    .read_text()
+    .replace("../../meshes/half_beam.msh", mesh("half_beam.msh").as_posix())
+)
+
+
+def check(tmp_path, text, command="check"):
+    """Run a scene that must be refused, and give the one line that says why."""
+    file = tmp_path / "scene.toml"
+    file.write_text(text)
+    more = ["--out", str(tmp_path / "out")] if command == "run" else []
+    return refused([command, str(file), *more]).replace(f"{tmp_path}/", "")
+
+
+def refused(arguments):
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    lines = [line for line in result.stderr.split("\r") if "nldyn: " in line]
+    assert len(lines) == 1 and lines[0].count("\n") == 1
+    assert "Traceback" not in result.stderr
+    return lines[0].strip().removeprefix("nldyn: ")
+
+
+def test_the_scenes_that_the_faults_are_put_into_are_good(tmp_path):
+    for text in (MODAL, BEAM):
+        file = tmp_path / "scene.toml"
+        file.write_text(text)
+        result = CliRunner().invoke(main, ["check", str(file)])
+        assert result.exit_code == 0, result.output
+        assert "no fault found" in result.stdout
+
+
+def test_missing_file(tmp_path):
+    file = tmp_path / "none.toml"
+    assert refused(["check", str(file)]) == f"{file}: there is no such file"
+
+
+def test_folder(tmp_path):
+    assert refused(["check", str(tmp_path)]) == f"{tmp_path}: is a folder, not a scene file"
+
+
+def test_not_text(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_bytes(b"\xff\xfe\x00")
+    assert "not UTF-8" in refused(["check", str(file)])
+
+
+def test_not_toml_names_the_line(tmp_path):
+    said = check(tmp_path, "[modal]\nfrequencies_hz = \n")
+    assert said == "scene.toml: is not valid TOML: invalid value (at line 2, column 18)"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        (
+            "stiffness = 5e9",
+            "stifness = 5e9",
+            "stops[0].stifness is not a known key; did you mean 'stiffness'?",
+        ),
+        (
+            "stiffness = 5e9",
+            "range_hz = [1, 2]\nstiffness = 5e9",
+            "stops[0].range_hz is not a known key here; did you mean continuation.range_hz?",
+        ),
+        (
+            "[[stops]]",
+            "[[stop]]",
+            "stop is not a known key; did you mean 'stops'?",
+        ),
+        (
+            "stiffness = 5e9",
+            "zzz = 1\nstiffness = 5e9",
+            "stops[0].zzz is not a known key; known here: 'at', 'law', 'stiffness', 'exponent', "
+            "'radius', 'youngs_modulus', 'poissons_ratio', 'gap', 'direction', 'against'",
+        ),
+        ("5e9", "-5e9", "stops[0].stiffness must be greater than 0, not -5000000000.0"),
+        ("5e9", "0.0", "stops[0].stiffness must be greater than 0, not 0.0"),
+        ("5e9", "nan", "stops[0].stiffness must be a finite number, not nan"),
+        ("5e9", "inf", "stops[0].stiffness must be a finite number, not inf"),
+        ("5e9", "'much'", "stops[0].stiffness must be a number, not 'much'"),
+        ("5e9", "true", "stops[0].stiffness must be a number, not true"),
+        ("[13.1,", "[nan,", "modal.frequencies_hz[0] must be a finite number, not nan"),
+        (
+            "[0.6, 0.5]",
+            "[0.6]",
+            "modal.participation.middle must have 2 numbers, one per mode, not [0.6]",
+        ),
+        (
+            "[0.6, 0.5]",
+            "[0, 0]",
+            "modal.participation.middle must not be zero throughout: nothing could move there",
+        ),
+        (
+            "[5.0, 90.0]",
+            "[90.0, 5.0]",
+            "continuation.range_hz must run from the lower to the higher frequency, "
+            "not [90.0, 5.0]",
+        ),
+        (
+            "[5.0, 90.0]",
+            "[5.0]",
+            "continuation.range_hz must be two frequencies, [lowest, highest], not [5.0]",
+        ),
+        ("[5.0, 90.0]", "[0.0, 9.0]", "continuation.range_hz[0] must be greater than 0, not 0.0"),
+        (
+            'stops]]\nat = "middle"',
+            'stops]]\nat = "midle"',
+            "stops[0].at 'midle' is not an interface; did you mean 'middle'?",
+        ),
+        (
+            'excitation]]\nat = "middle"',
+            'excitation]]\nat = "q"',
+            "excitation[0].at 'q' is not an interface; known: 'middle'",
+        ),
+        ('[[stops]]\nat = "middle"', "[[stops]]", "stops[0].at is missing"),
+        (
+            "stiffness = 5e9",
+            "",
+            "stops[0] needs 'stiffness' (N/m^exponent), or 'radius' and 'youngs_modulus' of a "
+            "sphere",
+        ),
+        (
+            "stiffness = 5e9",
+            "law = 'linear'\nstiffness = 5e9\nexponent = 1.5",
+            "stops[0] has 'exponent', which is not a key of a linear stop",
+        ),
+        (
+            "stiffness = 5e9",
+            "law = 'hertzian'\nstiffness = 5e9",
+            "stops[0].law must be 'hertz' or 'linear', not 'hertzian'",
+        ),
+        ("[[stops]]", "[stops]", "stops must be written with two brackets: [[stops]]"),
+        (
+            '"unbalance"',
+            '"harmonic"',
+            "excitation[0] has 'mass_times_radius', which is not a key of kind 'harmonic'; "
+            "use 'amplitude'",
+        ),
+        (
+            "[continuation]",
+            "[damping]\nmodal_ratio = [0.1]\n[continuation]",
+            "damping.modal_ratio has 1 entries for a model with 2 modes",
+        ),
+        (
+            "[continuation]",
+            "[damping]\nmodal_ratio = -0.1\n[continuation]",
+            "damping.modal_ratio must be a number from 0 to below 1, or one per mode, not -0.1",
+        ),
+        (
+            "[modal]",
+            "[mesh]\nfile = 'beam.msh'\n[modal]",
+            "modal cannot stand beside [mesh]; keep one of them",
+        ),
+        (
+            "[continuation]",
+            "[reduction]\nmodes = 1\n[continuation]",
+            "reduction describes a mesh, but the structure is given by [modal]",
+        ),
+        ("[modal]", "mesh = 'beam.msh'\n[modal]", "mesh must be a table: [mesh]"),
+    ],
+)
+def test_fault_in_modal_scene(tmp_path, old, new, sentence):
+    assert old in MODAL
+    assert check(tmp_path, MODAL.replace(old, new, 1)) == f"scene.toml: {sentence}"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        (
+            'at = "foot"',
+            'at = "fooot"',
+            "supports[1].at 'fooot' is not a point set of the mesh MESH; did you mean 'foot'?",
+        ),
+        (
+            "[parts.leaf]",
+            "[parts.laef]",
+            "parts 'laef' is not a part of the mesh MESH; did you mean 'leaf'?",
+        ),
+        (
+            "[[supports]]",
+            "[[hinges]]\nat='corner'\npart='lief'\n[[supports]]",
+            "hinges[0].part 'lief' is not a part of the mesh MESH; did you mean 'leaf'?",
+        ),
+        ("modes = 1", "modes = -1", "reduction.modes must be at least 0, not -1"),
+        (
+            "modes = 1",
+            "modes = 1\ncutoff_hz = 500.0",
+            "reduction has both 'modes' and 'cutoff_hz'; keep one",
+        ),
+        ("half_beam.msh", "full.msh", "mesh.file names FULL, which does not exist"),
+        (
+            "density = 7746.0",
+            "density = nan",
+            "parts.beam.density must be a finite number, not nan",
+        ),
+        (
+            "height = 0.01 ",
+            "# ",
+            "parts.beam needs one section: 'width' and 'height', or 'diameter' (and 'bore'), or "
+            "'area' and 'second_moment'; given: 'width'",
+        ),
+        (
+            "[interfaces.middle]",
+            "[interfaces.center]",
+            "dampers[0].at 'middle' is not an interface; known: 'center'",
+        ),
+        (
+            "[mesh]",
+            "[matrices]\nmass=[[1.0]]\nstiffness=[[1.0]]\ninterfaces.a=[1.0]\n[mesh]",
+            "matrices cannot stand beside [mesh]; keep one of them",
+        ),
+    ],
+)
+def test_fault_in_mesh_scene(tmp_path, old, new, sentence):
+    assert old in BEAM
+    path = mesh("half_beam.msh").as_posix()
+    sentence = sentence.replace("MESH", path)
+    sentence = sentence.replace("FULL", path.replace("half_beam", "full"))
+    assert check(tmp_path, BEAM.replace(old, new, 1)) == f"scene.toml: {sentence}"
+
+
+def test_part_without_material(tmp_path):
+    start, end = BEAM.index("[parts.leaf]"), BEAM.index("# Symmetry")
+    said = check(tmp_path, BEAM[:start] + BEAM[end:])
+    assert said.startswith("scene.toml: ")
+    assert "the mesh has 'beam', 'leaf'" in said
+
+
+def test_mode_count_too_large(tmp_path):
+    said = check(tmp_path, BEAM.replace("modes = 1", "modes = 1000"))
+    assert re.fullmatch(
+        r"scene.toml: reduction: modes = 1000, but the component has only \d+ degrees of freedom",
+        said,
+    )
+
+
+@pytest.mark.parametrize("content", ["", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"])
+def test_empty_mesh(tmp_path, content):
+    (tmp_path / "empty.msh").write_text(content)
+    said = check(tmp_path, BEAM.replace(mesh("half_beam.msh").as_posix(), "empty.msh"))
+    assert said.startswith("scene.toml: mesh.file: empty.msh: ")
+
+
+def test_nothing_to_compute(tmp_path):
+    start, end = MODAL.index("[[excitation]]"), MODAL.index("[continuation]")
+    said = check(tmp_path, MODAL[:start] + MODAL[end:], "run")
+    assert said == "scene.toml: excitation is missing: nothing moves the structure"
+    said = check(tmp_path, MODAL[:end], "run")
+    assert said.startswith("scene.toml: continuation is missing: ")
+    assert not (tmp_path / "out").exists()
+
+
+def test_no_structure(tmp_path):
+    said = check(tmp_path, "title = 'empty'")
+    assert said.startswith("scene.toml: gives no structure")
+
+
+def test_matrices(tmp_path):
+    base = "[matrices]\nmass = {}\nstiffness = {}\ninterfaces.a = [1.0, 0.0]\n"
+    one = "[[1.0, 0.0], [0.0, 1.0]]"
+    for mass, stiffness, sentence in (
+        ("[[1.0, 0.0]]", one, "matrices.mass must have 1 rows of 1 numbers"),
+        ("1.0", one, "matrices.mass must be a list in square brackets, not 1.0"),
+        (one, "[[1.0]]", "matrices.stiffness must have 2 rows of 2 numbers"),
+        (one, "[[1.0, 0.5], [0.0, 1.0]]", "matrices.stiffness must be symmetric"),
+        ("[[1.0, 2.0], [2.0, 1.0]]", one, "matrices.mass must be positive definite"),
+    ):
+        assert check(tmp_path, base.format(mass, stiffness)).startswith(f"scene.toml: {sentence}")
+
+
+def test_negative_gap_is_a_preload(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(MODAL.replace("stiffness = 5e9", "stiffness = 5e9\ngap = -1e-6"))
+    result = CliRunner().invoke(main, ["check", str(file)])
+    assert result.exit_code == 0
+    assert "gap -1e-06 m" in result.stdout

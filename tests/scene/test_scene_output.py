@@ -1,0 +1,83 @@
+"""Tables hold every digit; a failed picture leaves no directory."""
+
+import csv
+import json
+
+import pytest
+from fakes import FakeBranch, FakeDiagram, FakeOrbit, FakeSpecialPoint, diagram
+
+from nldyn.output import write_results
+from nldyn.resources import example
+from nldyn.scene import load_scene
+
+FILES = {"branches.csv", "special_points.csv", "diagram.png", "diagram.svg", "summary.json"}
+
+
+def read(path):
+    with path.open(newline="") as file:
+        return list(csv.reader(file))
+
+
+def names(place):
+    return {p.name for p in place.iterdir() if not p.name.startswith(".")}
+
+
+def test_files_and_columns(tmp_path):
+    place = tmp_path / "out"
+    scene = load_scene(example("one_dof.toml"))
+    computed = diagram()
+    assert write_results(computed, place, scene) == place
+    assert names(place) == FILES | {"scene.toml"}
+    assert (place / "scene.toml").read_text() == scene.text
+    branches, special = read(place / "branches.csv"), read(place / "special_points.csv")
+    assert ",".join(branches[0]) == (
+        "branch,point,period,frequency_hz,max_abs_displacement_m,max_penetration_m,impacts,"
+        "stable,largest_multiplier"
+    )
+    assert ",".join(special[0]) == (
+        "branch,period,type,frequency_hz,max_abs_displacement_m,impacts"
+    )
+    assert len(branches) == 1 + sum(len(b.points) for b in computed.branches)
+    assert len(special) == 1 + sum(len(b.special_points) for b in computed.branches)
+    assert {row[2] for row in special[1:]} == {"PD", "LP", "GR"}
+
+
+def test_numbers_come_back_bit_for_bit(tmp_path):
+    third, tiny = 100.0 / 3.0, 1.2345678901234567e-7
+    orbit = FakeOrbit(third, tiny, 3, False, 2, tiny / 7, multipliers=[-1.1 + 0j, 0.1j])
+    branch = FakeBranch("a", 3, [orbit], [FakeSpecialPoint("PD", orbit)])
+    write_results(FakeDiagram([branch]), tmp_path / "out")
+    row = read(tmp_path / "out" / "branches.csv")[1]
+    assert [float(row[3]), float(row[4]), float(row[5])] == [third, tiny, tiny / 7]
+    assert row[:3] + row[6:] == ["a", "0", "3", "2", "0", "1.1"]
+    assert float(read(tmp_path / "out" / "special_points.csv")[1][3]) == third
+
+
+def test_summary(tmp_path):
+    write_results(diagram(), tmp_path / "out")
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["software"].startswith("nldyn ")
+    assert summary["largest_residual"] == 1e-14
+    assert [b["stop_reason"] for b in summary["branches"]] == ["end of range"] * 3
+
+
+def test_no_directory_if_the_picture_fails(tmp_path, monkeypatch):
+    def fail(*_, **__):
+        raise RuntimeError("no font")
+
+    monkeypatch.setattr("nldyn.plot.save_diagram", fail)
+    with pytest.raises(RuntimeError, match="no font"):
+        write_results(diagram(), tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_pictures_are_the_same_on_every_run(tmp_path):
+    for name in ("a", "b"):
+        write_results(diagram(), tmp_path / name)
+    for file in FILES:
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
+
+
+def test_diagram_without_branches(tmp_path):
+    write_results(FakeDiagram([]), tmp_path / "out")
+    assert names(tmp_path / "out") == FILES
