@@ -215,7 +215,7 @@ def save_figure(ax: Axes, stem: Path) -> None:
         figure.savefig(stem.with_suffix(".svg"), metadata={"Date": None})
 
 
-def new_axes(width: float = 9.0, height: float = 5.5) -> Axes:
+def new_axes(width: float = 10.5, height: float = 5.5) -> Axes:
     """Make the axes of a figure of its own, in inches, without pyplot."""
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
@@ -279,7 +279,7 @@ def _draw_legend(
     for kind in marked:
         label = f"{MARKER_NAMES[kind]} ({kind})"
         entries.append(Line2D([], [], label=label, **_mark_style(kind)))
-    ax.legend(handles=entries, fontsize="small", loc="best", framealpha=0.9)
+    ax.legend(handles=entries, fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
 
 
 def _draw_displacement(ax: Axes, time: NDArray[np.float64], y: NDArray[np.float64]) -> None:

@@ -48,6 +48,8 @@ def check_mesh_names(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
         _require(name, mesh.parts, f"a part of the mesh {source}", file, ("parts",))
     for key, name in _points_used(scene):
         _require(name, mesh.point_sets, f"a point set of the mesh {source}", file, key)
+    if scene.mesh.mirror is not None:
+        _check_mirror(scene, scene.mesh.mirror, file)
     for number, hinge in enumerate(scene.hinges):
         key = ("hinges", number, "part")
         _require(hinge.part, mesh.parts, f"a part of the mesh {source}", file, key)
@@ -68,6 +70,16 @@ def check_ratio_count(scene: Scene, count: int, file: Path) -> None:
     if isinstance(ratios, list) and len(ratios) != count:
         fault = f"has {len(ratios)} entries for a model with {count} modes"
         raise scene_error(file, ("damping", "modal_ratio"), fault)
+
+
+def _check_mirror(scene: Scene, point: str, file: Path) -> None:
+    held = {direction for s in scene.supports if s.at == point for direction in s.fixed}
+    if held not in ({"x", "rotation"}, {"y", "rotation"}):
+        fault = (
+            f"'{point}' is not on a plane of symmetry, where [[supports]] fix ['x', 'rotation'] "
+            "or ['y', 'rotation'] and no more"
+        )
+        raise scene_error(file, ("mesh", "mirror"), fault)
 
 
 def _check_structure(scene: Scene, report: Report) -> None:
@@ -149,6 +161,8 @@ def _points_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
             yield (table, number, "at"), entry.at
     for name, interface in scene.interfaces.items():
         yield ("interfaces", name, "at"), interface.at
+    if scene.mesh is not None and scene.mesh.mirror is not None:
+        yield ("mesh", "mirror"), scene.mesh.mirror
 
 
 def _require(name: str, known: Mapping[str, object], what: str, file: Path, key: KeyPath) -> None:

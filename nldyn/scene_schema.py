@@ -28,6 +28,7 @@ class MeshTable(Table):
     """``[mesh]``: the file of the finite element mesh."""
 
     file: str
+    mirror: str | None = None
 
 
 class PartTable(Table):

@@ -209,6 +209,12 @@ def test_fault_in_modal_scene(tmp_path, old, new, sentence):
             "[[hinges]]\nat='corner'\npart='lief'\n[[supports]]",
             "hinges[0].part 'lief' is not a part of the mesh MESH; did you mean 'leaf'?",
         ),
+        (
+            'mirror = "middle"',
+            'mirror = "foot"',
+            "mesh.mirror 'foot' is not on a plane of symmetry, where [[supports]] fix "
+            "['x', 'rotation'] or ['y', 'rotation'] and no more",
+        ),
         ("modes = 1", "modes = -1", "reduction.modes must be at least 0, not -1"),
         (
             "modes = 1",
