@@ -33,8 +33,24 @@ out_option = click.option(
 )
 
 
+def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    """Print the version and stop, if wanted."""
+    if wanted:
+        from nldyn.version import software_version
+
+        click.echo(f"nldyn {software_version()}")
+        context.exit()
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="nldyn", message="%(prog)s %(version)s")
+@click.option(
+    "--version",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=print_version,
+    help="Show the version and exit.",
+)
 def main() -> None:
     """Bifurcation diagrams of structures that hit a stop, from a mesh or from modal data."""
 
@@ -103,11 +119,14 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[float, str], None]]:
     """Show the fraction done and what is being computed, on stderr."""
     from tqdm import tqdm
 
+    if quiet:
+        yield lambda fraction, text: None
+        return
     shape = "{percentage:3.0f}%|{bar}| {elapsed} {desc}"
-    with tqdm(total=1.0, bar_format=shape, disable=quiet, leave=False, file=sys.stderr) as bar:
+    with tqdm(total=1.0, bar_format=shape, leave=False, file=sys.stderr) as bar:
 
         def report(fraction: float, text: str) -> None:
-            bar.set_description_str(text, refresh=False)
+            bar.set_description_str(text, refresh=text != bar.desc)
             bar.update(max(min(fraction, 1.0) - bar.n, 0.0))
 
         yield report
@@ -158,7 +177,3 @@ def static_flexibility(system: System, interface: str) -> float:
     if any(shares[squares == 0.0]):
         return float("inf")
     return float(sum(shares[squares > 0.0] / squares[squares > 0.0]))
-
-
-if __name__ == "__main__":
-    main()

@@ -9,13 +9,13 @@ import csv
 import json
 import math
 from collections.abc import Iterable, Mapping
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nldyn.result_directory import result_directory
+from nldyn.version import software_version
 
 if TYPE_CHECKING:
     from nldyn.branch import Branch
@@ -124,14 +124,6 @@ def write_table(path: Path, columns: Iterable[str], rows: Iterable[Iterable[obje
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows(rows)
-
-
-def software_version() -> str:
-    """Give the version of the installed package."""
-    try:
-        return version("nldyn")
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def summary(diagram: Diagram) -> Mapping[str, object]:

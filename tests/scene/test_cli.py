@@ -1,0 +1,103 @@
+"""The verbs of the command line, their output and their exit codes."""
+
+import subprocess
+import sys
+import types
+
+import pytest
+from click.testing import CliRunner
+from fakes import diagram
+
+import nldyn.scene
+from nldyn.cli import main
+from nldyn.resources import example
+
+ONE_DOF = str(example("one_dof.toml"))
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def computed(monkeypatch):
+    """Let every scene give the same ready diagram."""
+
+    def compute(scene, progress):
+        progress(0.5, "harmonic branch")
+        return diagram()
+
+    monkeypatch.setattr(nldyn.scene, "compute", compute)
+
+
+def test_run(tmp_path, computed):
+    result = invoke("run", ONE_DOF, "--out", tmp_path / "out")
+    assert result.exit_code == 0
+    assert "harmonic branch" in result.stderr
+    assert "3 branches with 1100 points" in result.stdout
+    assert "special points: 3 GR, 3 LP, 6 PD" in result.stdout
+    assert (tmp_path / "out" / "branches.csv").is_file()
+
+
+def test_run_again_into_the_same_directory(tmp_path, computed):
+    for _ in range(2):
+        assert invoke("run", ONE_DOF, "--out", tmp_path / "out", "--quiet").exit_code == 0
+
+
+def test_quiet_run_says_nothing_on_stderr(tmp_path, computed):
+    assert invoke("run", ONE_DOF, "--out", tmp_path / "out", "--quiet").stderr == ""
+
+
+def test_somebody_elses_directory_is_refused_before_the_work(tmp_path, monkeypatch):
+    monkeypatch.setattr(nldyn.scene, "compute", lambda *_: pytest.fail("computed"))
+    (tmp_path / "mine.txt").write_text("")
+    result = invoke("run", ONE_DOF, "--out", tmp_path)
+    assert result.exit_code == 2
+    assert "not written by nldyn" in result.stderr and result.stderr.count("\n") == 1
+
+
+def test_ctrl_c(tmp_path, monkeypatch):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(nldyn.scene, "compute", stop)
+    result = invoke("run", ONE_DOF, "--out", tmp_path / "out", "--quiet")
+    assert result.exit_code == 130
+    assert result.stderr == "nldyn: stopped by Ctrl-C, nothing is written\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_check_prints_the_model():
+    result = invoke("check", ONE_DOF)
+    assert result.exit_code == 0
+    for text in ("13.129310", "0.635001", "5.92522e-05", "5.17e+09 N/m^1.5", "no fault found"):
+        assert text in result.stdout
+
+
+def test_paper_is_handed_on(tmp_path, monkeypatch):
+    given = []
+    paper = types.ModuleType("nldyn.paper")
+    paper.main = given.append
+    monkeypatch.setitem(sys.modules, "nldyn.paper", paper)
+    assert invoke("paper", "--out", tmp_path).exit_code == 0
+    assert given == [tmp_path]
+
+
+def test_version_and_help():
+    assert invoke("--version").stdout.startswith("nldyn")
+    help_text = invoke("--help").stdout
+    for verb in ("run", "check", "render", "paper"):
+        assert verb in help_text
+
+
+def test_missing_option_is_a_user_error():
+    assert invoke("run", ONE_DOF).exit_code == 2
+
+
+def test_help_imports_nothing_heavy():
+    code = "import sys, nldyn.cli; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    heavy = {"numba", "scipy", "matplotlib", "pyvista", "skfem", "pydantic", "tqdm"}
+    assert heavy.isdisjoint(loaded)
