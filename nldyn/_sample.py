@@ -1,0 +1,186 @@
+"""Compiled evaluation of recorded trajectories: states at any instant, local extremes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+FLIGHT = -1
+
+
+@njit(cache=True)
+def map_fraction(kind, s):
+    """Fraction of the panel that belongs to the stretched time s (see `gauss.time_map`)."""
+    if kind == 0:
+        return s
+    if kind == 1:
+        return s * (2.0 - s)
+    if kind == 2:
+        return s * s
+    return 0.5 - 0.5 * np.cos(np.pi * s)
+
+
+@njit(cache=True)
+def stretched_time(kind, x):
+    """Inverse of `map_fraction`."""
+    x = min(max(x, 0.0), 1.0)
+    if kind == 0:
+        return x
+    if kind == 1:
+        return 1.0 - np.sqrt(1.0 - x)
+    if kind == 2:
+        return np.sqrt(x)
+    return np.arccos(1.0 - 2.0 * x) / np.pi
+
+
+@njit(cache=True)
+def map_slope(kind, s):
+    """Derivative of `map_fraction`."""
+    if kind == 0:
+        return 1.0
+    if kind == 1:
+        return 2.0 - 2.0 * s
+    if kind == 2:
+        return 2.0 * s
+    return 0.5 * np.pi * np.sin(np.pi * s)
+
+
+@njit(cache=True)
+def antiderivative_weights(to_legendre, s, out):
+    """Weights of the node values in the integral of their interpolant from 0 to s."""
+    m = out.size
+    out[:] = 0.0
+    x = 2.0 * s - 1.0
+    before, here = 1.0, x  # Legendre polynomials of degree 0 and 1
+    for degree in range(m):
+        if degree == 0:
+            integral = s
+        else:
+            following = ((2 * degree + 1) * x * here - degree * before) / (degree + 1)
+            integral = 0.5 * (following - before) / (2 * degree + 1)
+            before, here = here, following
+        for j in range(m):
+            out[j] += integral * to_legendre[degree, j]
+
+
+@njit(cache=True)
+def state_at(eigenvalues, force, chi, to_legendre, gauss_nodes, kind, h, start, forces, t, w):
+    """Fill w with the homogeneous state a time t after the start of a piece."""
+    nz = eigenvalues.size
+    for k in range(nz):
+        w[k] = start[k] * np.exp(eigenvalues[k] * t)
+    if kind == FLIGHT:
+        return
+    m = gauss_nodes.size
+    s = stretched_time(kind, t / h)
+    weights = np.empty(m)
+    antiderivative_weights(to_legendre, s, weights)
+    for k in range(nz):
+        for j in range(m):
+            drive = 0.0j
+            for a in range(forces.shape[0]):
+                drive += force[k, a] * forces[a, j]
+            share = h * weights[j] * map_slope(kind, gauss_nodes[j])
+            w[k] -= share * drive * np.exp(eigenvalues[k] * (t - h * chi[kind, j]))
+
+
+@njit(cache=True)
+def sample_states(
+    eigenvalues, force, omega, chi, to_legendre, gauss_nodes,
+    rec_phase, rec_duration, rec_kind, rec_w, rec_force, count, phases,
+):  # fmt: skip
+    """Homogeneous states (n_phases, nz) at ascending forcing phases."""
+    states = np.empty((phases.size, eigenvalues.size), dtype=np.complex128)
+    piece = 0
+    for i in range(phases.size):
+        while piece + 1 < count and rec_phase[piece + 1] <= phases[i]:
+            piece += 1
+        t = (phases[i] - rec_phase[piece]) / omega
+        state_at(
+            eigenvalues, force, chi, to_legendre, gauss_nodes, rec_kind[piece],
+            rec_duration[piece], rec_w[piece], rec_force[piece], t, states[i],
+        )  # fmt: skip
+    return states
+
+
+@njit(cache=True)
+def output_rate(eigenvalues, row, forced, omega, phase, w):
+    """Value and rate of the output ``Re(row @ w) + Re(forced e^{i phase})``."""
+    turn = forced * np.exp(1j * phase)
+    value = turn.real
+    rate = -omega * turn.imag
+    for k in range(w.size):
+        part = row[k] * w[k]
+        value += part.real
+        rate += (eigenvalues[k] * part).real
+    return value, rate
+
+
+@njit(cache=True)
+def local_extremes(
+    eigenvalues, force, omega, chi, to_legendre, gauss_nodes,
+    rec_phase, rec_duration, rec_kind, rec_w, rec_force, count, row, forced,
+):  # fmt: skip
+    """Phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output.
+
+    The rate is sampled sixteen times per period of the fastest mode, its sign changes are
+    refined by the secant and bisection in turn.
+    """
+    nz = eigenvalues.size
+    fastest = omega
+    for k in range(nz):
+        fastest = max(fastest, abs(eigenvalues[k].imag))
+    spacing = 2.0 * np.pi / (16.0 * fastest)
+    capacity = 64
+    found = np.empty((capacity, 3))
+    n = 0
+    w = np.empty(nz, dtype=np.complex128)
+    old_rate = 0.0
+    for piece in range(count):
+        h = rec_duration[piece]
+        kind = rec_kind[piece]
+        pieces = int(np.ceil(h / spacing)) + 1
+        if kind != FLIGHT:
+            pieces += gauss_nodes.size
+        t_old = 0.0
+        for i in range(pieces + 1):
+            x = i / pieces
+            t = h * (x if kind == FLIGHT else map_fraction(kind, x))
+            state_at(
+                eigenvalues, force, chi, to_legendre, gauss_nodes, kind, h,
+                rec_w[piece], rec_force[piece], t, w,
+            )  # fmt: skip
+            _, rate = output_rate(
+                eigenvalues, row, forced, omega, rec_phase[piece] + omega * t, w
+            )
+            if i > 0 and old_rate * rate < 0.0 or (old_rate != 0.0 and rate == 0.0 and i > 0):
+                lo, hi, rate_lo, rate_hi = t_old, t, old_rate, rate
+                value = 0.0
+                for step in range(100):
+                    middle = 0.5 * (lo + hi)
+                    if step % 3 != 2 and rate_hi != rate_lo:
+                        middle = lo - rate_lo * (hi - lo) / (rate_hi - rate_lo)
+                    state_at(
+                        eigenvalues, force, chi, to_legendre, gauss_nodes, kind, h,
+                        rec_w[piece], rec_force[piece], middle, w,
+                    )  # fmt: skip
+                    value, rate_middle = output_rate(
+                        eigenvalues, row, forced, omega, rec_phase[piece] + omega * middle, w
+                    )
+                    if rate_middle * rate_lo > 0.0:
+                        lo, rate_lo = middle, rate_middle
+                    else:
+                        hi, rate_hi = middle, rate_middle
+                    if hi - lo <= 1e-9 * spacing or rate_middle == 0.0:
+                        break
+                if n == capacity:
+                    larger = np.empty((2 * capacity, 3))
+                    larger[:capacity] = found
+                    found = larger
+                    capacity *= 2
+                found[n, 0] = rec_phase[piece] + omega * 0.5 * (lo + hi)
+                found[n, 1] = value
+                found[n, 2] = 1.0 if old_rate > 0.0 else -1.0
+                n += 1
+            t_old, old_rate = t, rate
+    return found[:n]

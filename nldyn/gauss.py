@@ -1,0 +1,89 @@
+"""Gauss-Legendre collocation on one panel, with maps that resolve a contact switch."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+Real = NDArray[np.float64]
+
+# Panel kinds: 2 * (switch at the start) + (switch at the end).
+SMOOTH, ENDS_AT_SWITCH, STARTS_AT_SWITCH, BETWEEN_SWITCHES = range(4)
+
+
+class GaussTables(NamedTuple):
+    """Tables of an m-node panel for each of the four kinds of ends.
+
+    Parameters
+    ----------
+    chi : (4, m)
+        Node times as fractions of the panel.
+    integrate : (4, m, m)
+        ``integrate[kind, i, j]``: weight of node j in the integral up to node i.
+    weights : (4, m)
+        Weights of the integral over the panel.
+    to_legendre : (m, m)
+        Legendre coefficients in s from node values.
+    nodes : (m,)
+        The Gauss nodes in s.
+    """
+
+    chi: Real
+    integrate: Real
+    weights: Real
+    to_legendre: Real
+    nodes: Real
+
+
+def time_map(kind: int, s: Real | float) -> tuple[Real | float, Real | float]:
+    """Fraction of the panel χ(s) and its slope; quadratic at an end where a contact switches.
+
+    A force that starts like (t - t0)^p is smooth in s where t - t0 ~ s², if 2p is an integer.
+    The cosine has no other simple zeros in the complex plane, so it adds no branch points.
+
+    Examples
+    --------
+    >>> time_map(STARTS_AT_SWITCH, 0.5)
+    (0.25, 1.0)
+    """
+    if kind == SMOOTH:
+        return s, 1.0 + 0.0 * s
+    if kind == ENDS_AT_SWITCH:
+        return s * (2.0 - s), 2.0 - 2.0 * s
+    if kind == STARTS_AT_SWITCH:
+        return s * s, 2.0 * s
+    return 0.5 - 0.5 * np.cos(np.pi * s), 0.5 * np.pi * np.sin(np.pi * s)
+
+
+@lru_cache(maxsize=8)
+def gauss_tables(m: int) -> GaussTables:
+    """Tables for m Gauss nodes.
+
+    Examples
+    --------
+    >>> gauss_tables(4).weights[0].sum().round(12)
+    np.float64(1.0)
+    """
+    x, w = legendre.leggauss(m)
+    nodes = 0.5 * (x + 1.0)
+    degrees = np.arange(m)
+    vandermonde = legendre.legvander(x, m - 1)
+    to_legendre = (0.5 * (2 * degrees + 1))[:, None] * vandermonde.T * w
+    antiderivative = np.array(
+        [0.5 * legendre.legval(x, legendre.legint(unit, lbnd=-1)) for unit in np.eye(m)]
+    ).T
+    running = antiderivative @ to_legendre
+    maps = [time_map(kind, nodes) for kind in range(4)]
+    chi = np.array([c for c, _ in maps])
+    slope = np.array([d for _, d in maps])
+    return GaussTables(
+        chi,
+        np.ascontiguousarray(running[None] * slope[:, None, :]),
+        0.5 * w * slope,
+        to_legendre,
+        nodes,
+    )

@@ -1,0 +1,458 @@
+"""A reduced model with its stops, dampers and excitation, in modal form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+import scipy.linalg as sla
+from numpy.typing import ArrayLike, NDArray
+
+from nldyn.elements import Damper, Excitation, Stop
+from nldyn.errors import SystemModelError
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# Beyond this condition number of the eigenvector basis fewer than eight digits would be left.
+_MAX_CONDITION = 1e8
+
+
+class ReducedModelLike(Protocol):
+    """What `System.from_reduced` needs: modal frequencies and participations."""
+
+    @property
+    def frequencies_hz(self) -> Real:
+        """Modal frequencies in Hz, shape (n,)."""
+
+    @property
+    def participation(self) -> Mapping[str, Real]:
+        """Displacement of each mass-normalised mode at each interface, shape (n,)."""
+
+
+@dataclass(frozen=True)
+class LinearPart:
+    """Eigenvalues and eigenvectors of the linear part, one of each complex pair.
+
+    The state ``x = (q, q')`` is ``Re(right @ w)`` and ``w = left @ x``; between contacts every
+    w decays and turns by itself: ``w' = λ w``. Each right vector has a displacement part of unit
+    length, so that |w| is a modal displacement.
+
+    Parameters
+    ----------
+    eigenvalues : (nz,) complex
+        λ in 1/s with non-negative imaginary part.
+    right : (2n, nz) complex
+        Eigenvectors (doubled for complex pairs).
+    left : (nz, 2n) complex
+        Rows of the inverse eigenvector matrix.
+    is_pair : (nz,) bool
+        Whether λ stands for a complex pair.
+    condition : float
+        Condition number of the eigenvector basis (energy-scaled).
+    """
+
+    eigenvalues: Complex
+    right: Complex
+    left: Complex
+    is_pair: NDArray[np.bool_]
+    condition: float
+
+    @cached_property
+    def pack_mode(self) -> NDArray[np.int64]:
+        """Mode of each real coordinate of a packed w, shape (2n,)."""
+        return np.repeat(np.arange(self.is_pair.size), np.where(self.is_pair, 2, 1))
+
+    @cached_property
+    def pack_unit(self) -> Complex:
+        """1 where a packed coordinate is a real part, 1j where an imaginary one; shape (2n,)."""
+        unit = np.ones(self.pack_mode.size, dtype=complex)
+        unit[1:][self.pack_mode[1:] == self.pack_mode[:-1]] = 1j
+        return unit
+
+    def pack(self, w: Complex) -> Real:
+        """Real coordinates (..., 2n) of complex w (..., nz)."""
+        return np.ascontiguousarray((w[..., self.pack_mode] * self.pack_unit.conj()).real)
+
+    def unpack(self, packed: Real) -> Complex:
+        """Complex w (..., nz) of real coordinates (..., 2n)."""
+        w = np.zeros((*packed.shape[:-1], self.is_pair.size), dtype=complex)
+        for column, (mode, unit) in enumerate(zip(self.pack_mode, self.pack_unit, strict=True)):
+            w[..., mode] += packed[..., column] * unit
+        return w
+
+
+@dataclass(frozen=True)
+class ForcedResponse:
+    """Steady response of the linear part to the excitation at one frequency.
+
+    ``w_p(t) = positive e^{iωt} + negative e^{-iωt}``, both (nz,); the d-fields are their
+    derivatives with respect to ω.
+    """
+
+    omega: float
+    positive: Complex
+    negative: Complex
+    d_positive: Complex
+    d_negative: Complex
+
+    def at_phase(self, phase: float | Real) -> Complex:
+        """w_p at forcing phase ωt, shape (..., nz)."""
+        turn = np.exp(1j * np.asarray(phase))[..., None]
+        return self.positive * turn + self.negative / turn
+
+    def output(self, row: Complex) -> tuple[complex, complex]:
+        """Complex amplitude of the output ``Re(row @ w_p)`` and its derivative."""
+        value = row @ self.positive + np.conj(row @ self.negative)
+        slope = row @ self.d_positive + np.conj(row @ self.d_negative)
+        return complex(value), complex(slope)
+
+
+@dataclass(frozen=True)
+class System:
+    r"""Modal equations :math:`\ddot q + D\dot q + \Omega^2 q = \sum p f(t) - \sum c F(\delta)`.
+
+    Use `from_modal`, `from_matrices` or `from_reduced` to make one.
+
+    Parameters
+    ----------
+    natural_frequencies : (n,) array
+        Modal circular frequencies Ω in rad/s.
+    damping : (n, n) array
+        Modal damping matrix D in 1/s, without the point dampers.
+    participation : mapping of str to (n,) array
+        Displacement of each mass-normalised mode at each interface, 1/sqrt(kg).
+    stops, dampers, excitation : tuples
+        What acts at the interfaces.
+
+    Raises
+    ------
+    SystemModelError
+        If shapes disagree, a value is not finite or out of range, an interface is unknown,
+        or the damped linear part has no usable eigenvector basis.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     stops=[Stop("middle", stiffness=5.17e9)], excitation=[Unbalance("middle", 4.92e-6)])
+    >>> system.size
+    1
+    """
+
+    natural_frequencies: Real
+    damping: Real
+    participation: Mapping[str, Real]
+    stops: tuple[Stop, ...] = ()
+    dampers: tuple[Damper, ...] = ()
+    excitation: tuple[Excitation, ...] = ()
+
+    def __post_init__(self) -> None:
+        self._check_shapes()
+        self._check_interfaces()
+        _ = self.linear
+
+    @classmethod
+    def from_modal(
+        cls,
+        frequencies_hz: ArrayLike,
+        participation: Mapping[str, ArrayLike],
+        *,
+        modal_damping: float | ArrayLike = 0.0,
+        stops: Sequence[Stop] = (),
+        dampers: Sequence[Damper] = (),
+        excitation: Sequence[Excitation] = (),
+    ) -> System:
+        """System from modal data typed in by hand.
+
+        Parameters
+        ----------
+        frequencies_hz : (n,) array_like
+            Modal frequencies in Hz.
+        participation : mapping of str to (n,) array_like
+            Displacement of each mass-normalised mode at each interface, 1/sqrt(kg).
+        modal_damping : float or (n,) array_like
+            Damping ratio of every mode.
+        stops, dampers, excitation : sequences
+            What acts at the interfaces.
+
+        Raises
+        ------
+        SystemModelError
+            See `System`.
+
+        Examples
+        --------
+        >>> System.from_modal([10.0, 20.0], {"tip": [1.0, -1.0]}, modal_damping=0.01).size
+        2
+        """
+        omega = 2.0 * np.pi * np.atleast_1d(_array("frequencies_hz", frequencies_hz))
+        return cls(
+            omega,
+            _modal_damping(omega, modal_damping),
+            {name: np.atleast_1d(_array(name, phi)) for name, phi in participation.items()},
+            tuple(stops),
+            tuple(dampers),
+            tuple(excitation),
+        )
+
+    @classmethod
+    def from_matrices(
+        cls,
+        mass: ArrayLike,
+        stiffness: ArrayLike,
+        interfaces: Mapping[str, ArrayLike],
+        *,
+        damping: ArrayLike | None = None,
+        modal_damping: float | ArrayLike = 0.0,
+        stops: Sequence[Stop] = (),
+        dampers: Sequence[Damper] = (),
+        excitation: Sequence[Excitation] = (),
+    ) -> System:
+        """System from mass, stiffness and damping matrices.
+
+        Parameters
+        ----------
+        mass, stiffness : (n, n) array_like
+            Symmetric; the mass positive definite, the stiffness positive semidefinite.
+        interfaces : mapping of str to (n,) array_like
+            Unit load vector of each interface.
+        damping : (n, n) array_like, optional
+            Symmetric damping matrix in N s/m, added to the modal damping.
+        modal_damping : float or (n,) array_like
+            Damping ratio of every mode.
+        stops, dampers, excitation : sequences
+            What acts at the interfaces.
+
+        Raises
+        ------
+        SystemModelError
+            If a matrix is not square, symmetric, finite or definite; see also `System`.
+
+        Examples
+        --------
+        >>> s = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]}, modal_damping=0.0142)
+        >>> f"{s.frequencies_hz[0]:.4f}"
+        '13.1293'
+        """
+        M = _symmetric("mass", mass)
+        K = _symmetric("stiffness", stiffness)
+        if K.shape != M.shape:
+            raise SystemModelError(f"stiffness is {K.shape} but mass is {M.shape}")
+        try:
+            squared, modes = sla.eigh(K, M)
+        except sla.LinAlgError:
+            raise SystemModelError("mass must be positive definite") from None
+        if squared[0] < -1e-10 * abs(squared[-1]):
+            raise SystemModelError("stiffness must not be negative in any direction")
+        omega = np.sqrt(np.maximum(squared, 0.0))
+        D = _modal_damping(omega, modal_damping)
+        if damping is not None:
+            C = _symmetric("damping", damping)
+            if C.shape != M.shape:
+                raise SystemModelError(f"damping is {C.shape} but mass is {M.shape}")
+            D = D + modes.T @ C @ modes
+        participation = {}
+        for name, vector in interfaces.items():
+            b = np.atleast_1d(_array(f"interface '{name}'", vector))
+            if b.shape != omega.shape:
+                raise SystemModelError(
+                    f"interface '{name}' has {b.size} entries but the matrices have {omega.size} rows"
+                )
+            participation[name] = modes.T @ b
+        return cls(omega, D, participation, tuple(stops), tuple(dampers), tuple(excitation))
+
+    @classmethod
+    def from_reduced(
+        cls,
+        reduced: ReducedModelLike,
+        *,
+        modal_damping: float | ArrayLike = 0.0,
+        stops: Sequence[Stop] = (),
+        dampers: Sequence[Damper] = (),
+        excitation: Sequence[Excitation] = (),
+    ) -> System:
+        """System from a reduced model (anything with frequencies and participations).
+
+        Parameters
+        ----------
+        reduced : object
+            With `frequencies_hz` (n,) and `participation` {name: (n,)}.
+        modal_damping, stops, dampers, excitation
+            As for `from_modal`.
+
+        Raises
+        ------
+        SystemModelError
+            See `System`.
+        """
+        return cls.from_modal(
+            reduced.frequencies_hz,
+            reduced.participation,
+            modal_damping=modal_damping,
+            stops=stops,
+            dampers=dampers,
+            excitation=excitation,
+        )
+
+    @property
+    def size(self) -> int:
+        """Number of modes n."""
+        return int(self.natural_frequencies.size)
+
+    @property
+    def frequencies_hz(self) -> Real:
+        """Modal frequencies in Hz, shape (n,)."""
+        return self.natural_frequencies / (2.0 * np.pi)
+
+    @property
+    def interfaces(self) -> tuple[str, ...]:
+        """Names of the interfaces, in the order given."""
+        return tuple(self.participation)
+
+    @cached_property
+    def total_damping(self) -> Real:
+        """Modal damping matrix with the point dampers, (n, n), 1/s."""
+        D = np.array(self.damping)
+        for damper in self.dampers:
+            phi = self.participation[damper.at]
+            D += damper.coefficient * np.outer(phi, phi)
+        return D
+
+    @cached_property
+    def linear(self) -> LinearPart:
+        """Eigenvalues and eigenvectors of the linear part."""
+        return _linear_part(self.natural_frequencies, self.total_damping)
+
+    def stop_vector(self, stop: Stop) -> Real:
+        """Modal vector c with penetration ``c @ q - gap``, shape (n,)."""
+        c = self.participation[stop.at]
+        if stop.against is not None:
+            c = c - self.participation[stop.against]
+        return stop.direction * c
+
+    def displacement_row(self, phi: Real) -> Complex:
+        """Row that gives the displacement ``phi @ q = Re(row @ w)``, shape (nz,)."""
+        return np.asarray(phi @ self.linear.right[: self.size])
+
+    def force_column(self, phi: Real) -> Complex:
+        """Column by which a unit force on ``phi`` drives w, shape (nz,)."""
+        return np.asarray(self.linear.left[:, self.size :] @ phi)
+
+    def forced_response(self, omega: float) -> ForcedResponse:
+        """Steady linear response at ω (rad/s).
+
+        Raises
+        ------
+        SystemModelError
+            If an undamped mode is excited exactly at its frequency.
+        """
+        lam = self.linear.eigenvalues
+        drive = np.zeros((4, lam.size), dtype=complex)  # value and slope, e^{iωt} and e^{-iωt}
+        for source in self.excitation:
+            amplitude, slope = source.complex_amplitude(omega)
+            column = 0.5 * self.force_column(self.participation[source.at])
+            drive += np.outer([amplitude, slope, np.conj(amplitude), np.conj(slope)], column)
+        up, down = 1j * omega - lam, -1j * omega - lam
+        if np.any(np.minimum(abs(up), abs(down)) < 1e-12 * omega):
+            raise SystemModelError(
+                f"the excitation at {omega / (2 * np.pi):g} Hz meets an undamped mode exactly; "
+                "give the mode some damping or move the frequency"
+            )
+        positive, negative = drive[0] / up, drive[2] / down
+        return ForcedResponse(
+            omega,
+            positive,
+            negative,
+            (drive[1] - 1j * positive) / up,
+            (drive[3] + 1j * negative) / down,
+        )
+
+    def _check_shapes(self) -> None:
+        n = self.natural_frequencies.size
+        if n == 0:
+            raise SystemModelError("a system needs at least one mode")
+        if np.any(self.natural_frequencies < 0.0):
+            raise SystemModelError("frequencies_hz must not be negative")
+        if self.damping.shape != (n, n):
+            raise SystemModelError(f"damping must be ({n}, {n}), got {self.damping.shape}")
+        for name, phi in self.participation.items():
+            if phi.shape != (n,):
+                raise SystemModelError(
+                    f"participation of '{name}' has {phi.size} entries but there are {n} modes"
+                )
+
+    def _check_interfaces(self) -> None:
+        known = ", ".join(self.participation) or "none"
+        for kind, elements in (
+            ("stop", self.stops),
+            ("damper", self.dampers),
+            ("excitation", self.excitation),
+        ):
+            for element in elements:
+                names = [element.at]
+                if isinstance(element, Stop) and element.against is not None:
+                    names.append(element.against)
+                for name in names:
+                    if name not in self.participation:
+                        raise SystemModelError(
+                            f"{kind} at unknown interface '{name}'; there are: {known}"
+                        )
+
+
+def _array(name: str, values: ArrayLike) -> Real:
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise SystemModelError(f"{name} must hold numbers only") from None
+    if not np.all(np.isfinite(array)):
+        raise SystemModelError(f"{name} has an entry that is not finite")
+    return array
+
+
+def _symmetric(name: str, values: ArrayLike) -> Real:
+    matrix = np.atleast_2d(_array(name, values))
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
+        raise SystemModelError(f"{name} must be a square matrix, got shape {matrix.shape}")
+    if not np.allclose(matrix, matrix.T, rtol=1e-10, atol=1e-12 * float(np.abs(matrix).max())):
+        raise SystemModelError(f"{name} must be symmetric")
+    return matrix
+
+
+def _modal_damping(omega: Real, ratios: float | ArrayLike) -> Real:
+    zeta = _array("modal_damping", ratios)
+    if zeta.ndim > 1 or zeta.size not in (1, omega.size):
+        raise SystemModelError(
+            f"modal_damping must be one number or one per mode ({omega.size}), got {zeta.size}"
+        )
+    if np.any(zeta < 0.0):
+        raise SystemModelError("modal_damping must not be negative")
+    return np.diag(2.0 * zeta * omega)
+
+
+def _linear_part(omega: Real, damping: Real) -> LinearPart:
+    n = omega.size
+    if np.linalg.eigvalsh(0.5 * (damping + damping.T))[0] < -1e-12 * (1.0 + abs(damping).max()):
+        raise SystemModelError("the damping matrix must not feed energy in (it has a negative part)")
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(omega**2), -damping]])
+    eigenvalues, vectors = np.linalg.eig(A)
+    vectors = vectors / np.linalg.norm(vectors[:n], axis=0)
+    scale = np.concatenate([np.maximum(omega, 1e-3 * max(omega.max(), 1.0)), np.ones(n)])
+    energy_vectors = scale[:, None] * vectors
+    condition = float(np.linalg.cond(energy_vectors / np.linalg.norm(energy_vectors, axis=0)))
+    if not condition < _MAX_CONDITION:
+        raise SystemModelError(
+            "the linear part has (nearly) coinciding modes that damping makes inseparable "
+            f"(eigenvector condition {condition:.1e}): a mode at 0 Hz without damping or a "
+            "critically damped mode; change its frequency or damping slightly"
+        )
+    left = np.linalg.inv(vectors)
+    tiny = 1e-13 * np.abs(eigenvalues).max()
+    keep = np.flatnonzero(eigenvalues.imag > -tiny)
+    keep = keep[np.argsort(np.abs(eigenvalues[keep]), kind="stable")]
+    is_pair = eigenvalues[keep].imag > tiny
+    right = vectors[:, keep] * np.where(is_pair, 2.0, 1.0)
+    return LinearPart(eigenvalues[keep], right, left[keep], is_pair, condition)
