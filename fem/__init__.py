@@ -1,6 +1,7 @@
 """Plane frames of Euler-Bernoulli beams: from a mesh to stiffness, mass and interfaces."""
 
 from fem.abaqus import read_abaqus
+from fem.calibrate import Calibration, calibrate
 from fem.errors import ModelError
 from fem.frame import Component, assemble
 from fem.mesh import FrameMesh, frame_mesh
@@ -23,6 +24,7 @@ from fem.write import write_mesh
 
 __all__ = [
     "BeamPart",
+    "Calibration",
     "CircularSection",
     "Component",
     "CrossSection",
@@ -38,6 +40,7 @@ __all__ = [
     "Section",
     "Support",
     "assemble",
+    "calibrate",
     "frame_mesh",
     "from_meshio",
     "read_abaqus",

@@ -88,11 +88,13 @@ def full_beam_mesh(
     return fem.frame_mesh(points, members, source="full beam")
 
 
-def half_beam_model(mesh: fem.FrameMesh, middle_mass: float) -> fem.FrameModel:
+def half_beam_model(
+    mesh: fem.FrameMesh, middle_mass: float, beam: fem.BeamPart = BEAM
+) -> fem.FrameModel:
     """Half the beam: symmetric at the middle, with half of the mass there; foot clamped."""
     return fem.FrameModel(
         mesh,
-        parts=PARTS,
+        parts={**PARTS, "beam": beam},
         supports=[fem.Support("middle", ("x", "rotation")), fem.Support("foot", CLAMP)],
         point_masses=[fem.PointMass("middle", middle_mass / 2)],
         interfaces={"middle": fem.Interface("middle", "y")},

@@ -22,7 +22,7 @@ class Member:
     stop: int
     EA: float
     EI: float
-    rhoA: float
+    mass_per_length: float
 
 
 def bending_stiffness(EI, rhoA, length, omega):
@@ -47,7 +47,9 @@ def bending_stiffness(EI, rhoA, length, omega):
 def stretching_stiffness(EA, rhoA, length, omega):
     """(2, 2): forces along the axis at both ends."""
     q = omega * np.sqrt(rhoA / EA)
-    return EA * q / np.sin(q * length) * np.array([[np.cos(q * length), -1], [-1, np.cos(q * length)]])
+    return (
+        EA * q / np.sin(q * length) * np.array([[np.cos(q * length), -1], [-1, np.cos(q * length)]])
+    )
 
 
 def frame_stiffness(nodes, members, omega, lumps=None):
@@ -58,9 +60,13 @@ def frame_stiffness(nodes, members, omega, lumps=None):
         length = np.hypot(*span)
         c, s = span / length
         local = np.zeros((6, 6))
-        local[np.ix_([0, 3], [0, 3])] = stretching_stiffness(member.EA, member.rhoA, length, omega)
+        local[np.ix_([0, 3], [0, 3])] = stretching_stiffness(
+            member.EA, member.mass_per_length, length, omega
+        )
         bend = [1, 2, 4, 5]
-        local[np.ix_(bend, bend)] = bending_stiffness(member.EI, member.rhoA, length, omega)
+        local[np.ix_(bend, bend)] = bending_stiffness(
+            member.EI, member.mass_per_length, length, omega
+        )
         T = np.kron(np.eye(2), [[c, s, 0], [-s, c, 0], [0, 0, 1]])
         dofs = [3 * node + i for node in (member.start, member.stop) for i in range(3)]
         D[np.ix_(dofs, dofs)] += T.T @ local @ T
