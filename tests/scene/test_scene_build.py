@@ -1,6 +1,7 @@
 """Scenes become components, reduced models and systems."""
 
 import math
+import tomllib
 
 import numpy as np
 import pytest
@@ -54,6 +55,14 @@ def test_damper_of_beam_scenes_is_that_of_equation_3_1():
             assert damper.coefficient == pytest.approx(
                 2 * 0.0142 * math.sqrt(2.48 * 16877), abs=1e-5
             )
+
+
+def test_mass_of_beam_scenes_is_half_of_the_calibrated_one():
+    calibrated = tomllib.loads(mesh("half_beam.toml").read_text())["middle_mass"]
+    for name in examples():
+        if "_xi_" in name:
+            (mass,) = load_scene(example(name)).point_masses
+            assert mass.mass == pytest.approx(calibrated / 2, rel=1e-12)
 
 
 def test_component_can_be_handed_on():

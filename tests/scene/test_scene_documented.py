@@ -2,15 +2,16 @@
 
 import re
 import tomllib
+from pathlib import Path
 
 import pytest
 
-from nldyn.resources import data_directory, example, examples
+from nldyn.resources import example, examples
 from nldyn.scene import load_scene, parse_scene
 from nldyn.scene_messages import all_keys, table_at
 from nldyn.scene_schema import Scene
 
-DOC = (data_directory() / "docs" / "scene.md").read_text(encoding="utf-8")
+DOC = (Path(__file__).parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
 
 
 def documented():
