@@ -13,8 +13,17 @@ from fem.errors import ModelError, quoted
 from fem.mesh import FloatArray, FrameMesh, IntArray
 
 SET_PREFIX = "set:"
+
+
+def read_gmsh(path: Path) -> meshio.Mesh:
+    """Read a Gmsh file that has its end: of one that is cut off, meshio reads what is there."""
+    if b"$EndElements" not in path.read_bytes():
+        raise ModelError(f"{path}: the Gmsh file is cut off (there is no $EndElements)")
+    return meshio.gmsh.read(path)
+
+
 READERS: dict[str, tuple[str, Callable[[Path], meshio.Mesh]]] = {
-    ".msh": ("Gmsh", meshio.gmsh.read),
+    ".msh": ("Gmsh", read_gmsh),
     ".vtu": ("VTK", meshio.vtu.read),
     ".inp": ("Abaqus", read_abaqus),
 }
@@ -64,13 +73,14 @@ def read_mesh(path: str | Path) -> FrameMesh:
         raise ModelError(f"{path}: there is no such mesh file")
     kind, read = READERS[path.suffix.lower()]
     try:
-        content = read(path)
+        return from_meshio(read(path), str(path))
     except ModelError:
         raise
     except (Exception, SystemExit) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise ModelError(f"{path}: cannot be read as a {kind} mesh ({reason})") from error
-    return from_meshio(content, str(path))
+        if "'gmsh:physical'" in reason:
+            reason = "some curves or points have a physical group and some have none"
+        raise ModelError(f"{path}: cannot be read as {kind} mesh ({reason})") from error
 
 
 def from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> FrameMesh:

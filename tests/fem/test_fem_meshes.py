@@ -1,0 +1,298 @@
+"""Reading and writing meshes. The files in data/gmsh* were written by Gmsh 4.15."""
+
+import math
+from pathlib import Path
+
+import make_meshes
+import meshio
+import numpy as np
+import pytest
+from frames import BAR
+
+import fem
+
+DATA = Path(__file__).parent / "data"
+WHOLE_FILES = ["gmsh22.msh", "gmsh22_binary.msh", "gmsh41.msh", "gmsh41_binary.msh"]
+
+
+@pytest.mark.parametrize("name", [*WHOLE_FILES, "gmsh_export.inp"])
+def test_files_of_gmsh_give_points_lines_parts_and_z(name):
+    mesh = fem.read_mesh(DATA / name)
+    assert {part: len(mesh.part(part)) for part in ("beam", "leaf")} == {"beam": 3, "leaf": 2}
+    expected = {"corner": [0, 0, 0.5], "middle": [0.66, 0, 0.5], "foot": [0, -0.12, 0.5]}
+    for point, xyz in expected.items():
+        assert mesh.points[mesh.node(point)].tolist() == xyz
+    assert mesh.lengths[mesh.part("beam")] == pytest.approx(np.full(3, 0.22), rel=1e-11)
+    assert mesh.lengths[mesh.part("leaf")] == pytest.approx(np.full(2, 0.06), rel=1e-11)
+
+
+def test_gmsh_groups_may_overlap_and_have_no_name():
+    mesh = fem.read_mesh(DATA / "gmsh41_groups.msh")
+    assert len(mesh.part("all")) == 5
+    assert mesh.points[mesh.node("77")].tolist() == [0.66, 0, 0.5]
+    with pytest.raises(fem.ModelError, match="element 0 is in more than one part: 'all', 'beam'"):
+        fem.FrameModel(mesh, {"all": BAR, "beam": BAR})
+
+
+def same_structure(mesh):
+    model = make_meshes.half_beam_model(mesh, 0.4)
+    return fem.assemble(model)
+
+
+@pytest.mark.parametrize("extension", [".vtu", ".inp"])
+def test_the_half_beam_is_the_same_in_every_format(extension):
+    reference = same_structure(fem.read_mesh(make_meshes.HERE / "half_beam.msh"))
+    other = same_structure(fem.read_mesh(make_meshes.HERE / f"half_beam{extension}"))
+    for name in ("stiffness", "mass"):
+        expected, found = getattr(reference, name), getattr(other, name)
+        assert abs(found - expected).max() <= 1e-15 * abs(expected).max()
+    assert np.array_equal(other.interfaces["middle"], reference.interfaces["middle"])
+
+
+@pytest.mark.parametrize("extension", [".msh", ".vtu", ".inp"])
+def test_a_written_mesh_comes_back_to_the_last_bit(tmp_path, extension):
+    mesh = fem.frame_mesh(
+        {"a": (1 / 3, 0.1, 0.7), "b": (math.pi, 2e-7, 0.7), "c": (-1e5, math.e, 0.7)},
+        [("one", "a", "b", 20), ("two", "b", "c", 3), ("one", "c", "a", 1)],
+    )
+    fem.write_mesh(mesh, tmp_path / f"mesh{extension}")
+    back = fem.read_mesh(tmp_path / f"mesh{extension}")
+    assert np.array_equal(back.points, mesh.points)
+    assert np.array_equal(back.lines, mesh.lines)
+    for kind in ("parts", "point_sets"):
+        expected = {name: value.tolist() for name, value in getattr(mesh, kind).items()}
+        assert {name: value.tolist() for name, value in getattr(back, kind).items()} == expected
+
+
+def test_nodes_and_cells_off_the_frame_are_left_out():
+    content = meshio.Mesh(
+        [[9.0, 9.0], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
+        [("triangle", [[1, 2, 3]]), ("line", [[1, 2]])],
+        cell_data={"set:rod": [[0], [1]]},
+        point_sets={"tip": [2], "outside": [0, 3]},
+    )
+    mesh = fem.from_meshio(content)
+    assert mesh.points.tolist() == [[0, 0, 0], [1, 0, 0]]
+    assert mesh.node("tip") == 1
+    with pytest.raises(fem.ModelError, match=r"'outside' must hold exactly one node .* holds 0"):
+        mesh.node("outside")
+
+
+ABAQUS = """*HEADING
+** a frame with everything that is ordinary in such files
+*node, nset=all
+ 10, 0., 0., 1.
+ 20, 1., , 1.
+*Node
+ 30, 2., 0., 1.
+ 40, 1., 5., 1.
+*Element, type=B31, elset=bar
+ 1, 10, 20, 40
+*ELEMENT, TYPE=b21h,
+ ELSET=Bar
+ 7, 20, 30
+*Element, type=T2D2, elset=stay
+ 9, 30, 40
+*Element, type=MASS, elset=lump
+ 11, 20
+*Elset, elset=both
+ bar, 9
+*ELSET, ELSET=odd, GENERATE
+ 1, 9, 2
+*Nset, nset=tip
+ 30,
+*NSET, NSET=ends
+ 10, tip
+*Nset, nset=ends
+ 40
+*STEP
+"""
+
+
+def test_abaqus_sets_grow_nest_and_ignore_case(tmp_path):
+    path = tmp_path / "frame.inp"
+    path.write_text(ABAQUS)
+    mesh = fem.read_mesh(path)
+    assert mesh.points.tolist() == [[0, 0, 1], [1, 0, 1], [2, 0, 1], [1, 5, 1]]
+    assert mesh.lines.tolist() == [[0, 1], [1, 2], [2, 3]]
+    assert {name: part.tolist() for name, part in mesh.parts.items()} == {
+        "bar": [0, 1],
+        "stay": [2],
+        "both": [0, 1, 2],
+        "odd": [0, 1, 2],
+    }
+    assert {name: nodes.tolist() for name, nodes in mesh.point_sets.items()} == {
+        "all": [0, 1],
+        "tip": [2],
+        "ends": [0, 2, 3],
+    }
+
+
+def test_abaqus_includes_another_file(tmp_path):
+    (tmp_path / "nodes.inp").write_text("*NODE\n1, 0, 0\n2, 1, 0\n")
+    (tmp_path / "main.inp").write_text(
+        "*INCLUDE, INPUT=nodes.inp\n*ELEMENT, TYPE=B23, ELSET=rod\n1, 1, 2\n"
+    )
+    assert fem.read_mesh(tmp_path / "main.inp").lengths.tolist() == [1.0]
+
+
+def test_abaqus_file_written_by_meshio_reads_as_meshio_reads_it(tmp_path):
+    content = meshio.Mesh(
+        [[0.0, 0, 0], [1, 0, 0], [2, 1, 0]],
+        [("line", [[0, 1], [1, 2]])],
+        cell_sets={"a": [np.array([0])], "b": [np.array([1])]},
+        point_sets={"tip": np.array([2])},
+    )
+    path = tmp_path / "mesh.inp"
+    meshio.abaqus.write(path, content)
+    ours, theirs = fem.read_mesh(path), fem.from_meshio(meshio.abaqus.read(path))
+    assert np.array_equal(ours.lines, theirs.lines)
+    assert np.array_equal(ours.points, theirs.points)
+    assert ours.parts.keys() == theirs.parts.keys()
+    assert ours.node("tip") == theirs.node("tip") == 2
+
+
+NODES = "*NODE\n1, 0, 0\n2, 1, 0\n3, 2, 0\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (NODES, "no line elements"),
+        ("", "no line elements"),
+        (NODES + "*ELEMENT, TYPE=B22\n1, 1, 2, 3\n", "'B22' are not straight two-node lines"),
+        (NODES + "*ELEMENT, TYPE=B21\n1, 1, 8\n", "element 1 ends at node 8, which is not defined"),
+        (NODES + "*ELEMENT, TYPE=B21\n1, 1, 2\n1, 2, 3\n", "element 1 is defined twice"),
+        (NODES + "*NODE\n1, 5, 5\n", "node 1 is defined twice"),
+        (NODES + "*ELEMENT, TYPE=B21\n1, 1, 2\n*NSET, NSET=a\n9\n", "'a' holds node 9"),
+        (NODES + "*ELEMENT, TYPE=B21\n1, 1, 2\n*ELSET, ELSET=a\nb\n", "set 'b', which is not"),
+        (NODES + "*NSET\n1\n", r"a \*NSET has no name"),
+        (NODES + "*INSTANCE, NAME=i\n1., 0., 0.\n", "instance 'i' is moved"),
+        ("*INCLUDE, INPUT=no.inp\n", "included file .* does not exist"),
+        (NODES + "*ELEMENT, TYPE=B21\n1, 1\n", "cannot be read as Abaqus mesh"),
+        ("*NODE\n1, zero, 0\n", "cannot be read as Abaqus mesh"),
+        (NODES + "*ELEMENT, TYPE=B21\n1, 1, 1\n", "element 0 has zero length"),
+        (NODES + "*ELEMENT, TYPE=B21\n1, 1, 2\n2, 2, 1\n", "appears twice"),
+        ("*NODE\n1, nan, 0\n2, 1, 0\n*ELEMENT, TYPE=B21\n1, 1, 2\n", "node 0 .* not finite"),
+    ],
+)
+def test_a_bad_abaqus_file_is_one_sentence_with_its_name(tmp_path, text, sentence):
+    path = tmp_path / "bad.inp"
+    path.write_text(text)
+    with pytest.raises(fem.ModelError, match=sentence) as caught:
+        fem.read_mesh(path)
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("gmsh22_groups.msh", "appears twice .*two physical groups"),
+        ("gmsh41_save_all.msh", "some have none"),
+        ("gmsh41_second_order.msh", "'line3' are not straight two-node lines"),
+    ],
+)
+def test_unusable_files_of_gmsh_are_one_sentence(name, sentence):
+    with pytest.raises(fem.ModelError, match=sentence):
+        fem.read_mesh(DATA / name)
+
+
+@pytest.mark.parametrize("name", ["missing.msh", "missing.vtu", "missing.inp"])
+def test_a_missing_file_is_named(tmp_path, name):
+    with pytest.raises(fem.ModelError, match=f"{name}: there is no such mesh file"):
+        fem.read_mesh(tmp_path / name)
+
+
+def test_an_unknown_extension_is_named(tmp_path):
+    with pytest.raises(fem.ModelError, match=r"'.stl'; known are '.msh', '.vtu', '.inp'"):
+        fem.read_mesh(tmp_path / "mesh.stl")
+    mesh = fem.frame_mesh({"a": (0, 0), "b": (1, 0)}, [("rod", "a", "b", 1)])
+    with pytest.raises(fem.ModelError, match=r"'.stl'; known are"):
+        fem.write_mesh(mesh, tmp_path / "mesh.stl")
+
+
+@pytest.mark.parametrize("extension", [".msh", ".vtu", ".inp"])
+@pytest.mark.parametrize("content", [b"", b"\x00\xff\xfe nonsense", b"<xml>", b"$MeshFormat\n"])
+def test_nonsense_in_a_file_is_one_sentence(tmp_path, extension, content):
+    path = tmp_path / f"nonsense{extension}"
+    path.write_bytes(content)
+    with pytest.raises(fem.ModelError) as caught:
+        fem.read_mesh(path)
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", WHOLE_FILES)
+def test_a_file_that_is_cut_off_is_refused(tmp_path, name):
+    whole = (DATA / name).read_bytes()
+    path = tmp_path / name
+    for end in range(0, whole.rindex(b"$EndElements"), 7):
+        path.write_bytes(whole[:end])
+        with pytest.raises(fem.ModelError, match="cut off"):
+            fem.read_mesh(path)
+
+
+@pytest.mark.parametrize("name", ["gmsh22.msh", "gmsh41.msh", "gmsh_export.inp"])
+def test_a_file_with_a_hole_never_ends_in_a_traceback(tmp_path, name):
+    whole = (DATA / name).read_bytes()
+    path = tmp_path / name
+    for start in range(0, len(whole), 11):
+        path.write_bytes(whole[:start] + whole[start + 5 :])
+        try:
+            fem.read_mesh(path)
+        except fem.ModelError as error:
+            assert str(error).startswith(str(path))
+
+
+LINE = {"points": [[0, 0, 0], [1, 0, 0], [2, 0, 0]], "lines": [[0, 1], [1, 2]]}
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"points": np.zeros((0, 3)), "lines": np.zeros((0, 2))}, "the mesh is empty"),
+        ({"lines": np.zeros((0, 2))}, "the mesh is empty"),
+        ({"points": [[0, 0], [1, 0]]}, r"points must have shape \(n, 3\)"),
+        ({"lines": [[0, 1, 2]]}, r"lines must have shape \(e, 2\)"),
+        ({"points": [[0, 0, 0], [1, math.nan, 0], [2, 0, 0]]}, "coordinates of node 1"),
+        ({"points": [[0, 0, 0], [0, 0, 0], [2, 0, 0]]}, "element 0 has zero length"),
+        ({"lines": [[0, 1], [1, 3]]}, "lines has an index outside 0 to 2"),
+        ({"lines": [[0, 1], [1, 0]]}, "appears twice"),
+        ({"lines": [[0, 1]]}, "node 2 is on no line element"),
+        ({"parts": {"p": [5]}}, "part 'p' has an index outside 0 to 1"),
+        ({"point_sets": {"p": [-1]}}, "point 'p' has an index outside 0 to 2"),
+    ],
+)
+def test_a_bad_mesh_is_one_sentence(change, sentence):
+    with pytest.raises(fem.ModelError, match=sentence):
+        fem.FrameMesh(**{**LINE, **change}, source="my.msh")
+
+
+@pytest.mark.parametrize(
+    ("points", "members", "sentence"),
+    [
+        ({"a": (0, 0)}, [("rod", "a", "b", 1)], "ends at no point 'b'"),
+        ({"a": (0, 0), "b": (1, 0)}, [("rod", "a", "b", 0)], "has 0 elements"),
+        ({"a": (0, 0), "b": (1,)}, [("rod", "a", "b", 1)], "'b' needs two or three coordinates"),
+        ({}, [], "the mesh is empty"),
+    ],
+)
+def test_a_bad_member_is_one_sentence(points, members, sentence):
+    with pytest.raises(fem.ModelError, match=sentence):
+        fem.frame_mesh(points, members)
+
+
+def test_a_mesh_cannot_be_changed():
+    mesh = fem.FrameMesh(**LINE)
+    with pytest.raises(ValueError, match="read-only"):
+        mesh.points[0, 0] = 1.0
+
+
+def test_gmsh_cannot_be_written_with_overlapping_parts(tmp_path):
+    mesh = fem.FrameMesh(**LINE, parts={"a": [0, 1], "b": [1]})
+    with pytest.raises(fem.ModelError, match="'b' overlaps another"):
+        fem.write_mesh(mesh, tmp_path / "mesh.msh")
+    mesh = fem.FrameMesh(**LINE, parts={"a": [0, 1]}, point_sets={"a": [1]})
+    with pytest.raises(fem.ModelError, match="'a' names both a part and a point"):
+        fem.write_mesh(mesh, tmp_path / "mesh.msh")

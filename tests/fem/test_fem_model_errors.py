@@ -1,0 +1,130 @@
+"""What a model refuses, in one sentence that names the item."""
+
+import math
+
+import pytest
+from frames import BAR, CLAMP, STEEL, beam
+
+import fem
+
+
+def two_bars(**rest):
+    mesh = fem.frame_mesh(
+        {"a": (0, 0), "joint": (1, 0), "b": (2, 0)},
+        [("first", "a", "joint", 2), ("second", "joint", "b", 2)],
+        source="bars.msh",
+    )
+    return fem.FrameModel(mesh, **{"parts": {"first": BAR, "second": BAR}, **rest})
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: fem.Material(0.0, 1.0), "material: youngs_modulus must be positive"),
+        (lambda: fem.Material(1.0, math.nan), "material: density must be positive and finite"),
+        (lambda: fem.RectangularSection(-1.0, 1.0), "rectangular section: width"),
+        (lambda: fem.RectangularSection(1.0, math.inf), "rectangular section: height"),
+        (lambda: fem.CircularSection(0.0), "circular section: diameter"),
+        (lambda: fem.CircularSection(0.1, bore=0.1), "circular section: bore"),
+        (lambda: fem.CircularSection(0.1, bore=math.nan), "circular section: bore"),
+        (lambda: fem.Section(1.0, -1.0), "section: second_moment"),
+        (lambda: fem.Support("foot", ()), "support at 'foot': no direction"),
+        (lambda: fem.Support("foot", ("x", "z")), "support at 'foot': there is no direction 'z'"),
+        (lambda: fem.PointMass("tip", -1.0), "point mass at 'tip': mass must be finite and not"),
+        (lambda: fem.PointMass("tip", math.nan), "point mass at 'tip': mass"),
+        (lambda: fem.PointMass("tip", 1.0, -1.0), "point mass at 'tip': rotary inertia"),
+        (lambda: fem.PointMass("tip", 0.0), "point mass at 'tip': mass and rotary inertia are"),
+        (lambda: fem.PointSpring("tip", "z", 1.0), "spring at 'tip': there is no direction 'z'"),
+        (lambda: fem.PointSpring("tip", "y", 0.0), "spring at 'tip': stiffness must be positive"),
+        (lambda: fem.Interface("tip", "up"), "interface at 'tip': there is no direction 'up'"),
+        (
+            lambda: two_bars(supports=[fem.Support("c", "x")]),
+            "bars.msh: there is no point 'c'; there are 'a', 'joint', 'b'",
+        ),
+        (lambda: two_bars(point_masses=[fem.PointMass("c", 1.0)]), "there is no point 'c'"),
+        (lambda: two_bars(springs=[fem.PointSpring("c", "x", 1.0)]), "there is no point 'c'"),
+        (lambda: two_bars(hinges=[fem.Hinge("c", "first")]), "there is no point 'c'"),
+        (lambda: two_bars(interfaces={"i": fem.Interface("c", "x")}), "there is no point 'c'"),
+        (
+            lambda: two_bars(parts={"first": BAR, "secnd": BAR}),
+            "bars.msh: there is no part 'secnd'; there are 'first', 'second'",
+        ),
+        (
+            lambda: two_bars(parts={"first": BAR}),
+            "bars.msh: element 2 is in no part of the model, whose parts are 'first'",
+        ),
+        (lambda: two_bars(parts={}), "element 0 is in no part of the model, whose parts are none"),
+        (
+            lambda: two_bars(hinges=[fem.Hinge("b", "first")]),
+            "no part 'first' of the model meets the hinge at 'b'; there are 'second'",
+        ),
+        (
+            lambda: two_bars(hinges=[fem.Hinge("joint", "third")]),
+            "no part 'third' of the model meets the hinge",
+        ),
+        (
+            lambda: two_bars(hinges=[fem.Hinge("joint", "first"), fem.Hinge("joint", "second")]),
+            "all parts at 'joint' are hinged there",
+        ),
+        (lambda: two_bars(hinges=[fem.Hinge("a", "first")]), "all parts at 'a' are hinged there"),
+        (
+            lambda: two_bars(hinges=[fem.Hinge("joint", "first"), fem.Hinge("joint", "first")]),
+            "the hinge of part 'first' at 'joint' is given twice",
+        ),
+        (
+            lambda: two_bars(
+                supports=[fem.Support("a", CLAMP)], interfaces={"root": fem.Interface("a", "y")}
+            ),
+            "interface 'root' is on direction 'y' of point 'a', which a support holds",
+        ),
+    ],
+)
+def test_a_bad_model_is_one_sentence(make, sentence):
+    with pytest.raises(fem.ModelError, match=sentence) as caught:
+        make()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_frame_must_lie_in_one_plane():
+    mesh = fem.frame_mesh({"a": (0, 0, 0), "b": (1, 0, 0.1)}, [("bar", "a", "b", 2)], "out.msh")
+    with pytest.raises(fem.ModelError, match=r"out.msh: .* one z .* from 0 to 0.1"):
+        fem.FrameModel(mesh, {"bar": BAR})
+
+
+def test_the_plane_may_be_anywhere():
+    mesh = fem.frame_mesh({"a": (0, 0, 7), "b": (1, 0, 7)}, [("bar", "a", "b", 2)])
+    there = fem.assemble(fem.FrameModel(mesh, {"bar": BAR}))
+    here = fem.assemble(beam(elements=2))
+    assert abs(there.stiffness - here.stiffness).max() == 0.0
+
+
+def test_a_point_of_several_nodes_cannot_be_used_but_may_be_there():
+    mesh = fem.FrameMesh(
+        [[0, 0, 0], [1, 0, 0]], [[0, 1]], {"bar": [0]}, {"ends": [0, 1]}, source="bar.msh"
+    )
+    fem.FrameModel(mesh, {"bar": BAR})
+    with pytest.raises(fem.ModelError, match=r"'ends' must hold exactly one node .* holds 2"):
+        fem.FrameModel(mesh, {"bar": BAR}, supports=[fem.Support("ends", "x")])
+
+
+def test_supports_that_hold_everything_leave_nothing_to_assemble():
+    supports = [fem.Support("left", CLAMP), fem.Support("right", CLAMP)]
+    with pytest.raises(fem.ModelError, match="hold every degree of freedom"):
+        fem.assemble(beam(elements=1, supports=supports))
+
+
+def test_a_displacement_of_another_size_is_refused():
+    component = fem.assemble(beam(elements=1))
+    with pytest.raises(fem.ModelError, match=r"has shape \(6,\), not \(5,\)"):
+        component.shape([0.0] * 5)
+
+
+def test_sections_have_the_area_and_second_moment_of_the_handbook():
+    tube = fem.CircularSection(0.04, bore=0.03)
+    assert tube.area == pytest.approx(math.pi * (0.02**2 - 0.015**2), rel=1e-15)
+    assert tube.second_moment == pytest.approx(math.pi / 4 * (0.02**4 - 0.015**4), rel=1e-14)
+    # a box is the difference of two rectangles
+    outer, inner = fem.RectangularSection(0.05, 0.08), fem.RectangularSection(0.04, 0.07)
+    assert outer.second_moment == pytest.approx(0.05 * 0.08**3 / 12, rel=1e-15)
+    box = fem.Section(outer.area - inner.area, outer.second_moment - inner.second_moment)
+    assert fem.BeamPart(STEEL, box).section.area == pytest.approx(0.05 * 0.08 - 0.04 * 0.07)
