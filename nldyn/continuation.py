@@ -1,0 +1,387 @@
+"""Pseudo-arclength continuation of periodic orbits in the excitation frequency."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from nldyn.branch import Branch, BranchPoint, SpecialPoint
+from nldyn.errors import SystemModelError
+from nldyn.orbit import Orbit
+from nldyn.shooting import ShootingProblem
+from nldyn.special import Chord, LocateError, hidden_dip, special_points_between, tests
+from nldyn.system import Real
+
+
+@dataclass(frozen=True)
+class ContinuationOptions:
+    """Step control. Lengths are relative: a step of 0.1 changes orbit or frequency by 10 %.
+
+    Parameters
+    ----------
+    first_step, max_step, min_step : float
+        Arclength steps.
+    max_angle : float
+        Largest angle between the tangents of two neighbouring points, in radians.
+    max_points : int
+        Most points in one direction.
+    """
+
+    first_step: float = 0.01
+    max_step: float = 0.1
+    min_step: float = 1e-8
+    max_angle: float = 0.25
+    max_points: int = 5000
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.min_step <= self.first_step <= self.max_step:
+            raise SystemModelError(
+                "continuation: steps must satisfy 0 < min_step <= first_step <= max_step"
+            )
+        if not 0.0 < self.max_angle < 1.5:
+            raise SystemModelError(
+                f"continuation: max_angle must lie in (0, 1.5), got {self.max_angle:g}"
+            )
+        if self.max_points < 2:
+            raise SystemModelError(
+                f"continuation: max_points must be at least 2, got {self.max_points}"
+            )
+
+
+@dataclass
+class Walk:
+    """Iterator over the points of a branch in one direction.
+
+    Yields `BranchPoint`s; when it ends, `stop_reason` says why. The caller may stop between any
+    two points.
+
+    Parameters
+    ----------
+    start : BranchPoint
+        First point, yielded first; its tangent gives the direction.
+    range_hz : (float, float)
+        Frequencies between which to stay.
+    options : ContinuationOptions
+        Step control.
+    """
+
+    start: BranchPoint
+    range_hz: tuple[float, float]
+    options: ContinuationOptions
+    stop_reason: str = "not finished"
+
+    def __iter__(self) -> Iterator[BranchPoint]:
+        """Walk along the branch."""
+        problem = self.start.orbit.problem
+        here = self.start
+        step = self.options.first_step
+        yield here
+        for _ in range(self.options.max_points):
+            attempt = None
+            while attempt is None:
+                attempt = self._advance(problem, here, step)
+                if attempt is None:
+                    step *= 0.5
+                    if step < self.options.min_step:
+                        self.stop_reason = f"step below {self.options.min_step:g}"
+                        return
+            point, angle, iterations = attempt
+            low, high = self.range_hz
+            if not low <= point.orbit.frequency_hz <= high:
+                end = self._range_end(here, point, low if point.orbit.frequency_hz < low else high)
+                self.stop_reason = "end of the frequency range"
+                if end is not None:
+                    yield end
+                return
+            if _passed_flip(here.orbit, point.orbit):
+                self.stop_reason = f"joins the branch of period {problem.period // 2} at a flip"
+                return
+            if self._closed(here, point):
+                self.stop_reason = "closed branch"
+                yield point
+                return
+            yield point
+            here = point
+            growth = 0.7 * self.options.max_angle / max(angle, 1e-3)
+            if iterations > 5:
+                growth = min(growth, 0.8)
+            step = min(step * min(max(growth, 0.5), 1.6), self.options.max_step)
+        self.stop_reason = f"{self.options.max_points} points"
+
+    def _advance(
+        self, problem: ShootingProblem, here: BranchPoint, step: float
+    ) -> tuple[BranchPoint, float, int] | None:
+        """One predictor-corrector step; None when it must be shorter."""
+        weights = problem.metric(here.orbit.point)
+        norm = math.sqrt(float(np.sum(weights * here.tangent**2)))
+        direction = here.tangent / norm
+        guess = here.orbit.point + step * direction
+        row = weights * direction
+        found = problem.correct(guess, row / np.linalg.norm(row), max_iterations=8)
+        if not found.converged or found.first_step > 0.6 * step:
+            return None
+        tangent = problem.tangent(found.lin, problem.metric(found.point), direction)
+        cosine = float(np.sum(weights * direction * tangent))
+        cosine /= math.sqrt(float(np.sum(weights * tangent**2)))
+        angle = math.acos(min(max(cosine, -1.0), 1.0))
+        if angle > self.options.max_angle:
+            return None
+        orbit = Orbit(
+            problem, found.point, found.lin.monodromy, found.last_step, here.orbit.observe
+        )
+        return BranchPoint(orbit, tangent, here.arclength + step), angle, found.iterations
+
+    def _range_end(self, a: BranchPoint, b: BranchPoint, end_hz: float) -> BranchPoint | None:
+        """Point of the branch exactly at an end of the range."""
+        p = math.log(2.0 * math.pi * end_hz)
+        pa, pb = a.orbit.point[-1], b.orbit.point[-1]
+        if pa == p:
+            return None
+        share = (p - pa) / (pb - pa)
+        problem = a.orbit.problem
+        guess = (1.0 - share) * a.orbit.point + share * b.orbit.point
+        row = np.zeros(guess.size)
+        row[-1] = 1.0
+        guess[-1] = p
+        found = problem.correct(guess, row)
+        if not found.converged:
+            return None
+        orbit = Orbit(problem, found.point, found.lin.monodromy, found.last_step, a.orbit.observe)
+        tangent = problem.tangent(found.lin, problem.metric(found.point), a.tangent)
+        length = a.arclength + share * (b.arclength - a.arclength)
+        return BranchPoint(orbit, tangent, length)
+
+    def _closed(self, a: BranchPoint, b: BranchPoint) -> bool:
+        """Whether the walk from a to b passes the start again, in the same direction."""
+        start = self.start
+        if b.arclength - start.arclength < 10.0 * (b.arclength - a.arclength):
+            return False
+        weights = start.orbit.problem.metric(start.orbit.point)
+        step = b.orbit.point - a.orbit.point
+        if float(np.sum(weights * step * start.tangent)) <= 0.0:
+            return False
+        along = float(np.sum(weights * (start.orbit.point - a.orbit.point) * step))
+        length2 = float(np.sum(weights * step**2))
+        if not 0.0 <= along <= length2:
+            return False
+        off = start.orbit.point - a.orbit.point - along / length2 * step
+        return float(np.sum(weights * off**2)) < 0.01 * length2
+
+
+def _passed_flip(a: Orbit, b: Orbit) -> bool:
+    """Whether an even-period orbit turned into its own shift: a branch of half the period met."""
+    if a.period % 2:
+        return False
+    first, second = _half_difference(a), _half_difference(b)
+    return float(np.sum(first * second)) < 0.0
+
+
+def _half_difference(orbit: Orbit) -> Real:
+    nodes = orbit.problem.nodes(orbit.point)
+    half = nodes.shape[0] // 2
+    return nodes[:half] - nodes[half:]
+
+
+def start_point(orbit: Orbit, direction: float) -> BranchPoint:
+    """Branch point at an orbit, heading up (+1) or down (-1) in frequency."""
+    problem = orbit.problem
+    towards = np.zeros(orbit.point.size)
+    towards[-1] = direction
+    lin = problem.linearise(orbit.point)
+    tangent = problem.tangent(lin, problem.metric(orbit.point), towards)
+    return BranchPoint(orbit, tangent, 0.0)
+
+
+def trace(
+    start: BranchPoint,
+    range_hz: tuple[float, float],
+    options: ContinuationOptions | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[list[BranchPoint], list[SpecialPoint], str]:
+    """Walk from a point in the direction of its tangent and collect special points."""
+    walk = Walk(start, range_hz, options or ContinuationOptions())
+    nodes: list[BranchPoint] = []
+    special: list[SpecialPoint] = []
+    for point in walk:
+        nodes.append(point)
+        if progress is not None:
+            progress(point.orbit.frequency_hz)
+        if len(nodes) > 2:
+            _insert_dips(nodes)
+    for a, b in zip(nodes[:-1], nodes[1:], strict=True):
+        try:
+            special += special_points_between(a, b)
+        except LocateError:
+            special += _by_halves(a, b)
+    return nodes, special, walk.stop_reason
+
+
+def _insert_dips(nodes: list[BranchPoint]) -> None:
+    """Add points where a test function may have changed sign twice between two points."""
+    for kind in ("LP", "PD", "BP", "NS"):
+        where = hidden_dip(nodes[-3], nodes[-2], nodes[-1], kind)
+        if where is None:
+            continue
+        index = len(nodes) - 2 if where < nodes[-2].arclength else len(nodes) - 1
+        a, b = nodes[index - 1], nodes[index]
+        span = b.arclength - a.arclength
+        sigma = (where - a.arclength) / span
+        if span < 1e-6 or not 0.02 < sigma < 0.98:
+            continue
+        try:
+            extra = Chord(a, b).at(sigma)
+        except LocateError:
+            continue
+        if tests(extra)[kind] * tests(a)[kind] < 0.0:
+            nodes.insert(index, extra)
+            return
+
+
+def _by_halves(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[SpecialPoint]:
+    """Special points of a chord on which a correction failed: try again on its halves."""
+    if depth > 3:
+        return []
+    try:
+        middle = Chord(a, b).at(0.5)
+    except LocateError:
+        return []
+    found: list[SpecialPoint] = []
+    for first, last in ((a, middle), (middle, b)):
+        try:
+            found += special_points_between(first, last)
+        except LocateError:
+            found += _by_halves(first, last, depth + 1)
+    return found
+
+
+def continue_branch(
+    orbit: Orbit,
+    range_hz: tuple[float, float],
+    *,
+    name: str = "",
+    options: ContinuationOptions | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Branch:
+    """Continue an orbit in both directions through a range of frequencies.
+
+    Parameters
+    ----------
+    orbit : Orbit
+        Where to start; its frequency must lie in the range.
+    range_hz : (float, float)
+        Frequencies in Hz, ascending. The ends are met exactly.
+    name : str
+        Name of the branch.
+    options : ContinuationOptions, optional
+        Step control.
+    progress : callable, optional
+        Called with the frequency of every point.
+
+    Returns
+    -------
+    Branch
+
+    Raises
+    ------
+    SystemModelError
+        If the range is empty or the orbit lies outside.
+
+    References
+    ----------
+    H. B. Keller (1977), pseudo-arclength continuation; E. Doedel et al., AUTO-07p manual.
+    """
+    low, high = check_range(range_hz)
+    if not low <= orbit.frequency_hz <= high:
+        raise SystemModelError(
+            f"the orbit at {orbit.frequency_hz:g} Hz lies outside range_hz = ({low:g}, {high:g})"
+        )
+    up, up_special, up_reason = trace(start_point(orbit, 1.0), (low, high), options, progress)
+    if up_reason == "closed branch":
+        return make_branch(name, up, up_special, (up_reason, up_reason))
+    down, down_special, down_reason = trace(
+        start_point(orbit, -1.0), (low, high), options, progress
+    )
+    nodes = [_reversed(p) for p in down[:0:-1]] + up
+    special = [
+        SpecialPoint(s.kind, _reversed(s.point), s.frequency_error) for s in reversed(down_special)
+    ] + up_special
+    return make_branch(name, nodes, special, (down_reason, up_reason))
+
+
+def make_branch(
+    name: str, nodes: list[BranchPoint], special: list[SpecialPoint], reasons: tuple[str, str]
+) -> Branch:
+    """Branch from its parts; the period is that of its orbits."""
+    return Branch(name, nodes[0].orbit.period, tuple(nodes), tuple(special), reasons)
+
+
+def check_range(range_hz: tuple[float, float]) -> tuple[float, float]:
+    """A frequency range as two floats, or a SystemModelError that says what is wrong."""
+    low, high = (float(f) for f in range_hz)
+    if not (math.isfinite(low) and math.isfinite(high) and 0.0 < low < high):
+        raise SystemModelError(
+            f"range_hz must be two positive frequencies, ascending; got ({low:g}, {high:g})"
+        )
+    return low, high
+
+
+def _reversed(point: BranchPoint) -> BranchPoint:
+    return BranchPoint(point.orbit, -point.tangent, -point.arclength)
+
+
+def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoint:
+    """First point of the doubled branch at a flip, heading away from it.
+
+    Parameters
+    ----------
+    special : SpecialPoint
+        A flip (PD).
+    amplitude : float
+        Relative size of the first step off the branch; smaller ones are tried if it fails.
+
+    Returns
+    -------
+    BranchPoint
+        An orbit of twice the period.
+
+    Raises
+    ------
+    SystemModelError
+        If the special point is not a flip.
+    LocateError
+        If no orbit of twice the period is found.
+    """
+    if special.kind != "PD":
+        raise SystemModelError(f"switch_at_flip needs a PD point, got {special.kind}")
+    orbit = special.orbit
+    base = orbit.problem
+    problem = ShootingProblem(base.flow, 2 * base.period, 2 * base.segments)
+    values, vectors = np.linalg.eig(orbit.monodromy)
+    v = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
+    jacobians = base.flow.shoot(base.nodes(orbit.point), base.phases, orbit.omega).jacobians
+    modes = [v]
+    for jacobian in jacobians[:-1]:
+        modes.append(jacobian @ modes[-1])
+    shape = np.array(modes)
+    direction = np.append(np.concatenate([shape, -shape]).ravel(), 0.0)
+    nodes = base.nodes(orbit.point)
+    doubled = np.append(np.concatenate([nodes, nodes]).ravel(), orbit.point[-1])
+    weights = problem.metric(doubled)
+    direction /= math.sqrt(float(np.sum(weights * direction**2)))
+    row = weights * direction
+    for size in (amplitude, 0.25 * amplitude, 0.05 * amplitude, 0.01 * amplitude):
+        found = problem.correct(doubled + size * direction, row / np.linalg.norm(row))
+        if found.converged:
+            tangent = problem.tangent(found.lin, problem.metric(found.point), direction)
+            twin = Orbit(
+                problem, found.point, found.lin.monodromy, found.last_step, orbit.observe
+            )
+            return BranchPoint(twin, tangent, 0.0)
+    raise LocateError(
+        f"no orbit of period {problem.period} found beside the flip at {orbit.frequency_hz:.6g} Hz: "
+        f"{found.failure}"
+    )
+

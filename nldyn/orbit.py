@@ -1,0 +1,431 @@
+"""Periodic orbits: how they are found, and what an engineer wants to know of one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nldyn._sample import local_extremes, sample_states
+from nldyn.errors import SystemModelError
+from nldyn.flow import FlowMap, Trajectory
+from nldyn.shooting import ShootingProblem
+from nldyn.system import Real, System
+
+SEGMENTS_PER_PERIOD = 2
+
+
+@dataclass(frozen=True)
+class Extremes:
+    """Local extremes of one output over an orbit.
+
+    Parameters
+    ----------
+    phases : (k,)
+        Forcing phases.
+    values : (k,)
+        Values of the output (m; for a stop its penetration, negative when open).
+    is_maximum : (k,) bool
+        Whether each is a maximum.
+    """
+
+    phases: Real
+    values: Real
+    is_maximum: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class History:
+    """An orbit sampled in time.
+
+    Parameters
+    ----------
+    time : (k,)
+        Time in s from forcing phase zero.
+    modal : (k, n)
+        Modal displacements q.
+    modal_velocity : (k, n)
+        Modal velocities.
+    displacement : dict of str to (k,)
+        Displacement of each interface in m.
+    penetration, force : (k, n_stops)
+        Penetration (m, negative when open) and contact force (N) of each stop.
+    """
+
+    time: Real
+    modal: Real
+    modal_velocity: Real
+    displacement: dict[str, Real]
+    penetration: Real
+    force: Real
+
+
+@dataclass(frozen=True)
+class Impact:
+    """One contact phase of an orbit.
+
+    Parameters
+    ----------
+    stop : int
+        Index of the stop.
+    time : float
+        Instant of deepest penetration in s from forcing phase zero.
+    penetration : float
+        Deepest penetration in m.
+    force : float
+        Largest contact force in N.
+    """
+
+    stop: int
+    time: float
+    penetration: float
+    force: float
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """A periodic orbit of a system.
+
+    Parameters
+    ----------
+    problem : ShootingProblem
+        The equations that it solves.
+    point : (N + 1,)
+        Packed states at the shooting phases and ln ω.
+    monodromy : (2n, 2n)
+        Derivative of the state after a period with respect to the state before.
+    error : float
+        Length of the last Newton step relative to the orbit: an estimate of its error.
+    observe : str
+        Interface whose displacement is reported.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance, solve_orbit
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> orbit = solve_orbit(system, frequency_hz=60.0)
+    >>> orbit.impacts, orbit.stable
+    (1, False)
+    """
+
+    problem: ShootingProblem
+    point: Real
+    monodromy: Real
+    error: float
+    observe: str
+
+    @property
+    def system(self) -> System:
+        """The system."""
+        return self.problem.flow.system
+
+    @property
+    def omega(self) -> float:
+        """Excitation frequency in rad/s."""
+        return float(np.exp(self.point[-1]))
+
+    @property
+    def frequency_hz(self) -> float:
+        """Excitation frequency in Hz."""
+        return self.omega / (2.0 * math.pi)
+
+    @property
+    def period(self) -> int:
+        """Period multiple n: the orbit repeats after n excitation periods."""
+        return self.problem.period
+
+    @property
+    def duration(self) -> float:
+        """Period of the orbit in s."""
+        return self.period / self.frequency_hz
+
+    @cached_property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Floquet multipliers, largest first, shape (2n,)."""
+        values = np.linalg.eigvals(self.monodromy).astype(complex)
+        return values[np.argsort(-np.abs(values), kind="stable")]
+
+    @property
+    def largest_multiplier(self) -> complex:
+        """The multiplier that decides stability (of a complex pair the upper one)."""
+        value = complex(self.multipliers[0])
+        return complex(value.real, abs(value.imag))
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers lie inside the unit circle."""
+        return bool(abs(self.multipliers[0]) < 1.0)
+
+    @cached_property
+    def liouville_error(self) -> float:
+        """|det Φ / exp(-∫ tr D dt) - 1|: Liouville's formula, exact for linear damping."""
+        exact = -float(np.trace(self.system.total_damping)) * self.duration
+        sign, logdet = np.linalg.slogdet(self.monodromy)
+        return abs(math.expm1(logdet - exact)) if sign > 0.0 else math.inf
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The recorded motion over one period of the orbit."""
+        problem = self.problem
+        return problem.flow.trajectory(problem.nodes(self.point), problem.phases, self.omega)
+
+    def extremes(self, output: int) -> Extremes:
+        """Local extremes of an output: the stops' penetrations first, then the interfaces."""
+        trajectory = self.trajectory
+        data, rec = trajectory.data, trajectory.record
+        tables = trajectory.flow.tables
+        found = local_extremes(
+            data.eigenvalues,
+            data.force,
+            data.omega,
+            tables.chi,
+            tables.to_legendre,
+            tables.nodes,
+            rec.phase,
+            rec.duration,
+            rec.kind,
+            rec.w,
+            rec.force,
+            int(rec.count[0]),
+            data.rows[output],
+            data.forced[output],
+        )
+        offset = data.gap[output] if output < data.gap.size else 0.0
+        return Extremes(found[:, 0], found[:, 1] - offset, found[:, 2] > 0.0)
+
+    @cached_property
+    def observed_extremes(self) -> Extremes:
+        """Local extremes of the observed displacement."""
+        return self.extremes(len(self.system.stops) + self.system.interfaces.index(self.observe))
+
+    @cached_property
+    def penetration_peaks(self) -> tuple[Extremes, ...]:
+        """Local maxima of each stop's penetration, negative ones being near misses."""
+        peaks = []
+        for index in range(len(self.system.stops)):
+            found = self.extremes(index)
+            keep = found.is_maximum
+            peaks.append(Extremes(found.phases[keep], found.values[keep], keep[keep]))
+        return tuple(peaks)
+
+    @cached_property
+    def max_abs_displacement(self) -> float:
+        """Largest absolute displacement of the observed interface in m."""
+        values = self.observed_extremes.values
+        return float(np.max(np.abs(values))) if values.size else 0.0
+
+    @cached_property
+    def max_penetration(self) -> float:
+        """Deepest penetration over all stops in m (zero if none is touched)."""
+        values = [float(p.values.max()) for p in self.penetration_peaks if p.values.size]
+        return max(0.0, *values) if values else 0.0
+
+    @property
+    def impacts(self) -> int:
+        """Number of contact phases in one period of the orbit, over all stops."""
+        return int(self.trajectory.closings.sum())
+
+    @cached_property
+    def impact_list(self) -> tuple[Impact, ...]:
+        """Contact peaks in the order of time (a double-peaked contact counts twice here)."""
+        impacts = [
+            Impact(
+                index,
+                float(phase / self.omega),
+                float(depth),
+                float(stop.stiffness * depth**stop.exponent),
+            )
+            for index, (stop, peaks) in enumerate(
+                zip(self.system.stops, self.penetration_peaks, strict=True)
+            )
+            for phase, depth in zip(peaks.phases, peaks.values, strict=True)
+            if depth > 0.0
+        ]
+        return tuple(sorted(impacts, key=lambda impact: impact.time))
+
+    def states(self, phases: Real) -> Real:
+        """Modal displacements and velocities (k, 2n) at ascending forcing phases."""
+        trajectory = self.trajectory
+        data, rec = trajectory.data, trajectory.record
+        tables = trajectory.flow.tables
+        w = sample_states(
+            data.eigenvalues,
+            data.force,
+            data.omega,
+            tables.chi,
+            tables.to_legendre,
+            tables.nodes,
+            rec.phase,
+            rec.duration,
+            rec.kind,
+            rec.w,
+            rec.force,
+            int(rec.count[0]),
+            np.asarray(phases, dtype=float),
+        )
+        forced = self.system.forced_response(self.omega).at_phase(np.asarray(phases))
+        return np.asarray(((w + forced) @ self.system.linear.right.T).real)
+
+    def history(self, samples: int = 1000) -> History:
+        """Sample one period of the orbit.
+
+        Parameters
+        ----------
+        samples : int
+            Number of equal time steps; the result has one sample more.
+
+        Returns
+        -------
+        History
+
+        Raises
+        ------
+        ValueError
+            If `samples` is not positive.
+        """
+        if samples < 1:
+            raise ValueError(f"history: samples must be positive, got {samples}")
+        phases = np.linspace(0.0, 2.0 * np.pi * self.period, samples + 1)
+        states = self.states(phases)
+        system = self.system
+        q = states[:, : system.size]
+        stops = system.stops
+        depth = np.array([q @ system.stop_vector(s) - s.gap for s in stops]).reshape(len(stops), -1)
+        force = np.array(
+            [s.stiffness * np.maximum(d, 0.0) ** s.exponent for s, d in zip(stops, depth, strict=True)]
+        ).reshape(depth.shape)
+        return History(
+            phases / self.omega,
+            q,
+            states[:, system.size :],
+            {name: q @ phi for name, phi in system.participation.items()},
+            depth.T,
+            force.T,
+        )
+
+
+def check_observe(system: System, observe: str | None) -> str:
+    """Interface to observe: the given one, else the system's first."""
+    if not system.interfaces:
+        raise SystemModelError("the system has no interface to observe")
+    if observe is None:
+        return system.interfaces[0]
+    if observe not in system.interfaces:
+        raise SystemModelError(
+            f"observe: unknown interface '{observe}'; there are: {', '.join(system.interfaces)}"
+        )
+    return observe
+
+
+def shooting_problem(flow: FlowMap, period: int, segments: int | None = None) -> ShootingProblem:
+    """Shooting equations with two segments per excitation period unless told otherwise."""
+    if period < 1:
+        raise SystemModelError(f"period must be at least 1, got {period}")
+    return ShootingProblem(flow, period, segments or SEGMENTS_PER_PERIOD * period)
+
+
+class ConvergenceError(RuntimeError):
+    """No orbit was found; the text says how far Newton's method came."""
+
+
+def solve_orbit(
+    system: System | FlowMap,
+    frequency_hz: float,
+    period: int = 1,
+    *,
+    guess: Real | None = None,
+    observe: str | None = None,
+    segments: int | None = None,
+) -> Orbit:
+    """Find a periodic orbit at a given frequency by multiple shooting.
+
+    Parameters
+    ----------
+    system : System or FlowMap
+        What to solve.
+    frequency_hz : float
+        Excitation frequency in Hz.
+    period : int
+        Period multiple n.
+    guess : (2n,) or (k, 2n) array, optional
+        Modal displacements and velocities at phase zero, or at the k shooting phases. Without it
+        the system is simulated from rest for 200 periods.
+    observe : str, optional
+        Interface whose displacement is reported; the first unless given.
+    segments : int, optional
+        Number k of shooting segments.
+
+    Returns
+    -------
+    Orbit
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense.
+    ConvergenceError
+        If Newton's method does not converge; the text gives the last step.
+
+    Examples
+    --------
+    >>> from nldyn import System, Unbalance
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> orbit = solve_orbit(system, frequency_hz=20.0)
+    >>> orbit.impacts
+    0
+    """
+    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    if not (math.isfinite(frequency_hz) and frequency_hz > 0.0):
+        raise SystemModelError(f"frequency_hz must be positive, got {frequency_hz}")
+    observe = check_observe(flow.system, observe)
+    problem = shooting_problem(flow, period, segments)
+    omega = 2.0 * math.pi * frequency_hz
+    if guess is None:
+        start = np.zeros(problem.size)
+        warm = np.linspace(0.0, 400.0 * np.pi, 201)
+        start = flow.shoot(start[None], warm, omega, sensitivities=False, chained=True).ends[-1]
+        packed = _spread(problem, start, omega)
+    else:
+        guess = np.atleast_2d(np.asarray(guess, dtype=float))
+        if guess.shape not in ((1, problem.size), (problem.segments, problem.size)):
+            raise SystemModelError(
+                f"guess must have {problem.size} entries (or {problem.segments} such rows), "
+                f"got shape {guess.shape}"
+            )
+        if guess.shape[0] == problem.segments:
+            rows = zip(guess, problem.phases[:-1], strict=True)
+            packed = np.array([flow.to_packed(g, float(ph), omega) for g, ph in rows])
+        else:
+            packed = _spread(problem, flow.to_packed(guess[0], 0.0, omega), omega)
+    return refine(problem, packed, omega, observe)
+
+
+def refine(problem: ShootingProblem, packed: Real, omega: float, observe: str) -> Orbit:
+    """Newton's method at fixed frequency from packed states (k, 2n)."""
+    guess = np.append(packed.ravel(), math.log(omega))
+    row = np.zeros(guess.size)
+    row[-1] = 1.0
+    found = problem.correct(guess, row, max_iterations=25)
+    if not found.converged:
+        raise ConvergenceError(
+            f"no orbit of period {problem.period} found at {omega / (2 * math.pi):g} Hz: "
+            f"{found.failure}, last relative step {found.last_step:.1e} "
+            f"after {found.iterations} iterations"
+        )
+    return Orbit(problem, found.point, found.lin.monodromy, found.last_step, observe)
+
+
+def _spread(problem: ShootingProblem, start: Real, omega: float) -> Real:
+    """States at all shooting phases by integrating from the first."""
+    if problem.segments == 1:
+        return start[None]
+    ends = problem.flow.shoot(
+        start[None], problem.phases[:-1], omega, sensitivities=False, chained=True
+    ).ends
+    return np.vstack([start[None], ends])

@@ -1,0 +1,214 @@
+"""Special points: test functions along a branch, and where they change sign."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from nldyn.branch import BranchPoint, SpecialPoint
+from nldyn.orbit import Orbit
+from nldyn.system import Complex, Real
+
+MULTIPLIER_TESTS = ("PD", "BP", "NS")
+
+
+class LocateError(RuntimeError):
+    """An orbit between two points of a branch could not be corrected."""
+
+
+def flip_test(multipliers: Complex) -> float:
+    """∏(μ + 1), each factor divided by 1 + |μ|: changes sign where a multiplier crosses -1."""
+    return float(np.prod((multipliers + 1.0) / (1.0 + np.abs(multipliers))).real)
+
+
+def branch_point_test(multipliers: Complex) -> float:
+    """∏(μ - 1), each factor divided by 1 + |μ|: changes sign where a multiplier crosses +1."""
+    return float(np.prod((multipliers - 1.0) / (1.0 + np.abs(multipliers))).real)
+
+
+def torus_test(multipliers: Complex) -> float:
+    """∏(μᵢμⱼ - 1) over pairs i < j, scaled: zero where a pair is on the unit circle.
+
+    The product is the determinant of the bialternate product of Φ with itself minus the identity
+    (Kuznetsov 2004, section 10.2.2).
+    """
+    i, j = np.triu_indices(multipliers.size, 1)
+    products = multipliers[i] * multipliers[j]
+    return float(np.prod((products - 1.0) / (1.0 + np.abs(products))).real)
+
+
+def tests(point: BranchPoint) -> dict[str, float]:
+    """All smooth test functions at a point; LP is the frequency part of the tangent."""
+    mu = point.orbit.multipliers
+    return {
+        "LP": float(point.tangent[-1]),
+        "PD": flip_test(mu),
+        "BP": branch_point_test(mu),
+        "NS": torus_test(mu) if mu.size > 2 else 1.0,
+    }
+
+
+@dataclass(frozen=True)
+class Chord:
+    """The piece of a branch between two neighbouring points, as a function of σ in [0, 1]."""
+
+    first: BranchPoint
+    last: BranchPoint
+
+    def at(self, sigma: float) -> BranchPoint:
+        """Point of the branch on the plane through σ of the chord.
+
+        Raises
+        ------
+        LocateError
+            If Newton's method fails there.
+        """
+        if sigma <= 0.0:
+            return self.first
+        if sigma >= 1.0:
+            return self.last
+        a, b = self.first, self.last
+        problem = a.orbit.problem
+        weights = problem.metric(a.orbit.point)
+        secant = b.orbit.point - a.orbit.point
+        guess = _hermite(a, b, sigma)
+        row = weights * secant
+        found = problem.correct(guess, row / np.linalg.norm(row))
+        if not found.converged:
+            raise LocateError(found.failure)
+        orbit = Orbit(problem, found.point, found.lin.monodromy, found.last_step, a.orbit.observe)
+        tangent = problem.tangent(found.lin, problem.metric(found.point), secant)
+        length = a.arclength + sigma * (b.arclength - a.arclength)
+        return BranchPoint(orbit, tangent, length)
+
+
+def _hermite(a: BranchPoint, b: BranchPoint, x: float) -> Real:
+    length = b.arclength - a.arclength
+    return np.asarray(
+        (1.0 + 2.0 * x) * (1.0 - x) ** 2 * a.orbit.point
+        + x * (1.0 - x) ** 2 * length * a.tangent
+        + x * x * (3.0 - 2.0 * x) * b.orbit.point
+        + x * x * (x - 1.0) * length * b.tangent
+    )
+
+
+def locate(kind: str, chord: Chord, test: Callable[[BranchPoint], float]) -> SpecialPoint:
+    """Root of a test function on a chord whose ends have opposite signs (Brent's method)."""
+    sigma, info = brentq(lambda x: test(chord.at(x)), 0.0, 1.0, xtol=1e-10, full_output=True)
+    point = chord.at(float(sigma))
+    near = chord.at(min(max(sigma + 1e-6, 0.0), 1.0 - 1e-9))
+    slope = abs(near.orbit.frequency_hz - point.orbit.frequency_hz) / 1e-6
+    error = (1e-10 * slope / point.orbit.frequency_hz) + point.orbit.error
+    if not info.converged:
+        raise LocateError(f"{kind} not located")
+    return SpecialPoint(kind, point, error)
+
+
+def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[SpecialPoint]:
+    """All special points between two neighbouring points, in order.
+
+    Each change of sign is followed by Brent's method. Where several tests change sign at once the
+    chord is halved first, so that none hides another.
+    """
+    chord = Chord(a, b)
+    before, after = tests(a), tests(b)
+    changed = [k for k in before if before[k] * after[k] < 0.0]
+    kinds = [k for k in changed if not (k == "BP" and "LP" in changed)]
+    grazes = a.orbit.impacts != b.orbit.impacts
+    lonely_fold = "LP" in changed and "BP" not in changed
+    count = len(kinds) + abs(a.orbit.impacts - b.orbit.impacts)
+    if (count > 1 or lonely_fold) and depth < 12:
+        middle = chord.at(0.5)
+        return special_points_between(a, middle, depth + 1) + special_points_between(
+            middle, b, depth + 1
+        )
+    found = [locate(k, chord, lambda point, k=k: tests(point)[k]) for k in kinds]  # type: ignore[misc]
+    found = [s for s in found if s.kind != "NS" or _on_unit_circle(s.orbit.multipliers)]
+    if grazes:
+        found.append(locate_grazing(chord))
+    return sorted(found, key=lambda s: s.point.arclength)
+
+
+def _on_unit_circle(multipliers: Complex) -> bool:
+    """Whether a complex pair (not a real pair μ, 1/μ) is what makes the torus test vanish."""
+    complex_ones = multipliers[np.abs(multipliers.imag) > 1e-6 * np.abs(multipliers)]
+    return bool(np.any(np.abs(np.abs(complex_ones) - 1.0) < 1e-5))
+
+
+def locate_grazing(chord: Chord) -> SpecialPoint:
+    """Point where a contact just appears or vanishes.
+
+    The number of contacts brackets it; the depth of the extremum that comes into contact, with
+    the sign that the count gives, is the function whose root is taken.
+    """
+    a, b = chord.first, chord.last
+    more = max(a.orbit.impacts, b.orbit.impacts)
+    sign_first = 1.0 if a.orbit.impacts == more else -1.0
+    low, high = 0.0, 1.0
+    for _ in range(6):
+        middle = 0.5 * (low + high)
+        side = 1.0 if chord.at(middle).orbit.impacts >= more else -1.0
+        if side == sign_first:
+            low = middle
+        else:
+            high = middle
+    touching = chord.at(low if sign_first > 0.0 else high).orbit
+    output, is_maximum, turn = _shallowest(touching)
+
+    def depth(sigma: float) -> float:
+        orbit = chord.at(sigma).orbit
+        value = _nearest_extreme(orbit, output, is_maximum, turn)
+        return value if orbit.impacts >= more else -value
+
+    sigma = float(brentq(depth, low, high, xtol=1e-10))
+    point = chord.at(sigma)
+    slope = abs(math.log(b.orbit.frequency_hz / a.orbit.frequency_hz))
+    return SpecialPoint("GR", point, 1e-10 * slope + point.orbit.error)
+
+
+def _shallowest(orbit: Orbit) -> tuple[int, bool, float]:
+    """Stop, kind and relative phase of the penetration extremum nearest to zero."""
+    best = (math.inf, 0, True, 0.0)
+    for output in range(len(orbit.system.stops)):
+        found = orbit.extremes(output)
+        for phase, value, is_maximum in zip(
+            found.phases, found.values, found.is_maximum, strict=True
+        ):
+            best = min(best, (abs(float(value)), output, bool(is_maximum), float(phase)))
+    return best[1], best[2], best[3]
+
+
+def _nearest_extreme(orbit: Orbit, output: int, is_maximum: bool, phase: float) -> float:
+    """Distance from zero of the extremum of one kind nearest in phase."""
+    found = orbit.extremes(output)
+    keep = found.is_maximum == is_maximum
+    full = 2.0 * np.pi * orbit.period
+    distance = np.abs((found.phases[keep] - phase + 0.5 * full) % full - 0.5 * full)
+    if distance.size == 0:
+        return math.inf
+    return abs(float(found.values[keep][int(np.argmin(distance))]))
+
+
+def hidden_dip(
+    z: BranchPoint, a: BranchPoint, b: BranchPoint, kind: str
+) -> float | None:
+    """Arclength between z and b at which a test may touch zero unseen, from a parabola.
+
+    The test has one sign at all three points but its parabola comes within a quarter of zero.
+    """
+    x = np.array([p.arclength for p in (z, a, b)])
+    y = np.array([tests(p)[kind] for p in (z, a, b)])
+    if y.min() * y.max() <= 0.0 or x[1] == x[0] or x[2] == x[1]:
+        return None
+    c = np.polyfit(x - x[1], y, 2)
+    if c[0] * y[1] <= 0.0:  # bends away from zero
+        return None
+    where = -0.5 * c[1] / c[0]
+    value = c[2] - 0.25 * c[1] ** 2 / c[0]
+    if not x[0] - x[1] < where < x[2] - x[1]:
+        return None
+    return float(where + x[1]) if value * y[1] < 0.25 * np.min(np.abs(y)) * abs(y[1]) else None
