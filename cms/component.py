@@ -70,27 +70,27 @@ def symmetric_matrix(matrix: Any, what: str) -> SparseMatrix:
     """
     try:
         if np.iscomplexobj(matrix):
-            raise ReductionError(f"the {what} matrix is complex, it must be real.")
+            raise ReductionError(f"the {what} matrix is complex, it must be real")
         array = sparse.csc_array(matrix, dtype=np.float64)
     except ReductionError:
         raise
     except (TypeError, ValueError) as error:
-        raise ReductionError(f"the {what} cannot be read as a matrix of numbers.") from error
+        raise ReductionError(f"the {what} cannot be read as a matrix of numbers") from error
     if array.ndim != 2 or array.shape[0] != array.shape[1]:
-        raise ReductionError(f"the {what} matrix has shape {array.shape}, it must be square.")
+        raise ReductionError(f"the {what} matrix has shape {array.shape}, it must be square")
     if array.shape[0] == 0:
-        raise ReductionError(f"the {what} matrix is empty: the component has no free dof.")
+        raise ReductionError(f"the {what} matrix is empty: the component has no free dof")
     bad = np.flatnonzero(~np.isfinite(array.data))
     if bad.size:
         row = int(array.indices[bad[0]])
         value = array.data[bad[0]]
-        raise ReductionError(f"the {what} matrix has the entry {value} in row {row}.")
+        raise ReductionError(f"the {what} matrix has the entry {value} in row {row}")
     largest = float(abs(array).max())
     difference = float(abs(array - array.T).max())
     if difference > SYMMETRY_TOLERANCE * largest:
         raise ReductionError(
             f"the {what} matrix is not symmetric: entries opposite each other differ by "
-            f"{difference:.3g}, its largest entry being {largest:.3g}."
+            f"{difference:.3g}, its largest entry being {largest:.3g}"
         )
     return sparse.csc_array((array + array.T) * 0.5)
 
@@ -106,16 +106,16 @@ def interface_vector(vector: Any, name: str, size: int) -> FloatArray:
     try:
         array = np.asarray(vector, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise ReductionError(f"interface '{name}' is not a vector of numbers.") from error
+        raise ReductionError(f"interface '{name}' is not a vector of numbers") from error
     if array.shape != (size,):
         raise ReductionError(
             f"interface '{name}' has shape {array.shape}, but the component has {size} "
-            "degrees of freedom."
+            "degrees of freedom"
         )
     if not np.all(np.isfinite(array)):
-        raise ReductionError(f"interface '{name}' has an entry that is not a finite number.")
+        raise ReductionError(f"interface '{name}' has an entry that is not a finite number")
     if not np.any(array):
-        raise ReductionError(f"interface '{name}' is a zero vector: it moves with no dof.")
+        raise ReductionError(f"interface '{name}' is a zero vector: it moves with no dof")
     return array
 
 
@@ -130,17 +130,17 @@ def checked_pencil(component: ComponentLike) -> Pencil:
     for attribute in ("stiffness", "mass", "interfaces"):
         if not hasattr(component, attribute):
             kind = type(component).__name__
-            raise ReductionError(f"the component (a {kind}) has no attribute '{attribute}'.")
+            raise ReductionError(f"the component (a {kind}) has no attribute '{attribute}'")
     stiffness = symmetric_matrix(component.stiffness, "stiffness")
     mass = symmetric_matrix(component.mass, "mass")
     if stiffness.shape != mass.shape:
         raise ReductionError(
-            f"the stiffness matrix has shape {stiffness.shape}, but the mass matrix {mass.shape}."
+            f"the stiffness matrix has shape {stiffness.shape}, but the mass matrix {mass.shape}"
         )
     check_diagonal(stiffness, "stiffness")
     check_diagonal(mass, "mass")
     if not abs(mass).max() > 0.0:
-        raise ReductionError("the mass matrix is zero: the component has no mass.")
+        raise ReductionError("the mass matrix is zero: the component has no mass")
     size = int(stiffness.shape[0])
     names = tuple(component.interfaces)
     vectors = [interface_vector(component.interfaces[name], name, size) for name in names]
@@ -155,5 +155,5 @@ def check_diagonal(matrix: SparseMatrix, what: str) -> None:
     if diagonal[worst] < 0.0:
         raise ReductionError(
             f"the {what} matrix is not positive: its diagonal has {diagonal[worst]:.3g} "
-            f"in row {worst}."
+            f"in row {worst}"
         )

@@ -57,7 +57,7 @@ def fastest_square(pencil: Pencil) -> float:
     mass = pencil.mass.diagonal()
     heavy = mass > 0.0
     if not np.any(heavy):
-        raise ReductionError("the mass matrix has no positive diagonal entry.")
+        raise ReductionError("the mass matrix has no positive diagonal entry")
     return float(np.max(pencil.stiffness.diagonal()[heavy] / mass[heavy]))
 
 
@@ -81,7 +81,7 @@ def shifted_factor(pencil: Pencil) -> Shifted:
     if moved is None:
         raise ReductionError(
             "the stiffness or the mass matrix is indefinite, or a dof has neither: "
-            f"K + {shift:.3g} M is not positive definite."
+            f"K + {shift:.3g} M is not positive definite"
         )
     shifted = Shifted(moved, shift, fastest)
     few = lowest_modes(pencil, shifted, min(6, pencil.size))
@@ -131,7 +131,7 @@ def lowest_modes(pencil: Pencil, shifted: Shifted, count: int) -> Modes:
         squares = np.where(np.abs(squares) <= RIGID_TOLERANCE * shifted.fastest, 0.0, squares)
     if squares[0] < 0.0:
         raise ReductionError(
-            f"the stiffness matrix is not positive: its lowest w^2 is {squares[0]:.3g} rad^2/s^2."
+            f"the stiffness matrix is not positive: its lowest w^2 is {squares[0]:.3g} rad^2/s^2"
         )
     errors = mode_errors(pencil, shifted, squares, vectors)
     check_errors(errors, squares, shifted)
@@ -159,7 +159,7 @@ def dense_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatArra
     if size > DENSE_AT_MOST:
         raise ReductionError(
             f"{count} modes are more than a quarter of the component's {size} degrees of "
-            f"freedom, which is done only up to {DENSE_AT_MOST} degrees of freedom."
+            f"freedom, which is done only up to {DENSE_AT_MOST} degrees of freedom"
         )
     mass, matrix = pencil.mass.toarray(), shifted.factor.matrix.toarray()
     nu, vectors = linalg.eigh(mass, matrix, subset_by_index=[size - count, size - 1])
@@ -171,7 +171,7 @@ def dense_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatArra
         massive = nu > 1e-12 * nu[0]
         if not np.all(massive):
             raise ReductionError(
-                f"{count} modes are asked for, but only {np.count_nonzero(massive)} have mass."
+                f"{count} modes are asked for, but only {np.count_nonzero(massive)} have mass"
             )
         return 1.0 / nu - shifted.shift, vectors / np.sqrt(nu)
     return with_fast_modes(pencil, shifted, nu, vectors)
@@ -215,7 +215,7 @@ def lanczos_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatAr
             ncv=min(size, max(2 * wanted + 1, 20)),
         )
     except (ArpackNoConvergence, ArpackError) as error:
-        raise ReductionError(f"the eigen-solver did not converge to {count} modes.") from error
+        raise ReductionError(f"the eigen-solver did not converge to {count} modes") from error
     order = np.argsort(squares)[:count]
     return squares[order], vectors[:, order]
 
@@ -261,5 +261,5 @@ def check_errors(errors: FloatArray, squares: FloatArray, shifted: Shifted) -> N
         worst = int(failed[0])
         raise ReductionError(
             f"mode {worst + 1} of the component fails its residual check "
-            f"({errors[worst]:.1e} > {allowed:.1e}), as when the mesh is too fine."
+            f"({errors[worst]:.1e} > {allowed:.1e}), as when the mesh is too fine"
         )

@@ -66,13 +66,13 @@ class ReducedModel:
         if len(shape) != 1 or np.ndim(self.basis) != 2 or self.basis.shape[1:] != shape:
             raise ReductionError(
                 f"frequencies_hz of shape {shape} and basis of shape {np.shape(self.basis)} "
-                "do not belong together."
+                "do not belong together"
             )
         for name, row in {"residuals": self.residuals, **self.participation}.items():
             if np.shape(row) != shape:
-                raise ReductionError(f"'{name}' has shape {np.shape(row)}, it must have {shape}.")
+                raise ReductionError(f"'{name}' has shape {np.shape(row)}, it must have {shape}")
         if not 0 <= self.modes <= shape[0]:
-            raise ReductionError(f"modes = {self.modes} is not between 0 and {shape[0]}.")
+            raise ReductionError(f"modes = {self.modes} is not between 0 and {shape[0]}")
         for field in ("frequencies_hz", "basis", "residuals"):
             object.__setattr__(self, field, read_only(getattr(self, field)))
         rows = {name: read_only(row) for name, row in self.participation.items()}
@@ -119,7 +119,7 @@ class ReducedModel:
         states = np.asarray(q, dtype=np.float64)
         if states.ndim not in (1, 2) or states.shape[0] != self.size:
             raise ReductionError(
-                f"q has shape {states.shape}, it must be ({self.size},) or ({self.size}, m)."
+                f"q has shape {states.shape}, it must be ({self.size},) or ({self.size}, m)"
             )
         return self.basis @ states
 
@@ -236,26 +236,26 @@ class ReducedModel:
             with np.load(path, allow_pickle=False) as file:
                 arrays = dict(file)
         except FileNotFoundError as error:
-            raise ReductionError(f"there is no file {path}.") from error
+            raise ReductionError(f"there is no file {path}") from error
         except Exception as error:  # whatever zipfile, numpy or the system make of a broken file
-            raise ReductionError(f"{path} is not a readable .npz file.") from error
+            raise ReductionError(f"{path} is not a readable .npz file") from error
         return from_arrays(arrays, path)
 
     def _row(self, name: str) -> FloatArray:
         if name not in self.participation:
             known = ", ".join(self.participation) or "none"
-            raise ReductionError(f"there is no interface '{name}' (there are: {known}).")
+            raise ReductionError(f"there is no interface '{name}' (there are: {known})")
         return self.participation[name]
 
 
 def from_arrays(arrays: Mapping[str, NDArray[Any]], path: str | os.PathLike[str]) -> ReducedModel:
     """The reduced model from the arrays of its file, or ReductionError naming the file."""
     if "format" not in arrays or str(arrays["format"]) != FORMAT:
-        raise ReductionError(f"{path} does not hold a reduced model.")
+        raise ReductionError(f"{path} does not hold a reduced model")
     version = int(arrays["version"]) if "version" in arrays else 0
     if version != FORMAT_VERSION:
         raise ReductionError(
-            f"{path} has format version {version}, this program reads version {FORMAT_VERSION}."
+            f"{path} has format version {version}, this program reads version {FORMAT_VERSION}"
         )
     try:
         names = [str(name) for name in arrays["interfaces"]]

@@ -126,33 +126,33 @@ def check_request(modes: int | None, cutoff_hz: float | None) -> None:
     """Raise ReductionError unless exactly one of modes and cutoff_hz is given, and sensible."""
     if (modes is None) == (cutoff_hz is None):
         given = "neither" if modes is None else "both"
-        raise ReductionError(f"give either modes or cutoff_hz; {given} is given.")
+        raise ReductionError(f"give either modes or cutoff_hz; {given} is given")
     if modes is not None:
         try:
             count = operator.index(modes)
         except TypeError:
             count = -1
         if isinstance(modes, bool) or count < 0:
-            raise ReductionError(f"modes = {modes!r} must be a whole number, 0 or more.")
+            raise ReductionError(f"modes = {modes!r} must be a whole number, 0 or more")
     elif not (isinstance(cutoff_hz, int | float | np.number) and 0.0 < cutoff_hz < math.inf):
-        raise ReductionError(f"cutoff_hz = {cutoff_hz!r} must be a positive frequency in Hz.")
+        raise ReductionError(f"cutoff_hz = {cutoff_hz!r} must be a positive frequency in Hz")
 
 
 def check_count(modes: int | None, residual: bool, pencil: Pencil) -> None:
     """Raise ReductionError where the component cannot give what is asked for."""
     if modes is not None and modes > pencil.size:
         raise ReductionError(
-            f"modes = {modes}, but the component has only {pencil.size} degrees of freedom."
+            f"modes = {modes}, but the component has only {pencil.size} degrees of freedom"
         )
     if modes == 0 and not residual:
-        raise ReductionError("modes = 0 without residual modes leaves nothing of the component.")
+        raise ReductionError("modes = 0 without residual modes leaves nothing of the component")
     if modes == 0 and not pencil.names:
-        raise ReductionError("modes = 0, and the component has no interface for a residual mode.")
+        raise ReductionError("modes = 0, and the component has no interface for a residual mode")
 
 
 def nothing_kept(cutoff_hz: float | None) -> str:
     """The sentence for an empty reduced model."""
-    return f"no mode of the component lies below cutoff_hz = {cutoff_hz}, so nothing is left of it."
+    return f"no mode of the component lies below cutoff_hz = {cutoff_hz}, so nothing is left of it"
 
 
 def kept_modes(
@@ -171,7 +171,7 @@ def check_held(shifted: Shifted) -> None:
         raise ReductionError(
             f"the component floats ({shifted.rigid} rigid-body "
             f"mode{'s' if shifted.rigid > 1 else ''}): residual flexibility needs supports "
-            "that hold it, or use residual=False."
+            "that hold it, or use residual=False"
         )
 
 

@@ -103,5 +103,5 @@ def diagonalised(basis: FloatArray, pencil: Pencil) -> tuple[FloatArray, FloatAr
     nu, directions = linalg.eigh((mass + mass.T) / 2, (stiffness + stiffness.T) / 2)
     nu, directions = nu[::-1], directions[:, ::-1]
     if nu[-1] <= 0.0:
-        raise ReductionError("a residual mode has no mass: give its interface some mass.")
+        raise ReductionError("a residual mode has no mass: give its interface some mass")
     return 1.0 / nu, basis @ directions / np.sqrt(nu)
