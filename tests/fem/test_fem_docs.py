@@ -1,0 +1,54 @@
+"""The examples in the documentation run, and its table is what is computed."""
+
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from frames import CLAMP, beam, bending_hz, frequencies_hz
+from test_fem_frames import THIN_BAR, THIN_MEMBERS, exact_portal_frequencies, portal
+
+import fem
+
+ROOT = Path(__file__).resolve().parents[2]
+TEXT = (ROOT / "docs" / "fem.md").read_text(encoding="utf-8")
+
+
+def test_examples_run_in_order(monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    names = {}
+    for block in re.findall(r"```python\n(.*?)```", TEXT, flags=re.DOTALL):
+        exec(block, names)
+    assert names["component"].stiffness.shape == (3 * 93 - 5, 3 * 93 - 5)
+    assert names["fit"].converged
+    assert "| length |" in capsys.readouterr().out
+
+
+def first_errors(elements):
+    pinned = [fem.Support(end, ("x", "y")) for end in ("left", "right")]
+    clamped = [fem.Support("left", CLAMP)]
+    cases = (
+        (beam(elements=elements, supports=pinned), bending_hz(np.pi)),
+        (beam(elements=elements, supports=clamped), bending_hz(1.8751040687119611)),
+        (portal(elements, part=THIN_BAR), exact_portal_frequencies(THIN_MEMBERS)[0]),
+        (portal(elements), exact_portal_frequencies()[0]),
+    )
+    return [frequencies_hz(fem.assemble(model), 1)[0] / exact - 1 for model, exact in cases]
+
+
+@pytest.mark.parametrize("elements", [2, 4, 8, 16, 32])
+def test_convergence_table_is_what_is_computed(elements):
+    block = TEXT.split("<!-- convergence -->")[1].split("<!-- end of convergence -->")[0]
+    row = next(line for line in block.splitlines() if line.startswith(f"| {elements} |"))
+    printed = [float(word) for word in row.strip("| ").split("|")[1:]]
+    # the last digit, and what rounding in the eigenvalues can do
+    assert first_errors(elements) == pytest.approx(printed, rel=6e-3, abs=5e-10)
+
+
+@pytest.mark.skipif(os.sep != "/", reason="the example paths are those of a checkout")
+def test_links_lead_somewhere():
+    for name in ("fem.md", "calibration.md"):
+        text = (ROOT / "docs" / name).read_text(encoding="utf-8")
+        for target in re.findall(r"\]\(([\w./]+)(?:#[\w-]+)?\)", text):
+            assert (ROOT / "docs" / target).exists(), target
