@@ -151,7 +151,7 @@ def calibrate(
     ...     frequencies, {"length": 0.5}, {"f1": 16.6, "f2": 104.0}, {"f1": 0.05, "f2": 0.5}
     ... )
     >>> round(fit.values["length"], 3), round(fit.standard_uncertainties["length"], 4)
-    (0.71, 0.0005)
+    (0.711, 0.0005)
     """
     names, wanted = list(start), list(targets)
     _check(start, targets, tolerances, bounds or {}, step)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ from fem.elements import local_matrices, turn
 from fem.errors import ModelError
 from fem.mesh import FloatArray, IntArray
 from fem.model import DIRECTIONS, FrameModel
+from fem.store import load_model, save_model
 
 SparseArray = sparse.csr_array
 
@@ -63,6 +65,15 @@ class Component:
     def element_shape(self, u: FloatArray) -> FloatArray:
         """(ux, uy, rotation) at both ends of every element, with hinges, shape (e, 2, 3)."""
         return self._all(u)[self.element_dofs].reshape(-1, 2, 3)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the frame to an .npz file; the matrices are assembled again by `load`."""
+        save_model(self.model, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Component:
+        """Read and assemble a frame that `save` wrote; a `ModelError` says what is wrong."""
+        return assemble(load_model(path))
 
     def _all(self, u: FloatArray) -> FloatArray:
         u = np.asarray(u, dtype=np.float64)

@@ -1,5 +1,7 @@
 """The examples in the documentation run, and its table is what is computed."""
 
+import doctest
+import importlib
 import os
 import re
 from pathlib import Path
@@ -23,6 +25,28 @@ def test_examples_run_in_order(monkeypatch, capsys):
     assert names["component"].stiffness.shape == (3 * 93 - 5, 3 * 93 - 5)
     assert names["fit"].converged
     assert "| length |" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "abaqus",
+        "calibrate",
+        "elements",
+        "errors",
+        "frame",
+        "mesh",
+        "model",
+        "read",
+        "store",
+        "write",
+    ],
+)
+def test_examples_in_docstrings_run(monkeypatch, name):
+    monkeypatch.chdir(ROOT)
+    result = doctest.testmod(importlib.import_module(f"fem.{name}"))
+    assert result.attempted > 0
+    assert result.failed == 0
 
 
 def first_errors(elements):

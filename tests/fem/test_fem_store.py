@@ -1,0 +1,63 @@
+"""A frame that is saved comes back."""
+
+import numpy as np
+import pytest
+from frames import BAR, STEEL
+
+import fem
+
+
+class Plank:
+    area = 2e-3
+    second_moment = 3e-8
+
+
+def frame():
+    mesh = fem.frame_mesh(
+        {"a": (0, 0), "joint": (1, 0.2), "b": (2, 0)},
+        [("first", "a", "joint", 3), ("second", "joint", "b", 2), ("third", "a", "b", 2)],
+        source="frame.msh",
+    )
+    return fem.FrameModel(
+        mesh,
+        parts={
+            "first": BAR,
+            "second": fem.BeamPart(STEEL, fem.CircularSection(0.03, 0.01)),
+            "third": fem.BeamPart(STEEL, Plank()),
+        },
+        supports=[fem.Support("a", ("x", "y"))],
+        point_masses=[fem.PointMass("b", 0.3, 0.1)],
+        springs=[fem.PointSpring("b", "y", 1e4)],
+        hinges=[fem.Hinge("joint", "second")],
+        interfaces={"end": fem.Interface("b", "rotation")},
+    )
+
+
+def test_a_component_comes_back_to_the_last_bit(tmp_path):
+    component = fem.assemble(frame())
+    component.save(tmp_path / "frame.npz")
+    back = fem.Component.load(tmp_path / "frame.npz")
+    for name in ("stiffness", "mass"):
+        assert abs(getattr(back, name) - getattr(component, name)).max() == 0.0
+    assert np.array_equal(back.interfaces["end"], component.interfaces["end"])
+    assert back.model.supports == component.model.supports
+    assert back.model.hinges == component.model.hinges
+    assert back.model.mesh.source == "frame.msh"
+    assert [path.name for path in tmp_path.iterdir()] == ["frame.npz"]
+
+
+def test_files_that_are_not_frames_are_one_sentence(tmp_path):
+    with pytest.raises(fem.ModelError, match=r"no.npz: there is no such frame file"):
+        fem.Component.load(tmp_path / "no.npz")
+    path = tmp_path / "other.npz"
+    for content in (b"", b"nonsense"):
+        path.write_bytes(content)
+        with pytest.raises(fem.ModelError, match="is not a file of a saved frame"):
+            fem.Component.load(path)
+    np.savez(path, points=np.zeros(3))
+    with pytest.raises(fem.ModelError, match="is not a file of a saved frame"):
+        fem.Component.load(path)
+    fem.assemble(frame()).save(path)
+    path.write_bytes(path.read_bytes()[:-200])
+    with pytest.raises(fem.ModelError, match="is not a file of a saved frame"):
+        fem.Component.load(path)
