@@ -112,4 +112,4 @@ def _disconnected_lines(lengths: FloatArray) -> skfem.MeshLine:
     count = len(lengths)
     ends = np.zeros((1, 2 * count))
     ends[0, 1::2] = lengths
-    return skfem.MeshLine(ends, np.arange(2 * count).reshape(count, 2).T)
+    return skfem.MeshLine(ends, np.ascontiguousarray(np.arange(2 * count).reshape(count, 2).T))
