@@ -31,6 +31,7 @@ out_option = click.option(
     metavar="DIR",
     help="Directory for the results: new, empty, or of an earlier run.",
 )
+quiet_option = click.option("--quiet", is_flag=True, help="Show no progress bar.")
 
 
 def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
@@ -58,7 +59,7 @@ def main() -> None:
 @main.command()
 @scene_argument
 @out_option
-@click.option("--quiet", is_flag=True, help="Show no progress bar.")
+@quiet_option
 def run(scene: Path, out: Path, quiet: bool) -> None:
     """Compute the branches of a scene, and write tables and a diagram."""
     with plain_errors():
@@ -86,6 +87,51 @@ def check(scene: Path) -> None:
         loaded = load_scene(scene)
         click.echo(describe_system(build_system(loaded)))
         click.echo(f"{scene}: no fault found")
+
+
+@main.command()
+@scene_argument
+@out_option
+@click.option(
+    "--frequency-hz",
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="HZ",
+    help="Draw the orbit at this excitation frequency; else the highest harmonic one.",
+)
+@click.option(
+    "--period",
+    type=click.IntRange(min=1),
+    default=1,
+    show_default=True,
+    help="Period of that orbit, in periods of the excitation.",
+)
+@click.option(
+    "--video",
+    type=click.Choice(["gif", "mp4"]),
+    default="gif",
+    show_default=True,
+    help="Kind of animation.",
+)
+@quiet_option
+def render(
+    scene: Path, out: Path, frequency_hz: float | None, period: int, video: str, quiet: bool
+) -> None:
+    """Draw mode shapes, deepest contact and one period in motion of a scene with a mesh."""
+    with plain_errors():
+        from nldyn.render import render_scene
+        from nldyn.result_directory import check_directory
+        from nldyn.scene import load_scene
+
+        loaded = load_scene(scene)
+        check_directory(out)
+        with progress_bar(quiet) as report:
+            made = render_scene(
+                loaded, out, frequency_hz=frequency_hz, period=period, video=video, progress=report
+            )
+    click.echo(f"written to {out}")
+    if made.missing:
+        click.echo(f"nldyn: {made.missing}", err=True)
+        sys.exit(NO_GRAPHICS)
 
 
 @main.command()

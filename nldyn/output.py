@@ -12,15 +12,12 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from nldyn.result_directory import result_directory
 from nldyn.version import software_version
 
 if TYPE_CHECKING:
     from nldyn.branch import Branch
     from nldyn.diagram import Diagram
-    from nldyn.orbit import Orbit
     from nldyn.scene_schema import Scene
 
 BRANCH_COLUMNS = (
@@ -94,7 +91,7 @@ def branch_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
                 float(orbit.max_penetration),
                 int(orbit.impacts),
                 int(orbit.stable),
-                largest_multiplier(orbit),
+                abs(orbit.largest_multiplier),
             )
 
 
@@ -113,11 +110,6 @@ def special_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
             )
 
 
-def largest_multiplier(orbit: Orbit) -> float:
-    """Give the modulus of the multiplier that is farthest from the origin."""
-    return float(np.abs(orbit.multipliers).max())
-
-
 def write_table(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
     """Write a CSV file; floats keep every digit (``repr``)."""
     with path.open("w", newline="", encoding="utf-8") as file:
@@ -132,7 +124,8 @@ def summary(diagram: Diagram) -> Mapping[str, object]:
     return {
         "software": f"nldyn {software_version()}",
         "points": len(orbits),
-        "largest_residual": worst(orbit.residual for orbit in orbits),
+        "largest_relative_error": worst(orbit.error for orbit in orbits),
+        "largest_liouville_error": worst(orbit.liouville_error for orbit in orbits),
         "branches": [_branch_summary(branch) for branch in diagram.branches],
     }
 
@@ -151,5 +144,5 @@ def _branch_summary(branch: Branch) -> dict[str, object]:
 
 def worst(values: Iterable[float]) -> float | None:
     """Give the largest of some error figures; none if there are none or one is not finite."""
-    largest = max((float(value) for value in values), default=math.nan)
-    return largest if math.isfinite(largest) else None
+    figures = [float(value) for value in values]
+    return max(figures) if figures and all(map(math.isfinite, figures)) else None

@@ -163,7 +163,7 @@ def plot_diagram(
 
 
 def plot_orbit(
-    orbit: Orbit, axes: tuple[Axes, Axes] | None = None, *, points: int = 2001
+    orbit: Orbit, axes: tuple[Axes, Axes] | None = None, *, samples: int = 4000
 ) -> tuple[Axes, Axes]:
     """Draw displacement and contact force of an orbit over one of its periods.
 
@@ -173,24 +173,40 @@ def plot_orbit(
         A periodic orbit.
     axes : pair of matplotlib.axes.Axes, optional
         Where to draw displacement and force; a new figure unless given.
-    points : int
-        Number of equally spaced instants.
+    samples : int
+        Number of equal time steps.
 
     Returns
     -------
     pair of matplotlib.axes.Axes
         Those for the displacement, with every impact marked, and for the contact force.
     """
-    history = orbit.history(points)
+    history = orbit.history(samples)
     upper, lower = axes if axes is not None else new_axes_pair()
-    time = np.asarray(history.time)
-    _draw_displacement(upper, time, np.asarray(history.displacement))
-    _draw_force(lower, time, np.asarray(history.contact_force))
-    _mark_impacts((upper, lower), np.asarray(history.impact_times))
+    _draw_displacement(upper, history.time, history.displacement[orbit.observe])
+    _draw_forces(lower, history.time, history.force, [s.at for s in orbit.system.stops])
+    starts = [contact_starts(history.time, depth) for depth in history.penetration.T]
+    _mark_impacts((upper, lower), np.concatenate([[], *starts]))
     name = period_name(orbit.period)
     upper.set_title(f"{name} orbit at {orbit.frequency_hz:.6g} Hz")
     lower.set_xlabel("time (s)")
     return upper, lower
+
+
+def contact_starts(
+    time: NDArray[np.float64], penetration: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Give the instants at which a sampled penetration turns positive.
+
+    Examples
+    --------
+    >>> contact_starts(np.array([0.0, 1.0, 2.0, 3.0]), np.array([-1.0, 1.0, -2.0, -1.0]))
+    array([0.5])
+    """
+    before, after = penetration[:-1], penetration[1:]
+    closing = (before <= 0.0) & (after > 0.0)
+    share = before[closing] / (before[closing] - after[closing])
+    return time[:-1][closing] + share * (time[1:] - time[:-1])[closing]
 
 
 def save_diagram(
@@ -289,10 +305,16 @@ def _draw_displacement(ax: Axes, time: NDArray[np.float64], y: NDArray[np.float6
     ax.set_ylabel(f"displacement ({unit})")
 
 
-def _draw_force(ax: Axes, time: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-    ax.plot(time, force, color=PERIOD_COLOURS[1], linewidth=1.2)
+def _draw_forces(
+    ax: Axes, time: NDArray[np.float64], forces: NDArray[np.float64], names: Sequence[str]
+) -> None:
+    for number, name in enumerate(names):
+        colour = PERIOD_COLOURS[(number + 1) % len(PERIOD_COLOURS)]
+        ax.plot(time, forces[:, number], color=colour, linewidth=1.2, label=f"stop at {name}")
     ax.set_ylabel("contact force (N)")
     ax.set_ylim(bottom=0.0)
+    if len(names) > 1:
+        ax.legend(fontsize="small", loc="upper right")
 
 
 def _mark_impacts(axes: Sequence[Axes], times: NDArray[np.float64]) -> None:

@@ -1,16 +1,8 @@
 """Orbits, branches and diagrams that look computed."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-
-
-@dataclass(frozen=True)
-class FakeHistory:
-    time: np.ndarray
-    displacement: np.ndarray
-    contact_force: np.ndarray
-    impact_times: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -21,8 +13,9 @@ class FakeOrbit:
     stable: bool = True
     impacts: int = 1
     max_penetration: float = 1e-7
-    residual: float = 1e-14
-    multipliers: np.ndarray = field(default_factory=lambda: np.array([0.5 + 0.2j, 0.5 - 0.2j]))
+    error: float = 1e-14
+    liouville_error: float = 1e-12
+    largest_multiplier: complex = 0.5 + 0.2j
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,14 @@ import sys
 
 import numpy as np
 import pytest
-from fakes import FakeHistory, FakeOrbit, diagram, resonance
+from fakes import diagram, resonance
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nldyn.orbit import solve_orbit
 from nldyn.plot import length_unit, plot_diagram, plot_orbit, stability_runs
+from nldyn.resources import example
+from nldyn.scene import build_system, load_scene
 
 
 @given(st.lists(st.booleans(), max_size=30))
@@ -75,18 +78,21 @@ def test_unit(size, unit):
     assert length_unit(size)[1] == unit
 
 
-class OrbitWithHistory(FakeOrbit):
-    def history(self, n):
-        time = np.linspace(0.0, 1 / 25.3, n)
-        y = 1e-4 * (np.sin(2 * np.pi * 25.3 * time) - 0.9)
-        return FakeHistory(time, y, 1e3 * np.maximum(y, 0), np.array([0.0071]))
-
-
 def test_orbit_shows_displacement_impacts_and_force():
-    upper, lower = plot_orbit(OrbitWithHistory(25.3, 2e-4))
+    system = build_system(load_scene(example("one_dof.toml")))
+    orbit = solve_orbit(system, frequency_hz=25.3)
+    upper, lower = plot_orbit(orbit)
     assert upper.get_ylabel() == "displacement (µm)"
+    assert upper.get_title() == "harmonic orbit at 25.3 Hz"
     assert lower.get_ylabel() == "contact force (N)"
     assert upper.get_legend().get_texts()[0].get_text() == "impact"
+    y = upper.lines[1].get_ydata()
+    assert np.abs(y).max() == pytest.approx(1e6 * orbit.max_abs_displacement, rel=1e-4)
+    force = lower.lines[0]
+    impacts = upper.lines[2:]
+    assert len(impacts) == orbit.impacts == 1
+    first_push = force.get_xdata()[np.argmax(force.get_ydata() > 0)]
+    assert impacts[0].get_xdata()[0] == pytest.approx(first_push, abs=2e-5)
 
 
 def test_library_functions_leave_pyplot_alone():

@@ -44,7 +44,7 @@ def test_files_and_columns(tmp_path):
 
 def test_numbers_come_back_bit_for_bit(tmp_path):
     third, tiny = 100.0 / 3.0, 1.2345678901234567e-7
-    orbit = FakeOrbit(third, tiny, 3, False, 2, tiny / 7, multipliers=[-1.1 + 0j, 0.1j])
+    orbit = FakeOrbit(third, tiny, 3, False, 2, tiny / 7, largest_multiplier=-1.1 + 0j)
     branch = FakeBranch("a", 3, [orbit], [FakeSpecialPoint("PD", orbit)])
     write_results(FakeDiagram([branch]), tmp_path / "out")
     row = read(tmp_path / "out" / "branches.csv")[1]
@@ -57,7 +57,8 @@ def test_summary(tmp_path):
     write_results(diagram(), tmp_path / "out")
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["software"].startswith("nldyn ")
-    assert summary["largest_residual"] == 1e-14
+    assert summary["largest_relative_error"] == 1e-14
+    assert summary["largest_liouville_error"] == 1e-12
     assert [b["stop_reason"] for b in summary["branches"]] == ["end of range"] * 3
 
 

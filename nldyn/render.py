@@ -1,0 +1,249 @@
+"""Pictures of a scene's structure: its modes, its deepest contact, and one period in motion."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nldyn.errors import SceneError
+from nldyn.result_directory import result_directory
+from nldyn.scene import build_component, build_reduced, build_system
+from nldyn.scene_checks import check_computable
+from nldyn.scene_messages import scene_error
+
+if TYPE_CHECKING:
+    import cms
+    import fem
+    from fem.render import StopSphere
+    from nldyn.orbit import Orbit
+    from nldyn.scene_schema import Scene
+    from nldyn.system import System
+
+DRAWN_RADIUS = 0.005
+FRAMES = 60
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """What `render_scene` made.
+
+    Parameters
+    ----------
+    directory : Path
+        Where the files are.
+    orbit : Orbit or None
+        The orbit drawn; none if the scene has no ``[continuation]``.
+    missing : str
+        Empty, or what to install to get the pictures that could not be made.
+    """
+
+    directory: Path
+    orbit: Orbit | None
+    missing: str = ""
+
+
+def render_scene(
+    scene: Scene,
+    directory: str | Path,
+    *,
+    frequency_hz: float | None = None,
+    period: int = 1,
+    video: str = "gif",
+    progress: Callable[[float, str], None] | None = None,
+) -> Rendering:
+    """Draw the mode shapes, the deepest contact and the motion of a scene with a mesh.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with a ``[mesh]``. Without a ``[continuation]`` only its modes are drawn.
+    directory : str or Path
+        Gets ``modes.csv`` and ``mode_shapes.png``, and for the orbit ``orbit.png``,
+        ``orbit.svg``, ``deepest_contact.png`` and ``motion.gif``; all of them or nothing.
+    frequency_hz : float, optional
+        Excitation frequency of the orbit in Hz; unless given, where the harmonic branch has its
+        largest displacement.
+    period : int
+        Period of the orbit in periods of the excitation, if a frequency is given.
+    video : {"gif", "mp4"}
+        Kind of animation.
+    progress : callable, optional
+        Called now and then with the fraction done (0 to 1) and what is being done.
+
+    Returns
+    -------
+    Rendering
+        Without a graphics library, what needs none is written, and `missing` says what to
+        install.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no mesh, or there is no such orbit.
+    OutputError
+        If the directory cannot be written.
+    """
+    if scene.mesh is None:
+        raise scene_error(scene.file, ("mesh",), "is missing: only a mesh can be drawn")
+    if scene.continuation is not None:
+        check_computable(scene, scene.file)
+    tell = progress or (lambda fraction, text: None)
+    tell(0.0, "model")
+    component = build_component(scene)
+    reduced = build_reduced(scene, component)
+    orbit = None
+    if scene.continuation is not None:
+        tell(0.05, "orbit")
+        orbit = orbit_to_draw(scene, build_system(scene, reduced), frequency_hz, period)
+    with result_directory(directory, "render") as folder:
+        write_modes(reduced, folder / "modes.csv")
+        if orbit is not None:
+            save_orbit(orbit, folder)
+        drawing = _Drawing(scene, component, reduced, folder, tell)
+        missing = drawing.draw(orbit, video)
+    return Rendering(Path(directory), orbit, missing)
+
+
+def orbit_to_draw(scene: Scene, system: System, frequency_hz: float | None, period: int) -> Orbit:
+    """Find the orbit to draw: at a frequency, or at the top of the harmonic branch."""
+    if frequency_hz is not None:
+        return _orbit_at(scene, system, frequency_hz, period)
+    from nldyn.continuation import continue_branch
+
+    assert scene.continuation is not None
+    low, high = scene.continuation.range_hz
+    branch = continue_branch(_orbit_at(scene, system, low, 1), (low, high))
+    return max(branch.points, key=lambda orbit: orbit.max_abs_displacement)
+
+
+def _orbit_at(scene: Scene, system: System, frequency_hz: float, period: int) -> Orbit:
+    from nldyn.orbit import ConvergenceError, solve_orbit
+
+    try:
+        return solve_orbit(system, frequency_hz=frequency_hz, period=period)
+    except ConvergenceError as error:
+        raise SceneError(f"{scene.file}: {error}") from error
+
+
+def deepest_state(orbit: Orbit) -> NDArray[np.float64]:
+    """Modal displacements at the instant of deepest contact, or of largest displacement."""
+    impacts = orbit.impact_list
+    if impacts:
+        phase = orbit.omega * max(impacts, key=lambda impact: impact.penetration).time
+    else:
+        extremes = orbit.observed_extremes
+        phase = float(extremes.phases[np.argmax(np.abs(extremes.values))])
+    return orbit.states(np.array([phase]))[0, : orbit.system.size]
+
+
+def write_modes(reduced: cms.ReducedModel, path: Path) -> None:
+    """Write frequency and participation of each mode of the reduced model to a CSV file."""
+    names = list(reduced.participation)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["mode", "frequency_hz", *(f"participation_{name}" for name in names)])
+        for number, hz in enumerate(reduced.frequencies_hz):
+            row = [float(reduced.participation[name][number]) for name in names]
+            writer.writerow([number + 1, float(hz), *row])
+
+
+def save_orbit(orbit: Orbit, folder: Path) -> None:
+    """Draw displacement and contact force over time, as ``orbit.png`` and ``orbit.svg``."""
+    from nldyn.plot import plot_orbit, save_figure
+
+    save_figure(plot_orbit(orbit)[0], folder / "orbit")
+
+
+def stop_to_draw(scene: Scene) -> StopSphere | None:
+    """Give the first stop that acts along an axis of the frame, as a sphere to be drawn."""
+    from fem.render import StopSphere
+
+    axes = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
+    for stop in scene.stops:
+        place = scene.interfaces[stop.at]
+        if place.direction in axes:
+            x, y = axes[place.direction]
+            way = (stop.direction * x, stop.direction * y)
+            return StopSphere(place.at, stop.radius or DRAWN_RADIUS, way, stop.gap)
+    return None
+
+
+@dataclass(frozen=True)
+class _Drawing:
+    """The pictures that need a graphics library."""
+
+    scene: Scene
+    component: fem.Component
+    reduced: cms.ReducedModel
+    folder: Path
+    tell: Callable[[float, str], None]
+
+    def draw(self, orbit: Orbit | None, video: str) -> str:
+        """Make all of them; say what to install if something is missing for it."""
+        from fem.render import RenderError, gl_available
+
+        available, advice = gl_available()
+        if not available:
+            return advice
+        try:
+            self.modes()
+            if orbit is not None:
+                self.deepest_contact(orbit)
+                self.motion(orbit, video)
+        except RenderError as error:
+            return str(error)
+        return ""
+
+    def modes(self) -> None:
+        """Draw a sheet with all modes of the reduced model."""
+        from fem.render import render_modes
+
+        self.tell(0.3, "mode shapes")
+        kept = self.reduced.modes
+        titles = [
+            f"{'mode' if number < kept else 'residual mode'} {number + 1}: {hz:.1f} Hz"
+            for number, hz in enumerate(self.reduced.frequencies_hz)
+        ]
+        path = self.folder / "mode_shapes.png"
+        render_modes(self.component, self.reduced.basis, titles, path, mirror=_mirror(self.scene))
+
+    def deepest_contact(self, orbit: Orbit) -> None:
+        """Draw the structure at the instant of deepest contact."""
+        from fem.render import render_shape
+
+        self.tell(0.4, "deepest contact")
+        what = "deepest contact" if orbit.impacts else "largest deflection"
+        render_shape(
+            self.component,
+            self.reduced.expand(deepest_state(orbit)),
+            self.folder / "deepest_contact.png",
+            title=f"{what} at {orbit.frequency_hz:.4g} Hz",
+            stop=stop_to_draw(self.scene),
+            mirror=_mirror(self.scene),
+        )
+
+    def motion(self, orbit: Orbit, video: str) -> None:
+        """Animate one period of the orbit."""
+        from fem.render import animate
+
+        self.tell(0.5, "animation")
+        history = orbit.history(FRAMES)
+        animate(
+            self.component,
+            self.reduced.expand(history.modal[:-1].T).T,
+            self.folder / f"motion.{video}",
+            times=history.time[:-1],
+            title=f"one period of the orbit at {orbit.frequency_hz:.4g} Hz",
+            stop=stop_to_draw(self.scene),
+            mirror=_mirror(self.scene),
+        )
+
+
+def _mirror(scene: Scene) -> str | None:
+    return scene.mesh.mirror if scene.mesh is not None else None

@@ -1,0 +1,74 @@
+"""Pictures of a scene; without a graphics library everything else is still written."""
+
+import csv
+
+import pytest
+from click.testing import CliRunner
+
+import fem.render
+from nldyn.cli import main
+from nldyn.render import deepest_state, orbit_to_draw, stop_to_draw
+from nldyn.resources import example
+from nldyn.scene import build_system, load_scene
+
+BEAM = example("two_dof_xi_0.01.toml")
+
+
+def render(tmp_path, scene=BEAM, *more):
+    out = tmp_path / "out"
+    arguments = ["render", str(scene), "--out", str(out), "--quiet", *more]
+    return CliRunner().invoke(main, arguments), out
+
+
+def names(out):
+    return {p.name for p in out.iterdir() if not p.name.startswith(".")}
+
+
+def test_without_graphics_the_rest_is_written(tmp_path, monkeypatch):
+    monkeypatch.setattr(fem.render, "gl_available", lambda: (False, "install libegl1"))
+    result, out = render(tmp_path, BEAM, "--frequency-hz", "23.0")
+    assert result.exit_code == 3
+    assert result.stderr == "nldyn: install libegl1\n"
+    assert names(out) == {"modes.csv", "orbit.png", "orbit.svg"}
+    with (out / "modes.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["mode"] for row in rows] == ["1", "2"]
+    assert float(rows[0]["frequency_hz"]) == pytest.approx(13.1, rel=3e-3)
+    assert float(rows[0]["participation_middle"]) > 0
+
+
+def test_pictures_stand_beside_the_tables_of_a_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(fem.render, "gl_available", lambda: (False, "none"))
+    for _ in range(2):
+        _, out = render(tmp_path, BEAM, "--frequency-hz", "23.0")
+    assert "modes.csv" in names(out)
+
+
+def test_scene_without_mesh_cannot_be_drawn(tmp_path):
+    result, out = render(tmp_path, example("one_dof.toml"))
+    assert result.exit_code == 2
+    assert "mesh is missing: only a mesh can be drawn" in result.stderr
+    assert not out.exists()
+
+
+def test_stop_is_drawn_where_the_interface_is():
+    stop = stop_to_draw(load_scene(BEAM))
+    assert (stop.point, stop.direction, stop.gap) == ("middle", (0.0, 1.0), 0.0)
+
+
+def test_deepest_state_is_at_the_largest_penetration():
+    scene = load_scene(BEAM)
+    system = build_system(scene)
+    orbit = orbit_to_draw(scene, system, 23.0, 1)
+    depth = system.participation["middle"] @ deepest_state(orbit)
+    assert depth == pytest.approx(orbit.max_penetration, rel=1e-9)
+
+
+def test_all_pictures(tmp_path, monkeypatch):
+    available, advice = fem.render.gl_available()
+    if not available:
+        pytest.skip(advice)
+    monkeypatch.setattr("nldyn.render.FRAMES", 3)
+    result, out = render(tmp_path, BEAM, "--frequency-hz", "23.0")
+    assert result.exit_code == 0, result.output
+    assert {"mode_shapes.png", "deepest_contact.png", "motion.gif"} < names(out)
