@@ -8,7 +8,7 @@ from numba import njit
 FLIGHT = -1
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def map_fraction(kind, s):
     """Fraction of the panel that belongs to the stretched time s (see `gauss.time_map`)."""
     if kind == 0:
@@ -20,7 +20,7 @@ def map_fraction(kind, s):
     return 0.5 - 0.5 * np.cos(np.pi * s)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def stretched_time(kind, x):
     """Inverse of `map_fraction`."""
     x = min(max(x, 0.0), 1.0)
@@ -33,7 +33,7 @@ def stretched_time(kind, x):
     return np.arccos(1.0 - 2.0 * x) / np.pi
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def map_slope(kind, s):
     """Derivative of `map_fraction`."""
     if kind == 0:
@@ -45,7 +45,7 @@ def map_slope(kind, s):
     return 0.5 * np.pi * np.sin(np.pi * s)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def antiderivative_weights(to_legendre, s, out):
     """Weights of the node values in the integral of their interpolant from 0 to s."""
     m = out.size
@@ -63,7 +63,7 @@ def antiderivative_weights(to_legendre, s, out):
             out[j] += integral * to_legendre[degree, j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def state_at(eigenvalues, force, chi, to_legendre, gauss_nodes, kind, h, start, forces, t, w):
     """Fill w with the homogeneous state a time t after the start of a piece."""
     nz = eigenvalues.size
@@ -84,7 +84,7 @@ def state_at(eigenvalues, force, chi, to_legendre, gauss_nodes, kind, h, start, 
             w[k] -= share * drive * np.exp(eigenvalues[k] * (t - h * chi[kind, j]))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def sample_states(
     eigenvalues, force, omega, chi, to_legendre, gauss_nodes,
     rec_phase, rec_duration, rec_kind, rec_w, rec_force, count, phases,
@@ -103,7 +103,7 @@ def sample_states(
     return states
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def output_rate(eigenvalues, row, forced, omega, phase, w):
     """Value and rate of the output ``Re(row @ w) + Re(forced e^{i phase})``."""
     turn = forced * np.exp(1j * phase)
@@ -116,7 +116,7 @@ def output_rate(eigenvalues, row, forced, omega, phase, w):
     return value, rate
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def local_extremes(
     eigenvalues, force, omega, chi, to_legendre, gauss_nodes,
     rec_phase, rec_duration, rec_kind, rec_w, rec_force, count, row, forced,

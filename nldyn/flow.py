@@ -13,9 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn._flight import FlowData
-from nldyn._segment import CONTACT_FAILED, OK, TOO_MANY_PIECES, Record
-from nldyn._shoot import shoot
+from nldyn._kernels import CONTACT_FAILED, OK, TOO_MANY_PIECES, FlowData, Record, shoot
 from nldyn.gauss import GaussTables, gauss_tables
 from nldyn.system import Complex, Real, System
 

@@ -352,9 +352,8 @@ class System:
         """
         lam = self.linear.eigenvalues
         drive = np.zeros((4, lam.size), dtype=complex)  # value and slope, e^{iωt} and e^{-iωt}
-        for source in self.excitation:
+        for source, column in zip(self.excitation, self._excitation_columns, strict=True):
             amplitude, slope = source.complex_amplitude(omega)
-            column = 0.5 * self.force_column(self.participation[source.at])
             drive += np.outer([amplitude, slope, np.conj(amplitude), np.conj(slope)], column)
         up, down = 1j * omega - lam, -1j * omega - lam
         if np.any(np.minimum(abs(up), abs(down)) < 1e-12 * omega):
@@ -370,6 +369,10 @@ class System:
             (drive[1] - 1j * positive) / up,
             (drive[3] + 1j * negative) / down,
         )
+
+    @cached_property
+    def _excitation_columns(self) -> list[Complex]:
+        return [0.5 * self.force_column(self.participation[e.at]) for e in self.excitation]
 
     def _check_shapes(self) -> None:
         n = self.natural_frequencies.size

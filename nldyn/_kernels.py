@@ -1,0 +1,849 @@
+"""Compiled kernels of the flow map: flights, contact phases, segments.
+
+All kernels that `shoot` calls are in this one file, because the compile cache looks only at the
+file of the function that is called: a change in another file would go unnoticed.
+
+**Flights** are propagated in closed form; the first contact is found with steps that are bounded
+by the third derivative of the gap, so that none is passed over.
+
+**Contact phases**: the modes see one scalar force per stop, so the penetrations at the Gauss nodes
+of a panel satisfy a small Volterra equation
+
+    δ_a(t_i) = free_a(t_i) - Σ_b Σ_j h W_ij K_ab(t_i - t_j) F_b(δ_b(t_j)),
+
+K being the impulse response between two stops. Its Newton matrix also gives all sensitivities.
+The end state is a Gauss quadrature: order 2m with m nodes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from nldyn.gauss import GaussTables
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+OK, TOO_MANY_PIECES, CONTACT_FAILED = range(3)
+FLIGHT = -1
+
+
+class FlowData(NamedTuple):
+    """Numbers of a system at one excitation frequency, as the kernels need them.
+
+    The first rows of `rows` are the stops' penetration rows, then the observed outputs.
+    """
+
+    eigenvalues: Complex  # (nz,)
+    rows: Complex  # (n_out, nz)
+    force: Complex  # (nz, n_stops): w' = λ w - force @ F
+    forced: Complex  # (n_out,) forced amplitude of each output
+    d_forced: Complex  # (n_out,) its derivative with respect to ω
+    gap: Real  # (n_stops,)
+    stiffness: Real  # (n_stops,)
+    exponent: Real  # (n_stops,)
+    mobility: Real  # (n_stops,) velocity jump per unit impulse, 1/kg
+    duration_factor: Real  # (n_stops,) contact duration = factor * peak / speed
+    pack_mode: NDArray[np.int64]  # (2n,)
+    pack_unit: Complex  # (2n,)
+    omega: float
+    tail: float  # largest relative Legendre tail accepted on a contact panel
+
+
+@njit(cache=True, error_model="numpy")
+def output_derivatives(fl, out, w, phase, t):
+    """Value and first two time derivatives of output `out`, and a bound on the third, after t."""
+    turn = fl.forced[out] * np.exp(1j * (phase + fl.omega * t))
+    value = turn.real
+    first = -fl.omega * turn.imag
+    second = -fl.omega * fl.omega * turn.real
+    bound = abs(turn) * fl.omega**3
+    for k in range(fl.eigenvalues.size):
+        lam = fl.eigenvalues[k]
+        part = fl.rows[out, k] * w[k] * np.exp(lam * t)
+        value += part.real
+        part1 = lam * part
+        first += part1.real
+        part2 = lam * part1
+        second += part2.real
+        bound += abs(part2) * abs(lam)
+    return value, first, second, bound
+
+
+@njit(cache=True, error_model="numpy")
+def safe_step(h, h1, h2, bound):
+    """First positive root of h + h1 τ + h2 τ²/2 + bound τ³/6, for h <= 0.
+
+    No function with these derivatives and a third derivative below `bound` reaches zero sooner.
+    """
+    if bound <= 0.0:
+        return np.inf
+    if h >= 0.0:
+        if h1 >= 0.0:
+            return 0.0
+        # leave the root at zero out: h1 + h2 τ/2 + bound τ²/6 = 0
+        return (-0.5 * h2 + math.sqrt(0.25 * h2 * h2 - 2.0 / 3.0 * bound * h1)) * 3.0 / bound
+    turning = h2 * h2 - 2.0 * bound * h1
+    tau = -1.0
+    if h2 < 0.0 and h1 > 0.0 and turning >= 0.0:
+        top = 2.0 * h1 / (-h2 + math.sqrt(turning))
+        if h + top * (h1 + top * (0.5 * h2 + top * bound / 6.0)) >= 0.0:
+            tau = 0.0  # the root lies on the concave rise before the top: Newton from the left
+    if tau < 0.0:  # beyond the inflection: Newton from an upper bound of all roots
+        tau = 2.0 * max(
+            3.0 * abs(h2) / bound,
+            max(math.sqrt(6.0 * abs(h1) / bound), (6.0 * abs(h) / bound) ** (1.0 / 3.0)),
+        )
+    for _ in range(60):
+        p = h + tau * (h1 + tau * (0.5 * h2 + tau * bound / 6.0))
+        p1 = h1 + tau * (h2 + 0.5 * tau * bound)
+        if p1 <= 0.0:
+            break
+        step = p / p1
+        tau -= step
+        if abs(step) <= 1e-15 * tau:
+            break
+    return max(tau, 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def closing_time(fl, stop, w, phase, start, end):
+    """First time in [start, end] at which a stop closes, or inf; no contact is passed over.
+
+    Every step is bounded by the third derivative, so that it cannot cross a contact; the steps
+    converge to the contact at order three. Only contacts shorter than 1e-9 periods of the
+    fastest mode can be stepped over, and these carry no force.
+    """
+    fastest = fl.omega
+    for k in range(fl.eigenvalues.size):
+        fastest = max(fastest, abs(fl.eigenvalues[k]))
+    shortest = 1e-10 / fastest
+    t = start
+    while t <= end:
+        value, h1, h2, bound = output_derivatives(fl, stop, w, phase, t)
+        h = value - fl.gap[stop]
+        if h >= 0.0 and h1 > 0.0:
+            return t
+        tau = safe_step(min(h, 0.0), h1, h2, bound)
+        if tau < shortest:
+            if h1 > 0.0 and h + h1 * shortest >= 0.0:
+                return min(t + max(tau, 0.0), end)
+            tau = shortest
+        t += tau
+    return np.inf
+
+
+@njit(cache=True, error_model="numpy")
+def fly(fl, w, t):
+    """Advance w in place by a flight of duration t."""
+    for k in range(w.size):
+        w[k] *= np.exp(fl.eigenvalues[k] * t)
+
+
+@njit(cache=True, error_model="numpy")
+def fly_columns(fl, columns, t):
+    """Advance sensitivities (nz, n_columns) in place by a flight of duration t."""
+    for k in range(columns.shape[0]):
+        factor = np.exp(fl.eigenvalues[k] * t)
+        for c in range(columns.shape[1]):
+            columns[k, c] *= factor
+
+
+class Record(NamedTuple):
+    """Pieces of a trajectory, enough to evaluate the state at any instant.
+
+    Parameters
+    ----------
+    phase, duration : (n_pieces,)
+        Forcing phase at the start, duration in s.
+    kind : (n_pieces,)
+        -1 for a flight, else the kind of the panel's ends.
+    w : (n_pieces, nz) complex
+        State at the start.
+    force : (n_pieces, n_stops, m)
+        Forces at the nodes of a panel.
+    count : (1,)
+        Number of pieces in use.
+    """
+
+    phase: NDArray[np.float64]
+    duration: NDArray[np.float64]
+    kind: NDArray[np.int64]
+    w: NDArray[np.complex128]
+    force: NDArray[np.float64]
+    count: NDArray[np.int64]
+
+
+@njit(cache=True, error_model="numpy")
+def law(delta, stiffness, exponent):
+    """Contact force and its derivative with respect to the penetration."""
+    if delta <= 0.0:
+        return 0.0, 0.0
+    if exponent == 1.5:
+        root = np.sqrt(delta)
+        return stiffness * delta * root, 1.5 * stiffness * root
+    if exponent == 1.0:
+        return stiffness * delta, stiffness
+    slope = stiffness * delta ** (exponent - 1.0)
+    return slope * delta, exponent * slope
+
+
+@njit(cache=True, error_model="numpy")
+def kernel_matrix(fl, tab, kind, h, active, E, E_inv, G):
+    """Fill E (m, nz) = exp(λ t_i), its inverse, and G = h W_ij K_ab(t_i - t_j)."""
+    m = tab.nodes.size
+    nz = fl.eigenvalues.size
+    for i in range(m):
+        for k in range(nz):
+            exponent = fl.eigenvalues[k] * (h * tab.chi[kind, i])
+            E[i, k] = np.exp(exponent)
+            E_inv[i, k] = np.exp(-exponent)
+    for a in range(active.size):
+        for b in range(active.size):
+            for i in range(m):
+                for j in range(m):
+                    G[a * m + i, b * m + j] = 0.0
+            for k in range(nz):
+                z = h * fl.rows[active[a], k] * fl.force[k, active[b]]
+                for i in range(m):
+                    zi = z * E[i, k]
+                    for j in range(m):
+                        G[a * m + i, b * m + j] += zi.real * E_inv[j, k].real - (
+                            zi.imag * E_inv[j, k].imag
+                        )
+            for i in range(m):
+                for j in range(m):
+                    G[a * m + i, b * m + j] *= tab.integrate[kind, i, j]
+
+
+@njit(cache=True, error_model="numpy")
+def lu_solve(A, B):
+    """Solve A X = B in place (X overwrites B, LU overwrites A), with row pivoting."""
+    n = A.shape[0]
+    n_rhs = B.shape[1]
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(A[i, k]) > abs(A[pivot, k]):
+                pivot = i
+        if pivot != k:
+            for j in range(n):
+                A[k, j], A[pivot, j] = A[pivot, j], A[k, j]
+            for j in range(n_rhs):
+                B[k, j], B[pivot, j] = B[pivot, j], B[k, j]
+        inverse = 1.0 / A[k, k] if A[k, k] != 0.0 else np.inf
+        for i in range(k + 1, n):
+            factor = A[i, k] * inverse
+            if factor != 0.0:
+                for j in range(k + 1, n):
+                    A[i, j] -= factor * A[k, j]
+                for j in range(n_rhs):
+                    B[i, j] -= factor * B[k, j]
+    for k in range(n - 1, -1, -1):
+        inverse = 1.0 / A[k, k] if A[k, k] != 0.0 else np.inf
+        for j in range(n_rhs):
+            total = B[k, j]
+            for i in range(k + 1, n):
+                total -= A[k, i] * B[i, j]
+            B[k, j] = total * inverse
+
+
+@njit(cache=True, error_model="numpy")
+def free_output(fl, out, w, E, i, phase):
+    """Output `out` at node i if no force acted."""
+    value = (fl.forced[out] * np.exp(1j * phase)).real
+    for k in range(fl.eigenvalues.size):
+        value += (fl.rows[out, k] * E[i, k] * w[k]).real
+    return value
+
+
+@njit(cache=True, error_model="numpy")
+def solve_panel(fl, tab, kind, phase, w, h, active, delta, F, dF, E, E_inv, G):
+    """Newton's method for the penetrations at the nodes; delta (na, m) holds the guess.
+
+    Returns whether it converged, with F, dF, E, E_inv and G filled.
+    """
+    m = tab.nodes.size
+    na = active.size
+    size = na * m
+    kernel_matrix(fl, tab, kind, h, active, E, E_inv, G)
+    free = np.empty(size)
+    for a in range(na):
+        for i in range(m):
+            node_phase = phase + fl.omega * h * tab.chi[kind, i]
+            free[a * m + i] = free_output(fl, active[a], w, E, i, node_phase) - fl.gap[active[a]]
+    J = np.empty((size, size))
+    step = np.empty((size, 1))
+    for _ in range(40):
+        scale = 0.0
+        for a in range(na):
+            for i in range(m):
+                F[a, i], dF[a, i] = law(
+                    delta[a, i], fl.stiffness[active[a]], fl.exponent[active[a]]
+                )
+                scale = max(scale, abs(delta[a, i]))
+        flat, flat_F, flat_dF = delta.reshape(size), F.reshape(size), dF.reshape(size)
+        for p in range(size):
+            total = free[p] - flat[p]
+            for q in range(size):
+                total -= G[p, q] * flat_F[q]
+                J[p, q] = G[p, q] * flat_dF[q]
+            J[p, p] += 1.0
+            step[p, 0] = total
+        lu_solve(J, step)
+        change = 0.0
+        for p in range(size):
+            flat[p] += step[p, 0]
+            change = max(change, abs(step[p, 0]))
+        if not np.isfinite(change):
+            return False
+        if change <= 1e-11 * scale:
+            for a in range(na):
+                for i in range(m):
+                    F[a, i], dF[a, i] = law(
+                        delta[a, i], fl.stiffness[active[a]], fl.exponent[active[a]]
+                    )
+            return True
+    return False
+
+
+@njit(cache=True, error_model="numpy")
+def panel_end(fl, tab, kind, w, h, active, F, E_inv, w_end):
+    """State w_end at the end of a panel from the forces at its nodes."""
+    for k in range(w.size):
+        total = w[k]
+        for j in range(tab.nodes.size):
+            drive = 0.0j
+            for a in range(active.size):
+                drive += fl.force[k, active[a]] * F[a, j]
+            total -= h * tab.weights[kind, j] * drive * E_inv[j, k]
+        w_end[k] = total * np.exp(fl.eigenvalues[k] * h)
+
+
+@njit(cache=True, error_model="numpy")
+def panel_columns(fl, tab, kind, phase, t0, h, active, dF, E, E_inv, G, columns):
+    """Advance sensitivities (nz, n_columns) in place over a panel.
+
+    The last column is the derivative with respect to ω at fixed time; t0 is the time from the
+    start of the segment at which its phase is fixed.
+    """
+    m = tab.nodes.size
+    na = active.size
+    nz = fl.eigenvalues.size
+    size = na * m
+    n_columns = columns.shape[1]
+    J = np.empty((size, size))
+    rhs = np.zeros((size, n_columns))
+    flat_dF = dF.reshape(size)
+    for p in range(size):
+        for q in range(size):
+            J[p, q] = G[p, q] * flat_dF[q]
+        J[p, p] += 1.0
+    for a in range(na):
+        for i in range(m):
+            p = a * m + i
+            for k in range(nz):
+                z = fl.rows[active[a], k] * E[i, k]
+                for c in range(n_columns):
+                    rhs[p, c] += z.real * columns[k, c].real - z.imag * columns[k, c].imag
+            t = h * tab.chi[kind, i]
+            turn = np.exp(1j * (phase + fl.omega * t))
+            slope = fl.d_forced[active[a]] + 1j * (t0 + t) * fl.forced[active[a]]
+            rhs[p, n_columns - 1] += (slope * turn).real
+    lu_solve(J, rhs)
+    for k in range(nz):
+        growth = np.exp(fl.eigenvalues[k] * h)
+        for a in range(na):
+            for j in range(m):
+                z = fl.force[k, active[a]] * (h * tab.weights[kind, j] * dF[a, j]) * E_inv[j, k]
+                for c in range(n_columns):
+                    columns[k, c] -= z * rhs[a * m + j, c]
+        for c in range(n_columns):
+            columns[k, c] *= growth
+
+
+@njit(cache=True, error_model="numpy")
+def legendre_tail(tab, F):
+    """Largest of the last two Legendre coefficients of the forces, relative to the largest force."""
+    m = tab.nodes.size
+    worst = 0.0
+    largest = 0.0
+    for a in range(F.shape[0]):
+        for row in range(m - 2, m):
+            total = 0.0
+            for j in range(m):
+                total += tab.to_legendre[row, j] * F[a, j]
+            worst = max(worst, abs(total))
+        for j in range(m):
+            largest = max(largest, F[a, j])
+    if largest == 0.0:
+        return 0.0
+    return worst / largest
+
+
+@njit(cache=True, error_model="numpy")
+def record_piece(rec, phase, h, kind, w):
+    """Append a piece; return its index, or -1 when the record is full."""
+    n = rec.count[0]
+    if n >= rec.phase.size:
+        return -1
+    rec.phase[n] = phase
+    rec.duration[n] = h
+    rec.kind[n] = kind
+    rec.w[n, :] = w
+    rec.force[n, :, :] = 0.0
+    rec.count[0] = n + 1
+    return n
+
+
+@njit(cache=True, error_model="numpy")
+def expected_contact(fl, stop, w, phase):
+    """Peak penetration, duration and time to release of a free impact through the present state.
+
+    From the energy of the contact spring and the local mobility; a push (positive acceleration
+    without speed) counts as an impact as deep as its static penetration. All zero when the stop
+    is left at once.
+    """
+    value, speed, accel, _ = output_derivatives(fl, stop, w, phase, 0.0)
+    depth = max(value - fl.gap[stop], 0.0)
+    p = fl.exponent[stop]
+    rate = fl.stiffness[stop] * fl.mobility[stop]
+    static = (max(accel, 0.0) / rate) ** (1.0 / p)
+    energy = 0.5 * speed * speed + rate * (depth ** (p + 1.0) + static ** (p + 1.0)) / (p + 1.0)
+    if energy <= 0.0:
+        return 0.0, 0.0, 0.0
+    top_speed = np.sqrt(2.0 * energy)
+    peak = (energy * (p + 1.0) / rate) ** (1.0 / (p + 1.0))
+    duration = fl.duration_factor[stop] * peak / top_speed
+    left = duration * (0.5 + np.arcsin(speed / top_speed) / np.pi)
+    if accel < 0.0 and left > 0.0:
+        turned = (speed + np.sqrt(speed * speed - 2.0 * accel * depth)) / -accel
+        if speed > 0.0:  # a slow touch is turned back by the deceleration
+            share = turned / (turned + left)
+            left *= share
+            duration *= share
+            peak *= share
+        else:
+            left = min(left, turned)
+    return peak, duration, left
+
+
+@njit(cache=True, error_model="numpy")
+def profile_guess(tab, kind, h, peak, duration, left, delta_row):
+    """Half-sine penetrations at the nodes to start Newton's method from."""
+    for i in range(delta_row.size):
+        t = h * tab.chi[kind, i]
+        x = np.pi * min((duration - left + t) / duration, 1.0)
+        delta_row[i] = max(peak * np.sin(x), 1e-2 * peak)
+
+
+@njit(cache=True, error_model="numpy")
+def stretch_profile(tab, old_kind, new_kind, ratio, old, new):
+    """Carry node values over to a panel `ratio` times as long, linearly in time."""
+    m = old.size
+    for i in range(m):
+        x = tab.chi[new_kind, i] * ratio
+        j = 0
+        while j < m and tab.chi[old_kind, j] < x:
+            j += 1
+        if j == 0:
+            new[i] = old[0] * x / tab.chi[old_kind, 0] if old_kind >= 2 else old[0]
+        elif j == m:
+            new[i] = old[m - 1]
+        else:
+            x0, x1 = tab.chi[old_kind, j - 1], tab.chi[old_kind, j]
+            new[i] = old[j - 1] + (old[j] - old[j - 1]) * (x - x0) / (x1 - x0)
+
+
+@njit(cache=True, error_model="numpy")
+def crossing(x0, y0, x1, y1):
+    """Where the line through two points meets zero."""
+    return x0 + (x1 - x0) * y0 / (y0 - y1)
+
+
+@njit(cache=True, error_model="numpy")
+def first_event(fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, w_end):
+    """Stop that first opens or closes within a panel and the fraction of the panel, or (-1, 1)."""
+    m = tab.nodes.size
+    event, where = -1, 2.0
+    position = -1
+    for s in range(closed.size):
+        if closed[s]:
+            position += 1
+        end, _, _, _ = output_derivatives(fl, s, w_end, phase + fl.omega * h, 0.0)
+        sign = 1.0 if closed[s] else -1.0
+        x0, y0 = 0.0, 0.0
+        for i in range(m + 1):
+            if i == m:
+                x1, y1 = 1.0, sign * (end - fl.gap[s])
+            elif closed[s]:
+                x1 = tab.chi[kind, i]
+                y1 = delta[position, i]
+            else:
+                x1 = tab.chi[kind, i]
+                y1 = fl.gap[s] - node_output(fl, tab, kind, phase, w, h, active, F, E, E_inv, s, i)
+            if y1 < 0.0:
+                x = crossing(x0, y0, x1, y1) if y0 > 0.0 else 0.5 * (x0 + x1)
+                if x < where:
+                    event, where = s, x
+                break
+            x0, y0 = x1, y1
+    return event, where
+
+
+@njit(cache=True, error_model="numpy")
+def node_output(fl, tab, kind, phase, w, h, active, F, E, E_inv, out, i):
+    """Output at node i of a panel, with the forces at work."""
+    value = free_output(fl, out, w, E, i, phase + fl.omega * h * tab.chi[kind, i])
+    for k in range(fl.eigenvalues.size):
+        total = 0.0j
+        for a in range(active.size):
+            for j in range(tab.nodes.size):
+                share = h * tab.integrate[kind, i, j] * F[a, j]
+                total += fl.force[k, active[a]] * share * E_inv[j, k]
+        value -= (fl.rows[out, k] * E[i, k] * total).real
+    return value
+
+
+@njit(cache=True, error_model="numpy")
+def guess_panel(fl, tab, phase, w, h, start_switch, active, delta):
+    """Choose the kind and length of a panel and guess its penetrations; h bounds the length.
+
+    A contact is covered by two panels, so that no panel has to resolve more than a quarter wave.
+    """
+    ends = False
+    length = h
+    for a in range(active.size):
+        _, duration, left = expected_contact(fl, active[a], w, phase)
+        if left > 0.6 * duration:
+            if 0.5 * left < length:
+                ends = False
+                length = 0.5 * left
+        elif left < length:
+            ends = True
+            length = left
+    kind = 2 * start_switch + (1 if ends else 0)
+    for a in range(active.size):
+        peak, duration, left = expected_contact(fl, active[a], w, phase)
+        if duration > 0.0:
+            profile_guess(tab, kind, length, peak, duration, left, delta[a])
+        else:
+            delta[a, :] = 0.0
+    return kind, length
+
+
+@njit(cache=True, error_model="numpy")
+def keep_profile(tab, kind, new_kind, ratio, delta, guess):
+    """Carry all node values over to a panel `ratio` times as long."""
+    for a in range(delta.shape[0]):
+        stretch_profile(tab, kind, new_kind, ratio, delta[a], guess)
+        delta[a, :] = np.maximum(guess, 1e-3 * np.max(guess))
+
+
+@njit(cache=True, error_model="numpy")
+def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta, work, w_end):
+    """Solve one panel and choose its length, at most h_max.
+
+    Returns (status, kind, h, event): a panel that ends where stop `event` opens or closes, or
+    (event = -1) one short enough to be resolved. `work` holds (F, dF, E, E_inv, G).
+    """
+    F, dF, E, E_inv, G = work
+    guess = np.empty(tab.nodes.size)
+    aim = -1
+    limit = h_max
+    kind, h = guess_panel(fl, tab, phase, w, limit, start_switch, active, delta)
+    for _ in range(100):
+        if h <= 0.0 or phase + fl.omega * h == phase:
+            return OK, kind, 0.0, active[0] if aim < 0 else aim
+        if not solve_panel(fl, tab, kind, phase, w, h, active, delta, F, dF, E, E_inv, G):
+            limit = 0.4 * h
+            aim = -1
+            kind, h = guess_panel(fl, tab, phase, w, limit, start_switch, active, delta)
+            continue
+        panel_end(fl, tab, kind, w, h, active, F, E_inv, w_end)
+        end_phase = phase + fl.omega * h
+        if aim >= 0:
+            value, speed, _, _ = output_derivatives(fl, aim, w_end, end_phase, 0.0)
+            approaching = speed < 0.0 if closed[aim] else speed > 0.0
+            dh = (fl.gap[aim] - value) / speed if approaching else np.inf
+            # the force vanishes there with its slope: an error ε of the instant costs ε^2.5
+            if abs(dh) <= 1e-9 * h:
+                if legendre_tail(tab, F) <= fl.tail:
+                    return OK, kind, h, aim
+            elif h < h_max and h + dh >= h_max:
+                h = h_max
+                continue
+            elif -0.5 * h < dh < h and h + dh < h_max:
+                h += dh
+                continue
+            aim = -1
+            keep_profile(tab, kind, 2 * start_switch, 0.5, delta, guess)
+            kind = 2 * start_switch
+            h *= 0.5
+            continue
+        event, where = first_event(
+            fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, w_end
+        )
+        if event >= 0:
+            aim = event
+            keep_profile(tab, kind, 2 * start_switch + 1, where, delta, guess)
+            kind = 2 * start_switch + 1
+            h *= where
+            continue
+        if kind % 2 == 1 and h < h_max:  # the release was expected here: follow it
+            for a in range(active.size):
+                value, speed, _, _ = output_derivatives(fl, active[a], w_end, end_phase, 0.0)
+                dh = (fl.gap[active[a]] - value) / speed if speed < 0.0 else np.inf
+                if dh < h:
+                    aim = active[a]
+                    h = min(h + dh, h_max)
+                    break
+            if aim >= 0:
+                continue
+        if legendre_tail(tab, F) > fl.tail:
+            keep_profile(tab, kind, 2 * start_switch, 0.5, delta, guess)
+            kind = 2 * start_switch
+            h *= 0.5
+            continue
+        return OK, kind, h, -1
+    return CONTACT_FAILED, kind, h, -1
+
+
+@njit(cache=True, error_model="numpy")
+def propagate(fl, tab, packed, phase, duration, with_columns, rec, recording):
+    """Carry a packed state over one segment.
+
+    Parameters
+    ----------
+    fl, tab : FlowData, GaussTables
+    packed : (2n,)
+        Real coordinates of w at the start.
+    phase, duration : float
+        Forcing phase at the start; duration in s. The duration follows the frequency
+        (fixed phase), and the derivative with respect to ω takes that into account.
+    with_columns : bool
+        Whether to carry sensitivities.
+    rec, recording : Record, bool
+        Where to record the pieces, and whether to.
+
+    Returns
+    -------
+    end : (2n,)
+    jacobian : (2n, 2n)
+        Derivative of the end with respect to the start.
+    d_omega : (2n,)
+        Derivative of the end with respect to ω.
+    closings : (n_stops,)
+        How often each stop closed.
+    status : int
+    """
+    nz = fl.eigenvalues.size
+    size = fl.pack_mode.size
+    n_stops = fl.gap.size
+    m = tab.nodes.size
+    w = np.zeros(nz, dtype=np.complex128)
+    columns = np.zeros((nz, size + 1), dtype=np.complex128)
+    for c in range(size):
+        w[fl.pack_mode[c]] += packed[c] * fl.pack_unit[c]
+        columns[fl.pack_mode[c], c] = fl.pack_unit[c]
+    closings = np.zeros(n_stops, dtype=np.int64)
+    closed = np.zeros(n_stops, dtype=np.bool_)
+    for s in range(n_stops):
+        value, _, _, _ = output_derivatives(fl, s, w, phase, 0.0)
+        closed[s] = value - fl.gap[s] > 0.0
+    status = run_pieces(
+        fl, tab, w, columns, phase, duration, closed, closings, with_columns, rec, recording, m
+    )
+    end = np.empty(size)
+    jacobian = np.empty((size, size))
+    d_omega = np.empty(size)
+    rate = np.empty(nz, dtype=np.complex128)
+    end_phase = phase + fl.omega * duration
+    for k in range(nz):
+        rate[k] = fl.eigenvalues[k] * w[k]
+    for s in range(n_stops):
+        value, _, _, _ = output_derivatives(fl, s, w, end_phase, 0.0)
+        delta = value - fl.gap[s]
+        if delta > 0.0:
+            force = fl.stiffness[s] * delta ** fl.exponent[s]
+            for k in range(nz):
+                rate[k] -= fl.force[k, s] * force
+    for r in range(size):
+        mode = fl.pack_mode[r]
+        turn = np.conj(fl.pack_unit[r])
+        end[r] = (w[mode] * turn).real
+        for c in range(size):
+            jacobian[r, c] = (columns[mode, c] * turn).real
+        total = columns[mode, size] - rate[mode] * (duration / fl.omega)
+        d_omega[r] = (total * turn).real
+    return end, jacobian, d_omega, closings, status
+
+
+@njit(cache=True, error_model="numpy")
+def run_pieces(
+    fl, tab, w, columns, phase, duration, closed, closings, with_columns, rec, recording, m
+):
+    """Advance w and its sensitivities in place over a segment, piece by piece."""
+    nz = w.size
+    n_stops = closed.size
+    fastest = 0.0
+    for k in range(nz):
+        fastest = max(fastest, abs(fl.eigenvalues[k]))
+    h_cap = 0.6 * m / fastest
+    shortest = 1e-10 / max(fastest, fl.omega)
+    t = 0.0
+    start_switch = 0
+    skip = 0.0
+    w_end = np.empty(nz, dtype=np.complex128)
+    for _ in range(100000):
+        remain = duration - t
+        if remain <= 0.0:
+            return OK
+        here = phase + fl.omega * t
+        n_active = 0
+        for s in range(n_stops):
+            if closed[s]:
+                n_active += 1
+        if n_active == 0:
+            first, stop = remain, -1
+            for s in range(n_stops):
+                at = closing_time(fl, s, w, here, skip, first)
+                if at < first:
+                    first, stop = at, s
+            if recording and record_piece(rec, here, first, FLIGHT, w) < 0:
+                return TOO_MANY_PIECES
+            fly(fl, w, first)
+            if with_columns:
+                fly_columns(fl, columns, first)
+            t = duration if stop < 0 else t + first
+            skip = 0.0
+            if stop >= 0:
+                closed[stop] = True
+                closings[stop] += 1
+                start_switch = 1
+            continue
+        active = np.flatnonzero(closed)
+        if n_active == 1 and start_switch == 1:
+            _, _, left = expected_contact(fl, active[0], w, here)
+            if left < min(shortest, remain):  # a touch without force
+                closed[active[0]] = False
+                closings[active[0]] -= 1
+                start_switch, skip = 0, shortest
+                continue
+        delta = np.empty((n_active, m))
+        work = (
+            np.empty((n_active, m)),
+            np.empty((n_active, m)),
+            np.empty((m, nz), dtype=np.complex128),
+            np.empty((m, nz), dtype=np.complex128),
+            np.empty((n_active * m, n_active * m)),
+        )
+        h_max = min(remain, h_cap)
+        status, kind, h, event = contact_panel(
+            fl, tab, here, w, h_max, start_switch, closed, active, delta, work, w_end
+        )
+        if status != OK:
+            return status
+        F, dF, E, E_inv, G = work
+        if h > 0.0:
+            if recording:
+                n = record_piece(rec, here, h, kind, w)
+                if n < 0:
+                    return TOO_MANY_PIECES
+                for a in range(n_active):
+                    rec.force[n, active[a], :] = F[a]
+            if with_columns:
+                panel_columns(fl, tab, kind, here, t, h, active, dF, E, E_inv, G, columns)
+            w[:] = w_end
+            t = duration if h >= remain else t + h
+        start_switch = 0
+        if event >= 0:
+            closed[event] = not closed[event]
+            start_switch = 1
+            if closed[event]:
+                closings[event] += 1
+            skip = shortest if h < shortest else 0.0
+    return TOO_MANY_PIECES
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def shoot(
+    eigenvalues,
+    rows,
+    force,
+    forced,
+    d_forced,
+    gap,
+    stiffness,
+    exponent,
+    mobility,
+    duration_factor,
+    pack_mode,
+    pack_unit,
+    omega,
+    tail,
+    chi,
+    integrate,
+    weights,
+    to_legendre,
+    gauss_nodes,
+    rec_phase,
+    rec_duration,
+    rec_kind,
+    rec_w,
+    rec_force,
+    rec_count,
+    nodes,
+    phases,
+    chained,
+    with_columns,
+    recording,
+):
+    """Propagate each node (k, 2n) to the next phase; see `propagate` for what comes back.
+
+    When `chained`, only the first node is used and each segment starts where the last one ended.
+    """
+    fl = FlowData(
+        eigenvalues,
+        rows,
+        force,
+        forced,
+        d_forced,
+        gap,
+        stiffness,
+        exponent,
+        mobility,
+        duration_factor,
+        pack_mode,
+        pack_unit,
+        omega,
+        tail,
+    )
+    tab = GaussTables(chi, integrate, weights, to_legendre, gauss_nodes)
+    rec = Record(rec_phase, rec_duration, rec_kind, rec_w, rec_force, rec_count)
+    k = phases.size - 1
+    size = pack_mode.size
+    ends = np.zeros((k, size))
+    kept = k if with_columns else 1
+    jacobians = np.zeros((kept, size, size))
+    d_omegas = np.zeros((kept, size))
+    closings = np.zeros(gap.size, dtype=np.int64)
+    for i in range(k):
+        start = ends[i - 1] if chained and i > 0 else nodes[i]
+        duration = (phases[i + 1] - phases[i]) / omega
+        end, jacobian, d_omega, closed, status = propagate(
+            fl, tab, start, phases[i], duration, with_columns, rec, recording
+        )
+        ends[i] = end
+        if with_columns:
+            jacobians[i] = jacobian
+            d_omegas[i] = d_omega
+        closings += closed
+        if status != OK:
+            return ends, jacobians, d_omegas, closings, status
+    return ends, jacobians, d_omegas, closings, OK
