@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from nldyn.diagram import Diagram
+    from nldyn.diagram import Diagram, Progress
     from nldyn.elements import Stop
     from nldyn.system import System
 
@@ -161,19 +161,23 @@ def plain_errors() -> Iterator[None]:
 
 
 @contextmanager
-def progress_bar(quiet: bool) -> Iterator[Callable[[float, str], None]]:
-    """Show the fraction done and what is being computed, on stderr."""
+def progress_bar(quiet: bool) -> Iterator[Progress]:
+    """Count the orbits on stderr, and show what is being computed."""
+    if quiet:
+        yield lambda what, frequency_hz: None
+        return
     from tqdm import tqdm
 
-    if quiet:
-        yield lambda fraction, text: None
-        return
-    shape = "{percentage:3.0f}%|{bar}| {elapsed} {desc}"
-    with tqdm(total=1.0, bar_format=shape, leave=False, file=sys.stderr) as bar:
+    shape = "{elapsed}  {n} orbits  {desc}"
+    with tqdm(bar_format=shape, leave=False, file=sys.stderr) as bar:
+        before = ""
 
-        def report(fraction: float, text: str) -> None:
-            bar.set_description_str(text, refresh=text != bar.desc)
-            bar.update(max(min(fraction, 1.0) - bar.n, 0.0))
+        def report(what: str, frequency_hz: float) -> None:
+            nonlocal before
+            where = f" at {frequency_hz:.2f} Hz" if frequency_hz else ""
+            bar.set_description_str(what + where, refresh=what != before)
+            bar.update(1 if frequency_hz else 0)
+            before = what
 
         yield report
 
@@ -184,11 +188,13 @@ def describe(diagram: Diagram, seconds: float, out: Path) -> str:
     kinds = Counter(str(point.kind) for branch in branches for point in branch.special_points)
     found = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())) or "none"
     points = sum(len(branch.points) for branch in branches)
-    return (
-        f"{len(branches)} branches with {points} points in {seconds:.1f} s\n"
-        f"special points: {found}\n"
-        f"written to {out}"
-    )
+    lines = [
+        f"{len(branches)} branches with {points} points in {seconds:.1f} s",
+        f"special points: {found}",
+        *(f"note: {note}" for note in diagram.notes),
+        f"written to {out}",
+    ]
+    return "\n".join(lines)
 
 
 def describe_system(system: System) -> str:

@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
 from nldyn.branch import Branch, BranchPoint, SpecialPoint
 from nldyn.errors import SystemModelError
-from nldyn.orbit import Orbit
+from nldyn.orbit import ConvergenceError, Orbit, refine
 from nldyn.shooting import ShootingProblem
 from nldyn.special import Chord, LocateError, hidden_dip, special_points_between, tests
 from nldyn.system import Real
@@ -96,8 +97,13 @@ class Walk:
                 if end is not None:
                     yield end
                 return
-            if _passed_flip(here.orbit, point.orbit):
-                self.stop_reason = f"joins the branch of period {problem.period // 2} at a flip"
+            if passed_flip(here.orbit, point.orbit):
+                end = _flip_between(here, point)
+                self.stop_reason = (
+                    f"joins the branch of period {problem.period // 2} at the flip at "
+                    f"{end.orbit.frequency_hz:.6g} Hz"
+                )
+                yield end
                 return
             if self._closed(here, point):
                 self.stop_reason = "closed branch"
@@ -121,7 +127,12 @@ class Walk:
         guess = here.orbit.point + step * direction
         row = weights * direction
         found = problem.correct(guess, row / np.linalg.norm(row), max_iterations=8)
-        if not found.converged or found.first_step > 0.6 * step:
+        if not found.converged:
+            return None
+        # a curve that turns by max_angle leaves its tangent by half of that: a longer correction
+        # has landed on another branch
+        off = math.sqrt(float(np.sum(weights * (found.point - guess) ** 2)))
+        if off > 0.75 * self.options.max_angle * step:
             return None
         tangent = problem.tangent(found.lin, problem.metric(found.point), direction)
         cosine = float(np.sum(weights * direction * tangent))
@@ -171,12 +182,53 @@ class Walk:
         return float(np.sum(weights * off**2)) < 0.01 * length2
 
 
-def _passed_flip(a: Orbit, b: Orbit) -> bool:
-    """Whether an even-period orbit turned into its own shift: a branch of half the period met."""
+def passed_flip(a: Orbit, b: Orbit) -> bool:
+    """Whether an even-period orbit turned into its own shift: a branch of half the period met.
+
+    At the flip the two halves of the orbit are equal; behind it they have changed places.
+    """
     if a.period % 2:
         return False
     first, second = _half_difference(a), _half_difference(b)
-    return float(np.sum(first * second)) < 0.0
+    product = float(np.sum(first * second))
+    return product < -0.8 * float(np.linalg.norm(first) * np.linalg.norm(second))
+
+
+def _flip_between(a: BranchPoint, b: BranchPoint) -> BranchPoint:
+    """The orbit of half the period near the flip between a and b, run through twice.
+
+    The shooting equations of the doubled branch are singular at the flip, so the point where the
+    halves agree is interpolated and solved as an orbit of half the period: the states are exact,
+    the frequency is that of the interpolation.
+    """
+    chord = Chord(a, b)
+    reference = _half_difference(a.orbit).ravel()
+    problem = a.orbit.problem
+
+    def difference(sigma: float) -> float:
+        nodes = problem.nodes(chord.between(sigma))
+        half = nodes.shape[0] // 2
+        return float(reference @ (nodes[:half] - nodes[half:]).ravel())
+
+    sigma = float(brentq(difference, 0.0, 1.0))
+    point = chord.between(sigma)
+    nodes = problem.nodes(point)
+    half = nodes.shape[0] // 2
+    single = ShootingProblem(problem.flow, problem.period // 2, half)
+    mean = 0.5 * (nodes[:half] + nodes[half:])
+    try:
+        orbit = refine(single, mean, float(np.exp(point[-1])), a.orbit.observe)
+    except ConvergenceError:
+        return a
+    states = np.tile(single.nodes(orbit.point), (2, 1)).ravel()
+    doubled = Orbit(
+        problem,
+        np.append(states, orbit.point[-1]),
+        orbit.monodromy @ orbit.monodromy,
+        orbit.error,
+        orbit.observe,
+    )
+    return BranchPoint(doubled, a.tangent, a.arclength + sigma * (b.arclength - a.arclength))
 
 
 def _half_difference(orbit: Orbit) -> Real:
@@ -294,7 +346,7 @@ def continue_branch(
     H. B. Keller (1977), pseudo-arclength continuation; E. Doedel et al., AUTO-07p manual.
     """
     low, high = check_range(range_hz)
-    if not low <= orbit.frequency_hz <= high:
+    if not low * (1.0 - 1e-9) <= orbit.frequency_hz <= high * (1.0 + 1e-9):
         raise SystemModelError(
             f"the orbit at {orbit.frequency_hz:g} Hz lies outside range_hz = ({low:g}, {high:g})"
         )

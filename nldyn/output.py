@@ -126,6 +126,7 @@ def summary(diagram: Diagram) -> Mapping[str, object]:
         "points": len(orbits),
         "largest_relative_error": worst(orbit.error for orbit in orbits),
         "largest_liouville_error": worst(orbit.liouville_error for orbit in orbits),
+        "notes": list(diagram.notes),
         "branches": [_branch_summary(branch) for branch in diagram.branches],
     }
 

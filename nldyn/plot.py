@@ -83,6 +83,35 @@ def stability_runs(stable: ArrayLike) -> list[Run]:
     return runs
 
 
+def branch_curve(
+    branch: Branch,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Give the curve to draw of a branch: its points, with the special points in between.
+
+    Parameters
+    ----------
+    branch : Branch
+        A branch.
+
+    Returns
+    -------
+    frequency_hz, max_abs_displacement, stable : (n,) arrays
+        In Hz and m, in the order along the branch. A special point counts as stable if a
+        neighbour is, so that the drawn stability changes at the special point itself.
+    """
+    located = [(node.arclength, node.orbit, node.orbit.stable) for node in branch.nodes]
+    lengths = [length for length, _, _ in located]
+    for special in branch.special_points:
+        after = int(np.searchsorted(lengths, special.point.arclength))
+        neighbours = branch.nodes[max(after - 1, 0) : after + 1]
+        stable = any(node.orbit.stable for node in neighbours)
+        located.append((special.point.arclength, special.orbit, stable))
+    located.sort(key=lambda entry: entry[0])
+    hz = np.array([orbit.frequency_hz for _, orbit, _ in located], dtype=float)
+    y = np.array([orbit.max_abs_displacement for _, orbit, _ in located], dtype=float)
+    return hz, y, np.array([stable for _, _, stable in located], dtype=bool)
+
+
 def length_unit(largest: float) -> tuple[float, str]:
     """Choose the unit for an axis that reaches up to ``largest`` metres.
 
@@ -145,7 +174,7 @@ def plot_diagram(
     ValueError
         For a unit that is not one of the four.
     """
-    branches = list(getattr(diagram, "branches", diagram))
+    branches = list(diagram if isinstance(diagram, Iterable) else diagram.branches)
     ax = ax if ax is not None else new_axes()
     factor, unit = _unit_of(branches, unit)
     colours = period_colours(branch.period for branch in branches)
@@ -156,7 +185,7 @@ def plot_diagram(
     ax.set_ylabel(f"max |y| ({unit})")
     ax.set_yscale(yscale)
     if yscale == "linear":
-        ax.set_ylim(bottom=0.0)
+        ax.set_ylim(bottom=-0.02 * ax.get_ylim()[1])
     if legend and branches:
         _draw_legend(ax, colours, branches, marked)
     return ax
@@ -253,12 +282,11 @@ def period_colours(periods: Iterable[int]) -> dict[int, str]:
 
 
 def _draw_branch(ax: Axes, branch: Branch, colour: str, factor: float) -> None:
-    hz = np.asarray(branch.frequency_hz)
-    y = np.asarray(branch.max_abs_displacement) / factor
-    for run in stability_runs(branch.stable):
+    hz, y, stable = branch_curve(branch)
+    for run in stability_runs(stable):
         part = slice(run.start, run.stop)
         style = STABLE if run.stable else UNSTABLE
-        ax.plot(hz[part], y[part], color=colour, linewidth=1.4, linestyle=style)
+        ax.plot(hz[part], y[part] / factor, color=colour, linewidth=1.4, linestyle=style)
 
 
 def _draw_marks(ax: Axes, branches: Sequence[Branch], kind: str, factor: float) -> bool:

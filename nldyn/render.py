@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     import cms
     import fem
     from fem.render import StopSphere
+    from nldyn.diagram import Progress
     from nldyn.orbit import Orbit
     from nldyn.scene_schema import Scene
     from nldyn.system import System
@@ -55,7 +55,7 @@ def render_scene(
     frequency_hz: float | None = None,
     period: int = 1,
     video: str = "gif",
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> Rendering:
     """Draw the mode shapes, the deepest contact and the motion of a scene with a mesh.
 
@@ -74,7 +74,7 @@ def render_scene(
     video : {"gif", "mp4"}
         Kind of animation.
     progress : callable, optional
-        Called now and then with the fraction done (0 to 1) and what is being done.
+        Called as ``progress(what, frequency_hz)``; the frequency is 0 where none applies.
 
     Returns
     -------
@@ -93,14 +93,13 @@ def render_scene(
         raise scene_error(scene.file, ("mesh",), "is missing: only a mesh can be drawn")
     if scene.continuation is not None:
         check_computable(scene, scene.file)
-    tell = progress or (lambda fraction, text: None)
-    tell(0.0, "model")
+    tell = progress or (lambda what, frequency_hz: None)
+    tell("model", 0.0)
     component = build_component(scene)
     reduced = build_reduced(scene, component)
     orbit = None
     if scene.continuation is not None:
-        tell(0.05, "orbit")
-        orbit = orbit_to_draw(scene, build_system(scene, reduced), frequency_hz, period)
+        orbit = orbit_to_draw(scene, build_system(scene, reduced), frequency_hz, period, tell)
     with result_directory(directory, "render") as folder:
         write_modes(reduced, folder / "modes.csv")
         if orbit is not None:
@@ -110,25 +109,29 @@ def render_scene(
     return Rendering(Path(directory), orbit, missing)
 
 
-def orbit_to_draw(scene: Scene, system: System, frequency_hz: float | None, period: int) -> Orbit:
-    """Find the orbit to draw: at a frequency, or at the top of the harmonic branch."""
-    if frequency_hz is not None:
-        return _orbit_at(scene, system, frequency_hz, period)
-    from nldyn.continuation import continue_branch
-
-    assert scene.continuation is not None
-    low, high = scene.continuation.range_hz
-    branch = continue_branch(_orbit_at(scene, system, low, 1), (low, high))
-    return max(branch.points, key=lambda orbit: orbit.max_abs_displacement)
-
-
-def _orbit_at(scene: Scene, system: System, frequency_hz: float, period: int) -> Orbit:
+def orbit_to_draw(
+    scene: Scene,
+    system: System,
+    frequency_hz: float | None,
+    period: int = 1,
+    progress: Progress | None = None,
+) -> Orbit:
+    """Find the orbit to draw: at a frequency, or where the harmonic orbits are largest."""
+    from nldyn.diagram import diagram
     from nldyn.orbit import ConvergenceError, solve_orbit
 
-    try:
-        return solve_orbit(system, frequency_hz=frequency_hz, period=period)
-    except ConvergenceError as error:
-        raise SceneError(f"{scene.file}: {error}") from error
+    if frequency_hz is not None:
+        try:
+            return solve_orbit(system, frequency_hz=frequency_hz, period=period)
+        except ConvergenceError as error:
+            raise SceneError(f"{scene.file}: {error}") from error
+    assert scene.continuation is not None
+    low, high = scene.continuation.range_hz
+    branches = diagram(system, (low, high), [1], progress=progress).branches
+    orbits = [orbit for branch in branches for orbit in branch.points]
+    if not orbits:
+        raise SceneError(f"{scene.file}: no harmonic orbit is found from {low:g} to {high:g} Hz")
+    return max(orbits, key=lambda orbit: orbit.max_abs_displacement)
 
 
 def deepest_state(orbit: Orbit) -> NDArray[np.float64]:
@@ -182,7 +185,7 @@ class _Drawing:
     component: fem.Component
     reduced: cms.ReducedModel
     folder: Path
-    tell: Callable[[float, str], None]
+    tell: Progress
 
     def draw(self, orbit: Orbit | None, video: str) -> str:
         """Make all of them; say what to install if something is missing for it."""
@@ -204,7 +207,7 @@ class _Drawing:
         """Draw a sheet with all modes of the reduced model."""
         from fem.render import render_modes
 
-        self.tell(0.3, "mode shapes")
+        self.tell("mode shapes", 0.0)
         kept = self.reduced.modes
         titles = [
             f"{'mode' if number < kept else 'residual mode'} {number + 1}: {hz:.1f} Hz"
@@ -217,7 +220,7 @@ class _Drawing:
         """Draw the structure at the instant of deepest contact."""
         from fem.render import render_shape
 
-        self.tell(0.4, "deepest contact")
+        self.tell("deepest contact", 0.0)
         what = "deepest contact" if orbit.impacts else "largest deflection"
         render_shape(
             self.component,
@@ -232,7 +235,7 @@ class _Drawing:
         """Animate one period of the orbit."""
         from fem.render import animate
 
-        self.tell(0.5, "animation")
+        self.tell("animation", 0.0)
         history = orbit.history(FRAMES)
         animate(
             self.component,

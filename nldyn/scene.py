@@ -6,7 +6,7 @@ This module alone joins `fem`, `cms` and `nldyn`.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,7 @@ from nldyn.scene_schema import ExcitationTable, PartTable, Scene, StopTable
 if TYPE_CHECKING:
     import cms
     import fem
-    from nldyn.diagram import Diagram
+    from nldyn.diagram import Diagram, Progress
     from nldyn.elements import Excitation, Stop
     from nldyn.system import System
 
@@ -243,7 +243,7 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
         )
 
 
-def compute(scene: Scene, progress: Callable[[float, str], None] | None = None) -> Diagram:
+def compute(scene: Scene, progress: Progress | None = None) -> Diagram:
     """Compute all branches that a scene asks for.
 
     The whole scene is built and checked before the first orbit is sought.
@@ -253,7 +253,7 @@ def compute(scene: Scene, progress: Callable[[float, str], None] | None = None) 
     scene : Scene
         A scene with an ``[[excitation]]`` and a ``[continuation]``.
     progress : callable, optional
-        Called now and then with the fraction done (0 to 1) and what is being computed.
+        Called as ``progress(what, frequency_hz)`` at every orbit.
 
     Returns
     -------
@@ -267,17 +267,22 @@ def compute(scene: Scene, progress: Callable[[float, str], None] | None = None) 
     """
     check_computable(scene, scene.file)
     system = build_system(scene)
-    from nldyn.diagram import diagram
+    from nldyn.continuation import ContinuationOptions
+    from nldyn.diagram import Seed, diagram
 
     table = scene.continuation
     assert table is not None
-    return diagram(
-        system,
-        range_hz=(table.range_hz[0], table.range_hz[1]),
-        periods=table.periods,
-        seeds=[(seed.period, seed.near_hz) for seed in scene.subharmonics],
-        progress=progress,
-    )
+    with _told_as(scene, ("continuation",), SystemModelError):
+        return diagram(
+            system,
+            (table.range_hz[0], table.range_hz[1]),
+            table.periods,
+            seeds=[Seed(seed.period, seed.near_hz) for seed in scene.subharmonics],
+            search_points=table.search_points,
+            doublings=table.follow_doublings,
+            options=ContinuationOptions(max_step=table.max_step),
+            progress=progress,
+        )
 
 
 def _frame_model(scene: Scene, mesh: fem.FrameMesh) -> fem.FrameModel:

@@ -38,6 +38,7 @@ def check_scene(scene: Scene, file: Path) -> None:
     _check_modal(scene, report)
     _check_matrices(scene, report)
     _check_interface_names(scene, report)
+    _check_seeds(scene, report)
 
 
 def check_mesh_names(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
@@ -142,6 +143,16 @@ def _check_interface_names(scene: Scene, report: Report) -> None:
     for key, name in _interfaces_used(scene):
         if name not in scene.interface_names:
             raise report(key, unknown_name(name, scene.interface_names, "an interface"))
+
+
+def _check_seeds(scene: Scene, report: Report) -> None:
+    if scene.continuation is None:
+        return
+    low, high = scene.continuation.range_hz
+    for number, seed in enumerate(scene.subharmonics):
+        if not low <= seed.near_hz <= high:
+            fault = f"must lie within continuation.range_hz, not at {seed.near_hz:g}"
+            raise report(("subharmonics", number, "near_hz"), fault)
 
 
 def _interfaces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:

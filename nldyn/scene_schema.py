@@ -230,8 +230,9 @@ class ContinuationTable(Table):
 
     range_hz: list[Positive]
     periods: Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=1)] = [1, 2, 3]
-    max_step_hz: Positive | None = None
-    follow_doublings: Annotated[int, Field(ge=0)] = 1
+    follow_doublings: Annotated[int, Field(ge=0)] = 0
+    search_points: Annotated[int, Field(ge=1)] = 12
+    max_step: Annotated[float, Field(ge=0.01, le=1.0)] = 0.1
 
     @field_validator("range_hz")
     @classmethod

@@ -75,7 +75,7 @@ class Chord:
         problem = a.orbit.problem
         weights = problem.metric(a.orbit.point)
         secant = b.orbit.point - a.orbit.point
-        guess = _hermite(a, b, sigma)
+        guess = self.between(sigma)
         row = weights * secant
         found = problem.correct(guess, row / np.linalg.norm(row))
         if not found.converged:
@@ -85,15 +85,16 @@ class Chord:
         length = a.arclength + sigma * (b.arclength - a.arclength)
         return BranchPoint(orbit, tangent, length)
 
-
-def _hermite(a: BranchPoint, b: BranchPoint, x: float) -> Real:
-    length = b.arclength - a.arclength
-    return np.asarray(
-        (1.0 + 2.0 * x) * (1.0 - x) ** 2 * a.orbit.point
-        + x * (1.0 - x) ** 2 * length * a.tangent
-        + x * x * (3.0 - 2.0 * x) * b.orbit.point
-        + x * x * (x - 1.0) * length * b.tangent
-    )
+    def between(self, x: float) -> Real:
+        """Cubic interpolation of the shooting unknowns, not corrected."""
+        a, b = self.first, self.last
+        length = b.arclength - a.arclength
+        return np.asarray(
+            (1.0 + 2.0 * x) * (1.0 - x) ** 2 * a.orbit.point
+            + x * (1.0 - x) ** 2 * length * a.tangent
+            + x * x * (3.0 - 2.0 * x) * b.orbit.point
+            + x * x * (x - 1.0) * length * b.tangent
+        )
 
 
 def locate(kind: str, chord: Chord, test: Callable[[BranchPoint], float]) -> SpecialPoint:

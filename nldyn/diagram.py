@@ -1,0 +1,259 @@
+"""The bifurcation diagram: all branches of the wanted periods that simulations and flips give."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from nldyn.branch import Branch, SpecialPoint
+from nldyn.continuation import (
+    ContinuationOptions,
+    check_range,
+    continue_branch,
+    make_branch,
+    switch_at_flip,
+    trace,
+)
+from nldyn.errors import SystemModelError
+from nldyn.flow import FlowMap
+from nldyn.orbit import Orbit, check_observe
+from nldyn.search import SearchOptions, orbits_from_strobe, simulate_strobe
+from nldyn.special import LocateError
+from nldyn.system import System
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Seed:
+    """A frequency at which to look for orbits of one period by simulation.
+
+    Parameters
+    ----------
+    period : int
+        Period multiple n.
+    near_hz : float
+        Excitation frequency in Hz.
+    """
+
+    period: int
+    near_hz: float
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """Branches over a range of frequencies.
+
+    Parameters
+    ----------
+    branches : tuple of Branch
+        In the order found; names tell period and origin.
+    range_hz : (float, float)
+        The range.
+    observe : str
+        Interface whose displacement is reported.
+    notes : tuple of str
+        What was tried and gave nothing.
+    """
+
+    branches: tuple[Branch, ...]
+    range_hz: tuple[float, float]
+    observe: str
+    notes: tuple[str, ...] = ()
+
+    def of_period(self, period: int) -> list[Branch]:
+        """Branches of one period multiple."""
+        return [b for b in self.branches if b.period == period]
+
+
+@dataclass
+class _Collector:
+    """Branches found so far, with the tools to add more."""
+
+    flow: FlowMap
+    range_hz: tuple[float, float]
+    observe: str
+    options: ContinuationOptions
+    progress: Progress
+    branches: list[Branch] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    flip_ends: list[Orbit] = field(default_factory=list)
+
+    def known(self, orbit: Orbit) -> bool:
+        return any(branch.contains(orbit) for branch in self.branches)
+
+    def add(self, branch: Branch) -> None:
+        count = len(self.branches) + 1
+        label = "harmonic" if branch.period == 1 else f"1/{branch.period}"
+        self.branches.append(replace(branch, name=f"{count:02d} {label}"))
+
+    def from_orbits(self, orbits: Iterable[Orbit]) -> int:
+        added = 0
+        for orbit in orbits:
+            if not self.known(orbit):
+                self.add(
+                    continue_branch(
+                        orbit,
+                        self.range_hz,
+                        options=self.options,
+                        progress=lambda f, n=orbit.period: self.progress(f"1/{n}", f),  # type: ignore[misc]
+                    )
+                )
+                added += 1
+        return added
+
+    def from_flip(self, special: SpecialPoint) -> bool:
+        """Follow the branch that is born at a flip, unless it is known."""
+        if any(_is_at(end, special) for end in self.flip_ends):
+            return False
+        try:
+            start = switch_at_flip(special)
+        except LocateError as error:
+            self.notes.append(str(error))
+            return False
+        low, high = self.range_hz
+        if not low < start.orbit.frequency_hz < high or self.known(start.orbit):
+            return False
+        period = start.orbit.period
+        nodes, specials, reason = trace(
+            start, self.range_hz, self.options, lambda f: self.progress(f"1/{period}", f)
+        )
+        origin = f"born at the flip at {special.frequency_hz:.6g} Hz"
+        self.add(make_branch("", nodes, specials, (origin, reason)))
+        if reason.startswith("joins"):
+            self.flip_ends.append(nodes[-1].orbit)
+        return True
+
+
+def _is_at(end: Orbit, special: SpecialPoint) -> bool:
+    """Whether a doubled branch ends at this flip."""
+    flip = special.orbit
+    return (
+        end.period == 2 * flip.period
+        and math.isclose(end.frequency_hz, flip.frequency_hz, rel_tol=2e-3)
+        and math.isclose(end.max_abs_displacement, flip.max_abs_displacement, rel_tol=2e-2)
+    )
+
+
+def diagram(
+    system: System | FlowMap,
+    range_hz: tuple[float, float],
+    periods: Sequence[int] = (1, 2, 3),
+    *,
+    seeds: Sequence[Seed] = (),
+    search_points: int = 12,
+    doublings: int = 0,
+    observe: str | None = None,
+    options: ContinuationOptions | None = None,
+    search: SearchOptions | None = None,
+    progress: Progress | None = None,
+) -> Diagram:
+    """Compute the branches of the wanted periods over a range of frequencies.
+
+    Orbits of each period are looked for by simulation at `search_points` frequencies and at the
+    seeds, continued in both directions, and at each flip the doubled branch is followed when its
+    period is wanted. What no simulation comes near (isolas of unstable orbits, say) is missed.
+
+    Parameters
+    ----------
+    system : System or FlowMap
+        What to compute.
+    range_hz : (float, float)
+        Frequencies in Hz, ascending.
+    periods : sequence of int
+        Period multiples wanted.
+    seeds : sequence of Seed
+        Further frequencies at which to look for a period (which need not be in `periods`).
+    search_points : int
+        Number of frequencies searched, equally spaced on a logarithmic axis.
+    doublings : int
+        How many further doublings to follow at flips of branches beyond `periods`.
+    observe : str, optional
+        Interface whose displacement is reported; the first unless given.
+    options, search : optional
+        Step control and search effort.
+    progress : callable, optional
+        Called as ``progress(what, frequency_hz)``.
+
+    Returns
+    -------
+    Diagram
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense.
+    """
+    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    low, high = check_range(range_hz)
+    wanted = sorted(set(periods))
+    if not wanted or wanted[0] < 1:
+        raise SystemModelError("periods must be a list of integers of at least 1")
+    for seed in seeds:
+        if not low <= seed.near_hz <= high:
+            raise SystemModelError(
+                f"subharmonic near_hz = {seed.near_hz:g} lies outside range_hz ({low:g}, {high:g})"
+            )
+    if search_points < 1:
+        raise SystemModelError("search_points must be at least 1")
+    box = _Collector(
+        flow,
+        (low, high),
+        check_observe(flow.system, observe),
+        options or ContinuationOptions(),
+        progress or (lambda what, frequency_hz: None),
+    )
+    effort = search or SearchOptions()
+    edges = np.geomspace(low, high, search_points + 1)
+    strobes = {}
+    for frequency in np.sqrt(edges[:-1] * edges[1:])[::-1]:
+        box.progress("search", float(frequency))
+        strobes[float(frequency)] = simulate_strobe(flow, float(frequency), effort)
+    for period in wanted:
+        if period % 2 == 0 and period // 2 in wanted:
+            _follow_flips(box, period // 2)
+        for strobe in strobes.values():
+            box.from_orbits(orbits_from_strobe(flow, strobe, period, box.observe, effort))
+    for seed in seeds:
+        _follow_seed(box, seed, effort)
+    _follow_flips_of_new(box, wanted, doublings)
+    return Diagram(tuple(box.branches), (low, high), box.observe, tuple(box.notes))
+
+
+def _follow_seed(box: _Collector, seed: Seed, effort: SearchOptions) -> None:
+    """Look around a seed's frequency, nearest first, until a new branch turns up."""
+    for shift in (0.0, 0.005, -0.005, 0.01, -0.01, 0.02, -0.02, 0.03, -0.03):
+        frequency = seed.near_hz * (1.0 + shift)
+        if not box.range_hz[0] <= frequency <= box.range_hz[1]:
+            continue
+        box.progress(f"search 1/{seed.period}", frequency)
+        strobe = simulate_strobe(box.flow, frequency, effort)
+        orbits = orbits_from_strobe(box.flow, strobe, seed.period, box.observe, effort)
+        if orbits:
+            box.from_orbits(orbits)
+            return
+    box.notes.append(f"no 1/{seed.period} orbit found near {seed.near_hz:g} Hz")
+
+
+def _follow_flips(box: _Collector, period: int) -> None:
+    for branch in [b for b in box.branches if b.period == period]:
+        for special in branch.special_points:
+            if special.kind == "PD":
+                box.from_flip(special)
+
+
+def _follow_flips_of_new(box: _Collector, wanted: Sequence[int], doublings: int) -> None:
+    """Doubled branches of wanted periods from branches found late, then further doublings."""
+    for period in wanted:
+        if 2 * period in wanted:
+            _follow_flips(box, period)
+    largest = max(wanted)
+    for _ in range(doublings):
+        for period in sorted({b.period for b in box.branches}):
+            if 2 * period > largest:
+                _follow_flips(box, period)
+        largest *= 2
+

@@ -1,0 +1,180 @@
+"""Starting orbits from time simulations: stroboscopic states that nearly return."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from nldyn.branch import minimal_period, same_orbit
+from nldyn.errors import SystemModelError
+from nldyn.flow import FlowMap
+from nldyn.orbit import ConvergenceError, Orbit, check_observe, refine, shooting_problem
+from nldyn.system import Real, System
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """How long to simulate and how many candidates to try.
+
+    Parameters
+    ----------
+    starts : int
+        Number of initial states: rest, then random ones.
+    transient, recorded : int
+        Excitation periods simulated before and during the recording.
+    candidates : int
+        Near returns tried for each start, closest first.
+    seed : int
+        Seed of the random initial states: results are repeatable.
+    """
+
+    starts: int = 6
+    transient: int = 60
+    recorded: int = 120
+    candidates: int = 4
+    seed: int = 20
+
+    def __post_init__(self) -> None:
+        for name in ("starts", "recorded", "candidates"):
+            if getattr(self, name) < 1:
+                raise SystemModelError(f"search: {name} must be at least 1")
+        if self.transient < 0:
+            raise SystemModelError("search: transient must not be negative")
+
+
+@dataclass(frozen=True)
+class Strobe:
+    """Stroboscopic states of several simulations at one frequency.
+
+    Parameters
+    ----------
+    omega : float
+        Excitation frequency in rad/s.
+    runs : tuple of (k, 2n) arrays
+        Packed states at the start of each recorded excitation period.
+    """
+
+    omega: float
+    runs: tuple[Real, ...]
+
+
+def simulate_strobe(flow: FlowMap, frequency_hz: float, options: SearchOptions) -> Strobe:
+    """Simulate from rest and from random states and record once per excitation period.
+
+    The random states have modal displacements of up to ten times the linear response, the size
+    of resonant motion.
+    """
+    omega = 2.0 * math.pi * frequency_hz
+    total = options.transient + options.recorded
+    phases = np.linspace(0.0, 2.0 * np.pi * total, total + 1)
+    n = 2 * flow.system.size
+    rng = np.random.default_rng(options.seed)
+    rest = flow.to_packed(np.zeros(n), 0.0, omega)
+    forced = flow.system.forced_response(omega)
+    size = float(np.max(np.abs(forced.positive) + np.abs(forced.negative)))
+    runs = []
+    for index in range(options.starts):
+        scale = 0.0 if index == 0 else size * 10.0 ** rng.uniform(-0.5, 1.0)
+        start = rest + scale * rng.standard_normal(n) / math.sqrt(n)
+        found = flow.shoot(start[None], phases, omega, sensitivities=False, chained=True)
+        if not found.failure:
+            runs.append(found.ends[options.transient :])
+    return Strobe(omega, tuple(runs))
+
+
+def orbits_from_strobe(
+    flow: FlowMap, strobe: Strobe, period: int, observe: str, options: SearchOptions
+) -> list[Orbit]:
+    """Orbits of one minimal period that Newton's method finds from near returns."""
+    problem = shooting_problem(flow, period)
+    found: list[Orbit] = []
+    for states in strobe.runs:
+        for start in _near_returns(states, period, options.candidates):
+            packed = _between(problem.phases, states[start], flow, strobe.omega)
+            try:
+                orbit = refine(problem, packed, strobe.omega, observe)
+            except ConvergenceError:
+                continue
+            if minimal_period(orbit) == period and not any(same_orbit(orbit, o) for o in found):
+                found.append(orbit)
+    return found
+
+
+def find_orbits(
+    system: System | FlowMap,
+    frequency_hz: float,
+    period: int,
+    *,
+    observe: str | None = None,
+    options: SearchOptions | None = None,
+) -> list[Orbit]:
+    """Orbits of period multiple n at one frequency, started from time simulations.
+
+    The system is simulated from several initial states. Attractors of period n are found because
+    the states repeat; unstable orbits because chaotic motion passes near them and nearly repeats.
+    Every near return is refined by multiple shooting. Not finding an orbit proves nothing.
+
+    Parameters
+    ----------
+    system : System or FlowMap
+        What to search.
+    frequency_hz : float
+        Excitation frequency in Hz.
+    period : int
+        Period multiple n; orbits whose true period is shorter are left out.
+    observe : str, optional
+        Interface whose displacement is reported.
+    options : SearchOptions, optional
+        Effort.
+
+    Returns
+    -------
+    list of Orbit
+        Different orbits (not shifts of each other), in the order found.
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance, find_orbits
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> orbits = find_orbits(system, frequency_hz=50.0, period=2)
+    >>> any(orbit.stable for orbit in orbits)
+    True
+    """
+    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    if not (math.isfinite(frequency_hz) and frequency_hz > 0.0):
+        raise SystemModelError(f"frequency_hz must be positive, got {frequency_hz}")
+    options = options or SearchOptions()
+    strobe = simulate_strobe(flow, frequency_hz, options)
+    return orbits_from_strobe(flow, strobe, period, check_observe(flow.system, observe), options)
+
+
+def _near_returns(states: Real, period: int, count: int) -> list[int]:
+    """Indices whose state comes back after `period`, the closest first, one per attractor lap."""
+    if len(states) <= period:
+        return []
+    distance = np.linalg.norm(states[period:] - states[:-period], axis=1)
+    scale = float(np.linalg.norm(states, axis=1).max()) or 1.0
+    chosen: list[int] = []
+    for index in np.argsort(distance, kind="stable"):
+        if distance[index] > 0.3 * scale or len(chosen) == count:
+            break
+        apart = [np.linalg.norm(states[index] - states[c]) for c in chosen]
+        if all(a > 1e-3 * scale for a in apart):
+            chosen.append(int(index))
+        if distance[index] < 1e-9 * scale:
+            break  # an attractor of this period: one start is enough
+    return chosen
+
+
+def _between(phases: Real, start: Real, flow: FlowMap, omega: float) -> Real:
+    ends = flow.shoot(start[None], phases[:-1], omega, sensitivities=False, chained=True).ends
+    return np.vstack([start[None], ends])
