@@ -59,8 +59,9 @@ def main() -> None:
 @main.command()
 @scene_argument
 @out_option
+@click.option("--log", is_flag=True, help="Draw the displacement on a logarithmic axis.")
 @quiet_option
-def run(scene: Path, out: Path, quiet: bool) -> None:
+def run(scene: Path, out: Path, log: bool, quiet: bool) -> None:
     """Compute the branches of a scene, and write tables and a diagram."""
     with plain_errors():
         from nldyn.result_directory import check_directory
@@ -73,7 +74,7 @@ def run(scene: Path, out: Path, quiet: bool) -> None:
             diagram = compute(loaded, report)
         from nldyn.output import write_results
 
-        write_results(diagram, out, loaded)
+        write_results(diagram, out, loaded, yscale="log" if log else "linear")
         click.echo(describe(diagram, time.perf_counter() - start, out))
 
 
@@ -169,7 +170,8 @@ def progress_bar(quiet: bool) -> Iterator[Progress]:
     from tqdm import tqdm
 
     shape = "{elapsed}  {n} orbits  {desc}"
-    with tqdm(bar_format=shape, leave=False, file=sys.stderr) as bar:
+    pause = 0.1 if sys.stderr.isatty() else 10.0
+    with tqdm(bar_format=shape, leave=False, file=sys.stderr, mininterval=pause) as bar:
         before = ""
 
         def report(what: str, frequency_hz: float) -> None:

@@ -10,7 +10,7 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from nldyn.result_directory import result_directory
 from nldyn.version import software_version
@@ -54,6 +54,8 @@ def write_results(diagram: Diagram, directory: str | Path, scene: Scene | None =
         ``diagram.svg``, ``summary.json`` and, with a scene, ``scene.toml``.
     scene : Scene, optional
         The scene it was computed from; its text is copied.
+    yscale : {"linear", "log"}
+        Scale of the displacement axis of the diagram.
 
     Returns
     -------
@@ -70,7 +72,7 @@ def write_results(diagram: Diagram, directory: str | Path, scene: Scene | None =
     with result_directory(directory, "run") as folder:
         write_table(folder / "branches.csv", BRANCH_COLUMNS, branch_rows(diagram))
         write_table(folder / "special_points.csv", SPECIAL_COLUMNS, special_rows(diagram))
-        save_diagram(diagram, folder, title=scene.title if scene else "")
+        save_diagram(diagram, folder, title=scene.title if scene else "", yscale=yscale)
         text = json.dumps(summary(diagram), indent=1, allow_nan=False)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
         if scene is not None:

@@ -19,18 +19,32 @@ class FakeOrbit:
 
 
 @dataclass(frozen=True)
+class FakeNode:
+    orbit: FakeOrbit
+    arclength: float
+
+
+@dataclass(frozen=True)
 class FakeSpecialPoint:
     kind: str
-    orbit: FakeOrbit
+    point: FakeNode
+
+    @property
+    def orbit(self):
+        return self.point.orbit
 
 
 @dataclass(frozen=True)
 class FakeBranch:
     name: str
     period: int
-    points: list
+    nodes: list
     special_points: list
     stop_reason: str = "end of range"
+
+    @property
+    def points(self):
+        return [node.orbit for node in self.nodes]
 
     @property
     def frequency_hz(self):
@@ -48,21 +62,20 @@ class FakeBranch:
 @dataclass(frozen=True)
 class FakeDiagram:
     branches: list
+    notes: tuple = ()
 
 
 def resonance(period=1, low=5.0, high=90.0, count=600, unstable=(30.0, 40.0)):
-    hz = np.linspace(low, high, count)
     peak = 25.3 * period
-    y = 1e-4 / np.sqrt((1 - (hz / peak) ** 2) ** 2 + (0.05 * hz / peak) ** 2)
-    orbits = [
-        FakeOrbit(f, a, period, stable=not unstable[0] < f < unstable[1])
-        for f, a in zip(hz.tolist(), y.tolist(), strict=True)
-    ]
-    special = [
-        FakeSpecialPoint(kind, min(orbits, key=lambda o, f=f: abs(o.frequency_hz - f)))
-        for kind, f in (("PD", unstable[0]), ("PD", unstable[1]), ("LP", high - 10), ("GR", 60.0))
-    ]
-    return FakeBranch(f"p{period}", period, orbits, special)
+
+    def node(hz):
+        y = 1e-4 / np.hypot(1 - (hz / peak) ** 2, 0.05 * hz / peak)
+        return FakeNode(FakeOrbit(hz, y, period, unstable[0] > hz or hz > unstable[1]), hz)
+
+    places = (("PD", unstable[0]), ("PD", unstable[1]), ("LP", high - 10), ("GR", 60.0))
+    special = [FakeSpecialPoint(kind, node(hz)) for kind, hz in places]
+    nodes = [node(hz) for hz in np.linspace(low, high, count).tolist()]
+    return FakeBranch(f"p{period}", period, nodes, special)
 
 
 def diagram():

@@ -1,8 +1,10 @@
 """The verbs of the command line, their output and their exit codes."""
 
+import csv
 import subprocess
 import sys
 import types
+from dataclasses import replace
 
 import pytest
 from click.testing import CliRunner
@@ -24,8 +26,8 @@ def computed(monkeypatch):
     """Let every scene give the same ready diagram."""
 
     def compute(scene, progress):
-        progress(0.5, "harmonic branch")
-        return diagram()
+        progress("harmonic branch", 25.3)
+        return replace(diagram(), notes=("no 1/5 orbit found near 62.2 Hz",))
 
     monkeypatch.setattr(nldyn.scene, "compute", compute)
 
@@ -33,10 +35,26 @@ def computed(monkeypatch):
 def test_run(tmp_path, computed):
     result = invoke("run", ONE_DOF, "--out", tmp_path / "out")
     assert result.exit_code == 0
-    assert "harmonic branch" in result.stderr
+    assert "harmonic branch at 25.30 Hz" in result.stderr
+    assert "note: no 1/5 orbit found near 62.2 Hz" in result.stdout
     assert "3 branches with 1100 points" in result.stdout
     assert "special points: 3 GR, 3 LP, 6 PD" in result.stdout
     assert (tmp_path / "out" / "branches.csv").is_file()
+
+
+def test_short_run_from_end_to_end(tmp_path):
+    scene = tmp_path / "short.toml"
+    text = example("one_dof.toml").read_text()
+    text = text.replace("[5.0, 90.0]", "[24.0, 27.0]\nsearch_points = 1")
+    scene.write_text(text.replace("periods = [1, 2, 3]", "periods = [1]"))
+    result = invoke("run", scene, "--out", tmp_path / "out", "--log")
+    assert result.exit_code == 0, result.output
+    with (tmp_path / "out" / "branches.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [float(rows[i]["frequency_hz"]) for i in (0, -1)] == pytest.approx([24.0, 27.0])
+    highest = max(float(row["max_abs_displacement_m"]) for row in rows)
+    assert highest == pytest.approx(225.46e-6, rel=5e-3)
+    assert {row["stable"] for row in rows} == {"1"}
 
 
 def test_run_again_into_the_same_directory(tmp_path, computed):

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nldyn.orbit import solve_orbit
-from nldyn.plot import length_unit, plot_diagram, plot_orbit, stability_runs
+from nldyn.plot import branch_curve, length_unit, plot_diagram, plot_orbit, stability_runs
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
 
@@ -40,8 +40,19 @@ def test_lines_are_split_where_stability_changes():
     solid, dotted, after = ax.lines
     assert solid.get_linestyle() == after.get_linestyle() == "-"
     assert dotted.get_linestyle() != "-"
-    assert solid.get_xdata()[-1] == dotted.get_xdata()[0] <= 30.0
-    assert after.get_xdata()[0] == dotted.get_xdata()[-1] >= 40.0
+    assert solid.get_xdata()[-1] == dotted.get_xdata()[0] == 30.0
+    assert after.get_xdata()[0] == dotted.get_xdata()[-1] == 40.0
+
+
+def test_special_points_lie_on_the_drawn_curve():
+    branch = resonance(count=11)
+    hz, y, stable = branch_curve(branch)
+    assert hz.size == 11 + len(branch.special_points)
+    assert np.all(np.diff(hz) >= 0)
+    for special in branch.special_points:
+        index = int(np.flatnonzero(hz == special.orbit.frequency_hz)[0])
+        assert y[index] == special.orbit.max_abs_displacement
+    assert stable[hz == 30.0].all() and not stable[(hz > 30.0) & (hz < 40.0)].any()
 
 
 def test_diagram_names_units_and_marks():

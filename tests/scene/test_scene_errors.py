@@ -184,6 +184,16 @@ def test_not_toml_names_the_line(tmp_path):
             "reduction describes a mesh, but the structure is given by [modal]",
         ),
         ("[modal]", "mesh = 'beam.msh'\n[modal]", "mesh must be a table: [mesh]"),
+        (
+            "[continuation]",
+            "[[subharmonics]]\nperiod = 5\nnear_hz = 95.0\n[continuation]",
+            "subharmonics[0].near_hz must lie within continuation.range_hz, not at 95",
+        ),
+        (
+            "[5.0, 90.0]",
+            "[5.0, 90.0]\nperiods = [1, 2.5]",
+            "continuation.periods[1] must be a whole number, not 2.5",
+        ),
     ],
 )
 def test_fault_in_modal_scene(tmp_path, old, new, sentence):

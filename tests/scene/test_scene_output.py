@@ -4,7 +4,7 @@ import csv
 import json
 
 import pytest
-from fakes import FakeBranch, FakeDiagram, FakeOrbit, FakeSpecialPoint, diagram
+from fakes import FakeBranch, FakeDiagram, FakeNode, FakeOrbit, FakeSpecialPoint, diagram
 
 from nldyn.output import write_results
 from nldyn.resources import example
@@ -45,7 +45,8 @@ def test_files_and_columns(tmp_path):
 def test_numbers_come_back_bit_for_bit(tmp_path):
     third, tiny = 100.0 / 3.0, 1.2345678901234567e-7
     orbit = FakeOrbit(third, tiny, 3, False, 2, tiny / 7, largest_multiplier=-1.1 + 0j)
-    branch = FakeBranch("a", 3, [orbit], [FakeSpecialPoint("PD", orbit)])
+    node = FakeNode(orbit, 0.0)
+    branch = FakeBranch("a", 3, [node], [FakeSpecialPoint("PD", node)])
     write_results(FakeDiagram([branch]), tmp_path / "out")
     row = read(tmp_path / "out" / "branches.csv")[1]
     assert [float(row[3]), float(row[4]), float(row[5])] == [third, tiny, tiny / 7]
