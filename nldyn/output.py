@@ -41,7 +41,13 @@ SPECIAL_COLUMNS = (
 )
 
 
-def write_results(diagram: Diagram, directory: str | Path, scene: Scene | None = None) -> Path:
+def write_results(
+    diagram: Diagram,
+    directory: str | Path,
+    scene: Scene | None = None,
+    *,
+    yscale: Literal["linear", "log"] = "linear",
+) -> Path:
     """Write a diagram as tables and pictures, all of them or nothing.
 
     Parameters
