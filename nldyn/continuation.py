@@ -268,6 +268,8 @@ def trace(
             special += special_points_between(a, b)
         except LocateError:
             special += _by_halves(a, b)
+    if walk.stop_reason.startswith("joins"):  # the flip itself: a branch point of this branch
+        special = [s for s in special if s.kind != "BP" or s.point.arclength < nodes[-2].arclength]
     return nodes, special, walk.stop_reason
 
 

@@ -176,6 +176,15 @@ class Orbit:
 
     def extremes(self, output: int) -> Extremes:
         """Local extremes of an output: the stops' penetrations first, then the interfaces."""
+        if output not in self._extremes:
+            self._extremes[output] = self._find_extremes(output)
+        return self._extremes[output]
+
+    @cached_property
+    def _extremes(self) -> dict[int, Extremes]:
+        return {}
+
+    def _find_extremes(self, output: int) -> Extremes:
         trajectory = self.trajectory
         data, rec = trajectory.data, trajectory.record
         tables = trajectory.flow.tables

@@ -158,7 +158,7 @@ class ShootingProblem:
             before, last = last, float(np.sqrt(np.sum(weights * step**2)))
             if iteration == 1:
                 first = last
-            if not last < 1e3:
+            if not (last < 1e3 and abs(step[-1]) < 0.5):
                 return Correction(point, lin, False, iteration, first, last, "Newton diverged")
             point = point + step
             stagnant = last < 1e-8 and last > 0.5 * before  # at the rounding level

@@ -112,86 +112,78 @@ def locate(kind: str, chord: Chord, test: Callable[[BranchPoint], float]) -> Spe
 def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[SpecialPoint]:
     """All special points between two neighbouring points, in order.
 
-    Each change of sign is followed by Brent's method. Where several tests change sign at once the
-    chord is halved first, so that none hides another.
+    Each change of sign is followed by Brent's method. Where several happen in one step, or an
+    event does not explain the change in the number of contacts, the chord is halved first.
     """
     chord = Chord(a, b)
     before, after = tests(a), tests(b)
     changed = [k for k in before if before[k] * after[k] < 0.0]
     kinds = [k for k in changed if not (k == "BP" and "LP" in changed)]
-    grazes = a.orbit.impacts != b.orbit.impacts
     lonely_fold = "LP" in changed and "BP" not in changed
-    count = len(kinds) + abs(a.orbit.impacts - b.orbit.impacts)
-    if (count > 1 or lonely_fold) and depth < 12:
+    contacts = abs(a.orbit.impacts - b.orbit.impacts)
+    touches = touching_extremes(a.orbit, b.orbit)
+    clear = len(touches) == contacts and len(kinds) + contacts <= 1 and not lonely_fold
+    if not clear and depth < 10:
         middle = chord.at(0.5)
         return special_points_between(a, middle, depth + 1) + special_points_between(
             middle, b, depth + 1
         )
     found = [locate(k, chord, lambda point, k=k: tests(point)[k]) for k in kinds]  # type: ignore[misc]
     found = [s for s in found if s.kind != "NS" or _on_unit_circle(s.orbit.multipliers)]
-    if grazes:
-        found.append(locate_grazing(chord))
+    if contacts and touches:
+        found.append(locate("GR", chord, touches[0].depth))
     return sorted(found, key=lambda s: s.point.arclength)
+
+
+@dataclass(frozen=True)
+class Touch:
+    """An extremum of a stop's penetration whose sign differs between two neighbouring orbits."""
+
+    output: int
+    is_maximum: bool
+    phase: float
+
+    def depth(self, point: BranchPoint) -> float:
+        """Value of the extremum of this kind nearest in phase."""
+        orbit = point.orbit
+        found = orbit.extremes(self.output)
+        keep = found.is_maximum == self.is_maximum
+        index = _nearest_phase(orbit, found.phases[keep], self.phase)
+        return float(found.values[keep][index])
+
+
+def _nearest_phase(orbit: Orbit, phases: Real, phase: float) -> int:
+    full = 2.0 * np.pi * orbit.period
+    return int(np.argmin(np.abs((phases - phase + 0.5 * full) % full - 0.5 * full)))
+
+
+def touching_extremes(a: Orbit, b: Orbit) -> list[Touch]:
+    """Extremes of the penetrations that change sign between two neighbouring orbits.
+
+    A maximum that becomes positive is a new contact; a minimum that becomes negative splits one.
+    """
+    touches = []
+    for output in range(len(a.system.stops)):
+        first, last = a.extremes(output), b.extremes(output)
+        for is_maximum in (True, False):
+            here, there = first.is_maximum == is_maximum, last.is_maximum == is_maximum
+            phases, values = first.phases[here], first.values[here]
+            if not phases.size or not there.any():
+                continue
+            for phase, value in zip(last.phases[there], last.values[there], strict=True):
+                index = _nearest_phase(a, phases, phase)
+                back = _nearest_phase(a, last.phases[there], phases[index])
+                mutual = last.phases[there][back] == phase
+                if mutual and values[index] * value < 0.0:
+                    nearer = phase if abs(value) < abs(values[index]) else phases[index]
+                    touches.append(Touch(output, is_maximum, float(nearer)))
+    return touches
 
 
 def _on_unit_circle(multipliers: Complex) -> bool:
     """Whether a complex pair (not a real pair μ, 1/μ) is what makes the torus test vanish."""
     complex_ones = multipliers[np.abs(multipliers.imag) > 1e-6 * np.abs(multipliers)]
     return bool(np.any(np.abs(np.abs(complex_ones) - 1.0) < 1e-5))
-
-
-def locate_grazing(chord: Chord) -> SpecialPoint:
-    """Point where a contact just appears or vanishes.
-
-    The number of contacts brackets it; the depth of the extremum that comes into contact, with
-    the sign that the count gives, is the function whose root is taken.
-    """
-    a, b = chord.first, chord.last
-    more = max(a.orbit.impacts, b.orbit.impacts)
-    sign_first = 1.0 if a.orbit.impacts == more else -1.0
-    low, high = 0.0, 1.0
-    for _ in range(6):
-        middle = 0.5 * (low + high)
-        side = 1.0 if chord.at(middle).orbit.impacts >= more else -1.0
-        if side == sign_first:
-            low = middle
-        else:
-            high = middle
-    touching = chord.at(low if sign_first > 0.0 else high).orbit
-    output, is_maximum, turn = _shallowest(touching)
-
-    def depth(sigma: float) -> float:
-        orbit = chord.at(sigma).orbit
-        value = _nearest_extreme(orbit, output, is_maximum, turn)
-        return value if orbit.impacts >= more else -value
-
-    sigma = float(brentq(depth, low, high, xtol=1e-10))
-    point = chord.at(sigma)
-    slope = abs(math.log(b.orbit.frequency_hz / a.orbit.frequency_hz))
-    return SpecialPoint("GR", point, 1e-10 * slope + point.orbit.error)
-
-
-def _shallowest(orbit: Orbit) -> tuple[int, bool, float]:
-    """Stop, kind and relative phase of the penetration extremum nearest to zero."""
-    best = (math.inf, 0, True, 0.0)
-    for output in range(len(orbit.system.stops)):
-        found = orbit.extremes(output)
-        for phase, value, is_maximum in zip(
-            found.phases, found.values, found.is_maximum, strict=True
-        ):
-            best = min(best, (abs(float(value)), output, bool(is_maximum), float(phase)))
-    return best[1], best[2], best[3]
-
-
-def _nearest_extreme(orbit: Orbit, output: int, is_maximum: bool, phase: float) -> float:
-    """Distance from zero of the extremum of one kind nearest in phase."""
-    found = orbit.extremes(output)
-    keep = found.is_maximum == is_maximum
-    full = 2.0 * np.pi * orbit.period
-    distance = np.abs((found.phases[keep] - phase + 0.5 * full) % full - 0.5 * full)
-    if distance.size == 0:
-        return math.inf
-    return abs(float(found.values[keep][int(np.argmin(distance))]))
 
 
 def hidden_dip(
