@@ -156,9 +156,16 @@ def plain_errors() -> Iterator[None]:
     except (SceneError, SystemModelError, OutputError) as error:
         click.echo(f"nldyn: {error}", err=True)
         sys.exit(BAD_INPUT)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemError) as error:
+        if not interrupted(error):
+            raise
         click.echo("nldyn: stopped by Ctrl-C, nothing is written", err=True)
         sys.exit(INTERRUPTED)
+
+
+def interrupted(error: BaseException) -> bool:
+    """Whether Ctrl-C is behind an error: within compiled code it comes as a SystemError."""
+    return isinstance(error, KeyboardInterrupt) or isinstance(error.__cause__, KeyboardInterrupt)
 
 
 @contextmanager

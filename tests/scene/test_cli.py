@@ -74,11 +74,17 @@ def test_somebody_elses_directory_is_refused_before_the_work(tmp_path, monkeypat
     assert "not written by nldyn" in result.stderr and result.stderr.count("\n") == 1
 
 
-def test_ctrl_c(tmp_path, monkeypatch):
-    def stop(*_):
-        raise KeyboardInterrupt
+def stop(*_):
+    raise KeyboardInterrupt
 
-    monkeypatch.setattr(nldyn.scene, "compute", stop)
+
+def stop_in_compiled_code(*_):
+    raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+
+@pytest.mark.parametrize("interrupt", [stop, stop_in_compiled_code])
+def test_ctrl_c(tmp_path, monkeypatch, interrupt):
+    monkeypatch.setattr(nldyn.scene, "compute", interrupt)
     result = invoke("run", ONE_DOF, "--out", tmp_path / "out", "--quiet")
     assert result.exit_code == 130
     assert result.stderr == "nldyn: stopped by Ctrl-C, nothing is written\n"
