@@ -163,9 +163,11 @@ def plain_errors() -> Iterator[None]:
         sys.exit(INTERRUPTED)
 
 
-def interrupted(error: BaseException) -> bool:
+def interrupted(error: BaseException | None) -> bool:
     """Whether Ctrl-C is behind an error: within compiled code it comes as a SystemError."""
-    return isinstance(error, KeyboardInterrupt) or isinstance(error.__cause__, KeyboardInterrupt)
+    if error is None or isinstance(error, KeyboardInterrupt):
+        return error is not None
+    return interrupted(error.__cause__)
 
 
 @contextmanager

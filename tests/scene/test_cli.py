@@ -79,7 +79,9 @@ def stop(*_):
 
 
 def stop_in_compiled_code(*_):
-    raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+    inner = SystemError("returned a result with an exception set")
+    inner.__cause__ = KeyboardInterrupt()
+    raise SystemError("and once more") from inner
 
 
 @pytest.mark.parametrize("interrupt", [stop, stop_in_compiled_code])
