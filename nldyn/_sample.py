@@ -135,6 +135,8 @@ def local_extremes(
     found = np.empty((capacity, 3))
     n = 0
     w = np.empty(nz, dtype=np.complex128)
+    turn = np.empty(nz, dtype=np.complex128)
+    flying = np.empty(nz, dtype=np.complex128)
     old_rate = 0.0
     for piece in range(count):
         h = rec_duration[piece]
@@ -143,13 +145,21 @@ def local_extremes(
         if kind != FLIGHT:
             pieces += gauss_nodes.size
         t_old = 0.0
+        for k in range(nz):
+            turn[k] = np.exp(eigenvalues[k] * (h / pieces))
+            flying[k] = rec_w[piece, k]
         for i in range(pieces + 1):
             x = i / pieces
             t = h * (x if kind == FLIGHT else map_fraction(kind, x))
-            state_at(
-                eigenvalues, force, chi, to_legendre, gauss_nodes, kind, h,
-                rec_w[piece], rec_force[piece], t, w,
-            )  # fmt: skip
+            if kind == FLIGHT:
+                for k in range(nz):
+                    w[k] = flying[k]
+                    flying[k] *= turn[k]
+            else:
+                state_at(
+                    eigenvalues, force, chi, to_legendre, gauss_nodes, kind, h,
+                    rec_w[piece], rec_force[piece], t, w,
+                )  # fmt: skip
             _, rate = output_rate(
                 eigenvalues, row, forced, omega, rec_phase[piece] + omega * t, w
             )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,11 +25,14 @@ class BranchPoint:
         Unit tangent in the metric of the shooting problem.
     arclength : float
         Relative arclength from the branch's first computed point.
+    tests : dict of str to float
+        Test functions, filled when first asked for (see `nldyn.special.tests`).
     """
 
     orbit: Orbit
     tangent: Real
     arclength: float
+    tests: dict[str, float] = field(default_factory=dict, compare=False, repr=False)
 
 
 @dataclass(frozen=True)

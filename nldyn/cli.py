@@ -202,7 +202,7 @@ def describe(diagram: Diagram, seconds: float, out: Path) -> str:
     lines = [
         f"{len(branches)} branches with {points} points in {seconds:.1f} s",
         f"special points: {found}",
-        *(f"note: {note}" for note in diagram.notes),
+        *(f"note: {note}" for note in dict.fromkeys(diagram.notes)),
         f"written to {out}",
     ]
     return "\n".join(lines)

@@ -208,9 +208,11 @@ class FlowMap:
         while True:
             rec = self._record(capacity)
             segments = self._run(data, nodes, phases, False, False, rec)
-            if rec.count[0] < capacity or capacity > 1 << 20:
+            used = int(rec.count[0])
+            if used < capacity or capacity > 1 << 20:
+                pieces = Record(*(part[:used].copy() for part in rec[:-1]), rec.count)
                 return Trajectory(
-                    self, data, rec, float(phases[0]), segments.closings, segments.failure
+                    self, data, pieces, float(phases[0]), segments.closings, segments.failure
                 )
             capacity *= 4
 

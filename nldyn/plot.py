@@ -127,6 +127,17 @@ def length_unit(largest: float) -> tuple[float, str]:
     return PREFIXES[-1] if 0.0 < size < math.inf else PREFIXES[0]
 
 
+def mark_size(count: int) -> float:
+    """Choose the size of special points in points: the more there are, the smaller.
+
+    Examples
+    --------
+    >>> mark_size(10), mark_size(1000)
+    (4.5, 1.8)
+    """
+    return min(4.5, max(1.8, 35.0 / math.sqrt(max(count, 1))))
+
+
 def period_name(period: int) -> str:
     """Name a branch by the period of its orbits: ``harmonic``, ``1/2 subharmonic``, ...
 
@@ -180,7 +191,8 @@ def plot_diagram(
     colours = period_colours(branch.period for branch in branches)
     for branch in branches:
         _draw_branch(ax, branch, colours[branch.period], factor)
-    marked = [kind for kind in special_points if _draw_marks(ax, branches, kind, factor)]
+    size = mark_size(sum(len(branch.special_points) for branch in branches))
+    marked = [kind for kind in special_points if _draw_marks(ax, branches, kind, factor, size)]
     ax.set_xlabel("excitation frequency (Hz)")
     ax.set_ylabel(f"max |y| ({unit})")
     ax.set_yscale(yscale)
@@ -289,24 +301,26 @@ def _draw_branch(ax: Axes, branch: Branch, colour: str, factor: float) -> None:
         ax.plot(hz[part], y[part] / factor, color=colour, linewidth=1.4, linestyle=style)
 
 
-def _draw_marks(ax: Axes, branches: Sequence[Branch], kind: str, factor: float) -> bool:
+def _draw_marks(
+    ax: Axes, branches: Sequence[Branch], kind: str, factor: float, size: float
+) -> bool:
     points = [point for point in _special_points(branches) if str(point.kind) == kind]
     if not points:
         return False
     hz = [float(point.orbit.frequency_hz) for point in points]
     y = [float(point.orbit.max_abs_displacement) / factor for point in points]
-    ax.plot(hz, y, **_mark_style(kind))
+    ax.plot(hz, y, **_mark_style(kind, size))
     return True
 
 
-def _mark_style(kind: str) -> dict[str, Any]:
+def _mark_style(kind: str, size: float = 4.5) -> dict[str, Any]:
     return {
         "linestyle": "none",
         "marker": MARKERS[kind],
-        "markersize": 4.5,
+        "markersize": size,
         "markerfacecolor": "white",
         "markeredgecolor": "black",
-        "markeredgewidth": 0.8,
+        "markeredgewidth": 0.18 * size,
         "zorder": 4,
     }
 

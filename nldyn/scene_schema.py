@@ -232,7 +232,7 @@ class ContinuationTable(Table):
     periods: Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=1)] = [1, 2, 3]
     follow_doublings: Annotated[int, Field(ge=0)] = 0
     search_points: Annotated[int, Field(ge=1)] = 12
-    max_step: Annotated[float, Field(ge=0.01, le=1.0)] = 0.1
+    max_step: Annotated[float, Field(ge=0.01, le=1.0)] = 0.05
 
     @field_validator("range_hz")
     @classmethod

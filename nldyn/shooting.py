@@ -6,11 +6,12 @@ the equations say that each segment ends where the next one starts.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.linalg as sla
+from numpy.typing import NDArray
 
 from nldyn.flow import FlowMap
 from nldyn.system import Real
@@ -90,6 +91,10 @@ class ShootingProblem:
         """Forcing phases of the segment ends, shape (k + 1,)."""
         return np.linspace(0.0, 2.0 * np.pi * self.period, self.segments + 1)
 
+    @cached_property
+    def _following(self) -> NDArray[np.int64]:
+        return (np.arange(self.segments) + 1) % self.segments
+
     @property
     def size(self) -> int:
         """Number of real coordinates of a state, 2n."""
@@ -102,9 +107,12 @@ class ShootingProblem:
     def scale(self, point: Real) -> float:
         """Root mean square of the total modal displacement, the unit of relative steps."""
         forced = self.flow.system.forced_response(float(np.exp(point[-1])))
-        own = float(np.mean(np.sum(self.nodes(point) ** 2, axis=1)))
-        steady = float(np.sum(np.abs(forced.positive) ** 2 + np.abs(forced.negative) ** 2))
-        return float(np.sqrt(own + steady)) or 1.0
+        states = point[:-1]
+        own = float(states @ states) / self.segments
+        steady = np.vdot(forced.positive, forced.positive) + np.vdot(
+            forced.negative, forced.negative
+        )
+        return math.sqrt(own + float(steady.real)) or 1.0
 
     def metric(self, point: Real) -> Real:
         """Weights g of the arclength: ds² = Σ g Δ², relative in states and frequency."""
@@ -118,12 +126,12 @@ class ShootingProblem:
         nodes = self.nodes(point)
         segments = self.flow.shoot(nodes, self.phases, omega)
         k, n = self.segments, self.size
-        residual = segments.ends - np.roll(nodes, -1, axis=0)
+        residual = segments.ends - nodes[self._following]
         jacobian = np.zeros((k * n, k * n + 1))
         blocks = jacobian[:, :-1].reshape(k, n, k, n)
         index = np.arange(k)
         blocks[index, :, index, :] = segments.jacobians
-        blocks[index, :, (index + 1) % k, :] -= np.eye(n)
+        blocks[index, :, self._following, :] -= np.eye(n)
         jacobian[:, -1] = omega * segments.d_omega.ravel()
         monodromy = segments.jacobians[0]
         for block in segments.jacobians[1:]:
@@ -171,5 +179,5 @@ class ShootingProblem:
         matrix = np.vstack([lin.jacobian, weights * towards])
         rhs = np.zeros(matrix.shape[0])
         rhs[-1] = 1.0
-        tangent = sla.solve(matrix, rhs)
+        tangent = np.linalg.solve(matrix, rhs)
         return np.asarray(tangent / np.sqrt(np.sum(weights * tangent**2)))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from nldyn.branch import BranchPoint, SpecialPoint
@@ -36,20 +37,27 @@ def torus_test(multipliers: Complex) -> float:
     The product is the determinant of the bialternate product of Φ with itself minus the identity
     (Kuznetsov 2004, section 10.2.2).
     """
-    i, j = np.triu_indices(multipliers.size, 1)
+    i, j = _pairs(multipliers.size)
     products = multipliers[i] * multipliers[j]
     return float(np.prod((products - 1.0) / (1.0 + np.abs(products))).real)
 
 
+@lru_cache(maxsize=8)
+def _pairs(size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    return np.triu_indices(size, 1)
+
+
 def tests(point: BranchPoint) -> dict[str, float]:
     """All smooth test functions at a point; LP is the frequency part of the tangent."""
-    mu = point.orbit.multipliers
-    return {
-        "LP": float(point.tangent[-1]),
-        "PD": flip_test(mu),
-        "BP": branch_point_test(mu),
-        "NS": torus_test(mu) if mu.size > 2 else 1.0,
-    }
+    if not point.tests:
+        mu = point.orbit.multipliers
+        point.tests.update(
+            LP=float(point.tangent[-1]),
+            PD=flip_test(mu),
+            BP=branch_point_test(mu),
+            NS=torus_test(mu) if mu.size > 2 else 1.0,
+        )
+    return point.tests
 
 
 @dataclass(frozen=True)
@@ -193,15 +201,18 @@ def hidden_dip(
 
     The test has one sign at all three points but its parabola comes within a quarter of zero.
     """
-    x = np.array([p.arclength for p in (z, a, b)])
-    y = np.array([tests(p)[kind] for p in (z, a, b)])
-    if y.min() * y.max() <= 0.0 or x[1] == x[0] or x[2] == x[1]:
+    (y0, y1, y2) = (tests(p)[kind] for p in (z, a, b))
+    left, right = z.arclength - a.arclength, b.arclength - a.arclength
+    if min(y0, y1, y2) * max(y0, y1, y2) <= 0.0 or left == 0.0 or right == 0.0:
         return None
-    c = np.polyfit(x - x[1], y, 2)
-    if c[0] * y[1] <= 0.0:  # bends away from zero
+    first, last = (y0 - y1) / left, (y2 - y1) / right
+    curvature = (last - first) / (right - left)
+    slope = first - curvature * left
+    if curvature * y1 <= 0.0:  # bends away from zero
         return None
-    where = -0.5 * c[1] / c[0]
-    value = c[2] - 0.25 * c[1] ** 2 / c[0]
-    if not x[0] - x[1] < where < x[2] - x[1]:
+    where = -0.5 * slope / curvature
+    value = y1 - 0.25 * slope**2 / curvature
+    if not left < where < right:
         return None
-    return float(where + x[1]) if value * y[1] < 0.25 * np.min(np.abs(y)) * abs(y[1]) else None
+    close = value * y1 < 0.25 * min(abs(y0), abs(y1), abs(y2)) * abs(y1)
+    return where + a.arclength if close else None
