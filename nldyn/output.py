@@ -72,6 +72,17 @@ def write_results(
     ------
     OutputError
         If the directory holds only other people's files or cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from nldyn import System, Unbalance, diagram
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> computed = diagram(system, (10.0, 16.0), [1], search_points=1)
+    >>> folder = write_results(computed, tempfile.mkdtemp())
+    >>> (folder / "branches.csv").read_text()[:20]
+    'branch,point,period,'
     """
     from nldyn.plot import save_diagram
 

@@ -184,6 +184,16 @@ def plot_diagram(
     ------
     ValueError
         For a unit that is not one of the four.
+
+    Examples
+    --------
+    >>> from nldyn import System, Unbalance, continue_branch, solve_orbit
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> branch = continue_branch(solve_orbit(system, frequency_hz=10.0), (5.0, 20.0))
+    >>> ax = plot_diagram([branch])
+    >>> ax.get_ylabel()
+    'max |y| (µm)'
     """
     branches = list(diagram if isinstance(diagram, Iterable) else diagram.branches)
     ax = ax if ax is not None else new_axes()
@@ -220,7 +230,17 @@ def plot_orbit(
     Returns
     -------
     pair of matplotlib.axes.Axes
-        Those for the displacement, with every impact marked, and for the contact force.
+        Those for the displacement, with the begin of every contact marked, and for the contact
+        force.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance, solve_orbit
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     stops=[Stop("middle", stiffness=5.17e9)], excitation=[Unbalance("middle", 4.92e-6)])
+    >>> displacement, force = plot_orbit(solve_orbit(system, frequency_hz=25.3))
+    >>> displacement.get_title()
+    'harmonic orbit at 25.3 Hz'
     """
     history = orbit.history(samples)
     upper, lower = axes if axes is not None else new_axes_pair()

@@ -88,6 +88,14 @@ def render_scene(
         If the scene has no mesh, or there is no such orbit.
     OutputError
         If the directory cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from nldyn.resources import example
+    >>> from nldyn.scene import load_scene
+    >>> scene = load_scene(example("two_dof_xi_0.01.toml"))
+    >>> made = render_scene(scene, tempfile.mkdtemp(), frequency_hz=23.0)   # doctest: +SKIP
     """
     if scene.mesh is None:
         raise scene_error(scene.file, ("mesh",), "is missing: only a mesh can be drawn")

@@ -264,6 +264,25 @@ def compute(scene: Scene, progress: Progress | None = None) -> Diagram:
     ------
     SceneError
         As for `build_system`, and if the scene has nothing to compute.
+
+    Examples
+    --------
+    >>> scene = parse_scene('''
+    ... [modal]
+    ... frequencies_hz = [13.1]
+    ... participation.tip = [0.6]
+    ... [damping]
+    ... modal_ratio = 0.02
+    ... [[excitation]]
+    ... at = "tip"
+    ... kind = "harmonic"
+    ... amplitude = 1.0
+    ... [continuation]
+    ... range_hz = [10.0, 16.0]
+    ... periods = [1]
+    ... ''')
+    >>> len(compute(scene).branches)     # without a stop there is only the resonance curve
+    1
     """
     check_computable(scene, scene.file)
     system = build_system(scene)
