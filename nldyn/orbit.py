@@ -415,12 +415,18 @@ def solve_orbit(
     return refine(problem, packed, omega, observe)
 
 
-def refine(problem: ShootingProblem, packed: Real, omega: float, observe: str) -> Orbit:
+def refine(
+    problem: ShootingProblem,
+    packed: Real,
+    omega: float,
+    observe: str,
+    max_iterations: int = 25,
+) -> Orbit:
     """Newton's method at fixed frequency from packed states (k, 2n)."""
     guess = np.append(packed.ravel(), math.log(omega))
     row = np.zeros(guess.size)
     row[-1] = 1.0
-    found = problem.correct(guess, row, max_iterations=25)
+    found = problem.correct(guess, row, max_iterations=max_iterations)
     if not found.converged:
         raise ConvergenceError(
             f"no orbit of period {problem.period} found at {omega / (2 * math.pi):g} Hz: "

@@ -135,7 +135,7 @@ def orbit_to_draw(
             raise SceneError(f"{scene.file}: {error}") from error
     assert scene.continuation is not None
     low, high = scene.continuation.range_hz
-    branches = diagram(system, (low, high), [1], progress=progress).branches
+    branches = diagram(system, (low, high), [1], search_points=4, progress=progress).branches
     orbits = [orbit for branch in branches for orbit in branch.points]
     if not orbits:
         raise SceneError(f"{scene.file}: no harmonic orbit is found from {low:g} to {high:g} Hz")

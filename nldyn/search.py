@@ -30,10 +30,10 @@ class SearchOptions:
         Seed of the random initial states: results are repeatable.
     """
 
-    starts: int = 6
+    starts: int = 5
     transient: int = 60
     recorded: int = 120
-    candidates: int = 4
+    candidates: int = 3
     seed: int = 20
 
     def __post_init__(self) -> None:
@@ -94,7 +94,7 @@ def orbits_from_strobe(
         for start in _near_returns(states, period, options.candidates):
             packed = _between(problem.phases, states[start], flow, strobe.omega)
             try:
-                orbit = refine(problem, packed, strobe.omega, observe)
+                orbit = refine(problem, packed, strobe.omega, observe, max_iterations=10)
             except ConvergenceError:
                 continue
             if minimal_period(orbit) == period and not any(same_orbit(orbit, o) for o in found):

@@ -143,22 +143,24 @@ class ShootingProblem:
         guess: Real,
         row: Real,
         *,
+        offset: float | None = None,
         rtol: float = 1e-10,
         max_iterations: int = 12,
     ) -> Correction:
-        """Newton's method on the plane through the guess with normal `row` (N + 1,).
+        """Newton's method on the plane ``row @ point = offset`` (through the guess by default).
 
-        A row that is zero but for its last entry holds the frequency.
+        A row (N + 1,) that is zero but for its last entry holds the frequency.
         """
         point = guess.copy()
         weights = self.metric(guess)
+        level = float(row @ guess) if offset is None else offset
         first = last = np.inf
         for iteration in range(1, max_iterations + 1):
             lin = self.linearise(point)
             if lin.failure:
                 return Correction(point, lin, False, iteration, first, last, lin.failure)
             matrix = np.vstack([lin.jacobian, row])
-            target = np.append(-lin.residual, row @ (guess - point))
+            target = np.append(-lin.residual, level - row @ point)
             try:
                 step = np.linalg.solve(matrix, target)
             except np.linalg.LinAlgError:

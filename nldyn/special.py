@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,10 +62,23 @@ def tests(point: BranchPoint) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Chord:
-    """The piece of a branch between two neighbouring points, as a function of σ in [0, 1]."""
+    """The piece of a branch between two neighbouring points, as a function of σ in [0, 1].
+
+    σ is the position along the secant; points once computed help to predict the next ones.
+    """
 
     first: BranchPoint
     last: BranchPoint
+    known: dict[float, BranchPoint] = field(default_factory=dict)
+
+    @cached_property
+    def _secant(self) -> Real:
+        return self.last.orbit.point - self.first.orbit.point
+
+    @cached_property
+    def _row(self) -> Real:
+        row = self.first.orbit.problem.metric(self.first.orbit.point) * self._secant
+        return np.asarray(row / np.linalg.norm(row))
 
     def at(self, sigma: float) -> BranchPoint:
         """Point of the branch on the plane through σ of the chord.
@@ -79,29 +92,35 @@ class Chord:
             return self.first
         if sigma >= 1.0:
             return self.last
-        a, b = self.first, self.last
+        if sigma in self.known:
+            return self.known[sigma]
+        a = self.first
         problem = a.orbit.problem
-        weights = problem.metric(a.orbit.point)
-        secant = b.orbit.point - a.orbit.point
-        guess = self.between(sigma)
-        row = weights * secant
-        found = problem.correct(guess, row / np.linalg.norm(row))
+        row = self._row
+        offset = float(row @ (a.orbit.point + sigma * self._secant))
+        found = problem.correct(self.between(sigma), row, offset=offset)
         if not found.converged:
             raise LocateError(found.failure)
         orbit = Orbit(problem, found.point, found.lin.monodromy, found.last_step, a.orbit.observe)
-        tangent = problem.tangent(found.lin, problem.metric(found.point), secant)
-        length = a.arclength + sigma * (b.arclength - a.arclength)
-        return BranchPoint(orbit, tangent, length)
+        tangent = problem.tangent(found.lin, problem.metric(found.point), self._secant)
+        length = a.arclength + sigma * (self.last.arclength - a.arclength)
+        self.known[sigma] = BranchPoint(orbit, tangent, length)
+        return self.known[sigma]
 
-    def between(self, x: float) -> Real:
-        """Cubic interpolation of the shooting unknowns, not corrected."""
-        a, b = self.first, self.last
-        length = b.arclength - a.arclength
+    def between(self, sigma: float) -> Real:
+        """Cubic interpolation of the shooting unknowns between the nearest known points."""
+        below = max((s for s in self.known if s < sigma), default=0.0)
+        above = min((s for s in self.known if s > sigma), default=1.0)
+        a, b = self.at(below), self.at(above)
+        x = (sigma - below) / (above - below)
+        pace = float(self._row @ self._secant) * (above - below)
+        start = a.tangent * (pace / float(self._row @ a.tangent))
+        end = b.tangent * (pace / float(self._row @ b.tangent))
         return np.asarray(
             (1.0 + 2.0 * x) * (1.0 - x) ** 2 * a.orbit.point
-            + x * (1.0 - x) ** 2 * length * a.tangent
+            + x * (1.0 - x) ** 2 * start
             + x * x * (3.0 - 2.0 * x) * b.orbit.point
-            + x * x * (x - 1.0) * length * b.tangent
+            + x * x * (x - 1.0) * end
         )
 
 
