@@ -176,7 +176,7 @@ class Record(NamedTuple):
         State at the start.
     force : (n_pieces, n_stops, m)
         Forces at the nodes of a panel.
-    count : (1,)
+    used : (1,)
         Number of pieces in use.
     """
 
@@ -185,7 +185,7 @@ class Record(NamedTuple):
     kind: NDArray[np.int64]
     w: NDArray[np.complex128]
     force: NDArray[np.float64]
-    count: NDArray[np.int64]
+    used: NDArray[np.int64]
 
 
 @njit(cache=True, error_model="numpy")
@@ -378,7 +378,7 @@ def panel_columns(fl, tab, kind, phase, t0, h, active, dF, E, E_inv, G, columns)
 
 @njit(cache=True, error_model="numpy")
 def legendre_tail(tab, F):
-    """Largest of the last two Legendre coefficients of the forces, relative to the largest force."""
+    """Last two Legendre coefficients of the forces, the larger, relative to the largest force."""
     m = tab.nodes.size
     worst = 0.0
     largest = 0.0
@@ -398,7 +398,7 @@ def legendre_tail(tab, F):
 @njit(cache=True, error_model="numpy")
 def record_piece(rec, phase, h, kind, w):
     """Append a piece; return its index, or -1 when the record is full."""
-    n = rec.count[0]
+    n = rec.used[0]
     if n >= rec.phase.size:
         return -1
     rec.phase[n] = phase
@@ -406,7 +406,7 @@ def record_piece(rec, phase, h, kind, w):
     rec.kind[n] = kind
     rec.w[n, :] = w
     rec.force[n, :, :] = 0.0
-    rec.count[0] = n + 1
+    rec.used[0] = n + 1
     return n
 
 
@@ -644,7 +644,10 @@ def propagate(fl, tab, packed, phase, duration, with_columns, rec, recording):
 
     Parameters
     ----------
-    fl, tab : FlowData, GaussTables
+    fl : FlowData
+        Numbers of the system.
+    tab : GaussTables
+        Collocation tables.
     packed : (2n,)
         Real coordinates of w at the start.
     phase, duration : float

@@ -160,10 +160,8 @@ def local_extremes(
                     eigenvalues, force, chi, to_legendre, gauss_nodes, kind, h,
                     rec_w[piece], rec_force[piece], t, w,
                 )  # fmt: skip
-            _, rate = output_rate(
-                eigenvalues, row, forced, omega, rec_phase[piece] + omega * t, w
-            )
-            if i > 0 and old_rate * rate < 0.0 or (old_rate != 0.0 and rate == 0.0 and i > 0):
+            _, rate = output_rate(eigenvalues, row, forced, omega, rec_phase[piece] + omega * t, w)
+            if i > 0 and (old_rate * rate < 0.0 or (old_rate != 0.0 and rate == 0.0)):
                 lo, hi, rate_lo, rate_hi = t_old, t, old_rate, rate
                 value = 0.0
                 for step in range(100):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,7 +124,7 @@ class Branch:
         """
         p = math.log(2.0 * math.pi * frequency_hz)
         found: list[Orbit] = []
-        for a, b in zip(self.nodes[:-1], self.nodes[1:], strict=True):
+        for a, b in pairwise(self.nodes):
             pa, pb = a.orbit.point[-1], b.orbit.point[-1]
             if min(pa, pb) <= p <= max(pa, pb):
                 share = 0.5 if pa == pb else (p - pa) / (pb - pa)

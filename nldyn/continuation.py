@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import brentq
@@ -263,7 +264,7 @@ def trace(
             progress(point.orbit.frequency_hz)
         if len(nodes) > 2:
             _insert_dips(nodes)
-    for a, b in zip(nodes[:-1], nodes[1:], strict=True):
+    for a, b in pairwise(nodes):
         try:
             special += special_points_between(a, b)
         except LocateError:
@@ -430,12 +431,9 @@ def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoin
         found = problem.correct(doubled + size * direction, row / np.linalg.norm(row))
         if found.converged:
             tangent = problem.tangent(found.lin, problem.metric(found.point), direction)
-            twin = Orbit(
-                problem, found.point, found.lin.monodromy, found.last_step, orbit.observe
-            )
+            twin = Orbit(problem, found.point, found.lin.monodromy, found.last_step, orbit.observe)
             return BranchPoint(twin, tangent, 0.0)
     raise LocateError(
-        f"no orbit of period {problem.period} found beside the flip at {orbit.frequency_hz:.6g} Hz: "
-        f"{found.failure}"
+        f"no orbit of period {problem.period} found beside the flip at "
+        f"{orbit.frequency_hz:.6g} Hz: {found.failure}"
     )
-

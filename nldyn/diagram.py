@@ -164,7 +164,7 @@ def diagram(
     range_hz : (float, float)
         Frequencies in Hz, ascending.
     periods : sequence of int
-        Period multiples wanted.
+        Period multiples wanted; may be empty when there are seeds.
     seeds : sequence of Seed
         Further frequencies at which to look for a period (which need not be in `periods`).
     search_points : int
@@ -190,7 +190,7 @@ def diagram(
     flow = system if isinstance(system, FlowMap) else FlowMap(system)
     low, high = check_range(range_hz)
     wanted = sorted(set(periods))
-    if not wanted or wanted[0] < 1:
+    if any(n < 1 for n in wanted) or not (wanted or seeds):
         raise SystemModelError("periods must be a list of integers of at least 1")
     for seed in seeds:
         if not low <= seed.near_hz <= high:
@@ -209,7 +209,7 @@ def diagram(
     effort = search or SearchOptions()
     edges = np.geomspace(low, high, search_points + 1)
     strobes = {}
-    for frequency in np.sqrt(edges[:-1] * edges[1:])[::-1]:
+    for frequency in np.sqrt(edges[:-1] * edges[1:])[::-1] if wanted else ():
         box.progress("search", float(frequency))
         strobes[float(frequency)] = simulate_strobe(flow, float(frequency), effort)
     for period in wanted:
@@ -250,10 +250,9 @@ def _follow_flips_of_new(box: _Collector, wanted: Sequence[int], doublings: int)
     for period in wanted:
         if 2 * period in wanted:
             _follow_flips(box, period)
-    largest = max(wanted)
+    largest = max(wanted, default=1)
     for _ in range(doublings):
         for period in sorted({b.period for b in box.branches}):
             if 2 * period > largest:
                 _follow_flips(box, period)
         largest *= 2
-

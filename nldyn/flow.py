@@ -118,7 +118,7 @@ class FlowMap:
         )
 
     @cached_property
-    def _static(self) -> tuple[Real, ...]:
+    def _stops(self) -> tuple[Real, Real, Real, Real, Real]:
         s = self.system
         vectors = [s.stop_vector(stop) for stop in s.stops]
         exponents = np.array([stop.exponent for stop in s.stops], dtype=float)
@@ -144,13 +144,18 @@ class FlowMap:
         forced = self.system.forced_response(omega)
         value = self.rows @ forced.positive + np.conj(self.rows @ forced.negative)
         slope = self.rows @ forced.d_positive + np.conj(self.rows @ forced.d_negative)
+        gap, stiffness, exponent, mobility, duration_factor = self._stops
         return FlowData(
             linear.eigenvalues,
             self.rows,
             self._force,
             value,
             slope,
-            *self._static,
+            gap,
+            stiffness,
+            exponent,
+            mobility,
+            duration_factor,
             linear.pack_mode,
             linear.pack_unit,
             float(omega),
@@ -208,9 +213,16 @@ class FlowMap:
         while True:
             rec = self._record(capacity)
             segments = self._run(data, nodes, phases, False, False, rec)
-            used = int(rec.count[0])
+            used = int(rec.used[0])
             if used < capacity or capacity > 1 << 20:
-                pieces = Record(*(part[:used].copy() for part in rec[:-1]), rec.count)
+                pieces = Record(
+                    rec.phase[:used].copy(),
+                    rec.duration[:used].copy(),
+                    rec.kind[:used].copy(),
+                    rec.w[:used].copy(),
+                    rec.force[:used].copy(),
+                    rec.used,
+                )
                 return Trajectory(
                     self, data, pieces, float(phases[0]), segments.closings, segments.failure
                 )

@@ -200,7 +200,7 @@ class Orbit:
             rec.kind,
             rec.w,
             rec.force,
-            int(rec.count[0]),
+            int(rec.used[0]),
             data.rows[output],
             data.forced[output],
         )
@@ -274,7 +274,7 @@ class Orbit:
             rec.kind,
             rec.w,
             rec.force,
-            int(rec.count[0]),
+            int(rec.used[0]),
             np.asarray(phases, dtype=float),
         )
         forced = self.system.forced_response(self.omega).at_phase(np.asarray(phases))
@@ -306,7 +306,10 @@ class Orbit:
         stops = system.stops
         depth = np.array([q @ system.stop_vector(s) - s.gap for s in stops]).reshape(len(stops), -1)
         force = np.array(
-            [s.stiffness * np.maximum(d, 0.0) ** s.exponent for s, d in zip(stops, depth, strict=True)]
+            [
+                s.stiffness * np.maximum(d, 0.0) ** s.exponent
+                for s, d in zip(stops, depth, strict=True)
+            ]
         ).reshape(depth.shape)
         return History(
             phases / self.omega,

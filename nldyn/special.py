@@ -213,9 +213,7 @@ def _on_unit_circle(multipliers: Complex) -> bool:
     return bool(np.any(np.abs(np.abs(complex_ones) - 1.0) < 1e-5))
 
 
-def hidden_dip(
-    z: BranchPoint, a: BranchPoint, b: BranchPoint, kind: str
-) -> float | None:
+def hidden_dip(z: BranchPoint, a: BranchPoint, b: BranchPoint, kind: str) -> float | None:
     """Arclength between z and b at which a test may touch zero unseen, from a parabola.
 
     The test has one sign at all three points but its parabola comes within a quarter of zero.

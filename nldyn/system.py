@@ -254,7 +254,8 @@ class System:
             b = np.atleast_1d(_array(f"interface '{name}'", vector))
             if b.shape != omega.shape:
                 raise SystemModelError(
-                    f"interface '{name}' has {b.size} entries but the matrices have {omega.size} rows"
+                    f"interface '{name}' has {b.size} entries "
+                    f"but the matrices have {omega.size} rows"
                 )
             participation[name] = modes.T @ b
         return cls(omega, D, participation, tuple(stops), tuple(dampers), tuple(excitation))
@@ -441,7 +442,9 @@ def _modal_damping(omega: Real, ratios: float | ArrayLike) -> Real:
 def _linear_part(omega: Real, damping: Real) -> LinearPart:
     n = omega.size
     if np.linalg.eigvalsh(0.5 * (damping + damping.T))[0] < -1e-12 * (1.0 + abs(damping).max()):
-        raise SystemModelError("the damping matrix must not feed energy in (it has a negative part)")
+        raise SystemModelError(
+            "the damping matrix must not feed energy in (it has a negative part)"
+        )
     A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(omega**2), -damping]])
     eigenvalues, vectors = np.linalg.eig(A)
     vectors = vectors / np.linalg.norm(vectors[:n], axis=0)

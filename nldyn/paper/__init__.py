@@ -1,0 +1,48 @@
+"""Reproduce the figures and numbers of the paper, claim by claim."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+__all__ = ["main"]
+
+
+def main(out: str | Path, workers: int = 2) -> None:
+    """Compute all models and write figures, the table of claims and a page.
+
+    Parameters
+    ----------
+    out : str or Path
+        Directory of results; it is written whole or not at all.
+    workers : int
+        Number of processes.
+
+    Raises
+    ------
+    OutputError
+        If the directory cannot be written or holds something else.
+
+    Examples
+    --------
+    >>> main("results/paper")        # doctest: +SKIP
+    """
+    from nldyn.paper.claims import evaluate, write_claims
+    from nldyn.paper.figures import write_figures
+    from nldyn.paper.jobs import run_jobs
+    from nldyn.paper.page import write_page
+    from nldyn.result_directory import check_directory, result_directory
+
+    check_directory(out)
+    start = time.perf_counter()
+    results = run_jobs(workers)
+    with result_directory(out, "paper") as folder:
+        rows = evaluate(results)
+        write_claims(rows, folder / "claims.csv")
+        write_figures(results, folder)
+        write_page(rows, results, time.perf_counter() - start, folder)
+    verdicts = [row.verdict for row in rows]
+    counts = ", ".join(f"{verdicts.count(v)} {v}" for v in ("agrees", "differs", "not decided"))
+    print(f"{len(rows)} claims: {counts}; {time.perf_counter() - start:.0f} s; written to {out}",
+          file=sys.stderr)  # fmt: skip

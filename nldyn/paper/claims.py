@@ -1,0 +1,107 @@
+"""The paper's statements, one by one, against what we compute."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from nldyn.diagram import Diagram
+from nldyn.paper.checks import CHECKS
+from nldyn.paper.evidence import Finding
+
+DATA = Path(__file__).resolve().parent / "data"
+READING_TOLERANCE = 0.01  # what a reader can measure in a plot
+
+Results = Mapping[str, Diagram]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One row of the table of claims.
+
+    Parameters
+    ----------
+    id, published, unit, kind, quantity, model
+        As in ``data/claims.csv``.
+    computed : str
+        Our value or what we found.
+    deviation : str
+        Relative deviation in per cent, or empty.
+    verdict : {"agrees", "differs", "not decided"}
+    note : str
+        Why, where it is known.
+    """
+
+    id: str
+    published: str
+    unit: str
+    kind: str
+    quantity: str
+    model: str
+    computed: str
+    deviation: str
+    verdict: str
+    note: str
+
+
+def published_claims() -> list[dict[str, str]]:
+    """Rows of ``data/claims.csv``: what the paper states.
+
+    Examples
+    --------
+    >>> published_claims()[0]["id"]
+    'linear.f1'
+    """
+    with (DATA / "claims.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def evaluate(results: Results) -> list[Claim]:
+    """Every published claim with our value and a verdict."""
+    return [_judged(row, CHECKS.get(row["id"]), results) for row in published_claims()]
+
+
+def write_claims(rows: list[Claim], path: Path) -> None:
+    """Write the columns id, published, computed, deviation, verdict, note."""
+    columns = ("id", "published", "computed", "deviation", "verdict", "note")
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows([getattr(row, c) for c in columns] for row in rows)
+
+
+def _judged(
+    row: Mapping[str, str], check: Callable[[Results], Finding] | None, results: Results
+) -> Claim:
+    finding = check(results) if check else Finding(None, note="not computed")
+    head = (row["id"], row["published"], row["unit"], row["kind"], row["quantity"], row["model"])
+    if finding.holds is not None:
+        verdict = "agrees" if finding.holds else "differs"
+        return Claim(*head, finding.text, "", verdict, finding.note)
+    if finding.value is None:
+        return Claim(*head, finding.text, "", "not decided", finding.note)
+    published = float(row["published"])
+    deviation = finding.value / published - 1.0
+    if row["kind"] == "bound":
+        agrees = finding.value <= published
+    else:
+        rounding = 0.5 * _last_digit(row["published"]) / abs(published)
+        agrees = abs(deviation) <= max(READING_TOLERANCE, rounding)
+    computed = f"{finding.value:.6g}"
+    return Claim(
+        *head,
+        computed,
+        f"{100 * deviation:+.2f} %",
+        "agrees" if agrees else "differs",
+        finding.note,
+    )
+
+
+def _last_digit(number: str) -> float:
+    """Value of one unit in the last digit of a printed number."""
+    mantissa, _, exponent = number.lower().partition("e")
+    decimals = len(mantissa.partition(".")[2])
+    return 10.0 ** (int(exponent or 0) - decimals) if not math.isnan(float(number)) else 0.0

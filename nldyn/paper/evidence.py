@@ -1,0 +1,101 @@
+"""Small questions to a diagram, from which the checks of the claims are made."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+
+from nldyn.branch import Branch, SpecialPoint
+from nldyn.diagram import Diagram
+from nldyn.orbit import Orbit
+from nldyn.peaks import Peak, resonance_peaks
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a check found: a number to compare, or whether a statement holds, or neither.
+
+    Parameters
+    ----------
+    value : float, optional
+        Number to compare with the published one.
+    holds : bool, optional
+        Whether a statement holds.
+    text : str
+        What was found, for a statement.
+    note : str
+        Remark for the table.
+    """
+
+    value: float | None = None
+    holds: bool | None = None
+    text: str = ""
+    note: str = ""
+
+
+def highest_peak(
+    branches: Iterable[Branch], low_hz: float, high_hz: float
+) -> tuple[Branch, Peak] | None:
+    """The highest resonance peak of some branches in a window of frequencies."""
+    peaks = [
+        (branch, peak) for branch in branches for peak in resonance_peaks(branch, (low_hz, high_hz))
+    ]
+    return max(peaks, key=lambda pair: pair[1].height, default=None)
+
+
+def peak_near(diagram: Diagram, period: int, near_hz: float, width: float = 0.05) -> Finding:
+    """Frequency of the highest peak of one period within a relative width of a frequency."""
+    found = highest_peak(
+        diagram.of_period(period), near_hz * (1.0 - width), near_hz * (1.0 + width)
+    )
+    if found is None:
+        return Finding(holds=False, text="no such peak", note=f"searched within {100 * width:g} %")
+    branch, peak = found
+    note = f"max |y| = {1e6 * peak.height:.4g} µm, {describe(peak.orbit)}, branch {branch.name}"
+    return Finding(peak.frequency_hz, note=note)
+
+
+def main_branch(diagram: Diagram, period: int, low_hz: float, high_hz: float) -> Branch | None:
+    """The branch of one period with the highest peak in a window."""
+    found = highest_peak(diagram.of_period(period), low_hz, high_hz)
+    return found[0] if found else None
+
+
+def special(
+    branch: Branch, kind: str, low_hz: float = 0.0, high_hz: float = float("inf")
+) -> list[SpecialPoint]:
+    """Special points of one kind between two frequencies."""
+    return [
+        s for s in branch.special_points if s.kind == kind and low_hz <= s.frequency_hz <= high_hz
+    ]
+
+
+def nearest_special(branch: Branch, kind: str, hz: float) -> SpecialPoint | None:
+    """The special point of one kind that is nearest to a frequency."""
+    points = special(branch, kind)
+    return min(points, key=lambda s: abs(s.frequency_hz - hz), default=None)
+
+
+def unstable_share(branches: Iterable[Branch], low_hz: float, high_hz: float) -> float:
+    """Share of the arclength of some branches that is unstable, in a window of frequencies."""
+    total = unstable = 0.0
+    for branch in branches:
+        for a, b in pairwise(branch.nodes):
+            if low_hz <= a.orbit.frequency_hz <= high_hz:
+                length = b.arclength - a.arclength
+                total += length
+                unstable += 0.0 if a.orbit.stable and b.orbit.stable else length
+    return unstable / total if total else 0.0
+
+
+def orbits_at(diagram: Diagram, period: int, hz: float) -> list[Orbit]:
+    """All orbits of one period at a frequency, the highest first."""
+    found = [orbit for branch in diagram.of_period(period) for orbit in branch.at(hz)]
+    return sorted(found, key=lambda orbit: -orbit.max_abs_displacement)
+
+
+def describe(orbit: Orbit) -> str:
+    """Impacts and stability in words."""
+    plural = "s" if orbit.impacts != 1 else ""
+    return f"{orbit.impacts} impact{plural} per period, {'stable' if orbit.stable else 'unstable'}"

@@ -1,0 +1,90 @@
+"""Figures 2 to 9 in the paper's layout, as PNG and SVG."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from matplotlib.axes import Axes
+
+from nldyn.branch import Branch
+from nldyn.diagram import Diagram
+from nldyn.orbit import Orbit
+from nldyn.paper.evidence import orbits_at
+from nldyn.plot import new_axes_pair, plot_diagram, plot_orbit, save_figure
+
+Results = Mapping[str, Diagram]
+
+SECOND_MODE_HZ = 125.1  # the dashed lines of Figure 4: superharmonics expected at 125.1 Hz / n
+
+CAPTIONS = {
+    "figure_2": "Figure 2: 1-DOF model",
+    "figure_3": "Figure 3: orbit of the 1-DOF model at 25.3 Hz",
+    "figure_4": "Figure 4: 2-DOF model, ξ = 0.01",
+    "figure_5": "Figure 5: 2-DOF model, ξ = 0.001",
+    "figure_6": "Figure 6: orbits of the 2-DOF model at 23.0 Hz, ξ = 0.001",
+    "figure_7": "Figure 7: 4-DOF model, ξ = 0.01",
+    "figure_8": "Figure 8: 4-DOF model, ξ = 0.001",
+    "figure_9": "Figure 9: orbits of the 4-DOF model at 22.5 Hz, ξ = 0.001",
+}
+
+
+def write_figures(results: Results, folder: Path) -> None:
+    """Write all figures to a folder."""
+    one = [*results["one_dof"].branches, *results["one_dof.listed"].branches]
+    save_figure(_diagram(one, "figure_2"), folder / "figure_2")
+    for name, key in (
+        ("figure_4", "two_dof_xi_0.01"),
+        ("figure_5", "two_dof_xi_0.001"),
+        ("figure_7", "four_dof_xi_0.01"),
+        ("figure_8", "four_dof_xi_0.001"),
+    ):
+        ax = _diagram(results[key].branches, name)
+        if name in ("figure_4", "figure_5"):
+            _dashed(ax, [SECOND_MODE_HZ / n for n in (2, 3, 4, 5)])
+        if name == "figure_7":
+            _inset(ax, results[key].of_period(1), 24.5, 29.0)
+        save_figure(ax, folder / name)
+    _orbits(orbits_at(results["one_dof"], 1, 25.3)[:1], "figure_3", folder)
+    _orbits(orbits_at(results["two_dof_xi_0.001"], 1, 23.0)[:3], "figure_6", folder)
+    _orbits(orbits_at(results["four_dof_xi_0.001"], 1, 22.5)[:3], "figure_9", folder)
+
+
+def _diagram(branches: Iterable[Branch], name: str) -> Axes:
+    ax = plot_diagram(branches, special_points=(), unit="mm")
+    ax.set_xlim(0.0, 90.0)
+    ax.set_title(CAPTIONS[name])
+    return ax
+
+
+def _dashed(ax: Axes, frequencies_hz: Iterable[float]) -> None:
+    for hz in frequencies_hz:
+        ax.axvline(hz, color="0.6", lw=0.8, ls="--", zorder=0)
+
+
+def _inset(ax: Axes, branches: list[Branch], low: float, high: float) -> None:
+    """Enlarge a range of frequencies in the upper right corner (as in the paper's Figure 7)."""
+    small = ax.inset_axes((0.56, 0.5, 0.26, 0.42))
+    plot_diagram(branches, small, special_points=(), unit="mm", legend=False)
+    tops = [
+        1e3 * o.max_abs_displacement
+        for b in branches
+        for o in b.points
+        if low <= o.frequency_hz <= high
+    ]
+    small.set_xlim(low, high)
+    small.set_ylim(0.0, 1.1 * max(tops, default=1.0))
+    small.set_xlabel("")
+    small.set_ylabel("")
+    small.tick_params(labelsize=7)
+    small.set_title(f"{low:g} to {high:g} Hz", fontsize=8)
+
+
+def _orbits(orbits: list[Orbit], name: str, folder: Path) -> None:
+    """One picture for each orbit: ``name.png`` for the first, then ``name_b``, ``name_c``."""
+    for letter, orbit in zip("abc", orbits, strict=False):
+        upper, lower = new_axes_pair()
+        plot_orbit(orbit, (upper, lower))
+        state = "stable" if orbit.stable else "unstable"
+        upper.set_title(f"{CAPTIONS[name]}, orbit {letter} ({state}, {orbit.impacts} impacts)")
+        save_figure(upper, folder / (name if letter == "a" else f"{name}_{letter}"))

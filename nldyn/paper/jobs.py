@@ -1,0 +1,143 @@
+"""The computations behind the figures, spread over processes."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, replace
+
+import cms
+from nldyn.diagram import Diagram, Seed, diagram
+from nldyn.elements import Stop
+from nldyn.resources import example
+from nldyn.scene import build_component, build_system, load_scene
+from nldyn.system import System
+
+BILINEAR_ALPHA = 790.0  # section 3, from equation 3.2
+STIFFNESS = 16877.0  # N/m, section 3
+
+
+@dataclass(frozen=True)
+class Job:
+    """One diagram to compute.
+
+    Parameters
+    ----------
+    name : str
+        Key of the result.
+    system : callable
+        Gives the system.
+    range_hz : (float, float)
+        Frequencies.
+    periods : tuple of int
+        Period multiples wanted everywhere in the range.
+    seeds : tuple of Seed
+        Further orbits to look for.
+    search_points : int
+        Frequencies searched.
+    """
+
+    name: str
+    system: Callable[[], System]
+    range_hz: tuple[float, float]
+    periods: tuple[int, ...] = (1,)
+    seeds: tuple[Seed, ...] = ()
+    search_points: int = 12
+
+    def run(self) -> Diagram:
+        """Compute the diagram."""
+        return diagram(
+            self.system(),
+            self.range_hz,
+            self.periods,
+            seeds=self.seeds,
+            search_points=self.search_points,
+        )
+
+
+def scene_system(name: str) -> System:
+    """System of an example scene."""
+    return build_system(load_scene(example(f"{name}.toml")))
+
+
+def bilinear_system() -> System:
+    """Two modes against a linear one-sided spring with α = 790 (section 4)."""
+    stop = Stop.linear("middle", BILINEAR_ALPHA * STIFFNESS)
+    return replace(scene_system("two_dof_xi_0.01"), stops=(stop,))
+
+
+def undamped_system() -> System:
+    """Two modes without modal damping: only the damper at the middle is left."""
+    system = scene_system("two_dof_xi_0.01")
+    return replace(system, damping=0.0 * system.damping)
+
+
+def five_dof_system() -> System:
+    """Four free-interface modes and the residual flexibility (section 5)."""
+    base = scene_system("four_dof_xi_0.01")
+    component = build_component(load_scene(example("four_dof_xi_0.01.toml")))
+    return System.from_reduced(
+        cms.reduce(component, modes=4),
+        modal_damping=0.01,
+        stops=base.stops,
+        dampers=base.dampers,
+        excitation=base.excitation,
+    )
+
+
+def _scene(name: str) -> Callable[[], System]:
+    return lambda: scene_system(name)
+
+
+# The subharmonics of the 1-DOF model that section 3 lists, beside the main 1/2 and 1/3.
+LISTED = (
+    Seed(3, 37.1), Seed(5, 62.2), Seed(2, 16.1), Seed(4, 33.0), Seed(7, 58.0),
+    Seed(10, 83.0), Seed(3, 18.4), Seed(5, 31.0), Seed(9, 56.0), Seed(13, 81.0),
+)  # fmt: skip
+
+JOBS = (
+    Job("four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (15.0, 90.0), (1, 2, 3)),
+    Job("four_dof_xi_0.01", _scene("four_dof_xi_0.01"), (15.0, 90.0), (1, 2, 3)),
+    Job(
+        "two_dof_xi_0.001",
+        _scene("two_dof_xi_0.001"),
+        (12.0, 90.0),
+        (1, 2, 3),
+        (Seed(1, 23.0), Seed(3, 33.0), Seed(14, 57.0)),
+    ),
+    Job(
+        "two_dof_xi_0.01",
+        _scene("two_dof_xi_0.01"),
+        (12.0, 90.0),
+        (1, 2, 3),
+        (Seed(1, 23.0), Seed(3, 33.0)),
+    ),
+    Job("one_dof.listed", _scene("one_dof"), (5.0, 90.0), (), LISTED),
+    Job("one_dof", _scene("one_dof"), (5.0, 90.0), (1, 2), (Seed(3, 76.0),)),
+    Job("five_dof_xi_0.01", five_dof_system, (15.0, 90.0), (1,)),
+    Job("two_dof.undamped", undamped_system, (20.0, 60.0), (1,), search_points=6),
+    Job("two_dof.bilinear", bilinear_system, (22.0, 70.0), (1,), search_points=6),
+    Job("two_dof.high", _scene("two_dof_xi_0.01"), (60.0, 135.0), (1,), search_points=4),
+)
+
+
+def run_job(name: str) -> Diagram:
+    """Compute the job of one name (in a worker process)."""
+    return next(job for job in JOBS if job.name == name).run()
+
+
+def run_jobs(workers: int) -> dict[str, Diagram]:
+    """Compute all jobs, the longest first, with a progress bar on stderr."""
+    from tqdm import tqdm
+
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: threads only hinder
+    scene_system("one_dof")  # fail early, before any process is started
+    results: dict[str, Diagram] = {}
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        futures = {pool.submit(run_job, job.name): job.name for job in JOBS}
+        for future in tqdm(as_completed(futures), total=len(futures), desc="diagrams"):
+            results[futures[future]] = future.result()
+    return results
