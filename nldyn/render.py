@@ -230,14 +230,28 @@ class _Drawing:
 
         self.tell("deepest contact", 0.0)
         what = "deepest contact" if orbit.impacts else "largest deflection"
+        state = self.reduced.expand(deepest_state(orbit))
+        stop = stop_to_draw(self.scene)
         render_shape(
             self.component,
-            self.reduced.expand(deepest_state(orbit)),
+            state,
             self.folder / "deepest_contact.png",
             title=f"{what} at {orbit.frequency_hz:.4g} Hz",
-            stop=stop_to_draw(self.scene),
+            scale=self.visible_scale(state, orbit.max_penetration, stop),
+            stop=stop,
             mirror=_mirror(self.scene),
         )
+
+    def visible_scale(
+        self, state: NDArray[np.float64], penetration: float, stop: StopSphere | None
+    ) -> float:
+        """Factor on the deflection at which the stop is not drowned in what it dents."""
+        from fem.render import automatic_scale, frame_drawing, round_number
+
+        factor = automatic_scale(frame_drawing(self.component, _mirror(self.scene)), state[None])
+        if stop is None or penetration == 0.0:
+            return factor
+        return min(factor, round_number(2.0 * stop.radius / penetration))
 
     def motion(self, orbit: Orbit, video: str) -> None:
         """Animate one period of the orbit."""
