@@ -47,9 +47,18 @@ class Motion:
         return J
 
     def run(
-        self, state: np.ndarray, phases: tuple[float, float], omega: float, *, tangent: bool = True
+        self,
+        state: np.ndarray,
+        phases: tuple[float, float],
+        omega: float,
+        *,
+        tangent: bool = True,
+        max_step: float = 0.05,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """End state and its derivative with respect to the start, good to 1e-12 and 5e-11."""
+        """End state and its derivative with respect to the start, good to 1e-12 and 5e-11.
+
+        The steps (radians of the forcing phase) must be shorter than every contact.
+        """
         size = 2 * self.n
 
         def extended(phase: float, y: np.ndarray) -> np.ndarray:
@@ -69,7 +78,7 @@ class Motion:
             method="DOP853",
             rtol=2e-13,
             atol=atol,
-            max_step=0.05,
+            max_step=max_step,
         )
         y = found.y[:, -1]
         return y[:size], y[size:].reshape(size, -1)
