@@ -9,6 +9,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 
 import cms
+from nldyn.continuation import ContinuationOptions
 from nldyn.diagram import Diagram, Seed, diagram
 from nldyn.elements import Stop
 from nldyn.resources import example
@@ -37,6 +38,8 @@ class Job:
         Further orbits to look for.
     search_points : int
         Frequencies searched.
+    options : ContinuationOptions, optional
+        Step control.
     """
 
     name: str
@@ -45,6 +48,7 @@ class Job:
     periods: tuple[int, ...] = (1,)
     seeds: tuple[Seed, ...] = ()
     search_points: int = 12
+    options: ContinuationOptions | None = None
 
     def run(self) -> Diagram:
         """Compute the diagram."""
@@ -54,6 +58,7 @@ class Job:
             self.periods,
             seeds=self.seeds,
             search_points=self.search_points,
+            options=self.options,
         )
 
 
@@ -97,18 +102,22 @@ LISTED = (
     Seed(10, 83.0), Seed(3, 18.4), Seed(5, 31.0), Seed(9, 56.0), Seed(13, 81.0),
 )  # fmt: skip
 
+# At low damping the branches are long: larger steps, and an end after 3000 points each way.
+COARSE = ContinuationOptions(max_step=0.15, max_angle=0.4, max_points=3000)
+
 # The harmonic branch of each larger model, its main 1/2 and 1/3 branches, and those near 33 Hz.
 MAIN = (Seed(2, 45.0), Seed(3, 68.0), Seed(3, 33.0))
 
 JOBS = (
-    Job("four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (15.0, 90.0), (1,), MAIN, 6),
+    Job("four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (18.0, 90.0), (1,), MAIN, 6, COARSE),
     Job(
         "two_dof_xi_0.001",
         _scene("two_dof_xi_0.001"),
-        (15.0, 90.0),
+        (18.0, 90.0),
         (1,),
         (Seed(1, 23.0), *MAIN, Seed(14, 57.0)),
         6,
+        COARSE,
     ),
     Job("four_dof_xi_0.01", _scene("four_dof_xi_0.01"), (15.0, 90.0), (1,), MAIN, 6),
     Job(
