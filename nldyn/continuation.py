@@ -135,6 +135,8 @@ class Walk:
         off = math.sqrt(float(np.sum(weights * (found.point - guess) ** 2)))
         if off > 0.75 * self.options.max_angle * step:
             return None
+        if _jumped_to_shift(problem, here.orbit.point, guess, found.point):
+            return None
         tangent = problem.tangent(found.lin, problem.metric(found.point), direction)
         cosine = float(np.sum(weights * direction * tangent))
         cosine /= math.sqrt(float(np.sum(weights * tangent**2)))
@@ -190,8 +192,9 @@ def passed_flip(a: Orbit, b: Orbit) -> bool:
     """
     if a.period % 2:
         return False
-    first, second = _half_difference(a), _half_difference(b)
-    product = float(np.sum(first * second))
+    first = _half_difference(a.problem, a.point)
+    second = _half_difference(b.problem, b.point)
+    product = float(first @ second)
     return product < -0.8 * float(np.linalg.norm(first) * np.linalg.norm(second))
 
 
@@ -203,13 +206,11 @@ def _flip_between(a: BranchPoint, b: BranchPoint) -> BranchPoint:
     the frequency is that of the interpolation.
     """
     chord = Chord(a, b)
-    reference = _half_difference(a.orbit).ravel()
     problem = a.orbit.problem
+    reference = _half_difference(problem, a.orbit.point)
 
     def difference(sigma: float) -> float:
-        nodes = problem.nodes(chord.between(sigma))
-        half = nodes.shape[0] // 2
-        return float(reference @ (nodes[:half] - nodes[half:]).ravel())
+        return float(reference @ _half_difference(problem, chord.between(sigma)))
 
     sigma = float(brentq(difference, 0.0, 1.0))
     point = chord.between(sigma)
@@ -232,10 +233,23 @@ def _flip_between(a: BranchPoint, b: BranchPoint) -> BranchPoint:
     return BranchPoint(doubled, a.tangent, a.arclength + sigma * (b.arclength - a.arclength))
 
 
-def _half_difference(orbit: Orbit) -> Real:
-    nodes = orbit.problem.nodes(orbit.point)
+def _half_difference(problem: ShootingProblem, point: Real) -> Real:
+    """First half of the states minus the second: zero for an orbit of half the period."""
+    nodes = problem.nodes(point)
     half = nodes.shape[0] // 2
-    return nodes[:half] - nodes[half:]
+    return (nodes[:half] - nodes[half:]).ravel()
+
+
+def _jumped_to_shift(problem: ShootingProblem, here: Real, guess: Real, there: Real) -> bool:
+    """Whether a step has landed on the same orbit shifted by half its period.
+
+    Through a flip the halves change places steadily, as the tangent foretells; not in a jump.
+    """
+    if problem.period % 2:
+        return False
+    a, g, b = (_half_difference(problem, point) for point in (here, guess, there))
+    size = max(float(np.linalg.norm(a)), float(np.linalg.norm(b)))
+    return float(a @ b) < 0.0 and float(np.linalg.norm(b - g)) > 0.5 * size
 
 
 def start_point(orbit: Orbit, direction: float) -> BranchPoint:

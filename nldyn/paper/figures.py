@@ -63,8 +63,8 @@ def _dashed(ax: Axes, frequencies_hz: Iterable[float]) -> None:
 
 
 def _inset(ax: Axes, branches: list[Branch], low: float, high: float) -> None:
-    """Enlarge a range of frequencies in the upper right corner (as in the paper's Figure 7)."""
-    small = ax.inset_axes((0.56, 0.5, 0.26, 0.42))
+    """Enlarge a range of frequencies in the empty upper left corner."""
+    small = ax.inset_axes((0.055, 0.5, 0.16, 0.42))
     plot_diagram(branches, small, special_points=(), unit="mm", legend=False)
     tops = [
         1e3 * o.max_abs_displacement
