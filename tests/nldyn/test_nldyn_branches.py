@@ -1,0 +1,338 @@
+"""Other branches: doubled, closed, quasi-periodic; how a walk ends, steps and can be stopped."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from conftest import RANGE_HZ, make_one_dof
+from independent import Motion
+
+from nldyn import (
+    ContinuationOptions,
+    FlowMap,
+    Stop,
+    System,
+    SystemModelError,
+    Unbalance,
+    Walk,
+    continue_branch,
+    find_orbits,
+    solve_orbit,
+    switch_at_flip,
+)
+from nldyn.branch import minimal_period, same_orbit
+from nldyn.continuation import start_point, trace
+from nldyn.special import (
+    branch_point_test,
+    flip_test,
+    special_points_between,
+    torus_test,
+)
+
+
+@pytest.fixture(scope="module")
+def torus_system() -> System:
+    """Two modes and a soft stop: a pair of multipliers leaves the unit circle near 11.5 Hz."""
+    return System.from_modal(
+        [10.0, 34.0], {"m": [0.635, 0.3]}, modal_damping=0.02,
+        stops=[Stop("m", stiffness=1.2e7, gap=1e-5)], excitation=[Unbalance("m", 4.92e-6)],
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def torus_branch(torus_system):
+    return continue_branch(solve_orbit(torus_system, 60.0), (5.0, 80.0))
+
+
+# --- flips and doubled branches ----------------------------------------------------------------
+
+
+def flips(branch):
+    return [s for s in branch.special_points if s.kind == "PD"]
+
+
+@pytest.mark.parametrize("index", [-1, -2])
+def test_doubled_branch_starts_at_the_flip(harmonic_branch, index):
+    """Near a flip the amplitude of the period-2 part goes with the root of the distance."""
+    flip = flips(harmonic_branch)[index]
+    distances, parts = [], []
+    for amplitude in (2e-3, 4e-3):
+        point = switch_at_flip(flip, amplitude)
+        orbit = point.orbit
+        assert (orbit.period, minimal_period(orbit)) == (2, 2)
+        distances.append(orbit.frequency_hz - flip.frequency_hz)
+        nodes = orbit.problem.nodes(orbit.point)
+        half = len(nodes) // 2
+        parts.append(np.linalg.norm(nodes[:half] - nodes[half:]))
+        assert abs(distances[-1]) < 1e-3 * flip.frequency_hz
+    assert parts[1] / parts[0] == pytest.approx(2.0, rel=0.02)
+    assert distances[1] / distances[0] == pytest.approx(4.0, rel=0.1)
+
+
+def test_doubled_branch_joins_two_flips(harmonic_branch):
+    """From the flip at 8.71 Hz to the one at 10.43 Hz, both ways round."""
+    low, high = (f for f in flips(harmonic_branch) if 8.0 < f.frequency_hz < 11.0)
+    for first, last in ((high, low), (low, high)):
+        nodes, _, reason = trace(switch_at_flip(first), (5.7, 90.0))
+        assert reason.startswith("joins the branch of period 1 at the flip")
+        end = nodes[-1].orbit
+        assert end.frequency_hz == pytest.approx(last.frequency_hz, rel=1e-4)
+        assert minimal_period(end) == 1
+
+
+def test_switching_needs_a_flip(harmonic_branch):
+    fold = next(s for s in harmonic_branch.special_points if s.kind == "LP")
+    with pytest.raises(SystemModelError, match="needs a PD point, got LP"):
+        switch_at_flip(fold)
+
+
+# --- closed branches -----------------------------------------------------------------------------
+
+
+def test_isola_is_walked_round_once(one_dof):
+    """The 1/2 isola between 9.06 and 9.47 Hz closes on itself; its ends are folds."""
+    isolas = []
+    for orbit in find_orbits(one_dof, 9.3, 2):
+        branch = continue_branch(orbit, RANGE_HZ)
+        if branch.stop_reason.startswith("closed"):
+            isolas.append(branch)
+    assert isolas
+    for branch in isolas:
+        assert branch.stop_reasons == ("closed branch", "closed branch")
+        frequencies = branch.frequency_hz
+        assert frequencies.min() == pytest.approx(9.0624, abs=2e-3)
+        assert frequencies.max() == pytest.approx(9.4742, abs=2e-3)
+        folds = [s.frequency_hz for s in branch.special_points if s.kind == "LP"]
+        assert len(folds) % 2 == 0
+        assert min(folds) <= frequencies.min() and max(folds) >= frequencies.max()
+        assert all(minimal_period(orbit) == 2 for orbit in branch.points)
+        assert branch.contains(branch.points[0])
+    ends = [sorted(s.frequency_hz for s in b.special_points if s.kind == "LP") for b in isolas]
+    for other in ends[1:]:
+        assert other == pytest.approx(ends[0], rel=1e-9)
+
+
+# --- Neimark-Sacker ------------------------------------------------------------------------------
+
+
+def torus_points(branch):
+    return [s for s in branch.special_points if s.kind == "NS"]
+
+
+def test_neimark_sacker_point_has_a_complex_pair_on_the_unit_circle(torus_branch):
+    points = torus_points(torus_branch)
+    assert len(points) == 2
+    for point in points:
+        mu = point.orbit.multipliers
+        pair = mu[np.argsort(np.abs(np.abs(mu) - 1.0))[:2]]
+        assert np.abs(np.abs(pair) - 1.0).max() < 1e-7
+        assert abs(pair[0].imag) > 0.1  # a pair, not a neutral saddle
+        assert pair[0] == pytest.approx(np.conj(pair[1]), abs=1e-12)
+        assert abs(torus_test(mu)) < 1e-7
+
+
+def test_neimark_sacker_pair_under_runge_kutta(torus_system, torus_branch):
+    for point in torus_points(torus_branch):
+        orbit = point.orbit
+        start = orbit.states(np.array([0.0]))[0]
+        _, jacobian = Motion(torus_system).run(start, (0.0, 2 * np.pi), orbit.omega)
+        moduli = np.abs(np.linalg.eigvals(jacobian))
+        assert np.sort(np.abs(moduli - 1.0))[1] < 1e-6
+
+
+def test_pair_crosses_the_unit_circle_at_the_neimark_sacker_point(torus_branch):
+    nodes = torus_branch.nodes
+    for point in torus_points(torus_branch):
+        i = next(k for k, n in enumerate(nodes) if n.arclength > point.point.arclength)
+        inside, outside = sorted(abs(nodes[k].orbit.largest_multiplier) for k in (i - 1, i))
+        assert inside < 1.0 < outside
+
+
+def test_motion_beyond_the_neimark_sacker_point_is_a_torus(torus_system, torus_branch):
+    """Stroboscopic states fill a closed curve: bounded, never returning, no period up to 12."""
+    first, last = sorted(s.frequency_hz for s in torus_points(torus_branch))
+    frequency = 0.5 * (first + last)
+    flow = FlowMap(torus_system)
+    orbit = next(o for o in torus_branch.at(frequency) if abs(o.largest_multiplier.imag) > 0.1)
+    assert not orbit.stable
+    start = orbit.problem.nodes(orbit.point)[0] * (1 + 1e-3)
+    phases = 2 * np.pi * np.arange(1501)
+    states = flow.shoot(start[None], phases, orbit.omega, sensitivities=False, chained=True).ends[
+        -400:
+    ]
+    size = np.ptp(states, axis=0).max()
+    for period in range(1, 13):
+        apart = np.abs(states[period:] - states[:-period]).max(axis=1)
+        assert apart.max() > 1e-2 * size
+    assert np.abs(states).max() < 100 * np.abs(start).max()
+
+
+# --- test functions on made-up multipliers -------------------------------------------------------
+
+
+def test_flip_test_changes_sign_at_every_flip():
+    for other in (0.3, -0.4, 5.0):
+        below, above = np.array([-0.99, other]), np.array([-1.01, other])
+        assert flip_test(below) * flip_test(above) < 0.0
+    assert flip_test(np.array([-1.0, 0.5])) == 0.0
+
+
+def test_branch_point_test_changes_sign_at_one():
+    below, above = np.array([0.99, 0.4]), np.array([1.01, 0.4])
+    assert branch_point_test(below) * branch_point_test(above) < 0.0
+    assert branch_point_test(np.array([1.0, 0.5])) == 0.0
+
+
+def test_torus_test_is_the_bialternate_product():
+    """det(Φ ⊙ Φ - I) in the basis e_i ∧ e_j is the product of μ_i μ_j - 1."""
+    rng = np.random.default_rng(3)
+    phi = rng.standard_normal((4, 4))
+    pairs = list(itertools.combinations(range(4), 2))
+    product = np.array(
+        [[phi[p, r] * phi[q, s] - phi[q, r] * phi[p, s] for r, s in pairs] for p, q in pairs]
+    )
+    mu = np.linalg.eigvals(phi).astype(complex)
+    scale = np.prod([1 + abs(mu[i] * mu[j]) for i, j in pairs])
+    exact = np.linalg.det(product - np.eye(6)) / scale
+    assert torus_test(mu) == pytest.approx(exact, rel=1e-10)
+
+
+@pytest.mark.parametrize("angle", [0.1, 1.0, 2.0, 3.0])
+def test_torus_test_changes_sign_where_a_pair_leaves_the_circle(angle):
+    pair = np.exp([1j * angle, -1j * angle])
+    rest = np.array([0.7, -0.2 + 0j])
+    inside, outside = (torus_test(np.concatenate([r * pair, rest])) for r in (0.999, 1.001))
+    assert inside * outside < 0.0
+
+
+# --- walking -------------------------------------------------------------------------------------
+
+
+def test_walk_can_be_stopped_between_two_points_and_taken_up_again(one_dof):
+    start = start_point(solve_orbit(one_dof, 45.0), 1.0)
+    walk = Walk(start, (40.0, 60.0), ContinuationOptions())
+    some = list(itertools.islice(walk, 4))
+    assert [p.arclength for p in some] == sorted(p.arclength for p in some)
+    assert some[0] is start
+    assert walk.stop_reason == "not finished"
+    rest = Walk(some[-1], (40.0, 60.0), ContinuationOptions())
+    points = list(rest)
+    assert rest.stop_reason == "end of the frequency range"
+    assert points[-1].orbit.frequency_hz == pytest.approx(60.0, rel=1e-14)
+
+
+def test_walk_stops_after_the_most_points_it_may_compute(one_dof):
+    branch = continue_branch(
+        solve_orbit(one_dof, 45.0), (5.7, 90.0), options=ContinuationOptions(max_points=3)
+    )
+    assert branch.stop_reasons == ("3 points", "3 points")
+    assert len(branch.points) == 7
+
+
+def test_tangent_is_that_of_a_difference_along_the_branch(harmonic_branch):
+    nodes = harmonic_branch.nodes
+    for i in (40, 120, 250):
+        node = nodes[i]
+        weights = node.orbit.problem.metric(node.orbit.point)
+        assert np.sum(weights * node.tangent**2) == pytest.approx(1.0, rel=1e-12)
+        problem, point = node.orbit.problem, node.orbit.point
+        h = 1e-5
+        row = weights * node.tangent
+        ends = [problem.correct(point + s * h * node.tangent, row).point for s in (1, -1)]
+        slope = (ends[0] - ends[1]) / (2 * h)
+        off = np.sqrt(np.sum(weights * (slope - node.tangent) ** 2))
+        assert off < 1e-4
+
+
+def test_progress_is_told_every_frequency(one_dof):
+    heard = []
+    branch = continue_branch(solve_orbit(one_dof, 45.0), (40.0, 50.0), progress=heard.append)
+    assert len(heard) >= len(branch.points)
+    assert min(heard) == pytest.approx(40.0) and max(heard) == pytest.approx(50.0)
+
+
+def test_smaller_steps_give_the_same_special_points(one_dof):
+    orbit = solve_orbit(one_dof, 14.0)
+    coarse = continue_branch(orbit, (8.0, 15.0))
+    fine = continue_branch(
+        orbit, (8.0, 15.0),
+        options=ContinuationOptions(max_step=0.03, max_angle=0.1),
+    )  # fmt: skip
+    assert len(fine.points) > 1.5 * len(coarse.points)
+    for a, b in zip(coarse.special_points, fine.special_points, strict=True):
+        assert a.kind == b.kind
+        assert a.frequency_hz == pytest.approx(b.frequency_hz, rel=1e-9)
+
+
+def test_no_special_points_between_the_same_two_points_in_either_direction(harmonic_branch):
+    """Around the flip at 33.65 Hz, forwards and backwards: one flip each."""
+    flip = flips(harmonic_branch)[-1]
+    nodes = harmonic_branch.nodes
+    i = next(k for k, n in enumerate(nodes) if n.arclength > flip.point.arclength)
+    forward = special_points_between(nodes[i - 1], nodes[i])
+    backward = special_points_between(nodes[i], nodes[i - 1])
+    assert [s.kind for s in forward] == [s.kind for s in backward] == ["PD"]
+    assert forward[0].frequency_hz == pytest.approx(backward[0].frequency_hz, rel=1e-9)
+
+
+def test_branch_of_a_linear_system_is_its_receptance():
+    system = System.from_modal(
+        [13.1, 40.0], {"m": [0.6, 0.5]}, modal_damping=0.02, excitation=[Unbalance("m", 1e-5)]
+    )
+    branch = continue_branch(solve_orbit(system, 20.0), (5.0, 60.0))
+    omega = 2 * np.pi * branch.frequency_hz
+    natural = 2 * np.pi * np.array([13.1, 40.0])
+    modal = np.array([0.6, 0.5]) ** 2 / (
+        natural**2 - omega[:, None] ** 2 + 0.04j * natural * omega[:, None]
+    )
+    exact = np.abs(modal.sum(axis=1)) * 1e-5 * omega**2
+    np.testing.assert_allclose(branch.max_abs_displacement, exact, rtol=1e-10)
+    assert branch.special_points == ()
+    assert branch.stable.all()
+
+
+JUMP = {
+    "frequencies_hz": [10.0, 26.2377],
+    "participation": {"m": [0.635, 1.4387]},
+    "modal_damping": 0.003,
+    "stops": [Stop("m", stiffness=7.84e8, gap=1e-5)],
+    "excitation": [Unbalance("m", 4.92e-6)],
+}
+
+
+@pytest.mark.xfail(
+    strict=True, reason="near a lightly damped linear resonance a step lands on another branch"
+)
+def test_step_near_a_linear_resonance_stays_on_the_branch():
+    """The steps are relative to the forced response, which is far larger than the motion here."""
+    system = System.from_modal(**JUMP)
+    guess = np.array([1.858e-5, -3.373e-6, 5.041e-5, -8.235e-5])
+    orbit = solve_orbit(system, 10.0, guess=guess)
+    branch = continue_branch(orbit, (9.95, 10.05))
+    careful = continue_branch(
+        orbit, (9.95, 10.05), options=ContinuationOptions(max_step=0.01, first_step=0.01)
+    )
+    low, fine = branch.points[0], careful.points[0]
+    assert low.frequency_hz == pytest.approx(fine.frequency_hz)
+    assert same_orbit(low, fine)
+
+
+def test_softer_stop_and_larger_unbalance_leave_the_special_points():
+    """With zero gap only stiffness · force^(p-1) matters: the special points do not move."""
+    base = continue_branch(solve_orbit(make_one_dof(), 20.0), (12.0, 20.0))
+    scaled = continue_branch(
+        solve_orbit(
+            make_one_dof(
+                stops=[Stop("middle", stiffness=5.17e8)],
+                excitation=[Unbalance("middle", 4.92e-4)],
+            ),
+            20.0,
+        ),
+        (12.0, 20.0),
+    )
+    assert [s.kind for s in base.special_points] == [s.kind for s in scaled.special_points]
+    assert len(base.special_points) >= 4
+    for a, b in zip(base.special_points, scaled.special_points, strict=True):
+        assert a.frequency_hz == pytest.approx(b.frequency_hz, rel=1e-9)
