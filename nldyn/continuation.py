@@ -28,14 +28,17 @@ class ContinuationOptions:
         Arclength steps.
     max_angle : float
         Largest angle between the tangents of two neighbouring points, in radians.
+    grazing_step : float
+        Longest step over which the number of contacts may change.
     max_points : int
         Most points in one direction.
     """
 
     first_step: float = 0.01
-    max_step: float = 0.1
+    max_step: float = 0.05
     min_step: float = 1e-8
     max_angle: float = 0.25
+    grazing_step: float = 0.004
     max_points: int = 5000
 
     def __post_init__(self) -> None:
@@ -146,6 +149,9 @@ class Walk:
         orbit = Orbit(
             problem, found.point, found.lin.monodromy, found.last_step, here.orbit.observe
         )
+        # behind a grazing point the branch may turn on a very short length
+        if step > self.options.grazing_step and orbit.impacts != here.orbit.impacts:
+            return None
         return BranchPoint(orbit, tangent, here.arclength + step), angle, found.iterations
 
     def _range_end(self, a: BranchPoint, b: BranchPoint, end_hz: float) -> BranchPoint | None:

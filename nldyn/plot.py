@@ -26,7 +26,8 @@ STABLE: Literal["-"] = "-"
 UNSTABLE = (0.0, (1.0, 1.4))
 # Okabe and Ito's colours, told apart by colour-blind readers; dark ones first.
 PERIOD_COLOURS = (
-    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#5D4E9C", "#8B4513", "#777777",
+    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#5D4E9C", "#8B4513",
+    "#777777",
 )  # fmt: skip
 MARKERS = {"LP": "o", "PD": "s", "NS": "D", "BP": "^", "GR": "x"}
 MARKER_NAMES = {

@@ -102,15 +102,14 @@ LISTED = (
     Seed(10, 83.0), Seed(3, 18.4), Seed(5, 31.0), Seed(9, 56.0), Seed(13, 81.0),
 )  # fmt: skip
 
-# At low damping the branches are long: larger steps, and an end after 1200 points each way.
-COARSE = ContinuationOptions(max_step=0.15, max_angle=0.4, max_points=1200)
-BOUNDED = ContinuationOptions(max_points=1200)
+# At low damping the branches are long and end after so many points each way.
+LONG = ContinuationOptions(max_points=1800)
 
 # The main 1/2 and 1/3 branches of each larger model, beside the harmonic branch.
 MAIN = (Seed(2, 45.0), Seed(3, 68.0))
 
 JOBS = (
-    Job("four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (18.0, 90.0), (1,), MAIN, 6, COARSE),
+    Job("four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (18.0, 90.0), (1,), MAIN, 6, LONG),
     Job(
         "two_dof_xi_0.001",
         _scene("two_dof_xi_0.001"),
@@ -118,9 +117,9 @@ JOBS = (
         (1,),
         (Seed(1, 23.0), *MAIN, Seed(14, 57.0)),
         6,
-        COARSE,
+        LONG,
     ),
-    Job("four_dof_xi_0.01", _scene("four_dof_xi_0.01"), (15.0, 90.0), (1,), MAIN, 6, BOUNDED),
+    Job("four_dof_xi_0.01", _scene("four_dof_xi_0.01"), (15.0, 90.0), (1,), MAIN, 6),
     Job(
         "two_dof_xi_0.01",
         _scene("two_dof_xi_0.01"),
@@ -128,7 +127,7 @@ JOBS = (
         (1,),
         (Seed(1, 23.0), *MAIN, Seed(3, 33.0)),
         6,
-        BOUNDED,
+        LONG,
     ),
     Job("one_dof.listed", _scene("one_dof"), (5.0, 90.0), (), LISTED),
     Job("one_dof", _scene("one_dof"), (5.0, 90.0), (1, 2), (Seed(3, 76.0),)),
