@@ -169,6 +169,20 @@ def test_motion_beyond_the_neimark_sacker_point_is_a_torus(torus_system, torus_b
     assert np.abs(states).max() < 100 * np.abs(start).max()
 
 
+def test_neutral_saddle_is_not_a_neimark_sacker_point(torus_branch):
+    """Two more times the test changes sign, where real multipliers pass μ₁μ₂ = 1."""
+    points = [s.point.arclength for s in torus_points(torus_branch)]
+    saddles = 0
+    for a, b in itertools.pairwise(torus_branch.nodes):
+        if torus_test(a.orbit.multipliers) * torus_test(b.orbit.multipliers) < 0.0:
+            if any(a.arclength <= s <= b.arclength for s in points):
+                continue
+            saddles += 1
+            real = [m.real for m in a.orbit.multipliers if m.imag == 0.0]
+            assert max(real) > 1.0
+    assert saddles == 2
+
+
 # --- test functions on made-up multipliers -------------------------------------------------------
 
 

@@ -1,0 +1,80 @@
+"""Subharmonic orbits of equation 3.1, started from simulations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import make_one_dof
+from independent import Motion
+
+from nldyn import FlowMap, SearchOptions, Seed, SystemModelError, diagram, find_orbits
+from nldyn.branch import minimal_period, same_orbit
+
+# where the paper's text sees subharmonics: 1/3 near 37.1, 1/5 near 62.2, 1/7 near 58, 1/13 near 81
+PLACES = [(3, 37.1), (5, 62.2), (7, 58.0), (13, 80.19), (2, 50.6), (3, 76.0)]
+
+
+@pytest.mark.parametrize(("period", "frequency"), PLACES)
+def test_subharmonic_is_found_with_the_period_asked_for(one_dof, period, frequency):
+    orbits = find_orbits(one_dof, frequency, period)
+    assert orbits
+    for orbit in orbits:
+        assert orbit.period == minimal_period(orbit) == period
+        assert orbit.frequency_hz == pytest.approx(frequency, rel=1e-13)
+        assert orbit.liouville_error < 1e-7
+    assert any(orbit.stable for orbit in orbits)
+    for i, orbit in enumerate(orbits):
+        assert not any(same_orbit(orbit, other) for other in orbits[:i])
+
+
+def test_subharmonic_returns_under_runge_kutta_after_its_period_only(one_dof):
+    orbit = next(o for o in find_orbits(one_dof, 62.2, 5) if o.stable)
+    states = orbit.states(2 * np.pi * np.arange(5))
+    scale = np.abs(orbit.history(500).modal).max() * np.array([1.0, orbit.omega])
+    x, _ = Motion(one_dof).run(states[0], (0.0, 10 * np.pi), orbit.omega, tangent=False)
+    assert np.abs((x - states[0]) / scale).max() < 1e-7
+    for other in states[1:]:
+        assert np.abs((other - states[0]) / scale).max() > 1e-2
+
+
+def test_search_is_repeatable(one_dof):
+    first, second = (find_orbits(one_dof, 62.2, 5) for _ in range(2))
+    assert len(first) == len(second)
+    for a, b in zip(first, second, strict=True):
+        np.testing.assert_array_equal(a.point, b.point)
+
+
+def test_flow_map_serves_as_well_as_the_system(one_dof):
+    flow = FlowMap(one_dof)
+    orbits = find_orbits(flow, 37.1, 3)
+    assert orbits[0].problem.flow is flow
+    assert same_orbit(orbits[0], find_orbits(one_dof, 37.1, 3)[0])
+
+
+def test_period_that_does_not_exist_gives_an_empty_list(one_dof):
+    """A linear system has its forced orbit only."""
+    linear = make_one_dof(stops=[])
+    assert find_orbits(linear, 26.0, 2, options=SearchOptions(starts=2)) == []
+    assert len(find_orbits(linear, 26.0, 1)) == 1
+
+
+def test_diagram_finds_the_doubled_branch_between_two_flips(one_dof):
+    found = diagram(one_dof, (8.0, 12.0), periods=(1, 2), search_points=2)
+    assert [b.period for b in found.branches].count(1) == 1
+    doubled = [b for b in found.of_period(2) if "8.7" in b.stop_reason and "10.4" in b.stop_reason]
+    assert len(doubled) == 1
+    assert found.range_hz == (8.0, 12.0)
+    assert found.observe == "middle"
+    names = [b.name for b in found.branches]
+    assert len(set(names)) == len(names)
+
+
+def test_diagram_says_what_it_did_not_find(one_dof):
+    found = diagram(
+        make_one_dof(stops=[]), (20.0, 30.0), periods=(1,), search_points=1,
+        seeds=[Seed(2, 26.0)], search=SearchOptions(starts=1, transient=200),
+    )  # fmt: skip
+    assert [b.period for b in found.branches] == [1]
+    assert found.notes == ("no 1/2 orbit found near 26 Hz",)
+    with pytest.raises(SystemModelError, match="near_hz = 95 lies outside"):
+        diagram(one_dof, (84.0, 88.0), seeds=[Seed(2, 95.0)])
