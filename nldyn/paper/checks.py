@@ -335,7 +335,7 @@ def _higher(results: Results) -> Finding:
 
 
 def _sub14(results: Results) -> Finding:
-    branches = results["two_dof_xi_0.001"].of_period(14)
+    branches = results["two_dof.sub14"].of_period(14)
     if not branches:
         return Finding(holds=False, text="no 1/14 orbit found near 57 Hz")
     branch = branches[0]

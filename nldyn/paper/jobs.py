@@ -115,7 +115,7 @@ JOBS = (
         _scene("two_dof_xi_0.001"),
         (18.0, 90.0),
         (1,),
-        (Seed(1, 23.0), *MAIN, Seed(14, 57.0)),
+        (Seed(1, 23.0), *MAIN),
         6,
         LONG,
     ),
@@ -134,6 +134,14 @@ JOBS = (
     Job("five_dof_xi_0.01", five_dof_system, (15.0, 90.0), search_points=6),
     Job("two_dof.undamped", undamped_system, (20.0, 60.0), (1,), search_points=6),
     Job("two_dof.bilinear", bilinear_system, (22.0, 70.0), (1,), search_points=6),
+    Job(
+        "two_dof.sub14",
+        _scene("two_dof_xi_0.001"),
+        (50.0, 65.0),
+        (),
+        (Seed(14, 57.0),),
+        options=ContinuationOptions(max_points=150),
+    ),
     Job("two_dof.high", _scene("two_dof_xi_0.01"), (60.0, 135.0), (1,), search_points=4),
 )
 
