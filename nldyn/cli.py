@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from nldyn.elements import Stop
     from nldyn.system import System
 
-BAD_INPUT, NO_GRAPHICS, INTERRUPTED = 2, 3, 130
+NOTHING_FOUND, BAD_INPUT, NO_GRAPHICS, INTERRUPTED = 1, 2, 3, 130
 
 scene_argument = click.argument("scene", type=click.Path(path_type=Path), metavar="SCENE.toml")
 out_option = click.option(
@@ -76,6 +76,9 @@ def run(scene: Path, out: Path, log: bool, quiet: bool) -> None:
 
         write_results(diagram, out, loaded, yscale="log" if log else "linear")
         click.echo(describe(diagram, time.perf_counter() - start, out))
+        if not diagram.branches:
+            click.echo("nldyn: no periodic orbit was found; the tables are empty", err=True)
+            sys.exit(NOTHING_FOUND)
 
 
 @main.command()
@@ -200,7 +203,8 @@ def describe(diagram: Diagram, seconds: float, out: Path) -> str:
     found = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())) or "none"
     points = sum(len(branch.points) for branch in branches)
     lines = [
-        f"{len(branches)} branches with {points} points in {seconds:.1f} s",
+        f"{len(branches)} {'branch' if len(branches) == 1 else 'branches'} with {points} points "
+        f"in {seconds:.1f} s",
         f"special points: {found}",
         *(f"note: {note}" for note in dict.fromkeys(diagram.notes)),
         f"written to {out}",

@@ -220,6 +220,11 @@ def diagram(
     for seed in seeds:
         _follow_seed(box, seed, effort)
     _follow_flips_of_new(box, wanted, doublings)
+    for period in wanted:
+        if not any(branch.period == period for branch in box.branches):
+            box.notes.append(
+                f"no orbit of period {period} found by simulation at {search_points} frequencies"
+            )
     return Diagram(tuple(box.branches), (low, high), box.observe, tuple(box.notes))
 
 

@@ -282,7 +282,7 @@ def save_diagram(
 ) -> None:
     """Write ``diagram.png`` and ``diagram.svg`` to a directory that exists."""
     ax = plot_diagram(diagram, yscale=yscale)
-    ax.set_title(title)
+    ax.set_title(title, parse_math=False)
     save_figure(ax, Path(directory) / "diagram")
 
 

@@ -46,7 +46,13 @@ def check_directory(directory: str | Path) -> Path:
     >>> check_directory(tempfile.mkdtemp()).is_dir()
     True
     """
-    target = Path(directory).resolve()
+    try:
+        return _checked(Path(directory).resolve(), directory)
+    except OSError as error:
+        raise OutputError(f"{directory}: cannot be looked at: {error.strerror}") from error
+
+
+def _checked(target: Path, directory: str | Path) -> Path:
     if target.exists() and not target.is_dir():
         raise OutputError(f"{directory}: is a file, not a directory for results")
     if target.is_dir() and any(target.iterdir()) and not (target / MANIFEST).is_file():
