@@ -80,6 +80,8 @@ def read_mesh(path: str | Path) -> FrameMesh:
         reason = " ".join(str(error).split()) or type(error).__name__
         if "'gmsh:physical'" in reason:
             reason = "some curves or points have a physical group and some have none"
+        if "zero-size array" in reason:
+            raise ModelError(f"{path}: the mesh is empty, it has no elements") from error
         raise ModelError(f"{path}: cannot be read as {kind} mesh ({reason})") from error
 
 

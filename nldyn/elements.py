@@ -121,6 +121,8 @@ class Stop:
         if self.exponent < 1.0:
             raise SystemModelError(f"{owner}: exponent must be at least 1, got {self.exponent:g}")
         _finite(owner, "gap", self.gap)
+        if self.against == self.at:
+            raise SystemModelError(f"{owner}: against must be another interface")
         if self.direction not in (1, -1):
             raise SystemModelError(f"{owner}: direction must be +1 or -1, got {self.direction}")
 
