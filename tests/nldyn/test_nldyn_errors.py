@@ -71,6 +71,10 @@ def test_stop_direction(direction):
     sentence(lambda: Stop("middle", 1e9, direction=direction), "direction must be +1 or -1")
 
 
+def test_stop_against_itself():
+    sentence(lambda: Stop("middle", 1e9, against="middle"), "stop at 'middle'", "itself")
+
+
 @FEW
 @given(BAD | st.just(0.0))
 def test_hertz_stiffness(value):
@@ -289,7 +293,6 @@ UNCHECKED = [
     ("seed", lambda one, orbit: SearchOptions(seed=-1)),
     ("nodes", lambda one, orbit: FlowOptions(nodes=12.5)),
     ("period", lambda one, orbit: Seed(0, 50.0)),
-    ("against", lambda one, orbit: Stop("m", 1e9, against="m")),
     ("shape", lambda one, orbit: modal(participation={"m": [[1.0, 2.0]]})()),
     ("frequencies_hz", lambda one, orbit: modal(frequencies_hz=[[10.0, 20.0]])()),
 ]

@@ -280,6 +280,17 @@ def test_units_do_not_matter():
     assert_same_orbit(two_masses(), tonnes, length=1e-3)
 
 
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+def test_two_stops_at_one_place_are_one_stop_of_their_stiffness(exponent):
+    stiffness = 2e9 * 4e-6 ** (1.5 - exponent)
+    one = two_masses(stops=[Stop("first", stiffness, exponent)])
+    two = two_masses(stops=[Stop("first", share * stiffness, exponent) for share in (0.3, 0.7)])
+    a, b = solve_orbit(one, 31.0), solve_orbit(two, 31.0)
+    assert 2 * a.impacts == b.impacts > 0
+    assert b.max_abs_displacement == pytest.approx(a.max_abs_displacement, rel=1e-9)
+    np.testing.assert_allclose(a.multipliers, b.multipliers, rtol=0, atol=1e-7)
+
+
 def test_a_mode_that_no_interface_sees_changes_nothing():
     whole = two_masses()
     more = System.from_modal(
