@@ -72,7 +72,9 @@ def test_stop_direction(direction):
 
 
 def test_stop_against_itself():
-    sentence(lambda: Stop("middle", 1e9, against="middle"), "stop at 'middle'", "itself")
+    sentence(
+        lambda: Stop("middle", 1e9, against="middle"), "stop at 'middle'", "against", "another"
+    )
 
 
 @FEW
