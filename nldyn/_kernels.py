@@ -480,8 +480,11 @@ def crossing(x0, y0, x1, y1):
 
 
 @njit(cache=True, error_model="numpy")
-def first_event(fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, w_end):
-    """Stop that first opens or closes within a panel and the fraction of the panel, or (-1, 1)."""
+def first_event(fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, w_end, skip):
+    """Stop that first opens or closes within a panel and the fraction of the panel, or (-1, 2).
+
+    Stop `skip` is left out.
+    """
     m = tab.nodes.size
     event, where = -1, 2.0
     position = -1
@@ -490,6 +493,8 @@ def first_event(fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, 
         if closed[s]:
             position += 1
             noise = 1e-4 * np.max(delta[position]) + output_noise(fl, s, w)
+        if s == skip:
+            continue
         end, _, _, _ = output_derivatives(fl, s, w_end, phase + fl.omega * h, 0.0)
         sign = 1.0 if closed[s] else -1.0
         x0, y0 = 0.0, 0.0
@@ -597,9 +602,19 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
             value -= fl.gap[aim]
             dh = -value / speed if approaching else np.inf
             # the force vanishes there with its slope: an error ε of the instant costs ε^2.5
-            if abs(dh) <= 1e-9 * h or (approaching and abs(value) <= noise):
+            tight = 1e-9 if fl.exponent[aim] >= 1.5 else 1e-13  # a jump of the slope costs more
+            if abs(dh) <= tight * h or (approaching and abs(value) <= noise):
                 if resolved:
-                    return OK, kind, h, aim
+                    other, where = first_event(
+                        fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, w_end, aim
+                    )
+                    if other < 0 or where > 1.0 - 1e-7:
+                        return OK, kind, h, aim
+                    aim = other
+                    keep_profile(tab, kind, 2 * start_switch + 1, where, delta, guess)
+                    kind = 2 * start_switch + 1
+                    h *= where
+                    continue
             elif -0.5 * h < dh < h and h < h_max:
                 h = min(h + dh, h_max)
                 continue
@@ -611,7 +626,7 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
             h *= 0.5
             continue
         event, where = first_event(
-            fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, w_end
+            fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, w_end, -1
         )
         if event >= 0:
             aim = event

@@ -163,7 +163,7 @@ def local_extremes(
             _, rate = output_rate(eigenvalues, row, forced, omega, rec_phase[piece] + omega * t, w)
             if i > 0 and (old_rate * rate < 0.0 or (old_rate != 0.0 and rate == 0.0)):
                 lo, hi, rate_lo, rate_hi = t_old, t, old_rate, rate
-                value = 0.0
+                value, middle = 0.0, lo
                 for step in range(100):
                     middle = 0.5 * (lo + hi)
                     if step % 3 != 2 and rate_hi != rate_lo:
@@ -186,7 +186,7 @@ def local_extremes(
                     larger[:capacity] = found
                     found = larger
                     capacity *= 2
-                found[n, 0] = rec_phase[piece] + omega * 0.5 * (lo + hi)
+                found[n, 0] = rec_phase[piece] + omega * middle
                 found[n, 1] = value
                 found[n, 2] = 1.0 if old_rate > 0.0 else -1.0
                 n += 1

@@ -132,9 +132,9 @@ def test_short_contact_of_a_second_stop_while_the_first_is_closed():
     assert_agrees(system, x0, (0.0, 2 * np.pi), 2 * np.pi * 20.0, closings=[0, 1])
 
 
-@pytest.mark.xfail(
-    strict=True, reason="a panel that ends where one stop switches does not look at the others"
-)
+MISSED = pytest.mark.xfail(strict=True, reason="a second crossing of the stop aimed at is missed")
+
+
 @pytest.mark.parametrize(
     ("frequencies", "shape", "stops", "velocity", "effort"),
     [
@@ -143,12 +143,15 @@ def test_short_contact_of_a_second_stop_while_the_first_is_closed():
             [Stop("m", 1e8, gap=-2e-6), Stop("m", 1e10, gap=1e-6, direction=-1)],
             [2e-3, -2e-5], DEFAULT,
         ),
-        (
+        pytest.param(
             [20.0, 97.0], [0.85, 0.5],
             [Stop("m", 1e7, gap=-1e-6), Stop("m", 1e8, gap=2e-7, direction=-1)],
-            [1e-5, 2e-3], DEFAULT,
+            [1e-5, 2e-3], DEFAULT, marks=MISSED,
         ),
-        ([20.0], [0.6], [Stop("m", 1e7, gap=-2e-6), Stop("m", 1e10)], [-3e-5], FINE),
+        pytest.param(
+            [20.0], [0.6], [Stop("m", 1e7, gap=-2e-6), Stop("m", 1e10)], [-3e-5], FINE,
+            marks=MISSED,
+        ),
     ],
     ids=["both sides", "both sides, soft", "one behind the other"],
 )  # fmt: skip
@@ -384,9 +387,6 @@ def test_bilinear_oscillator_is_its_piecewise_closed_form(gap, k_b, tail):
     assert jacobian_error < 2e-8
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the release is located to 1e-9 of a panel, but here the slope jumps there"
-)
 def test_monodromy_of_a_bilinear_oscillator_is_exact_too():
     assert bilinear_errors(1.5e-5, 1.33e7, FlowOptions(tail=1e-6))[1] < 1e-11
 
