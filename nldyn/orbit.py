@@ -402,7 +402,7 @@ def solve_orbit(
         start = np.zeros(problem.size)
         warm = np.linspace(0.0, 400.0 * np.pi, 201)
         start = flow.shoot(start[None], warm, omega, sensitivities=False, chained=True).ends[-1]
-        packed = _spread(problem, start, omega)
+        packed = spread(problem, start, omega)
     else:
         guess = np.atleast_2d(np.asarray(guess, dtype=float))
         if guess.shape not in ((1, problem.size), (problem.segments, problem.size)):
@@ -414,7 +414,7 @@ def solve_orbit(
             rows = zip(guess, problem.phases[:-1], strict=True)
             packed = np.array([flow.to_packed(g, float(ph), omega) for g, ph in rows])
         else:
-            packed = _spread(problem, flow.to_packed(guess[0], 0.0, omega), omega)
+            packed = spread(problem, flow.to_packed(guess[0], 0.0, omega), omega)
     return refine(problem, packed, omega, observe)
 
 
@@ -439,7 +439,7 @@ def refine(
     return Orbit(problem, found.point, found.lin.monodromy, found.last_step, observe)
 
 
-def _spread(problem: ShootingProblem, start: Real, omega: float) -> Real:
+def spread(problem: ShootingProblem, start: Real, omega: float) -> Real:
     """States at all shooting phases by integrating from the first."""
     if problem.segments == 1:
         return start[None]

@@ -10,7 +10,7 @@ import numpy as np
 from nldyn.branch import minimal_period, same_orbit
 from nldyn.errors import SystemModelError
 from nldyn.flow import FlowMap
-from nldyn.orbit import ConvergenceError, Orbit, check_observe, refine, shooting_problem
+from nldyn.orbit import ConvergenceError, Orbit, check_observe, refine, shooting_problem, spread
 from nldyn.system import Real, System
 
 
@@ -92,7 +92,7 @@ def orbits_from_strobe(
     found: list[Orbit] = []
     for states in strobe.runs:
         for start in _near_returns(states, period, options.candidates):
-            packed = _between(problem.phases, states[start], flow, strobe.omega)
+            packed = spread(problem, states[start], strobe.omega)
             try:
                 orbit = refine(problem, packed, strobe.omega, observe, max_iterations=10)
             except ConvergenceError:
@@ -173,8 +173,3 @@ def _near_returns(states: Real, period: int, count: int) -> list[int]:
         if distance[index] < 1e-9 * scale:
             break  # an attractor of this period: one start is enough
     return chosen
-
-
-def _between(phases: Real, start: Real, flow: FlowMap, omega: float) -> Real:
-    ends = flow.shoot(start[None], phases[:-1], omega, sensitivities=False, chained=True).ends
-    return np.vstack([start[None], ends])
