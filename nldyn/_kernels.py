@@ -272,10 +272,11 @@ def free_output(fl, out, w, E, i, phase):
 
 
 @njit(cache=True, error_model="numpy")
-def solve_panel(fl, tab, kind, phase, w, h, active, delta, F, dF, E, E_inv, G):
+def solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, F, dF, E, E_inv, G):
     """Newton's method for the penetrations at the nodes; delta (na, m) holds the guess.
 
-    Returns whether it converged, with F, dF, E, E_inv and G filled.
+    noise (na,) is the rounding error to expect in each. Returns whether it converged, with F, dF,
+    E, E_inv and G filled.
     """
     m = tab.nodes.size
     na = active.size
@@ -288,15 +289,9 @@ def solve_panel(fl, tab, kind, phase, w, h, active, delta, F, dF, E, E_inv, G):
             free[a * m + i] = free_output(fl, active[a], w, E, i, node_phase) - fl.gap[active[a]]
     J = np.empty((size, size))
     step = np.empty((size, 1))
+    flat, flat_F, flat_dF = delta.reshape(size), F.reshape(size), dF.reshape(size)
     for _ in range(40):
-        scale = 0.0
-        for a in range(na):
-            for i in range(m):
-                F[a, i], dF[a, i] = law(
-                    delta[a, i], fl.stiffness[active[a]], fl.exponent[active[a]]
-                )
-                scale = max(scale, abs(delta[a, i]))
-        flat, flat_F, flat_dF = delta.reshape(size), F.reshape(size), dF.reshape(size)
+        panel_forces(fl, active, delta, F, dF)
         for p in range(size):
             total = free[p] - flat[p]
             for q in range(size):
@@ -305,20 +300,28 @@ def solve_panel(fl, tab, kind, phase, w, h, active, delta, F, dF, E, E_inv, G):
             J[p, p] += 1.0
             step[p, 0] = total
         lu_solve(J, step)
-        change = 0.0
-        for p in range(size):
-            flat[p] += step[p, 0]
-            change = max(change, abs(step[p, 0]))
-        if not np.isfinite(change):
-            return False
-        if change <= 1e-11 * scale:
-            for a in range(na):
-                for i in range(m):
-                    F[a, i], dF[a, i] = law(
-                        delta[a, i], fl.stiffness[active[a]], fl.exponent[active[a]]
-                    )
+        converged = True
+        for a in range(na):
+            scale, change = 0.0, 0.0
+            for i in range(m):
+                scale = max(scale, abs(delta[a, i]))
+                change = max(change, abs(step[a * m + i, 0]))
+                delta[a, i] += step[a * m + i, 0]
+            if not np.isfinite(change):
+                return False
+            converged = converged and change <= max(1e-11 * scale, noise[a])
+        if converged:
+            panel_forces(fl, active, delta, F, dF)
             return True
     return False
+
+
+@njit(cache=True, error_model="numpy")
+def panel_forces(fl, active, delta, F, dF):
+    """Fill F and its derivative dF at all nodes from the penetrations."""
+    for a in range(active.size):
+        for i in range(delta.shape[1]):
+            F[a, i], dF[a, i] = law(delta[a, i], fl.stiffness[active[a]], fl.exponent[active[a]])
 
 
 @njit(cache=True, error_model="numpy")
@@ -377,22 +380,28 @@ def panel_columns(fl, tab, kind, phase, t0, h, active, dF, E, E_inv, G, columns)
 
 
 @njit(cache=True, error_model="numpy")
-def legendre_tail(tab, F):
-    """Last two Legendre coefficients of the forces, the larger, relative to the largest force."""
-    m = tab.nodes.size
+def legendre_tail(tab, values):
+    """Larger of the last two Legendre coefficients of the polynomial through node values."""
+    m = values.size
     worst = 0.0
-    largest = 0.0
-    for a in range(F.shape[0]):
-        for row in range(m - 2, m):
-            total = 0.0
-            for j in range(m):
-                total += tab.to_legendre[row, j] * F[a, j]
-            worst = max(worst, abs(total))
+    for row in range(m - 2, m):
+        total = 0.0
         for j in range(m):
-            largest = max(largest, F[a, j])
-    if largest == 0.0:
-        return 0.0
-    return worst / largest
+            total += tab.to_legendre[row, j] * values[j]
+        worst = max(worst, abs(total))
+    return worst
+
+
+@njit(cache=True, error_model="numpy")
+def resolved(fl, tab, noise, delta, F):
+    """Whether the Legendre tail of each force is small beside its largest value."""
+    for a in range(F.shape[0]):
+        deepest = np.max(delta[a])
+        if deepest <= 10.0 * noise[a]:
+            continue
+        if legendre_tail(tab, F[a]) > max(fl.tail, 20.0 * noise[a] / deepest) * np.max(F[a]):
+            return False
+    return True
 
 
 @njit(cache=True, error_model="numpy")
@@ -474,45 +483,103 @@ def stretch_profile(tab, old_kind, new_kind, ratio, old, new):
 
 
 @njit(cache=True, error_model="numpy")
-def crossing(x0, y0, x1, y1):
-    """Where the line through two points meets zero."""
-    return x0 + (x1 - x0) * y0 / (y0 - y1)
+def map_fraction(kind, s):
+    """Fraction of the panel that belongs to the stretched time s (see `gauss.time_map`)."""
+    if kind == 0:
+        return s
+    if kind == 1:
+        return s * (2.0 - s)
+    if kind == 2:
+        return s * s
+    return 0.5 - 0.5 * np.cos(np.pi * s)
 
 
 @njit(cache=True, error_model="numpy")
-def first_event(fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, w_end, skip):
-    """Stop that first opens or closes within a panel and the fraction of the panel, or (-1, 2).
+def interpolate(tab, values, s):
+    """Polynomial through the values at 0, the nodes and 1, at s (barycentric formula)."""
+    top, bottom = 0.0, 0.0
+    for j in range(values.size):
+        distance = s - tab.ends_nodes[j]
+        if distance == 0.0:
+            return values[j]
+        weight = tab.barycentric[j] / distance
+        top += weight * values[j]
+        bottom += weight
+    return top / bottom
 
-    Stop `skip` is left out.
+
+@njit(cache=True, error_model="numpy")
+def first_root(tab, values, noise):
+    """First s at which the polynomial through `values` falls below -noise, or 2.
+
+    It is looked at on a grid four times as fine as the nodes, and at the minima between.
     """
+    grid = tab.fine_grid
+    n = grid.size
+    fine = np.empty(n)
+    for i in range(n):
+        total = 0.0
+        for j in range(values.size):
+            total += tab.to_fine[i, j] * values[j]
+        fine[i] = total
+    for i in range(1, n):
+        below = -1.0
+        if fine[i] < (-noise if i < n - 1 else 0.0):
+            below = grid[i]
+        elif i < n - 1 and fine[i - 1] >= fine[i] <= fine[i + 1]:
+            left, right = grid[i - 1] - grid[i], grid[i + 1] - grid[i]
+            up, on = (fine[i - 1] - fine[i]) / left, (fine[i + 1] - fine[i]) / right
+            curvature = (on - up) / (right - left)
+            slope = up - curvature * left
+            if curvature > 0.0 and fine[i] - 0.25 * slope * slope / curvature < -0.5 * noise:
+                bottom = grid[i] - 0.5 * slope / curvature
+                if interpolate(tab, values, bottom) < -noise:
+                    below = bottom
+        if below < 0.0:
+            continue
+        last = i - 1
+        while last > 0 and fine[last] <= 0.0:
+            last -= 1
+        if fine[last] <= 0.0:
+            return 0.5 * below
+        low, high = grid[last], below
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            if interpolate(tab, values, middle) > 0.0:
+                low = middle
+            else:
+                high = middle
+            if high - low <= 1e-9 * high:
+                break
+        return high
+    return 2.0
+
+
+@njit(cache=True, error_model="numpy")
+def first_event(fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, w_end):
+    """Stop that first opens or closes within a panel and the fraction of the panel, or (-1, 2)."""
     m = tab.nodes.size
     event, where = -1, 2.0
     position = -1
+    values = np.empty(m + 2)
     for s in range(closed.size):
-        noise = 0.0  # nodes of a panel that is too long may dip below zero by its error
+        noise = output_noise(fl, s, w)
+        start, _, _, _ = output_derivatives(fl, s, w, phase, 0.0)
+        end, _, _, _ = output_derivatives(fl, s, w_end, phase + fl.omega * h, 0.0)
         if closed[s]:
             position += 1
-            noise = 1e-4 * np.max(delta[position]) + output_noise(fl, s, w)
-        if s == skip:
-            continue
-        end, _, _, _ = output_derivatives(fl, s, w_end, phase + fl.omega * h, 0.0)
-        sign = 1.0 if closed[s] else -1.0
-        x0, y0 = 0.0, 0.0
-        for i in range(m + 1):
-            if i == m:
-                x1, y1 = 1.0, sign * (end - fl.gap[s])
-            elif closed[s]:
-                x1 = tab.chi[kind, i]
-                y1 = delta[position, i]
-            else:
-                x1 = tab.chi[kind, i]
-                y1 = fl.gap[s] - node_output(fl, tab, kind, phase, w, h, active, F, E, E_inv, s, i)
-            if y1 < (-noise if i < m else 0.0):
-                x = crossing(x0, y0, x1, y1) if y0 > 0.0 else 0.5 * (x0 + x1)
-                if x < where:
-                    event, where = s, x
-                break
-            x0, y0 = x1, y1
+            values[0], values[m + 1] = start - fl.gap[s], end - fl.gap[s]
+            values[1 : m + 1] = delta[position]
+        else:
+            values[0], values[m + 1] = fl.gap[s] - start, fl.gap[s] - end
+            for i in range(m):
+                output = node_output(fl, tab, kind, phase, w, h, active, F, E, E_inv, s, i)
+                values[i + 1] = fl.gap[s] - output
+        root = first_root(tab, values, noise + 4.0 * legendre_tail(tab, values[1 : m + 1]))
+        if root <= 1.0:
+            fraction = map_fraction(kind, root)
+            if fraction < where:
+                event, where = s, fraction
     return event, where
 
 
@@ -574,9 +641,10 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
     """
     F, dF, E, E_inv, G = work
     guess = np.empty(tab.nodes.size)
-    noise = 0.0
+    noise = np.empty(active.size)
     for a in range(active.size):
-        noise = max(noise, output_noise(fl, active[a], w))
+        noise[a] = output_noise(fl, active[a], w)
+    smooth, switch = 2 * start_switch, 2 * start_switch + 1
     aim = -1
     limit = h_max
     kind, h = guess_panel(fl, tab, phase, w, limit, start_switch, active, delta)
@@ -584,7 +652,7 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
     for _ in range(100):
         if h <= 0.0 or phase + fl.omega * h == phase:
             return OK, kind, 0.0, active[0] if aim < 0 else aim
-        if not solve_panel(fl, tab, kind, phase, w, h, active, delta, F, dF, E, E_inv, G):
+        if not solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, F, dF, E, E_inv, G):
             limit = 0.4 * min(h, tried)
             aim = -1
             kind, h = guess_panel(fl, tab, phase, w, limit, start_switch, active, delta)
@@ -592,10 +660,17 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
             continue
         panel_end(fl, tab, kind, w, h, active, F, E_inv, w_end)
         end_phase = phase + fl.omega * h
-        deepest = np.max(delta)
-        resolved = deepest <= 10.0 * noise or legendre_tail(tab, F) <= max(
-            fl.tail, 20.0 * noise / deepest
+        fine = resolved(fl, tab, noise, delta, F)
+        event, where = first_event(
+            fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, w_end
         )
+        at_end = where > (0.999 if event == aim else 1.0 - 1e-7)
+        if event >= 0 and (aim < 0 or not at_end):
+            aim = event
+            keep_profile(tab, kind, switch, where, delta, guess)
+            kind = switch
+            h *= where
+            continue
         if aim >= 0:
             value, speed, _, _ = output_derivatives(fl, aim, w_end, end_phase, 0.0)
             approaching = speed < 0.0 if closed[aim] else speed > 0.0
@@ -603,36 +678,18 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
             dh = -value / speed if approaching else np.inf
             # the force vanishes there with its slope: an error ε of the instant costs ε^2.5
             tight = 1e-9 if fl.exponent[aim] >= 1.5 else 1e-13  # a jump of the slope costs more
-            if abs(dh) <= tight * h or (approaching and abs(value) <= noise):
-                if resolved:
-                    other, where = first_event(
-                        fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, w_end, aim
-                    )
-                    if other < 0 or where > 1.0 - 1e-7:
-                        return OK, kind, h, aim
-                    aim = other
-                    keep_profile(tab, kind, 2 * start_switch + 1, where, delta, guess)
-                    kind = 2 * start_switch + 1
-                    h *= where
-                    continue
-            elif -0.5 * h < dh < h and h < h_max:
+            if abs(dh) <= tight * h or (approaching and abs(value) <= output_noise(fl, aim, w)):
+                if fine:
+                    return OK, kind, h, aim
+            elif -0.5 * h < dh < h and (dh < 0.0 or h < h_max):
                 h = min(h + dh, h_max)
                 continue
-            elif dh > 0.0 and resolved:  # the contact goes on
+            elif dh > 0.0 and fine:  # the contact goes on
                 return OK, kind, h, -1
             aim = -1
-            keep_profile(tab, kind, 2 * start_switch, 0.5, delta, guess)
-            kind = 2 * start_switch
+            keep_profile(tab, kind, smooth, 0.5, delta, guess)
+            kind = smooth
             h *= 0.5
-            continue
-        event, where = first_event(
-            fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, w_end, -1
-        )
-        if event >= 0:
-            aim = event
-            keep_profile(tab, kind, 2 * start_switch + 1, where, delta, guess)
-            kind = 2 * start_switch + 1
-            h *= where
             continue
         if kind % 2 == 1 and h < h_max:  # the release was expected here: follow it
             for a in range(active.size):
@@ -644,9 +701,9 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
                     break
             if aim >= 0:
                 continue
-        if not resolved:
-            keep_profile(tab, kind, 2 * start_switch, 0.5, delta, guess)
-            kind = 2 * start_switch
+        if not fine:
+            keep_profile(tab, kind, smooth, 0.5, delta, guess)
+            kind = smooth
             h *= 0.5
             continue
         return OK, kind, h, -1
@@ -851,6 +908,10 @@ def shoot(
     weights,
     to_legendre,
     gauss_nodes,
+    ends_nodes,
+    barycentric,
+    fine_grid,
+    to_fine,
     rec_phase,
     rec_duration,
     rec_kind,
@@ -883,7 +944,9 @@ def shoot(
         omega,
         tail,
     )
-    tab = GaussTables(chi, integrate, weights, to_legendre, gauss_nodes)
+    tab = GaussTables(
+        chi, integrate, weights, to_legendre, gauss_nodes, ends_nodes, barycentric, fine_grid, to_fine
+    )
     rec = Record(rec_phase, rec_duration, rec_kind, rec_w, rec_force, rec_count)
     k = phases.size - 1
     size = pack_mode.size

@@ -5,19 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from nldyn._kernels import map_fraction
+
 FLIGHT = -1
-
-
-@njit(cache=True, error_model="numpy")
-def map_fraction(kind, s):
-    """Fraction of the panel that belongs to the stretched time s (see `gauss.time_map`)."""
-    if kind == 0:
-        return s
-    if kind == 1:
-        return s * (2.0 - s)
-    if kind == 2:
-        return s * s
-    return 0.5 - 0.5 * np.cos(np.pi * s)
 
 
 @njit(cache=True, error_model="numpy")

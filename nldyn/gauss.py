@@ -30,6 +30,12 @@ class GaussTables(NamedTuple):
         Legendre coefficients in s from node values.
     nodes : (m,)
         The Gauss nodes in s.
+    ends_nodes, barycentric : (m + 2,)
+        0, the nodes and 1, and the weights of barycentric interpolation through them.
+    fine_grid : (N,)
+        Chebyshev points in s with both ends, four times as many.
+    to_fine : (N, m + 2)
+        Interpolation from `ends_nodes` to `fine_grid`.
     """
 
     chi: Real
@@ -37,6 +43,10 @@ class GaussTables(NamedTuple):
     weights: Real
     to_legendre: Real
     nodes: Real
+    ends_nodes: Real
+    barycentric: Real
+    fine_grid: Real
+    to_fine: Real
 
 
 def time_map(kind: int, s: Real | float) -> tuple[Real | float, Real | float]:
@@ -80,10 +90,32 @@ def gauss_tables(m: int) -> GaussTables:
     maps = [time_map(kind, nodes) for kind in range(4)]
     chi = np.array([c for c, _ in maps])
     slope = np.array([d for _, d in maps])
+    ends_nodes = np.concatenate([[0.0], nodes, [1.0]])
+    barycentric = 1.0 / np.prod(_differences(4.0 * ends_nodes), axis=1)
+    fine_grid = 0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 4 * (m + 2)))
     return GaussTables(
         chi,
         np.ascontiguousarray(running[None] * slope[:, None, :]),
         0.5 * w * slope,
         to_legendre,
         nodes,
+        ends_nodes,
+        barycentric,
+        fine_grid,
+        _interpolation(ends_nodes, barycentric, fine_grid),
     )
+
+
+def _differences(points: Real) -> Real:
+    """Matrix of x_i - x_j with ones on the diagonal."""
+    return points[:, None] - points[None, :] + np.eye(points.size)
+
+
+def _interpolation(points: Real, barycentric: Real, targets: Real) -> Real:
+    """Matrix that takes values at the points to values of their polynomial at the targets."""
+    distance = targets[:, None] - points[None, :]
+    hit = distance == 0.0
+    weights = barycentric / np.where(hit, 1.0, distance)
+    weights[hit.any(axis=1)] = 0.0
+    weights[hit] = 1.0
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
