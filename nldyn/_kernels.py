@@ -393,13 +393,16 @@ def legendre_tail(tab, values):
 
 
 @njit(cache=True, error_model="numpy")
-def resolved(fl, tab, noise, delta, F):
-    """Whether the Legendre tail of each force is small beside its largest value."""
+def resolved(fl, tab, noise, delta, F, dF):
+    """Whether the Legendre tails of each force and of its slope are small beside their largest."""
     for a in range(F.shape[0]):
         deepest = np.max(delta[a])
         if deepest <= 10.0 * noise[a]:
             continue
-        if legendre_tail(tab, F[a]) > max(fl.tail, 20.0 * noise[a] / deepest) * np.max(F[a]):
+        tail = max(fl.tail, 20.0 * noise[a] / deepest)
+        if legendre_tail(tab, F[a]) > tail * np.max(F[a]):
+            return False
+        if legendre_tail(tab, dF[a]) > 10.0 * tail * np.max(dF[a]):
             return False
     return True
 
@@ -660,7 +663,7 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
             continue
         panel_end(fl, tab, kind, w, h, active, F, E_inv, w_end)
         end_phase = phase + fl.omega * h
-        fine = resolved(fl, tab, noise, delta, F)
+        fine = resolved(fl, tab, noise, delta, F, dF)
         event, where = first_event(
             fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, w_end
         )
