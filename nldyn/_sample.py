@@ -114,27 +114,26 @@ def local_extremes(
     """Phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output.
 
     The rate is sampled sixteen times per period of the fastest mode, its sign changes are
-    refined by the secant and bisection in turn.
+    refined by the secant and bisection in turn. The motion is taken as periodic: an extreme at
+    its start counts once.
     """
     nz = eigenvalues.size
     fastest = omega
     for k in range(nz):
         fastest = max(fastest, abs(eigenvalues[k].imag))
     spacing = 2.0 * np.pi / (16.0 * fastest)
-    capacity = 64
-    found = np.empty((capacity, 3))
+    found = np.empty((64, 3))
     n = 0
     w = np.empty(nz, dtype=np.complex128)
     turn = np.empty(nz, dtype=np.complex128)
     flying = np.empty(nz, dtype=np.complex128)
-    old_rate = 0.0
+    first_value, first_sign, sign, t_old, rate_old = 0.0, 0, 0, 0.0, 0.0
     for piece in range(count):
         h = rec_duration[piece]
         kind = rec_kind[piece]
         pieces = int(np.ceil(h / spacing)) + 1
         if kind != FLIGHT:
             pieces += gauss_nodes.size
-        t_old = 0.0
         for k in range(nz):
             turn[k] = np.exp(eigenvalues[k] * (h / pieces))
             flying[k] = rec_w[piece, k]
@@ -150,11 +149,18 @@ def local_extremes(
                     eigenvalues, force, chi, to_legendre, gauss_nodes, kind, h,
                     rec_w[piece], rec_force[piece], t, w,
                 )  # fmt: skip
-            _, rate = output_rate(eigenvalues, row, forced, omega, rec_phase[piece] + omega * t, w)
-            if i > 0 and (old_rate * rate < 0.0 or (old_rate != 0.0 and rate == 0.0)):
-                lo, hi, rate_lo, rate_hi = t_old, t, old_rate, rate
-                value, middle = 0.0, lo
-                for step in range(100):
+            value, rate = output_rate(
+                eigenvalues, row, forced, omega, rec_phase[piece] + omega * t, w
+            )
+            new_sign = 1 if rate > 0.0 else -1 if rate < 0.0 else sign
+            if piece == 0 and i == 0:
+                first_value = value
+            if first_sign == 0:
+                first_sign = sign = new_sign
+            if new_sign != sign:
+                lo, hi, rate_lo, rate_hi = t_old, t, rate_old, rate
+                middle = t
+                for step in range(100 if i > 0 else 0):
                     middle = 0.5 * (lo + hi)
                     if step % 3 != 2 and rate_hi != rate_lo:
                         middle = lo - rate_lo * (hi - lo) / (rate_hi - rate_lo)
@@ -165,20 +171,26 @@ def local_extremes(
                     value, rate_middle = output_rate(
                         eigenvalues, row, forced, omega, rec_phase[piece] + omega * middle, w
                     )
-                    if rate_middle * rate_lo > 0.0:
+                    if rate_middle * sign > 0.0:
                         lo, rate_lo = middle, rate_middle
                     else:
                         hi, rate_hi = middle, rate_middle
                     if hi - lo <= 1e-9 * spacing or rate_middle == 0.0:
                         break
-                if n == capacity:
-                    larger = np.empty((2 * capacity, 3))
-                    larger[:capacity] = found
-                    found = larger
-                    capacity *= 2
-                found[n, 0] = rec_phase[piece] + omega * middle
-                found[n, 1] = value
-                found[n, 2] = 1.0 if old_rate > 0.0 else -1.0
-                n += 1
-            t_old, old_rate = t, rate
+                found, n = append_extreme(found, n, rec_phase[piece] + omega * middle, value, sign)
+                sign = new_sign
+            t_old, rate_old = t, rate
+    if sign != first_sign:
+        found, n = append_extreme(found, n, rec_phase[0], first_value, sign)
     return found[:n]
+
+
+@njit(cache=True, error_model="numpy")
+def append_extreme(found, n, phase, value, sign):
+    """Append to a table that grows; returns it and its length."""
+    if n == found.shape[0]:
+        larger = np.empty((2 * n, 3))
+        larger[:n] = found
+        found = larger
+    found[n, 0], found[n, 1], found[n, 2] = phase, value, sign
+    return found, n + 1

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn._kernels import CONTACT_FAILED, OK, TOO_MANY_PIECES, FlowData, Record, shoot
+from nldyn._sample import local_extremes, sample_states
 from nldyn.gauss import GaussTables, gauss_tables
 from nldyn.system import Complex, Real, System
 
@@ -304,6 +305,37 @@ class Trajectory:
     start_phase: float
     closings: NDArray[np.int64]
     failure: str
+
+    def homogeneous(self, phases: Real) -> Complex:
+        """Homogeneous states w (k, nz) at ascending forcing phases within the motion."""
+        return np.asarray(sample_states(*self._pieces, np.asarray(phases, dtype=float)))
+
+    def extremes(self, output: int) -> Real:
+        """Phase, value and kind (+1 maximum, -1 minimum) of an output's local extremes, (k, 3).
+
+        The motion is taken as periodic. Outputs are the stops' penetrations without their gaps,
+        then the interfaces' displacements.
+        """
+        row, forced = self.data.rows[output], self.data.forced[output]
+        return np.asarray(local_extremes(*self._pieces, row, forced))
+
+    @cached_property
+    def _pieces(self) -> tuple[object, ...]:
+        data, tables, rec = self.data, self.flow.tables, self.record
+        return (
+            data.eigenvalues,
+            data.force,
+            data.omega,
+            tables.chi,
+            tables.to_legendre,
+            tables.nodes,
+            rec.phase,
+            rec.duration,
+            rec.kind,
+            rec.w,
+            rec.force,
+            int(rec.used[0]),
+        )
 
 
 def _duration_factor(p: float) -> float:

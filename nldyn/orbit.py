@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn._sample import local_extremes, sample_states
 from nldyn.errors import SystemModelError
 from nldyn.flow import FlowMap, Trajectory
 from nldyn.shooting import ShootingProblem
@@ -185,26 +184,9 @@ class Orbit:
         return {}
 
     def _find_extremes(self, output: int) -> Extremes:
-        trajectory = self.trajectory
-        data, rec = trajectory.data, trajectory.record
-        tables = trajectory.flow.tables
-        found = local_extremes(
-            data.eigenvalues,
-            data.force,
-            data.omega,
-            tables.chi,
-            tables.to_legendre,
-            tables.nodes,
-            rec.phase,
-            rec.duration,
-            rec.kind,
-            rec.w,
-            rec.force,
-            int(rec.used[0]),
-            data.rows[output],
-            data.forced[output],
-        )
-        offset = data.gap[output] if output < data.gap.size else 0.0
+        found = self.trajectory.extremes(output)
+        gap = self.trajectory.data.gap
+        offset = gap[output] if output < gap.size else 0.0
         return Extremes(found[:, 0], found[:, 1] - offset, found[:, 2] > 0.0)
 
     @cached_property
@@ -258,26 +240,13 @@ class Orbit:
         return tuple(sorted(impacts, key=lambda impact: impact.time))
 
     def states(self, phases: Real) -> Real:
-        """Modal displacements and velocities (k, 2n) at ascending forcing phases."""
-        trajectory = self.trajectory
-        data, rec = trajectory.data, trajectory.record
-        tables = trajectory.flow.tables
-        w = sample_states(
-            data.eigenvalues,
-            data.force,
-            data.omega,
-            tables.chi,
-            tables.to_legendre,
-            tables.nodes,
-            rec.phase,
-            rec.duration,
-            rec.kind,
-            rec.w,
-            rec.force,
-            int(rec.used[0]),
-            np.asarray(phases, dtype=float),
-        )
-        forced = self.system.forced_response(self.omega).at_phase(np.asarray(phases))
+        """Modal displacements and velocities (k, 2n) at any forcing phases."""
+        phases = np.asarray(phases, dtype=float)
+        within = phases % (2.0 * np.pi * self.period)
+        order = np.argsort(within, kind="stable")
+        w = np.empty((phases.size, self.system.linear.eigenvalues.size), dtype=complex)
+        w[order] = self.trajectory.homogeneous(within[order])
+        forced = self.system.forced_response(self.omega).at_phase(phases)
         return np.asarray(((w + forced) @ self.system.linear.right.T).real)
 
     def history(self, samples: int = 1000) -> History:

@@ -243,7 +243,6 @@ def test_rate_is_zero_at_an_extreme(frequency):
 
 
 @pytest.mark.parametrize("frequency", [5.0, 20.0, 33.0])
-@pytest.mark.xfail(strict=True, reason="an extreme exactly at phase zero is lost")
 def test_extremes_of_an_undamped_orbit_lie_at_phases_zero_and_pi(frequency):
     system = System.from_matrices(
         [[2.48]], [[16877.0]], {"m": [1.0]}, excitation=[HarmonicForce("m", 1.0)]
@@ -255,7 +254,6 @@ def test_extremes_of_an_undamped_orbit_lie_at_phases_zero_and_pi(frequency):
     assert sorted(found.values) == pytest.approx(sorted([steady, -steady]), rel=1e-12)
 
 
-@pytest.mark.xfail(strict=True, reason="beyond the last recorded piece the state is extrapolated")
 def test_states_are_periodic_in_the_phase():
     orbit = solve_orbit(make_one_dof(), 26.0)
     phases = np.linspace(0.0, 2 * np.pi, 9)
