@@ -3,13 +3,16 @@
 All kernels that `shoot` calls are in this one file, because the compile cache looks only at the
 file of the function that is called: a change in another file would go unnoticed.
 
+The state z is a list of pairs that move by themselves between contacts, z_b' = A_b z_b with real
+2×2 blocks; w is z without the steady response to the excitation.
+
 **Flights** are propagated in closed form; the first contact is found with steps that are bounded
 by the third derivative of the gap, so that none is passed over.
 
 **Contact phases**: the modes see one scalar force per stop, so the penetrations at the Gauss nodes
 of a panel satisfy a small Volterra equation
 
-    δ_a(t_i) = free_a(t_i) - Σ_b Σ_j h W_ij K_ab(t_i - t_j) F_b(δ_b(t_j)),
+    δ_a(t_i) = free_a(t_i) - Σ_b Σ_j h W_ij K_ab(t_i - t_j) F_b(t_j),
 
 K being the impulse response between two stops. Its Newton matrix also gives all sensitivities.
 The end state is a Gauss quadrature: order 2m with m nodes.
@@ -33,26 +36,71 @@ OK, TOO_MANY_PIECES, CONTACT_FAILED = range(3)
 FLIGHT = -1
 
 
-class FlowData(NamedTuple):
-    """Numbers of a system at one excitation frequency, as the kernels need them.
+class SystemData(NamedTuple):
+    """Numbers of a system, as the kernels need them.
 
     The first rows of `rows` are the stops' penetration rows, then the observed outputs.
     """
 
-    eigenvalues: Complex  # (nz,)
-    rows: Complex  # (n_out, nz)
-    force: Complex  # (nz, n_stops): w' = λ w - force @ F
-    forced: Complex  # (n_out,) forced amplitude of each output
-    d_forced: Complex  # (n_out,) its derivative with respect to ω
+    blocks: Real  # (n, 2, 2)
+    rows: Real  # (n_out, 2n)
+    rows1: Real  # (n_out, 2n) rows of the velocities: rows @ A
+    rows2: Real  # (n_out, 2n) rows of the accelerations
+    bound3: Real  # (n_out, n) |third derivative| <= bound3 |w_b| at any later time
+    force: Real  # (2n, n_stops): w' = A w - force @ F
+    drive: Complex  # (2, 2n) excitation Re((drive[0] + ω² drive[1]) e^{iωt}) of z
     gap: Real  # (n_stops,)
     stiffness: Real  # (n_stops,)
     exponent: Real  # (n_stops,)
     mobility: Real  # (n_stops,) velocity jump per unit impulse, 1/kg
     duration_factor: Real  # (n_stops,) contact duration = factor * peak / speed
-    pack_mode: NDArray[np.int64]  # (2n,)
-    pack_unit: Complex  # (2n,)
-    omega: float
     tail: float  # largest relative Legendre tail accepted on a contact panel
+
+
+class FlowData(NamedTuple):
+    """Numbers of a system at one excitation frequency; see `SystemData`."""
+
+    blocks: Real
+    rows: Real
+    rows1: Real
+    rows2: Real
+    bound3: Real
+    force: Real
+    steady: Complex  # (2n,) z = w + Re(steady e^{iωt})
+    d_steady: Complex  # (2n,) its derivative with respect to ω
+    forced: Complex  # (n_out,) steady amplitude of each output
+    d_forced: Complex  # (n_out,) its derivative with respect to ω
+    gap: Real
+    stiffness: Real
+    exponent: Real
+    mobility: Real
+    duration_factor: Real
+    omega: float
+    tail: float
+
+
+@njit(cache=True, error_model="numpy")
+def block_exponential(block, t):
+    """The four entries of exp(block t), row by row (also for equal or zero eigenvalues)."""
+    mean = 0.5 * (block[0, 0] + block[1, 1])
+    half = 0.5 * (block[0, 0] - block[1, 1])
+    square = half * half + block[0, 1] * block[1, 0]
+    if square < 0.0:
+        rate = math.sqrt(-square)
+        size = math.exp(mean * t)
+        even = size * math.cos(rate * t)
+        odd = size * math.sin(rate * t) / rate
+    else:
+        rate = math.sqrt(square)
+        if abs(rate * t) < 1.0:
+            size = math.exp(mean * t)
+            even = size * math.cosh(rate * t)
+            odd = size * (math.sinh(rate * t) / rate if rate > 0.0 else t)
+        else:
+            up, down = math.exp((mean + rate) * t), math.exp((mean - rate) * t)
+            even = 0.5 * (up + down)
+            odd = 0.5 * (up - down) / rate
+    return even + odd * half, odd * block[0, 1], odd * block[1, 0], even - odd * half
 
 
 @njit(cache=True, error_model="numpy")
@@ -63,15 +111,16 @@ def output_derivatives(fl, out, w, phase, t):
     first = -fl.omega * turn.imag
     second = -fl.omega * fl.omega * turn.real
     bound = abs(turn) * fl.omega**3
-    for k in range(fl.eigenvalues.size):
-        lam = fl.eigenvalues[k]
-        part = fl.rows[out, k] * w[k] * np.exp(lam * t)
-        value += part.real
-        part1 = lam * part
-        first += part1.real
-        part2 = lam * part1
-        second += part2.real
-        bound += abs(part2) * abs(lam)
+    for b in range(fl.blocks.shape[0]):
+        j = 2 * b
+        x, y = w[j], w[j + 1]
+        if t != 0.0:
+            e00, e01, e10, e11 = block_exponential(fl.blocks[b], t)
+            x, y = e00 * x + e01 * y, e10 * x + e11 * y
+        value += fl.rows[out, j] * x + fl.rows[out, j + 1] * y
+        first += fl.rows1[out, j] * x + fl.rows1[out, j + 1] * y
+        second += fl.rows2[out, j] * x + fl.rows2[out, j + 1] * y
+        bound += fl.bound3[out, b] * math.sqrt(x * x + y * y)
     return value, first, second, bound
 
 
@@ -79,9 +128,22 @@ def output_derivatives(fl, out, w, phase, t):
 def output_noise(fl, out, w):
     """Rounding error to expect in an output: 4 units in the last place of its terms."""
     total = abs(fl.forced[out])
-    for k in range(fl.eigenvalues.size):
-        total += abs(fl.rows[out, k] * w[k])
+    for j in range(w.size):
+        total += abs(fl.rows[out, j] * w[j])
     return 1e-15 * total
+
+
+@njit(cache=True, error_model="numpy")
+def fastest_rate(fl):
+    """Largest |eigenvalue| of the blocks, in 1/s."""
+    fastest = 0.0
+    for b in range(fl.blocks.shape[0]):
+        block = fl.blocks[b]
+        mean = 0.5 * (block[0, 0] + block[1, 1])
+        square = 0.25 * (block[0, 0] - block[1, 1]) ** 2 + block[0, 1] * block[1, 0]
+        rate = math.sqrt(abs(square))
+        fastest = max(fastest, math.hypot(mean, rate) if square < 0.0 else abs(mean) + rate)
+    return fastest
 
 
 @njit(cache=True, error_model="numpy")
@@ -90,8 +152,12 @@ def safe_step(h, h1, h2, bound):
 
     No function with these derivatives and a third derivative below `bound` reaches zero sooner.
     """
-    if bound <= 0.0:
-        return np.inf
+    if bound <= 0.0:  # a parabola
+        if h >= 0.0:
+            return -2.0 * h1 / h2 if h1 < 0.0 < h2 else (0.0 if h1 >= 0.0 else np.inf)
+        square = h1 * h1 - 2.0 * h * h2
+        top = h1 + math.sqrt(square) if square >= 0.0 else 0.0
+        return -2.0 * h / top if top > 0.0 else np.inf
     if h >= 0.0:
         if h1 >= 0.0:
             return 0.0
@@ -128,10 +194,7 @@ def closing_time(fl, stop, w, phase, start, end):
     converge to the contact at order three. Only contacts shorter than 1e-9 periods of the
     fastest mode can be stepped over, and these carry no force.
     """
-    fastest = fl.omega
-    for k in range(fl.eigenvalues.size):
-        fastest = max(fastest, abs(fl.eigenvalues[k]))
-    shortest = 1e-10 / fastest
+    shortest = 1e-10 / max(fl.omega, fastest_rate(fl))
     t = start
     while t <= end:
         value, h1, h2, bound = output_derivatives(fl, stop, w, phase, t)
@@ -148,19 +211,14 @@ def closing_time(fl, stop, w, phase, start, end):
 
 
 @njit(cache=True, error_model="numpy")
-def fly(fl, w, t):
-    """Advance w in place by a flight of duration t."""
-    for k in range(w.size):
-        w[k] *= np.exp(fl.eigenvalues[k] * t)
-
-
-@njit(cache=True, error_model="numpy")
-def fly_columns(fl, columns, t):
-    """Advance sensitivities (nz, n_columns) in place by a flight of duration t."""
-    for k in range(columns.shape[0]):
-        factor = np.exp(fl.eigenvalues[k] * t)
+def fly(fl, columns, t):
+    """Advance states or sensitivities (2n, n_columns) in place by a flight of duration t."""
+    for b in range(fl.blocks.shape[0]):
+        e00, e01, e10, e11 = block_exponential(fl.blocks[b], t)
         for c in range(columns.shape[1]):
-            columns[k, c] *= factor
+            x, y = columns[2 * b, c], columns[2 * b + 1, c]
+            columns[2 * b, c] = e00 * x + e01 * y
+            columns[2 * b + 1, c] = e10 * x + e11 * y
 
 
 class Record(NamedTuple):
@@ -172,8 +230,8 @@ class Record(NamedTuple):
         Forcing phase at the start, duration in s.
     kind : (n_pieces,)
         -1 for a flight, else the kind of the panel's ends.
-    w : (n_pieces, nz) complex
-        State at the start.
+    w : (n_pieces, 2n)
+        State at the start without the steady response.
     force : (n_pieces, n_stops, m)
         Forces at the nodes of a panel.
     used : (1,)
@@ -183,7 +241,7 @@ class Record(NamedTuple):
     phase: NDArray[np.float64]
     duration: NDArray[np.float64]
     kind: NDArray[np.int64]
-    w: NDArray[np.complex128]
+    w: NDArray[np.float64]
     force: NDArray[np.float64]
     used: NDArray[np.int64]
 
@@ -203,31 +261,35 @@ def law(delta, stiffness, exponent):
 
 
 @njit(cache=True, error_model="numpy")
-def kernel_matrix(fl, tab, kind, h, active, E, E_inv, G):
-    """Fill E (m, nz) = exp(λ t_i), its inverse, and G = h W_ij K_ab(t_i - t_j)."""
+def panel_responses(fl, tab, kind, h, active, to, back, G):
+    """Fill what a panel of length h needs to know of the linear part.
+
+    to[a, i] = row_a exp(A t_i) and back[a, j] = exp(-A t_j) force_a, both (na, m, 2n), and
+    G = h W_ij K_ab(t_i - t_j) with the impulse response K_ab(t) = row_a exp(A t) force_b.
+    """
     m = tab.nodes.size
-    nz = fl.eigenvalues.size
+    na = active.size
     for i in range(m):
-        for k in range(nz):
-            exponent = fl.eigenvalues[k] * (h * tab.chi[kind, i])
-            E[i, k] = np.exp(exponent)
-            E_inv[i, k] = np.exp(-exponent)
-    for a in range(active.size):
-        for b in range(active.size):
+        t = h * tab.chi[kind, i]
+        for b in range(fl.blocks.shape[0]):
+            j = 2 * b
+            e00, e01, e10, e11 = block_exponential(fl.blocks[b], t)
+            i00, i01, i10, i11 = block_exponential(fl.blocks[b], -t)
+            for a in range(na):
+                x, y = fl.rows[active[a], j], fl.rows[active[a], j + 1]
+                to[a, i, j] = x * e00 + y * e10
+                to[a, i, j + 1] = x * e01 + y * e11
+                x, y = fl.force[j, active[a]], fl.force[j + 1, active[a]]
+                back[a, i, j] = i00 * x + i01 * y
+                back[a, i, j + 1] = i10 * x + i11 * y
+    for a in range(na):
+        for b in range(na):
             for i in range(m):
                 for j in range(m):
-                    G[a * m + i, b * m + j] = 0.0
-            for k in range(nz):
-                z = h * fl.rows[active[a], k] * fl.force[k, active[b]]
-                for i in range(m):
-                    zi = z * E[i, k]
-                    for j in range(m):
-                        G[a * m + i, b * m + j] += zi.real * E_inv[j, k].real - (
-                            zi.imag * E_inv[j, k].imag
-                        )
-            for i in range(m):
-                for j in range(m):
-                    G[a * m + i, b * m + j] *= tab.integrate[kind, i, j]
+                    total = 0.0
+                    for k in range(to.shape[2]):
+                        total += to[a, i, k] * back[b, j, k]
+                    G[a * m + i, b * m + j] = h * tab.integrate[kind, i, j] * total
 
 
 @njit(cache=True, error_model="numpy")
@@ -263,30 +325,29 @@ def lu_solve(A, B):
 
 
 @njit(cache=True, error_model="numpy")
-def free_output(fl, out, w, E, i, phase):
-    """Output `out` at node i if no force acted."""
-    value = (fl.forced[out] * np.exp(1j * phase)).real
-    for k in range(fl.eigenvalues.size):
-        value += (fl.rows[out, k] * E[i, k] * w[k]).real
-    return value
+def forced_output(fl, out, phase):
+    """Steady output at a forcing phase."""
+    return (fl.forced[out] * np.exp(1j * phase)).real
 
 
 @njit(cache=True, error_model="numpy")
-def solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, F, dF, E, E_inv, G):
+def solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, F, dF, to, back, G):
     """Newton's method for the penetrations at the nodes; delta (na, m) holds the guess.
 
     noise (na,) is the rounding error to expect in each. Returns whether it converged, with F, dF,
-    E, E_inv and G filled.
+    to, back and G filled.
     """
     m = tab.nodes.size
     na = active.size
     size = na * m
-    kernel_matrix(fl, tab, kind, h, active, E, E_inv, G)
+    panel_responses(fl, tab, kind, h, active, to, back, G)
     free = np.empty(size)
     for a in range(na):
         for i in range(m):
-            node_phase = phase + fl.omega * h * tab.chi[kind, i]
-            free[a * m + i] = free_output(fl, active[a], w, E, i, node_phase) - fl.gap[active[a]]
+            value = forced_output(fl, active[a], phase + fl.omega * h * tab.chi[kind, i])
+            for k in range(w.size):
+                value += to[a, i, k] * w[k]
+            free[a * m + i] = value - fl.gap[active[a]]
     J = np.empty((size, size))
     step = np.empty((size, 1))
     flat, flat_F, flat_dF = delta.reshape(size), F.reshape(size), dF.reshape(size)
@@ -325,28 +386,26 @@ def panel_forces(fl, active, delta, F, dF):
 
 
 @njit(cache=True, error_model="numpy")
-def panel_end(fl, tab, kind, w, h, active, F, E_inv, w_end):
+def panel_end(fl, tab, kind, w, h, active, F, back, w_end):
     """State w_end at the end of a panel from the forces at its nodes."""
-    for k in range(w.size):
-        total = w[k]
+    w_end[:] = w
+    for a in range(active.size):
         for j in range(tab.nodes.size):
-            drive = 0.0j
-            for a in range(active.size):
-                drive += fl.force[k, active[a]] * F[a, j]
-            total -= h * tab.weights[kind, j] * drive * E_inv[j, k]
-        w_end[k] = total * np.exp(fl.eigenvalues[k] * h)
+            impulse = h * tab.weights[kind, j] * F[a, j]
+            for k in range(w.size):
+                w_end[k] -= impulse * back[a, j, k]
+    fly(fl, w_end.reshape(w.size, 1), h)
 
 
 @njit(cache=True, error_model="numpy")
-def panel_columns(fl, tab, kind, phase, t0, h, active, dF, E, E_inv, G, columns):
-    """Advance sensitivities (nz, n_columns) in place over a panel.
+def panel_columns(fl, tab, kind, phase, t0, h, active, dF, to, back, G, columns):
+    """Advance sensitivities (2n, n_columns) in place over a panel.
 
     The last column is the derivative with respect to ω at fixed time; t0 is the time from the
     start of the segment at which its phase is fixed.
     """
     m = tab.nodes.size
     na = active.size
-    nz = fl.eigenvalues.size
     size = na * m
     n_columns = columns.shape[1]
     J = np.empty((size, size))
@@ -359,24 +418,23 @@ def panel_columns(fl, tab, kind, phase, t0, h, active, dF, E, E_inv, G, columns)
     for a in range(na):
         for i in range(m):
             p = a * m + i
-            for k in range(nz):
-                z = fl.rows[active[a], k] * E[i, k]
+            for k in range(columns.shape[0]):
+                z = to[a, i, k]
                 for c in range(n_columns):
-                    rhs[p, c] += z.real * columns[k, c].real - z.imag * columns[k, c].imag
+                    rhs[p, c] += z * columns[k, c]
             t = h * tab.chi[kind, i]
             turn = np.exp(1j * (phase + fl.omega * t))
             slope = fl.d_forced[active[a]] + 1j * (t0 + t) * fl.forced[active[a]]
             rhs[p, n_columns - 1] += (slope * turn).real
     lu_solve(J, rhs)
-    for k in range(nz):
-        growth = np.exp(fl.eigenvalues[k] * h)
-        for a in range(na):
-            for j in range(m):
-                z = fl.force[k, active[a]] * (h * tab.weights[kind, j] * dF[a, j]) * E_inv[j, k]
+    for a in range(na):
+        for j in range(m):
+            share = h * tab.weights[kind, j] * dF[a, j]
+            for k in range(columns.shape[0]):
+                z = share * back[a, j, k]
                 for c in range(n_columns):
                     columns[k, c] -= z * rhs[a * m + j, c]
-        for c in range(n_columns):
-            columns[k, c] *= growth
+    fly(fl, columns, h)
 
 
 @njit(cache=True, error_model="numpy")
@@ -559,7 +617,7 @@ def first_root(tab, values, noise):
 
 
 @njit(cache=True, error_model="numpy")
-def first_event(fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, w_end):
+def first_event(fl, tab, kind, phase, w, h, closed, active, delta, F, back, w_end):
     """Stop that first opens or closes within a panel and the fraction of the panel, or (-1, 2)."""
     m = tab.nodes.size
     event, where = -1, 2.0
@@ -575,9 +633,9 @@ def first_event(fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, 
             values[1 : m + 1] = delta[position]
         else:
             values[0], values[m + 1] = fl.gap[s] - start, fl.gap[s] - end
+            node_outputs(fl, tab, kind, phase, w, h, active, F, back, s, values[1 : m + 1])
             for i in range(m):
-                output = node_output(fl, tab, kind, phase, w, h, active, F, E, E_inv, s, i)
-                values[i + 1] = fl.gap[s] - output
+                values[i + 1] = fl.gap[s] - values[i + 1]
         root = first_root(tab, values, noise + 4.0 * legendre_tail(tab, values[1 : m + 1]))
         if root <= 1.0:
             fraction = map_fraction(kind, root)
@@ -587,16 +645,30 @@ def first_event(fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, 
 
 
 @njit(cache=True, error_model="numpy")
-def node_output(fl, tab, kind, phase, w, h, active, F, E, E_inv, out, i):
-    """Output at node i of a panel, with the forces at work."""
-    value = free_output(fl, out, w, E, i, phase + fl.omega * h * tab.chi[kind, i])
-    for k in range(fl.eigenvalues.size):
-        total = 0.0j
+def node_outputs(fl, tab, kind, phase, w, h, active, F, back, out, values):
+    """Fill an output at the nodes of a panel, with the forces at work."""
+    m = tab.nodes.size
+    driven = np.empty(w.size)
+    for i in range(m):
+        t = h * tab.chi[kind, i]
+        driven[:] = w
         for a in range(active.size):
-            for j in range(tab.nodes.size):
-                share = h * tab.integrate[kind, i, j] * F[a, j]
-                total += fl.force[k, active[a]] * share * E_inv[j, k]
-        value -= (fl.rows[out, k] * E[i, k] * total).real
+            for j in range(m):
+                impulse = h * tab.integrate[kind, i, j] * F[a, j]
+                for k in range(w.size):
+                    driven[k] -= impulse * back[a, j, k]
+        values[i] = free_output(fl, out, driven, t) + forced_output(fl, out, phase + fl.omega * t)
+
+
+@njit(cache=True, error_model="numpy")
+def free_output(fl, out, w, t):
+    """Output of the homogeneous state w after a flight of duration t."""
+    value = 0.0
+    for b in range(fl.blocks.shape[0]):
+        j = 2 * b
+        e00, e01, e10, e11 = block_exponential(fl.blocks[b], t)
+        value += fl.rows[out, j] * (e00 * w[j] + e01 * w[j + 1])
+        value += fl.rows[out, j + 1] * (e10 * w[j] + e11 * w[j + 1])
     return value
 
 
@@ -640,9 +712,9 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
     """Solve one panel and choose its length, at most h_max.
 
     Returns (status, kind, h, event): a panel that ends where stop `event` opens or closes, or
-    (event = -1) one short enough to be resolved. `work` holds (F, dF, E, E_inv, G).
+    (event = -1) one short enough to be resolved. `work` holds (F, dF, to, back, G).
     """
-    F, dF, E, E_inv, G = work
+    F, dF, to, back, G = work
     guess = np.empty(tab.nodes.size)
     noise = np.empty(active.size)
     for a in range(active.size):
@@ -655,17 +727,17 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
     for _ in range(100):
         if h <= 0.0 or phase + fl.omega * h == phase:
             return OK, kind, 0.0, active[0] if aim < 0 else aim
-        if not solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, F, dF, E, E_inv, G):
+        if not solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, F, dF, to, back, G):
             limit = 0.4 * min(h, tried)
             aim = -1
             kind, h = guess_panel(fl, tab, phase, w, limit, start_switch, active, delta)
             tried = h
             continue
-        panel_end(fl, tab, kind, w, h, active, F, E_inv, w_end)
+        panel_end(fl, tab, kind, w, h, active, F, back, w_end)
         end_phase = phase + fl.omega * h
         fine = resolved(fl, tab, noise, delta, F, dF)
         event, where = first_event(
-            fl, tab, kind, phase, w, h, closed, active, delta, F, E, E_inv, w_end
+            fl, tab, kind, phase, w, h, closed, active, delta, F, back, w_end
         )
         at_end = where > (0.999 if event == aim else 1.0 - 1e-7)
         if event >= 0 and (aim < 0 or not at_end):
@@ -714,8 +786,8 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
 
 
 @njit(cache=True, error_model="numpy")
-def propagate(fl, tab, packed, phase, duration, with_columns, rec, recording):
-    """Carry a packed state over one segment.
+def propagate(fl, tab, start, phase, duration, with_columns, rec, recording):
+    """Carry a state over one segment.
 
     Parameters
     ----------
@@ -723,8 +795,8 @@ def propagate(fl, tab, packed, phase, duration, with_columns, rec, recording):
         Numbers of the system.
     tab : GaussTables
         Collocation tables.
-    packed : (2n,)
-        Real coordinates of w at the start.
+    start : (2n,)
+        State z at the start.
     phase, duration : float
         Forcing phase at the start; duration in s. The duration follows the frequency
         (fixed phase), and the derivative with respect to ω takes that into account.
@@ -744,46 +816,36 @@ def propagate(fl, tab, packed, phase, duration, with_columns, rec, recording):
         How often each stop closed.
     status : int
     """
-    nz = fl.eigenvalues.size
-    size = fl.pack_mode.size
+    size = start.size
     n_stops = fl.gap.size
-    m = tab.nodes.size
-    w = np.zeros(nz, dtype=np.complex128)
-    columns = np.zeros((nz, size + 1), dtype=np.complex128)
+    turn = np.exp(1j * phase)
+    w = start - (fl.steady * turn).real
+    columns = np.zeros((size, size + 1))
     for c in range(size):
-        w[fl.pack_mode[c]] += packed[c] * fl.pack_unit[c]
-        columns[fl.pack_mode[c], c] = fl.pack_unit[c]
+        columns[c, c] = 1.0
+    columns[:, size] = -(fl.d_steady * turn).real
     closings = np.zeros(n_stops, dtype=np.int64)
     closed = np.zeros(n_stops, dtype=np.bool_)
     for s in range(n_stops):
         value, _, _, _ = output_derivatives(fl, s, w, phase, 0.0)
         closed[s] = value - fl.gap[s] > 0.0
     status = run_pieces(
-        fl, tab, w, columns, phase, duration, closed, closings, with_columns, rec, recording, m
+        fl, tab, w, columns, phase, duration, closed, closings, with_columns, rec, recording
     )
-    end = np.empty(size)
-    jacobian = np.empty((size, size))
-    d_omega = np.empty(size)
-    rate = np.empty(nz, dtype=np.complex128)
     end_phase = phase + fl.omega * duration
-    for k in range(nz):
-        rate[k] = fl.eigenvalues[k] * w[k]
+    turn = np.exp(1j * end_phase)
+    rate = np.zeros(size)
+    for b in range(fl.blocks.shape[0]):
+        for i in range(2):
+            for j in range(2):
+                rate[2 * b + i] += fl.blocks[b, i, j] * w[2 * b + j]
     for s in range(n_stops):
         value, _, _, _ = output_derivatives(fl, s, w, end_phase, 0.0)
-        delta = value - fl.gap[s]
-        if delta > 0.0:
-            force = fl.stiffness[s] * delta ** fl.exponent[s]
-            for k in range(nz):
-                rate[k] -= fl.force[k, s] * force
-    for r in range(size):
-        mode = fl.pack_mode[r]
-        turn = np.conj(fl.pack_unit[r])
-        end[r] = (w[mode] * turn).real
-        for c in range(size):
-            jacobian[r, c] = (columns[mode, c] * turn).real
-        total = columns[mode, size] - rate[mode] * (duration / fl.omega)
-        d_omega[r] = (total * turn).real
-    return end, jacobian, d_omega, closings, status
+        force, _ = law(value - fl.gap[s], fl.stiffness[s], fl.exponent[s])
+        rate -= fl.force[:, s] * force
+    end = w + (fl.steady * turn).real
+    d_omega = columns[:, size] + (fl.d_steady * turn).real - rate * (duration / fl.omega)
+    return end, columns[:, :size].copy(), d_omega, closings, status
 
 
 @njit(cache=True, error_model="numpy")
@@ -803,20 +865,18 @@ def switch_with(fl, w, phase, h, closed, closings):
 
 @njit(cache=True, error_model="numpy")
 def run_pieces(
-    fl, tab, w, columns, phase, duration, closed, closings, with_columns, rec, recording, m
+    fl, tab, w, columns, phase, duration, closed, closings, with_columns, rec, recording
 ):
     """Advance w and its sensitivities in place over a segment, piece by piece."""
-    nz = w.size
+    m = tab.nodes.size
     n_stops = closed.size
-    fastest = 0.0
-    for k in range(nz):
-        fastest = max(fastest, abs(fl.eigenvalues[k]))
-    h_cap = 0.6 * m / fastest
+    fastest = fastest_rate(fl)
+    h_cap = 0.6 * m / fastest if fastest > 0.0 else np.inf
     shortest = 1e-10 / max(fastest, fl.omega)
     t = 0.0
     start_switch = 0
     skip = 0.0
-    w_end = np.empty(nz, dtype=np.complex128)
+    w_end = np.empty(w.size)
     for _ in range(5000):
         remain = duration - t
         if remain <= 0.0:
@@ -834,9 +894,9 @@ def run_pieces(
                     first, stop = at, s
             if recording and record_piece(rec, here, first, FLIGHT, w) < 0:
                 return TOO_MANY_PIECES
-            fly(fl, w, first)
+            fly(fl, w.reshape(w.size, 1), first)
             if with_columns:
-                fly_columns(fl, columns, first)
+                fly(fl, columns, first)
             t = duration if stop < 0 else t + first
             skip = 0.0
             if stop >= 0:
@@ -857,8 +917,8 @@ def run_pieces(
         work = (
             np.empty((n_active, m)),
             np.empty((n_active, m)),
-            np.empty((m, nz), dtype=np.complex128),
-            np.empty((m, nz), dtype=np.complex128),
+            np.empty((n_active, m, w.size)),
+            np.empty((n_active, m, w.size)),
             np.empty((n_active * m, n_active * m)),
         )
         h_max = min(remain, h_cap)
@@ -867,7 +927,7 @@ def run_pieces(
         )
         if status != OK:
             return status
-        F, dF, E, E_inv, G = work
+        F, dF, to, back, G = work
         if h > 0.0:
             if recording:
                 n = record_piece(rec, here, h, kind, w)
@@ -876,7 +936,7 @@ def run_pieces(
                 for a in range(n_active):
                     rec.force[n, active[a], :] = F[a]
             if with_columns:
-                panel_columns(fl, tab, kind, here, t, h, active, dF, E, E_inv, G, columns)
+                panel_columns(fl, tab, kind, here, t, h, active, dF, to, back, G, columns)
             w[:] = w_end
             t = duration if h >= remain else t + h
         start_switch = 0
@@ -890,21 +950,52 @@ def run_pieces(
     return TOO_MANY_PIECES
 
 
+@njit(cache=True, error_model="numpy")
+def steady_response(blocks, drive, omega):
+    """Amplitude of the steady response to drive[0] + ω² drive[1] and its derivative, (2n,)."""
+    size = drive.shape[1]
+    steady = np.empty(size, dtype=np.complex128)
+    d_steady = np.empty(size, dtype=np.complex128)
+    for b in range(blocks.shape[0]):
+        i, j = 2 * b, 2 * b + 1
+        m00, m01 = 1j * omega - blocks[b, 0, 0], -blocks[b, 0, 1]
+        m10, m11 = -blocks[b, 1, 0], 1j * omega - blocks[b, 1, 1]
+        det = m00 * m11 - m01 * m10
+        x = drive[0, i] + omega * omega * drive[1, i]
+        y = drive[0, j] + omega * omega * drive[1, j]
+        steady[i] = (m11 * x - m01 * y) / det
+        steady[j] = (m00 * y - m10 * x) / det
+        x = 2.0 * omega * drive[1, i] - 1j * steady[i]
+        y = 2.0 * omega * drive[1, j] - 1j * steady[j]
+        d_steady[i] = (m11 * x - m01 * y) / det
+        d_steady[j] = (m00 * y - m10 * x) / det
+    return steady, d_steady
+
+
+@njit(cache=True, error_model="numpy")
+def output_amplitudes(rows, amplitude):
+    """Rows (n_out, 2n) times a complex amplitude (2n,)."""
+    outputs = np.zeros(rows.shape[0], dtype=np.complex128)
+    for out in range(rows.shape[0]):
+        for j in range(rows.shape[1]):
+            outputs[out] += rows[out, j] * amplitude[j]
+    return outputs
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def shoot(
-    eigenvalues,
+    blocks,
     rows,
+    rows1,
+    rows2,
+    bound3,
     force,
-    forced,
-    d_forced,
+    drive,
     gap,
     stiffness,
     exponent,
     mobility,
     duration_factor,
-    pack_mode,
-    pack_unit,
-    omega,
     tail,
     chi,
     integrate,
@@ -921,6 +1012,7 @@ def shoot(
     rec_w,
     rec_force,
     rec_count,
+    omega,
     nodes,
     phases,
     chained,
@@ -931,28 +1023,40 @@ def shoot(
 
     When `chained`, only the first node is used and each segment starts where the last one ended.
     """
+    steady, d_steady = steady_response(blocks, drive, omega)
     fl = FlowData(
-        eigenvalues,
+        blocks,
         rows,
+        rows1,
+        rows2,
+        bound3,
         force,
-        forced,
-        d_forced,
+        steady,
+        d_steady,
+        output_amplitudes(rows, steady),
+        output_amplitudes(rows, d_steady),
         gap,
         stiffness,
         exponent,
         mobility,
         duration_factor,
-        pack_mode,
-        pack_unit,
         omega,
         tail,
     )
     tab = GaussTables(
-        chi, integrate, weights, to_legendre, gauss_nodes, ends_nodes, barycentric, fine_grid, to_fine
+        chi,
+        integrate,
+        weights,
+        to_legendre,
+        gauss_nodes,
+        ends_nodes,
+        barycentric,
+        fine_grid,
+        to_fine,
     )
     rec = Record(rec_phase, rec_duration, rec_kind, rec_w, rec_force, rec_count)
     k = phases.size - 1
-    size = pack_mode.size
+    size = drive.shape[1]
     ends = np.zeros((k, size))
     kept = k if with_columns else 1
     jacobians = np.zeros((kept, size, size))

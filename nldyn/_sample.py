@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from nldyn._kernels import map_fraction
+from nldyn._kernels import block_exponential, map_fraction
 
 FLIGHT = -1
 
@@ -54,79 +54,79 @@ def antiderivative_weights(to_legendre, s, out):
 
 
 @njit(cache=True, error_model="numpy")
-def state_at(eigenvalues, force, chi, to_legendre, gauss_nodes, kind, h, start, forces, t, w):
+def state_at(blocks, force, chi, to_legendre, gauss_nodes, kind, h, start, forces, t, w):
     """Fill w with the homogeneous state a time t after the start of a piece."""
-    nz = eigenvalues.size
-    for k in range(nz):
-        w[k] = start[k] * np.exp(eigenvalues[k] * t)
+    w[:] = start
+    fly_state(blocks, w, t)
     if kind == FLIGHT:
         return
     m = gauss_nodes.size
-    s = stretched_time(kind, t / h)
     weights = np.empty(m)
-    antiderivative_weights(to_legendre, s, weights)
-    for k in range(nz):
-        for j in range(m):
-            drive = 0.0j
-            for a in range(forces.shape[0]):
-                drive += force[k, a] * forces[a, j]
-            share = h * weights[j] * map_slope(kind, gauss_nodes[j])
-            w[k] -= share * drive * np.exp(eigenvalues[k] * (t - h * chi[kind, j]))
+    antiderivative_weights(to_legendre, stretched_time(kind, t / h), weights)
+    drive = np.empty(w.size)
+    for j in range(m):
+        drive[:] = 0.0
+        for a in range(forces.shape[0]):
+            drive += force[:, a] * forces[a, j]
+        fly_state(blocks, drive, t - h * chi[kind, j])
+        w -= h * weights[j] * map_slope(kind, gauss_nodes[j]) * drive
+
+
+@njit(cache=True, error_model="numpy")
+def fly_state(blocks, w, t):
+    """Advance a homogeneous state in place by a time t without contact."""
+    for b in range(blocks.shape[0]):
+        e00, e01, e10, e11 = block_exponential(blocks[b], t)
+        x, y = w[2 * b], w[2 * b + 1]
+        w[2 * b], w[2 * b + 1] = e00 * x + e01 * y, e10 * x + e11 * y
 
 
 @njit(cache=True, error_model="numpy")
 def sample_states(
-    eigenvalues, force, omega, chi, to_legendre, gauss_nodes,
+    blocks, force, omega, chi, to_legendre, gauss_nodes,
     rec_phase, rec_duration, rec_kind, rec_w, rec_force, count, phases,
 ):  # fmt: skip
-    """Homogeneous states (n_phases, nz) at ascending forcing phases."""
-    states = np.empty((phases.size, eigenvalues.size), dtype=np.complex128)
+    """Homogeneous states (n_phases, 2n) at ascending forcing phases."""
+    states = np.empty((phases.size, force.shape[0]))
     piece = 0
     for i in range(phases.size):
         while piece + 1 < count and rec_phase[piece + 1] <= phases[i]:
             piece += 1
         t = (phases[i] - rec_phase[piece]) / omega
         state_at(
-            eigenvalues, force, chi, to_legendre, gauss_nodes, rec_kind[piece],
+            blocks, force, chi, to_legendre, gauss_nodes, rec_kind[piece],
             rec_duration[piece], rec_w[piece], rec_force[piece], t, states[i],
         )  # fmt: skip
     return states
 
 
 @njit(cache=True, error_model="numpy")
-def output_rate(eigenvalues, row, forced, omega, phase, w):
-    """Value and rate of the output ``Re(row @ w) + Re(forced e^{i phase})``."""
+def output_rate(row, row1, forced, omega, phase, w):
+    """Value and rate of the output ``row @ w + Re(forced e^{i phase})``."""
     turn = forced * np.exp(1j * phase)
     value = turn.real
     rate = -omega * turn.imag
     for k in range(w.size):
-        part = row[k] * w[k]
-        value += part.real
-        rate += (eigenvalues[k] * part).real
+        value += row[k] * w[k]
+        rate += row1[k] * w[k]
     return value, rate
 
 
 @njit(cache=True, error_model="numpy")
 def local_extremes(
-    eigenvalues, force, omega, chi, to_legendre, gauss_nodes,
-    rec_phase, rec_duration, rec_kind, rec_w, rec_force, count, row, forced,
+    blocks, force, omega, chi, to_legendre, gauss_nodes,
+    rec_phase, rec_duration, rec_kind, rec_w, rec_force, count, row, row1, forced, fastest,
 ):  # fmt: skip
     """Phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output.
 
-    The rate is sampled sixteen times per period of the fastest mode, its sign changes are
+    The rate is sampled sixteen times per period of the fastest mode (rad/s), its sign changes are
     refined by the secant and bisection in turn. The motion is taken as periodic: an extreme at
     its start counts once.
     """
-    nz = eigenvalues.size
-    fastest = omega
-    for k in range(nz):
-        fastest = max(fastest, abs(eigenvalues[k].imag))
     spacing = 2.0 * np.pi / (16.0 * fastest)
     found = np.empty((64, 3))
     n = 0
-    w = np.empty(nz, dtype=np.complex128)
-    turn = np.empty(nz, dtype=np.complex128)
-    flying = np.empty(nz, dtype=np.complex128)
+    w = np.empty(force.shape[0])
     first_value, first_sign, sign, t_old, rate_old = 0.0, 0, 0, 0.0, 0.0
     for piece in range(count):
         h = rec_duration[piece]
@@ -134,24 +134,14 @@ def local_extremes(
         pieces = int(np.ceil(h / spacing)) + 1
         if kind != FLIGHT:
             pieces += gauss_nodes.size
-        for k in range(nz):
-            turn[k] = np.exp(eigenvalues[k] * (h / pieces))
-            flying[k] = rec_w[piece, k]
         for i in range(pieces + 1):
             x = i / pieces
             t = h * (x if kind == FLIGHT else map_fraction(kind, x))
-            if kind == FLIGHT:
-                for k in range(nz):
-                    w[k] = flying[k]
-                    flying[k] *= turn[k]
-            else:
-                state_at(
-                    eigenvalues, force, chi, to_legendre, gauss_nodes, kind, h,
-                    rec_w[piece], rec_force[piece], t, w,
-                )  # fmt: skip
-            value, rate = output_rate(
-                eigenvalues, row, forced, omega, rec_phase[piece] + omega * t, w
-            )
+            state_at(
+                blocks, force, chi, to_legendre, gauss_nodes, kind, h,
+                rec_w[piece], rec_force[piece], t, w,
+            )  # fmt: skip
+            value, rate = output_rate(row, row1, forced, omega, rec_phase[piece] + omega * t, w)
             new_sign = 1 if rate > 0.0 else -1 if rate < 0.0 else sign
             if piece == 0 and i == 0:
                 first_value = value
@@ -165,11 +155,11 @@ def local_extremes(
                     if step % 3 != 2 and rate_hi != rate_lo:
                         middle = lo - rate_lo * (hi - lo) / (rate_hi - rate_lo)
                     state_at(
-                        eigenvalues, force, chi, to_legendre, gauss_nodes, kind, h,
+                        blocks, force, chi, to_legendre, gauss_nodes, kind, h,
                         rec_w[piece], rec_force[piece], middle, w,
                     )  # fmt: skip
                     value, rate_middle = output_rate(
-                        eigenvalues, row, forced, omega, rec_phase[piece] + omega * middle, w
+                        row, row1, forced, omega, rec_phase[piece] + omega * middle, w
                     )
                     if rate_middle * sign > 0.0:
                         lo, rate_lo = middle, rate_middle

@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine
-from nldyn.system import Real
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ class Branch:
 
 
 def stroboscopic(orbit: Orbit) -> Real:
-    """States (n, 2n_modes) at the start of each excitation period, packed."""
+    """States (n, 2n_modes) at the start of each excitation period."""
     problem = orbit.problem
     return problem.nodes(orbit.point)[:: problem.segments // problem.period]
 

@@ -12,10 +12,10 @@ from scipy.optimize import brentq
 
 from nldyn.branch import Branch, BranchPoint, SpecialPoint
 from nldyn.errors import SystemModelError
+from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine
 from nldyn.shooting import ShootingProblem
 from nldyn.special import Chord, LocateError, hidden_dip, special_points_between, tests
-from nldyn.system import Real
 
 
 @dataclass(frozen=True)

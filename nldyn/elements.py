@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 from nldyn.errors import SystemModelError
 
@@ -214,9 +215,11 @@ class HarmonicForce:
 
     Examples
     --------
-    >>> HarmonicForce("middle", 2.0).complex_amplitude(10.0)
-    ((2+0j), 0j)
+    >>> HarmonicForce("middle", 2.0).phasor
+    (2+0j)
     """
+
+    order: ClassVar[int] = 0  # the force is phasor * ω**order
 
     at: str
     amplitude: float
@@ -225,9 +228,10 @@ class HarmonicForce:
     def __post_init__(self) -> None:
         _check_excitation(self.at, "amplitude", self.amplitude, self.phase_deg)
 
-    def complex_amplitude(self, omega: float) -> tuple[complex, complex]:
-        """Complex amplitude in N at ω (rad/s) and its derivative with respect to ω."""
-        return self.amplitude * _phasor(self.phase_deg), 0j
+    @property
+    def phasor(self) -> complex:
+        """Complex amplitude in N."""
+        return self.amplitude * _turn(self.phase_deg)
 
 
 @dataclass(frozen=True)
@@ -245,9 +249,11 @@ class Unbalance:
 
     Examples
     --------
-    >>> Unbalance("middle", 2.0).complex_amplitude(10.0)
-    ((200+0j), (40+0j))
+    >>> Unbalance("middle", 2.0).phasor
+    (2+0j)
     """
+
+    order: ClassVar[int] = 2
 
     at: str
     mass_times_radius: float
@@ -256,10 +262,10 @@ class Unbalance:
     def __post_init__(self) -> None:
         _check_excitation(self.at, "mass_times_radius", self.mass_times_radius, self.phase_deg)
 
-    def complex_amplitude(self, omega: float) -> tuple[complex, complex]:
-        """Complex amplitude in N at ω (rad/s) and its derivative with respect to ω."""
-        unit = self.mass_times_radius * _phasor(self.phase_deg)
-        return unit * omega**2, 2.0 * unit * omega
+    @property
+    def phasor(self) -> complex:
+        """Complex amplitude over ω² in kg m."""
+        return self.mass_times_radius * _turn(self.phase_deg)
 
 
 Excitation = HarmonicForce | Unbalance
@@ -273,6 +279,6 @@ def _check_excitation(at: str, name: str, value: float, phase_deg: float) -> Non
     _finite(owner, "phase_deg", phase_deg)
 
 
-def _phasor(phase_deg: float) -> complex:
+def _turn(phase_deg: float) -> complex:
     phase = math.radians(phase_deg)
     return complex(math.cos(phase), math.sin(phase))

@@ -9,14 +9,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn._kernels import CONTACT_FAILED, OK, TOO_MANY_PIECES, FlowData, Record, shoot
+from nldyn._kernels import CONTACT_FAILED, OK, TOO_MANY_PIECES, Record, SystemData, shoot
 from nldyn._sample import local_extremes, sample_states
 from nldyn.gauss import GaussTables, gauss_tables
-from nldyn.system import Complex, Real, System
+from nldyn.linear import Real
+from nldyn.system import System
 
 __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
 
@@ -57,7 +59,7 @@ class Segments:
     Parameters
     ----------
     ends : (k, 2n)
-        Packed states at the ends.
+        States at the ends.
     jacobians : (k, 2n, 2n)
         Derivatives of the ends with respect to the starts.
     d_omega : (k, 2n)
@@ -78,8 +80,7 @@ class Segments:
 class FlowMap:
     """Exact flights and collocated contact phases of a system.
 
-    States are packed modal coordinates w of the homogeneous response, `LinearPart.pack`: the
-    physical state is ``Re(right @ (w + w_forced(phase)))``, see `to_packed` and `to_physical`.
+    States z are the pairs of coordinates of `LinearPart`; `to_state` and `to_modal` translate.
 
     Parameters
     ----------
@@ -95,8 +96,10 @@ class FlowMap:
     >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
     ...     excitation=[Unbalance("middle", 4.92e-6)])
     >>> flow = FlowMap(system)
-    >>> segments = flow.shoot(np.zeros((1, 2)), np.array([0.0, 2 * np.pi]), 2 * np.pi * 20.0)
-    >>> bool(np.all(segments.ends == 0.0))     # the steady linear response is w = 0
+    >>> omega = 2 * np.pi * 20.0
+    >>> steady = system.steady(omega).real[None]
+    >>> segments = flow.shoot(steady, np.array([0.0, 2 * np.pi]), omega)
+    >>> bool(np.allclose(segments.ends, steady, rtol=1e-12))
     True
     """
 
@@ -110,56 +113,40 @@ class FlowMap:
         return gauss_tables(self.options.nodes)
 
     @cached_property
-    def rows(self) -> Complex:
-        """Output rows (n_stops + n_interfaces, nz): penetrations first, then displacements."""
+    def rows(self) -> Real:
+        """Output rows (n_stops + n_interfaces, 2n): penetrations first, then displacements."""
         s = self.system
         vectors = [s.stop_vector(stop) for stop in s.stops] + list(s.participation.values())
-        return np.array([s.displacement_row(v) for v in vectors], dtype=complex).reshape(
-            len(vectors), s.linear.eigenvalues.size
-        )
+        return np.array([s.displacement_row(v) for v in vectors]).reshape(len(vectors), 2 * s.size)
 
     @cached_property
-    def _stops(self) -> tuple[Real, Real, Real, Real, Real]:
-        s = self.system
+    def rate_rows(self) -> Real:
+        """Rows of the outputs' velocities in flight."""
+        return self.system.linear.times_block(self.rows)
+
+    @cached_property
+    def _data(self) -> SystemData:
+        s, linear = self.system, self.system.linear
         vectors = [s.stop_vector(stop) for stop in s.stops]
-        exponents = np.array([stop.exponent for stop in s.stops], dtype=float)
-        factors = np.array([_duration_factor(p) for p in exponents], dtype=float)
-        return (
+        accelerations = linear.times_block(self.rate_rows)
+        thirds = linear.times_block(accelerations).reshape(-1, s.size, 2)
+        sizes = np.linalg.norm(thirds, axis=2)
+        bounds = np.multiply(sizes, linear.growth, out=np.zeros_like(sizes), where=sizes > 0.0)
+        force = np.array([s.force_column(v) for v in vectors]).reshape(-1, 2 * s.size)
+        exponents = [stop.exponent for stop in s.stops]
+        return SystemData(
+            linear.blocks,
+            self.rows,
+            self.rate_rows,
+            accelerations,
+            bounds,
+            np.ascontiguousarray(force.T),
+            s.drive,
             np.array([stop.gap for stop in s.stops], dtype=float),
             np.array([stop.stiffness for stop in s.stops], dtype=float),
-            exponents,
+            np.array(exponents, dtype=float),
             np.array([v @ v for v in vectors], dtype=float),
-            factors,
-        )
-
-    @cached_property
-    def _force(self) -> Complex:
-        s = self.system
-        columns = [s.force_column(s.stop_vector(stop)) for stop in s.stops]
-        nz = s.linear.eigenvalues.size
-        return np.ascontiguousarray(np.array(columns, dtype=complex).reshape(len(columns), nz).T)
-
-    def data(self, omega: float) -> FlowData:
-        """Numbers for the kernels at ω (rad/s)."""
-        linear = self.system.linear
-        forced = self.system.forced_response(omega)
-        value = self.rows @ forced.positive + np.conj(self.rows @ forced.negative)
-        slope = self.rows @ forced.d_positive + np.conj(self.rows @ forced.d_negative)
-        gap, stiffness, exponent, mobility, duration_factor = self._stops
-        return FlowData(
-            linear.eigenvalues,
-            self.rows,
-            self._force,
-            value,
-            slope,
-            gap,
-            stiffness,
-            exponent,
-            mobility,
-            duration_factor,
-            linear.pack_mode,
-            linear.pack_unit,
-            float(omega),
+            np.array([_duration_factor(p) for p in exponents], dtype=float),
             self.options.tail,
         )
 
@@ -172,7 +159,7 @@ class FlowMap:
         sensitivities: bool = True,
         chained: bool = False,
     ) -> Segments:
-        """Carry packed states over consecutive segments.
+        """Carry states over consecutive segments.
 
         Parameters
         ----------
@@ -191,7 +178,7 @@ class FlowMap:
         -------
         Segments
         """
-        return self._run(self.data(omega), nodes, phases, sensitivities, chained, None)
+        return self._run(omega, nodes, phases, sensitivities, chained, None)
 
     def trajectory(self, nodes: Real, phases: Real, omega: float) -> Trajectory:
         """Record the motion from phase to phase, restarted from each node state.
@@ -199,7 +186,7 @@ class FlowMap:
         Parameters
         ----------
         nodes : (k, 2n) array
-            Packed states at the first k phases.
+            States at the first k phases.
         phases : (k + 1,) array
             Forcing phases in radians.
         omega : float
@@ -209,11 +196,10 @@ class FlowMap:
         -------
         Trajectory
         """
-        data = self.data(omega)
         capacity = 64 * len(nodes)
         while True:
             rec = self._record(capacity)
-            segments = self._run(data, nodes, phases, False, False, rec)
+            segments = self._run(omega, nodes, phases, False, False, rec)
             used = int(rec.used[0])
             if used < capacity or capacity > 1 << 20:
                 pieces = Record(
@@ -224,14 +210,12 @@ class FlowMap:
                     rec.force[:used].copy(),
                     rec.used,
                 )
-                return Trajectory(
-                    self, data, pieces, float(phases[0]), segments.closings, segments.failure
-                )
+                return Trajectory(self, omega, pieces, segments.closings, segments.failure)
             capacity *= 4
 
     def _run(
         self,
-        data: FlowData,
+        omega: float,
         nodes: Real,
         phases: Real,
         sensitivities: bool,
@@ -239,9 +223,10 @@ class FlowMap:
         rec: Record | None,
     ) -> Segments:
         ends, jacobians, d_omegas, closings, status = shoot(
-            *data,
+            *self._data,
             *self.tables,
             *(self._no_record if rec is None else rec),
+            float(omega),
             np.ascontiguousarray(nodes, dtype=float),
             np.ascontiguousarray(phases, dtype=float),
             chained,
@@ -255,25 +240,21 @@ class FlowMap:
     def _no_record(self) -> Record:
         return self._record(1)
 
-    def to_physical(self, packed: Real, phase: float, omega: float) -> Real:
-        """Modal displacements and velocities (..., 2n) of packed states at a forcing phase."""
-        linear = self.system.linear
-        w = linear.unpack(np.asarray(packed)) + self.system.forced_response(omega).at_phase(phase)
-        return np.asarray((w @ linear.right.T).real)
+    def to_modal(self, states: Real) -> Real:
+        """Modal displacements and velocities (..., 2n) of states z."""
+        return np.asarray(np.asarray(states) @ self.system.linear.right.T)
 
-    def to_packed(self, state: Real, phase: float, omega: float) -> Real:
-        """Packed states of modal displacements and velocities (..., 2n) at a forcing phase."""
-        linear = self.system.linear
-        w = np.asarray(state) @ linear.left.T
-        return linear.pack(w - self.system.forced_response(omega).at_phase(phase))
+    def to_state(self, modal: Real) -> Real:
+        """States z of modal displacements and velocities (..., 2n)."""
+        return np.asarray(np.asarray(modal) @ self.system.linear.left.T)
 
     def _record(self, capacity: int) -> Record:
-        nz, n_stops = self._force.shape
+        n_stops = len(self.system.stops)
         return Record(
             np.empty(capacity),
             np.empty(capacity),
             np.empty(capacity, dtype=np.int64),
-            np.empty((capacity, nz), dtype=complex),
+            np.empty((capacity, 2 * self.system.size)),
             np.empty((capacity, n_stops, self.options.nodes)),
             np.zeros(1, dtype=np.int64),
         )
@@ -287,12 +268,10 @@ class Trajectory:
     ----------
     flow : FlowMap
         What made it.
-    data : FlowData
-        Numbers at its frequency.
+    omega : float
+        Excitation frequency in rad/s.
     record : Record
         Flights and contact panels.
-    start_phase : float
-        Forcing phase at the start.
     closings : (n_stops,)
         How often each stop closed.
     failure : str
@@ -300,15 +279,17 @@ class Trajectory:
     """
 
     flow: FlowMap
-    data: FlowData
+    omega: float
     record: Record
-    start_phase: float
     closings: NDArray[np.int64]
     failure: str
 
-    def homogeneous(self, phases: Real) -> Complex:
-        """Homogeneous states w (k, nz) at ascending forcing phases within the motion."""
-        return np.asarray(sample_states(*self._pieces, np.asarray(phases, dtype=float)))
+    def states(self, phases: Real) -> Real:
+        """States z (k, 2n) at ascending forcing phases within the motion."""
+        phases = np.asarray(phases, dtype=float)
+        turn = np.exp(1j * phases)[:, None]
+        steady = (self.flow.system.steady(self.omega) * turn).real
+        return np.asarray(sample_states(*self._pieces, phases) + steady)
 
     def extremes(self, output: int) -> Real:
         """Phase, value and kind (+1 maximum, -1 minimum) of an output's local extremes, (k, 3).
@@ -316,16 +297,21 @@ class Trajectory:
         The motion is taken as periodic. Outputs are the stops' penetrations without their gaps,
         then the interfaces' displacements.
         """
-        row, forced = self.data.rows[output], self.data.forced[output]
-        return np.asarray(local_extremes(*self._pieces, row, forced))
+        flow = self.flow
+        row = flow.rows[output]
+        forced = complex(row @ flow.system.steady(self.omega))
+        fastest = max(self.omega, flow.system.linear.fastest)
+        return np.asarray(
+            local_extremes(*self._pieces, row, flow.rate_rows[output], forced, fastest)
+        )
 
     @cached_property
-    def _pieces(self) -> tuple[object, ...]:
-        data, tables, rec = self.data, self.flow.tables, self.record
+    def _pieces(self) -> Any:
+        data, tables, rec = self.flow._data, self.flow.tables, self.record
         return (
-            data.eigenvalues,
+            data.blocks,
             data.force,
-            data.omega,
+            self.omega,
             tables.chi,
             tables.to_legendre,
             tables.nodes,

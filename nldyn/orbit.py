@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from nldyn.errors import SystemModelError
 from nldyn.flow import FlowMap, Trajectory
+from nldyn.linear import Real
 from nldyn.shooting import ShootingProblem
-from nldyn.system import Real, System
+from nldyn.system import System
 
 SEGMENTS_PER_PERIOD = 2
 
@@ -93,7 +94,7 @@ class Orbit:
     problem : ShootingProblem
         The equations that it solves.
     point : (N + 1,)
-        Packed states at the shooting phases and ln ω.
+        States z at the shooting phases and ln ω.
     monodromy : (2n, 2n)
         Derivative of the state after a period with respect to the state before.
     error : float
@@ -185,8 +186,8 @@ class Orbit:
 
     def _find_extremes(self, output: int) -> Extremes:
         found = self.trajectory.extremes(output)
-        gap = self.trajectory.data.gap
-        offset = gap[output] if output < gap.size else 0.0
+        stops = self.system.stops
+        offset = stops[output].gap if output < len(stops) else 0.0
         return Extremes(found[:, 0], found[:, 1] - offset, found[:, 2] > 0.0)
 
     @cached_property
@@ -244,10 +245,9 @@ class Orbit:
         phases = np.asarray(phases, dtype=float)
         within = phases % (2.0 * np.pi * self.period)
         order = np.argsort(within, kind="stable")
-        w = np.empty((phases.size, self.system.linear.eigenvalues.size), dtype=complex)
-        w[order] = self.trajectory.homogeneous(within[order])
-        forced = self.system.forced_response(self.omega).at_phase(phases)
-        return np.asarray(((w + forced) @ self.system.linear.right.T).real)
+        states = np.empty((phases.size, 2 * self.system.size))
+        states[order] = self.trajectory.states(within[order])
+        return self.problem.flow.to_modal(states)
 
     def history(self, samples: int = 1000) -> History:
         """Sample one period of the orbit.
@@ -371,7 +371,7 @@ def solve_orbit(
         start = np.zeros(problem.size)
         warm = np.linspace(0.0, 400.0 * np.pi, 201)
         start = flow.shoot(start[None], warm, omega, sensitivities=False, chained=True).ends[-1]
-        packed = spread(problem, start, omega)
+        nodes = spread(problem, start, omega)
     else:
         guess = np.atleast_2d(np.asarray(guess, dtype=float))
         if guess.shape not in ((1, problem.size), (problem.segments, problem.size)):
@@ -380,22 +380,21 @@ def solve_orbit(
                 f"got shape {guess.shape}"
             )
         if guess.shape[0] == problem.segments:
-            rows = zip(guess, problem.phases[:-1], strict=True)
-            packed = np.array([flow.to_packed(g, float(ph), omega) for g, ph in rows])
+            nodes = flow.to_state(guess)
         else:
-            packed = spread(problem, flow.to_packed(guess[0], 0.0, omega), omega)
-    return refine(problem, packed, omega, observe)
+            nodes = spread(problem, flow.to_state(guess[0]), omega)
+    return refine(problem, nodes, omega, observe)
 
 
 def refine(
     problem: ShootingProblem,
-    packed: Real,
+    nodes: Real,
     omega: float,
     observe: str,
     max_iterations: int = 25,
 ) -> Orbit:
-    """Newton's method at fixed frequency from packed states (k, 2n)."""
-    guess = np.append(packed.ravel(), math.log(omega))
+    """Newton's method at fixed frequency from states (k, 2n)."""
+    guess = np.append(nodes.ravel(), math.log(omega))
     row = np.zeros(guess.size)
     row[-1] = 1.0
     found = problem.correct(guess, row, max_iterations=max_iterations)

@@ -10,8 +10,9 @@ import numpy as np
 from nldyn.branch import minimal_period, same_orbit
 from nldyn.errors import SystemModelError
 from nldyn.flow import FlowMap
+from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, check_observe, refine, shooting_problem, spread
-from nldyn.system import Real, System
+from nldyn.system import System
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class SearchOptions:
         Seed of the random initial states: results are repeatable.
     """
 
-    starts: int = 5
+    starts: int = 10
     transient: int = 60
     recorded: int = 120
     candidates: int = 3
@@ -53,7 +54,7 @@ class Strobe:
     omega : float
         Excitation frequency in rad/s.
     runs : tuple of (k, 2n) arrays
-        Packed states at the start of each recorded excitation period.
+        States at the start of each recorded excitation period.
     """
 
     omega: float
@@ -71,13 +72,11 @@ def simulate_strobe(flow: FlowMap, frequency_hz: float, options: SearchOptions) 
     phases = np.linspace(0.0, 2.0 * np.pi * total, total + 1)
     n = 2 * flow.system.size
     rng = np.random.default_rng(options.seed)
-    rest = flow.to_packed(np.zeros(n), 0.0, omega)
-    forced = flow.system.forced_response(omega)
-    size = float(np.max(np.abs(forced.positive) + np.abs(forced.negative)))
+    size = float(np.abs(flow.system.steady(omega)).max())
     runs = []
     for index in range(options.starts):
         scale = 0.0 if index == 0 else size * 10.0 ** rng.uniform(-0.5, 1.0)
-        start = rest + scale * rng.standard_normal(n) / math.sqrt(n)
+        start = scale * rng.standard_normal(n) / math.sqrt(n)
         found = flow.shoot(start[None], phases, omega, sensitivities=False, chained=True)
         if not found.failure:
             runs.append(found.ends[options.transient :])
@@ -92,9 +91,9 @@ def orbits_from_strobe(
     found: list[Orbit] = []
     for states in strobe.runs:
         for start in _near_returns(states, period, options.candidates):
-            packed = spread(problem, states[start], strobe.omega)
+            nodes = spread(problem, states[start], strobe.omega)
             try:
-                orbit = refine(problem, packed, strobe.omega, observe, max_iterations=10)
+                orbit = refine(problem, nodes, strobe.omega, observe, max_iterations=10)
             except ConvergenceError:
                 continue
             if minimal_period(orbit) == period and not any(same_orbit(orbit, o) for o in found):

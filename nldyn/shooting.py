@@ -1,6 +1,6 @@
 """Multiple shooting: the boundary value problem of a periodic orbit and its Newton iterations.
 
-Unknowns are the packed states at k equally spaced phases of the orbit's period and p = ln ω;
+Unknowns are the states at k equally spaced phases of the orbit's period and p = ln ω;
 the equations say that each segment ends where the next one starts.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.flow import FlowMap
-from nldyn.system import Real
+from nldyn.linear import Real
 
 
 @dataclass(frozen=True)
@@ -105,14 +105,9 @@ class ShootingProblem:
         return point[:-1].reshape(self.segments, self.size)
 
     def scale(self, point: Real) -> float:
-        """Root mean square of the total modal displacement, the unit of relative steps."""
-        forced = self.flow.system.forced_response(float(np.exp(point[-1])))
+        """Root mean square of the modal displacements, the unit of relative steps."""
         states = point[:-1]
-        own = float(states @ states) / self.segments
-        steady = np.vdot(forced.positive, forced.positive) + np.vdot(
-            forced.negative, forced.negative
-        )
-        return math.sqrt(own + float(steady.real)) or 1.0
+        return math.sqrt(float(states @ states) / self.segments) or 1.0
 
     def metric(self, point: Real) -> Real:
         """Weights g of the arclength: ds² = Σ g Δ², relative in states and frequency."""

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from nldyn.branch import BranchPoint, SpecialPoint
+from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
-from nldyn.system import Complex, Real
 
 MULTIPLIER_TESTS = ("PD", "BP", "NS")
 

@@ -9,16 +9,11 @@ from typing import Protocol
 
 import numpy as np
 import scipy.linalg as sla
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from nldyn.elements import Damper, Excitation, Stop
 from nldyn.errors import SystemModelError
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-
-# Beyond this condition number of the eigenvector basis fewer than eight digits would be left.
-_MAX_CONDITION = 1e8
+from nldyn.linear import Complex, LinearPart, Real, linear_part
 
 
 class ReducedModelLike(Protocol):
@@ -31,78 +26,6 @@ class ReducedModelLike(Protocol):
     @property
     def participation(self) -> Mapping[str, Real]:
         """Displacement of each mass-normalised mode at each interface, shape (n,)."""
-
-
-@dataclass(frozen=True)
-class LinearPart:
-    """Eigenvalues and eigenvectors of the linear part, one of each complex pair.
-
-    The state ``x = (q, q')`` is ``Re(right @ w)`` and ``w = left @ x``; between contacts every
-    w decays and turns by itself: ``w' = λ w``. Each right vector has a displacement part of unit
-    length, so that |w| is a modal displacement.
-
-    Parameters
-    ----------
-    eigenvalues : (nz,) complex
-        λ in 1/s with non-negative imaginary part.
-    right : (2n, nz) complex
-        Eigenvectors (doubled for complex pairs).
-    left : (nz, 2n) complex
-        Rows of the inverse eigenvector matrix.
-    is_pair : (nz,) bool
-        Whether λ stands for a complex pair.
-    condition : float
-        Condition number of the eigenvector basis (energy-scaled).
-    """
-
-    eigenvalues: Complex
-    right: Complex
-    left: Complex
-    is_pair: NDArray[np.bool_]
-    condition: float
-
-    @cached_property
-    def pack_mode(self) -> NDArray[np.int64]:
-        """Mode of each real coordinate of a packed w, shape (2n,)."""
-        return np.repeat(np.arange(self.is_pair.size), np.where(self.is_pair, 2, 1))
-
-    @cached_property
-    def pack_unit(self) -> Complex:
-        """1 where a packed coordinate is a real part, 1j where an imaginary one; shape (2n,)."""
-        unit = np.ones(self.pack_mode.size, dtype=complex)
-        unit[1:][self.pack_mode[1:] == self.pack_mode[:-1]] = 1j
-        return unit
-
-    def pack(self, w: Complex) -> Real:
-        """Real coordinates (..., 2n) of complex w (..., nz)."""
-        return np.ascontiguousarray((w[..., self.pack_mode] * self.pack_unit.conj()).real)
-
-    def unpack(self, packed: Real) -> Complex:
-        """Complex w (..., nz) of real coordinates (..., 2n)."""
-        w = np.zeros((*packed.shape[:-1], self.is_pair.size), dtype=complex)
-        for column, (mode, unit) in enumerate(zip(self.pack_mode, self.pack_unit, strict=True)):
-            w[..., mode] += packed[..., column] * unit
-        return w
-
-
-@dataclass(frozen=True)
-class ForcedResponse:
-    """Steady response of the linear part to the excitation at one frequency.
-
-    ``w_p(t) = positive e^{iωt} + negative e^{-iωt}``, both (nz,); the d-fields are their
-    derivatives with respect to ω.
-    """
-
-    omega: float
-    positive: Complex
-    negative: Complex
-    d_positive: Complex
-    d_negative: Complex
-
-    def at_phase(self, phase: float | Real) -> Complex:
-        """w_p at forcing phase ωt, shape (..., nz)."""
-        turn = np.exp(1j * np.asarray(phase))[..., None]
-        return self.positive * turn + self.negative / turn
 
 
 @dataclass(frozen=True)
@@ -126,7 +49,7 @@ class System:
     ------
     SystemModelError
         If shapes disagree, a value is not finite or out of range, an interface is unknown,
-        or the damped linear part has no usable eigenvector basis.
+        or damping makes coupled modes inseparable.
 
     Examples
     --------
@@ -319,8 +242,8 @@ class System:
 
     @cached_property
     def linear(self) -> LinearPart:
-        """Eigenvalues and eigenvectors of the linear part."""
-        return _linear_part(self.natural_frequencies, self.total_damping)
+        """Independent pairs of coordinates of the linear part."""
+        return linear_part(self.natural_frequencies, self.total_damping)
 
     def stop_vector(self, stop: Stop) -> Real:
         """Modal vector c with penetration ``c @ q - gap``, shape (n,)."""
@@ -329,53 +252,32 @@ class System:
             c = c - self.participation[stop.against]
         return stop.direction * c
 
-    def displacement_row(self, phi: Real) -> Complex:
-        """Row that gives the displacement ``phi @ q = Re(row @ w)``, shape (nz,)."""
+    def displacement_row(self, phi: Real) -> Real:
+        """Row that gives the displacement ``phi @ q = row @ z``, shape (2n,)."""
         return np.asarray(phi @ self.linear.right[: self.size])
 
-    def force_column(self, phi: Real) -> Complex:
-        """Column by which a unit force on ``phi`` drives w, shape (nz,)."""
+    def force_column(self, phi: Real) -> Real:
+        """Column by which a unit force on ``phi`` drives z, shape (2n,)."""
         return np.asarray(self.linear.left[:, self.size :] @ phi)
 
-    def forced_response(self, omega: float) -> ForcedResponse:
-        """Steady linear response at ω (rad/s).
+    @cached_property
+    def drive(self) -> Complex:
+        """Excitation of z: Re((drive[0] + ω² drive[1]) e^{iωt}), shape (2, 2n)."""
+        drive = np.zeros((2, 2 * self.size), dtype=complex)
+        for source in self.excitation:
+            column = self.force_column(self.participation[source.at])
+            drive[source.order // 2] += source.phasor * column
+        return drive
+
+    def steady(self, omega: float) -> Complex:
+        """Amplitude (2n,) of the steady linear response z = Re(steady e^{iωt}) at ω (rad/s).
 
         Raises
         ------
         SystemModelError
             If an undamped mode is excited exactly at its frequency.
         """
-        if self._last_forced and self._last_forced[0].omega == omega:
-            return self._last_forced[0]
-        lam = self.linear.eigenvalues
-        drive = np.zeros((4, lam.size), dtype=complex)  # value and slope, e^{iωt} and e^{-iωt}
-        for source, column in zip(self.excitation, self._excitation_columns, strict=True):
-            amplitude, slope = source.complex_amplitude(omega)
-            drive += np.outer([amplitude, slope, np.conj(amplitude), np.conj(slope)], column)
-        up, down = 1j * omega - lam, -1j * omega - lam
-        if np.any(np.minimum(abs(up), abs(down)) < 1e-12 * omega):
-            raise SystemModelError(
-                f"the excitation at {omega / (2 * np.pi):g} Hz meets an undamped mode exactly; "
-                "give the mode some damping or move the frequency"
-            )
-        positive, negative = drive[0] / up, drive[2] / down
-        response = ForcedResponse(
-            omega,
-            positive,
-            negative,
-            (drive[1] - 1j * positive) / up,
-            (drive[3] + 1j * negative) / down,
-        )
-        self._last_forced[:] = [response]
-        return response
-
-    @cached_property
-    def _last_forced(self) -> list[ForcedResponse]:
-        return []  # the last answer: it is asked for several times at each frequency
-
-    @cached_property
-    def _excitation_columns(self) -> list[Complex]:
-        return [0.5 * self.force_column(self.participation[e.at]) for e in self.excitation]
+        return self.linear.steady(self.drive[0] + omega**2 * self.drive[1], omega)
 
     def _check_shapes(self) -> None:
         n = self.natural_frequencies.size
@@ -437,30 +339,3 @@ def _modal_damping(omega: Real, ratios: float | ArrayLike) -> Real:
     if np.any(zeta < 0.0):
         raise SystemModelError("modal_damping must not be negative")
     return np.diag(2.0 * zeta * omega)
-
-
-def _linear_part(omega: Real, damping: Real) -> LinearPart:
-    n = omega.size
-    if np.linalg.eigvalsh(0.5 * (damping + damping.T))[0] < -1e-12 * (1.0 + abs(damping).max()):
-        raise SystemModelError(
-            "the damping matrix must not feed energy in (it has a negative part)"
-        )
-    A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(omega**2), -damping]])
-    eigenvalues, vectors = np.linalg.eig(A)
-    vectors = vectors / np.linalg.norm(vectors[:n], axis=0)
-    scale = np.concatenate([np.maximum(omega, 1e-3 * max(omega.max(), 1.0)), np.ones(n)])
-    energy_vectors = scale[:, None] * vectors
-    condition = float(np.linalg.cond(energy_vectors / np.linalg.norm(energy_vectors, axis=0)))
-    if not condition < _MAX_CONDITION:
-        raise SystemModelError(
-            "the linear part has (nearly) coinciding modes that damping makes inseparable "
-            f"(eigenvector condition {condition:.1e}): a mode at 0 Hz without damping or a "
-            "critically damped mode; change its frequency or damping slightly"
-        )
-    left = np.linalg.inv(vectors)
-    tiny = 1e-13 * np.abs(eigenvalues).max()
-    keep = np.flatnonzero(eigenvalues.imag > -tiny)
-    keep = keep[np.argsort(np.abs(eigenvalues[keep]), kind="stable")]
-    is_pair = eigenvalues[keep].imag > tiny
-    right = vectors[:, keep] * np.where(is_pair, 2.0, 1.0)
-    return LinearPart(eigenvalues[keep], right, left[keep], is_pair, condition)

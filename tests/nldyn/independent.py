@@ -28,7 +28,7 @@ class Motion:
         """Time derivative of the state."""
         dx = self.A @ x
         for shape, source in self.sources:
-            amplitude, _ = source.complex_amplitude(omega)
+            amplitude = source.phasor * omega**source.order
             dx[self.n :] += shape * (amplitude * np.exp(1j * phase)).real
         for c, stiffness, exponent, gap in self.stops:
             depth = c @ x[: self.n] - gap
@@ -84,7 +84,6 @@ class Motion:
         return y[:size], y[size:].reshape(size, -1)
 
 
-def packed_map(system: System) -> np.ndarray:
-    """Matrix L with packed = L @ physical for the homogeneous part, (2n, 2n)."""
-    linear = system.linear
-    return np.array([linear.pack(linear.left @ e) for e in np.eye(2 * system.size)]).T
+def state_map(system: System) -> np.ndarray:
+    """Matrix L with z = L @ x for modal displacements and velocities x, (2n, 2n)."""
+    return system.linear.left

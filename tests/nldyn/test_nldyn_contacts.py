@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from independent import Motion, packed_map
+from independent import Motion, state_map
 from scipy.optimize import brentq
 
 from nldyn import (
@@ -33,12 +33,12 @@ def three_modes(*stops: Stop, damping: float = 0.01) -> System:
 def flow_and_jacobian(system, x0, phases, omega, options=None):
     """End state, Jacobian in physical coordinates, number of closings."""
     flow = FlowMap(system, options)
-    start = flow.to_packed(np.asarray(x0), phases[0], omega)
+    start = flow.to_state(np.asarray(x0))
     found = flow.shoot(start[None], np.array(phases), omega)
     assert found.failure == ""
-    L = packed_map(system)
+    L = state_map(system)
     jacobian = np.linalg.solve(L, found.jacobians[0] @ L)
-    return flow.to_physical(found.ends[0], phases[1], omega), jacobian, found.closings
+    return flow.to_modal(found.ends[0]), jacobian, found.closings
 
 
 # largest relative errors of state and Jacobian; the reference itself is good to 1e-12 and 5e-11
@@ -129,8 +129,6 @@ def test_short_contact_of_a_second_stop_while_the_first_is_closed():
     )  # fmt: skip
     x0 = [rest - 1e-3, 0.0]
     assert_agrees(system, x0, (0.0, 2 * np.pi), 2 * np.pi * 20.0, closings=[0, 1])
-
-
 
 
 @pytest.mark.parametrize(
@@ -254,19 +252,19 @@ def test_stop_from_the_other_side_is_the_mirrored_system():
 
 @pytest.mark.parametrize("modes", [1, 3])
 def test_frequency_derivative_against_runge_kutta(one_dof, modes):
-    """d_omega at fixed phases and fixed packed start, from sixth-order differences in ω.
+    """d_omega at fixed phases and fixed start, from sixth-order differences in ω.
 
     The end state depends smoothly on ω as long as every contact begins and ends with speed.
     """
     system = one_dof if modes == 1 else three_modes(Stop("middle", stiffness=5e9))
     x0 = np.array([-2e-6, 3e-3]) if modes == 1 else X0
     flow, omega, phases = FlowMap(system), OMEGA, np.array(TURN)
-    start = flow.to_packed(x0, phases[0], omega)
+    start = flow.to_state(x0)
 
     def end(w: float) -> np.ndarray:
-        x0 = flow.to_physical(start, phases[0], w)
+        x0 = flow.to_modal(start)
         x, _ = Motion(system).run(x0, TURN, w, tangent=False)
-        return flow.to_packed(x, phases[1], w)
+        return flow.to_state(x)
 
     h = 1e-3 * omega
     d1, d2, d3 = (end(omega + k * h) - end(omega - k * h) for k in (1, 2, 3))
@@ -419,11 +417,11 @@ def test_free_impact_has_the_duration_and_depth_of_its_energy(speed, exponent):
     )  # fmt: skip
     flow = FlowMap(system)
     omega = 2 * np.pi / duration  # the contact fills one period of an excitation that is absent
-    start = flow.to_packed(np.array([0.0, speed * math.sqrt(mass)]), 0.0, omega)
+    start = flow.to_state(np.array([0.0, speed * math.sqrt(mass)]))
     phases = np.array([0.0, np.pi, 2 * np.pi, 3 * np.pi])
     found = flow.shoot(start[None], phases, omega, chained=True)
     states = zip(found.ends, phases[1:], strict=True)
-    x = np.array([flow.to_physical(end, phase, omega) for end, phase in states]) / math.sqrt(mass)
+    x = np.array([flow.to_modal(end) for end, phase in states]) / math.sqrt(mass)
     slow = 2 * np.pi * natural_hz * duration  # what the weak spring and damper change, relative
     tolerance = 10 * (slow**2 + 2e-3 * slow) + 1e-9
     scale = np.array([peak, speed])

@@ -60,7 +60,7 @@ def test_volume_shrinks_as_liouville_says(state, exponent, gap, second, phase, t
     flow = FlowMap(system, FlowOptions(tail=1e-6))
     omega = 2 * np.pi * 25.0
     phases = np.array([phase, phase + turn])
-    start = flow.to_packed(state, phase, omega)
+    start = flow.to_state(state)
     found = flow.shoot(start[None], phases, omega)
     assert found.failure == ""
     modal = sum(2 * 0.01 * 2 * np.pi * f for f in FREQUENCIES)
@@ -91,7 +91,7 @@ def test_without_a_gap_motion_scales_with_force(state, exponent, decades):
         stop = Stop("middle", stiffness=stiffness * scale ** (1 - exponent), exponent=exponent)
         system = three_modes(stops=[stop], excitation=[Unbalance("middle", 5e-6 * scale)])
         flow = FlowMap(system)
-        start = flow.to_packed(scale * state, phases[0], omega)
+        start = flow.to_state(scale * state)
         found = flow.shoot(start[None], phases, omega)
         return found.ends[0] / scale, found.jacobians[0], found.closings[0]
 
@@ -132,9 +132,9 @@ def test_phase_of_the_excitation_shifts_time(state, degrees, kind):
 
     def run(phase_deg, offset):
         flow = FlowMap(three_modes(excitation=excitation(phase_deg)))
-        start = flow.to_packed(state, phases[0] + offset, omega)
+        start = flow.to_state(state)
         end = flow.shoot(start[None], phases + offset, omega, sensitivities=False).ends[0]
-        return flow.to_physical(end, phases[1] + offset, omega)
+        return flow.to_modal(end)
 
     early, late = run(degrees, 0.0), run(0.0, shift)
     np.testing.assert_allclose(early[:3], late[:3], rtol=0, atol=1e-9 * np.abs(late[:3]).max())

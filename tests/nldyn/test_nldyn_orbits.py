@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from conftest import make_one_dof
-from independent import Motion, packed_map
+from independent import Motion, state_map
 
 from nldyn import (
     ConvergenceError,
@@ -97,7 +97,7 @@ def test_orbit_closes_under_runge_kutta(make, frequency):
     n = system.size
     scale = np.repeat([np.abs(start[:n]).max(), orbit.omega * np.abs(start[:n]).max()], n)
     assert np.abs((end - start) / scale).max() < 3e-8
-    L = packed_map(system)
+    L = state_map(system)
     found = np.linalg.solve(L, orbit.monodromy @ L)
     weights = scale[:, None] / scale
     error = np.abs((found - jacobian) / weights).max() / np.abs(jacobian / weights).max()
@@ -135,7 +135,7 @@ def test_history_is_periodic_and_starts_at_the_shooting_point():
     assert history.time[-1] == pytest.approx(orbit.duration, rel=1e-14)
     np.testing.assert_allclose(history.modal[0], history.modal[-1], rtol=0, atol=1e-15)
     flow = orbit.problem.flow
-    start = flow.to_physical(orbit.problem.nodes(orbit.point)[0], 0.0, orbit.omega)
+    start = flow.to_modal(orbit.problem.nodes(orbit.point)[0])
     np.testing.assert_allclose(history.modal[0], start[:2], rtol=1e-12)
     np.testing.assert_allclose(history.modal_velocity[0], start[2:], rtol=1e-12)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from independent import Motion, packed_map
+from independent import Motion, state_map
 from scipy.optimize import brentq
 from scipy.special import beta
 
@@ -34,11 +34,11 @@ def through_contact(state, stiffness, exponent):
     )
     flow = FlowMap(system)
     phases = np.array([0.0, 0.35 * np.pi])
-    found = flow.shoot(flow.to_packed(state, 0.0, OMEGA)[None], phases, OMEGA)
-    L = packed_map(system)
+    found = flow.shoot(flow.to_state(state)[None], phases, OMEGA)
+    L = state_map(system)
     jacobian = np.linalg.solve(L, found.jacobians[0] @ L)
     weights = np.array([1.0, NATURAL])
-    end = flow.to_physical(found.ends[0], phases[1], OMEGA) / weights
+    end = flow.to_modal(found.ends[0]) / weights
     return system, end, jacobian * weights / weights[:, None]
 
 
@@ -171,7 +171,7 @@ def test_no_contact_is_passed_over(drawn):
     crossing = brentq(lambda x: float(motion(x)) - gap, t[first - 1], t[first], xtol=1e-17)
     system = motion.system(gap)
     flow = FlowMap(system)
-    start = flow.to_packed(motion.state, 0.0, motion.omega)
+    start = flow.to_state(motion.state)
 
     def closings(until: float) -> int:
         phases = np.array([0.0, motion.omega * until])

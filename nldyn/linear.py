@@ -1,0 +1,154 @@
+"""The linear part of a system: independent pairs of real coordinates, and its steady response."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sla
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from nldyn.errors import SystemModelError
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# Beyond this condition number of the basis fewer than eight digits would be left.
+_MAX_CONDITION = 1e8
+
+
+@dataclass(frozen=True)
+class LinearPart:
+    r"""Pairs of real coordinates that move by themselves between contacts.
+
+    The state :math:`x = (q, \dot q)` is ``right @ z`` and ``z = left @ x``; each pair follows
+    :math:`\dot z_b = A_b z_b` with a real 2×2 block. A mode that no damper couples to others is
+    a pair whatever its damping, also at 0 Hz and at critical damping; coupled modes are pairs of
+    the eigenvectors' planes. The length of z is a modal displacement.
+
+    Parameters
+    ----------
+    blocks : (n, 2, 2)
+        Matrices A_b in 1/s.
+    right, left : (2n, 2n)
+        Basis and its inverse.
+    growth : (n,)
+        Largest value of the norm of exp(A_b t) over t >= 0 (infinite for a free rigid body).
+    condition : float
+        Condition number of the basis in energy coordinates.
+    """
+
+    blocks: Real
+    right: Real
+    left: Real
+    growth: Real
+    condition: float
+
+    @property
+    def fastest(self) -> float:
+        """Largest imaginary part of an eigenvalue: the fastest vibration in rad/s."""
+        return float(np.abs(np.linalg.eigvals(self.blocks).imag).max())
+
+    def times_block(self, rows: Real) -> Real:
+        """Rows (..., 2n) times the block-diagonal matrix A."""
+        pairs = rows.reshape(*rows.shape[:-1], -1, 2)
+        product = np.einsum("...bi,bij->...bj", pairs, self.blocks)
+        return np.ascontiguousarray(product.reshape(rows.shape))
+
+    def steady(self, drive: Complex, omega: float) -> Complex:
+        """Amplitude f (2n,) of the steady response Re(f e^{iωt}) to Re(drive e^{iωt}).
+
+        Raises
+        ------
+        SystemModelError
+            If an undamped mode is excited exactly at its frequency.
+        """
+        matrices = 1j * omega * np.eye(2) - self.blocks
+        size = np.abs(self.blocks).max(axis=(1, 2)) + omega
+        if np.any(np.abs(np.linalg.det(matrices)) < 1e-12 * size**2):
+            raise SystemModelError(
+                f"the excitation at {omega / (2 * np.pi):g} Hz meets an undamped mode exactly; "
+                "give the mode some damping or move the frequency"
+            )
+        return np.asarray(np.linalg.solve(matrices, drive.reshape(-1, 2, 1)).ravel())
+
+
+def linear_part(omega: Real, damping: Real) -> LinearPart:
+    """Linear part of modes with circular frequencies (n,) and a damping matrix (n, n).
+
+    Raises
+    ------
+    SystemModelError
+        If the damping feeds energy in, or makes coupled modes inseparable.
+    """
+    n = omega.size
+    if np.linalg.eigvalsh(0.5 * (damping + damping.T))[0] < -1e-12 * (1.0 + abs(damping).max()):
+        raise SystemModelError(
+            "the damping matrix must not feed energy in (it has a negative part)"
+        )
+    unit = np.maximum(omega, 1e-3 * (omega.max() or 1.0))
+    blocks, columns, scales = [], [], []
+    groups, group_of = connected_components(damping != 0.0, directed=False)
+    for group in range(groups):
+        modes = np.flatnonzero(group_of == group)
+        A = _energy_matrix(omega[modes], unit[modes], damping[np.ix_(modes, modes)])
+        places = np.concatenate([modes, n + modes])
+        for plane in [np.eye(2)] if modes.size == 1 else _invariant_planes(A):
+            block = plane.T @ A @ plane
+            column = np.zeros((2 * n, 2))
+            column[places] = plane
+            blocks.append(block)
+            columns.append(column)
+            scales.append(max(np.sqrt(abs(np.linalg.det(block))), unit[modes].min()))
+    energy_basis = np.hstack(columns)
+    condition = float(np.linalg.cond(energy_basis))
+    if not condition < _MAX_CONDITION:
+        raise SystemModelError(
+            "the linear part has (nearly) coinciding modes that damping makes inseparable "
+            f"(condition of their basis {condition:.1e}); change a frequency or damping slightly"
+        )
+    to_state = 1.0 / np.concatenate([unit, np.ones(n)])
+    scale = np.repeat(scales, 2)
+    return LinearPart(
+        np.array(blocks),
+        to_state[:, None] * energy_basis * scale,
+        np.linalg.inv(energy_basis) / scale[:, None] / to_state,
+        np.array([_growth(block) for block in blocks]),
+        condition,
+    )
+
+
+def _energy_matrix(omega: Real, unit: Real, damping: Real) -> Real:
+    """Matrix of the state (unit·q, q'), in which energy is half the squared length."""
+    n = omega.size
+    return np.block([[np.zeros((n, n)), np.diag(unit)], [-np.diag(omega**2 / unit), -damping]])
+
+
+def _invariant_planes(A: Real) -> list[Real]:
+    """Orthonormal bases (2n, 2) of planes that A maps into themselves, slowest first."""
+    values, vectors = sla.eig(A)
+    tiny = 1e-12 * np.abs(values).max()
+    pairs = [(v.real, v.imag) for v in vectors.T[values.imag > tiny]]
+    order = [abs(x) for x in values[values.imag > tiny]]
+    real = np.flatnonzero(np.abs(values.imag) <= tiny)
+    real = real[np.argsort(values[real].real)]
+    for first, second in zip(real[::2], real[1::2], strict=True):
+        pairs.append((vectors[:, first].real, vectors[:, second].real))
+        order.append(abs(values[second]))
+    planes = [np.linalg.qr(np.column_stack(pair))[0] for pair in pairs]
+    return [planes[i] for i in np.argsort(order, kind="stable")]
+
+
+def _growth(block: Real) -> float:
+    """Upper bound of the norm of exp(block t) over all t >= 0."""
+    if np.linalg.eigvalsh(0.5 * (block + block.T))[-1] <= 1e-9 * np.abs(block).max():
+        return 1.0
+    values = np.linalg.eigvals(block)
+    slowest = np.abs(values).min()
+    if slowest <= 1e-12 * np.abs(values).max():
+        slowest = np.abs(values).max()
+    if slowest == 0.0:
+        return np.inf
+    times = np.geomspace(1e-4, 40.0, 200) / slowest
+    return 1.1 * max(float(np.linalg.norm(sla.expm(block * t), 2)) for t in times)
