@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from nldyn.branch import Branch, BranchPoint, SpecialPoint
-from nldyn.errors import SystemModelError
+from nldyn.errors import SystemModelError, check_whole
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine
 from nldyn.shooting import ShootingProblem
@@ -42,18 +42,15 @@ class ContinuationOptions:
     max_points: int = 5000
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.min_step <= self.first_step <= self.max_step:
+        if not 0.0 < self.min_step <= self.first_step <= self.max_step < math.inf:
             raise SystemModelError(
-                "continuation: steps must satisfy 0 < min_step <= first_step <= max_step"
+                "continuation: steps must satisfy 0 < min_step <= first_step <= max_step < inf"
             )
         if not 0.0 < self.max_angle < 1.5:
             raise SystemModelError(
                 f"continuation: max_angle must lie in (0, 1.5), got {self.max_angle:g}"
             )
-        if self.max_points < 2:
-            raise SystemModelError(
-                f"continuation: max_points must be at least 2, got {self.max_points}"
-            )
+        check_whole("continuation: max_points", self.max_points, 2)
 
 
 @dataclass
@@ -395,6 +392,8 @@ def make_branch(
 
 def check_range(range_hz: tuple[float, float]) -> tuple[float, float]:
     """A frequency range as two floats, or a SystemModelError that says what is wrong."""
+    if len(range_hz) != 2:
+        raise SystemModelError(f"range_hz must be two frequencies, got {len(range_hz)}")
     low, high = (float(f) for f in range_hz)
     if not (math.isfinite(low) and math.isfinite(high) and 0.0 < low < high):
         raise SystemModelError(

@@ -17,7 +17,7 @@ from nldyn.continuation import (
     switch_at_flip,
     trace,
 )
-from nldyn.errors import SystemModelError
+from nldyn.errors import SystemModelError, check_whole
 from nldyn.flow import FlowMap
 from nldyn.orbit import Orbit, check_observe
 from nldyn.search import SearchOptions, orbits_from_strobe, simulate_strobe
@@ -41,6 +41,11 @@ class Seed:
 
     period: int
     near_hz: float
+
+    def __post_init__(self) -> None:
+        check_whole("Seed: period", self.period, 1)
+        if not (math.isfinite(self.near_hz) and self.near_hz > 0.0):
+            raise SystemModelError(f"Seed: near_hz must be positive, got {self.near_hz:g}")
 
 
 @dataclass(frozen=True)
@@ -189,16 +194,18 @@ def diagram(
     """
     flow = system if isinstance(system, FlowMap) else FlowMap(system)
     low, high = check_range(range_hz)
+    for period in periods:
+        check_whole("periods: each", period, 1)
     wanted = sorted(set(periods))
-    if any(n < 1 for n in wanted) or not (wanted or seeds):
-        raise SystemModelError("periods must be a list of integers of at least 1")
+    if not (wanted or seeds):
+        raise SystemModelError("periods must not be empty when there are no seeds")
     for seed in seeds:
         if not low <= seed.near_hz <= high:
             raise SystemModelError(
                 f"subharmonic near_hz = {seed.near_hz:g} lies outside range_hz ({low:g}, {high:g})"
             )
-    if search_points < 1:
-        raise SystemModelError("search_points must be at least 1")
+    check_whole("search_points", search_points, 1)
+    check_whole("doublings", doublings, 0)
     box = _Collector(
         flow,
         (low, high),

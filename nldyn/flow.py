@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from nldyn._kernels import CONTACT_FAILED, OK, TOO_MANY_PIECES, Record, SystemData, shoot
 from nldyn._sample import local_extremes, sample_states
+from nldyn.errors import SystemModelError, check_whole
 from nldyn.gauss import GaussTables, gauss_tables
 from nldyn.linear import Real
 from nldyn.system import System
@@ -46,10 +47,9 @@ class FlowOptions:
     tail: float = 1e-4
 
     def __post_init__(self) -> None:
-        if not 4 <= self.nodes <= 40:
-            raise ValueError(f"FlowOptions: nodes must lie between 4 and 40, got {self.nodes}")
+        check_whole("FlowOptions: nodes", self.nodes, 4, 40)
         if not 0.0 < self.tail < 1.0:
-            raise ValueError(f"FlowOptions: tail must lie between 0 and 1, got {self.tail:g}")
+            raise SystemModelError(f"FlowOptions: tail must lie between 0 and 1, got {self.tail:g}")
 
 
 @dataclass(frozen=True)

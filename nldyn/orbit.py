@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.errors import SystemModelError
+from nldyn.errors import SystemModelError, check_whole
 from nldyn.flow import FlowMap, Trajectory
 from nldyn.linear import Real
 from nldyn.shooting import ShootingProblem
@@ -305,9 +305,13 @@ def check_observe(system: System, observe: str | None) -> str:
 
 def shooting_problem(flow: FlowMap, period: int, segments: int | None = None) -> ShootingProblem:
     """Shooting equations with two segments per excitation period unless told otherwise."""
-    if period < 1:
-        raise SystemModelError(f"period must be at least 1, got {period}")
-    return ShootingProblem(flow, period, segments or SEGMENTS_PER_PERIOD * period)
+    check_whole("period", period, 1)
+    if segments is None:
+        segments = SEGMENTS_PER_PERIOD * period
+    check_whole("segments", segments, 1)
+    if segments % period:
+        raise SystemModelError(f"segments must be a multiple of period {period}, got {segments}")
+    return ShootingProblem(flow, period, segments)
 
 
 class ConvergenceError(RuntimeError):
@@ -379,6 +383,8 @@ def solve_orbit(
                 f"guess must have {problem.size} entries (or {problem.segments} such rows), "
                 f"got shape {guess.shape}"
             )
+        if not np.all(np.isfinite(guess)):
+            raise SystemModelError("guess has an entry that is not finite")
         if guess.shape[0] == problem.segments:
             nodes = flow.to_state(guess)
         else:

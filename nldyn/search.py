@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nldyn.branch import minimal_period, same_orbit
-from nldyn.errors import SystemModelError
+from nldyn.errors import SystemModelError, check_whole
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, check_observe, refine, shooting_problem, spread
@@ -39,10 +39,9 @@ class SearchOptions:
 
     def __post_init__(self) -> None:
         for name in ("starts", "recorded", "candidates"):
-            if getattr(self, name) < 1:
-                raise SystemModelError(f"search: {name} must be at least 1")
-        if self.transient < 0:
-            raise SystemModelError("search: transient must not be negative")
+            check_whole(f"search: {name}", getattr(self, name), 1)
+        for name in ("transient", "seed"):
+            check_whole(f"search: {name}", getattr(self, name), 0)
 
 
 @dataclass(frozen=True)

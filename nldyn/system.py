@@ -281,6 +281,10 @@ class System:
 
     def _check_shapes(self) -> None:
         n = self.natural_frequencies.size
+        if self.natural_frequencies.ndim != 1:
+            raise SystemModelError(
+                f"frequencies_hz must be a list, got shape {self.natural_frequencies.shape}"
+            )
         if n == 0:
             raise SystemModelError("a system needs at least one mode")
         if np.any(self.natural_frequencies < 0.0):
@@ -291,6 +295,8 @@ class System:
             if phi.shape != (n,):
                 raise SystemModelError(
                     f"participation of '{name}' has {phi.size} entries but there are {n} modes"
+                    if phi.ndim == 1
+                    else f"participation of '{name}' must be a list, got shape {phi.shape}"
                 )
 
     def _check_interfaces(self) -> None:

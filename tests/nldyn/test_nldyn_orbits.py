@@ -260,10 +260,3 @@ def test_states_are_periodic_in_the_phase():
     np.testing.assert_allclose(
         orbit.states(phases + 2 * np.pi), orbit.states(phases), rtol=0, atol=1e-9
     )
-
-
-@pytest.mark.xfail(strict=True, reason="states at whole periods are not among the shooting points")
-@pytest.mark.parametrize(("period", "segments"), [(2, 1), (2, 3)])
-def test_segments_need_not_be_a_multiple_of_the_period(period, segments):
-    orbit = solve_orbit(make_one_dof(), 26.0, period, segments=segments)
-    assert minimal_period(orbit) == 1
