@@ -23,11 +23,12 @@ if TYPE_CHECKING:
 
 NOTHING_FOUND, BAD_INPUT, NO_GRAPHICS, INTERRUPTED = 1, 2, 3, 130
 
-scene_argument = click.argument("scene", type=click.Path(path_type=Path), metavar="SCENE.toml")
+any_path = click.Path(path_type=Path, readable=False)  # what is wrong with it is said later
+scene_argument = click.argument("scene", type=any_path, metavar="SCENE.toml")
 out_option = click.option(
     "--out",
     required=True,
-    type=click.Path(path_type=Path),
+    type=any_path,
     metavar="DIR",
     help="Directory for the results: new, empty, or of an earlier run.",
 )
@@ -87,9 +88,11 @@ def check(scene: Path) -> None:
     """Check a scene, and print the modes of its structure."""
     with plain_errors():
         from nldyn.scene import build_system, load_scene
+        from nldyn.scene_checks import check_computable
 
         loaded = load_scene(scene)
         click.echo(describe_system(build_system(loaded)))
+        check_computable(loaded, scene)
         click.echo(f"{scene}: no fault found")
 
 

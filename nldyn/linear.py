@@ -16,6 +16,7 @@ Complex = NDArray[np.complex128]
 
 # Beyond this condition number of the basis fewer than eight digits would be left.
 _MAX_CONDITION = 1e8
+_LARGEST_RATE = 1e100  # its square is far from the largest floating-point number
 
 
 @dataclass(frozen=True)
@@ -83,10 +84,12 @@ def linear_part(omega: Real, damping: Real) -> LinearPart:
         If the damping feeds energy in, or makes coupled modes inseparable.
     """
     n = omega.size
-    if np.linalg.eigvalsh(0.5 * (damping + damping.T))[0] < -1e-12 * (1.0 + abs(damping).max()):
+    if not (omega.max() < _LARGEST_RATE and abs(damping).max() < _LARGEST_RATE):
         raise SystemModelError(
-            "the damping matrix must not feed energy in (it has a negative part)"
+            f"frequencies_hz or damping beyond {_LARGEST_RATE:g} 1/s cannot be computed with"
         )
+    if np.linalg.eigvalsh(0.5 * (damping + damping.T))[0] < -1e-12 * (1.0 + abs(damping).max()):
+        raise SystemModelError("damping must not feed energy in (the matrix has a negative part)")
     unit = np.maximum(omega, 1e-3 * (omega.max() or 1.0))
     blocks, columns, scales = [], [], []
     groups, group_of = connected_components(damping != 0.0, directed=False)

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from nldyn.errors import SceneError, SystemModelError
 from nldyn.scene_checks import check_computable, check_mesh_names, check_ratio_count, check_scene
-from nldyn.scene_messages import KeyPath, from_validation, scene_error
+from nldyn.scene_messages import KeyPath, from_validation, scene_error, table_at
 from nldyn.scene_schema import ExcitationTable, PartTable, Scene, StopTable
 
 if TYPE_CHECKING:
@@ -64,15 +64,13 @@ def load_scene(path: str | Path) -> Scene:
     """
     file = Path(path)
     try:
-        text = file.read_bytes().decode("utf-8")
-    except FileNotFoundError:
-        raise SceneError(f"{file}: there is no such file") from None
-    except IsADirectoryError:
-        raise SceneError(f"{file}: is a folder, not a scene file") from None
+        content = file.read_bytes()
+    except (OSError, ValueError) as error:
+        raise SceneError(f"{file}: {_unreadable(error)}") from None
+    try:
+        text = content.decode("utf-8")
     except UnicodeDecodeError:
         raise SceneError(f"{file}: is not a TOML file (its text is not UTF-8)") from None
-    except OSError as error:
-        raise SceneError(f"{file}: cannot be read: {error.strerror}") from None
     return parse_scene(text, file)
 
 
@@ -102,9 +100,11 @@ def parse_scene(text: str, file: str | Path = "scene.toml") -> Scene:
     """
     file = Path(file)
     try:
-        scene = Scene.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
+        tables = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
         raise SceneError(f"{file}: is not valid TOML: {_lower_first(str(error))}") from None
+    try:
+        scene = Scene.model_validate(tables)
     except ValidationError as error:
         raise from_validation(file, Scene, error) from None
     scene._file, scene._text = file, text
@@ -141,8 +141,11 @@ def build_component(scene: Scene) -> fem.Component:
     if scene.mesh is None:
         raise scene_error(scene.file, ("mesh",), "is missing: the structure is not given by a mesh")
     path = scene.file.parent / scene.mesh.file
-    if not path.is_file():
-        raise scene_error(scene.file, ("mesh", "file"), f"names {path}, which does not exist")
+    try:
+        path.open("rb").close()
+    except (OSError, ValueError) as error:
+        fault = f"names {path}, which {_unreadable(error)}"
+        raise scene_error(scene.file, ("mesh", "file"), fault) from None
     with _told_as(scene, ("mesh", "file"), fem.ModelError):
         mesh = fem.read_mesh(path)
     check_mesh_names(scene, mesh, scene.file)
@@ -233,9 +236,10 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
             table = scene.matrices
             check_ratio_count(scene, len(table.mass), scene.file)
             first = _observed_first(scene, table.interfaces)
-            return System.from_matrices(
-                table.mass, table.stiffness, first, damping=table.damping, **acting
-            )
+            with _told_as(scene, ("matrices",), SystemModelError):
+                return System.from_matrices(
+                    table.mass, table.stiffness, first, damping=table.damping, **acting
+                )
         reduced = reduced or build_reduced(scene)
         check_ratio_count(scene, len(reduced.frequencies_hz), scene.file)
         return System.from_modal(
@@ -366,7 +370,21 @@ def _told_as(scene: Scene, key: KeyPath, *kinds: type[ValueError]) -> Iterator[N
     try:
         yield
     except kinds as error:
-        raise scene_error(scene.file, key, str(error).rstrip("."), sep=": ") from error
+        text = str(error).rstrip(".")
+        word, _, rest = text.partition(" ")
+        table = table_at(Scene, key)
+        if key and table is not None and word in table.model_fields:
+            raise scene_error(scene.file, (*key, word), rest) from error
+        raise scene_error(scene.file, key, text, sep=": ") from error
+
+
+def _unreadable(error: OSError | ValueError) -> str:
+    """Say why a file cannot be opened."""
+    if isinstance(error, FileNotFoundError):
+        return "does not exist"
+    if isinstance(error, IsADirectoryError):
+        return "is a folder"
+    return f"cannot be read: {_lower_first(getattr(error, 'strerror', None) or str(error))}"
 
 
 def _lower_first(text: str) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nldyn.errors import SceneError
 from nldyn.scene_messages import KeyPath, scene_error, show, unknown_name
@@ -20,12 +21,12 @@ class TaggedMesh(Protocol):
     """What the checks need of a mesh: the names of its parts and of its point sets."""
 
     @property
-    def parts(self) -> Mapping[str, object]:
-        """Parts by name."""
+    def parts(self) -> Mapping[str, NDArray[np.int64]]:
+        """Elements of the parts by name."""
 
     @property
-    def point_sets(self) -> Mapping[str, object]:
-        """Point sets by name."""
+    def point_sets(self) -> Mapping[str, NDArray[np.int64]]:
+        """Nodes of the point sets by name."""
 
 
 def check_scene(scene: Scene, file: Path) -> None:
@@ -42,13 +43,21 @@ def check_scene(scene: Scene, file: Path) -> None:
 
 
 def check_mesh_names(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
-    """Check that every part and point set named in the scene is in the mesh."""
+    """Check that the scene and the mesh agree on the names of parts and points."""
     assert scene.mesh is not None
     source = scene.mesh.file
     for name in scene.parts:
-        _require(name, mesh.parts, f"a part of the mesh {source}", file, ("parts",))
+        if name not in mesh.parts:
+            fault = unknown_name(name, mesh.parts, f"a part of the mesh {source}")
+            raise scene_error(file, ("parts", name), fault.removeprefix(f"'{name}' "))
+    _check_parts_complete(scene, mesh, file)
     for key, name in _points_used(scene):
         _require(name, mesh.point_sets, f"a point set of the mesh {source}", file, key)
+        count = len(mesh.point_sets[name])
+        if count != 1:
+            fault = f"'{name}' must be a single point, but holds {count} nodes of the mesh {source}"
+            raise scene_error(file, key, fault)
+    _check_interfaces_free(scene, file)
     if scene.mesh.mirror is not None:
         _check_mirror(scene, scene.mesh.mirror, file)
     for number, hinge in enumerate(scene.hinges):
@@ -71,6 +80,23 @@ def check_ratio_count(scene: Scene, count: int, file: Path) -> None:
     if isinstance(ratios, list) and len(ratios) != count:
         fault = f"has {len(ratios)} entries for a model with {count} modes"
         raise scene_error(file, ("damping", "modal_ratio"), fault)
+
+
+def _check_parts_complete(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
+    assert scene.mesh is not None
+    described = [mesh.parts[name] for name in scene.parts]
+    for name, elements in mesh.parts.items():
+        if not np.isin(elements, np.concatenate(described)).all():
+            fault = f"is missing: the mesh {scene.mesh.file} has a part '{name}'"
+            raise scene_error(file, ("parts", name), fault)
+
+
+def _check_interfaces_free(scene: Scene, file: Path) -> None:
+    held = {(support.at, direction) for support in scene.supports for direction in support.fixed}
+    for name, interface in scene.interfaces.items():
+        if (interface.at, interface.direction) in held:
+            fault = f"'{interface.direction}' is held by a support at '{interface.at}'"
+            raise scene_error(file, ("interfaces", name, "direction"), fault)
 
 
 def _check_mirror(scene: Scene, point: str, file: Path) -> None:

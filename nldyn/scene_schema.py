@@ -9,13 +9,35 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    field_validator,
+    model_validator,
+)
 
 from nldyn.scene_messages import quoted, show
 
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Matrix = list[list[float]]
+SMALLEST, LARGEST = 1e-50, 1e50
+
+
+def _plausible(value: float) -> float:
+    """Refuse what no unit explains, before its powers leave the range of floating-point numbers."""
+    if value != 0.0 and not SMALLEST <= abs(value) <= LARGEST:
+        raise ValueError(f"must be 0 or from {SMALLEST:g} to {LARGEST:g} in size, not {value:g}")
+    return value
+
+
+Number = Annotated[float, AfterValidator(_plausible)]
+Positive = Annotated[Number, Field(gt=0)]
+NotNegative = Annotated[Number, Field(ge=0)]
+Frequency = Annotated[float, Field(ge=1e-6, le=1e12)]
+ModeFrequency = Annotated[NotNegative, Field(le=1e12)]
+Period = Annotated[int, Field(ge=1, le=100)]
+Matrix = list[list[Number]]
 
 
 class Table(BaseModel):
@@ -112,7 +134,7 @@ class ReductionTable(Table):
     """``[reduction]``: which modes of the mesh's model are kept."""
 
     modes: Annotated[int, Field(ge=0)] | None = None
-    cutoff_hz: Positive | None = None
+    cutoff_hz: Frequency | None = None
     residual: bool = True
 
     @model_validator(mode="after")
@@ -124,8 +146,8 @@ class ReductionTable(Table):
 class ModalTable(Table):
     """``[modal]``: a structure given by its modes instead of a mesh."""
 
-    frequencies_hz: Annotated[list[NotNegative], Field(min_length=1)]
-    participation: Annotated[dict[str, list[float]], Field(min_length=1)]
+    frequencies_hz: Annotated[list[ModeFrequency], Field(min_length=1)]
+    participation: Annotated[dict[str, list[Number]], Field(min_length=1)]
 
 
 class MatricesTable(Table):
@@ -134,7 +156,7 @@ class MatricesTable(Table):
     mass: Annotated[Matrix, Field(min_length=1)]
     stiffness: Annotated[Matrix, Field(min_length=1)]
     damping: Matrix | None = None
-    interfaces: Annotated[dict[str, list[float]], Field(min_length=1)]
+    interfaces: Annotated[dict[str, list[Number]], Field(min_length=1)]
 
 
 class DampingTable(Table):
@@ -172,7 +194,7 @@ class StopTable(Table):
     radius: Positive | None = None
     youngs_modulus: Positive | None = None
     poissons_ratio: Annotated[float, Field(gt=-1, le=0.5)] | None = None
-    gap: float = 0.0
+    gap: Number = 0.0
     direction: Literal[1, -1] = 1
     against: str | None = None
 
@@ -183,6 +205,8 @@ class StopTable(Table):
 
     @model_validator(mode="after")
     def _complete(self) -> StopTable:
+        if self.against == self.at:
+            raise ValueError("needs another interface than its own in 'against'")
         sphere = ("radius", "youngs_modulus", "poissons_ratio")
         if self.law == "linear":
             _refuse(self, (*sphere, "exponent"), "a linear stop")
@@ -206,7 +230,7 @@ class ExcitationTable(Table):
     kind: Literal["unbalance", "harmonic"]
     mass_times_radius: Positive | None = None
     amplitude: Positive | None = None
-    phase_deg: float = 0.0
+    phase_deg: Number = 0.0
 
     @model_validator(mode="after")
     def _complete(self) -> ExcitationTable:
@@ -228,10 +252,10 @@ class ObserveTable(Table):
 class ContinuationTable(Table):
     """``[continuation]``: which branches of periodic orbits are followed, and how far."""
 
-    range_hz: list[Positive]
-    periods: Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=1)] = [1, 2, 3]
-    follow_doublings: Annotated[int, Field(ge=0)] = 0
-    search_points: Annotated[int, Field(ge=1)] = 12
+    range_hz: list[Frequency]
+    periods: Annotated[list[Period], Field(min_length=1)] = [1, 2, 3]
+    follow_doublings: Annotated[int, Field(ge=0, le=10)] = 0
+    search_points: Annotated[int, Field(ge=1, le=1000)] = 12
     max_step: Annotated[float, Field(ge=0.01, le=1.0)] = 0.05
 
     @field_validator("range_hz")
@@ -247,8 +271,8 @@ class ContinuationTable(Table):
 class SeedTable(Table):
     """``[[subharmonics]]``: where to look for the start of a branch by time simulation."""
 
-    period: Annotated[int, Field(ge=1)]
-    near_hz: Positive
+    period: Period
+    near_hz: Frequency
 
 
 class Scene(Table):

@@ -163,6 +163,8 @@ class System:
             squared, modes = sla.eigh(K, M)
         except sla.LinAlgError:
             raise SystemModelError("mass must be positive definite") from None
+        if not np.all(np.isfinite(squared)):
+            raise SystemModelError("mass is too small beside the stiffness to compute with")
         if squared[0] < -1e-10 * abs(squared[-1]):
             raise SystemModelError("stiffness must not be negative in any direction")
         omega = np.sqrt(np.maximum(squared, 0.0))

@@ -58,11 +58,11 @@ def test_the_scenes_that_the_faults_are_put_into_are_good(tmp_path):
 
 def test_missing_file(tmp_path):
     file = tmp_path / "none.toml"
-    assert refused(["check", str(file)]) == f"{file}: there is no such file"
+    assert refused(["check", str(file)]) == f"{file}: does not exist"
 
 
 def test_folder(tmp_path):
-    assert refused(["check", str(tmp_path)]) == f"{tmp_path}: is a folder, not a scene file"
+    assert refused(["check", str(tmp_path)]) == f"{tmp_path}: is a folder"
 
 
 def test_not_text(tmp_path):
@@ -128,7 +128,7 @@ def test_not_toml_names_the_line(tmp_path):
             "[5.0]",
             "continuation.range_hz must be two frequencies, [lowest, highest], not [5.0]",
         ),
-        ("[5.0, 90.0]", "[0.0, 9.0]", "continuation.range_hz[0] must be greater than 0, not 0.0"),
+        ("[5.0, 90.0]", "[0.0, 9.0]", "continuation.range_hz[0] must be at least 1e-06, not 0.0"),
         (
             'stops]]\nat = "middle"',
             'stops]]\nat = "midle"',
@@ -191,6 +191,32 @@ def test_not_toml_names_the_line(tmp_path):
         ),
         (
             "[5.0, 90.0]",
+            "[5.0, 1e300]",
+            "continuation.range_hz[1] must be at most 1e+12, not 1e+300",
+        ),
+        (
+            "[5.0, 90.0]",
+            "[5.0, 90.0]\nsearch_points = 1000000",
+            "continuation.search_points must be at most 1000, not 1000000",
+        ),
+        (
+            "[5.0, 90.0]",
+            "[5.0, 90.0]\nperiods = [1, 5000]",
+            "continuation.periods[1] must be at most 100, not 5000",
+        ),
+        (
+            "[5.0, 90.0]",
+            "[5.0, 90.0]\nfollow_doublings = 99",
+            "continuation.follow_doublings must be at most 10, not 99",
+        ),
+        ("5e9", "5e99", "stops[0].stiffness must be 0 or from 1e-50 to 1e+50 in size, not 5e+99"),
+        (
+            "5e9",
+            "5e9\nagainst = 'middle'",
+            "stops[0] needs another interface than its own in 'against'",
+        ),
+        (
+            "[5.0, 90.0]",
             "[5.0, 90.0]\nperiods = [1, 2.5]",
             "continuation.periods[1] must be a whole number, not 2.5",
         ),
@@ -212,7 +238,7 @@ def test_fault_in_modal_scene(tmp_path, old, new, sentence):
         (
             "[parts.leaf]",
             "[parts.laef]",
-            "parts 'laef' is not a part of the mesh MESH; did you mean 'leaf'?",
+            "parts.laef is not a part of the mesh MESH; did you mean 'leaf'?",
         ),
         (
             "[[supports]]",
@@ -225,6 +251,17 @@ def test_fault_in_modal_scene(tmp_path, old, new, sentence):
             "mesh.mirror 'foot' is not on a plane of symmetry, where [[supports]] fix "
             "['x', 'rotation'] or ['y', 'rotation'] and no more",
         ),
+        (
+            '[interfaces.middle]\nat = "middle"\ndirection = "y"',
+            '[interfaces.middle]\nat = "middle"\ndirection = "x"',
+            "interfaces.middle.direction 'x' is held by a support at 'middle'",
+        ),
+        (
+            'at = "foot"',
+            'at = "leaf"',
+            "supports[1].at 'leaf' is not a point set of the mesh MESH; known: 'corner', 'middle', "
+            "'foot'",
+        ),
         ("modes = 1", "modes = -1", "reduction.modes must be at least 0, not -1"),
         (
             "modes = 1",
@@ -232,6 +269,7 @@ def test_fault_in_modal_scene(tmp_path, old, new, sentence):
             "reduction has both 'modes' and 'cutoff_hz'; keep one",
         ),
         ("half_beam.msh", "full.msh", "mesh.file names FULL, which does not exist"),
+        ("half_beam.msh", "", "mesh.file names FOLDER, which is a folder"),
         (
             "density = 7746.0",
             "density = nan",
@@ -260,20 +298,21 @@ def test_fault_in_mesh_scene(tmp_path, old, new, sentence):
     path = mesh("half_beam.msh").as_posix()
     sentence = sentence.replace("MESH", path)
     sentence = sentence.replace("FULL", path.replace("half_beam", "full"))
+    sentence = sentence.replace("FOLDER", mesh("half_beam.msh").parent.as_posix())
     assert check(tmp_path, BEAM.replace(old, new, 1)) == f"scene.toml: {sentence}"
 
 
 def test_part_without_material(tmp_path):
     start, end = BEAM.index("[parts.leaf]"), BEAM.index("# Symmetry")
     said = check(tmp_path, BEAM[:start] + BEAM[end:])
-    assert said.startswith("scene.toml: ")
-    assert "the mesh has 'beam', 'leaf'" in said
+    path = mesh("half_beam.msh").as_posix()
+    assert said == f"scene.toml: parts.leaf is missing: the mesh {path} has a part 'leaf'"
 
 
 def test_mode_count_too_large(tmp_path):
     said = check(tmp_path, BEAM.replace("modes = 1", "modes = 1000"))
     assert re.fullmatch(
-        r"scene.toml: reduction: modes = 1000, but the component has only \d+ degrees of freedom",
+        r"scene.toml: reduction.modes = 1000, but the component has only \d+ degrees of freedom",
         said,
     )
 
@@ -294,6 +333,20 @@ def test_nothing_to_compute(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_check_tells_what_run_would_miss_after_printing_the_modes(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(MODAL[: MODAL.index("[continuation]")])
+    result = CliRunner().invoke(main, ["check", str(file)])
+    assert result.exit_code == 2
+    assert "13.1" in result.stdout and "no fault" not in result.stdout
+    assert result.stderr.startswith(f"nldyn: {file}: continuation is missing: ")
+
+
+def test_deep_nesting_and_long_numbers_are_not_toml(tmp_path):
+    for value in ("[" * 5000, "9" * 5000):
+        assert check(tmp_path, f"title = {value}").startswith("scene.toml: is not valid TOML: ")
+
+
 def test_no_structure(tmp_path):
     said = check(tmp_path, "title = 'empty'")
     assert said.startswith("scene.toml: gives no structure")
@@ -308,6 +361,10 @@ def test_matrices(tmp_path):
         (one, "[[1.0]]", "matrices.stiffness must have 2 rows of 2 numbers"),
         (one, "[[1.0, 0.5], [0.0, 1.0]]", "matrices.stiffness must be symmetric"),
         ("[[1.0, 2.0], [2.0, 1.0]]", one, "matrices.mass must be positive definite"),
+        (one, "[[1.0, 0.0], [0.0, -1.0]]", "matrices.stiffness must not be negative"),
+        (one, "[[1.0, 0.0], [0.0, 0.0]]", "matrices: nothing holds mode 1 at 0 Hz"),
+        ("[[1e-320, 0], [0, 1]]", one, "matrices.mass[0][0] must be 0 or from 1e-50"),
+        ("[[1e308, 0], [0, 1]]", one, "matrices.mass[0][0] must be 0 or from 1e-50"),
     ):
         assert check(tmp_path, base.format(mass, stiffness)).startswith(f"scene.toml: {sentence}")
 
