@@ -22,6 +22,8 @@ TWO_NODE_LINES: tuple[str, ...] = ("B21", "B23", "B31", "B31OS", "B33", "FRAME2D
 TWO_NODE_LINES += ("PIPE21", "PIPE31", "T2D2", "T3D2")
 THREE_NODE_LINES = ("B22", "B32", "B32OS", "PIPE22", "PIPE32", "T2D3", "T3D3")
 
+LONGEST_RANGE = 10_000_000
+
 
 @dataclass(frozen=True)
 class _Keyword:
@@ -76,6 +78,8 @@ def read_abaqus(path: str | Path) -> meshio.Mesh:
     for keyword in _keywords(deck.path):
         if keyword.name in _ACTIONS:
             _ACTIONS[keyword.name](deck, keyword)
+    if not deck.nodes:
+        raise deck.fail("is not an Abaqus input file with nodes (there is no *NODE)")
     return _to_meshio(deck)
 
 
@@ -157,6 +161,8 @@ def _read_set(deck: _Deck, keyword: _Keyword) -> None:
     for row in ([word for word in row if word] for row in keyword.rows):
         if "GENERATE" in keyword.parameters:
             first, last, step = [*(int(word) for word in row), 1][:3]
+            if step < 1 or last - first > LONGEST_RANGE * step:
+                raise deck.fail(f"set {name!r} cannot run from {first} to {last} by {step}")
             deck.grow(kind, name, list(range(first, last + 1, step)))
         else:
             for word in row:

@@ -13,11 +13,15 @@ from fem.errors import ModelError, quoted
 from fem.mesh import FloatArray, FrameMesh, IntArray
 
 SET_PREFIX = "set:"
+FARTHEST = 1e50
 
 
 def read_gmsh(path: Path) -> meshio.Mesh:
     """Read a Gmsh file that has its end: of one that is cut off, meshio reads what is there."""
-    if b"$EndElements" not in path.read_bytes():
+    content = path.read_bytes()
+    if b"$MeshFormat" not in content:
+        raise ModelError(f"{path}: is not a Gmsh file (there is no $MeshFormat)")
+    if b"$EndElements" not in content:
         raise ModelError(f"{path}: the Gmsh file is cut off (there is no $EndElements)")
     return meshio.gmsh.read(path)
 
@@ -71,13 +75,15 @@ def read_mesh(path: str | Path) -> FrameMesh:
         )
     if not path.is_file():
         raise ModelError(f"{path}: there is no such mesh file")
+    if path.stat().st_size == 0:
+        raise ModelError(f"{path}: the mesh file is empty")
     kind, read = READERS[path.suffix.lower()]
     try:
         return from_meshio(read(path), str(path))
     except ModelError:
         raise
     except (Exception, SystemExit) as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
+        reason = " ".join(str(error).split()) or "it is damaged or cut off"
         if "'gmsh:physical'" in reason:
             reason = "some curves or points have a physical group and some have none"
         if "zero-size array" in reason:
@@ -100,10 +106,11 @@ def from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> FrameMesh:
     """
     points = _three_coordinates(content, source)
     lines, parts = _lines_and_parts(content, source)
-    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(points) < FARTHEST).all(axis=1))
     if len(bad):
         raise ModelError(
             f"{source}: the coordinates of node {bad[0]} (counted from 0) are not finite numbers"
+            f" below {FARTHEST:g} m"
         )
     used = np.unique(lines)
     number = np.full(len(points), -1)

@@ -105,13 +105,27 @@ def branch_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
                 branch.name,
                 number,
                 orbit.period,
-                float(orbit.frequency_hz),
+                at_end(orbit.frequency_hz, diagram.range_hz),
                 float(orbit.max_abs_displacement),
                 float(orbit.max_penetration),
                 int(orbit.impacts),
                 int(orbit.stable),
                 abs(orbit.largest_multiplier),
             )
+
+
+def at_end(frequency_hz: float, range_hz: tuple[float, float]) -> float:
+    """Give the end of the range that a frequency meets, else the frequency itself.
+
+    Orbits keep the logarithm of their frequency, so that 90 Hz come back as 89.99999999999999.
+
+    Examples
+    --------
+    >>> at_end(89.99999999999999, (5.0, 90.0)), at_end(89.999, (5.0, 90.0))
+    (90.0, 89.999)
+    """
+    ends = (end for end in range_hz if math.isclose(frequency_hz, end, rel_tol=1e-14))
+    return float(next(ends, frequency_hz))
 
 
 def special_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
@@ -146,12 +160,12 @@ def summary(diagram: Diagram) -> Mapping[str, object]:
         "largest_relative_error": worst(orbit.error for orbit in orbits),
         "largest_liouville_error": worst(orbit.liouville_error for orbit in orbits),
         "notes": list(diagram.notes),
-        "branches": [_branch_summary(branch) for branch in diagram.branches],
+        "branches": [_branch_summary(branch, diagram.range_hz) for branch in diagram.branches],
     }
 
 
-def _branch_summary(branch: Branch) -> dict[str, object]:
-    hz = [float(orbit.frequency_hz) for orbit in branch.points]
+def _branch_summary(branch: Branch, range_hz: tuple[float, float]) -> dict[str, object]:
+    hz = [at_end(orbit.frequency_hz, range_hz) for orbit in branch.points]
     return {
         "name": branch.name,
         "period": branch.period,

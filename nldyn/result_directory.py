@@ -47,9 +47,14 @@ def check_directory(directory: str | Path) -> Path:
     True
     """
     try:
-        return _checked(Path(directory).resolve(), directory)
-    except OSError as error:
-        raise OutputError(f"{directory}: cannot be looked at: {error.strerror}") from error
+        target = _checked(Path(directory).resolve(), directory)
+        with _new_directory(target):
+            return target
+    except (OSError, ValueError, RuntimeError) as error:
+        if isinstance(error, OutputError):
+            raise
+        fault = getattr(error, "strerror", None) or error
+        raise OutputError(f"{directory}: cannot be made: {fault}") from error
 
 
 def _checked(target: Path, directory: str | Path) -> Path:
@@ -59,10 +64,24 @@ def _checked(target: Path, directory: str | Path) -> Path:
         raise OutputError(
             f"{directory}: holds files that were not written by nldyn; choose another directory"
         )
-    parent = next(folder for folder in target.parents if folder.exists())
-    if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
-        raise OutputError(f"{directory}: cannot be made, {parent} is not a folder to write in")
+    if target.is_mount():
+        raise OutputError(f"{directory}: cannot be replaced; choose a folder in it")
     return target
+
+
+@contextmanager
+def _new_directory(target: Path) -> Iterator[Path]:
+    """Make the hidden directory beside the wanted one; leave nothing of it behind."""
+    made = [folder for folder in target.parents if not folder.exists()]
+    new = target.with_name(f".{target.name}.{secrets.token_hex(4)}.new")
+    try:
+        new.mkdir(parents=True)
+        yield new
+    finally:
+        shutil.rmtree(new, ignore_errors=True)
+        for folder in made:
+            with suppress(OSError):
+                folder.rmdir()
 
 
 @contextmanager
@@ -98,21 +117,13 @@ def result_directory(directory: str | Path, kind: str) -> Iterator[Path]:
     '1'
     """
     target = check_directory(directory)
-    made = [folder for folder in target.parents if not folder.exists()]
-    new = target.with_name(f".{target.name}.{secrets.token_hex(4)}.new")
     try:
-        new.mkdir(parents=True)
-        yield new
-        _complete(new, target, kind)
-        _swap(new, target)
-    except BaseException as error:
-        shutil.rmtree(new, ignore_errors=True)
-        for folder in made:
-            with suppress(OSError):
-                folder.rmdir()
-        if isinstance(error, OSError):
-            raise OutputError(f"{directory}: cannot be written: {error}") from error
-        raise
+        with _new_directory(target) as new:
+            yield new
+            _complete(new, target, kind)
+            _swap(new, target)
+    except OSError as error:
+        raise OutputError(f"{directory}: cannot be written: {error}") from error
 
 
 def _complete(new: Path, target: Path, kind: str) -> None:

@@ -159,7 +159,7 @@ NODES = "*NODE\n1, 0, 0\n2, 1, 0\n3, 2, 0\n"
     ("text", "sentence"),
     [
         (NODES, "no line elements"),
-        ("", "no line elements"),
+        ("", "the mesh file is empty"),
         (NODES + "*ELEMENT, TYPE=B22\n1, 1, 2, 3\n", "'B22' are not straight two-node lines"),
         (NODES + "*ELEMENT, TYPE=B21\n1, 1, 8\n", "element 1 ends at node 8, which is not defined"),
         (NODES + "*ELEMENT, TYPE=B21\n1, 1, 2\n1, 2, 3\n", "element 1 is defined twice"),
@@ -227,10 +227,28 @@ def test_nonsense_in_a_file_is_one_sentence(tmp_path, extension, content):
 def test_a_file_that_is_cut_off_is_refused(tmp_path, name):
     whole = (DATA / name).read_bytes()
     path = tmp_path / name
-    for end in range(0, whole.rindex(b"$EndElements"), 7):
+    for end in range(len("$MeshFormat"), whole.rindex(b"$EndElements"), 7):
         path.write_bytes(whole[:end])
         with pytest.raises(fem.ModelError, match="cut off"):
             fem.read_mesh(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "sentence"),
+    [
+        ("a.vtu", b"", "the mesh file is empty"),
+        ("a.vtu", b'<VTKFile type="UnstructuredGrid">', "damaged or cut off"),
+        ("a.msh", b"<VTKFile>", r"is not a Gmsh file \(there is no \$MeshFormat\)"),
+        ("a.inp", b"<VTKFile>", r"is not an Abaqus input file with nodes \(there is no \*NODE\)"),
+        ("a.inp", b"*NODE\n1,0\n*NSET, NSET=q, GENERATE\n1,9999999999\n", "'q' cannot run from 1"),
+        ("a.inp", b"*NODE\n1,0\n*NSET, NSET=q, GENERATE\n1,2,0\n", "cannot run from 1 to 2 by 0"),
+        ("a.inp", b"*NODE\n1,0\n2,1e99\n*ELEMENT,TYPE=B21\n1,1,2\n", "node 1 .* below 1e.50 m"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_told(tmp_path, name, content, sentence):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(fem.ModelError, match=sentence):
+        fem.read_mesh(tmp_path / name)
 
 
 @pytest.mark.parametrize("name", ["gmsh22.msh", "gmsh41.msh", "gmsh_export.inp"])

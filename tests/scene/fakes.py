@@ -63,6 +63,7 @@ class FakeBranch:
 class FakeDiagram:
     branches: list
     notes: tuple = ()
+    range_hz: tuple = (5.0, 90.0)
 
 
 def resonance(period=1, low=5.0, high=90.0, count=600, unstable=(30.0, 40.0)):

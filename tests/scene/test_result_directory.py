@@ -1,6 +1,7 @@
 """Results appear whole or not at all, and nobody's files are lost."""
 
 import os
+import sys
 
 import pytest
 
@@ -119,8 +120,24 @@ def test_file_is_refused(tmp_path):
     place.write_text("")
     with pytest.raises(OutputError, match="is a file"):
         check_directory(place)
-    with pytest.raises(OutputError, match="not a folder"):
+    with pytest.raises(OutputError, match="cannot be made: Not a directory"):
         check_directory(place / "below")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
+def test_a_place_that_refuses_folders_is_found_before_the_work():
+    with pytest.raises(OutputError, match="/proc/foo: cannot be made"):
+        check_directory("/proc/foo")
+
+
+def test_a_name_that_is_too_long_is_found_before_the_work(tmp_path):
+    with pytest.raises(OutputError, match="cannot be made: File name too long"):
+        check_directory(tmp_path / ("x" * 250))
+
+
+def test_checking_leaves_nothing(tmp_path):
+    check_directory(tmp_path / "a" / "results")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_permissions_are_those_of_any_new_directory(tmp_path):

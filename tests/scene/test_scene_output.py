@@ -3,6 +3,7 @@
 import csv
 import json
 
+import numpy as np
 import pytest
 from fakes import FakeBranch, FakeDiagram, FakeNode, FakeOrbit, FakeSpecialPoint, diagram
 
@@ -52,6 +53,17 @@ def test_numbers_come_back_bit_for_bit(tmp_path):
     assert [float(row[3]), float(row[4]), float(row[5])] == [third, tiny, tiny / 7]
     assert row[:3] + row[6:] == ["a", "0", "3", "2", "0", "1.1"]
     assert float(read(tmp_path / "out" / "special_points.csv")[1][3]) == third
+
+
+def test_the_ends_of_the_range_are_written_as_they_were_given(tmp_path):
+    stored = [float(np.exp(np.log(2 * np.pi * hz))) / (2 * np.pi) for hz in (5.0, 89.999, 90.0)]
+    assert stored[2] != 90.0
+    nodes = [FakeNode(FakeOrbit(hz, 1e-4), hz) for hz in stored]
+    write_results(FakeDiagram([FakeBranch("a", 1, nodes, [])]), tmp_path / "out")
+    written = [row[3] for row in read(tmp_path / "out" / "branches.csv")[1:]]
+    assert written == ["5.0", repr(stored[1]), "90.0"]
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["branches"][0]["range_hz"] == [5.0, 90.0]
 
 
 def test_summary(tmp_path):
