@@ -1,5 +1,10 @@
 """Periodic orbits of reduced structures against stops: flow map, shooting, continuation."""
 
+from nldyn.kernel_cache import ensure_cache
+
+ensure_cache()  # before the kernels are imported
+
+# ruff: noqa: E402
 from nldyn.branch import Branch, BranchPoint, SpecialPoint
 from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
 from nldyn.diagram import Diagram, Seed, diagram

@@ -1,5 +1,5 @@
 """``python -m nldyn`` is the command line."""
 
-from nldyn.cli import main
+from nldyn_command import main
 
-main(prog_name="nldyn")
+main()

@@ -16,12 +16,14 @@ from typing import TYPE_CHECKING
 
 import click
 
+from nldyn_command import INTERRUPTED, STOPPED, interrupted
+
 if TYPE_CHECKING:
-    from nldyn.diagram import Diagram, Progress
+    from nldyn.diagram import Diagram
     from nldyn.elements import Stop
     from nldyn.system import System
 
-NOTHING_FOUND, BAD_INPUT, NO_GRAPHICS, INTERRUPTED = 1, 2, 3, 130
+NOTHING_FOUND, BAD_INPUT, NO_GRAPHICS = 1, 2, 3
 
 any_path = click.Path(path_type=Path, readable=False)  # what is wrong with it is said later
 scene_argument = click.argument("scene", type=any_path, metavar="SCENE.toml")
@@ -32,7 +34,7 @@ out_option = click.option(
     metavar="DIR",
     help="Directory for the results: new, empty, or of an earlier run.",
 )
-quiet_option = click.option("--quiet", is_flag=True, help="Show no progress bar.")
+quiet_option = click.option("--quiet", is_flag=True, help="Show no progress.")
 
 
 def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
@@ -65,13 +67,14 @@ def main() -> None:
 def run(scene: Path, out: Path, log: bool, quiet: bool) -> None:
     """Compute the branches of a scene, and write tables and a diagram."""
     with plain_errors():
+        from nldyn.progress import progress_line
         from nldyn.result_directory import check_directory
         from nldyn.scene import compute, load_scene
 
         start = time.perf_counter()
         loaded = load_scene(scene)
         check_directory(out)
-        with progress_bar(quiet) as report:
+        with progress_line(quiet) as report:
             diagram = compute(loaded, report)
         from nldyn.output import write_results
 
@@ -125,13 +128,14 @@ def render(
 ) -> None:
     """Draw mode shapes, deepest contact and one period in motion of a scene with a mesh."""
     with plain_errors():
+        from nldyn.progress import progress_line
         from nldyn.render import render_scene
         from nldyn.result_directory import check_directory
         from nldyn.scene import load_scene
 
         loaded = load_scene(scene)
         check_directory(out)
-        with progress_bar(quiet) as report:
+        with progress_line(quiet) as report:
             made = render_scene(
                 loaded, out, frequency_hz=frequency_hz, period=period, video=video, progress=report
             )
@@ -165,38 +169,8 @@ def plain_errors() -> Iterator[None]:
     except (KeyboardInterrupt, SystemError) as error:
         if not interrupted(error):
             raise
-        click.echo("nldyn: stopped by Ctrl-C, nothing is written", err=True)
+        click.echo(STOPPED, err=True)
         sys.exit(INTERRUPTED)
-
-
-def interrupted(error: BaseException | None) -> bool:
-    """Whether Ctrl-C is behind an error: within compiled code it comes as a SystemError."""
-    if error is None or isinstance(error, KeyboardInterrupt):
-        return error is not None
-    return interrupted(error.__cause__)
-
-
-@contextmanager
-def progress_bar(quiet: bool) -> Iterator[Progress]:
-    """Count the orbits on stderr, and show what is being computed."""
-    if quiet:
-        yield lambda what, frequency_hz: None
-        return
-    from tqdm import tqdm
-
-    shape = "{elapsed}  {n} orbits  {desc}"
-    pause = 0.1 if sys.stderr.isatty() else 10.0
-    with tqdm(bar_format=shape, leave=False, file=sys.stderr, mininterval=pause) as bar:
-        before = ""
-
-        def report(what: str, frequency_hz: float) -> None:
-            nonlocal before
-            where = f" at {frequency_hz:.2f} Hz" if frequency_hz else ""
-            bar.set_description_str(what + where, refresh=what != before)
-            bar.update(1 if frequency_hz else 0)
-            before = what
-
-        yield report
 
 
 def describe(diagram: Diagram, seconds: float, out: Path) -> str:

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_EXCEPTION, ProcessPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from multiprocessing.queues import SimpleQueue
 
 import cms
 from nldyn.continuation import ContinuationOptions
-from nldyn.diagram import Diagram, Seed, diagram
+from nldyn.diagram import Diagram, Progress, Seed, diagram
 from nldyn.elements import Stop
+from nldyn.progress import progress_line
 from nldyn.resources import example
 from nldyn.scene import build_component, build_system, load_scene
 from nldyn.system import System
@@ -50,7 +55,7 @@ class Job:
     search_points: int = 12
     options: ContinuationOptions | None = None
 
-    def run(self) -> Diagram:
+    def run(self, progress: Progress | None = None) -> Diagram:
         """Compute the diagram."""
         return diagram(
             self.system(),
@@ -59,6 +64,7 @@ class Job:
             seeds=self.seeds,
             search_points=self.search_points,
             options=self.options,
+            progress=progress,
         )
 
 
@@ -146,9 +152,28 @@ JOBS = (
 )
 
 
+Message = tuple[str, str, float]
+_tell: Callable[[Message], None]
+
+
+def _prepare_worker(messages: SimpleQueue[Message]) -> None:
+    """Let a worker process tell what it computes, and end when its parent ends."""
+    global _tell
+    _tell = messages.put
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
+
+
 def run_job(name: str) -> Diagram:
     """Compute the job of one name (in a worker process), with what the figures need of it."""
-    result = next(job for job in JOBS if job.name == name).run()
+    job = next(job for job in JOBS if job.name == name)
+    result = job.run(lambda what, frequency_hz: _tell((name, what, frequency_hz)))
     for branch in result.branches:
         for orbit in branch.points:
             _ = orbit.max_abs_displacement, orbit.max_penetration, orbit.stable
@@ -156,15 +181,46 @@ def run_job(name: str) -> Diagram:
 
 
 def run_jobs(workers: int) -> dict[str, Diagram]:
-    """Compute all jobs, the longest first, with a progress bar on stderr."""
-    from tqdm import tqdm
-
+    """Compute all jobs, the longest first, and say on stderr what is being computed."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: threads only hinder
     scene_system("one_dof")  # fail early, before any process is started
-    results: dict[str, Diagram] = {}
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        futures = {pool.submit(run_job, job.name): job.name for job in JOBS}
-        for future in tqdm(as_completed(futures), total=len(futures), desc="diagrams"):
-            results[futures[future]] = future.result()
-    return results
+    messages: SimpleQueue[Message] = context.SimpleQueue()
+    with (
+        progress_line() as report,
+        ProcessPoolExecutor(workers, context, _prepare_worker, (messages,)) as pool,
+        _ended_at_failure(),
+    ):
+        with _ctrl_c_for_parent_only():
+            futures = {job.name: pool.submit(run_job, job.name) for job in JOBS}
+        waiting = set(futures.values())
+        while waiting:
+            ended, waiting = wait(waiting, timeout=0.1, return_when=FIRST_EXCEPTION)
+            for future in ended:
+                future.result()  # or the error that ended it
+            done = f"{len(futures) - len(waiting)} of {len(futures)} diagrams"
+            while not messages.empty():
+                name, what, frequency_hz = messages.get()
+                report(f"{done}, {name}: {what}", frequency_hz)
+        return {name: future.result() for name, future in futures.items()}
+
+
+@contextmanager
+def _ctrl_c_for_parent_only() -> Iterator[None]:
+    """Start processes that ignore Ctrl-C, which a terminal sends to all of them."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _ended_at_failure() -> Iterator[None]:
+    """End the worker processes at once when something goes wrong."""
+    try:
+        yield
+    except BaseException:
+        for worker in multiprocessing.active_children():
+            worker.terminate()
+        raise

@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 from fakes import diagram
 
+import nldyn.progress
 import nldyn.scene
 from nldyn.cli import main
 from nldyn.resources import example
@@ -32,10 +33,11 @@ def computed(monkeypatch):
     monkeypatch.setattr(nldyn.scene, "compute", compute)
 
 
-def test_run(tmp_path, computed):
+def test_run(tmp_path, computed, monkeypatch):
+    monkeypatch.setattr(nldyn.progress, "FILE_PAUSE", 0.0)
     result = invoke("run", ONE_DOF, "--out", tmp_path / "out")
     assert result.exit_code == 0
-    assert "harmonic branch at 25.30 Hz" in result.stderr
+    assert result.stderr == "00:00  1 orbits, harmonic branch at 25.30 Hz\n"
     assert "note: no 1/5 orbit found near 62.2 Hz" in result.stdout
     assert "3 branches with 1100 points" in result.stdout
     assert "special points: 3 GR, 3 LP, 6 PD" in result.stdout
@@ -60,6 +62,10 @@ def test_short_run_from_end_to_end(tmp_path):
 def test_run_again_into_the_same_directory(tmp_path, computed):
     for _ in range(2):
         assert invoke("run", ONE_DOF, "--out", tmp_path / "out", "--quiet").exit_code == 0
+
+
+def test_short_run_into_a_file_says_nothing_on_the_way(tmp_path, computed):
+    assert invoke("run", ONE_DOF, "--out", tmp_path / "out").stderr == ""
 
 
 def test_quiet_run_says_nothing_on_stderr(tmp_path, computed):
@@ -125,5 +131,5 @@ def test_help_imports_nothing_heavy_of_its_own():
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()
-    heavy = {"numba", "scipy", "matplotlib", "pyvista", "skfem", "pydantic", "tqdm"}
+    heavy = {"numba", "scipy", "matplotlib", "pyvista", "skfem", "pydantic"}
     assert heavy.isdisjoint(loaded)

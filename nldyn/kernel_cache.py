@@ -1,0 +1,33 @@
+"""Where the compiled kernels are kept: beside the package, in the home directory, or nowhere."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import shutil
+import sys
+import tempfile
+
+import numba
+
+ADVICE = (
+    "nldyn: no folder to keep compiled code in, so each start compiles for a minute; "
+    "set NUMBA_CACHE_DIR to a folder to write in"
+)
+
+
+def ensure_cache() -> None:
+    """Give numba a folder for this process and its children where it finds none by itself."""
+    try:
+        numba.njit(cache=True)(_probe)
+    except RuntimeError:
+        folder = tempfile.mkdtemp(prefix="nldyn-")
+        atexit.register(shutil.rmtree, folder, ignore_errors=True)
+        os.environ["NUMBA_CACHE_DIR"] = folder
+        os.environ.setdefault("MPLCONFIGDIR", folder)  # matplotlib would complain in two lines
+        numba.config.reload_config()  # type: ignore[no-untyped-call]
+        print(ADVICE, file=sys.stderr)
+
+
+def _probe() -> None:
+    """Nothing: only its place in the file system counts."""
