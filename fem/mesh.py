@@ -138,7 +138,7 @@ class FrameMesh:
 
     def _check_elements(self) -> None:
         size = float(np.ptp(self.points, axis=0).max())
-        short = np.flatnonzero(self.lengths <= 1e-12 * size)
+        short = np.flatnonzero(self.lengths <= max(1e-12 * size, 1e-50))
         if len(short):
             raise ModelError(f"{self.source}: element {short[0]} has zero length")
         _, first, count = np.unique(

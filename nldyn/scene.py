@@ -68,7 +68,7 @@ def load_scene(path: str | Path) -> Scene:
     except (OSError, ValueError) as error:
         raise SceneError(f"{file}: {_unreadable(error)}") from None
     try:
-        text = content.decode("utf-8")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise SceneError(f"{file}: is not a TOML file (its text is not UTF-8)") from None
     return parse_scene(text, file)
@@ -185,7 +185,9 @@ def build_reduced(scene: Scene, component: fem.Component | None = None) -> cms.R
     component = component or build_component(scene)
     table = scene.reduction
     assert table is not None
-    with _told_as(scene, ("reduction",), cms.ReductionError):
+    pieces = _count_pieces(component.model.mesh)
+    hint = f"; the mesh is in {pieces} pieces that share no node" if pieces > 1 else ""
+    with _told_as(scene, ("reduction",), cms.ReductionError, hint=hint):
         return cms.reduce(
             component, modes=table.modes, cutoff_hz=table.cutoff_hz, residual=table.residual
         )
@@ -322,6 +324,17 @@ def _frame_model(scene: Scene, mesh: fem.FrameMesh) -> fem.FrameModel:
     )
 
 
+def _count_pieces(mesh: fem.FrameMesh) -> int:
+    """Count the pieces of a mesh that share no node."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count = len(mesh.points)
+    links = coo_array((mesh.lengths, (mesh.lines[:, 0], mesh.lines[:, 1])), shape=(count, count))
+    pieces, _ = connected_components(links, directed=False)
+    return int(pieces)
+
+
 def _part(table: PartTable) -> fem.BeamPart:
     import fem
 
@@ -365,12 +378,14 @@ def _observed_first(scene: Scene, interfaces: Any) -> dict[str, Any]:
 
 
 @contextmanager
-def _told_as(scene: Scene, key: KeyPath, *kinds: type[ValueError]) -> Iterator[None]:
+def _told_as(
+    scene: Scene, key: KeyPath, *kinds: type[ValueError], hint: str = ""
+) -> Iterator[None]:
     """Tell an error of a lower layer as one of this scene's."""
     try:
         yield
     except kinds as error:
-        text = str(error).rstrip(".")
+        text = str(error).rstrip(".") + hint
         word, _, rest = text.partition(" ")
         table = table_at(Scene, key)
         if key and table is not None and word in table.model_fields:

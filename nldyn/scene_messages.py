@@ -71,7 +71,7 @@ def _fault(model: type[BaseModel], detail: ErrorDetails) -> str:
         return f"must be {context['expected']}, not {show(given)}"
     if kind == "too_short":
         return "must not be empty"
-    if kind == "list_type" and isinstance(given, dict):
+    if kind == "list_type" and isinstance(given, dict) and table_at(model, (*detail["loc"], 0)):
         return f"must be written with two brackets: [[{format_key(detail['loc'])}]]"
     if kind == "model_type":
         return f"must be a table: [{format_key(detail['loc'])}]"

@@ -5,6 +5,7 @@ import re
 import pytest
 from click.testing import CliRunner
 
+import fem
 from nldyn.cli import main
 from nldyn.resources import example, mesh
 
@@ -155,6 +156,17 @@ def test_not_toml_names_the_line(tmp_path):
             "stiffness = 5e9",
             "law = 'hertzian'\nstiffness = 5e9",
             "stops[0].law must be 'hertz' or 'linear', not 'hertzian'",
+        ),
+        (
+            "[13.1, 125.1]",
+            "{a = 1}",
+            "modal.frequencies_hz must be a list in square brackets, not a table",
+        ),
+        (
+            "[5.0, 90.0]",
+            "[5.0, 5.000000000000001]",
+            "continuation.range_hz must run from the "
+            "lower to the higher frequency, not [5.0, 5.000000000000001]",
         ),
         ("[[stops]]", "[stops]", "stops must be written with two brackets: [[stops]]"),
         (
@@ -340,6 +352,23 @@ def test_check_tells_what_run_would_miss_after_printing_the_modes(tmp_path):
     assert result.exit_code == 2
     assert "13.1" in result.stdout and "no fault" not in result.stdout
     assert result.stderr.startswith(f"nldyn: {file}: continuation is missing: ")
+
+
+def test_a_byte_order_mark_is_passed_over(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(MODAL, encoding="utf-8-sig")
+    assert CliRunner().invoke(main, ["check", str(file)]).exit_code == 0
+
+
+def test_parts_that_only_touch(tmp_path):
+    """Two nodes in one place do not join the parts."""
+    points = {"middle": (0, 0), "corner": (1, 0), "top": (1, 0), "foot": (1, -0.1)}
+    loose = fem.frame_mesh(points, [("beam", "middle", "corner", 2), ("leaf", "top", "foot", 2)])
+    fem.write_mesh(loose, tmp_path / "loose.vtu")
+    text = BEAM.replace(mesh("half_beam.msh").as_posix(), "loose.vtu")
+    said = check(tmp_path, text)
+    assert said.startswith("scene.toml: reduction: the component floats (1 rigid-body mode): ")
+    assert said.endswith("; the mesh is in 2 pieces that share no node")
 
 
 def test_deep_nesting_and_long_numbers_are_not_toml(tmp_path):
