@@ -289,7 +289,7 @@ class Trajectory:
         phases = np.asarray(phases, dtype=float)
         turn = np.exp(1j * phases)[:, None]
         steady = (self.flow.system.steady(self.omega) * turn).real
-        return np.asarray(sample_states(*self._pieces, phases) + steady)
+        return self._evaluate(sample_states, phases) + steady
 
     def extremes(self, output: int) -> Real:
         """Phase, value and kind (+1 maximum, -1 minimum) of an output's local extremes, (k, 3).
@@ -301,14 +301,12 @@ class Trajectory:
         row = flow.rows[output]
         forced = complex(row @ flow.system.steady(self.omega))
         fastest = max(self.omega, flow.system.linear.fastest)
-        return np.asarray(
-            local_extremes(*self._pieces, row, flow.rate_rows[output], forced, fastest)
-        )
+        return self._evaluate(local_extremes, row, flow.rate_rows[output], forced, fastest)
 
-    @cached_property
-    def _pieces(self) -> Any:
+    def _evaluate(self, kernel: Any, *arguments: object) -> Real:
+        """Call a kernel of `_sample` on the recorded pieces."""
         data, tables, rec = self.flow._data, self.flow.tables, self.record
-        return (
+        found = kernel(
             data.blocks,
             data.force,
             self.omega,
@@ -321,7 +319,9 @@ class Trajectory:
             rec.w,
             rec.force,
             int(rec.used[0]),
+            *arguments,
         )
+        return np.asarray(found)
 
 
 def _duration_factor(p: float) -> float:

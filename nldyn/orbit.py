@@ -371,6 +371,7 @@ def solve_orbit(
     observe = check_observe(flow.system, observe)
     problem = shooting_problem(flow, period, segments)
     omega = 2.0 * math.pi * frequency_hz
+    flow.system.steady(omega)  # refuses the resonance of an undamped mode
     if guess is None:
         start = np.zeros(problem.size)
         warm = np.linspace(0.0, 400.0 * np.pi, 201)

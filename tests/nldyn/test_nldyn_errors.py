@@ -189,8 +189,11 @@ def test_matrices(changes, words):
 
 
 def test_modes_that_damping_makes_inseparable():
-    sentence(modal(frequencies_hz=[10.0, 20.0], modal_damping=[1.0, 0.1]), "critically damped")
-    sentence(modal(frequencies_hz=[0.0, 20.0]), "0 Hz")
+    """Two free bodies on one damper: a triple eigenvalue at zero with one chain."""
+    free = modal(
+        frequencies_hz=[0.0, 0.0], participation={"m": [1.0, 2.0]}, dampers=[Damper("m", 1.0)]
+    )
+    sentence(free, "coinciding modes", "damping")
 
 
 def test_undamped_mode_at_its_own_frequency():
