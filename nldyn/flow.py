@@ -289,7 +289,7 @@ class Trajectory:
         phases = np.asarray(phases, dtype=float)
         turn = np.exp(1j * phases)[:, None]
         steady = (self.flow.system.steady(self.omega) * turn).real
-        return self._evaluate(sample_states, phases) + steady
+        return np.asarray(self._evaluate(sample_states, phases) + steady)
 
     def extremes(self, output: int) -> Real:
         """Phase, value and kind (+1 maximum, -1 minimum) of an output's local extremes, (k, 3).

@@ -6,8 +6,8 @@ import itertools
 
 import numpy as np
 import pytest
-from conftest import RANGE_HZ, make_one_dof
 from independent import Motion
+from one_dof import RANGE_HZ, make_one_dof
 
 from nldyn import (
     ContinuationOptions,

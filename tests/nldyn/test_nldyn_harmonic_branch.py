@@ -12,8 +12,8 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from conftest import RANGE_HZ
 from independent import Motion
+from one_dof import RANGE_HZ
 
 from nldyn import continue_branch, solve_orbit
 from nldyn.peaks import resonance_peaks

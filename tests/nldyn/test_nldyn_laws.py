@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from conftest import make_one_dof
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from one_dof import make_one_dof
 
 from nldyn import (
     Damper,

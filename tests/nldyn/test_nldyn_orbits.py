@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from conftest import make_one_dof
 from independent import Motion, state_map
+from one_dof import make_one_dof
 
 from nldyn import (
     ConvergenceError,

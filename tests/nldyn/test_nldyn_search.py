@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import make_one_dof
 from independent import Motion
+from one_dof import make_one_dof
 
 from nldyn import FlowMap, SearchOptions, Seed, SystemModelError, diagram, find_orbits
 from nldyn.branch import minimal_period, same_orbit
