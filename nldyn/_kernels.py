@@ -1,7 +1,7 @@
 """Compiled kernels of the flow map: flights, contact phases, segments.
 
-All kernels that `shoot` calls are in this one file, because the compile cache looks only at the
-file of the function that is called: a change in another file would go unnoticed.
+All kernels that are called from here are in this one file, because the compile cache looks only
+at the file of the function that is called: a change in another file would go unnoticed.
 
 The state z is a list of pairs that move by themselves between contacts, z_b' = A_b z_b with real
 2×2 blocks; w is z without the steady response to the excitation.
@@ -21,39 +21,42 @@ The end state is a Gauss quadrature: order 2m with m nodes.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numba
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
-
-from nldyn.gauss import GaussTables
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-OK, TOO_MANY_PIECES, CONTACT_FAILED = range(3)
+njit: Any = numba.njit  # its stubs lack the options that spare what only Python callers need
+# kernels that are called by other kernels only
+inner = njit(cache=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+# those with one caller: every level of calls is optimised anew, so this saves compile time
+inlined = njit(cache=True, error_model="numpy", inline="always")
+
+OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_FULL = range(7)
 FLIGHT = -1
 
 
-class SystemData(NamedTuple):
-    """Numbers of a system, as the kernels need them.
+GAP, STIFFNESS, EXPONENT, MOBILITY, DURATION = range(5)  # columns of `stops`
 
-    The first rows of `rows` are the stops' penetration rows, then the observed outputs.
+
+class SystemData(NamedTuple):
+    """Numbers of a system, as the kernels need them: few arrays, since each one costs compile time.
+
+    Outputs are the penetrations of the stops, then the observed displacements.
     """
 
     blocks: Real  # (n, 2, 2)
-    rows: Real  # (n_out, 2n)
-    rows1: Real  # (n_out, 2n) rows of the velocities: rows @ A
-    rows2: Real  # (n_out, 2n) rows of the accelerations
+    rows: Real  # (3, n_out, 2n) outputs, their velocities and accelerations in flight
     bound3: Real  # (n_out, n) |third derivative| <= bound3 |w_b| at any later time
     force: Real  # (2n, n_stops): w' = A w - force @ F
     drive: Complex  # (2, 2n) excitation Re((drive[0] + ω² drive[1]) e^{iωt}) of z
-    gap: Real  # (n_stops,)
-    stiffness: Real  # (n_stops,)
-    exponent: Real  # (n_stops,)
-    mobility: Real  # (n_stops,) velocity jump per unit impulse, 1/kg
-    duration_factor: Real  # (n_stops,) contact duration = factor * peak / speed
+    # (n_stops, 5): gap; stiffness and exponent; velocity jump per unit impulse in 1/kg;
+    # duration of a free contact over (peak penetration / speed)
+    stops: Real
     tail: float  # largest relative Legendre tail accepted on a contact panel
 
 
@@ -62,24 +65,16 @@ class FlowData(NamedTuple):
 
     blocks: Real
     rows: Real
-    rows1: Real
-    rows2: Real
     bound3: Real
     force: Real
-    steady: Complex  # (2n,) z = w + Re(steady e^{iωt})
-    d_steady: Complex  # (2n,) its derivative with respect to ω
-    forced: Complex  # (n_out,) steady amplitude of each output
-    d_forced: Complex  # (n_out,) its derivative with respect to ω
-    gap: Real
-    stiffness: Real
-    exponent: Real
-    mobility: Real
-    duration_factor: Real
+    stops: Real
+    steady: Complex  # (2, 2n) z = w + Re(steady[0] e^{iωt}), and the derivative with respect to ω
+    forced: Complex  # (2, n_out) the same of the outputs
     omega: float
     tail: float
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def block_exponential(block, t):
     """The four entries of exp(block t), row by row (also for equal or zero eigenvalues)."""
     mean = 0.5 * (block[0, 0] + block[1, 1])
@@ -103,10 +98,10 @@ def block_exponential(block, t):
     return even + odd * half, odd * block[0, 1], odd * block[1, 0], even - odd * half
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def output_derivatives(fl, out, w, phase, t):
     """Value and first two time derivatives of output `out`, and a bound on the third, after t."""
-    turn = fl.forced[out] * np.exp(1j * (phase + fl.omega * t))
+    turn = fl.forced[0, out] * np.exp(1j * (phase + fl.omega * t))
     value = turn.real
     first = -fl.omega * turn.imag
     second = -fl.omega * fl.omega * turn.real
@@ -117,23 +112,23 @@ def output_derivatives(fl, out, w, phase, t):
         if t != 0.0:
             e00, e01, e10, e11 = block_exponential(fl.blocks[b], t)
             x, y = e00 * x + e01 * y, e10 * x + e11 * y
-        value += fl.rows[out, j] * x + fl.rows[out, j + 1] * y
-        first += fl.rows1[out, j] * x + fl.rows1[out, j + 1] * y
-        second += fl.rows2[out, j] * x + fl.rows2[out, j + 1] * y
+        value += fl.rows[0, out, j] * x + fl.rows[0, out, j + 1] * y
+        first += fl.rows[1, out, j] * x + fl.rows[1, out, j + 1] * y
+        second += fl.rows[2, out, j] * x + fl.rows[2, out, j + 1] * y
         bound += fl.bound3[out, b] * math.sqrt(x * x + y * y)
     return value, first, second, bound
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def output_noise(fl, out, w):
     """Rounding error to expect in an output: 4 units in the last place of its terms."""
-    total = abs(fl.forced[out])
+    total = abs(fl.forced[0, out])
     for j in range(w.size):
-        total += abs(fl.rows[out, j] * w[j])
+        total += abs(fl.rows[0, out, j] * w[j])
     return 1e-15 * total
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def fastest_rate(fl):
     """Largest |eigenvalue| of the blocks, in 1/s."""
     fastest = 0.0
@@ -146,7 +141,7 @@ def fastest_rate(fl):
     return fastest
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def safe_step(h, h1, h2, bound):
     """First positive root of h + h1 τ + h2 τ²/2 + bound τ³/6, for h <= 0.
 
@@ -186,7 +181,7 @@ def safe_step(h, h1, h2, bound):
     return max(tau, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def closing_time(fl, stop, w, phase, start, end):
     """First time in [start, end] at which a stop closes, or inf; no contact is passed over.
 
@@ -198,7 +193,7 @@ def closing_time(fl, stop, w, phase, start, end):
     t = start
     while t <= end:
         value, h1, h2, bound = output_derivatives(fl, stop, w, phase, t)
-        h = value - fl.gap[stop]
+        h = value - fl.stops[stop, GAP]
         if h >= 0.0 and h1 > 0.0:
             return t
         tau = safe_step(min(h, 0.0), h1, h2, bound)
@@ -210,9 +205,18 @@ def closing_time(fl, stop, w, phase, start, end):
     return np.inf
 
 
-@njit(cache=True, error_model="numpy")
+@inner
+def fly_state(fl, w, t):
+    """Advance a state (2n,) in place by a flight of duration t."""
+    for b in range(fl.blocks.shape[0]):
+        e00, e01, e10, e11 = block_exponential(fl.blocks[b], t)
+        x, y = w[2 * b], w[2 * b + 1]
+        w[2 * b], w[2 * b + 1] = e00 * x + e01 * y, e10 * x + e11 * y
+
+
+@inner
 def fly(fl, columns, t):
-    """Advance states or sensitivities (2n, n_columns) in place by a flight of duration t."""
+    """Advance sensitivities (2n, n_columns) in place by a flight of duration t."""
     for b in range(fl.blocks.shape[0]):
         e00, e01, e10, e11 = block_exponential(fl.blocks[b], t)
         for c in range(columns.shape[1]):
@@ -246,7 +250,7 @@ class Record(NamedTuple):
     used: NDArray[np.int64]
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def law(delta, stiffness, exponent):
     """Contact force and its derivative with respect to the penetration."""
     if delta <= 0.0:
@@ -260,7 +264,7 @@ def law(delta, stiffness, exponent):
     return slope * delta, exponent * slope
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def panel_responses(fl, tab, kind, h, active, to, back, G):
     """Fill what a panel of length h needs to know of the linear part.
 
@@ -276,7 +280,7 @@ def panel_responses(fl, tab, kind, h, active, to, back, G):
             e00, e01, e10, e11 = block_exponential(fl.blocks[b], t)
             i00, i01, i10, i11 = block_exponential(fl.blocks[b], -t)
             for a in range(na):
-                x, y = fl.rows[active[a], j], fl.rows[active[a], j + 1]
+                x, y = fl.rows[0, active[a], j], fl.rows[0, active[a], j + 1]
                 to[a, i, j] = x * e00 + y * e10
                 to[a, i, j + 1] = x * e01 + y * e11
                 x, y = fl.force[j, active[a]], fl.force[j + 1, active[a]]
@@ -292,7 +296,7 @@ def panel_responses(fl, tab, kind, h, active, to, back, G):
                     G[a * m + i, b * m + j] = h * tab.integrate[kind, i, j] * total
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def lu_solve(A, B):
     """Solve A X = B in place (X overwrites B, LU overwrites A), with row pivoting."""
     n = A.shape[0]
@@ -324,13 +328,13 @@ def lu_solve(A, B):
             B[k, j] = total * inverse
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def forced_output(fl, out, phase):
     """Steady output at a forcing phase."""
-    return (fl.forced[out] * np.exp(1j * phase)).real
+    return (fl.forced[0, out] * np.exp(1j * phase)).real
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, F, dF, to, back, G):
     """Newton's method for the penetrations at the nodes; delta (na, m) holds the guess.
 
@@ -347,17 +351,16 @@ def solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, F, dF, to, bac
             value = forced_output(fl, active[a], phase + fl.omega * h * tab.chi[kind, i])
             for k in range(w.size):
                 value += to[a, i, k] * w[k]
-            free[a * m + i] = value - fl.gap[active[a]]
+            free[a * m + i] = value - fl.stops[active[a], GAP]
     J = np.empty((size, size))
     step = np.empty((size, 1))
-    flat, flat_F, flat_dF = delta.reshape(size), F.reshape(size), dF.reshape(size)
     for _ in range(40):
         panel_forces(fl, active, delta, F, dF)
         for p in range(size):
-            total = free[p] - flat[p]
+            total = free[p] - delta[p // m, p % m]
             for q in range(size):
-                total -= G[p, q] * flat_F[q]
-                J[p, q] = G[p, q] * flat_dF[q]
+                total -= G[p, q] * F[q // m, q % m]
+                J[p, q] = G[p, q] * dF[q // m, q % m]
             J[p, p] += 1.0
             step[p, 0] = total
         lu_solve(J, step)
@@ -377,27 +380,30 @@ def solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, F, dF, to, bac
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def panel_forces(fl, active, delta, F, dF):
     """Fill F and its derivative dF at all nodes from the penetrations."""
     for a in range(active.size):
         for i in range(delta.shape[1]):
-            F[a, i], dF[a, i] = law(delta[a, i], fl.stiffness[active[a]], fl.exponent[active[a]])
+            F[a, i], dF[a, i] = law(
+                delta[a, i], fl.stops[active[a], STIFFNESS], fl.stops[active[a], EXPONENT]
+            )
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def panel_end(fl, tab, kind, w, h, active, F, back, w_end):
     """State w_end at the end of a panel from the forces at its nodes."""
-    w_end[:] = w
+    for k in range(w.size):
+        w_end[k] = w[k]
     for a in range(active.size):
         for j in range(tab.nodes.size):
             impulse = h * tab.weights[kind, j] * F[a, j]
             for k in range(w.size):
                 w_end[k] -= impulse * back[a, j, k]
-    fly(fl, w_end.reshape(w.size, 1), h)
+    fly_state(fl, w_end, h)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def panel_columns(fl, tab, kind, phase, t0, h, active, dF, to, back, G, columns):
     """Advance sensitivities (2n, n_columns) in place over a panel.
 
@@ -410,10 +416,9 @@ def panel_columns(fl, tab, kind, phase, t0, h, active, dF, to, back, G, columns)
     n_columns = columns.shape[1]
     J = np.empty((size, size))
     rhs = np.zeros((size, n_columns))
-    flat_dF = dF.reshape(size)
     for p in range(size):
         for q in range(size):
-            J[p, q] = G[p, q] * flat_dF[q]
+            J[p, q] = G[p, q] * dF[q // m, q % m]
         J[p, p] += 1.0
     for a in range(na):
         for i in range(m):
@@ -424,7 +429,7 @@ def panel_columns(fl, tab, kind, phase, t0, h, active, dF, to, back, G, columns)
                     rhs[p, c] += z * columns[k, c]
             t = h * tab.chi[kind, i]
             turn = np.exp(1j * (phase + fl.omega * t))
-            slope = fl.d_forced[active[a]] + 1j * (t0 + t) * fl.forced[active[a]]
+            slope = fl.forced[1, active[a]] + 1j * (t0 + t) * fl.forced[0, active[a]]
             rhs[p, n_columns - 1] += (slope * turn).real
     lu_solve(J, rhs)
     for a in range(na):
@@ -437,35 +442,44 @@ def panel_columns(fl, tab, kind, phase, t0, h, active, dF, to, back, G, columns)
     fly(fl, columns, h)
 
 
-@njit(cache=True, error_model="numpy")
-def legendre_tail(tab, values):
-    """Larger of the last two Legendre coefficients of the polynomial through node values."""
-    m = values.size
+@inner
+def legendre_tail(tab, values, a):
+    """Larger of the last two Legendre coefficients of the polynomial through row a of values."""
+    m = tab.nodes.size
     worst = 0.0
     for row in range(m - 2, m):
         total = 0.0
         for j in range(m):
-            total += tab.to_legendre[row, j] * values[j]
+            total += tab.to_legendre[row, j] * values[a, j]
         worst = max(worst, abs(total))
     return worst
 
 
-@njit(cache=True, error_model="numpy")
+@inner
+def largest(values, a):
+    """Largest value in row a."""
+    found = values[a, 0]
+    for j in range(1, values.shape[1]):
+        found = max(found, values[a, j])
+    return found
+
+
+@inner
 def resolved(fl, tab, noise, delta, F, dF):
     """Whether the Legendre tails of each force and of its slope are small beside their largest."""
     for a in range(F.shape[0]):
-        deepest = np.max(delta[a])
+        deepest = largest(delta, a)
         if deepest <= 10.0 * noise[a]:
             continue
         tail = max(fl.tail, 20.0 * noise[a] / deepest)
-        if legendre_tail(tab, F[a]) > tail * np.max(F[a]):
+        if legendre_tail(tab, F, a) > tail * largest(F, a):
             return False
-        if legendre_tail(tab, dF[a]) > 10.0 * tail * np.max(dF[a]):
+        if legendre_tail(tab, dF, a) > 10.0 * tail * largest(dF, a):
             return False
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def record_piece(rec, phase, h, kind, w):
     """Append a piece; return its index, or -1 when the record is full."""
     n = rec.used[0]
@@ -474,13 +488,16 @@ def record_piece(rec, phase, h, kind, w):
     rec.phase[n] = phase
     rec.duration[n] = h
     rec.kind[n] = kind
-    rec.w[n, :] = w
-    rec.force[n, :, :] = 0.0
+    for k in range(w.size):
+        rec.w[n, k] = w[k]
+    for a in range(rec.force.shape[1]):
+        for i in range(rec.force.shape[2]):
+            rec.force[n, a, i] = 0.0
     rec.used[0] = n + 1
     return n
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def expected_contact(fl, stop, w, phase):
     """Peak penetration, duration and time to release of a free impact through the present state.
 
@@ -489,16 +506,16 @@ def expected_contact(fl, stop, w, phase):
     is left at once.
     """
     value, speed, accel, _ = output_derivatives(fl, stop, w, phase, 0.0)
-    depth = max(value - fl.gap[stop], 0.0)
-    p = fl.exponent[stop]
-    rate = fl.stiffness[stop] * fl.mobility[stop]
+    depth = max(value - fl.stops[stop, GAP], 0.0)
+    p = fl.stops[stop, EXPONENT]
+    rate = fl.stops[stop, STIFFNESS] * fl.stops[stop, MOBILITY]
     static = (max(accel, 0.0) / rate) ** (1.0 / p)
     energy = 0.5 * speed * speed + rate * (depth ** (p + 1.0) + static ** (p + 1.0)) / (p + 1.0)
     if energy <= 0.0:
         return 0.0, 0.0, 0.0
     top_speed = np.sqrt(2.0 * energy)
     peak = (energy * (p + 1.0) / rate) ** (1.0 / (p + 1.0))
-    duration = fl.duration_factor[stop] * peak / top_speed
+    duration = fl.stops[stop, DURATION] * peak / top_speed
     left = duration * (0.5 + np.arcsin(speed / top_speed) / np.pi)
     if speed >= 0.0 and depth < static:  # pushed in from near rest
         left = duration
@@ -516,7 +533,7 @@ def expected_contact(fl, stop, w, phase):
     return peak, duration, left
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def profile_guess(tab, kind, h, peak, duration, left, delta_row):
     """Half-sine penetrations at the nodes to start Newton's method from."""
     for i in range(delta_row.size):
@@ -525,7 +542,7 @@ def profile_guess(tab, kind, h, peak, duration, left, delta_row):
         delta_row[i] = max(peak * np.sin(x), 1e-2 * peak)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def stretch_profile(tab, old_kind, new_kind, ratio, old, new):
     """Carry node values over to a panel `ratio` times as long, linearly in time."""
     m = old.size
@@ -543,7 +560,7 @@ def stretch_profile(tab, old_kind, new_kind, ratio, old, new):
             new[i] = old[j - 1] + (old[j] - old[j - 1]) * (x - x0) / (x1 - x0)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def map_fraction(kind, s):
     """Fraction of the panel that belongs to the stretched time s (see `gauss.time_map`)."""
     if kind == 0:
@@ -555,7 +572,7 @@ def map_fraction(kind, s):
     return 0.5 - 0.5 * np.cos(np.pi * s)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def interpolate(tab, values, s):
     """Polynomial through the values at 0, the nodes and 1, at s (barycentric formula)."""
     top, bottom = 0.0, 0.0
@@ -569,7 +586,7 @@ def interpolate(tab, values, s):
     return top / bottom
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def first_root(tab, values, noise):
     """First s at which the polynomial through `values` falls below -noise, or 2.
 
@@ -616,27 +633,34 @@ def first_root(tab, values, noise):
     return 2.0
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def first_event(fl, tab, kind, phase, w, h, closed, active, delta, F, back, w_end):
     """Stop that first opens or closes within a panel and the fraction of the panel, or (-1, 2)."""
     m = tab.nodes.size
     event, where = -1, 2.0
     position = -1
+    inner = np.empty((1, m))
     values = np.empty(m + 2)
     for s in range(closed.size):
         noise = output_noise(fl, s, w)
         start, _, _, _ = output_derivatives(fl, s, w, phase, 0.0)
         end, _, _, _ = output_derivatives(fl, s, w_end, phase + fl.omega * h, 0.0)
+        sign = 1.0 if closed[s] else -1.0  # the values are positive as long as nothing happens
         if closed[s]:
             position += 1
-            values[0], values[m + 1] = start - fl.gap[s], end - fl.gap[s]
-            values[1 : m + 1] = delta[position]
-        else:
-            values[0], values[m + 1] = fl.gap[s] - start, fl.gap[s] - end
-            node_outputs(fl, tab, kind, phase, w, h, active, F, back, s, values[1 : m + 1])
             for i in range(m):
-                values[i + 1] = fl.gap[s] - values[i + 1]
-        root = first_root(tab, values, noise + 4.0 * legendre_tail(tab, values[1 : m + 1]))
+                inner[0, i] = delta[position, i]
+        else:
+            node_outputs(fl, tab, kind, phase, w, h, active, F, back, s, inner)
+            for i in range(m):
+                inner[0, i] = fl.stops[s, GAP] - inner[0, i]
+        values[0], values[m + 1] = (
+            sign * (start - fl.stops[s, GAP]),
+            sign * (end - fl.stops[s, GAP]),
+        )
+        for i in range(m):
+            values[i + 1] = inner[0, i]
+        root = first_root(tab, values, noise + 4.0 * legendre_tail(tab, inner, 0))
         if root <= 1.0:
             fraction = map_fraction(kind, root)
             if fraction < where:
@@ -644,35 +668,38 @@ def first_event(fl, tab, kind, phase, w, h, closed, active, delta, F, back, w_en
     return event, where
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def node_outputs(fl, tab, kind, phase, w, h, active, F, back, out, values):
-    """Fill an output at the nodes of a panel, with the forces at work."""
+    """Fill an output at the nodes of a panel, (1, m), with the forces at work."""
     m = tab.nodes.size
     driven = np.empty(w.size)
     for i in range(m):
         t = h * tab.chi[kind, i]
-        driven[:] = w
+        for k in range(w.size):
+            driven[k] = w[k]
         for a in range(active.size):
             for j in range(m):
                 impulse = h * tab.integrate[kind, i, j] * F[a, j]
                 for k in range(w.size):
                     driven[k] -= impulse * back[a, j, k]
-        values[i] = free_output(fl, out, driven, t) + forced_output(fl, out, phase + fl.omega * t)
+        values[0, i] = free_output(fl, out, driven, t) + forced_output(
+            fl, out, phase + fl.omega * t
+        )
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def free_output(fl, out, w, t):
     """Output of the homogeneous state w after a flight of duration t."""
     value = 0.0
     for b in range(fl.blocks.shape[0]):
         j = 2 * b
         e00, e01, e10, e11 = block_exponential(fl.blocks[b], t)
-        value += fl.rows[out, j] * (e00 * w[j] + e01 * w[j + 1])
-        value += fl.rows[out, j + 1] * (e10 * w[j] + e11 * w[j + 1])
+        value += fl.rows[0, out, j] * (e00 * w[j] + e01 * w[j + 1])
+        value += fl.rows[0, out, j + 1] * (e10 * w[j] + e11 * w[j + 1])
     return value
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def guess_panel(fl, tab, phase, w, h, start_switch, active, delta):
     """Choose the kind and length of a panel and guess its penetrations; h bounds the length.
 
@@ -695,19 +722,24 @@ def guess_panel(fl, tab, phase, w, h, start_switch, active, delta):
         if duration > 0.0:
             profile_guess(tab, kind, length, peak, duration, left, delta[a])
         else:
-            delta[a, :] = 0.0
+            for i in range(tab.nodes.size):
+                delta[a, i] = 0.0
     return kind, length
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def keep_profile(tab, kind, new_kind, ratio, delta, guess):
     """Carry all node values over to a panel `ratio` times as long."""
     for a in range(delta.shape[0]):
         stretch_profile(tab, kind, new_kind, ratio, delta[a], guess)
-        delta[a, :] = np.maximum(guess, 1e-3 * np.max(guess))
+        top = 0.0
+        for i in range(guess.size):
+            top = max(top, guess[i])
+        for i in range(guess.size):
+            delta[a, i] = max(guess[i], 1e-3 * top)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta, work, w_end):
     """Solve one panel and choose its length, at most h_max.
 
@@ -749,10 +781,12 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
         if aim >= 0:
             value, speed, _, _ = output_derivatives(fl, aim, w_end, end_phase, 0.0)
             approaching = speed < 0.0 if closed[aim] else speed > 0.0
-            value -= fl.gap[aim]
+            value -= fl.stops[aim, GAP]
             dh = -value / speed if approaching else np.inf
             # the force vanishes there with its slope: an error ε of the instant costs ε^2.5
-            tight = 1e-9 if fl.exponent[aim] >= 1.5 else 1e-13  # a jump of the slope costs more
+            tight = (
+                1e-9 if fl.stops[aim, EXPONENT] >= 1.5 else 1e-13
+            )  # a jump of the slope costs more
             if abs(dh) <= tight * h or (approaching and abs(value) <= output_noise(fl, aim, w)):
                 if fine:
                     return OK, kind, h, aim
@@ -769,7 +803,7 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
         if kind % 2 == 1 and h < h_max:  # the release was expected here: follow it
             for a in range(active.size):
                 value, speed, _, _ = output_derivatives(fl, active[a], w_end, end_phase, 0.0)
-                dh = (fl.gap[active[a]] - value) / speed if speed < 0.0 else np.inf
+                dh = (fl.stops[active[a], GAP] - value) / speed if speed < 0.0 else np.inf
                 if dh < h:
                     aim = active[a]
                     h = min(h + dh, h_max)
@@ -785,8 +819,10 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
     return CONTACT_FAILED, kind, h, -1
 
 
-@njit(cache=True, error_model="numpy")
-def propagate(fl, tab, start, phase, duration, with_columns, rec, recording):
+@inlined
+def propagate(
+    fl, tab, start, phase, duration, with_columns, rec, recording, end, jacobian, d_omega, closings
+):
     """Carry a state over one segment.
 
     Parameters
@@ -805,30 +841,32 @@ def propagate(fl, tab, start, phase, duration, with_columns, rec, recording):
     rec, recording : Record, bool
         Where to record the pieces, and whether to.
 
+    end : (2n,)
+        Filled with the state at the end.
+    jacobian : (2n, 2n)
+        Filled with the derivative of the end with respect to the start, if wanted.
+    d_omega : (2n,)
+        Filled with the derivative of the end with respect to ω.
+    closings : (n_stops,)
+        Increased by how often each stop closed.
+
     Returns
     -------
-    end : (2n,)
-    jacobian : (2n, 2n)
-        Derivative of the end with respect to the start.
-    d_omega : (2n,)
-        Derivative of the end with respect to ω.
-    closings : (n_stops,)
-        How often each stop closed.
     status : int
     """
     size = start.size
-    n_stops = fl.gap.size
+    n_stops = fl.stops.shape[0]
     turn = np.exp(1j * phase)
-    w = start - (fl.steady * turn).real
+    w = np.empty(size)
     columns = np.zeros((size, size + 1))
-    for c in range(size):
-        columns[c, c] = 1.0
-    columns[:, size] = -(fl.d_steady * turn).real
-    closings = np.zeros(n_stops, dtype=np.int64)
+    for i in range(size):
+        w[i] = start[i] - (fl.steady[0, i] * turn).real
+        columns[i, i] = 1.0
+        columns[i, size] = -(fl.steady[1, i] * turn).real
     closed = np.zeros(n_stops, dtype=np.bool_)
     for s in range(n_stops):
         value, _, _, _ = output_derivatives(fl, s, w, phase, 0.0)
-        closed[s] = value - fl.gap[s] > 0.0
+        closed[s] = value - fl.stops[s, GAP] > 0.0
     status = run_pieces(
         fl, tab, w, columns, phase, duration, closed, closings, with_columns, rec, recording
     )
@@ -841,14 +879,20 @@ def propagate(fl, tab, start, phase, duration, with_columns, rec, recording):
                 rate[2 * b + i] += fl.blocks[b, i, j] * w[2 * b + j]
     for s in range(n_stops):
         value, _, _, _ = output_derivatives(fl, s, w, end_phase, 0.0)
-        force, _ = law(value - fl.gap[s], fl.stiffness[s], fl.exponent[s])
-        rate -= fl.force[:, s] * force
-    end = w + (fl.steady * turn).real
-    d_omega = columns[:, size] + (fl.d_steady * turn).real - rate * (duration / fl.omega)
-    return end, columns[:, :size].copy(), d_omega, closings, status
+        force, _ = law(value - fl.stops[s, GAP], fl.stops[s, STIFFNESS], fl.stops[s, EXPONENT])
+        for i in range(size):
+            rate[i] -= fl.force[i, s] * force
+    for i in range(size):
+        end[i] = w[i] + (fl.steady[0, i] * turn).real
+        d_omega[i] = columns[i, size] + (fl.steady[1, i] * turn).real
+        d_omega[i] -= rate[i] * (duration / fl.omega)
+        if with_columns:
+            for j in range(size):
+                jacobian[i, j] = columns[i, j]
+    return status
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def switch_with(fl, w, phase, h, closed, closings):
     """Open and close the stops that do so at the very instant of another one's event.
 
@@ -857,13 +901,13 @@ def switch_with(fl, w, phase, h, closed, closings):
     for s in range(closed.size):
         value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
         reach = 1e-8 * h * abs(speed) + 10.0 * output_noise(fl, s, w)
-        if abs(value - fl.gap[s]) <= reach and closed[s] != (speed > 0.0):
+        if abs(value - fl.stops[s, GAP]) <= reach and closed[s] != (speed > 0.0):
             closed[s] = speed > 0.0
             if closed[s]:
                 closings[s] += 1
 
 
-@njit(cache=True, error_model="numpy")
+@inlined
 def run_pieces(
     fl, tab, w, columns, phase, duration, closed, closings, with_columns, rec, recording
 ):
@@ -874,7 +918,7 @@ def run_pieces(
     h_cap = 0.6 * m / fastest if fastest > 0.0 else np.inf
     shortest = 1e-10 / max(fastest, fl.omega)
     t = 0.0
-    start_switch = 0
+    start_switch = 1 if duration < 0.0 else 0  # written so that one version is compiled, not two
     skip = 0.0
     w_end = np.empty(w.size)
     for _ in range(5000):
@@ -882,9 +926,11 @@ def run_pieces(
         if remain <= 0.0:
             return OK
         here = phase + fl.omega * t
+        active = np.empty(n_stops, dtype=np.int64)
         n_active = 0
         for s in range(n_stops):
             if closed[s]:
+                active[n_active] = s
                 n_active += 1
         if n_active == 0:
             first, stop = remain, -1
@@ -893,8 +939,8 @@ def run_pieces(
                 if at < first:
                     first, stop = at, s
             if recording and record_piece(rec, here, first, FLIGHT, w) < 0:
-                return TOO_MANY_PIECES
-            fly(fl, w.reshape(w.size, 1), first)
+                return RECORD_FULL
+            fly_state(fl, w, first)
             if with_columns:
                 fly(fl, columns, first)
             t = duration if stop < 0 else t + first
@@ -905,7 +951,7 @@ def run_pieces(
                 switch_with(fl, w, phase + fl.omega * t, 0.0, closed, closings)
                 start_switch = 1
             continue
-        active = np.flatnonzero(closed)
+        active = active[:n_active]
         if n_active == 1 and start_switch == 1:
             peak, _, left = expected_contact(fl, active[0], w, here)
             if peak <= 100.0 * output_noise(fl, active[0], w):  # a touch without force
@@ -932,12 +978,14 @@ def run_pieces(
             if recording:
                 n = record_piece(rec, here, h, kind, w)
                 if n < 0:
-                    return TOO_MANY_PIECES
+                    return RECORD_FULL
                 for a in range(n_active):
-                    rec.force[n, active[a], :] = F[a]
+                    for i in range(m):
+                        rec.force[n, active[a], i] = F[a, i]
             if with_columns:
                 panel_columns(fl, tab, kind, here, t, h, active, dF, to, back, G, columns)
-            w[:] = w_end
+            for k in range(w.size):
+                w[k] = w_end[k]
             t = duration if h >= remain else t + h
         start_switch = 0
         if event >= 0:
@@ -950,12 +998,12 @@ def run_pieces(
     return TOO_MANY_PIECES
 
 
-@njit(cache=True, error_model="numpy")
-def steady_response(blocks, drive, omega):
-    """Amplitude of the steady response to drive[0] + ω² drive[1] and its derivative, (2n,)."""
-    size = drive.shape[1]
-    steady = np.empty(size, dtype=np.complex128)
-    d_steady = np.empty(size, dtype=np.complex128)
+@inner
+def at_frequency(system, omega):
+    """Numbers of the system at an excitation frequency (rad/s)."""
+    blocks, rows, drive = system.blocks, system.rows, system.drive
+    n_out = rows.shape[1]
+    steady = np.empty(drive.shape, dtype=np.complex128)
     for b in range(blocks.shape[0]):
         i, j = 2 * b, 2 * b + 1
         m00, m01 = 1j * omega - blocks[b, 0, 0], -blocks[b, 0, 1]
@@ -963,116 +1011,151 @@ def steady_response(blocks, drive, omega):
         det = m00 * m11 - m01 * m10
         x = drive[0, i] + omega * omega * drive[1, i]
         y = drive[0, j] + omega * omega * drive[1, j]
-        steady[i] = (m11 * x - m01 * y) / det
-        steady[j] = (m00 * y - m10 * x) / det
-        x = 2.0 * omega * drive[1, i] - 1j * steady[i]
-        y = 2.0 * omega * drive[1, j] - 1j * steady[j]
-        d_steady[i] = (m11 * x - m01 * y) / det
-        d_steady[j] = (m00 * y - m10 * x) / det
-    return steady, d_steady
-
-
-@njit(cache=True, error_model="numpy")
-def output_amplitudes(rows, amplitude):
-    """Rows (n_out, 2n) times a complex amplitude (2n,)."""
-    outputs = np.zeros(rows.shape[0], dtype=np.complex128)
-    for out in range(rows.shape[0]):
-        for j in range(rows.shape[1]):
-            outputs[out] += rows[out, j] * amplitude[j]
-    return outputs
+        steady[0, i] = (m11 * x - m01 * y) / det
+        steady[0, j] = (m00 * y - m10 * x) / det
+        x = 2.0 * omega * drive[1, i] - 1j * steady[0, i]
+        y = 2.0 * omega * drive[1, j] - 1j * steady[0, j]
+        steady[1, i] = (m11 * x - m01 * y) / det
+        steady[1, j] = (m00 * y - m10 * x) / det
+    forced = np.zeros((2, n_out), dtype=np.complex128)
+    for d in range(2):
+        for out in range(n_out):
+            for j in range(drive.shape[1]):
+                forced[d, out] += rows[0, out, j] * steady[d, j]
+    return FlowData(
+        blocks,
+        rows,
+        system.bound3,
+        system.force,
+        system.stops,
+        steady,
+        forced,
+        omega,
+        system.tail,
+    )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def shoot(
-    blocks,
-    rows,
-    rows1,
-    rows2,
-    bound3,
-    force,
-    drive,
-    gap,
-    stiffness,
-    exponent,
-    mobility,
-    duration_factor,
-    tail,
-    chi,
-    integrate,
-    weights,
-    to_legendre,
-    gauss_nodes,
-    ends_nodes,
-    barycentric,
-    fine_grid,
-    to_fine,
-    rec_phase,
-    rec_duration,
-    rec_kind,
-    rec_w,
-    rec_force,
-    rec_count,
-    omega,
-    nodes,
-    phases,
-    chained,
-    with_columns,
-    recording,
-):
+def shoot(system, tab, rec, recording, omega, nodes, phases, chained, with_columns):
     """Propagate each node (k, 2n) to the next phase; see `propagate` for what comes back.
 
     When `chained`, only the first node is used and each segment starts where the last one ended.
     """
-    steady, d_steady = steady_response(blocks, drive, omega)
-    fl = FlowData(
-        blocks,
-        rows,
-        rows1,
-        rows2,
-        bound3,
-        force,
-        steady,
-        d_steady,
-        output_amplitudes(rows, steady),
-        output_amplitudes(rows, d_steady),
-        gap,
-        stiffness,
-        exponent,
-        mobility,
-        duration_factor,
-        omega,
-        tail,
-    )
-    tab = GaussTables(
-        chi,
-        integrate,
-        weights,
-        to_legendre,
-        gauss_nodes,
-        ends_nodes,
-        barycentric,
-        fine_grid,
-        to_fine,
-    )
-    rec = Record(rec_phase, rec_duration, rec_kind, rec_w, rec_force, rec_count)
+    fl = at_frequency(system, omega)
     k = phases.size - 1
-    size = drive.shape[1]
+    size = nodes.shape[1]
     ends = np.zeros((k, size))
     kept = k if with_columns else 1
     jacobians = np.zeros((kept, size, size))
     d_omegas = np.zeros((kept, size))
-    closings = np.zeros(gap.size, dtype=np.int64)
+    closings = np.zeros(system.stops.shape[0], dtype=np.int64)
+    rec.used[0] = 0
     for i in range(k):
         start = ends[i - 1] if chained and i > 0 else nodes[i]
         duration = (phases[i + 1] - phases[i]) / omega
-        end, jacobian, d_omega, closed, status = propagate(
-            fl, tab, start, phases[i], duration, with_columns, rec, recording
-        )
-        ends[i] = end
-        if with_columns:
-            jacobians[i] = jacobian
-            d_omegas[i] = d_omega
-        closings += closed
+        j = i if with_columns else 0
+        status = propagate(
+            fl, tab, start, phases[i], duration, with_columns, rec, recording,
+            ends[i], jacobians[j], d_omegas[j], closings,
+        )  # fmt: skip
         if status != OK:
             return ends, jacobians, d_omegas, closings, status
     return ends, jacobians, d_omegas, closings, OK
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def newton(system, tab, rec, point, row, level, phases, state_weight, rtol, max_iterations):
+    """Newton's method for the shooting equations and ``row @ point = level``, in place.
+
+    Parameters
+    ----------
+    system, tab, rec : SystemData, GaussTables, Record
+        As for `shoot`.
+    point : (N + 1,)
+        States at the k phases and ln ω; the guess, then the solution.
+    row, level : (N + 1,), float
+        Plane on which to stay.
+    phases : (k + 1,)
+        Forcing phases of the segment ends.
+    state_weight : float
+        Weight of a state's square in the squared length of a step (that of ln ω is 1).
+    rtol, max_iterations : float, int
+        Longest last step, most steps.
+
+    Returns
+    -------
+    outcome : int
+        `OK`, `DIVERGED`, `SINGULAR`, `NOT_CONVERGED` or why the flow map failed.
+    iterations : int
+    first, last : float
+        Lengths of the first and the last step.
+    along : (N + 1,)
+        Vector along the branch, of no particular length.
+    jacobians : (k, 2n, 2n)
+        At the point before the last step, as the record and the closings.
+    closings : (n_stops,)
+    """
+    k = phases.size - 1
+    size = (point.size - 1) // k
+    unknowns = point.size
+    matrix = np.empty((unknowns, unknowns))
+    sides = np.empty((unknowns, 2))
+    nodes = np.empty((k, size))
+    along = np.zeros(unknowns)
+    first, last = np.inf, np.inf
+    yes = max_iterations > 0  # not a literal, so that `shoot` is compiled once
+    outcome = NOT_CONVERGED
+    iteration = 0
+    while True:
+        iteration += 1
+        omega = math.exp(point[unknowns - 1])
+        for s in range(k):
+            for i in range(size):
+                nodes[s, i] = point[s * size + i]
+        ends, jacobians, d_omegas, closings, status = shoot(
+            system, tab, rec, yes, omega, nodes, phases, not yes, yes
+        )
+        if status != OK:
+            outcome = status
+            break
+        for i in range(unknowns):
+            sides[i, 0], sides[i, 1] = 0.0, 0.0
+            for j in range(unknowns):
+                matrix[i, j] = 0.0
+        for s in range(k):
+            following = (s + 1) % k
+            for i in range(size):
+                r = s * size + i
+                sides[r, 0] = nodes[following, i] - ends[s, i]
+                matrix[r, following * size + i] -= 1.0
+                for j in range(size):
+                    matrix[r, s * size + j] += jacobians[s, i, j]
+                matrix[r, unknowns - 1] = omega * d_omegas[s, i]
+        sides[unknowns - 1, 0] = level
+        for j in range(unknowns):
+            matrix[unknowns - 1, j] = row[j]
+            sides[unknowns - 1, 0] -= row[j] * point[j]
+        sides[unknowns - 1, 1] = 1.0
+        lu_solve(matrix, sides)
+        before = last
+        length = sides[unknowns - 1, 0] ** 2
+        for i in range(unknowns - 1):
+            length += state_weight * sides[i, 0] ** 2
+        last = math.sqrt(length)
+        if iteration == 1:
+            first = last
+        if not np.isfinite(last):
+            outcome = SINGULAR
+            break
+        if last >= 1e3 or abs(sides[unknowns - 1, 0]) >= 0.5:
+            outcome = DIVERGED
+            break
+        for i in range(unknowns):
+            point[i] += sides[i, 0]
+            along[i] = sides[i, 1]
+        if last <= rtol or (last < 1e-8 and last > 0.5 * before):  # stagnant: rounding level
+            outcome = OK
+            break
+        if iteration == max_iterations:
+            break
+    return outcome, iteration, first, last, along, jacobians, closings

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from nldyn._kernels import block_exponential, map_fraction
+from nldyn._kernels import block_exponential, inner, map_fraction
 
 FLIGHT = -1
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def stretched_time(kind, x):
     """Inverse of `map_fraction`."""
     x = min(max(x, 0.0), 1.0)
@@ -23,7 +23,7 @@ def stretched_time(kind, x):
     return np.arccos(1.0 - 2.0 * x) / np.pi
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def map_slope(kind, s):
     """Derivative of `map_fraction`."""
     if kind == 0:
@@ -35,11 +35,12 @@ def map_slope(kind, s):
     return 0.5 * np.pi * np.sin(np.pi * s)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def antiderivative_weights(to_legendre, s, out):
     """Weights of the node values in the integral of their interpolant from 0 to s."""
     m = out.size
-    out[:] = 0.0
+    for j in range(m):
+        out[j] = 0.0
     x = 2.0 * s - 1.0
     before, here = 1.0, x  # Legendre polynomials of degree 0 and 1
     for degree in range(m):
@@ -53,10 +54,11 @@ def antiderivative_weights(to_legendre, s, out):
             out[j] += integral * to_legendre[degree, j]
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def state_at(blocks, force, chi, to_legendre, gauss_nodes, kind, h, start, forces, t, w):
     """Fill w with the homogeneous state a time t after the start of a piece."""
-    w[:] = start
+    for k in range(w.size):
+        w[k] = start[k]
     fly_state(blocks, w, t)
     if kind == FLIGHT:
         return
@@ -65,14 +67,17 @@ def state_at(blocks, force, chi, to_legendre, gauss_nodes, kind, h, start, force
     antiderivative_weights(to_legendre, stretched_time(kind, t / h), weights)
     drive = np.empty(w.size)
     for j in range(m):
-        drive[:] = 0.0
-        for a in range(forces.shape[0]):
-            drive += force[:, a] * forces[a, j]
+        for k in range(w.size):
+            drive[k] = 0.0
+            for a in range(forces.shape[0]):
+                drive[k] += force[k, a] * forces[a, j]
         fly_state(blocks, drive, t - h * chi[kind, j])
-        w -= h * weights[j] * map_slope(kind, gauss_nodes[j]) * drive
+        share = h * weights[j] * map_slope(kind, gauss_nodes[j])
+        for k in range(w.size):
+            w[k] -= share * drive[k]
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def fly_state(blocks, w, t):
     """Advance a homogeneous state in place by a time t without contact."""
     for b in range(blocks.shape[0]):
@@ -100,7 +105,7 @@ def sample_states(
     return states
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def output_rate(row, row1, forced, omega, phase, w):
     """Value and rate of the output ``row @ w + Re(forced e^{i phase})``."""
     turn = forced * np.exp(1j * phase)
@@ -175,12 +180,14 @@ def local_extremes(
     return found[:n]
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def append_extreme(found, n, phase, value, sign):
     """Append to a table that grows; returns it and its length."""
     if n == found.shape[0]:
         larger = np.empty((2 * n, 3))
-        larger[:n] = found
+        for i in range(n):
+            for j in range(3):
+                larger[i, j] = found[i, j]
         found = larger
     found[n, 0], found[n, 1], found[n, 2] = phase, value, sign
     return found, n + 1

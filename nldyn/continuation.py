@@ -137,15 +137,13 @@ class Walk:
             return None
         if _jumped_to_shift(problem, here.orbit.point, guess, found.point):
             return None
-        tangent = problem.tangent(found.lin, problem.metric(found.point), direction)
+        tangent = problem.tangent(found, direction)
         cosine = float(np.sum(weights * direction * tangent))
         cosine /= math.sqrt(float(np.sum(weights * tangent**2)))
         angle = math.acos(min(max(cosine, -1.0), 1.0))
         if angle > self.options.max_angle:
             return None
-        orbit = Orbit(
-            problem, found.point, found.lin.monodromy, found.last_step, here.orbit.observe
-        )
+        orbit = Orbit.of(problem, found, here.orbit.observe)
         # behind a grazing point the branch may turn on a very short length
         if step > self.options.grazing_step and orbit.impacts != here.orbit.impacts:
             return None
@@ -166,8 +164,8 @@ class Walk:
         found = problem.correct(guess, row)
         if not found.converged:
             return None
-        orbit = Orbit(problem, found.point, found.lin.monodromy, found.last_step, a.orbit.observe)
-        tangent = problem.tangent(found.lin, problem.metric(found.point), a.tangent)
+        orbit = Orbit.of(problem, found, a.orbit.observe)
+        tangent = problem.tangent(found, a.tangent)
         length = a.arclength + share * (b.arclength - a.arclength)
         return BranchPoint(orbit, tangent, length)
 
@@ -260,9 +258,10 @@ def start_point(orbit: Orbit, direction: float) -> BranchPoint:
     problem = orbit.problem
     towards = np.zeros(orbit.point.size)
     towards[-1] = direction
-    lin = problem.linearise(orbit.point)
-    tangent = problem.tangent(lin, problem.metric(orbit.point), towards)
-    return BranchPoint(orbit, tangent, 0.0)
+    found = problem.correct(orbit.point, towards)
+    if not found.converged:
+        raise ConvergenceError(f"no orbit at {orbit.frequency_hz:g} Hz: {found.failure}")
+    return BranchPoint(orbit, problem.tangent(found, towards), 0.0)
 
 
 def trace(
@@ -449,8 +448,8 @@ def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoin
     for size in (amplitude, 0.25 * amplitude, 0.05 * amplitude, 0.01 * amplitude):
         found = problem.correct(doubled + size * direction, row / np.linalg.norm(row))
         if found.converged:
-            tangent = problem.tangent(found.lin, problem.metric(found.point), direction)
-            twin = Orbit(problem, found.point, found.lin.monodromy, found.last_step, orbit.observe)
+            tangent = problem.tangent(found, direction)
+            twin = Orbit.of(problem, found, orbit.observe)
             return BranchPoint(twin, tangent, 0.0)
     raise LocateError(
         f"no orbit of period {problem.period} found beside the flip at "

@@ -14,7 +14,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn._kernels import CONTACT_FAILED, OK, TOO_MANY_PIECES, Record, SystemData, shoot
+from nldyn._kernels import (
+    CONTACT_FAILED,
+    DIVERGED,
+    NOT_CONVERGED,
+    OK,
+    RECORD_FULL,
+    SINGULAR,
+    TOO_MANY_PIECES,
+    Record,
+    SystemData,
+    newton,
+    shoot,
+)
 from nldyn._sample import local_extremes, sample_states
 from nldyn.errors import SystemModelError, check_whole
 from nldyn.gauss import GaussTables, gauss_tables
@@ -24,9 +36,12 @@ from nldyn.system import System
 __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
 
 _REASONS = {
-    OK: "ok",
+    OK: "",
     TOO_MANY_PIECES: "too many contacts in one segment",
     CONTACT_FAILED: "a contact phase could not be resolved",
+    DIVERGED: "Newton's method diverged",
+    SINGULAR: "singular Jacobian",
+    NOT_CONVERGED: "Newton's method did not converge",
 }
 
 
@@ -75,6 +90,50 @@ class Segments:
     d_omega: Real
     closings: NDArray[np.int64]
     failure: str = ""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Outcome of Newton's method for the shooting equations.
+
+    Parameters
+    ----------
+    point : (N + 1,)
+        States at the k phases and ln ω.
+    along : (N + 1,)
+        Direction of the branch, of no particular length or sense.
+    jacobians : (k, 2n, 2n)
+        Of the segments, at the point before the last step.
+    motion : Trajectory
+        From the point before the last step.
+    iterations : int
+    first_step, last_step : float
+        Lengths of the first and the last Newton step: the error left is far below the last.
+    failure : str
+        Empty, or why it did not converge.
+    """
+
+    point: Real
+    along: Real
+    jacobians: Real
+    motion: Trajectory
+    iterations: int
+    first_step: float
+    last_step: float
+    failure: str
+
+    @property
+    def converged(self) -> bool:
+        """Whether a solution was found."""
+        return not self.failure
+
+    @cached_property
+    def monodromy(self) -> Real:
+        """Product of the segments' Jacobians, (2n, 2n)."""
+        product = np.asarray(self.jacobians[0])
+        for jacobian in self.jacobians[1:]:
+            product = jacobian @ product
+        return product
 
 
 class FlowMap:
@@ -133,20 +192,17 @@ class FlowMap:
         sizes = np.linalg.norm(thirds, axis=2)
         bounds = np.multiply(sizes, linear.growth, out=np.zeros_like(sizes), where=sizes > 0.0)
         force = np.array([s.force_column(v) for v in vectors]).reshape(-1, 2 * s.size)
-        exponents = [stop.exponent for stop in s.stops]
+        stops = [
+            (stop.gap, stop.stiffness, stop.exponent, v @ v, _duration_factor(stop.exponent))
+            for stop, v in zip(s.stops, vectors, strict=True)
+        ]
         return SystemData(
             linear.blocks,
-            self.rows,
-            self.rate_rows,
-            accelerations,
+            np.array([self.rows, self.rate_rows, accelerations]),
             bounds,
             np.ascontiguousarray(force.T),
             s.drive,
-            np.array([stop.gap for stop in s.stops], dtype=float),
-            np.array([stop.stiffness for stop in s.stops], dtype=float),
-            np.array(exponents, dtype=float),
-            np.array([v @ v for v in vectors], dtype=float),
-            np.array([_duration_factor(p) for p in exponents], dtype=float),
+            np.array(stops, dtype=float).reshape(-1, 5),
             self.options.tail,
         )
 
@@ -178,7 +234,18 @@ class FlowMap:
         -------
         Segments
         """
-        return self._run(omega, nodes, phases, sensitivities, chained, None)
+        ends, jacobians, d_omegas, closings, status = shoot(
+            self._data,
+            self.tables,
+            self._record(1),
+            False,
+            float(omega),
+            np.ascontiguousarray(nodes, dtype=float),
+            np.ascontiguousarray(phases, dtype=float),
+            chained,
+            sensitivities,
+        )
+        return Segments(ends, jacobians, d_omegas, closings, _REASONS[status])
 
     def trajectory(self, nodes: Real, phases: Real, omega: float) -> Trajectory:
         """Record the motion from phase to phase, restarted from each node state.
@@ -198,47 +265,88 @@ class FlowMap:
         """
         capacity = 64 * len(nodes)
         while True:
-            rec = self._record(capacity)
-            segments = self._run(omega, nodes, phases, False, False, rec)
-            used = int(rec.used[0])
-            if used < capacity or capacity > 1 << 20:
-                pieces = Record(
-                    rec.phase[:used].copy(),
-                    rec.duration[:used].copy(),
-                    rec.kind[:used].copy(),
-                    rec.w[:used].copy(),
-                    rec.force[:used].copy(),
-                    rec.used,
-                )
-                return Trajectory(self, omega, pieces, segments.closings, segments.failure)
+            record = self._record(capacity)
+            _, _, _, closings, status = shoot(
+                self._data,
+                self.tables,
+                record,
+                True,
+                float(omega),
+                np.ascontiguousarray(nodes, dtype=float),
+                np.ascontiguousarray(phases, dtype=float),
+                False,
+                False,
+            )
+            if status != RECORD_FULL:
+                return self._motion(omega, record, closings, _REASONS[status])
             capacity *= 4
 
-    def _run(
+    def newton(
         self,
-        omega: float,
-        nodes: Real,
+        guess: Real,
+        row: Real,
+        level: float,
         phases: Real,
-        sensitivities: bool,
-        chained: bool,
-        rec: Record | None,
-    ) -> Segments:
-        ends, jacobians, d_omegas, closings, status = shoot(
-            *self._data,
-            *self.tables,
-            *(self._no_record if rec is None else rec),
-            float(omega),
-            np.ascontiguousarray(nodes, dtype=float),
-            np.ascontiguousarray(phases, dtype=float),
-            chained,
-            sensitivities,
-            rec is not None,
-        )
-        failure = "" if status == OK else _REASONS[status]
-        return Segments(ends, jacobians, d_omegas, closings, failure)
+        state_weight: float,
+        rtol: float,
+        max_iterations: int,
+    ) -> Solution:
+        """Solve the shooting equations with ``row @ point = level``; see `_kernels.newton`.
 
-    @cached_property
-    def _no_record(self) -> Record:
-        return self._record(1)
+        Parameters
+        ----------
+        guess, row : (N + 1,) arrays
+            States at the k phases, one after the other, and ln ω; normal of the plane.
+        level : float
+            Offset of the plane.
+        phases : (k + 1,) array
+            Forcing phases of the segment ends.
+        state_weight : float
+            Weight of the states in the squared length of a step.
+        rtol, max_iterations : float, int
+            When to stop.
+
+        Returns
+        -------
+        Solution
+        """
+        capacity = 64 * phases.size
+        while True:
+            point, record = guess.copy(), self._record(capacity)
+            status, iterations, first, last, along, jacobians, closings = newton(
+                self._data,
+                self.tables,
+                record,
+                point,
+                np.ascontiguousarray(row, dtype=float),
+                float(level),
+                phases,
+                float(state_weight),
+                rtol,
+                max_iterations,
+            )
+            if status != RECORD_FULL:
+                omega = math.exp(point[-1])
+                motion = self._motion(omega, record, closings, _REASONS[status])
+                return Solution(
+                    point, along, jacobians, motion, iterations, first, last, _REASONS[status]
+                )
+            capacity *= 4
+
+    def _motion(
+        self, omega: float, rec: Record, closings: NDArray[np.int64], failure: str
+    ) -> Trajectory:
+        """The motion in a record, of which only the used part is kept."""
+        n = int(rec.used[0])
+        pieces = Record(
+            rec.phase[:n].copy(),
+            rec.duration[:n].copy(),
+            rec.kind[:n].copy(),
+            rec.w[:n].copy(),
+            rec.force[:n].copy(),
+            rec.used,
+        )
+        return Trajectory(self, omega, pieces, closings, failure)
 
     def to_modal(self, states: Real) -> Real:
         """Modal displacements and velocities (..., 2n) of states z."""
@@ -249,13 +357,12 @@ class FlowMap:
         return np.asarray(np.asarray(modal) @ self.system.linear.left.T)
 
     def _record(self, capacity: int) -> Record:
-        n_stops = len(self.system.stops)
         return Record(
             np.empty(capacity),
             np.empty(capacity),
             np.empty(capacity, dtype=np.int64),
             np.empty((capacity, 2 * self.system.size)),
-            np.empty((capacity, n_stops, self.options.nodes)),
+            np.empty((capacity, len(self.system.stops), self.options.nodes)),
             np.zeros(1, dtype=np.int64),
         )
 

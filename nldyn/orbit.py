@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.errors import SystemModelError, check_whole
-from nldyn.flow import FlowMap, Trajectory
+from nldyn.flow import FlowMap, Solution, Trajectory
 from nldyn.linear import Real
 from nldyn.shooting import ShootingProblem
 from nldyn.system import System
@@ -101,6 +101,8 @@ class Orbit:
         Length of the last Newton step relative to the orbit: an estimate of its error.
     observe : str
         Interface whose displacement is reported.
+    motion : Trajectory, optional
+        The recorded motion, if it is known already.
 
     Examples
     --------
@@ -118,6 +120,12 @@ class Orbit:
     monodromy: Real
     error: float
     observe: str
+    motion: Trajectory | None = field(default=None, compare=False, repr=False)
+
+    @classmethod
+    def of(cls, problem: ShootingProblem, found: Solution, observe: str) -> Orbit:
+        """Orbit from a solution of its equations."""
+        return cls(problem, found.point, found.monodromy, found.last_step, observe, found.motion)
 
     @property
     def system(self) -> System:
@@ -171,6 +179,8 @@ class Orbit:
     @cached_property
     def trajectory(self) -> Trajectory:
         """The recorded motion over one period of the orbit."""
+        if self.motion is not None:
+            return self.motion
         problem = self.problem
         return problem.flow.trajectory(problem.nodes(self.point), problem.phases, self.omega)
 
@@ -411,7 +421,7 @@ def refine(
             f"{found.failure}, last relative step {found.last_step:.1e} "
             f"after {found.iterations} iterations"
         )
-    return Orbit(problem, found.point, found.lin.monodromy, found.last_step, observe)
+    return Orbit.of(problem, found, observe)
 
 
 def spread(problem: ShootingProblem, start: Real, omega: float) -> Real:

@@ -101,8 +101,8 @@ class Chord:
         found = problem.correct(self.between(sigma), row, offset=offset)
         if not found.converged:
             raise LocateError(found.failure)
-        orbit = Orbit(problem, found.point, found.lin.monodromy, found.last_step, a.orbit.observe)
-        tangent = problem.tangent(found.lin, problem.metric(found.point), self._secant)
+        orbit = Orbit.of(problem, found, a.orbit.observe)
+        tangent = problem.tangent(found, self._secant)
         length = a.arclength + sigma * (self.last.arclength - a.arclength)
         self.known[sigma] = BranchPoint(orbit, tangent, length)
         return self.known[sigma]
