@@ -104,13 +104,13 @@ def check(scene: Path) -> None:
 @out_option
 @click.option(
     "--frequency-hz",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=click.FloatRange(1e-6, 1e12),
     metavar="HZ",
     help="Draw the orbit at this excitation frequency; else the highest harmonic one.",
 )
 @click.option(
     "--period",
-    type=click.IntRange(min=1),
+    type=click.IntRange(1, 100),
     default=1,
     show_default=True,
     help="Period of that orbit, in periods of the excitation.",
@@ -127,6 +127,8 @@ def render(
     scene: Path, out: Path, frequency_hz: float | None, period: int, video: str, quiet: bool
 ) -> None:
     """Draw mode shapes, deepest contact and one period in motion of a scene with a mesh."""
+    if period != 1 and frequency_hz is None:
+        raise click.UsageError("'--period' needs '--frequency-hz'")
     with plain_errors():
         from nldyn.progress import progress_line
         from nldyn.render import render_scene

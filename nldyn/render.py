@@ -99,7 +99,7 @@ def render_scene(
     """
     if scene.mesh is None:
         raise scene_error(scene.file, ("mesh",), "is missing: only a mesh can be drawn")
-    if scene.continuation is not None:
+    if scene.continuation is not None or frequency_hz is not None:
         check_computable(scene, scene.file)
     tell = progress or (lambda what, frequency_hz: None)
     tell("model", 0.0)

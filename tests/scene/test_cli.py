@@ -13,7 +13,7 @@ from fakes import diagram
 import nldyn.progress
 import nldyn.scene
 from nldyn.cli import main
-from nldyn.resources import example
+from nldyn.resources import example, mesh
 
 ONE_DOF = str(example("one_dof.toml"))
 
@@ -124,6 +124,31 @@ def test_version_and_help():
 
 def test_missing_option_is_a_user_error():
     assert invoke("run", ONE_DOF).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--frequency-hz", "1e300"], "is not in the range 1e-06<=x<="),
+        (["--frequency-hz", "22", "--period", "101"], "101 is not in the range 1<=x<=100"),
+        (["--period", "2"], "'--period' needs '--frequency-hz'"),
+        (["--video", "avi"], "'avi' is not one of 'gif', 'mp4'"),
+    ],
+)
+def test_render_options_are_checked_first(tmp_path, options, words):
+    result = invoke("render", "none.toml", "--out", tmp_path, *options)
+    assert result.exit_code == 2
+    assert words in result.stderr and "Traceback" not in result.stderr
+
+
+def test_orbit_cannot_be_drawn_without_a_range(tmp_path):
+    text = example("two_dof_xi_0.01.toml").read_text()
+    text = text.replace("../../meshes/half_beam.msh", mesh("half_beam.msh").as_posix())
+    scene = tmp_path / "scene.toml"
+    scene.write_text(text[: text.index("[continuation]")])
+    result = invoke("render", scene, "--out", tmp_path / "out", "--frequency-hz", "22")
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"nldyn: {scene}: continuation is missing")
 
 
 def test_help_imports_nothing_heavy_of_its_own():

@@ -135,6 +135,12 @@ def test_a_name_that_is_too_long_is_found_before_the_work(tmp_path):
         check_directory(tmp_path / ("x" * 250))
 
 
+def test_a_mount_point_cannot_be_replaced(tmp_path, monkeypatch):
+    monkeypatch.setattr("pathlib.Path.is_mount", lambda _: True)
+    with pytest.raises(OutputError, match="cannot be replaced; choose a folder in it"):
+        check_directory(tmp_path)
+
+
 def test_checking_leaves_nothing(tmp_path):
     check_directory(tmp_path / "a" / "results")
     assert list(tmp_path.iterdir()) == []
