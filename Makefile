@@ -1,10 +1,10 @@
-# `make paper` reproduces the paper's figures, `make test` runs the tests.
-# Both set up a virtual environment in .venv first.
+# `make paper` reproduces the paper's figures, `make test` runs the tests, `make bench` measures
+# speed against error. All set up a virtual environment in .venv first.
 PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 
-.PHONY: paper test check clean
+.PHONY: paper test check bench clean
 
 $(VENV)/.installed: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -20,6 +20,10 @@ test: $(VENV)/.installed
 check: $(VENV)/.installed
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+
+bench: $(VENV)/.installed
+	-$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[bench]"
+	$(BIN)/python -m nldyn.bench --out results/bench
 
 clean:
 	rm -rf results $(VENV)

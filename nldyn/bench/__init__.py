@@ -1,0 +1,1 @@
+"""Speed against error: the flow map beside general integrators."""
