@@ -332,4 +332,7 @@ class ExactFlow:
 
 
 def _sum(series: Series, h: Number) -> Number:
-    return mp.polyval(series[::-1], h)
+    total = mp.zero
+    for coefficient in reversed(series):
+        total = total * h + coefficient
+    return total

@@ -1,0 +1,125 @@
+"""Targets, tables and diagrams from a few made-up numbers."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from nldyn.bench.figures import draw_model
+from nldyn.bench.measure import Sample
+from nldyn.bench.page import write_page
+from nldyn.bench.run import auto_flip_points, auto_times, sample_row, special_point_rows
+from nldyn.bench.studies import (
+    BRANCHES,
+    BranchTime,
+    FirstCall,
+    GrazingError,
+    ModesTime,
+    pair_up,
+    profile_branch,
+)
+from nldyn.bench.targets import all_targets, ratio_rows
+
+ENGINES = ("nldyn", "solve_ivp DOP853", "solve_ivp DOP853 in numpy")
+
+
+def made_up_samples():
+    return [
+        Sample(model, engine, f"{k}", 1e-5 * factor * k, 3, 10.0**-k, 10.0**-k, 10.0**-k, 10.0**-k)
+        for model in ("one_dof", "four_dof")
+        for engine, factor in zip(ENGINES, (1.0, 400.0, 600.0), strict=True)
+        for k in (4, 8, 12)
+    ]
+
+
+@pytest.fixture
+def verdicts():
+    branch = BranchTime(BRANCHES[0], 0.2, 10, 2, 0, 1e-10, (("PD", 33.0),))
+    slow = BranchTime(BRANCHES[1], 0.7, 10, 2, 1, 1e-10, ())
+    targets = all_targets(
+        made_up_samples(),
+        "8",
+        [branch, slow],
+        [ModesTime(4, 1.0, 1, 0.0), ModesTime(64, 15.0, 1, 0.0)],
+        [GrazingError(0.1, 1.0, 0.0, 1e-9), GrazingError(0.01, 1.5, 0.0, 1e-10)],
+        {"flow map": 0.6, "walk": 0.4},
+        FirstCall(1.0, 31.0, 1.0, 2.0),
+    )
+    return {t.what: t.verdict for t in targets}
+
+
+def test_verdicts_follow_from_the_numbers(verdicts):
+    def of(*words):
+        (found,) = [v for k, v in verdicts.items() if all(word in k for word in words)]
+        return found
+
+    assert of("one_dof", "numpy") == "met"
+    assert of("one_dof", "compiled") == "missed"
+    assert of("four_dof", "compiled") == "met"
+    assert of("one_dof", ", warm") == "met"
+    assert of("four_dof", ", warm") == "missed"
+    assert of("one_dof", "1e-9") == "met"
+    assert of("four_dof", "1e-9") == "missed"
+    assert of("grazing") == "met"
+    assert of("4 to 64 modes") == "met"
+    assert of("default", "state") == "missed"
+    assert of("default", "monodromy") == "met"
+    assert of("tightest") == "met"
+    assert of("share") == "met"
+    assert of("cold") == "missed"
+    assert of("first orbit", "warm") == "met"
+
+
+def test_nothing_measured_is_not_met():
+    (first, *_) = all_targets([], "", [], [], [], {}, None)
+    assert first.verdict == "not measured"
+
+
+def test_page_holds_tables_and_diagrams(tmp_path):
+    samples = made_up_samples()
+    draw_model(samples, "one_dof", tmp_path, auto_flip_points())
+    tables = {
+        "Targets": [{"what": "speed", "verdict": "met"}],
+        "Speed at equal error": ratio_rows(samples, ["one_dof"], ENGINES, [1e-8]),
+        "Branches": auto_times(),
+        "First call": [],
+        "Work and precision": [sample_row(s) for s in samples],
+    }
+    page = write_page(tables, ["one_dof"], 1.0, tmp_path).read_text("utf-8")
+    assert "| speed | met |" in page
+    assert "| one_dof | solve_ivp DOP853 | 32 | 400 |" in page
+    assert "AUTO-07p, NTST 400" in page
+    assert "Nothing was measured." in page
+    assert {f.name for f in tmp_path.iterdir()} == {
+        "page.md",
+        "targets.csv",
+        "speed_at_equal_error.csv",
+        "branches.csv",
+        "first_call.csv",
+        "work_and_precision.csv",
+        "work_precision_one_dof.png",
+        "work_precision_one_dof.svg",
+    }
+    with (tmp_path / "work_and_precision.csv").open(encoding="utf-8") as stream:
+        assert len(list(csv.DictReader(stream))) == len(samples)
+
+
+def test_special_points_stand_beside_the_published_ones():
+    run = BranchTime(BRANCHES[0], 0.2, 10, 1, 0, 0.0, (("PD", 33.654364273 * (1 + 1e-9)),))
+    row = special_point_rows(run)[-1]
+    assert row["nldyn"] == "1e-09"
+    assert row["AUTO 200"] == "-5e-05"
+
+
+def test_special_points_are_paired_by_frequency():
+    a, b, alone = pair_up(np.array([1.0, 2.0, 3.0]), np.array([1.0 + 1e-9, 2.5, 3.0]))
+    assert a.tolist() == [1.0, 3.0]
+    assert b[1] == 3.0
+    assert alone == 2
+
+
+def test_shares_of_a_profile_make_a_whole():
+    task = type(BRANCHES[0])("one_dof", 26.0, (25.0, 27.0))
+    shares = profile_branch(task)
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert shares["flow map"] > 0.05
