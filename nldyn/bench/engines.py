@@ -30,6 +30,7 @@ FLOW_OPTIONS = [
     FlowOptions(),
     FlowOptions(nodes=12, tail=1e-5),
     FlowOptions(nodes=16, tail=1e-6),
+    FlowOptions(nodes=16, tail=1e-8),
 ]
 TOLERANCES = [1e-4, 1e-6, 1e-8, 1e-10, 1e-12]
 STEPS = [50, 200, 800, 3200, 12800]
@@ -149,7 +150,7 @@ ENGINES = [
         adaptive(scipy_advance("DOP853", motion.numpy_rate), False),
     ),
     *plain_and_events("solve_ivp DOP853", TOLERANCES, scipy_advance("DOP853")),
-    *plain_and_events("solve_ivp LSODA", TOLERANCES, scipy_advance("LSODA"), largest=4),
+    *plain_and_events("solve_ivp LSODA", TOLERANCES, scipy_advance("LSODA")),
     *plain_and_events("solve_ivp Radau", HALF, scipy_advance("Radau"), largest=2),
     Engine("RK4, equal steps", STEPS, fixed_steps(RK4_A, RK4_B, RK4_C)),
     Engine(

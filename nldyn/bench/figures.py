@@ -23,6 +23,7 @@ TITLES = {
 MODEL_TITLES = dict(zip(MODELS, ("1 DOF", "2 DOF", "4 DOF", "16 DOF"), strict=True))
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#5D4E9C", "#8B4513")
 MARKERS = "osD^vP*X<>hd"
+ROUNDING = 1e-16  # smaller errors are drawn there
 Points = Sequence[tuple[float, float]]
 
 
@@ -72,7 +73,7 @@ def draw_model(
 
 
 def _line(axes: Axes, points: Points, name: str, number: int) -> None:
-    shown = sorted((max(e, 1e-17), t) for e, t in points)
+    shown = [(max(e, ROUNDING), t) for e, t in points]
     if not shown:
         return
     ours = name == NLDYN

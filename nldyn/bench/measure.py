@@ -100,6 +100,8 @@ def flip_frequency_error(flip: Flip, prepared: Prepared, found: Sensitivities) -
         if step:
             job = prepared(unknown[:-1], float(unknown[-1]))
             found = job.read(job.run())
+        if not np.all(np.isfinite(found.monodromy)):
+            return math.nan
         size = case.start.size
         determinant = np.linalg.det(found.monodromy + np.eye(size))
         residual = np.append(found.state - unknown[:-1], determinant)

@@ -17,6 +17,7 @@ PACKAGES = ("numpy", "scipy", "numba", "heyoka", "scikit-sundae")
 
 NOTES = {
     "Targets": "The verdicts are computed from the tables below.",
+    "Fastest engine": "Of all with derivatives, at the largest of the three errors.",
     "Speed at equal error": (
         "Milliseconds for one period with monodromy matrix and derivative by frequency, at the "
         "largest of the three errors, interpolated on the work-precision curves; and how many "

@@ -15,7 +15,7 @@ from nldyn.bench.measure import Sample, measure_engine, setting_label
 from nldyn.bench.models import MODELS, load_flip
 from nldyn.bench.page import Row, write_page
 from nldyn.bench.studies import BranchTime
-from nldyn.bench.targets import all_targets, ratio_rows
+from nldyn.bench.targets import all_targets, fastest_rows, ratio_rows
 from nldyn.flow import FlowOptions
 
 WANTED = (1e-4, 1e-6, 1e-8, 1e-10)
@@ -60,6 +60,7 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
     rivals = [e.name for e in ENGINES if e.has_monodromy]
     tables: dict[str, Sequence[Row]] = {
         "Targets": [vars(t) for t in targets],
+        "Fastest engine": fastest_rows(samples, models, WANTED),
         "Speed at equal error": ratio_rows(samples, models, rivals, WANTED),
         "Number of modes": [
             {

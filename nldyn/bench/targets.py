@@ -179,6 +179,24 @@ def default_targets(samples: Sequence[Sample], default: str) -> list[Target]:
     ]
 
 
+def fastest_rows(
+    samples: Sequence[Sample], models: Sequence[str], wanted: Sequence[float]
+) -> list[dict[str, str]]:
+    """The fastest engine of each model at each error."""
+    rows = []
+    for model in models:
+        row = {"model": model}
+        for error in wanted:
+            times = {
+                engine: seconds_at(curve(samples, model, engine, "worst"), error)
+                for engine in dict.fromkeys(s.engine for s in samples)
+            }
+            reached = {engine: t for engine, t in times.items() if t is not None}
+            row[f"at {error:.0e}"] = min(reached, key=reached.__getitem__) if reached else "none"
+        rows.append(row)
+    return rows
+
+
 def ratio_rows(
     samples: Sequence[Sample],
     models: Sequence[str],

@@ -18,7 +18,7 @@ from nldyn.bench.studies import (
     pair_up,
     profile_branch,
 )
-from nldyn.bench.targets import all_targets, ratio_rows
+from nldyn.bench.targets import all_targets, fastest_rows, ratio_rows
 
 ENGINES = ("nldyn", "solve_ivp DOP853", "solve_ivp DOP853 in numpy")
 
@@ -68,6 +68,11 @@ def test_verdicts_follow_from_the_numbers(verdicts):
     assert of("share") == "met"
     assert of("cold") == "missed"
     assert of("first orbit", "warm") == "met"
+
+
+def test_fastest_engine_is_the_one_that_takes_least():
+    (row,) = fastest_rows(made_up_samples(), ["one_dof"], [1e-8, 1e-14])
+    assert row == {"model": "one_dof", "at 1e-08": "nldyn", "at 1e-14": "none"}
 
 
 def test_nothing_measured_is_not_met():
