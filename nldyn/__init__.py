@@ -1,20 +1,36 @@
-"""Periodic orbits of reduced structures against stops: flow map, shooting, continuation."""
+"""Periodic orbits of reduced structures against stops: flow map, shooting, continuation.
 
-from nldyn.kernel_cache import ensure_cache
+The names are loaded when they are first asked for: `import nldyn` itself takes no time, so that
+the command line answers at once.
+"""
 
-ensure_cache()  # before the kernels are imported
+from importlib import import_module
+from typing import TYPE_CHECKING
 
-# ruff: noqa: E402
-from nldyn.branch import Branch, BranchPoint, SpecialPoint
-from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
-from nldyn.diagram import Diagram, Seed, diagram
-from nldyn.elements import Damper, HarmonicForce, Stop, Unbalance, hertz_stiffness
-from nldyn.errors import SceneError, SystemModelError
-from nldyn.flow import FlowMap, FlowOptions
-from nldyn.orbit import ConvergenceError, History, Orbit, solve_orbit
-from nldyn.search import SearchOptions, find_orbits
-from nldyn.special import LocateError
-from nldyn.system import System
+if TYPE_CHECKING:
+    from nldyn.branch import Branch, BranchPoint, SpecialPoint
+    from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
+    from nldyn.diagrams import Diagram, Seed, diagram
+    from nldyn.elements import Damper, HarmonicForce, Stop, Unbalance, hertz_stiffness
+    from nldyn.errors import SceneError, SystemModelError
+    from nldyn.flow import FlowMap, FlowOptions
+    from nldyn.orbit import ConvergenceError, History, Orbit, solve_orbit
+    from nldyn.search import SearchOptions, find_orbits
+    from nldyn.special import LocateError
+    from nldyn.system import System
+
+_HOMES = {
+    "branch": "Branch BranchPoint SpecialPoint",
+    "continuation": "ContinuationOptions Walk continue_branch switch_at_flip",
+    "diagrams": "Diagram Seed diagram",
+    "elements": "Damper HarmonicForce Stop Unbalance hertz_stiffness",
+    "errors": "SceneError SystemModelError",
+    "flow": "FlowMap FlowOptions",
+    "orbit": "ConvergenceError History Orbit solve_orbit",
+    "search": "SearchOptions find_orbits",
+    "special": "LocateError",
+    "system": "System",
+}
 
 __all__ = [
     "Branch",
@@ -45,3 +61,10 @@ __all__ = [
     "solve_orbit",
     "switch_at_flip",
 ]
+
+
+def __getattr__(name: str) -> object:
+    for home, names in _HOMES.items():
+        if name in names.split():
+            return getattr(import_module(f"nldyn.{home}"), name)
+    raise AttributeError(f"module 'nldyn' has no attribute '{name}'")

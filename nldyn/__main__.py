@@ -1,5 +1,5 @@
 """``python -m nldyn`` is the command line."""
 
-from nldyn_command import main
+from nldyn.command import main
 
 main()

@@ -27,6 +27,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from nldyn.kernel_cache import ensure_cache
+
+ensure_cache()
+
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nldyn_command import INTERRUPTED, STOPPED, interrupted
+from nldyn.command import INTERRUPTED, STOPPED, interrupted
 
 if TYPE_CHECKING:
-    from nldyn.diagram import Diagram
+    from nldyn.diagrams import Diagram
     from nldyn.elements import Stop
     from nldyn.system import System
 

@@ -17,7 +17,7 @@ from nldyn.version import software_version
 
 if TYPE_CHECKING:
     from nldyn.branch import Branch
-    from nldyn.diagram import Diagram
+    from nldyn.diagrams import Diagram
     from nldyn.scene_schema import Scene
 
 BRANCH_COLUMNS = (

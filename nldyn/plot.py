@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
     from nldyn.branch import Branch, SpecialPoint
-    from nldyn.diagram import Diagram
+    from nldyn.diagrams import Diagram
     from nldyn.orbit import Orbit
 
 STABLE: Literal["-"] = "-"

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from nldyn.diagram import Progress
+    from nldyn.diagrams import Progress
 
 TERMINAL_PAUSE, FILE_PAUSE = 0.1, 60.0  # s
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import cms
     import fem
     from fem.render import StopSphere
-    from nldyn.diagram import Progress
+    from nldyn.diagrams import Progress
     from nldyn.orbit import Orbit
     from nldyn.scene_schema import Scene
     from nldyn.system import System
@@ -125,7 +125,7 @@ def orbit_to_draw(
     progress: Progress | None = None,
 ) -> Orbit:
     """Find the orbit to draw: at a frequency, or where the harmonic orbits are largest."""
-    from nldyn.diagram import diagram
+    from nldyn.diagrams import diagram
     from nldyn.orbit import ConvergenceError, solve_orbit
 
     if frequency_hz is not None:

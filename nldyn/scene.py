@@ -21,7 +21,7 @@ from nldyn.scene_schema import ExcitationTable, PartTable, Scene, StopTable
 if TYPE_CHECKING:
     import cms
     import fem
-    from nldyn.diagram import Diagram, Progress
+    from nldyn.diagrams import Diagram, Progress
     from nldyn.elements import Excitation, Stop
     from nldyn.system import System
 
@@ -293,7 +293,7 @@ def compute(scene: Scene, progress: Progress | None = None) -> Diagram:
     check_computable(scene, scene.file)
     system = build_system(scene)
     from nldyn.continuation import ContinuationOptions
-    from nldyn.diagram import Seed, diagram
+    from nldyn.diagrams import Seed, diagram
 
     table = scene.continuation
     assert table is not None

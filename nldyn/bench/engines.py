@@ -21,7 +21,7 @@ from nldyn.bench.collocation import collocation
 from nldyn.bench.job import Job, Prepared
 from nldyn.bench.models import Case
 from nldyn.flow import FlowMap, FlowOptions
-from nldyn.system import Real
+from nldyn.linear import Real
 
 FLOW_OPTIONS = [
     FlowOptions(nodes=6, tail=0.01),
@@ -78,10 +78,10 @@ def flow_map(case: Case, options: FlowOptions) -> Prepared:
 
     def job(start: Real, omega: float) -> Job:
         both = itertools.cycle([omega, float(np.nextafter(omega, np.inf))])
-        packed = native.packed_start(flow, start, omega)
+        state = flow.to_state(start)[None]
         return Job(
-            lambda: flow.shoot(packed, native.PERIOD, next(both)),
-            lambda segments: native.physical(flow, segments, omega),
+            lambda: flow.shoot(state, native.PERIOD, next(both)),
+            lambda segments: native.physical(flow, segments),
         )
 
     return job

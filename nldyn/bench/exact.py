@@ -21,7 +21,8 @@ import mpmath
 import numpy as np
 
 from nldyn.elements import Unbalance
-from nldyn.system import Real, System
+from nldyn.linear import Real
+from nldyn.system import System
 
 mp = mpmath.mp
 Number = Any  # mpmath has no type hints

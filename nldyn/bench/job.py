@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from nldyn.bench.models import Sensitivities
-from nldyn.system import Real
+from nldyn.linear import Real
 
 
 class EngineError(RuntimeError):

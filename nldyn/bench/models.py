@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from nldyn.elements import Stop, Unbalance
-from nldyn.system import Real, System
+from nldyn.linear import Real
+from nldyn.system import System
 
 MODELS = ("one_dof", "two_dof", "four_dof", "sixteen_dof")
 

@@ -16,7 +16,8 @@ from numba import njit
 
 from nldyn.bench.models import Sensitivities
 from nldyn.elements import Unbalance
-from nldyn.system import Real, System
+from nldyn.linear import Real
+from nldyn.system import System
 
 FLIGHT, CONTACT = 0.0, 1.0
 PERIOD = 2.0 * math.pi

@@ -24,8 +24,9 @@ from nldyn.bench.native import sensitivities
 from nldyn.continuation import continue_branch
 from nldyn.elements import Stop
 from nldyn.flow import FlowMap, FlowOptions
+from nldyn.linear import Real
 from nldyn.orbit import solve_orbit
-from nldyn.system import Real, System
+from nldyn.system import System
 
 mp = mpmath.mp
 FILE = Path(__file__).with_name("data") / "reference.json"
@@ -70,8 +71,7 @@ def new_start(name: str) -> dict[str, Any]:
     branch = continue_branch(solve_orbit(flow, start_hz), (ends[0] - 0.2, ends[1] + 0.2))
     flips = [p for p in branch.special_points if p.kind == "PD"]
     orbit = min(flips, key=lambda p: abs(p.frequency_hz - flip_hz)).orbit
-    packed = orbit.problem.nodes(orbit.point)[0]
-    start = flow.to_physical(packed, 0.0, orbit.omega)
+    start = flow.to_modal(orbit.problem.nodes(orbit.point)[0])
     return {"system": to_table(system), "omega": orbit.omega, "start": start.tolist()}
 
 
@@ -80,13 +80,14 @@ def grazing_start(depth: str) -> dict[str, Any]:
     free = model_system("one_dof")
     omega = 2.0 * math.pi * 20.0
     flow = FlowMap(free)
-    amplitude = abs(complex(flow.data(omega).forced[0]))
+    steady = free.steady(omega)
+    amplitude = abs(complex(flow.rows[0] @ steady))
     gap = amplitude * (1.0 - float(depth))
     stop = Stop("middle", free.stops[0].stiffness, gap=gap)
     system = System(
         free.natural_frequencies, free.damping, free.participation, (stop,), (), free.excitation
     )
-    start = flow.to_physical(np.zeros(2), 0.0, omega)
+    start = flow.to_modal(steady.real)
     return {"system": to_table(system), "omega": omega, "start": start.tolist()}
 
 

@@ -21,8 +21,9 @@ from nldyn.bench.models import Case, Sensitivities, load_case, load_grazing
 from nldyn.branch import Branch
 from nldyn.continuation import continue_branch
 from nldyn.flow import FlowMap, FlowOptions
+from nldyn.linear import Real
 from nldyn.orbit import solve_orbit
-from nldyn.system import Real, System
+from nldyn.system import System
 
 DEFAULT = FlowOptions()
 TIGHT = FlowOptions(nodes=16, tail=1e-7)
@@ -188,7 +189,7 @@ def time_modes(numbers: Sequence[int] = MODES) -> list[ModesTime]:
             guess = np.concatenate(halves)
         orbit = solve_orbit(FlowMap(system, TIGHT), MODES_HZ, guess=guess)
         tight = orbit.problem.flow
-        start = tight.to_physical(orbit.problem.nodes(orbit.point)[0], 0.0, orbit.omega)
+        start = tight.to_modal(orbit.problem.nodes(orbit.point)[0])
         guess = start.reshape(2, -1)
         exact = native.sensitivities(tight, start, orbit.omega)
         case = Case(f"{modes} modes", system, orbit.omega, start, exact, 12.0)

@@ -15,7 +15,7 @@ import numpy as np
 from nldyn.bench import motion
 from nldyn.bench.models import Case
 from nldyn.elements import Unbalance
-from nldyn.system import Real
+from nldyn.linear import Real
 
 OMEGA, SIZE = hy.par[0], hy.par[1]
 

@@ -8,7 +8,7 @@ from functools import cache, partial
 
 import cms
 from nldyn.branch import Branch
-from nldyn.diagram import Diagram
+from nldyn.diagrams import Diagram
 from nldyn.elements import hertz_stiffness
 from nldyn.paper.evidence import (
     Finding,

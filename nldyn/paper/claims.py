@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from nldyn.diagram import Diagram
+from nldyn.diagrams import Diagram
 from nldyn.paper.checks import CHECKS
 from nldyn.paper.evidence import Finding
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from nldyn.branch import Branch, SpecialPoint
-from nldyn.diagram import Diagram
+from nldyn.diagrams import Diagram
 from nldyn.orbit import Orbit
 from nldyn.peaks import Peak, resonance_peaks
 

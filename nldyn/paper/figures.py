@@ -8,7 +8,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 
 from nldyn.branch import Branch
-from nldyn.diagram import Diagram
+from nldyn.diagrams import Diagram
 from nldyn.orbit import Orbit
 from nldyn.paper.evidence import orbits_at
 from nldyn.plot import new_axes_pair, plot_diagram, plot_orbit, save_figure

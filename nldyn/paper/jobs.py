@@ -14,7 +14,7 @@ from multiprocessing.queues import SimpleQueue
 
 import cms
 from nldyn.continuation import ContinuationOptions
-from nldyn.diagram import Diagram, Progress, Seed, diagram
+from nldyn.diagrams import Diagram, Progress, Seed, diagram
 from nldyn.elements import Stop
 from nldyn.progress import progress_line
 from nldyn.resources import example

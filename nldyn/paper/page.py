@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 
-from nldyn.diagram import Diagram
+from nldyn.diagrams import Diagram
 from nldyn.paper.claims import Claim
 from nldyn.paper.figures import CAPTIONS
 from nldyn.version import software_version

@@ -10,8 +10,7 @@ import types
 
 import pytest
 
-import nldyn_command
-from nldyn import progress
+from nldyn import command, progress
 from nldyn.paper.jobs import _ended_at_failure
 
 
@@ -31,7 +30,7 @@ def test_ctrl_c_while_the_package_is_loaded(monkeypatch, capsys, load):
     unready = type("Unready", (types.ModuleType,), {"main": property(load)})("nldyn.cli")
     monkeypatch.setitem(sys.modules, "nldyn.cli", unready)
     with pytest.raises(SystemExit) as end:
-        nldyn_command.main()
+        command.main()
     assert end.value.code == 130
     assert capsys.readouterr().err == "nldyn: stopped by Ctrl-C, nothing is written\n"
 
@@ -40,14 +39,14 @@ def test_other_errors_of_loading_are_not_hidden(monkeypatch):
     broken = type("Broken", (types.ModuleType,), {"main": property(lambda _: 1 / 0)})("nldyn.cli")
     monkeypatch.setitem(sys.modules, "nldyn.cli", broken)
     with pytest.raises(ZeroDivisionError):
-        nldyn_command.main()
+        command.main()
 
 
 def test_no_folder_for_compiled_code():
     """Without one, a temporary folder serves, one line says so, and nothing is left of it."""
     environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
     environment["NUMBA_CACHE_LOCATOR_CLASSES"] = "UserProvidedCacheLocator"
-    code = "import nldyn, os; f = os.environ['NUMBA_CACHE_DIR']; print(f, os.listdir(f))"
+    code = "import nldyn.flow, os; f = os.environ['NUMBA_CACHE_DIR']; print(f, os.listdir(f))"
     run = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
     )

@@ -1,6 +1,6 @@
 """The command ``nldyn``, started so that Ctrl-C is answered in one line from the first moment.
 
-It stands outside the package because the package takes a second to be imported.
+It imports nothing large before it can answer.
 """
 
 from __future__ import annotations
