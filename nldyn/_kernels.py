@@ -360,13 +360,8 @@ def solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, F, dF, to, bac
     step = np.empty((size, 1))
     for _ in range(40):
         panel_forces(fl, active, delta, F, dF)
-        for p in range(size):
-            total = free[p] - delta[p // m, p % m]
-            for q in range(size):
-                total -= G[p, q] * F[q // m, q % m]
-                J[p, q] = G[p, q] * dF[q // m, q % m]
-            J[p, p] += 1.0
-            step[p, 0] = total
+        newton_matrix(G, dF, J)
+        panel_residual(free, G, delta, F, step)
         lu_solve(J, step)
         converged = True
         for a in range(na):
@@ -377,11 +372,40 @@ def solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, F, dF, to, bac
                 delta[a, i] += step[a * m + i, 0]
             if not np.isfinite(change):
                 return False
-            converged = converged and change <= max(1e-11 * scale, noise[a])
+            # the error left goes with the square of the step
+            converged = converged and change <= max(1e-6 * scale, noise[a])
         if converged:
             panel_forces(fl, active, delta, F, dF)
             return True
     return False
+
+
+@inner
+def newton_matrix(G, dF, J):
+    """Fill J = 1 + G dF."""
+    for p in range(J.shape[0]):
+        q = 0
+        for b in range(dF.shape[0]):
+            for j in range(dF.shape[1]):
+                J[p, q] = G[p, q] * dF[b, j]
+                q += 1
+        J[p, p] += 1.0
+
+
+@inner
+def panel_residual(free, G, delta, F, residual):
+    """Fill free - delta - G F, (na m, 1)."""
+    p = 0
+    for a in range(delta.shape[0]):
+        for i in range(delta.shape[1]):
+            total = free[p] - delta[a, i]
+            q = 0
+            for b in range(F.shape[0]):
+                for j in range(F.shape[1]):
+                    total -= G[p, q] * F[b, j]
+                    q += 1
+            residual[p, 0] = total
+            p += 1
 
 
 @inner
@@ -420,10 +444,7 @@ def panel_columns(fl, tab, kind, phase, t0, h, active, dF, to, back, G, columns)
     n_columns = columns.shape[1]
     J = np.empty((size, size))
     rhs = np.zeros((size, n_columns))
-    for p in range(size):
-        for q in range(size):
-            J[p, q] = G[p, q] * dF[q // m, q % m]
-        J[p, p] += 1.0
+    newton_matrix(G, dF, J)
     for a in range(na):
         for i in range(m):
             p = a * m + i

@@ -55,26 +55,29 @@ def antiderivative_weights(to_legendre, s, out):
 
 
 @inner
-def state_at(blocks, force, chi, to_legendre, gauss_nodes, kind, h, start, forces, t, w):
+def impulses(blocks, force, chi, gauss_nodes, kind, h, forces, shares):
+    """Fill shares (m, 2n): the nodes' impulses on the state, carried back to the panel's start."""
+    for j in range(gauss_nodes.size):
+        slope = h * map_slope(kind, gauss_nodes[j])
+        for k in range(shares.shape[1]):
+            shares[j, k] = 0.0
+            for a in range(forces.shape[0]):
+                shares[j, k] += slope * force[k, a] * forces[a, j]
+        fly_state(blocks, shares[j], -h * chi[kind, j])
+
+
+@inner
+def state_at(blocks, to_legendre, kind, h, start, shares, t, w):
     """Fill w with the homogeneous state a time t after the start of a piece."""
     for k in range(w.size):
         w[k] = start[k]
+    if kind != FLIGHT:
+        weights = np.empty(shares.shape[0])
+        antiderivative_weights(to_legendre, stretched_time(kind, t / h), weights)
+        for j in range(weights.size):
+            for k in range(w.size):
+                w[k] -= weights[j] * shares[j, k]
     fly_state(blocks, w, t)
-    if kind == FLIGHT:
-        return
-    m = gauss_nodes.size
-    weights = np.empty(m)
-    antiderivative_weights(to_legendre, stretched_time(kind, t / h), weights)
-    drive = np.empty(w.size)
-    for j in range(m):
-        for k in range(w.size):
-            drive[k] = 0.0
-            for a in range(forces.shape[0]):
-                drive[k] += force[k, a] * forces[a, j]
-        fly_state(blocks, drive, t - h * chi[kind, j])
-        share = h * weights[j] * map_slope(kind, gauss_nodes[j])
-        for k in range(w.size):
-            w[k] -= share * drive[k]
 
 
 @inner
@@ -93,15 +96,17 @@ def sample_states(
 ):  # fmt: skip
     """Homogeneous states (n_phases, 2n) at ascending forcing phases."""
     states = np.empty((phases.size, force.shape[0]))
-    piece = 0
+    shares = np.empty((gauss_nodes.size, force.shape[0]))
+    piece, ready = 0, -1
     for i in range(phases.size):
         while piece + 1 < count and rec_phase[piece + 1] <= phases[i]:
             piece += 1
+        kind, h = rec_kind[piece], rec_duration[piece]
+        if ready != piece and kind != FLIGHT:
+            impulses(blocks, force, chi, gauss_nodes, kind, h, rec_force[piece], shares)
+            ready = piece
         t = (phases[i] - rec_phase[piece]) / omega
-        state_at(
-            blocks, force, chi, to_legendre, gauss_nodes, rec_kind[piece],
-            rec_duration[piece], rec_w[piece], rec_force[piece], t, states[i],
-        )  # fmt: skip
+        state_at(blocks, to_legendre, kind, h, rec_w[piece], shares, t, states[i])
     return states
 
 
@@ -131,7 +136,9 @@ def local_extremes(
     spacing = 2.0 * np.pi / (16.0 * fastest)
     found = np.empty((64, 3))
     n = 0
-    w = np.empty(force.shape[0])
+    w, v = np.empty(force.shape[0]), np.empty(force.shape[0])
+    shares = np.empty((gauss_nodes.size, force.shape[0]))
+    steps = np.empty((blocks.shape[0], 4))
     first_value, first_sign, sign, t_old, rate_old = 0.0, 0, 0, 0.0, 0.0
     for piece in range(count):
         h = rec_duration[piece]
@@ -139,13 +146,20 @@ def local_extremes(
         pieces = int(np.ceil(h / spacing)) + 1
         if kind != FLIGHT:
             pieces += gauss_nodes.size
+            impulses(blocks, force, chi, gauss_nodes, kind, h, rec_force[piece], shares)
+        for b in range(blocks.shape[0]):
+            e00, e01, e10, e11 = block_exponential(blocks[b], h / pieces)
+            steps[b, 0], steps[b, 1], steps[b, 2], steps[b, 3] = e00, e01, e10, e11
         for i in range(pieces + 1):
             x = i / pieces
             t = h * (x if kind == FLIGHT else map_fraction(kind, x))
-            state_at(
-                blocks, force, chi, to_legendre, gauss_nodes, kind, h,
-                rec_w[piece], rec_force[piece], t, w,
-            )  # fmt: skip
+            if kind != FLIGHT or i == 0:
+                state_at(blocks, to_legendre, kind, h, rec_w[piece], shares, t, w)
+            else:
+                for b in range(blocks.shape[0]):
+                    x, y = w[2 * b], w[2 * b + 1]
+                    w[2 * b] = steps[b, 0] * x + steps[b, 1] * y
+                    w[2 * b + 1] = steps[b, 2] * x + steps[b, 3] * y
             value, rate = output_rate(row, row1, forced, omega, rec_phase[piece] + omega * t, w)
             new_sign = 1 if rate > 0.0 else -1 if rate < 0.0 else sign
             if piece == 0 and i == 0:
@@ -159,12 +173,9 @@ def local_extremes(
                     middle = 0.5 * (lo + hi)
                     if step % 3 != 2 and rate_hi != rate_lo:
                         middle = lo - rate_lo * (hi - lo) / (rate_hi - rate_lo)
-                    state_at(
-                        blocks, force, chi, to_legendre, gauss_nodes, kind, h,
-                        rec_w[piece], rec_force[piece], middle, w,
-                    )  # fmt: skip
+                    state_at(blocks, to_legendre, kind, h, rec_w[piece], shares, middle, v)
                     value, rate_middle = output_rate(
-                        row, row1, forced, omega, rec_phase[piece] + omega * middle, w
+                        row, row1, forced, omega, rec_phase[piece] + omega * middle, v
                     )
                     if rate_middle * sign > 0.0:
                         lo, rate_lo = middle, rate_middle

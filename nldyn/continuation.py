@@ -79,12 +79,13 @@ class Walk:
         """Walk along the branch."""
         problem = self.start.orbit.problem
         here = self.start
+        curvature = np.zeros(here.tangent.size)
         step = self.options.first_step
         yield here
         for _ in range(self.options.max_points):
             attempt = None
             while attempt is None:
-                attempt = self._advance(problem, here, step)
+                attempt = self._advance(problem, here, curvature, step)
                 if attempt is None:
                     step *= 0.5
                     if step < self.options.min_step:
@@ -111,6 +112,7 @@ class Walk:
                 yield point
                 return
             yield point
+            curvature = (point.tangent - here.tangent) / (point.arclength - here.arclength)
             here = point
             growth = 0.7 * self.options.max_angle / max(angle, 1e-3)
             if iterations > 5:
@@ -119,23 +121,29 @@ class Walk:
         self.stop_reason = f"{self.options.max_points} points"
 
     def _advance(
-        self, problem: ShootingProblem, here: BranchPoint, step: float
+        self, problem: ShootingProblem, here: BranchPoint, curvature: Real, step: float
     ) -> tuple[BranchPoint, float, int] | None:
         """One predictor-corrector step; None when it must be shorter."""
         weights = problem.metric(here.orbit.point)
         norm = math.sqrt(float(np.sum(weights * here.tangent**2)))
         direction = here.tangent / norm
-        guess = here.orbit.point + step * direction
+        straight = here.orbit.point + step * direction
         row = weights * direction
-        found = problem.correct(guess, row / np.linalg.norm(row), max_iterations=8)
+        row /= np.linalg.norm(row)
+        found = problem.correct(
+            straight + 0.5 * step**2 * curvature,
+            row,
+            offset=float(row @ straight),
+            max_iterations=8,
+        )
         if not found.converged:
             return None
         # a curve that turns by max_angle leaves its tangent by half of that: a longer correction
         # has landed on another branch
-        off = math.sqrt(float(np.sum(weights * (found.point - guess) ** 2)))
+        off = math.sqrt(float(np.sum(weights * (found.point - straight) ** 2)))
         if off > 0.75 * self.options.max_angle * step:
             return None
-        if _jumped_to_shift(problem, here.orbit.point, guess, found.point):
+        if _jumped_to_shift(problem, here.orbit.point, straight, found.point):
             return None
         tangent = problem.tangent(found, direction)
         cosine = float(np.sum(weights * direction * tangent))
