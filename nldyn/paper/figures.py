@@ -86,5 +86,6 @@ def _orbits(orbits: list[Orbit], name: str, folder: Path) -> None:
         upper, lower = new_axes_pair()
         plot_orbit(orbit, (upper, lower))
         state = "stable" if orbit.stable else "unstable"
-        upper.set_title(f"{CAPTIONS[name]}, orbit {letter} ({state}, {orbit.impacts} impacts)")
+        impacts = f"{orbit.impacts} impact{'' if orbit.impacts == 1 else 's'}"
+        upper.set_title(f"{CAPTIONS[name]}, orbit {letter} ({state}, {impacts})")
         save_figure(upper, folder / (name if letter == "a" else f"{name}_{letter}"))

@@ -109,7 +109,7 @@ LISTED = (
 )  # fmt: skip
 
 # At low damping the branches are long and end after so many points each way.
-LONG = ContinuationOptions(max_points=1800)
+LONG = ContinuationOptions(max_points=8000)
 
 # The main 1/2 and 1/3 branches of each larger model, beside the harmonic branch.
 MAIN = (Seed(2, 45.0), Seed(3, 68.0))
