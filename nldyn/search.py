@@ -26,15 +26,15 @@ class SearchOptions:
     transient, recorded : int
         Excitation periods simulated before and during the recording.
     candidates : int
-        Near returns tried for each start, closest first.
+        Near returns tried for each start, closest first: attractors, and saddles on the way.
     seed : int
         Seed of the random initial states: results are repeatable.
     """
 
     starts: int = 10
-    transient: int = 60
-    recorded: int = 120
-    candidates: int = 3
+    transient: int = 5
+    recorded: int = 175
+    candidates: int = 5
     seed: int = 20
 
     def __post_init__(self) -> None:
@@ -156,18 +156,22 @@ def find_orbits(
 
 
 def _near_returns(states: Real, period: int, count: int) -> list[int]:
-    """Indices whose state comes back after `period`, the closest first, one per attractor lap."""
+    """Indices where the state comes back after `period` more nearly than before and after.
+
+    A motion that settles on an attractor also lingers near the saddles that it passes. The
+    closest returns come first; states near a chosen one are left out.
+    """
     if len(states) <= period:
         return []
     distance = np.linalg.norm(states[period:] - states[:-period], axis=1)
     scale = float(np.linalg.norm(states, axis=1).max()) or 1.0
+    before, after = np.append(np.inf, distance[:-1]), np.append(distance[1:], np.inf)
+    returns = np.flatnonzero((distance <= before) & (distance <= after) & (distance < 0.3 * scale))
     chosen: list[int] = []
-    for index in np.argsort(distance, kind="stable"):
-        if distance[index] > 0.3 * scale or len(chosen) == count:
+    for index in returns[np.argsort(distance[returns], kind="stable")]:
+        if len(chosen) == count:
             break
         apart = [np.linalg.norm(states[index] - states[c]) for c in chosen]
-        if all(a > 1e-3 * scale for a in apart):
+        if all(a > 1e-2 * scale for a in apart):
             chosen.append(int(index))
-        if distance[index] < 1e-9 * scale:
-            break  # an attractor of this period: one start is enough
     return chosen

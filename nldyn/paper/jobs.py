@@ -114,6 +114,9 @@ LONG = ContinuationOptions(max_points=8000)
 # The main 1/2 and 1/3 branches of each larger model, beside the harmonic branch.
 MAIN = (Seed(2, 45.0), Seed(3, 68.0))
 
+# Harmonic orbits that no other branch leads to, near the resonance.
+NEAR_23 = (Seed(1, 22.0), Seed(1, 23.0), Seed(1, 23.5))
+
 JOBS = (
     Job("four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (18.0, 90.0), (1,), MAIN, 6, LONG),
     Job(
@@ -121,7 +124,7 @@ JOBS = (
         _scene("two_dof_xi_0.001"),
         (18.0, 90.0),
         (1,),
-        (Seed(1, 23.0), *MAIN),
+        (*NEAR_23, *MAIN),
         6,
         LONG,
     ),
@@ -131,7 +134,7 @@ JOBS = (
         _scene("two_dof_xi_0.01"),
         (15.0, 90.0),
         (1,),
-        (Seed(1, 23.0), *MAIN, Seed(3, 33.0)),
+        (*NEAR_23, *MAIN, Seed(3, 33.0)),
         6,
         LONG,
     ),

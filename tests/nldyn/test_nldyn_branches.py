@@ -12,7 +12,6 @@ from one_dof import RANGE_HZ, make_one_dof
 from nldyn import (
     ContinuationOptions,
     FlowMap,
-    SearchOptions,
     Stop,
     System,
     SystemModelError,
@@ -95,7 +94,7 @@ def test_switching_needs_a_flip(harmonic_branch):
 def test_isola_is_walked_round_once(one_dof):
     """The 1/2 isola between 9.06 and 9.47 Hz closes on itself; its ends are folds."""
     isolas = []
-    for orbit in find_orbits(one_dof, 9.3, 2, options=SearchOptions(starts=20)):
+    for orbit in find_orbits(one_dof, 9.3, 2):
         branch = continue_branch(orbit, RANGE_HZ)
         if branch.stop_reason.startswith("closed"):
             isolas.append(branch)
