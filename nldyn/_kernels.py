@@ -55,7 +55,7 @@ class SystemData(NamedTuple):
 
     blocks: Real  # (n, 2, 2)
     rows: Real  # (3, n_out, 2n) outputs, their velocities and accelerations in flight
-    bound3: Real  # (n_out, n) |third derivative| <= bound3 |w_b| at any later time
+    bound3: Real  # (n_out, 2n) |third derivative| <= Σ_b |bound3_b| |w_b| at any later time
     force: Real  # (2n, n_stops): w' = A w - force @ F
     drive: Complex  # (2, 2n) excitation Re((drive[0] + ω² drive[1]) e^{iωt}) of z
     # (n_stops, 5): gap; stiffness and exponent; velocity jump per unit impulse in 1/kg;
@@ -119,7 +119,11 @@ def output_derivatives(fl, out, w, phase, t):
         value += fl.rows[0, out, j] * x + fl.rows[0, out, j + 1] * y
         first += fl.rows[1, out, j] * x + fl.rows[1, out, j + 1] * y
         second += fl.rows[2, out, j] * x + fl.rows[2, out, j + 1] * y
-        bound += fl.bound3[out, b] * math.sqrt(x * x + y * y)
+        if fl.blocks[b, 0, 1] == 0.0 and fl.blocks[b, 1, 0] == 0.0:  # two decays
+            bound += fl.bound3[out, j] * abs(x) + fl.bound3[out, j + 1] * abs(y)
+        else:
+            size = math.hypot(fl.bound3[out, j], fl.bound3[out, j + 1])
+            bound += size * math.hypot(x, y)
     return value, first, second, bound
 
 

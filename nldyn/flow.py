@@ -37,7 +37,7 @@ __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
 
 _REASONS = {
     OK: "",
-    TOO_MANY_PIECES: "too many contacts in one segment",
+    TOO_MANY_PIECES: "too many contacts, or too fast a mode, for one segment",
     CONTACT_FAILED: "a contact phase could not be resolved",
     DIVERGED: "Newton's method diverged",
     SINGULAR: "singular Jacobian",
@@ -188,9 +188,9 @@ class FlowMap:
         s, linear = self.system, self.system.linear
         vectors = [s.stop_vector(stop) for stop in s.stops]
         accelerations = linear.times_block(self.rate_rows)
-        thirds = linear.times_block(accelerations).reshape(-1, s.size, 2)
-        sizes = np.linalg.norm(thirds, axis=2)
-        bounds = np.multiply(sizes, linear.growth, out=np.zeros_like(sizes), where=sizes > 0.0)
+        thirds = np.abs(linear.times_block(accelerations))
+        growth = np.repeat(linear.growth, 2)
+        bounds = np.multiply(thirds, growth, out=np.zeros_like(thirds), where=thirds > 0.0)
         force = np.array([s.force_column(v) for v in vectors]).reshape(-1, 2 * s.size)
         stops = [
             (stop.gap, stop.stiffness, stop.exponent, v @ v, _duration_factor(stop.exponent))

@@ -98,7 +98,7 @@ def linear_part(omega: Real, damping: Real) -> LinearPart:
         A = _energy_matrix(omega[modes], unit[modes], damping[np.ix_(modes, modes)])
         places = np.concatenate([modes, n + modes])
         for plane in [np.eye(2)] if modes.size == 1 else _invariant_planes(A):
-            block = plane.T @ A @ plane
+            plane, block = _separated(plane, plane.T @ A @ plane)
             column = np.zeros((2 * n, 2))
             column[places] = plane
             blocks.append(block)
@@ -141,6 +141,19 @@ def _invariant_planes(A: Real) -> list[Real]:
         order.append(abs(values[second]))
     planes = [np.linalg.qr(np.column_stack(pair))[0] for pair in pairs]
     return [planes[i] for i in np.argsort(order, kind="stable")]
+
+
+def _separated(plane: Real, block: Real) -> tuple[Real, Real]:
+    """The same plane along the eigenvectors of its block if these are real and far apart.
+
+    A fast decay then leaves nothing in the coordinate of the slow one.
+    """
+    values, vectors = np.linalg.eig(block)
+    if np.iscomplexobj(values) or np.abs(values).max() <= 4.0 * np.abs(values).min():
+        return plane, block
+    if np.linalg.cond(vectors) > 10.0:
+        return plane, block
+    return plane @ vectors, np.diag(values)
 
 
 def _growth(block: Real) -> float:
