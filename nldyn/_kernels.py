@@ -103,6 +103,26 @@ def block_exponential(block, t):
 
 
 @inner
+def there_and_back(block, t):
+    """The four entries of exp(block t), then those of exp(-block t)."""
+    mean = 0.5 * (block[0, 0] + block[1, 1])
+    half = 0.5 * (block[0, 0] - block[1, 1])
+    square = half * half + block[0, 1] * block[1, 0]
+    if square >= 0.0:
+        e00, e01, e10, e11 = block_exponential(block, t)
+        i00, i01, i10, i11 = block_exponential(block, -t)
+        return e00, e01, e10, e11, i00, i01, i10, i11
+    rate = math.sqrt(-square)
+    size = math.exp(mean * t)
+    even, odd = math.cos(rate * t), math.sin(rate * t) / rate
+    a, b, c, d = odd * half, odd * block[0, 1], odd * block[1, 0], 1.0 / size
+    return (
+        size * (even + a), size * b, size * c, size * (even - a),
+        d * (even - a), -d * b, -d * c, d * (even + a),
+    )  # fmt: skip
+
+
+@inner
 def output_derivatives(fl, out, w, phase, t):
     """Value and first two time derivatives of output `out`, and a bound on the third, after t."""
     turn = fl.forced[0, out] * np.exp(1j * (phase + fl.omega * t))
@@ -276,7 +296,7 @@ def law(delta, stiffness, exponent):
 def panel_responses(fl, tab, kind, h, active, to, back, G):
     """Fill what a panel of length h needs to know of the linear part.
 
-    to[a, i] = row_a exp(A t_i) and back[a, j] = exp(-A t_j) force_a, both (na, m, 2n), and
+    to[a, i] = row_a exp(A t_i), (na, m, 2n), back[a, :, j] = exp(-A t_j) force_a, (na, 2n, m), and
     G = h W_ij K_ab(t_i - t_j) with the impulse response K_ab(t) = row_a exp(A t) force_b.
     """
     m = tab.nodes.size
@@ -285,23 +305,25 @@ def panel_responses(fl, tab, kind, h, active, to, back, G):
         t = h * tab.chi[kind, i]
         for b in range(fl.blocks.shape[0]):
             j = 2 * b
-            e00, e01, e10, e11 = block_exponential(fl.blocks[b], t)
-            i00, i01, i10, i11 = block_exponential(fl.blocks[b], -t)
+            e00, e01, e10, e11, i00, i01, i10, i11 = there_and_back(fl.blocks[b], t)
             for a in range(na):
                 x, y = fl.rows[0, active[a], j], fl.rows[0, active[a], j + 1]
                 to[a, i, j] = x * e00 + y * e10
                 to[a, i, j + 1] = x * e01 + y * e11
                 x, y = fl.force[j, active[a]], fl.force[j + 1, active[a]]
-                back[a, i, j] = i00 * x + i01 * y
-                back[a, i, j + 1] = i10 * x + i11 * y
+                back[a, j, i] = i00 * x + i01 * y
+                back[a, j + 1, i] = i10 * x + i11 * y
     for a in range(na):
         for b in range(na):
             for i in range(m):
                 for j in range(m):
-                    total = 0.0
-                    for k in range(to.shape[2]):
-                        total += to[a, i, k] * back[b, j, k]
-                    G[a * m + i, b * m + j] = h * tab.integrate[kind, i, j] * total
+                    G[a * m + i, b * m + j] = 0.0
+                for k in range(to.shape[2]):
+                    z = h * to[a, i, k]
+                    for j in range(m):
+                        G[a * m + i, b * m + j] += z * back[b, k, j]
+                for j in range(m):
+                    G[a * m + i, b * m + j] *= tab.integrate[kind, i, j]
 
 
 @inner
@@ -428,10 +450,9 @@ def panel_end(fl, tab, kind, w, h, active, F, back, w_end):
     for k in range(w.size):
         w_end[k] = w[k]
     for a in range(active.size):
-        for j in range(tab.nodes.size):
-            impulse = h * tab.weights[kind, j] * F[a, j]
-            for k in range(w.size):
-                w_end[k] -= impulse * back[a, j, k]
+        for k in range(w.size):
+            for j in range(tab.nodes.size):
+                w_end[k] -= h * tab.weights[kind, j] * F[a, j] * back[a, k, j]
     fly_state(fl, w_end, h)
 
 
@@ -462,10 +483,9 @@ def panel_columns(fl, tab, kind, phase, t0, h, active, dF, to, back, G, columns)
             rhs[p, n_columns - 1] += (slope * turn).real
     lu_solve(J, rhs)
     for a in range(na):
-        for j in range(m):
-            share = h * tab.weights[kind, j] * dF[a, j]
-            for k in range(columns.shape[0]):
-                z = share * back[a, j, k]
+        for k in range(columns.shape[0]):
+            for j in range(m):
+                z = h * tab.weights[kind, j] * dF[a, j] * back[a, k, j]
                 for c in range(n_columns):
                     columns[k, c] -= z * rhs[a * m + j, c]
     fly(fl, columns, h)
@@ -707,10 +727,9 @@ def node_outputs(fl, tab, kind, phase, w, h, active, F, back, out, values):
         for k in range(w.size):
             driven[k] = w[k]
         for a in range(active.size):
-            for j in range(m):
-                impulse = h * tab.integrate[kind, i, j] * F[a, j]
-                for k in range(w.size):
-                    driven[k] -= impulse * back[a, j, k]
+            for k in range(w.size):
+                for j in range(m):
+                    driven[k] -= h * tab.integrate[kind, i, j] * F[a, j] * back[a, k, j]
         values[0, i] = free_output(fl, out, driven, t) + forced_output(
             fl, out, phase + fl.omega * t
         )
@@ -993,7 +1012,7 @@ def run_pieces(
             np.empty((n_active, m)),
             np.empty((n_active, m)),
             np.empty((n_active, m, w.size)),
-            np.empty((n_active, m, w.size)),
+            np.empty((n_active, w.size, m)),
             np.empty((n_active * m, n_active * m)),
         )
         h_max = min(remain, h_cap)
