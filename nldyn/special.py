@@ -140,8 +140,14 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
     """All special points between two neighbouring points, in order.
 
     Each change of sign is followed by Brent's method. Where several happen in one step, or an
-    event does not explain the change in the number of contacts, the chord is halved first.
+    event does not explain the change in the number of contacts, the chord is halved first; so it
+    is where multipliers near the unit circle move far, which may cross it twice.
     """
+    if depth < 3 and _travel(a.orbit.multipliers, b.orbit.multipliers) > 0.3:
+        middle = Chord(a, b).at(0.5)
+        return special_points_between(a, middle, depth + 1) + special_points_between(
+            middle, b, depth + 1
+        )
     chord = Chord(a, b)
     before, after = tests(a), tests(b)
     changed = [k for k in before if before[k] * after[k] < 0.0]
@@ -160,6 +166,13 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
     if contacts and touches:
         found.append(locate("GR", chord, touches[0].depth))
     return sorted(found, key=lambda s: s.point.arclength)
+
+
+def _travel(before: Complex, after: Complex) -> float:
+    """Longest way of a multiplier near the unit circle to the nearest one of the next orbit."""
+    distance = np.abs(before[:, None] - after[None, :])
+    near = np.abs(np.log(np.maximum(np.abs(before), 1e-3))) < 0.4
+    return float(distance.min(axis=1)[near].max(initial=0.0))
 
 
 @dataclass(frozen=True)
