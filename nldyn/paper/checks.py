@@ -439,8 +439,25 @@ def _orbit9(results: Results) -> Finding:
     text = "; ".join(f"{1e6 * o.max_abs_displacement:.3g} µm: {describe(o)}" for o in orbits)
     three = [o for o in orbits if o.impacts == 3]
     if not orbits:
-        return Finding(holds=False, text="no unstable harmonic orbit found at 22.5 Hz")
+        return Finding(holds=False, text="none at 22.5 Hz", note=_nearest_with_three(results))
     return Finding(float(three[0].impacts if three else orbits[0].impacts), note=text)
+
+
+def _nearest_with_three(results: Results) -> str:
+    """The unstable harmonic orbit with three impacts that is nearest to 22.5 Hz."""
+    unstable = [
+        orbit
+        for branch in results["four_dof_xi_0.001"].of_period(1)
+        for orbit in branch.points
+        if not orbit.stable and orbit.impacts == 3
+    ]
+    if not unstable:
+        return "no unstable harmonic orbit with three impacts at any frequency"
+    nearest = min(unstable, key=lambda orbit: abs(orbit.frequency_hz - 22.5))
+    return (
+        f"the nearest unstable orbit with three impacts, {1e6 * nearest.max_abs_displacement:.3g} "
+        f"µm, is at {nearest.frequency_hz:.4g} Hz"
+    )
 
 
 def _damping(results: Results) -> Finding:
