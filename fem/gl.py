@@ -100,4 +100,4 @@ def require_gl() -> None:
     """Raise RenderError if no picture can be made here."""
     available, advice = gl_available()
     if not available:
-        raise RenderError(f"{advice}")
+        raise RenderError(advice)

@@ -115,7 +115,7 @@ def render_shape(
     ...     factor = render_shape(component, u, "arm.png", title="An arm")
     """
     target = named(path, (".png",))
-    drawing = frame_drawing(component, mirror)
+    drawing = frame_surface(component, mirror)
     states = checked_states(component, u, 1)
     factor = automatic_scale(drawing, states) if scale is None else checked_scale(scale)
     require_gl()
@@ -173,7 +173,7 @@ def render_modes(
     ...     render_modes(component, np.eye(len(component.free))[:, :2], ["one", "two"], "arm.png")
     """
     target = named(path, (".png",))
-    drawing = frame_drawing(component, mirror)
+    drawing = frame_surface(component, mirror)
     modes = checked_states(component, np.asarray(shapes, dtype=np.float64).T, 2)
     if len(titles) != len(modes):
         raise ModelError(f"there are {len(modes)} modes to draw, but {len(titles)} titles")
@@ -252,7 +252,7 @@ def animate(
     ...     factor = animate(component, states, "arm.gif", times=times)
     """
     target = named(path, (".gif", ".mp4"))
-    drawing = frame_drawing(component, mirror)
+    drawing = frame_surface(component, mirror)
     states = checked_states(component, displacements, 2)
     instants = np.asarray(times, dtype=np.float64)
     if instants.shape != (len(states),):
@@ -323,11 +323,6 @@ def check_video(target: Path) -> None:
 
 
 # Scale and units
-
-
-def frame_drawing(component: Component, mirror: str | None) -> FrameSurface:
-    """The surface to draw, whole where a mirror is given."""
-    return frame_surface(component, mirror)
 
 
 def extent(points: FloatArray) -> float:

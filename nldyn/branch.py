@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -173,10 +172,3 @@ def minimal_period(orbit: Orbit, rtol: float = 1e-6) -> int:
             if float(np.abs(states - shifted).max()) <= rtol * scale:
                 return n
     return orbit.period
-
-
-def all_special_points(branches: Sequence[Branch]) -> Iterator[tuple[Branch, SpecialPoint]]:
-    """Pairs of a branch and each of its special points."""
-    for branch in branches:
-        for special in branch.special_points:
-            yield branch, special

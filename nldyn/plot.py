@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
-    from nldyn.branch import Branch, SpecialPoint
+    from nldyn.branch import Branch
     from nldyn.diagrams import Diagram
     from nldyn.orbit import Orbit
 
@@ -327,7 +327,7 @@ def _draw_branch(ax: Axes, branch: Branch, colour: str, factor: float) -> None:
 def _draw_marks(
     ax: Axes, branches: Sequence[Branch], kind: str, factor: float, size: float
 ) -> bool:
-    points = [point for point in _special_points(branches) if str(point.kind) == kind]
+    points = [p for branch in branches for p in branch.special_points if p.kind == kind]
     if not points:
         return False
     hz = [float(point.orbit.frequency_hz) for point in points]
@@ -389,10 +389,6 @@ def _mark_impacts(axes: Sequence[Axes], times: NDArray[np.float64]) -> None:
             ax.axvline(float(instant), color="0.35", linewidth=0.8, linestyle="--", label=label)
     if times.size:
         axes[0].legend(fontsize="small", loc="upper right")
-
-
-def _special_points(branches: Iterable[Branch]) -> list[SpecialPoint]:
-    return [point for branch in branches for point in branch.special_points]
 
 
 def _unit_of(branches: Sequence[Branch], unit: str | None) -> tuple[float, str]:

@@ -246,9 +246,10 @@ class _Drawing:
         self, state: NDArray[np.float64], penetration: float, stop: StopSphere | None
     ) -> float:
         """Factor on the deflection at which the stop is not drowned in what it dents."""
-        from fem.render import automatic_scale, frame_drawing, round_number
+        from fem.render import automatic_scale, round_number
+        from fem.sweep import frame_surface
 
-        factor = automatic_scale(frame_drawing(self.component, _mirror(self.scene)), state[None])
+        factor = automatic_scale(frame_surface(self.component, _mirror(self.scene)), state[None])
         if stop is None or penetration == 0.0:
             return factor
         return min(factor, round_number(2.0 * stop.radius / penetration))

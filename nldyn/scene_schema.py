@@ -65,13 +65,6 @@ class PartTable(Table):
     area: Positive | None = None
     second_moment: Positive | None = None
 
-    @property
-    def section_kind(self) -> Literal["rectangle", "circle", "general"]:
-        """Which section the keys describe."""
-        if self.width is not None:
-            return "rectangle"
-        return "circle" if self.diameter is not None else "general"
-
     @model_validator(mode="after")
     def _one_section(self) -> PartTable:
         keys = ("width", "height", "diameter", "bore", "area", "second_moment")
@@ -197,11 +190,6 @@ class StopTable(Table):
     gap: Number = 0.0
     direction: Literal[1, -1] = 1
     against: str | None = None
-
-    @property
-    def from_sphere(self) -> bool:
-        """Whether the stiffness follows from a sphere's radius and elastic constants."""
-        return self.radius is not None
 
     @model_validator(mode="after")
     def _complete(self) -> StopTable:

@@ -14,8 +14,6 @@ from nldyn.branch import BranchPoint, SpecialPoint
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
 
-MULTIPLIER_TESTS = ("PD", "BP", "NS")
-
 
 class LocateError(RuntimeError):
     """An orbit between two points of a branch could not be corrected."""
