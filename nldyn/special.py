@@ -14,6 +14,8 @@ from nldyn.branch import BranchPoint, SpecialPoint
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
 
+BRACKET = 1e-10  # width in σ to which a special point is located
+
 
 class LocateError(RuntimeError):
     """An orbit between two points of a branch could not be corrected."""
@@ -124,14 +126,16 @@ class Chord:
 
 def locate(kind: str, chord: Chord, test: Callable[[BranchPoint], float]) -> SpecialPoint:
     """Root of a test function on a chord whose ends have opposite signs (Brent's method)."""
-    sigma, info = brentq(lambda x: test(chord.at(x)), 0.0, 1.0, xtol=1e-10, full_output=True)
-    point = chord.at(float(sigma))
-    near = chord.at(min(max(sigma + 1e-6, 0.0), 1.0 - 1e-9))
-    slope = abs(near.orbit.frequency_hz - point.orbit.frequency_hz) / 1e-6
-    error = (1e-10 * slope / point.orbit.frequency_hz) + point.orbit.error
+    sigma, info = brentq(
+        lambda x: test(chord.at(x)), 0.0, 1.0, xtol=BRACKET, full_output=True, disp=False
+    )
     if not info.converged:
         raise LocateError(f"{kind} not located")
-    return SpecialPoint(kind, point, error)
+    point = chord.at(float(sigma))
+    step = 1e-6 if sigma < 0.5 else -1e-6
+    near = chord.at(float(sigma) + step)
+    slope = abs(near.orbit.frequency_hz / point.orbit.frequency_hz - 1.0) / abs(step)
+    return SpecialPoint(kind, point, BRACKET * slope + point.orbit.error)
 
 
 def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[SpecialPoint]:
