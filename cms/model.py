@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-import tempfile
+import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -205,14 +205,13 @@ class ReducedModel:
             "participation": np.array(list(self.participation.values())).reshape(-1, self.size),
         }
         target = Path(path)
-        handle, draft = tempfile.mkstemp(dir=target.parent, prefix=target.name, suffix=".part")
+        draft = target.with_name(f".{target.name}-{secrets.token_hex(4)}")
         try:
-            with os.fdopen(handle, "wb") as file:
+            with draft.open("wb") as file:
                 np.savez(file, **arrays)
-            os.replace(draft, target)
-        except BaseException:
-            Path(draft).unlink(missing_ok=True)
-            raise
+            draft.replace(target)
+        finally:
+            draft.unlink(missing_ok=True)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> ReducedModel:

@@ -9,7 +9,6 @@ import contextlib
 import importlib.util
 import math
 import os
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fem.errors import ModelError
+from fem.files import draft_of
 from fem.frame import Component
 from fem.gl import RenderError, gl_available, require_gl
 from fem.mesh import FloatArray
@@ -627,30 +627,7 @@ def fields(count: int) -> tuple[int, int]:
     return math.ceil(count / columns), columns
 
 
-# Files, whole or not at all
-
-
-@contextlib.contextmanager
-def draft_of(target: Path) -> Iterator[Path]:
-    """A file beside the target that takes its place at the end, or vanishes on an error."""
-    handle, name = tempfile.mkstemp(
-        dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix.lower()
-    )
-    os.close(handle)
-    draft = Path(name)
-    try:
-        yield draft
-        draft.chmod(0o666 & ~current_umask())
-        os.replace(draft, target)
-    finally:
-        draft.unlink(missing_ok=True)
-
-
-def current_umask() -> int:
-    """The process's file mode mask."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+# Files
 
 
 def write_image(target: Path, image: Image) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fem.errors import ModelError
+from fem.files import draft_of
 from fem.mesh import FrameMesh
 from fem.model import (
     BeamPart,
@@ -57,15 +57,8 @@ def save_model(model: FrameModel, path: str | os.PathLike[str]) -> None:
     }
     arrays |= {f"part {name}": elements for name, elements in mesh.parts.items()}
     arrays |= {f"point {name}": nodes for name, nodes in mesh.point_sets.items()}
-    target = Path(path)
-    handle, draft = tempfile.mkstemp(dir=target.parent, prefix=target.name, suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
-        os.replace(draft, target)
-    except BaseException:
-        Path(draft).unlink(missing_ok=True)
-        raise
+    with draft_of(Path(path)) as draft, draft.open("wb") as file:
+        np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
 
 
 def load_model(path: str | os.PathLike[str]) -> FrameModel:

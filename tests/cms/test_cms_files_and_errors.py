@@ -23,6 +23,12 @@ def test_save_and_load(tmp_path, cantilever):
     assert [file.name for file in tmp_path.iterdir()] == ["beam.reduced"]
 
 
+def test_file_may_be_read_by_whom_the_system_lets_read_new_files(tmp_path, cantilever):
+    (tmp_path / "ordinary").touch()
+    cms.reduce(cantilever, modes=1).save(tmp_path / "a.npz")
+    assert (tmp_path / "a.npz").stat().st_mode == (tmp_path / "ordinary").stat().st_mode
+
+
 def test_model_without_interfaces_survives_its_file(tmp_path, cantilever):
     reduced = cms.reduce(cms.Matrices(cantilever.stiffness, cantilever.mass, {}), modes=2)
     assert reduced.residual_modes == 0

@@ -34,6 +34,7 @@ def test_examples_run_in_order(monkeypatch, capsys):
         "calibrate",
         "elements",
         "errors",
+        "files",
         "frame",
         "mesh",
         "model",

@@ -61,3 +61,9 @@ def test_files_that_are_not_frames_are_one_sentence(tmp_path):
     path.write_bytes(path.read_bytes()[:-200])
     with pytest.raises(fem.ModelError, match="is not a file of a saved frame"):
         fem.Component.load(path)
+
+
+def test_file_may_be_read_by_whom_the_system_lets_read_new_files(tmp_path):
+    (tmp_path / "ordinary").touch()
+    fem.assemble(frame()).save(tmp_path / "frame.npz")
+    assert (tmp_path / "frame.npz").stat().st_mode == (tmp_path / "ordinary").stat().st_mode
