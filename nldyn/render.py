@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.errors import SceneError
+from nldyn.output import write_table
 from nldyn.result_directory import result_directory
 from nldyn.scene import build_component, build_reduced, build_system
 from nldyn.scene_checks import check_computable
@@ -155,13 +155,9 @@ def deepest_state(orbit: Orbit) -> NDArray[np.float64]:
 
 def write_modes(reduced: cms.ReducedModel, path: Path) -> None:
     """Write frequency and participation of each mode of the reduced model to a CSV file."""
-    names = list(reduced.participation)
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["mode", "frequency_hz", *(f"participation_{name}" for name in names)])
-        for number, hz in enumerate(reduced.frequencies_hz):
-            row = [float(reduced.participation[name][number]) for name in names]
-            writer.writerow([number + 1, float(hz), *row])
+    columns = ["mode", "frequency_hz", *(f"participation_{name}" for name in reduced.participation)]
+    values = np.column_stack([reduced.frequencies_hz, *reduced.participation.values()]).tolist()
+    write_table(path, columns, ([number, *row] for number, row in enumerate(values, start=1)))
 
 
 def save_orbit(orbit: Orbit, folder: Path) -> None:

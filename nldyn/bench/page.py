@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import platform
 import sys
@@ -10,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from nldyn.output import write_table
 from nldyn.version import software_version
 
 Row = Mapping[str, str]
@@ -64,14 +64,6 @@ def machine() -> str:
     )
 
 
-def write_table(rows: Sequence[Row], file: Path) -> None:
-    """Write a table as CSV."""
-    with file.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.DictWriter(stream, list(rows[0]) if rows else [])
-        writer.writeheader()
-        writer.writerows(rows)
-
-
 def markdown(rows: Sequence[Row]) -> str:
     """A table in markdown."""
     if not rows:
@@ -100,7 +92,9 @@ def write_page(
     """
     parts = ["# Speed against error", machine(), f"Measured in {seconds:.0f} s."]
     for title, rows in tables.items():
-        write_table(rows, folder / f"{title.lower().replace(' ', '_')}.csv")
+        columns = list(rows[0]) if rows else []
+        file = folder / f"{title.lower().replace(' ', '_')}.csv"
+        write_table(file, columns, ([row[c] for c in columns] for row in rows))
         parts += [f"## {title}", NOTES[title], markdown(rows)]
         if title == "Targets":
             parts += [f"![Speed against error of {m}](work_precision_{m}.png)" for m in models]

@@ -28,7 +28,7 @@ def main(out: str | Path, workers: int = 2) -> None:
     --------
     >>> main("results/paper")        # doctest: +SKIP
     """
-    from nldyn.paper.claims import evaluate, write_claims
+    from nldyn.paper.claims import evaluate, verdict_counts, write_claims
     from nldyn.paper.figures import write_figures
     from nldyn.paper.jobs import run_jobs
     from nldyn.paper.page import write_page
@@ -42,7 +42,6 @@ def main(out: str | Path, workers: int = 2) -> None:
         write_claims(rows, folder / "claims.csv")
         write_figures(results, folder)
         write_page(rows, results, time.perf_counter() - start, folder)
-    verdicts = [row.verdict for row in rows]
-    counts = ", ".join(f"{verdicts.count(v)} {v}" for v in ("agrees", "differs", "not decided"))
-    print(f"{len(rows)} claims: {counts}; {time.perf_counter() - start:.0f} s; written to {out}",
-          file=sys.stderr)  # fmt: skip
+    seconds = time.perf_counter() - start
+    counts = verdict_counts(rows)
+    print(f"{len(rows)} claims: {counts}; {seconds:.0f} s; written to {out}", file=sys.stderr)

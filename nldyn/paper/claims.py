@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import csv
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from nldyn.diagrams import Diagram
+from nldyn.output import write_table
 from nldyn.paper.checks import CHECKS
 from nldyn.paper.evidence import Finding
 
@@ -61,21 +61,25 @@ def published_claims() -> list[dict[str, str]]:
 
 def evaluate(results: Results) -> list[Claim]:
     """Every published claim with our value and a verdict."""
-    return [_judged(row, CHECKS.get(row["id"]), results) for row in published_claims()]
+    return [judged(row, CHECKS.get(row["id"]), results) for row in published_claims()]
 
 
-def write_claims(rows: list[Claim], path: Path) -> None:
+def write_claims(rows: Sequence[Claim], path: Path) -> None:
     """Write the columns id, published, computed, deviation, verdict, note."""
     columns = ("id", "published", "computed", "deviation", "verdict", "note")
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows([getattr(row, c) for c in columns] for row in rows)
+    write_table(path, columns, ([getattr(row, c) for c in columns] for row in rows))
 
 
-def _judged(
+def verdict_counts(rows: Sequence[Claim]) -> str:
+    """How many claims agree, differ and are not decided, in words."""
+    verdicts = [row.verdict for row in rows]
+    return ", ".join(f"{verdicts.count(v)} {v}" for v in ("agrees", "differs", "not decided"))
+
+
+def judged(
     row: Mapping[str, str], check: Callable[[Results], Finding] | None, results: Results
 ) -> Claim:
+    """A published claim with the verdict on what its check finds."""
     finding = check(results) if check else Finding(None, note="not computed")
     head = (row["id"], row["published"], row["unit"], row["kind"], row["quantity"], row["model"])
     if finding.holds is not None:
@@ -88,7 +92,7 @@ def _judged(
     if row["kind"] == "bound":
         agrees = finding.value <= published
     else:
-        rounding = 0.5 * _last_digit(row["published"]) / abs(published)
+        rounding = 0.5 * last_digit(row["published"]) / abs(published)
         agrees = abs(deviation) <= max(READING_TOLERANCE, rounding)
     computed = f"{finding.value:.6g}"
     return Claim(
@@ -100,8 +104,8 @@ def _judged(
     )
 
 
-def _last_digit(number: str) -> float:
+def last_digit(number: str) -> float:
     """Value of one unit in the last digit of a printed number."""
     mantissa, _, exponent = number.lower().partition("e")
     decimals = len(mantissa.partition(".")[2])
-    return 10.0 ** (int(exponent or 0) - decimals) if not math.isnan(float(number)) else 0.0
+    return 10.0 ** (int(exponent or 0) - decimals)

@@ -7,7 +7,7 @@ from html import escape
 from pathlib import Path
 
 from nldyn.diagrams import Diagram
-from nldyn.paper.claims import Claim
+from nldyn.paper.claims import Claim, verdict_counts
 from nldyn.paper.figures import CAPTIONS
 from nldyn.version import software_version
 
@@ -24,15 +24,14 @@ def write_page(
     rows: Sequence[Claim], results: Mapping[str, Diagram], seconds: float, folder: Path
 ) -> None:
     """Write ``index.html`` beside the figures."""
-    verdicts = [row.verdict for row in rows]
-    counts = ", ".join(f"{verdicts.count(v)} {v}" for v in ("agrees", "differs", "not decided"))
     parts = [
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>",
         f"<title>The paper, recomputed</title><style>{STYLE}</style></head><body>",
         "<h1>The paper's figures and claims, recomputed</h1>",
-        f"<p>nldyn {escape(software_version())}; {len(rows)} claims: {counts}; computed in "
-        f"{seconds:.0f} s. A number agrees if it deviates by no more than 1 % or half a unit of "
-        "the last digit printed. Stable orbits are drawn solid, unstable ones dotted.</p>",
+        f"<p>nldyn {escape(software_version())}; {len(rows)} claims: {verdict_counts(rows)}; "
+        f"computed in {seconds:.0f} s. A number agrees if it deviates by no more than 1 % or half "
+        "a unit of the last digit printed. Stable orbits are drawn solid, unstable ones "
+        "dotted.</p>",
         *[_figure(folder, name, caption) for name, caption in CAPTIONS.items()],
         "<h2>Claims</h2>",
         _claims_table(rows),
