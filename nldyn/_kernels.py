@@ -148,6 +148,13 @@ def output_derivatives(fl, out, w, phase, t):
 
 
 @inner
+def distance(fl, stop, w, phase):
+    """Penetration of a stop, negative when it is open."""
+    value, _, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
+    return value - fl.stops[stop, GAP]
+
+
+@inner
 def output_noise(fl, out, w):
     """Rounding error to expect in an output: 4 units in the last place of its terms."""
     total = abs(fl.forced[0, out])
@@ -262,19 +269,24 @@ class Record(NamedTuple):
         Forcing phase at the start, duration in s.
     kind : (n_pieces,)
         -1 for a flight, else the kind of the panel's ends.
+    event : (n_pieces,)
+        Stop that opens or closes at the end, or -1.
     w : (n_pieces, 2n)
         State at the start without the steady response.
-    force : (n_pieces, n_stops, m)
-        Forces at the nodes of a panel.
-    used : (1,)
-        Number of pieces in use.
+    force, depth : (n_pieces, n_stops, m)
+        Forces and penetrations at the nodes of a panel (zero where a stop is open).
+    used : (2,)
+        Number of pieces in use; number of pieces of the motion before, which are overwritten one
+        by one and serve as guesses.
     """
 
     phase: NDArray[np.float64]
     duration: NDArray[np.float64]
     kind: NDArray[np.int64]
+    event: NDArray[np.int64]
     w: NDArray[np.float64]
     force: NDArray[np.float64]
+    depth: NDArray[np.float64]
     used: NDArray[np.int64]
 
 
@@ -327,35 +339,65 @@ def panel_responses(fl, tab, kind, h, active, to, back, G):
 
 
 @inner
-def lu_solve(A, B):
-    """Solve A X = B in place (X overwrites B, LU overwrites A), with row pivoting."""
+def lu_factor(A, order):
+    """Replace A by its LU factors with the inverses of the pivots, order (n,) by the row swaps."""
     n = A.shape[0]
-    n_rhs = B.shape[1]
     for k in range(n):
         pivot = k
         for i in range(k + 1, n):
             if abs(A[i, k]) > abs(A[pivot, k]):
                 pivot = i
+        order[k] = pivot
         if pivot != k:
             for j in range(n):
                 A[k, j], A[pivot, j] = A[pivot, j], A[k, j]
-            for j in range(n_rhs):
-                B[k, j], B[pivot, j] = B[pivot, j], B[k, j]
-        inverse = 1.0 / A[k, k] if A[k, k] != 0.0 else np.inf
+        A[k, k] = 1.0 / A[k, k] if A[k, k] != 0.0 else np.inf
         for i in range(k + 1, n):
-            factor = A[i, k] * inverse
+            A[i, k] *= A[k, k]
+            factor = A[i, k]
             if factor != 0.0:
                 for j in range(k + 1, n):
                     A[i, j] -= factor * A[k, j]
-                for j in range(n_rhs):
-                    B[i, j] -= factor * B[k, j]
-    for k in range(n - 1, -1, -1):
-        inverse = 1.0 / A[k, k] if A[k, k] != 0.0 else np.inf
+
+
+@inner
+def lu_apply(A, order, B):
+    """Solve for the columns of B (n, n_rhs) in place with the factors of `lu_factor`."""
+    n, n_rhs = B.shape
+    for k in range(n):
+        if order[k] != k:
+            for j in range(n_rhs):
+                B[k, j], B[order[k], j] = B[order[k], j], B[k, j]
+    for i in range(1, n):
+        for k in range(i):
+            factor = A[i, k]
+            for j in range(n_rhs):
+                B[i, j] -= factor * B[k, j]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            factor = A[i, k]
+            for j in range(n_rhs):
+                B[i, j] -= factor * B[k, j]
         for j in range(n_rhs):
-            total = B[k, j]
-            for i in range(k + 1, n):
-                total -= A[k, i] * B[i, j]
-            B[k, j] = total * inverse
+            B[i, j] *= A[i, i]
+
+
+@inner
+def lu_apply_vector(A, order, b):
+    """The same for one right-hand side (n,)."""
+    n = b.size
+    for k in range(n):
+        b[k], b[order[k]] = b[order[k]], b[k]
+    for i in range(1, n):
+        total = b[i]
+        for k in range(i):
+            total -= A[i, k] * b[k]
+        b[i] = total
+    for i in range(n - 1, -1, -1):
+        total = b[i]
+        for k in range(i + 1, n):
+            total -= A[i, k] * b[k]
+        b[i] = total * A[i, i]
 
 
 @inner
@@ -365,12 +407,14 @@ def forced_output(fl, out, phase):
 
 
 @inner
-def solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, F, dF, to, back, G):
+def solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, work):
     """Newton's method for the penetrations at the nodes; delta (na, m) holds the guess.
 
     noise (na,) is the rounding error to expect in each. Returns whether it converged, with F, dF,
-    to, back and G filled.
+    to, back and G of `work` filled. The factors of its matrix serve as long as they bring an
+    error down tenfold per step, also those that the call before has left.
     """
+    F, dF, to, back, G, factors, order, kept = work
     m = tab.nodes.size
     na = active.size
     size = na * m
@@ -382,27 +426,39 @@ def solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, F, dF, to, bac
             for k in range(w.size):
                 value += to[a, i, k] * w[k]
             free[a * m + i] = value - fl.stops[active[a], GAP]
-    J = np.empty((size, size))
-    step = np.empty((size, 1))
-    for _ in range(40):
+    step = np.empty(size)
+    before = np.inf
+    for _ in range(60):
         panel_forces(fl, active, delta, F, dF)
-        newton_matrix(G, dF, J)
+        fresh = not kept[0]
+        if fresh:
+            newton_matrix(G, dF, factors)
+            lu_factor(factors, order)
+            kept[0] = True
         panel_residual(free, G, delta, F, step)
-        lu_solve(J, step)
-        converged = True
+        lu_apply_vector(factors, order, step)
+        change = 0.0
         for a in range(na):
-            scale, change = 0.0, 0.0
+            scale, longest = 0.0, 0.0
             for i in range(m):
                 scale = max(scale, abs(delta[a, i]))
-                change = max(change, abs(step[a * m + i, 0]))
-                delta[a, i] += step[a * m + i, 0]
-            if not np.isfinite(change):
+                longest = max(longest, abs(step[a * m + i]))
+                delta[a, i] += step[a * m + i]
+            if not np.isfinite(longest):
+                kept[0] = False
                 return False
-            # the error left goes with the square of the step
-            converged = converged and change <= max(1e-6 * scale, noise[a])
-        if converged:
+            if longest > noise[a]:
+                change = max(change, longest / scale)
+        # the error left: goes with the square after a step with a fresh matrix, else linearly
+        rate = change / before
+        left = change * change if fresh else change * rate / max(1.0 - rate, 1e-3)
+        if left <= 1e-12 and (fresh or before < np.inf or change == 0.0):
             panel_forces(fl, active, delta, F, dF)
             return True
+        if rate > 0.1:
+            kept[0] = False
+        before = change
+    kept[0] = False
     return False
 
 
@@ -420,7 +476,7 @@ def newton_matrix(G, dF, J):
 
 @inner
 def panel_residual(free, G, delta, F, residual):
-    """Fill free - delta - G F, (na m, 1)."""
+    """Fill free - delta - G F, (na m,)."""
     p = 0
     for a in range(delta.shape[0]):
         for i in range(delta.shape[1]):
@@ -430,7 +486,7 @@ def panel_residual(free, G, delta, F, residual):
                 for j in range(F.shape[1]):
                     total -= G[p, q] * F[b, j]
                     q += 1
-            residual[p, 0] = total
+            residual[p] = total
             p += 1
 
 
@@ -457,7 +513,9 @@ def panel_end(fl, tab, kind, w, h, active, F, back, w_end):
 
 
 @inner
-def panel_columns(fl, tab, kind, phase, t0, h, active, dF, to, back, G, columns):
+def panel_columns(
+    fl, tab, kind, phase, t0, h, active, dF, to, back, G, factors, order, columns
+):
     """Advance sensitivities (2n, n_columns) in place over a panel.
 
     The last column is the derivative with respect to ω at fixed time; t0 is the time from the
@@ -467,9 +525,9 @@ def panel_columns(fl, tab, kind, phase, t0, h, active, dF, to, back, G, columns)
     na = active.size
     size = na * m
     n_columns = columns.shape[1]
-    J = np.empty((size, size))
     rhs = np.zeros((size, n_columns))
-    newton_matrix(G, dF, J)
+    newton_matrix(G, dF, factors)
+    lu_factor(factors, order)
     for a in range(na):
         for i in range(m):
             p = a * m + i
@@ -481,7 +539,7 @@ def panel_columns(fl, tab, kind, phase, t0, h, active, dF, to, back, G, columns)
             turn = np.exp(1j * (phase + fl.omega * t))
             slope = fl.forced[1, active[a]] + 1j * (t0 + t) * fl.forced[0, active[a]]
             rhs[p, n_columns - 1] += (slope * turn).real
-    lu_solve(J, rhs)
+    lu_apply(factors, order, rhs)
     for a in range(na):
         for k in range(columns.shape[0]):
             for j in range(m):
@@ -529,7 +587,7 @@ def resolved(fl, tab, noise, delta, F, dF):
 
 
 @inner
-def record_piece(rec, phase, h, kind, w):
+def record_piece(rec, phase, h, kind, event, w):
     """Append a piece; return its index, or -1 when the record is full."""
     n = rec.used[0]
     if n >= rec.phase.size:
@@ -537,11 +595,13 @@ def record_piece(rec, phase, h, kind, w):
     rec.phase[n] = phase
     rec.duration[n] = h
     rec.kind[n] = kind
+    rec.event[n] = event
     for k in range(w.size):
         rec.w[n, k] = w[k]
     for a in range(rec.force.shape[1]):
         for i in range(rec.force.shape[2]):
             rec.force[n, a, i] = 0.0
+            rec.depth[n, a, i] = 0.0
     rec.used[0] = n + 1
     return n
 
@@ -670,13 +730,17 @@ def first_root(tab, values, noise):
         if fine[last] <= 0.0:
             return 0.5 * below
         low, high = grid[last], below
-        for _ in range(60):
+        above, under = fine[last], interpolate(tab, values, below)
+        for step in range(60):
             middle = 0.5 * (low + high)
-            if interpolate(tab, values, middle) > 0.0:
-                low = middle
+            if step % 3 != 2:
+                middle = low + (high - low) * above / (above - under)
+            value = interpolate(tab, values, middle)
+            if value > 0.0:
+                low, above = middle, value
             else:
-                high = middle
-            if high - low <= 1e-9 * high:
+                high, under = middle, value
+            if high - low <= 1e-6 * high or value == 0.0:
                 break
         return high
     return 2.0
@@ -776,6 +840,28 @@ def guess_panel(fl, tab, phase, w, h, start_switch, active, delta):
 
 
 @inner
+def remembered_panel(rec, start_switch, h_max, active, delta):
+    """Kind, length and event of the same panel of the motion before, or (-1, 0, -1).
+
+    Fills the penetrations.
+    """
+    n = rec.used[0]
+    if n >= rec.used[1] or rec.kind[n] == FLIGHT or rec.kind[n] // 2 != start_switch:
+        return -1, 0.0, -1
+    for a in range(active.size):
+        deepest = 0.0
+        for i in range(delta.shape[1]):
+            delta[a, i] = rec.depth[n, active[a], i]
+            deepest = max(deepest, delta[a, i])
+        if deepest == 0.0:
+            return -1, 0.0, -1
+    kind, h, event = rec.kind[n], rec.duration[n], rec.event[n]
+    if h > h_max or (event < 0 and h > 0.98 * h_max):
+        return kind, h_max, -1
+    return kind, h, event
+
+
+@inner
 def keep_profile(tab, kind, new_kind, ratio, delta, guess):
     """Carry all node values over to a panel `ratio` times as long."""
     for a in range(delta.shape[0]):
@@ -788,26 +874,44 @@ def keep_profile(tab, kind, new_kind, ratio, delta, guess):
 
 
 @inner
-def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta, work, w_end):
+def time_to_event(fl, stop, closed, w, phase):
+    """Time (of either sign) to the instant at which a stop opens or closes in flight, or inf.
+
+    The nearer root of the parabola through the present; inf where the gap changes the wrong way.
+    """
+    value, speed, accel, _ = output_derivatives(fl, stop, w, phase, 0.0)
+    value -= fl.stops[stop, GAP]
+    if (speed >= 0.0) if closed else (speed <= 0.0):
+        return np.inf
+    square = speed * speed - 2.0 * accel * value
+    root = math.sqrt(square) if square > 0.0 else abs(speed)
+    return -2.0 * value / (speed + math.copysign(root, speed))
+
+
+@inner
+def contact_panel(
+    fl, tab, phase, w, h_max, start_switch, closed, active, delta, work, w_end, rec
+):
     """Solve one panel and choose its length, at most h_max.
 
     Returns (status, kind, h, event): a panel that ends where stop `event` opens or closes, or
-    (event = -1) one short enough to be resolved. `work` holds (F, dF, to, back, G).
+    (event = -1) one short enough to be resolved. `work` holds what `solve_panel` fills.
     """
-    F, dF, to, back, G = work
+    F, dF, _, back, _, _, _, _ = work
     guess = np.empty(tab.nodes.size)
     noise = np.empty(active.size)
     for a in range(active.size):
         noise[a] = output_noise(fl, active[a], w)
     smooth, switch = 2 * start_switch, 2 * start_switch + 1
-    aim = -1
     limit = h_max
-    kind, h = guess_panel(fl, tab, phase, w, limit, start_switch, active, delta)
+    kind, h, aim = remembered_panel(rec, start_switch, h_max, active, delta)
+    if kind < 0:
+        kind, h = guess_panel(fl, tab, phase, w, limit, start_switch, active, delta)
     tried = h
     for _ in range(100):
         if h <= 0.0 or phase + fl.omega * h == phase:
             return OK, kind, 0.0, active[0] if aim < 0 else aim
-        if not solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, F, dF, to, back, G):
+        if not solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, work):
             limit = 0.4 * min(h, tried)
             aim = -1
             kind, h = guess_panel(fl, tab, phase, w, limit, start_switch, active, delta)
@@ -826,16 +930,18 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
             kind = switch
             h *= where
             continue
+        if aim < 0 and kind % 2 == 1 and h < h_max:  # a release was expected here: follow it
+            for a in range(active.size):
+                if aim < 0 and time_to_event(fl, active[a], True, w_end, end_phase) < h:
+                    aim = active[a]
         if aim >= 0:
-            value, speed, _, _ = output_derivatives(fl, aim, w_end, end_phase, 0.0)
-            approaching = speed < 0.0 if closed[aim] else speed > 0.0
-            value -= fl.stops[aim, GAP]
-            dh = -value / speed if approaching else np.inf
-            # the force vanishes there with its slope: an error ε of the instant costs ε^2.5
-            tight = (
-                1e-9 if fl.stops[aim, EXPONENT] >= 1.5 else 1e-13
-            )  # a jump of the slope costs more
-            if abs(dh) <= tight * h or (approaching and abs(value) <= output_noise(fl, aim, w)):
+            dh = time_to_event(fl, aim, closed[aim], w_end, end_phase)
+            # the force vanishes there with its slope: an error ε of the instant costs ε^2.5;
+            # a jump of the slope costs more
+            tight = 1e-9 if fl.stops[aim, EXPONENT] >= 1.5 else 1e-13
+            if abs(dh) <= tight * h or (
+                dh < np.inf and abs(distance(fl, aim, w_end, end_phase)) <= output_noise(fl, aim, w)
+            ):
                 if fine:
                     return OK, kind, h, aim
             elif -0.5 * h < dh < h and (dh < 0.0 or h < h_max):
@@ -844,26 +950,11 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
             elif dh > 0.0 and fine:  # the contact goes on
                 return OK, kind, h, -1
             aim = -1
-            keep_profile(tab, kind, smooth, 0.5, delta, guess)
-            kind = smooth
-            h *= 0.5
-            continue
-        if kind % 2 == 1 and h < h_max:  # the release was expected here: follow it
-            for a in range(active.size):
-                value, speed, _, _ = output_derivatives(fl, active[a], w_end, end_phase, 0.0)
-                dh = (fl.stops[active[a], GAP] - value) / speed if speed < 0.0 else np.inf
-                if dh < h:
-                    aim = active[a]
-                    h = min(h + dh, h_max)
-                    break
-            if aim >= 0:
-                continue
-        if not fine:
-            keep_profile(tab, kind, smooth, 0.5, delta, guess)
-            kind = smooth
-            h *= 0.5
-            continue
-        return OK, kind, h, -1
+        elif fine:
+            return OK, kind, h, -1
+        keep_profile(tab, kind, smooth, 0.5, delta, guess)
+        kind = smooth
+        h *= 0.5
     return CONTACT_FAILED, kind, h, -1
 
 
@@ -986,7 +1077,7 @@ def run_pieces(
                 at = closing_time(fl, s, w, here, skip, first)
                 if at < first:
                     first, stop = at, s
-            if recording and record_piece(rec, here, first, FLIGHT, w) < 0:
+            if recording and record_piece(rec, here, first, FLIGHT, stop, w) < 0:
                 return RECORD_FULL
             fly_state(fl, w, first)
             if with_columns:
@@ -1014,24 +1105,30 @@ def run_pieces(
             np.empty((n_active, m, w.size)),
             np.empty((n_active, w.size, m)),
             np.empty((n_active * m, n_active * m)),
+            np.empty((n_active * m, n_active * m)),
+            np.empty(n_active * m, dtype=np.int64),
+            np.zeros(1, dtype=np.bool_),
         )
         h_max = min(remain, h_cap)
         status, kind, h, event = contact_panel(
-            fl, tab, here, w, h_max, start_switch, closed, active, delta, work, w_end
+            fl, tab, here, w, h_max, start_switch, closed, active, delta, work, w_end, rec
         )
         if status != OK:
             return status
-        F, dF, to, back, G = work
+        F, dF, to, back, G, factors, order, _ = work
         if h > 0.0:
             if recording:
-                n = record_piece(rec, here, h, kind, w)
+                n = record_piece(rec, here, h, kind, event, w)
                 if n < 0:
                     return RECORD_FULL
                 for a in range(n_active):
                     for i in range(m):
                         rec.force[n, active[a], i] = F[a, i]
+                        rec.depth[n, active[a], i] = delta[a, i]
             if with_columns:
-                panel_columns(fl, tab, kind, here, t, h, active, dF, to, back, G, columns)
+                panel_columns(
+                    fl, tab, kind, here, t, h, active, dF, to, back, G, factors, order, columns
+                )
             for k in range(w.size):
                 w[k] = w_end[k]
             t = duration if h >= remain else t + h
@@ -1097,6 +1194,7 @@ def shoot(system, tab, rec, recording, omega, nodes, phases, chained, with_colum
     jacobians = np.zeros((kept, size, size))
     d_omegas = np.zeros((kept, size))
     closings = np.zeros(system.stops.shape[0], dtype=np.int64)
+    rec.used[1] = rec.used[0] if recording else 0
     rec.used[0] = 0
     for i in range(k):
         start = ends[i - 1] if chained and i > 0 else nodes[i]
@@ -1148,6 +1246,7 @@ def newton(system, tab, rec, point, row, level, phases, state_weight, rtol, max_
     unknowns = point.size
     matrix = np.empty((unknowns, unknowns))
     sides = np.empty((unknowns, 2))
+    order = np.empty(unknowns, dtype=np.int64)
     nodes = np.empty((k, size))
     along = np.zeros(unknowns)
     first, last = np.inf, np.inf
@@ -1184,7 +1283,8 @@ def newton(system, tab, rec, point, row, level, phases, state_weight, rtol, max_
             matrix[unknowns - 1, j] = row[j]
             sides[unknowns - 1, 0] -= row[j] * point[j]
         sides[unknowns - 1, 1] = 1.0
-        lu_solve(matrix, sides)
+        lu_factor(matrix, order)
+        lu_apply(matrix, order, sides)
         before = last
         length = sides[unknowns - 1, 0] ** 2
         for i in range(unknowns - 1):

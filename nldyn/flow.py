@@ -342,8 +342,10 @@ class FlowMap:
             rec.phase[:n].copy(),
             rec.duration[:n].copy(),
             rec.kind[:n].copy(),
+            rec.event[:n].copy(),
             rec.w[:n].copy(),
             rec.force[:n].copy(),
+            rec.depth[:n].copy(),
             rec.used,
         )
         return Trajectory(self, omega, pieces, closings, failure)
@@ -361,9 +363,11 @@ class FlowMap:
             np.empty(capacity),
             np.empty(capacity),
             np.empty(capacity, dtype=np.int64),
+            np.empty(capacity, dtype=np.int64),
             np.empty((capacity, 2 * self.system.size)),
             np.empty((capacity, len(self.system.stops), self.options.nodes)),
-            np.zeros(1, dtype=np.int64),
+            np.empty((capacity, len(self.system.stops), self.options.nodes)),
+            np.zeros(2, dtype=np.int64),
         )
 
 
