@@ -182,15 +182,15 @@ def safe_step(h, h1, h2, bound):
 
     No function with these derivatives and a third derivative below `bound` reaches zero sooner.
     """
+    if h >= 0.0 and (h1 > 0.0 or (h1 == 0.0 and h2 > 0.0)):
+        return 0.0
     if bound <= 0.0:  # a parabola
         if h >= 0.0:
-            return -2.0 * h1 / h2 if h1 < 0.0 < h2 else (0.0 if h1 >= 0.0 else np.inf)
+            return -2.0 * h1 / h2 if h2 > 0.0 else np.inf
         square = h1 * h1 - 2.0 * h * h2
         top = h1 + math.sqrt(square) if square >= 0.0 else 0.0
         return -2.0 * h / top if top > 0.0 else np.inf
     if h >= 0.0:
-        if h1 >= 0.0:
-            return 0.0
         # leave the root at zero out: h1 + h2 τ/2 + bound τ²/6 = 0
         return (-0.5 * h2 + math.sqrt(0.25 * h2 * h2 - 2.0 / 3.0 * bound * h1)) * 3.0 / bound
     turning = h2 * h2 - 2.0 * bound * h1
@@ -452,7 +452,7 @@ def solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, work):
         # the error left: goes with the square after a step with a fresh matrix, else linearly
         rate = change / before
         left = change * change if fresh else change * rate / max(1.0 - rate, 1e-3)
-        if left <= 1e-12 and (fresh or before < np.inf or change == 0.0):
+        if left <= 1e-13 and (fresh or before < np.inf or change == 0.0):
             panel_forces(fl, active, delta, F, dF)
             return True
         if rate > 0.1:
@@ -513,9 +513,7 @@ def panel_end(fl, tab, kind, w, h, active, F, back, w_end):
 
 
 @inner
-def panel_columns(
-    fl, tab, kind, phase, t0, h, active, dF, to, back, G, factors, order, columns
-):
+def panel_columns(fl, tab, kind, phase, t0, h, active, dF, to, back, G, factors, order, columns):
     """Advance sensitivities (2n, n_columns) in place over a panel.
 
     The last column is the derivative with respect to ω at fixed time; t0 is the time from the
@@ -572,16 +570,22 @@ def largest(values, a):
 
 
 @inner
-def resolved(fl, tab, noise, delta, F, dF):
-    """Whether the Legendre tails of each force and of its slope are small beside their largest."""
+def resolved(fl, tab, kind, noise, delta, F, dF):
+    """Whether the Legendre tails of each force and of its slope are small beside their largest.
+
+    The slope counts as it does in the sensitivities: times dχ/ds.
+    """
+    slopes = np.empty(dF.shape)
     for a in range(F.shape[0]):
+        for i in range(F.shape[1]):
+            slopes[a, i] = dF[a, i] * tab.slope[kind, i]
         deepest = largest(delta, a)
         if deepest <= 10.0 * noise[a]:
             continue
         tail = max(fl.tail, 20.0 * noise[a] / deepest)
         if legendre_tail(tab, F, a) > tail * largest(F, a):
             return False
-        if legendre_tail(tab, dF, a) > 10.0 * tail * largest(dF, a):
+        if legendre_tail(tab, slopes, a) > 10.0 * tail * largest(slopes, a):
             return False
     return True
 
@@ -889,9 +893,7 @@ def time_to_event(fl, stop, closed, w, phase):
 
 
 @inner
-def contact_panel(
-    fl, tab, phase, w, h_max, start_switch, closed, active, delta, work, w_end, rec
-):
+def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta, work, w_end, rec):
     """Solve one panel and choose its length, at most h_max.
 
     Returns (status, kind, h, event): a panel that ends where stop `event` opens or closes, or
@@ -919,7 +921,7 @@ def contact_panel(
             continue
         panel_end(fl, tab, kind, w, h, active, F, back, w_end)
         end_phase = phase + fl.omega * h
-        fine = resolved(fl, tab, noise, delta, F, dF)
+        fine = resolved(fl, tab, kind, noise, delta, F, dF)
         event, where = first_event(
             fl, tab, kind, phase, w, h, closed, active, delta, F, back, w_end
         )
@@ -995,6 +997,8 @@ def propagate(
     """
     size = start.size
     n_stops = fl.stops.shape[0]
+    before = 2.0 * math.pi * math.floor(phase / (2.0 * math.pi))  # whole turns cost digits
+    phase -= before
     turn = np.exp(1j * phase)
     w = np.empty(size)
     columns = np.zeros((size, size + 1))
@@ -1007,8 +1011,9 @@ def propagate(
         value, _, _, _ = output_derivatives(fl, s, w, phase, 0.0)
         closed[s] = value - fl.stops[s, GAP] > 0.0
     status = run_pieces(
-        fl, tab, w, columns, phase, duration, closed, closings, with_columns, rec, recording
-    )
+        fl, tab, w, columns, phase, before, duration, closed, closings, with_columns, rec,
+        recording,
+    )  # fmt: skip
     end_phase = phase + fl.omega * duration
     turn = np.exp(1j * end_phase)
     rate = np.zeros(size)
@@ -1048,9 +1053,12 @@ def switch_with(fl, w, phase, h, closed, closings):
 
 @inlined
 def run_pieces(
-    fl, tab, w, columns, phase, duration, closed, closings, with_columns, rec, recording
+    fl, tab, w, columns, phase, before, duration, closed, closings, with_columns, rec, recording
 ):
-    """Advance w and its sensitivities in place over a segment, piece by piece."""
+    """Advance w and its sensitivities in place over a segment, piece by piece.
+
+    `before` is the phase of the whole turns before it, which only the record shows.
+    """
     m = tab.nodes.size
     n_stops = closed.size
     fastest = fastest_rate(fl)
@@ -1077,7 +1085,7 @@ def run_pieces(
                 at = closing_time(fl, s, w, here, skip, first)
                 if at < first:
                     first, stop = at, s
-            if recording and record_piece(rec, here, first, FLIGHT, stop, w) < 0:
+            if recording and record_piece(rec, before + here, first, FLIGHT, stop, w) < 0:
                 return RECORD_FULL
             fly_state(fl, w, first)
             if with_columns:
@@ -1118,7 +1126,7 @@ def run_pieces(
         F, dF, to, back, G, factors, order, _ = work
         if h > 0.0:
             if recording:
-                n = record_piece(rec, here, h, kind, event, w)
+                n = record_piece(rec, before + here, h, kind, event, w)
                 if n < 0:
                     return RECORD_FULL
                 for a in range(n_active):

@@ -22,6 +22,8 @@ class GaussTables(NamedTuple):
     ----------
     chi : (4, m)
         Node times as fractions of the panel.
+    slope : (4, m)
+        dχ/ds at the nodes.
     integrate : (4, m, m)
         ``integrate[kind, i, j]``: weight of node j in the integral up to node i.
     weights : (4, m)
@@ -39,6 +41,7 @@ class GaussTables(NamedTuple):
     """
 
     chi: Real
+    slope: Real
     integrate: Real
     weights: Real
     to_legendre: Real
@@ -95,6 +98,7 @@ def gauss_tables(m: int) -> GaussTables:
     fine_grid = 0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 4 * (m + 2)))
     return GaussTables(
         chi,
+        slope,
         np.ascontiguousarray(running[None] * slope[:, None, :]),
         0.5 * w * slope,
         to_legendre,

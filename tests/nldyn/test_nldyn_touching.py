@@ -10,10 +10,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from independent import Motion, state_map
+from one_dof import make_one_dof
 from scipy.optimize import brentq
 from scipy.special import beta
 
-from nldyn import FlowMap, HarmonicForce, Stop, System
+from nldyn import FlowMap, HarmonicForce, Stop, System, Unbalance, solve_orbit
 
 GAP = 1e-3
 NATURAL = 2 * np.pi * 20.0
@@ -183,3 +184,33 @@ def test_no_contact_is_passed_over(drawn):
     sag = motion.bend * (t[1] - t[0]) ** 2 / 8  # what the sampling may not see
     if y[:first].max() + sag < gap:
         assert closings(crossing * (1 - 1e-9)) == 0
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.2, 1.5])
+def test_hundreds_of_whole_turns_before_the_start_change_nothing(exponent):
+    system = make_one_dof(stops=[Stop("middle", 1e6, exponent, gap=1e-5)])
+    flow = FlowMap(system)
+    omega = 2 * np.pi * 14.0
+    start = 3.0 * flow.system.steady(omega).real[None]
+    period = 2 * np.pi * np.array([0.0, 1.0])
+    first = flow.shoot(start, period, omega)
+    later = flow.shoot(start, period + 2 * np.pi * 400, omega)
+    assert not first.failure and not later.failure
+    assert later.ends == pytest.approx(first.ends, rel=1e-9)  # 1e-13 rad of phase
+    assert later.jacobians == pytest.approx(first.jacobians, rel=1e-7, abs=1e-9)
+
+
+@pytest.mark.parametrize("force", [[], [Unbalance("middle", 0.0)]])
+def test_a_point_that_rests_at_its_stop_never_hits_it(force):
+    orbit = solve_orbit(make_one_dof(excitation=force), 20.0)
+    assert orbit.impacts == 0 and orbit.max_abs_displacement == 0.0
+
+
+def test_a_linear_stop_does_not_end_a_long_simulation():
+    """Its force starts with a jump of the slope, so that the instant is needed to rounding."""
+    flow = FlowMap(make_one_dof(stops=[Stop.linear("middle", 1e6)]))
+    phases = 2 * np.pi * np.arange(181.0)
+    found = flow.shoot(
+        np.zeros((1, 2)), phases, 2 * np.pi * 14.0, sensitivities=False, chained=True
+    )
+    assert not found.failure
