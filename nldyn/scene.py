@@ -1,6 +1,6 @@
 """From a scene file to a component, a reduced model, a system and its branches.
 
-This module alone joins `fem`, `cms` and `nldyn`.
+This module joins `fem`, `cms` and `nldyn`.
 """
 
 from __future__ import annotations
