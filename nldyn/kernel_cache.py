@@ -11,7 +11,7 @@ import tempfile
 import numba
 
 ADVICE = (
-    "nldyn: no folder to keep compiled code in, so each start compiles for a minute; "
+    "nldyn: no folder to keep compiled code in, so each start compiles for up to a minute; "
     "set NUMBA_CACHE_DIR to a folder to write in"
 )
 

@@ -1,11 +1,12 @@
-"""The example in the theory runs and prints what its comments say."""
+"""The examples in the theory and the README run and print what is said there."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
-THEORY = Path(__file__).parents[2] / "docs" / "theory.md"
+ROOT = Path(__file__).parents[2]
+THEORY = ROOT / "docs" / "theory.md"
 
 
 def test_example_runs(capsys):
@@ -23,3 +24,11 @@ def test_every_kind_of_special_point_is_in_the_table():
     text = THEORY.read_text(encoding="utf-8")
     for kind in ("LP", "PD", "BP", "NS", "GR"):
         assert re.search(rf"^\| {kind} \|", text, flags=re.M)
+
+
+def test_example_of_the_readme_prints_what_it_says(capsys):
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.S)
+    exec(code, {})
+    (said,) = re.findall(r"^It prints `(.*?)`", text, flags=re.M)
+    assert capsys.readouterr().out == f"{said}\n"
