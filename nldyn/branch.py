@@ -13,7 +13,7 @@ from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BranchPoint:
     """An orbit on a branch with the branch's direction there.
 
@@ -32,10 +32,10 @@ class BranchPoint:
     orbit: Orbit
     tangent: Real
     arclength: float
-    tests: dict[str, float] = field(default_factory=dict, compare=False, repr=False)
+    tests: dict[str, float] = field(default_factory=dict, repr=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SpecialPoint:
     """A located bifurcation or grazing point.
 
@@ -64,7 +64,7 @@ class SpecialPoint:
         return self.point.orbit.frequency_hz
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Branch:
     """A curve of periodic orbits of one period multiple.
 

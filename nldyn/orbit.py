@@ -18,7 +18,7 @@ from nldyn.system import System
 SEGMENTS_PER_PERIOD = 2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Extremes:
     """Local extremes of one output over an orbit.
 
@@ -37,7 +37,7 @@ class Extremes:
     is_maximum: NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class History:
     """An orbit sampled in time.
 
@@ -85,7 +85,7 @@ class Impact:
     force: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Orbit:
     """A periodic orbit of a system.
 
@@ -120,7 +120,7 @@ class Orbit:
     monodromy: Real
     error: float
     observe: str
-    motion: Trajectory | None = field(default=None, compare=False, repr=False)
+    motion: Trajectory | None = field(default=None, repr=False)
 
     @classmethod
     def of(cls, problem: ShootingProblem, found: Solution, observe: str) -> Orbit:

@@ -44,7 +44,7 @@ class SearchOptions:
             check_whole(f"search: {name}", getattr(self, name), 0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Strobe:
     """Stroboscopic states of several simulations at one frequency.
 

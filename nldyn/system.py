@@ -28,7 +28,7 @@ class ReducedModelLike(Protocol):
         """Displacement of each mass-normalised mode at each interface, shape (n,)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class System:
     r"""Modal equations :math:`\ddot q + D\dot q + \Omega^2 q = \sum p f(t) - \sum c F(\delta)`.
 
@@ -321,7 +321,7 @@ class System:
 
 def _array(name: str, values: ArrayLike) -> Real:
     try:
-        array = np.asarray(values, dtype=float)
+        array = np.array(values, dtype=float)  # a copy: the caller may change the original
     except (TypeError, ValueError):
         raise SystemModelError(f"{name} must hold numbers only") from None
     if not np.all(np.isfinite(array)):

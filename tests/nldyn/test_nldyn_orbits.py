@@ -140,6 +140,22 @@ def test_history_is_periodic_and_starts_at_the_shooting_point():
     np.testing.assert_allclose(history.modal_velocity[0], start[2:], rtol=1e-12)
 
 
+def test_systems_and_orbits_can_be_compared_and_be_keys():
+    """Each is itself only: their arrays have no single answer to an equality."""
+    systems = [two_modes(), two_modes()]
+    orbits = [solve_orbit(system, 26.0) for system in systems]
+    for first, second in (systems, orbits):
+        assert first != second
+        assert {first: 1, second: 2}[second] == 2
+
+
+def test_system_does_not_follow_an_array_that_is_changed_later():
+    shape = np.array([0.635])
+    system = System.from_modal([13.1], {"middle": shape})
+    shape[0] = 9.0
+    assert system.participation["middle"].tolist() == [0.635]
+
+
 def test_number_of_segments_changes_nothing():
     orbits = {}
     for segments in (1, 2, 4, 8):
