@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from nldyn.continuation import (
 )
 from nldyn.errors import SystemModelError, check_whole
 from nldyn.flow import FlowMap
-from nldyn.orbit import Orbit, check_observe
+from nldyn.orbit import ConvergenceError, Orbit, check_observe
 from nldyn.search import SearchOptions, orbits_from_strobe, simulate_strobe
 from nldyn.special import LocateError
 from nldyn.system import System
@@ -48,7 +49,7 @@ class Seed:
             raise SystemModelError(f"Seed: near_hz must be positive, got {self.near_hz:g}")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Diagram:
     """Branches over a range of frequencies.
 
@@ -95,42 +96,41 @@ class _Collector:
         label = "harmonic" if branch.period == 1 else f"1/{branch.period}"
         self.branches.append(replace(branch, name=f"{count:02d} {label}"))
 
-    def from_orbits(self, orbits: Iterable[Orbit]) -> int:
-        added = 0
+    def from_orbits(self, orbits: Iterable[Orbit]) -> None:
+        """Follow each orbit both ways, unless its branch is known."""
         for orbit in orbits:
-            if not self.known(orbit):
-                self.add(
-                    continue_branch(
-                        orbit,
-                        self.range_hz,
-                        options=self.options,
-                        progress=lambda f, n=orbit.period: self.progress(f"1/{n}", f),  # type: ignore[misc]
-                    )
+            if self.known(orbit):
+                continue
+            try:
+                branch = continue_branch(
+                    orbit,
+                    self.range_hz,
+                    options=self.options,
+                    progress=partial(self.progress, f"1/{orbit.period}"),
                 )
-                added += 1
-        return added
+            except ConvergenceError as error:
+                self.notes.append(f"orbit of period {orbit.period} found but not followed: {error}")
+            else:
+                self.add(branch)
 
-    def from_flip(self, special: SpecialPoint) -> bool:
+    def from_flip(self, special: SpecialPoint) -> None:
         """Follow the branch that is born at a flip, unless it is known."""
         if any(_is_at(end, special) for end in self.flip_ends):
-            return False
+            return
         try:
             start = switch_at_flip(special)
         except LocateError as error:
             self.notes.append(str(error))
-            return False
+            return
         low, high = self.range_hz
         if not low < start.orbit.frequency_hz < high or self.known(start.orbit):
-            return False
-        period = start.orbit.period
-        nodes, specials, reason = trace(
-            start, self.range_hz, self.options, lambda f: self.progress(f"1/{period}", f)
-        )
+            return
+        progress = partial(self.progress, f"1/{start.orbit.period}")
+        nodes, specials, reason = trace(start, self.range_hz, self.options, progress)
         origin = f"born at the flip at {special.frequency_hz:.6g} Hz"
         self.add(make_branch("", nodes, specials, (origin, reason)))
         if reason.startswith("joins"):
             self.flip_ends.append(nodes[-1].orbit)
-        return True
 
 
 def _is_at(end: Orbit, special: SpecialPoint) -> bool:
@@ -229,9 +229,8 @@ def diagram(
     _follow_flips_of_new(box, wanted, doublings)
     for period in wanted:
         if not any(branch.period == period for branch in box.branches):
-            box.notes.append(
-                f"no orbit of period {period} found by simulation at {search_points} frequencies"
-            )
+            tried = f"{search_points} frequenc{'y' if search_points == 1 else 'ies'}"
+            box.notes.append(f"no orbit of period {period} found by simulation at {tried}")
     return Diagram(tuple(box.branches), (low, high), box.observe, tuple(box.notes))
 
 

@@ -7,7 +7,15 @@ import pytest
 from independent import Motion
 from one_dof import make_one_dof
 
-from nldyn import FlowMap, SearchOptions, Seed, SystemModelError, diagram, find_orbits
+from nldyn import (
+    ConvergenceError,
+    FlowMap,
+    SearchOptions,
+    Seed,
+    SystemModelError,
+    diagram,
+    find_orbits,
+)
 from nldyn.branch import minimal_period, same_orbit
 
 # where the paper's text sees subharmonics: 1/3 near 37.1, 1/5 near 62.2, 1/7 near 58, 1/13 near 81
@@ -67,6 +75,16 @@ def test_diagram_finds_the_doubled_branch_between_two_flips(one_dof):
     assert found.observe == "middle"
     names = [b.name for b in found.branches]
     assert len(set(names)) == len(names)
+
+
+def test_diagram_says_which_orbit_it_could_not_follow(monkeypatch):
+    def fails(orbit, *_, **__):
+        raise ConvergenceError(f"no orbit at {orbit.frequency_hz:g} Hz: singular Jacobian")
+
+    monkeypatch.setattr("nldyn.diagrams.continue_branch", fails)
+    found = diagram(make_one_dof(stops=[]), (25.0, 27.0), periods=(1,), search_points=1)
+    assert found.branches == ()
+    assert found.notes[0].startswith("orbit of period 1 found but not followed: no orbit at 25.98")
 
 
 def test_diagram_says_what_it_did_not_find(one_dof):
