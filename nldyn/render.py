@@ -225,7 +225,7 @@ class _Drawing:
         from fem.render import render_shape
 
         self.tell("deepest contact", 0.0)
-        what = "deepest contact" if orbit.impacts else "largest deflection"
+        what = "deepest contact" if orbit.impact_list else "largest deflection"
         state = self.reduced.expand(deepest_state(orbit))
         stop = stop_to_draw(self.scene)
         render_shape(
