@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import time
 from collections.abc import Sequence
 from importlib import resources
@@ -159,7 +160,7 @@ def auto_times() -> list[Row]:
 
 def auto_flip_points() -> dict[str, list[tuple[float, float]]]:
     """AUTO-07p on the flip of the 1-DOF model: error, and time per point of its branch."""
-    exact = load_flip("one_dof").omega / 6.283185307179586
+    exact = load_flip("one_dof").omega / (2.0 * math.pi)
     points = [p for p in studies.published_special_points() if p[0] == "PD"]
     _, _, found = min(points, key=lambda p: abs(p[1] - exact))
     seconds = {

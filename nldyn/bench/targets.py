@@ -92,7 +92,7 @@ def all_targets(
         Shares of the subjects in the time of the 1-DOF branch.
     """
     rivals = {
-        "in numpy": ("solve_ivp DOP853 in numpy", "solve_ivp DOP853 in numpy, events"),
+        "in numpy": ("solve_ivp DOP853 in numpy",),
         "compiled": ("solve_ivp DOP853", "solve_ivp DOP853, events"),
     }
     found = [
