@@ -36,9 +36,10 @@ def test_one_dof_is_equation_3_1():
     ],
 )
 def test_beam_scenes_meet_the_published_frequencies(name, published):
+    """Within 0.2 %, as the documentation of the calibration says."""
     system = build_system(load_scene(example(name)))
-    np.testing.assert_allclose(system.frequencies_hz, published, rtol=3e-3)
-    assert 1 / system.participation["middle"][0] ** 2 == pytest.approx(2.48, rel=3e-3)
+    np.testing.assert_allclose(system.frequencies_hz, published, rtol=2e-3)
+    assert 1 / system.participation["middle"][0] ** 2 == pytest.approx(2.48, rel=2e-3)
 
 
 def test_beam_scenes_share_one_structure():
