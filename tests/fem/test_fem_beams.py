@@ -37,20 +37,25 @@ def error(computed_hz, root, elements):
     return (computed_hz / bending_hz(root) - 1) / hermite_error(root, elements)
 
 
-def test_cantilever():
-    found = frequencies_hz(fem.assemble(beam(elements=32, supports=CLAMPED_LEFT)), 3)
-    assert found == pytest.approx(bending_hz(CANTILEVER), rel=1.1 * hermite_error(7.9, 32))
+def assert_above_by_the_error_of_its_elements(found_hz, roots, elements, rounding=1e-9):
+    """Each frequency comes from above, and by no more than 1.1 times its own error."""
+    excess = found_hz / bending_hz(roots) - 1
+    assert (excess > -rounding).all()
+    assert (excess < 1.1 * hermite_error(roots, elements) + rounding).all()
 
 
-def test_pinned_beam():
-    found = frequencies_hz(fem.assemble(beam(elements=32, supports=PINNED)), 3)
-    assert found == pytest.approx(bending_hz(PINNED_PINNED), rel=1.1 * hermite_error(3 * pi, 32))
-
-
-def test_beam_clamped_and_pinned():
-    supports = [*CLAMPED_LEFT, fem.Support("right", ("x", "y"))]
+@pytest.mark.parametrize(
+    ("supports", "roots"),
+    [
+        (CLAMPED_LEFT, CANTILEVER),
+        (PINNED, PINNED_PINNED),
+        ([*CLAMPED_LEFT, fem.Support("right", ("x", "y"))], CLAMPED_PINNED),
+    ],
+    ids=["cantilever", "pinned", "clamped and pinned"],
+)
+def test_beam_has_the_frequencies_of_its_closed_form(supports, roots):
     found = frequencies_hz(fem.assemble(beam(elements=32, supports=supports)), 3)
-    assert found == pytest.approx(bending_hz(CLAMPED_PINNED), rel=1.1 * hermite_error(10.3, 32))
+    assert_above_by_the_error_of_its_elements(found, roots, 32)
 
 
 def test_free_beam_has_three_rigid_body_modes_and_then_its_bending_modes():
@@ -59,7 +64,7 @@ def test_free_beam_has_three_rigid_body_modes_and_then_its_bending_modes():
         component.stiffness.toarray(), component.mass.toarray(), eigvals_only=True
     )
     found = np.sqrt(squares[3:6]) / (2 * pi)
-    assert found == pytest.approx(bending_hz(FREE_FREE), rel=1.1 * hermite_error(11, 32))
+    assert_above_by_the_error_of_its_elements(found, FREE_FREE, 32, rounding=2e-8)
     assert np.abs(squares[:3]).max() < 1e-13 * squares[-1]
 
 
