@@ -60,6 +60,27 @@ class Motion:
         The steps (radians of the forcing phase) must be shorter than every contact.
         """
         size = 2 * self.n
+        y = self._integrated(state, phases, omega, tangent, max_step)[:, -1]
+        return y[:size], y[size:].reshape(size, -1)
+
+    def closings(
+        self, state: np.ndarray, phases: tuple[float, float], omega: float, max_step: float = 0.05
+    ) -> list[int]:
+        """How often each stop closes: its depth turns positive from one step to the next."""
+        q = self._integrated(state, phases, omega, False, max_step)[: self.n]
+        depths = [c @ q - gap for c, _, _, gap in self.stops]
+        return [int(np.sum((d[:-1] <= 0.0) & (d[1:] > 0.0))) for d in depths]
+
+    def _integrated(
+        self,
+        state: np.ndarray,
+        phases: tuple[float, float],
+        omega: float,
+        tangent: bool,
+        max_step: float,
+    ) -> np.ndarray:
+        """State and, if wanted, its derivative at every step, one column each."""
+        size = 2 * self.n
 
         def extended(phase: float, y: np.ndarray) -> np.ndarray:
             x, X = y[:size], y[size:].reshape(size, -1)
@@ -71,7 +92,7 @@ class Motion:
         scale = np.repeat([length, length * fastest], self.n)
         start = np.eye(size) if tangent else np.zeros((size, 0))
         atol = 1e-14 * np.concatenate([scale, (scale[:, None] / scale).ravel()[: start.size]])
-        found = solve_ivp(
+        return solve_ivp(
             extended,
             phases,
             np.concatenate([state, start.ravel()]),
@@ -79,9 +100,7 @@ class Motion:
             rtol=2e-13,
             atol=atol,
             max_step=max_step,
-        )
-        y = found.y[:, -1]
-        return y[:size], y[size:].reshape(size, -1)
+        ).y
 
 
 def state_map(system: System) -> np.ndarray:

@@ -48,7 +48,9 @@ FINE = (FlowOptions(tail=1e-6), 4e-12, 2e-10)
 
 def assert_agrees(system, x0, phases, omega, *, closings, efforts=(DEFAULT, FINE)):
     """The flow map against `Motion.run`, velocities and displacements in their own scales."""
-    exact, exact_jacobian = Motion(system).run(np.asarray(x0), phases, omega)
+    motion = Motion(system)
+    exact, exact_jacobian = motion.run(np.asarray(x0), phases, omega)
+    assert motion.closings(np.asarray(x0), phases, omega) == closings
     n = system.size
     length, speed = np.abs(exact[:n]).max(), np.abs(exact[n:]).max()
     scale = np.repeat([length, max(speed, omega * length)], n)
