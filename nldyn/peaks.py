@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 from scipy.optimize import minimize_scalar
 
@@ -11,7 +12,7 @@ from nldyn.orbit import Orbit
 from nldyn.special import Chord, LocateError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Peak:
     """A local maximum of the largest displacement along a branch.
 
@@ -59,18 +60,35 @@ def resonance_peaks(branch: Branch, range_hz: tuple[float, float] | None = None)
     for i in range(1, len(heights) - 1):
         top = heights[i] >= heights[i - 1] and heights[i] > heights[i + 1]
         if top and low <= branch.nodes[i].orbit.frequency_hz <= high:
-            peaks.append(Peak(_refined(branch, i)))
+            peaks.append(Peak(_refined(branch, i, 1.0)))
     return peaks
 
 
-def _refined(branch: Branch, i: int) -> Orbit:
-    """Highest orbit on the two chords beside point i."""
+def lowest_orbit(branch: Branch, range_hz: tuple[float, float]) -> Orbit | None:
+    """The orbit of smallest largest displacement between two frequencies, refined as the tops are.
+
+    None if the branch has no computed point there.
+    """
+    low, high = range_hz
+    inside = [i for i, o in enumerate(branch.points) if low <= o.frequency_hz <= high]
+    if not inside:
+        return None
+    lowest = min(inside, key=lambda i: branch.nodes[i].orbit.max_abs_displacement)
+    return _refined(branch, lowest, -1.0)
+
+
+def _refined(branch: Branch, i: int, sense: float) -> Orbit:
+    """Highest orbit on the two chords beside point i, or the lowest for the sense -1."""
+
+    def height(orbit: Orbit) -> float:
+        return sense * orbit.max_abs_displacement
+
     best = branch.nodes[i].orbit
-    for a, b in ((i - 1, i), (i, i + 1)):
-        chord = Chord(branch.nodes[a], branch.nodes[b])
+    for a, b in pairwise(branch.nodes[max(i - 1, 0) : i + 2]):
+        chord = Chord(a, b)
         try:
             found = minimize_scalar(
-                lambda x, c=chord: -c.at(float(x)).orbit.max_abs_displacement,
+                lambda x, c=chord: -height(c.at(float(x)).orbit),
                 bounds=(0.0, 1.0),
                 method="bounded",
                 options={"xatol": 1e-4},
@@ -78,6 +96,6 @@ def _refined(branch: Branch, i: int) -> Orbit:
             orbit = chord.at(float(found.x)).orbit
         except LocateError:
             continue
-        if orbit.max_abs_displacement > best.max_abs_displacement:
+        if height(orbit) > height(best):
             best = orbit
     return best

@@ -10,10 +10,9 @@ from pathlib import Path
 from nldyn.diagrams import Diagram
 from nldyn.output import write_table
 from nldyn.paper.checks import CHECKS
-from nldyn.paper.evidence import Finding
+from nldyn.paper.evidence import READING_TOLERANCE, Finding
 
 DATA = Path(__file__).resolve().parent / "data"
-READING_TOLERANCE = 0.01  # what a reader can measure in a plot
 
 Results = Mapping[str, Diagram]
 

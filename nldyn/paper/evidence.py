@@ -11,6 +11,8 @@ from nldyn.diagrams import Diagram
 from nldyn.orbit import Orbit
 from nldyn.peaks import Peak, resonance_peaks
 
+READING_TOLERANCE = 0.01  # what a reader can measure in a plot
+
 
 @dataclass(frozen=True)
 class Finding:

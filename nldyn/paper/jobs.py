@@ -23,6 +23,7 @@ from nldyn.system import System
 
 BILINEAR_ALPHA = 790.0  # section 3, from equation 3.2
 STIFFNESS = 16877.0  # N/m, section 3
+HERTZ_STIFFNESS = 5.17e9  # N/m^1.5, half of what sections 2 and 3 print for the whole beam
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from independent import Motion
 from one_dof import RANGE_HZ, make_one_dof
+from scipy.optimize import minimize_scalar
 
 from nldyn import (
     ContinuationOptions,
@@ -24,6 +25,7 @@ from nldyn import (
 )
 from nldyn.branch import minimal_period, same_orbit
 from nldyn.continuation import start_point, trace
+from nldyn.peaks import lowest_orbit
 from nldyn.special import (
     branch_point_test,
     flip_test,
@@ -305,6 +307,24 @@ def test_branch_of_a_linear_system_is_its_receptance():
     np.testing.assert_allclose(branch.max_abs_displacement, exact, rtol=1e-10)
     assert branch.special_points == ()
     assert branch.stable.all()
+
+
+def test_lowest_orbit_is_the_antiresonance_of_the_receptance():
+    natural, shape = 2 * np.pi * np.array([13.1, 40.0]), np.array([0.6, 0.5])
+
+    def amplitude(hz):
+        omega = 2 * np.pi * hz
+        return abs(np.sum(shape**2 / (natural**2 - omega**2 + 0.04j * natural * omega))) * omega**2
+
+    system = System.from_modal(
+        natural / (2 * np.pi), {"m": shape}, modal_damping=0.02, excitation=[Unbalance("m", 1e-5)]
+    )
+    branch = continue_branch(solve_orbit(system, 20.0), (5.0, 60.0))
+    exact = minimize_scalar(amplitude, bounds=(20.0, 39.0), method="bounded")
+    found = lowest_orbit(branch, (20.0, 39.0))
+    assert found.max_abs_displacement == pytest.approx(1e-5 * exact.fun, rel=1e-8)
+    assert found.frequency_hz == pytest.approx(exact.x, rel=1e-4)
+    assert lowest_orbit(branch, (70.0, 80.0)) is None
 
 
 JUMP = {
