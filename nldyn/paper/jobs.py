@@ -110,8 +110,9 @@ LISTED = (
 )  # fmt: skip
 
 # Branches of the larger models are long, and crowd: with the default angle the main 1/2 branch at
-# ξ = 0.01 jumps to its own shift near 36 Hz, with this one it ends at the flip at 32.28 Hz.
-LONG = ContinuationOptions(max_points=8000, max_angle=0.1)
+# ξ = 0.01 jumps to its own shift near 36 Hz, with this one it ends at the flip at 32.28 Hz. One
+# that is cut off by max_points would be found and followed again from the next orbit.
+LONG = ContinuationOptions(max_points=20000, max_angle=0.1)
 
 # The main 1/2 and 1/3 branches of each larger model, beside the harmonic branch.
 MAIN = (Seed(2, 45.0), Seed(3, 68.0))
