@@ -251,7 +251,7 @@ def mode_errors(
 def check_errors(errors: FloatArray, squares: FloatArray, shifted: Shifted) -> None:
     """Raise ReductionError where a mode's error is above what rounding explains, or above 1e-3.
 
-    The rounding of K alone moves w_1^2 by about eps w_n^2, which shows in very fine meshes of
+    The rounding of K alone may move w_1^2 by eps w_n^2, which shows in very fine meshes of
     beams, where w_n / w_1 grows with the square of the number of elements.
     """
     rounding = 10 * EPS * shifted.fastest / (squares[0] + shifted.shift)
