@@ -1,6 +1,8 @@
 """How a claim of the paper is judged, and what is written of it."""
 
 import csv
+import re
+from pathlib import Path
 
 import pytest
 
@@ -27,6 +29,14 @@ def verdict(published, finding, kind="number"):
 
 def test_every_claim_has_a_check_and_every_check_a_claim():
     assert {row["id"] for row in published_claims()} == set(CHECKS)
+
+
+def test_claims_that_the_documentation_names_exist():
+    text = (Path(__file__).parents[2] / "docs" / "paper.md").read_text(encoding="utf-8")
+    differences = text.split("## Where we differ, and why")[1]
+    named = set(re.findall(r"`((?:fig|hertz|undamped|damping)[\w./]*)`", differences))
+    assert len(named) > 10
+    assert named <= set(CHECKS)
 
 
 @pytest.mark.parametrize(
