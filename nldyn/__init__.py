@@ -11,7 +11,14 @@ if TYPE_CHECKING:
     from nldyn.branch import Branch, BranchPoint, SpecialPoint
     from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
     from nldyn.diagrams import Diagram, Seed, diagram
-    from nldyn.elements import Damper, HarmonicForce, Stop, Unbalance, hertz_stiffness
+    from nldyn.elements import (
+        Damper,
+        HarmonicForce,
+        Stop,
+        Unbalance,
+        dissipation_for,
+        hertz_stiffness,
+    )
     from nldyn.errors import SceneError, SystemModelError
     from nldyn.flow import FlowMap, FlowOptions
     from nldyn.orbit import ConvergenceError, History, Orbit, solve_orbit
@@ -23,7 +30,7 @@ _HOMES = {
     "branch": "Branch BranchPoint SpecialPoint",
     "continuation": "ContinuationOptions Walk continue_branch switch_at_flip",
     "diagrams": "Diagram Seed diagram",
-    "elements": "Damper HarmonicForce Stop Unbalance hertz_stiffness",
+    "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
     "errors": "SceneError SystemModelError",
     "flow": "FlowMap FlowOptions",
     "orbit": "ConvergenceError History Orbit solve_orbit",
@@ -56,6 +63,7 @@ __all__ = [
     "Walk",
     "continue_branch",
     "diagram",
+    "dissipation_for",
     "find_orbits",
     "hertz_stiffness",
     "solve_orbit",

@@ -14,8 +14,9 @@ of a panel satisfy a small Volterra equation
 
     δ_a(t_i) = free_a(t_i) - Σ_b Σ_j h W_ij K_ab(t_i - t_j) F_b(t_j),
 
-K being the impulse response between two stops. Its Newton matrix also gives all sensitivities.
-The end state is a Gauss quadrature: order 2m with m nodes.
+K being the impulse response between two stops, and so do their rates if a force depends on them.
+Newton's matrix for the forces also gives all sensitivities. The end state is a Gauss quadrature:
+order 2m with m nodes.
 """
 
 from __future__ import annotations
@@ -25,6 +26,10 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from nldyn.kernel_cache import ensure_cache
@@ -44,7 +49,8 @@ OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_F
 FLIGHT = -1
 
 
-GAP, STIFFNESS, EXPONENT, MOBILITY, DURATION = range(5)  # columns of `stops`
+# columns of `stops`
+GAP, STIFFNESS, EXPONENT, DISSIPATION, MOBILITY, DURATION, INSTANT = range(7)
 
 
 class SystemData(NamedTuple):
@@ -58,9 +64,11 @@ class SystemData(NamedTuple):
     bound3: Real  # (n_out, 2n) |third derivative| <= Σ_b |bound3_b| |w_b| at any later time
     force: Real  # (2n, n_stops): w' = A w - force @ F
     drive: Complex  # (2, 2n) excitation Re((drive[0] + ω² drive[1]) e^{iωt}) of z
-    # (n_stops, 5): gap; stiffness and exponent; velocity jump per unit impulse in 1/kg;
-    # duration of a free contact over (peak penetration / speed)
+    # (n_stops, 7): gap; stiffness, exponent and dissipation; velocity jump per unit impulse in
+    # 1/kg; duration of a free contact over (peak penetration / speed); error allowed in the
+    # instant of an event, as a share of the panel
     stops: Real
+    laws: NDArray[np.int64]  # (n_stops,) address of a compiled law, or 0 for the power law
     tail: float  # largest relative Legendre tail accepted on a contact panel
 
 
@@ -72,6 +80,7 @@ class FlowData(NamedTuple):
     bound3: Real
     force: Real
     stops: Real
+    laws: NDArray[np.int64]
     steady: Complex  # (2, 2n) z = w + Re(steady[0] e^{iωt}), and the derivative with respect to ω
     forced: Complex  # (2, n_out) the same of the outputs
     omega: float
@@ -290,52 +299,119 @@ class Record(NamedTuple):
     used: NDArray[np.int64]
 
 
+@intrinsic
+def call_law(typing, address, delta, speed):
+    """Call ``void law(double delta, double speed, double out[3])`` at an address."""
+    signature = types.UniTuple(types.float64, 3)(types.int64, types.float64, types.float64)
+
+    def codegen(context, builder, signature, arguments):
+        double = ir.DoubleType()
+        kind = ir.FunctionType(ir.VoidType(), [double, double, double.as_pointer()])
+        function = builder.inttoptr(arguments[0], kind.as_pointer())
+        out = cgutils.alloca_once(builder, double, size=3)
+        builder.call(function, [arguments[1], arguments[2], out])
+        values = [builder.load(cgutils.gep_inbounds(builder, out, i)) for i in range(3)]
+        return context.make_tuple(builder, signature.return_type, values)
+
+    return signature, codegen
+
+
 @inner
-def law(delta, stiffness, exponent):
-    """Contact force and its derivative with respect to the penetration."""
+def law(fl, stop, delta, speed):
+    """Contact force and its derivatives with respect to penetration and speed."""
     if delta <= 0.0:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
+    if fl.laws[stop] != 0:
+        return call_law(fl.laws[stop], delta, speed)
+    exponent = fl.stops[stop, EXPONENT]
+    slope = fl.stops[stop, STIFFNESS]
     if exponent == 1.5:
-        root = np.sqrt(delta)
-        return stiffness * delta * root, 1.5 * stiffness * root
-    if exponent == 1.0:
-        return stiffness * delta, stiffness
-    slope = stiffness * delta ** (exponent - 1.0)
-    return slope * delta, exponent * slope
+        slope *= math.sqrt(delta)
+    elif exponent != 1.0:
+        slope *= delta ** (exponent - 1.0)
+    loss = fl.stops[stop, DISSIPATION]
+    factor = 1.0 + loss * speed
+    return slope * delta * factor, exponent * slope * factor, loss * slope * delta
 
 
 @inner
-def panel_responses(fl, tab, kind, h, active, to, back, G):
-    """Fill what a panel of length h needs to know of the linear part.
+def depends_on_speed(fl, stop):
+    """Whether a force depends on the speed of penetration, as far as one knows."""
+    return fl.laws[stop] != 0 or fl.stops[stop, DISSIPATION] != 0.0
 
-    to[a, i] = row_a exp(A t_i), (na, m, 2n), back[a, :, j] = exp(-A t_j) force_a, (na, 2n, m), and
-    G = h W_ij K_ab(t_i - t_j) with the impulse response K_ab(t) = row_a exp(A t) force_b.
+
+class Panel(NamedTuple):
+    """Arrays of a contact panel with na stops, m nodes and n modes.
+
+    They are filled by `solve_panel` and used until the next panel. Outputs are the na
+    penetrations and, if a force depends on them, their na rates.
     """
-    m = tab.nodes.size
+
+    active: NDArray[np.int64]  # (na,) closed stops
+    output: Real  # (n_outputs, m) values at the nodes
+    F: Real  # (na, m) forces
+    slope: Real  # (n_outputs, m) derivative of the force with respect to the output
+    to: Real  # (n_outputs, m, 2n) row exp(A t_i)
+    back: Real  # (na, 2n, m) exp(-A t_j) force
+    G: Real  # (n_outputs m, na m) outputs at the nodes per force at the nodes
+    factors: Real  # (na m, na m) of the matrix 1 + slope G, at these slopes or earlier ones
+    order: NDArray[np.int64]  # (na m,) its row swaps
+    kept: NDArray[np.bool_]  # (1,) whether `factors` are worth keeping
+
+
+@inner
+def new_panel(fl, m, n_states, active):
+    """An empty panel."""
     na = active.size
+    outputs = na
+    for a in range(na):
+        if depends_on_speed(fl, active[a]):
+            outputs = 2 * na
+    return Panel(
+        active,
+        np.zeros((outputs, m)),
+        np.empty((na, m)),
+        np.empty((outputs, m)),
+        np.empty((outputs, m, n_states)),
+        np.empty((na, n_states, m)),
+        np.empty((outputs * m, na * m)),
+        np.empty((na * m, na * m)),
+        np.empty(na * m, dtype=np.int64),
+        np.zeros(1, dtype=np.bool_),
+    )
+
+
+@inner
+def panel_responses(fl, tab, kind, h, panel):
+    """Fill what a panel of length h needs to know of the linear part: to, back and G."""
+    m = tab.nodes.size
+    na = panel.active.size
+    to, back, G = panel.to, panel.back, panel.G
     for i in range(m):
         t = h * tab.chi[kind, i]
         for b in range(fl.blocks.shape[0]):
             j = 2 * b
             e00, e01, e10, e11, i00, i01, i10, i11 = there_and_back(fl.blocks[b], t)
+            for o in range(to.shape[0]):
+                stop = panel.active[o % na]
+                x, y = fl.rows[o // na, stop, j], fl.rows[o // na, stop, j + 1]
+                to[o, i, j] = x * e00 + y * e10
+                to[o, i, j + 1] = x * e01 + y * e11
             for a in range(na):
-                x, y = fl.rows[0, active[a], j], fl.rows[0, active[a], j + 1]
-                to[a, i, j] = x * e00 + y * e10
-                to[a, i, j + 1] = x * e01 + y * e11
-                x, y = fl.force[j, active[a]], fl.force[j + 1, active[a]]
+                x, y = fl.force[j, panel.active[a]], fl.force[j + 1, panel.active[a]]
                 back[a, j, i] = i00 * x + i01 * y
                 back[a, j + 1, i] = i10 * x + i11 * y
-    for a in range(na):
+    for o in range(to.shape[0]):
         for b in range(na):
             for i in range(m):
                 for j in range(m):
-                    G[a * m + i, b * m + j] = 0.0
+                    G[o * m + i, b * m + j] = 0.0
                 for k in range(to.shape[2]):
-                    z = h * to[a, i, k]
+                    z = h * to[o, i, k]
                     for j in range(m):
-                        G[a * m + i, b * m + j] += z * back[b, k, j]
+                        G[o * m + i, b * m + j] += z * back[b, k, j]
                 for j in range(m):
-                    G[a * m + i, b * m + j] *= tab.integrate[kind, i, j]
+                    G[o * m + i, b * m + j] *= tab.integrate[kind, i, j]
 
 
 @inner
@@ -407,143 +483,190 @@ def forced_output(fl, out, phase):
 
 
 @inner
-def solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, work):
-    """Newton's method for the penetrations at the nodes; delta (na, m) holds the guess.
-
-    noise (na,) is the rounding error to expect in each. Returns whether it converged, with F, dF,
-    to, back and G of `work` filled. The factors of its matrix serve as long as they bring an
-    error down tenfold per step, also those that the call before has left.
-    """
-    F, dF, to, back, G, factors, order, kept = work
+def free_outputs(fl, tab, kind, phase, w, h, panel, free):
+    """Fill the panel's outputs at the nodes (n_outputs m,) without contact forces."""
     m = tab.nodes.size
-    na = active.size
-    size = na * m
-    panel_responses(fl, tab, kind, h, active, to, back, G)
-    free = np.empty(size)
+    na = panel.active.size
+    for i in range(m):
+        turn = np.exp(1j * (phase + fl.omega * h * tab.chi[kind, i]))
+        for o in range(panel.to.shape[0]):
+            steady = fl.forced[0, panel.active[o % na]] * turn
+            if o < na:
+                value = steady.real - fl.stops[panel.active[o], GAP]
+            else:
+                value = -fl.omega * steady.imag
+            for k in range(w.size):
+                value += panel.to[o, i, k] * w[k]
+            free[o * m + i] = value
+
+
+@inner
+def panel_forces(fl, panel, slope):
+    """Fill F from the outputs at the nodes, and its derivatives into `slope`."""
+    na, m = panel.F.shape
     for a in range(na):
         for i in range(m):
-            value = forced_output(fl, active[a], phase + fl.omega * h * tab.chi[kind, i])
-            for k in range(w.size):
-                value += to[a, i, k] * w[k]
-            free[a * m + i] = value - fl.stops[active[a], GAP]
-    step = np.empty(size)
+            speed = panel.output[na + a, i] if slope.shape[0] > na else 0.0
+            force, stiffness, viscosity = law(fl, panel.active[a], panel.output[a, i], speed)
+            panel.F[a, i] = force
+            slope[a, i] = stiffness
+            if slope.shape[0] > na:
+                slope[na + a, i] = viscosity
+
+
+@inner
+def factor_panel(panel):
+    """Factor the matrix 1 + slope G."""
+    na, m = panel.F.shape
+    A, G, slope = panel.factors, panel.G, panel.slope
+    for a in range(na):
+        for i in range(m):
+            p = a * m + i
+            for q in range(na * m):
+                A[p, q] = slope[a, i] * G[p, q]
+            if slope.shape[0] > na:
+                for q in range(na * m):
+                    A[p, q] += slope[na + a, i] * G[na * m + p, q]
+            A[p, p] += 1.0
+    lu_factor(A, panel.order)
+
+
+@inner
+def less_forced(G, free, force, o, i, m):
+    """Output o at node i: what is free minus what the forces (na m,) take away."""
+    p = o * m + i
+    total = free[p]
+    for q in range(force.size):
+        total -= G[p, q] * force[q]
+    return total
+
+
+@inner
+def solve_panel(fl, tab, kind, phase, w, h, noise, panel):
+    """Newton's method for the forces at the nodes; the penetrations in `output` are the guess.
+
+    noise (na,) is the rounding error to expect in each. Returns whether it converged, with the
+    panel filled. The factors of its matrix serve as long as they bring an error down tenfold per
+    step, also those that the call before has left.
+    """
+    na, m = panel.F.shape
+    size = na * m
+    outputs = panel.to.shape[0]
+    output, slope = panel.output, panel.slope
+    panel_responses(fl, tab, kind, h, panel)
+    free = np.empty(outputs * m)
+    free_outputs(fl, tab, kind, phase, w, h, panel, free)
+    new = np.empty(slope.shape)
+    force = np.empty(size)
+    step = np.zeros(size)
+    if outputs > na:  # rates that belong to the guess
+        for o in range(na, outputs):
+            for i in range(m):
+                output[o, i] = 0.0
+        panel_forces(fl, panel, new)
+        for p in range(size):
+            force[p] = panel.F[p // m, p % m]
+        for o in range(na, outputs):
+            for i in range(m):
+                output[o, i] = less_forced(panel.G, free, force, o, i, m)
     before = np.inf
-    for _ in range(60):
-        panel_forces(fl, active, delta, F, dF)
-        fresh = not kept[0]
+    for iteration in range(60):
+        panel_forces(fl, panel, new)
+        fresh = not panel.kept[0]
         if fresh:
-            newton_matrix(G, dF, factors)
-            lu_factor(factors, order)
-            kept[0] = True
-        panel_residual(free, G, delta, F, step)
-        lu_apply_vector(factors, order, step)
-        change = 0.0
+            for o in range(outputs):
+                for i in range(m):
+                    slope[o, i] = new[o, i]
+            factor_panel(panel)
+            panel.kept[0] = True
         for a in range(na):
+            for i in range(m):
+                p = a * m + i
+                if iteration > 0:
+                    step[p] = panel.F[a, i] - force[p]
+                else:
+                    force[p] = panel.F[a, i]
+        if iteration == 0:  # the guess is not what its forces lead to
+            for o in range(outputs):
+                for i in range(m):
+                    off = less_forced(panel.G, free, force, o, i, m) - output[o, i]
+                    step[(o % na) * m + i] += slope[o, i] * off
+        lu_apply_vector(panel.factors, panel.order, step)
+        for p in range(size):
+            force[p] += step[p]
+        change = 0.0
+        for o in range(outputs):
             scale, longest = 0.0, 0.0
             for i in range(m):
-                scale = max(scale, abs(delta[a, i]))
-                longest = max(longest, abs(step[a * m + i]))
-                delta[a, i] += step[a * m + i]
+                value = less_forced(panel.G, free, force, o, i, m)
+                scale = max(scale, abs(output[o, i]))
+                longest = max(longest, abs(value - output[o, i]))
+                output[o, i] = value
             if not np.isfinite(longest):
-                kept[0] = False
+                panel.kept[0] = False
                 return False
-            if longest > noise[a]:
+            if o < na and longest > noise[o]:
                 change = max(change, longest / scale)
         # the error left: goes with the square after a step with a fresh matrix, else linearly
         rate = change / before
         left = change * change if fresh else change * rate / max(1.0 - rate, 1e-3)
         if left <= 1e-13 and (fresh or before < np.inf or change == 0.0):
-            panel_forces(fl, active, delta, F, dF)
+            panel_forces(fl, panel, slope)
             return True
         if rate > 0.1:
-            kept[0] = False
+            panel.kept[0] = False
         before = change
-    kept[0] = False
+    panel.kept[0] = False
     return False
 
 
 @inner
-def newton_matrix(G, dF, J):
-    """Fill J = 1 + G dF."""
-    for p in range(J.shape[0]):
-        q = 0
-        for b in range(dF.shape[0]):
-            for j in range(dF.shape[1]):
-                J[p, q] = G[p, q] * dF[b, j]
-                q += 1
-        J[p, p] += 1.0
-
-
-@inner
-def panel_residual(free, G, delta, F, residual):
-    """Fill free - delta - G F, (na m,)."""
-    p = 0
-    for a in range(delta.shape[0]):
-        for i in range(delta.shape[1]):
-            total = free[p] - delta[a, i]
-            q = 0
-            for b in range(F.shape[0]):
-                for j in range(F.shape[1]):
-                    total -= G[p, q] * F[b, j]
-                    q += 1
-            residual[p] = total
-            p += 1
-
-
-@inner
-def panel_forces(fl, active, delta, F, dF):
-    """Fill F and its derivative dF at all nodes from the penetrations."""
-    for a in range(active.size):
-        for i in range(delta.shape[1]):
-            F[a, i], dF[a, i] = law(
-                delta[a, i], fl.stops[active[a], STIFFNESS], fl.stops[active[a], EXPONENT]
-            )
-
-
-@inner
-def panel_end(fl, tab, kind, w, h, active, F, back, w_end):
+def panel_end(fl, tab, kind, w, h, panel, w_end):
     """State w_end at the end of a panel from the forces at its nodes."""
     for k in range(w.size):
         w_end[k] = w[k]
-    for a in range(active.size):
+    for a in range(panel.active.size):
         for k in range(w.size):
             for j in range(tab.nodes.size):
-                w_end[k] -= h * tab.weights[kind, j] * F[a, j] * back[a, k, j]
+                w_end[k] -= h * tab.weights[kind, j] * panel.F[a, j] * panel.back[a, k, j]
     fly_state(fl, w_end, h)
 
 
 @inner
-def panel_columns(fl, tab, kind, phase, t0, h, active, dF, to, back, G, factors, order, columns):
+def panel_columns(fl, tab, kind, phase, t0, h, panel, columns):
     """Advance sensitivities (2n, n_columns) in place over a panel.
 
     The last column is the derivative with respect to ω at fixed time; t0 is the time from the
     start of the segment at which its phase is fixed.
     """
-    m = tab.nodes.size
-    na = active.size
-    size = na * m
+    na, m = panel.F.shape
     n_columns = columns.shape[1]
-    rhs = np.zeros((size, n_columns))
-    newton_matrix(G, dF, factors)
-    lu_factor(factors, order)
-    for a in range(na):
+    forces = np.zeros((na * m, n_columns))
+    for o in range(panel.to.shape[0]):
+        stop = panel.active[o % na]
         for i in range(m):
-            p = a * m + i
+            p = (o % na) * m + i
+            slope = panel.slope[o, i]
             for k in range(columns.shape[0]):
-                z = to[a, i, k]
+                z = slope * panel.to[o, i, k]
                 for c in range(n_columns):
-                    rhs[p, c] += z * columns[k, c]
+                    forces[p, c] += z * columns[k, c]
             t = h * tab.chi[kind, i]
             turn = np.exp(1j * (phase + fl.omega * t))
-            slope = fl.forced[1, active[a]] + 1j * (t0 + t) * fl.forced[0, active[a]]
-            rhs[p, n_columns - 1] += (slope * turn).real
-    lu_apply(factors, order, rhs)
+            d_omega = fl.forced[1, stop] + 1j * (t0 + t) * fl.forced[0, stop]
+            if o < na:
+                forces[p, n_columns - 1] += slope * (d_omega * turn).real
+            else:
+                d_omega = fl.omega * d_omega + fl.forced[0, stop]
+                forces[p, n_columns - 1] -= slope * (d_omega * turn).imag
+    factor_panel(panel)
+    lu_apply(panel.factors, panel.order, forces)
     for a in range(na):
         for k in range(columns.shape[0]):
             for j in range(m):
-                z = h * tab.weights[kind, j] * dF[a, j] * back[a, k, j]
+                z = h * tab.weights[kind, j] * panel.back[a, k, j]
                 for c in range(n_columns):
-                    columns[k, c] -= z * rhs[a * m + j, c]
+                    columns[k, c] -= z * forces[a * m + j, c]
     fly(fl, columns, h)
 
 
@@ -562,30 +685,33 @@ def legendre_tail(tab, values, a):
 
 @inner
 def largest(values, a):
-    """Largest value in row a."""
-    found = values[a, 0]
-    for j in range(1, values.shape[1]):
-        found = max(found, values[a, j])
+    """Largest absolute value in row a."""
+    found = 0.0
+    for j in range(values.shape[1]):
+        found = max(found, abs(values[a, j]))
     return found
 
 
 @inner
-def resolved(fl, tab, kind, noise, delta, F, dF):
-    """Whether the Legendre tails of each force and of its slope are small beside their largest.
+def resolved(fl, tab, kind, noise, panel):
+    """Whether the Legendre tails of each force and of its slopes are small beside their largest.
 
-    The slope counts as it does in the sensitivities: times dχ/ds.
+    A slope counts as it does in the sensitivities: times dχ/ds.
     """
-    slopes = np.empty(dF.shape)
-    for a in range(F.shape[0]):
-        for i in range(F.shape[1]):
-            slopes[a, i] = dF[a, i] * tab.slope[kind, i]
-        deepest = largest(delta, a)
+    na = panel.active.size
+    slopes = np.empty(panel.slope.shape)
+    for o in range(slopes.shape[0]):
+        for i in range(slopes.shape[1]):
+            slopes[o, i] = panel.slope[o, i] * tab.slope[kind, i]
+    for o in range(slopes.shape[0]):
+        a = o % na
+        deepest = largest(panel.output, a)
         if deepest <= 10.0 * noise[a]:
             continue
         tail = max(fl.tail, 20.0 * noise[a] / deepest)
-        if legendre_tail(tab, F, a) > tail * largest(F, a):
+        if o < na and legendre_tail(tab, panel.F, a) > tail * largest(panel.F, a):
             return False
-        if legendre_tail(tab, slopes, a) > 10.0 * tail * largest(slopes, a):
+        if legendre_tail(tab, slopes, o) > 4.0 * tail * largest(slopes, o):
             return False
     return True
 
@@ -751,7 +877,7 @@ def first_root(tab, values, noise):
 
 
 @inner
-def first_event(fl, tab, kind, phase, w, h, closed, active, delta, F, back, w_end):
+def first_event(fl, tab, kind, phase, w, h, closed, panel, w_end):
     """Stop that first opens or closes within a panel and the fraction of the panel, or (-1, 2)."""
     m = tab.nodes.size
     event, where = -1, 2.0
@@ -766,9 +892,9 @@ def first_event(fl, tab, kind, phase, w, h, closed, active, delta, F, back, w_en
         if closed[s]:
             position += 1
             for i in range(m):
-                inner[0, i] = delta[position, i]
+                inner[0, i] = panel.output[position, i]
         else:
-            node_outputs(fl, tab, kind, phase, w, h, active, F, back, s, inner)
+            node_outputs(fl, tab, kind, phase, w, h, panel, s, inner)
             for i in range(m):
                 inner[0, i] = fl.stops[s, GAP] - inner[0, i]
         values[0], values[m + 1] = (
@@ -786,7 +912,7 @@ def first_event(fl, tab, kind, phase, w, h, closed, active, delta, F, back, w_en
 
 
 @inner
-def node_outputs(fl, tab, kind, phase, w, h, active, F, back, out, values):
+def node_outputs(fl, tab, kind, phase, w, h, panel, out, values):
     """Fill an output at the nodes of a panel, (1, m), with the forces at work."""
     m = tab.nodes.size
     driven = np.empty(w.size)
@@ -794,10 +920,11 @@ def node_outputs(fl, tab, kind, phase, w, h, active, F, back, out, values):
         t = h * tab.chi[kind, i]
         for k in range(w.size):
             driven[k] = w[k]
-        for a in range(active.size):
+        for a in range(panel.active.size):
             for k in range(w.size):
                 for j in range(m):
-                    driven[k] -= h * tab.integrate[kind, i, j] * F[a, j] * back[a, k, j]
+                    z = h * tab.integrate[kind, i, j] * panel.F[a, j]
+                    driven[k] -= z * panel.back[a, k, j]
         values[0, i] = free_output(fl, out, driven, t) + forced_output(
             fl, out, phase + fl.omega * t
         )
@@ -816,11 +943,12 @@ def free_output(fl, out, w, t):
 
 
 @inner
-def guess_panel(fl, tab, phase, w, h, start_switch, active, delta):
+def guess_panel(fl, tab, phase, w, h, start_switch, panel):
     """Choose the kind and length of a panel and guess its penetrations; h bounds the length.
 
     A contact is covered by two panels, so that no panel has to resolve more than a quarter wave.
     """
+    active, delta = panel.active, panel.output
     ends = False
     length = h
     for a in range(active.size):
@@ -844,7 +972,7 @@ def guess_panel(fl, tab, phase, w, h, start_switch, active, delta):
 
 
 @inner
-def remembered_panel(rec, start_switch, h_max, active, delta):
+def remembered_panel(rec, start_switch, h_max, panel):
     """Kind, length and event of the same panel of the motion before, or (-1, 0, -1).
 
     Fills the penetrations.
@@ -852,12 +980,10 @@ def remembered_panel(rec, start_switch, h_max, active, delta):
     n = rec.used[0]
     if n >= rec.used[1] or rec.kind[n] == FLIGHT or rec.kind[n] // 2 != start_switch:
         return -1, 0.0, -1
-    for a in range(active.size):
-        deepest = 0.0
-        for i in range(delta.shape[1]):
-            delta[a, i] = rec.depth[n, active[a], i]
-            deepest = max(deepest, delta[a, i])
-        if deepest == 0.0:
+    for a in range(panel.active.size):
+        for i in range(panel.F.shape[1]):
+            panel.output[a, i] = rec.depth[n, panel.active[a], i]
+        if largest(panel.output, a) == 0.0:
             return -1, 0.0, -1
     kind, h, event = rec.kind[n], rec.duration[n], rec.event[n]
     if h > h_max or (event < 0 and h > 0.98 * h_max):
@@ -866,15 +992,15 @@ def remembered_panel(rec, start_switch, h_max, active, delta):
 
 
 @inner
-def keep_profile(tab, kind, new_kind, ratio, delta, guess):
-    """Carry all node values over to a panel `ratio` times as long."""
-    for a in range(delta.shape[0]):
-        stretch_profile(tab, kind, new_kind, ratio, delta[a], guess)
+def keep_profile(tab, kind, new_kind, ratio, panel, guess):
+    """Carry all penetrations over to a panel `ratio` times as long."""
+    for a in range(panel.active.size):
+        stretch_profile(tab, kind, new_kind, ratio, panel.output[a], guess)
         top = 0.0
         for i in range(guess.size):
             top = max(top, guess[i])
         for i in range(guess.size):
-            delta[a, i] = max(guess[i], 1e-3 * top)
+            panel.output[a, i] = max(guess[i], 1e-3 * top)
 
 
 @inner
@@ -893,42 +1019,40 @@ def time_to_event(fl, stop, closed, w, phase):
 
 
 @inner
-def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta, work, w_end, rec):
+def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, panel, w_end, rec):
     """Solve one panel and choose its length, at most h_max.
 
     Returns (status, kind, h, event): a panel that ends where stop `event` opens or closes, or
-    (event = -1) one short enough to be resolved. `work` holds what `solve_panel` fills.
+    (event = -1) one short enough to be resolved.
     """
-    F, dF, _, back, _, _, _, _ = work
+    active = panel.active
     guess = np.empty(tab.nodes.size)
     noise = np.empty(active.size)
     for a in range(active.size):
         noise[a] = output_noise(fl, active[a], w)
     smooth, switch = 2 * start_switch, 2 * start_switch + 1
     limit = h_max
-    kind, h, aim = remembered_panel(rec, start_switch, h_max, active, delta)
+    kind, h, aim = remembered_panel(rec, start_switch, h_max, panel)
     if kind < 0:
-        kind, h = guess_panel(fl, tab, phase, w, limit, start_switch, active, delta)
+        kind, h = guess_panel(fl, tab, phase, w, limit, start_switch, panel)
     tried = h
     for _ in range(100):
         if h <= 0.0 or phase + fl.omega * h == phase:
             return OK, kind, 0.0, active[0] if aim < 0 else aim
-        if not solve_panel(fl, tab, kind, phase, w, h, active, noise, delta, work):
+        if not solve_panel(fl, tab, kind, phase, w, h, noise, panel):
             limit = 0.4 * min(h, tried)
             aim = -1
-            kind, h = guess_panel(fl, tab, phase, w, limit, start_switch, active, delta)
+            kind, h = guess_panel(fl, tab, phase, w, limit, start_switch, panel)
             tried = h
             continue
-        panel_end(fl, tab, kind, w, h, active, F, back, w_end)
+        panel_end(fl, tab, kind, w, h, panel, w_end)
         end_phase = phase + fl.omega * h
-        fine = resolved(fl, tab, kind, noise, delta, F, dF)
-        event, where = first_event(
-            fl, tab, kind, phase, w, h, closed, active, delta, F, back, w_end
-        )
+        fine = resolved(fl, tab, kind, noise, panel)
+        event, where = first_event(fl, tab, kind, phase, w, h, closed, panel, w_end)
         at_end = where > (0.999 if event == aim else 1.0 - 1e-7)
         if event >= 0 and (aim < 0 or not at_end):
             aim = event
-            keep_profile(tab, kind, switch, where, delta, guess)
+            keep_profile(tab, kind, switch, where, panel, guess)
             kind = switch
             h *= where
             continue
@@ -938,10 +1062,7 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
                     aim = active[a]
         if aim >= 0:
             dh = time_to_event(fl, aim, closed[aim], w_end, end_phase)
-            # the force vanishes there with its slope: an error ε of the instant costs ε^2.5;
-            # a jump of the slope costs more
-            tight = 1e-9 if fl.stops[aim, EXPONENT] >= 1.5 else 1e-13
-            if abs(dh) <= tight * h or (
+            if abs(dh) <= fl.stops[aim, INSTANT] * h or (
                 dh < np.inf and abs(distance(fl, aim, w_end, end_phase)) <= output_noise(fl, aim, w)
             ):
                 if fine:
@@ -954,7 +1075,7 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, active, delta,
             aim = -1
         elif fine:
             return OK, kind, h, -1
-        keep_profile(tab, kind, smooth, 0.5, delta, guess)
+        keep_profile(tab, kind, smooth, 0.5, panel, guess)
         kind = smooth
         h *= 0.5
     return CONTACT_FAILED, kind, h, -1
@@ -1022,8 +1143,8 @@ def propagate(
             for j in range(2):
                 rate[2 * b + i] += fl.blocks[b, i, j] * w[2 * b + j]
     for s in range(n_stops):
-        value, _, _, _ = output_derivatives(fl, s, w, end_phase, 0.0)
-        force, _ = law(value - fl.stops[s, GAP], fl.stops[s, STIFFNESS], fl.stops[s, EXPONENT])
+        value, speed, _, _ = output_derivatives(fl, s, w, end_phase, 0.0)
+        force, _, _ = law(fl, s, value - fl.stops[s, GAP], speed)
         for i in range(size):
             rate[i] -= fl.force[i, s] * force
     for i in range(size):
@@ -1040,11 +1161,11 @@ def propagate(
 def switch_with(fl, w, phase, h, closed, closings):
     """Open and close the stops that do so at the very instant of another one's event.
 
-    The instant is known to 1e-9 of the length h of the panel before it.
+    The instant is known to a small share of the length h of the panel before it.
     """
     for s in range(closed.size):
         value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
-        reach = 1e-8 * h * abs(speed) + 10.0 * output_noise(fl, s, w)
+        reach = 10.0 * fl.stops[s, INSTANT] * h * abs(speed) + 10.0 * output_noise(fl, s, w)
         if abs(value - fl.stops[s, GAP]) <= reach and closed[s] != (speed > 0.0):
             closed[s] = speed > 0.0
             if closed[s]:
@@ -1106,24 +1227,13 @@ def run_pieces(
                 closings[active[0]] -= 1
                 start_switch, skip = 0, max(left, shortest)
                 continue
-        delta = np.empty((n_active, m))
-        work = (
-            np.empty((n_active, m)),
-            np.empty((n_active, m)),
-            np.empty((n_active, m, w.size)),
-            np.empty((n_active, w.size, m)),
-            np.empty((n_active * m, n_active * m)),
-            np.empty((n_active * m, n_active * m)),
-            np.empty(n_active * m, dtype=np.int64),
-            np.zeros(1, dtype=np.bool_),
-        )
+        panel = new_panel(fl, m, w.size, active)
         h_max = min(remain, h_cap)
         status, kind, h, event = contact_panel(
-            fl, tab, here, w, h_max, start_switch, closed, active, delta, work, w_end, rec
+            fl, tab, here, w, h_max, start_switch, closed, panel, w_end, rec
         )
         if status != OK:
             return status
-        F, dF, to, back, G, factors, order, _ = work
         if h > 0.0:
             if recording:
                 n = record_piece(rec, before + here, h, kind, event, w)
@@ -1131,12 +1241,10 @@ def run_pieces(
                     return RECORD_FULL
                 for a in range(n_active):
                     for i in range(m):
-                        rec.force[n, active[a], i] = F[a, i]
-                        rec.depth[n, active[a], i] = delta[a, i]
+                        rec.force[n, active[a], i] = panel.F[a, i]
+                        rec.depth[n, active[a], i] = panel.output[a, i]
             if with_columns:
-                panel_columns(
-                    fl, tab, kind, here, t, h, active, dF, to, back, G, factors, order, columns
-                )
+                panel_columns(fl, tab, kind, here, t, h, panel, columns)
             for k in range(w.size):
                 w[k] = w_end[k]
             t = duration if h >= remain else t + h
@@ -1181,6 +1289,7 @@ def at_frequency(system, omega):
         system.bound3,
         system.force,
         system.stops,
+        system.laws,
         steady,
         forced,
         omega,

@@ -6,7 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nldyn.contact_law import ContactLaw, check_law
 from nldyn.errors import SystemModelError
+from nldyn.linear import Real
 
 
 def _finite(owner: str, name: str, value: float) -> None:
@@ -76,11 +81,58 @@ def hertz_stiffness(
     return 4.0 / 3.0 * math.sqrt(radius) / compliance
 
 
+def dissipation_for(restitution: float, speed: float, *, law: str = "lankarani-nikravesh") -> float:
+    r"""Dissipation a of a `Stop` for a coefficient of restitution at an impact speed.
+
+    Parameters
+    ----------
+    restitution : float
+        Coefficient of restitution e, above 0 and at most 1.
+    speed : float
+        Impact speed v in m/s at which it holds; slower impacts lose less.
+    law : {"lankarani-nikravesh", "hunt-crossley"}
+        :math:`a = \tfrac34 (1 - e^2)/v` or :math:`\tfrac32 (1 - e)/v`. Both are first-order in
+        1 - e: at e = 0.5 the rebound is faster than asked for.
+
+    Returns
+    -------
+    float
+        Dissipation in s/m.
+
+    Raises
+    ------
+    SystemModelError
+        For values out of range or an unknown law.
+
+    References
+    ----------
+    K. H. Hunt, F. R. E. Crossley (1975), *J. Appl. Mech.* 42, 440-445, eq. 11;
+    H. M. Lankarani, P. E. Nikravesh (1990), *J. Mech. Des.* 112, 369-376, eq. 14.
+
+    Examples
+    --------
+    >>> round(dissipation_for(0.9, 0.05), 3)
+    2.85
+    """
+    owner = "dissipation_for"
+    _positive(owner, "restitution", restitution)
+    _positive(owner, "speed", speed)
+    if restitution > 1.0:
+        raise SystemModelError(f"{owner}: restitution must be at most 1, got {restitution:g}")
+    if law == "lankarani-nikravesh":
+        return 0.75 * (1.0 - restitution**2) / speed
+    if law == "hunt-crossley":
+        return 1.5 * (1.0 - restitution) / speed
+    raise SystemModelError(
+        f"{owner}: law must be 'lankarani-nikravesh' or 'hunt-crossley', got '{law}'"
+    )
+
+
 @dataclass(frozen=True)
 class Stop:
-    r"""One-sided contact with the force :math:`F = k\,\delta^p` for a penetration δ > 0.
+    r"""One-sided contact with the force :math:`F = k\,\delta^p (1 + a\dot\delta)` for δ > 0.
 
-    The penetration is ``direction * (displacement at `at` - displacement at `against`) - gap``.
+    The penetration δ is ``direction * (displacement at `at` - displacement at `against`) - gap``.
 
     Parameters
     ----------
@@ -89,13 +141,21 @@ class Stop:
     stiffness : float
         k in N/m^p.
     exponent : float
-        p: 1.5 for Hertz's law, 1 for a linear one-sided spring; at least 1.
+        p: 1.5 for Hertz's law, 1 for a linear one-sided spring; 1 to 4.
     gap : float
         Distance in m at rest; a negative gap preloads the stop.
     direction : {1, -1}
         Sign of the displacement that closes the gap.
     against : str, optional
         Interface on the other side; the ground unless given.
+    dissipation : float
+        a in s/m (Hunt and Crossley 1975, eq. 9, with a = 1.5 α). The force vanishes with the
+        penetration, as that of a dashpot would not; a body that leaves faster than 1/a is held
+        back. See `dissipation_for`.
+    law : callable, optional
+        Another law: ``law(penetration, speed)`` gives the force and its derivatives with respect
+        to both, for a positive penetration. numba must be able to compile it. It vanishes with
+        the penetration, where `stiffness` and `exponent` say how: as k δ^p.
 
     Raises
     ------
@@ -114,18 +174,69 @@ class Stop:
     gap: float = 0.0
     direction: int = 1
     against: str | None = None
+    dissipation: float = 0.0
+    law: ContactLaw | None = None
 
     def __post_init__(self) -> None:
         owner = f"stop at '{self.at}'"
         _positive(owner, "stiffness", self.stiffness)
         _finite(owner, "exponent", self.exponent)
-        if self.exponent < 1.0:
-            raise SystemModelError(f"{owner}: exponent must be at least 1, got {self.exponent:g}")
+        if not 1.0 <= self.exponent <= 4.0:
+            raise SystemModelError(
+                f"{owner}: exponent must lie between 1 and 4, got {self.exponent:g}"
+            )
+        _finite(owner, "dissipation", self.dissipation)
+        if self.dissipation < 0.0:
+            raise SystemModelError(
+                f"{owner}: dissipation must not be negative, got {self.dissipation:g}"
+            )
+        if self.law is not None:
+            if self.dissipation:
+                raise SystemModelError(f"{owner}: give either dissipation or a law of your own")
+            check_law(owner, self.law, self.stiffness, self.exponent)
         _finite(owner, "gap", self.gap)
         if self.against == self.at:
             raise SystemModelError(f"{owner}: against must be another interface")
         if self.direction not in (1, -1):
             raise SystemModelError(f"{owner}: direction must be +1 or -1, got {self.direction}")
+
+    @property
+    def depends_on_speed(self) -> bool:
+        """Whether the force may depend on the speed of penetration."""
+        return self.law is not None or self.dissipation != 0.0
+
+    def force(self, penetration: ArrayLike, speed: ArrayLike = 0.0) -> Real:
+        """Force in N at penetrations (m) and speeds (m/s).
+
+        Examples
+        --------
+        >>> Stop("middle", stiffness=2.0, exponent=1.0).force([-1.0, 3.0]).tolist()
+        [0.0, 6.0]
+        """
+        return self._evaluate(penetration, speed)[0]
+
+    def viscosity(self, penetration: ArrayLike, speed: ArrayLike = 0.0) -> Real:
+        """Derivative of the force with respect to the speed in N s/m.
+
+        Examples
+        --------
+        >>> Stop("middle", 2.0, 1.0, dissipation=0.1).viscosity(3.0).item()
+        0.6000000000000001
+        """
+        return self._evaluate(penetration, speed)[1]
+
+    def _evaluate(self, penetration: ArrayLike, speed: ArrayLike) -> tuple[Real, Real]:
+        delta, rate = np.broadcast_arrays(np.asarray(penetration, float), np.asarray(speed, float))
+        if self.law is not None:
+            law = self.law
+            values = [
+                law(x, v) if x > 0.0 else (0.0, 0.0, 0.0)
+                for x, v in zip(delta.ravel().tolist(), rate.ravel().tolist(), strict=True)
+            ]
+            table = np.array(values, dtype=float).reshape((*delta.shape, 3))
+            return table[..., 0], table[..., 2]
+        elastic = self.stiffness * np.maximum(delta, 0.0) ** self.exponent
+        return elastic * (1.0 + self.dissipation * rate), self.dissipation * elastic
 
     @classmethod
     def hertz(

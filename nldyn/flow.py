@@ -28,6 +28,7 @@ from nldyn._kernels import (
     shoot,
 )
 from nldyn._sample import local_extremes, sample_states
+from nldyn.contact_law import law_address
 from nldyn.errors import SystemModelError, check_whole
 from nldyn.gauss import GaussTables, gauss_tables
 from nldyn.linear import Real
@@ -51,20 +52,59 @@ class FlowOptions:
 
     Parameters
     ----------
-    nodes : int
+    rtol : float
+        Relative error to aim at in the state after a period, 1e-13 to 1e-2; that of the Jacobian
+        is about ten times as large. It sets the two others unless these are given.
+    nodes : int, optional
         Gauss nodes on a contact panel, 4 to 40; the end of a panel is accurate to order 2 nodes.
-    tail : float
+    tail : float, optional
         A panel is halved until the last two Legendre coefficients of its force are below this
         fraction of the largest force. The error at its end goes with the square.
+
+    Examples
+    --------
+    >>> FlowOptions(rtol=1e-6).panel_nodes
+    10
     """
 
-    nodes: int = 12
-    tail: float = 1e-4
+    rtol: float = 1e-9
+    nodes: int | None = None
+    tail: float | None = None
 
     def __post_init__(self) -> None:
-        check_whole("FlowOptions: nodes", self.nodes, 4, 40)
-        if not 0.0 < self.tail < 1.0:
+        if not 1e-13 <= self.rtol <= 1e-2:
+            raise SystemModelError(
+                f"FlowOptions: rtol must lie between 1e-13 and 1e-2, got {self.rtol:g}"
+            )
+        if self.nodes is not None:
+            check_whole("FlowOptions: nodes", self.nodes, 4, 40)
+        if self.tail is not None and not 0.0 < self.tail < 1.0:
             raise SystemModelError(f"FlowOptions: tail must lie between 0 and 1, got {self.tail:g}")
+
+    @property
+    def panel_nodes(self) -> int:
+        """Gauss nodes on a panel: more for more digits, since panels converge spectrally."""
+        return self.nodes or round(2.0 - 4.0 / 3.0 * math.log10(self.rtol))
+
+    @property
+    def panel_tail(self) -> float:
+        """Legendre tail accepted on a panel."""
+        return self.tail or 0.3 * math.sqrt(self.rtol)
+
+    @property
+    def finer(self) -> FlowOptions:
+        """A setting whose errors are negligible beside those of this one."""
+        return FlowOptions(
+            max(1e-3 * self.rtol, 1e-13), min(self.panel_nodes + 4, 40), 0.03 * self.panel_tail
+        )
+
+    def instant(self, exponent: float) -> float:
+        """Error allowed in the instant of an event, as a share of the panel before it.
+
+        The slope of the force starts with the power ``exponent - 1`` of the time, so an error ε
+        of its start costs ε^exponent in the Jacobian.
+        """
+        return 1e-13 if exponent < 1.5 else (1e-2 * self.rtol) ** (1.0 / exponent)
 
 
 @dataclass(frozen=True)
@@ -90,6 +130,11 @@ class Segments:
     d_omega: Real
     closings: NDArray[np.int64]
     failure: str = ""
+
+    @property
+    def monodromy(self) -> Real:
+        """Product of the segments' Jacobians, (2n, 2n)."""
+        return chain(self.jacobians)
 
 
 @dataclass(frozen=True)
@@ -130,10 +175,15 @@ class Solution:
     @cached_property
     def monodromy(self) -> Real:
         """Product of the segments' Jacobians, (2n, 2n)."""
-        product = np.asarray(self.jacobians[0])
-        for jacobian in self.jacobians[1:]:
-            product = jacobian @ product
-        return product
+        return chain(self.jacobians)
+
+
+def chain(jacobians: Real) -> Real:
+    """Product of the Jacobians (k, 2n, 2n) of consecutive segments, (2n, 2n)."""
+    product = np.asarray(jacobians[0])
+    for jacobian in jacobians[1:]:
+        product = jacobian @ product
+    return product
 
 
 class FlowMap:
@@ -169,7 +219,7 @@ class FlowMap:
     @cached_property
     def tables(self) -> GaussTables:
         """Collocation tables."""
-        return gauss_tables(self.options.nodes)
+        return gauss_tables(self.options.panel_nodes)
 
     @cached_property
     def rows(self) -> Real:
@@ -193,7 +243,15 @@ class FlowMap:
         bounds = np.multiply(thirds, growth, out=np.zeros_like(thirds), where=thirds > 0.0)
         force = np.array([s.force_column(v) for v in vectors]).reshape(-1, 2 * s.size)
         stops = [
-            (stop.gap, stop.stiffness, stop.exponent, v @ v, _duration_factor(stop.exponent))
+            (
+                stop.gap,
+                stop.stiffness,
+                stop.exponent,
+                stop.dissipation,
+                v @ v,
+                _duration_factor(stop.exponent),
+                self.options.instant(stop.exponent),
+            )
             for stop, v in zip(s.stops, vectors, strict=True)
         ]
         return SystemData(
@@ -202,8 +260,9 @@ class FlowMap:
             bounds,
             np.ascontiguousarray(force.T),
             s.drive,
-            np.array(stops, dtype=float).reshape(-1, 5),
-            self.options.tail,
+            np.array(stops, dtype=float).reshape(-1, 7),
+            np.array([law_address(stop.law) for stop in s.stops], dtype=np.int64),
+            self.options.panel_tail,
         )
 
     def shoot(
@@ -350,6 +409,11 @@ class FlowMap:
         )
         return Trajectory(self, omega, pieces, closings, failure)
 
+    @cached_property
+    def finer(self) -> FlowMap:
+        """The same map at a setting whose errors are negligible beside those of this one."""
+        return FlowMap(self.system, self.options.finer)
+
     def to_modal(self, states: Real) -> Real:
         """Modal displacements and velocities (..., 2n) of states z."""
         return np.asarray(np.asarray(states) @ self.system.linear.right.T)
@@ -365,8 +429,8 @@ class FlowMap:
             np.empty(capacity, dtype=np.int64),
             np.empty(capacity, dtype=np.int64),
             np.empty((capacity, 2 * self.system.size)),
-            np.empty((capacity, len(self.system.stops), self.options.nodes)),
-            np.empty((capacity, len(self.system.stops), self.options.nodes)),
+            np.empty((capacity, len(self.system.stops), self.options.panel_nodes)),
+            np.empty((capacity, len(self.system.stops), self.options.panel_nodes)),
             np.zeros(2, dtype=np.int64),
         )
 
@@ -413,6 +477,14 @@ class Trajectory:
         forced = complex(row @ flow.system.steady(self.omega))
         fastest = max(self.omega, flow.system.linear.fastest)
         return self._evaluate(local_extremes, row, flow.rate_rows[output], forced, fastest)
+
+    def contact_quadrature(self) -> tuple[Real, Real]:
+        """Forcing phases (k,) of all nodes of contact panels, and their weights in s (k,)."""
+        tables, rec = self.flow.tables, self.record
+        contact = rec.kind >= 0
+        kind, duration = rec.kind[contact], rec.duration[contact, None]
+        phases = rec.phase[contact, None] + self.omega * duration * tables.chi[kind]
+        return phases.ravel(), (duration * tables.weights[kind]).ravel()
 
     def _evaluate(self, kernel: Any, *arguments: object) -> Real:
         """Call a kernel of `_sample` on the recorded pieces."""

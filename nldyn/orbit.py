@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from nldyn.errors import SystemModelError, check_whole
 from nldyn.flow import FlowMap, Solution, Trajectory
@@ -83,6 +84,22 @@ class Impact:
     time: float
     penetration: float
     force: float
+
+
+@dataclass(frozen=True)
+class FlowError:
+    """Relative errors of the flow map over one period, in the norm of the coordinates z.
+
+    Parameters
+    ----------
+    state : float
+        Of the states at the ends of the segments.
+    monodromy : float
+        Of the monodromy matrix.
+    """
+
+    state: float
+    monodromy: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,11 +187,48 @@ class Orbit:
         return bool(abs(self.multipliers[0]) < 1.0)
 
     @cached_property
+    def flow_error(self) -> FlowError:
+        """Error of the flow map on this orbit, by a finer one."""
+        problem = self.problem
+        nodes = problem.nodes(self.point)
+        here, finer = (
+            flow.shoot(nodes, problem.phases, self.omega)
+            for flow in (problem.flow, problem.flow.finer)
+        )
+        return FlowError(
+            *(
+                float(np.linalg.norm(a - b) / np.linalg.norm(b))
+                for a, b in (
+                    (here.ends, finer.ends),
+                    (here.monodromy, finer.monodromy),
+                )
+            )
+        )
+
+    @cached_property
     def liouville_error(self) -> float:
-        """|det Φ / exp(-∫ tr D dt) - 1|: Liouville's formula, exact for linear damping."""
+        """|det Φ / exp(-∫ (tr D + Σ v² ∂F/∂δ') dt) - 1|: Liouville's formula.
+
+        v² is the velocity jump per unit impulse at a stop whose force depends on the speed.
+        """
         exact = -float(np.trace(self.system.total_damping)) * self.duration
+        exact -= self._contact_damping()
         sign, logdet = np.linalg.slogdet(self.monodromy)
         return abs(math.expm1(logdet - exact)) if sign > 0.0 else math.inf
+
+    def _contact_damping(self) -> float:
+        """∫ Σ v² ∂F/∂δ' dt over the contacts, by the quadrature of their panels."""
+        system = self.system
+        if not any(stop.depends_on_speed for stop in system.stops):
+            return 0.0
+        phases, weights = self.trajectory.contact_quadrature()
+        states = self.problem.flow.to_modal(self.trajectory.states(phases))
+        total = 0.0
+        for stop in system.stops:
+            v = system.stop_vector(stop)
+            depth = states[:, : system.size] @ v - stop.gap
+            total += float(v @ v * weights @ stop.viscosity(depth, states[:, system.size :] @ v))
+        return total
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -240,7 +294,7 @@ class Orbit:
                 index,
                 float(phase / self.omega),
                 float(depth),
-                float(stop.stiffness * depth**stop.exponent),
+                self._largest_force(index, float(phase), float(depth)),
             )
             for index, (stop, peaks) in enumerate(
                 zip(self.system.stops, self.penetration_peaks, strict=True)
@@ -249,6 +303,28 @@ class Orbit:
             if depth > 0.0
         ]
         return tuple(sorted(impacts, key=lambda impact: impact.time))
+
+    def _largest_force(self, index: int, phase: float, depth: float) -> float:
+        """Largest force of the contact whose penetration is deepest at a phase."""
+        stop, v = self.system.stops[index], self.system.stop_vector(self.system.stops[index])
+        if not stop.depends_on_speed:
+            return float(stop.force(depth))
+
+        def force(where: float) -> float:
+            state = self.states(np.array([where]))[0]
+            n = self.system.size
+            return float(stop.force(state[:n] @ v - stop.gap, state[n:] @ v))
+
+        pieces = self.trajectory.record
+        within = (pieces.kind >= 0) & (pieces.force[:, index].max(axis=1) > 0.0)
+        reach = self.omega * float(pieces.duration[within].max(initial=0.0))
+        found = minimize_scalar(
+            lambda where: -force(where),
+            bounds=(phase - reach, phase),
+            method="bounded",
+            options={"xatol": 1e-9 * max(reach, 1e-9)},
+        )
+        return max(-float(found.fun), force(phase))
 
     def states(self, phases: Real) -> Real:
         """Modal displacements and velocities (k, 2n) at any forcing phases."""
@@ -283,12 +359,10 @@ class Orbit:
         system = self.system
         q = states[:, : system.size]
         stops = system.stops
+        rate = states[:, system.size :]
         depth = np.array([q @ system.stop_vector(s) - s.gap for s in stops]).reshape(len(stops), -1)
         force = np.array(
-            [
-                s.stiffness * np.maximum(d, 0.0) ** s.exponent
-                for s, d in zip(stops, depth, strict=True)
-            ]
+            [s.force(d, rate @ system.stop_vector(s)) for s, d in zip(stops, depth, strict=True)]
         ).reshape(depth.shape)
         return History(
             phases / self.omega,

@@ -23,15 +23,7 @@ from nldyn.bench.models import Case
 from nldyn.flow import FlowMap, FlowOptions
 from nldyn.linear import Real
 
-FLOW_OPTIONS = [
-    FlowOptions(nodes=6, tail=0.01),
-    FlowOptions(nodes=8, tail=1e-3),
-    FlowOptions(nodes=12, tail=1e-3),
-    FlowOptions(),
-    FlowOptions(nodes=12, tail=1e-5),
-    FlowOptions(nodes=16, tail=1e-6),
-    FlowOptions(nodes=16, tail=1e-8),
-]
+FLOW_OPTIONS = [FlowOptions(rtol) for rtol in (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)]
 TOLERANCES = [1e-4, 1e-6, 1e-8, 1e-10, 1e-12]
 STEPS = [50, 200, 800, 3200, 12800]
 

@@ -166,5 +166,4 @@ def setting_label(setting: Any) -> str:
         return f"{setting:.0e}"
     if isinstance(setting, int):
         return f"{setting} steps"
-    values = vars(setting)
-    return ", ".join(f"{key} {value:g}" for key, value in values.items())
+    return f"rtol {setting.rtol:.0e}"

@@ -30,7 +30,7 @@ from nldyn.system import System
 
 mp = mpmath.mp
 FILE = Path(__file__).with_name("data") / "reference.json"
-TIGHT = FlowOptions(nodes=16, tail=1e-7)
+TIGHT = FlowOptions(rtol=1e-13)
 
 PRECISIONS = {
     "one_dof": (Precision(60, 70, 55), Precision(70, 85, 62)),

@@ -5,11 +5,22 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from nldyn import System
+from nldyn import Stop, System
+
+
+def contact(stop: Stop, depth: float, speed: float) -> tuple[float, float, float]:
+    """Force k δ^p (1 + a δ') and its derivatives by δ and δ', or what the stop's own law gives."""
+    if depth <= 0.0:
+        return 0.0, 0.0, 0.0
+    if stop.law is not None:
+        return stop.law(depth, speed)
+    k, p, a = stop.stiffness, stop.exponent, stop.dissipation
+    lossy = 1.0 + a * speed
+    return k * depth**p * lossy, p * k * depth ** (p - 1.0) * lossy, a * k * depth**p
 
 
 class Motion:
-    """q'' + D q' + Ω² q = Σ p Re(f e^{iφ}) - Σ c k max(c·q - gap, 0)^p, with φ = ωt as time.
+    """q'' + D q' + Ω² q = Σ p Re(f e^{iφ}) - Σ c F(c·q - gap, c·q'), with φ = ωt as time.
 
     The state holds modal displacements, then velocities.
     """
@@ -21,7 +32,7 @@ class Motion:
         self.A[:n, n:] = np.eye(n)
         self.A[n:, :n] = -np.diag(system.natural_frequencies**2)
         self.A[n:, n:] = -system.total_damping
-        self.stops = [(system.stop_vector(s), s.stiffness, s.exponent, s.gap) for s in system.stops]
+        self.stops = [(system.stop_vector(s), s) for s in system.stops]
         self.sources = [(system.participation[e.at], e) for e in system.excitation]
 
     def rate(self, phase: float, x: np.ndarray, omega: float) -> np.ndarray:
@@ -30,20 +41,17 @@ class Motion:
         for shape, source in self.sources:
             amplitude = source.phasor * omega**source.order
             dx[self.n :] += shape * (amplitude * np.exp(1j * phase)).real
-        for c, stiffness, exponent, gap in self.stops:
-            depth = c @ x[: self.n] - gap
-            if depth > 0.0:
-                dx[self.n :] -= c * stiffness * depth**exponent
+        for c, stop in self.stops:
+            dx[self.n :] -= c * contact(stop, c @ x[: self.n] - stop.gap, c @ x[self.n :])[0]
         return dx
 
     def tangent_matrix(self, x: np.ndarray) -> np.ndarray:
         """Derivative of the rate with respect to the state."""
         J = self.A.copy()
-        for c, stiffness, exponent, gap in self.stops:
-            depth = c @ x[: self.n] - gap
-            if depth > 0.0:
-                slope = stiffness * exponent * depth ** (exponent - 1.0)
-                J[self.n :, : self.n] -= slope * np.outer(c, c)
+        for c, stop in self.stops:
+            _, stiff, viscous = contact(stop, c @ x[: self.n] - stop.gap, c @ x[self.n :])
+            J[self.n :, : self.n] -= stiff * np.outer(c, c)
+            J[self.n :, self.n :] -= viscous * np.outer(c, c)
         return J
 
     def run(
@@ -68,7 +76,7 @@ class Motion:
     ) -> list[int]:
         """How often each stop closes: its depth turns positive from one step to the next."""
         q = self._integrated(state, phases, omega, False, max_step)[: self.n]
-        depths = [c @ q - gap for c, _, _, gap in self.stops]
+        depths = [c @ q - stop.gap for c, stop in self.stops]
         return [int(np.sum((d[:-1] <= 0.0) & (d[1:] > 0.0))) for d in depths]
 
     def _integrated(

@@ -1,0 +1,220 @@
+"""Contacts that dissipate, and laws of the user's own."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from independent import Motion
+from one_dof import make_one_dof
+from scipy.optimize import brentq
+
+from nldyn import (
+    FlowMap,
+    FlowOptions,
+    Stop,
+    System,
+    SystemModelError,
+    dissipation_for,
+    solve_orbit,
+)
+
+OMEGA = 2 * np.pi * 10.0
+
+
+def rebound(speed: float, loss: float) -> float:
+    """Speed after a free impact with F = k δ^p (1 + a v), from m v dv = -F dδ (exact).
+
+    Both speeds have the same v/a - ln(1 + a v)/a².
+    """
+
+    def spent(v):
+        return v / loss - math.log1p(loss * v) / loss**2
+
+    lowest = -(1.0 - 1e-15) / loss
+    return brentq(lambda v: spent(v) - spent(speed), max(lowest, -speed * (1 + 1e-9)), -1e-9)
+
+
+MASS = 2.0
+
+
+def free_mass(stop: Stop) -> FlowMap:
+    return FlowMap(System.from_matrices([[MASS]], [[0.0]], {"m": [1.0]}, stops=[stop]))
+
+
+def moving(flow: FlowMap, speed: float) -> np.ndarray:
+    """State of a mass that is about to hit."""
+    return flow.to_state(np.array([0.0, speed * math.sqrt(MASS)]))
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.floats(-3.0, 0.5), st.floats(0.01, 0.9), st.sampled_from([1.0, 1.5, 2.0]),
+    st.floats(4.0, 9.0),
+)  # fmt: skip
+def test_a_free_impact_loses_what_its_first_integral_says(log_speed, share, exponent, log_k):
+    speed = 10.0**log_speed
+    loss = share / speed
+    flow = free_mass(Stop("m", 10.0**log_k, exponent, dissipation=loss))
+    start = moving(flow, speed)
+    duration = 12.0 * (2.0 / 10.0**log_k / speed ** (exponent - 1.0)) ** (1.0 / (exponent + 1.0))
+    found = flow.shoot(start[None], np.array([0.0, OMEGA * duration]), OMEGA)
+    assert not found.failure and found.closings.tolist() == [1]
+    ratio = flow.to_modal(found.ends[0])[1] / flow.to_modal(start)[1]
+    assert ratio == pytest.approx(rebound(speed, loss) / speed, rel=2e-9)
+
+
+def test_speed_after_an_impact_depends_on_that_before_as_the_first_integral_says():
+    """d v1/d v0 = (v0/v1) (1 + a v1)/(1 + a v0)."""
+    flow = free_mass(Stop("m", 5e9, dissipation=3.0))
+    v0 = 0.1
+    found = flow.shoot(moving(flow, v0)[None], np.array([0.0, OMEGA * 0.02]), OMEGA)
+    v1 = flow.to_modal(found.ends[0])[1] / math.sqrt(MASS)
+    basis = flow.system.linear
+    jacobian = basis.right @ found.jacobians[0] @ basis.left
+    exact = v0 / v1 * (1 + 3.0 * v1) / (1 + 3.0 * v0)
+    assert jacobian[1, 1] == pytest.approx(exact, rel=1e-8)
+
+
+def test_restitution_asked_for_is_met_to_second_order():
+    for law in ("lankarani-nikravesh", "hunt-crossley"):
+        for e in (0.99, 0.97):
+            loss = dissipation_for(e, 0.2, law=law)
+            assert -rebound(0.2, loss) / 0.2 == pytest.approx(e, abs=2.0 * (1 - e) ** 2)
+
+
+def three_modes(*stops: Stop) -> System:
+    return System.from_modal(
+        [13.1, 117.5, 326.5],
+        {"middle": [0.63, 0.45, 0.5], "end": [0.2, -0.7, 0.4]},
+        modal_damping=0.01,
+        stops=list(stops),
+    )
+
+
+def stiffening(delta, speed):
+    """Hertz and a cubic term, with a loss that grows with the square of the penetration."""
+    root = math.sqrt(delta)
+    force = 2e9 * delta * root + 1e14 * delta**3 + 3e9 * delta**2 * speed
+    slope = 3e9 * root + 3e14 * delta**2 + 6e9 * delta * speed
+    return force, slope, 3e9 * delta**2
+
+
+LOSSY = [
+    (Stop("middle", 5e9, dissipation=5.0, gap=1e-6),),
+    (Stop("middle", 5e9, dissipation=2.0), Stop("end", 1e6, 1.0, gap=-2e-6, direction=-1)),
+    (Stop("middle", 5e9, dissipation=2.0, against="end"), Stop("end", 3e9, dissipation=4.0)),
+    (Stop("middle", 2e9, law=stiffening), Stop("end", 3e9, dissipation=4.0, gap=1e-6)),
+]
+
+
+@pytest.mark.parametrize("stops", LOSSY)
+def test_lossy_stops_against_runge_kutta(stops):
+    system = three_modes(*stops)
+    x0 = np.array([-2e-6, 1e-6, 0.0, 4e-3, 1e-3, 2e-3])
+    phases = (0.0, 0.6)
+    exact, exact_jacobian = Motion(system).run(x0, phases, OMEGA, max_step=0.005)
+    flow = FlowMap(system)
+    found = flow.shoot(flow.to_state(x0)[None], np.array(phases), OMEGA)
+    assert found.closings.tolist() == Motion(system).closings(x0, phases, OMEGA, max_step=0.005)
+    basis = system.linear
+    weights = np.repeat([np.abs(exact[:3]).max(), np.abs(exact[3:]).max()], 3)
+    assert flow.to_modal(found.ends[0]) / weights == pytest.approx(exact / weights, abs=1e-9)
+    units = weights / weights[:, None]
+    jacobian = basis.right @ found.jacobians[0] @ basis.left * units
+    size = np.abs(exact_jacobian * units).max()
+    assert np.abs(jacobian - exact_jacobian * units).max() < 1e-8 * size
+
+
+def test_a_law_of_ones_own_that_is_hertzs_gives_the_same_orbit():
+    def hertz(delta, speed):
+        return 5.17e9 * delta**1.5, 1.5 * 5.17e9 * delta**0.5, 0.0
+
+    known = solve_orbit(make_one_dof(), 26.0)
+    own = solve_orbit(make_one_dof(stops=[Stop("middle", 5.17e9, law=hertz)]), 26.0)
+    assert own.max_abs_displacement == pytest.approx(known.max_abs_displacement, rel=1e-10)
+    assert own.multipliers == pytest.approx(known.multipliers, rel=1e-8)
+
+
+@pytest.mark.parametrize("frequency_hz", [26.0, 12.0, 60.0])
+def test_liouvilles_formula_counts_the_damping_of_the_contact(frequency_hz):
+    system = make_one_dof(stops=[Stop("middle", 5.17e9, dissipation=4.0)])
+    orbit = solve_orbit(system, frequency_hz)
+    assert orbit.impacts > 0
+    assert orbit.liouville_error < 1e-8
+    lossless = math.exp(-np.trace(system.total_damping) * orbit.duration)
+    assert np.linalg.det(orbit.monodromy) < (1 - 1e-4) * lossless
+
+
+def test_the_work_of_the_force_is_what_dampers_and_contacts_take():
+    system = make_one_dof(stops=[Stop("middle", 5.17e9, dissipation=4.0)])
+    orbit = solve_orbit(FlowMap(system, FlowOptions(rtol=1e-12)), 26.0)
+    phi = system.participation["middle"]
+    # smooth parts by the trapezoidal rule over a period, the contact by its own quadrature
+    phases, weights = orbit.trajectory.contact_quadrature()
+    states = orbit.states(phases)
+    stop = system.stops[0]
+    delta, speed = states[:, :1] @ phi - stop.gap, states[:, 1:] @ phi
+    loss = float(weights @ (speed * stop.force(delta, speed)))
+    energy_change = loss
+    grid = np.linspace(0.0, 2 * np.pi, 200001)
+    v = orbit.states(grid)[:, 1:] @ phi
+    force = system.excitation[0].mass_times_radius * orbit.omega**2 * np.cos(grid)
+    damping = float(system.total_damping[0, 0] / phi[0] ** 2)
+    power = force * v - damping * v**2
+    energy_change -= np.trapezoid(power, grid) / orbit.omega
+    assert loss > 0.0
+    assert abs(energy_change) < 1e-6 * loss
+
+
+def test_the_largest_force_of_a_lossy_impact_comes_before_the_deepest_point():
+    orbit = solve_orbit(make_one_dof(stops=[Stop("middle", 5.17e9, dissipation=8.0)]), 26.0)
+    (impact,) = orbit.impact_list
+    stop = orbit.system.stops[0]
+    assert impact.force > stop.force(impact.penetration)
+    around = np.linspace(-0.05, 0.0, 20001) + impact.time * orbit.omega
+    states = orbit.states(around)
+    phi = orbit.system.participation["middle"]
+    sampled = stop.force(states[:, :1] @ phi, states[:, 1:] @ phi)
+    assert impact.force == pytest.approx(sampled.max(), rel=1e-6)
+
+
+def test_laws_that_cannot_be_used_are_refused():
+    def wrong_slope(delta, speed):
+        return delta**1.5, delta**0.5, 0.0
+
+    def dashpot(delta, speed):
+        return delta + 3.0 * speed, 1.0, 3.0
+
+    def not_a_number(delta, speed):
+        return math.nan, 1.0, 0.0
+
+    for law, words in (
+        (wrong_slope, "derivative by the penetration"),
+        (dashpot, "vanish with the penetration"),
+        (not_a_number, "not finite"),
+        (lambda delta: delta, "three numbers"),
+    ):
+        with pytest.raises(SystemModelError, match=words):
+            Stop("middle", 1.0, law=law)
+    with pytest.raises(SystemModelError, match="either dissipation or a law"):
+        Stop("middle", 1.0, dissipation=1.0, law=wrong_slope)
+    with pytest.raises(SystemModelError, match="dissipation must not be negative"):
+        Stop("middle", 1.0, dissipation=-1.0)
+    for arguments in ((1.1, 0.1), (0.0, 0.1), (0.9, 0.0)):
+        with pytest.raises(SystemModelError, match="dissipation_for"):
+            dissipation_for(*arguments)
+
+
+def test_a_law_that_cannot_be_compiled_says_so():
+    table = {"k": 5e9}
+
+    def from_a_table(delta, speed):
+        return table["k"] * delta**1.5, 1.5 * table["k"] * delta**0.5, 0.0
+
+    system = make_one_dof(stops=[Stop("middle", 5e9, law=from_a_table)])
+    with pytest.raises(SystemModelError, match="'from_a_table' cannot be compiled"):
+        solve_orbit(system, 26.0)
