@@ -125,11 +125,10 @@ class Walk:
     ) -> tuple[BranchPoint, float, int] | None:
         """One predictor-corrector step; None when it must be shorter."""
         weights = problem.metric(here.orbit.point)
-        norm = math.sqrt(float(np.sum(weights * here.tangent**2)))
-        direction = here.tangent / norm
+        direction = here.tangent / _length(weights, here.tangent)
         straight = here.orbit.point + step * direction
         row = weights * direction
-        row /= np.linalg.norm(row)
+        row /= math.sqrt(float(row @ row))
         found = problem.correct(
             straight + 0.5 * step**2 * curvature,
             row,
@@ -140,14 +139,13 @@ class Walk:
             return None
         # a curve that turns by max_angle leaves its tangent by half of that: a longer correction
         # has landed on another branch
-        off = math.sqrt(float(np.sum(weights * (found.point - straight) ** 2)))
+        off = _length(weights, found.point - straight)
         if off > 0.75 * self.options.max_angle * step:
             return None
         if _jumped_to_shift(problem, here.orbit.point, straight, found.point):
             return None
         tangent = problem.tangent(found, direction)
-        cosine = float(np.sum(weights * direction * tangent))
-        cosine /= math.sqrt(float(np.sum(weights * tangent**2)))
+        cosine = float(direction @ (weights * tangent)) / _length(weights, tangent)
         angle = math.acos(min(max(cosine, -1.0), 1.0))
         if angle > self.options.max_angle:
             return None
@@ -184,14 +182,19 @@ class Walk:
             return False
         weights = start.orbit.problem.metric(start.orbit.point)
         step = b.orbit.point - a.orbit.point
-        if float(np.sum(weights * step * start.tangent)) <= 0.0:
+        if float(step @ (weights * start.tangent)) <= 0.0:
             return False
-        along = float(np.sum(weights * (start.orbit.point - a.orbit.point) * step))
-        length2 = float(np.sum(weights * step**2))
+        along = float(step @ (weights * (start.orbit.point - a.orbit.point)))
+        length2 = float(step @ (weights * step))
         if not 0.0 <= along <= length2:
             return False
         off = start.orbit.point - a.orbit.point - along / length2 * step
-        return float(np.sum(weights * off**2)) < 0.01 * length2
+        return float(off @ (weights * off)) < 0.01 * length2
+
+
+def _length(weights: Real, vector: Real) -> float:
+    """Length of a vector in the metric of the arclength."""
+    return math.sqrt(float(vector @ (weights * vector)))
 
 
 def passed_flip(a: Orbit, b: Orbit) -> bool:
@@ -451,7 +454,7 @@ def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoin
     nodes = base.nodes(orbit.point)
     doubled = np.append(np.concatenate([nodes, nodes]).ravel(), orbit.point[-1])
     weights = problem.metric(doubled)
-    direction /= math.sqrt(float(np.sum(weights * direction**2)))
+    direction /= _length(weights, direction)
     row = weights * direction
     for size in (amplitude, 0.25 * amplitude, 0.05 * amplitude, 0.01 * amplitude):
         found = problem.correct(doubled + size * direction, row / np.linalg.norm(row))

@@ -31,7 +31,7 @@ from nldyn._sample import local_extremes, sample_states
 from nldyn.contact_law import law_address
 from nldyn.errors import SystemModelError, check_whole
 from nldyn.gauss import GaussTables, gauss_tables
-from nldyn.linear import Real
+from nldyn.linear import Complex, Real
 from nldyn.system import System
 
 __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
@@ -463,7 +463,7 @@ class Trajectory:
         """States z (k, 2n) at ascending forcing phases within the motion."""
         phases = np.asarray(phases, dtype=float)
         turn = np.exp(1j * phases)[:, None]
-        steady = (self.flow.system.steady(self.omega) * turn).real
+        steady = (self._steady * turn).real
         return np.asarray(self._evaluate(sample_states, phases) + steady)
 
     def extremes(self, output: int) -> Real:
@@ -474,7 +474,7 @@ class Trajectory:
         """
         flow = self.flow
         row = flow.rows[output]
-        forced = complex(row @ flow.system.steady(self.omega))
+        forced = complex(row @ self._steady)
         fastest = max(self.omega, flow.system.linear.fastest)
         return self._evaluate(local_extremes, row, flow.rate_rows[output], forced, fastest)
 
@@ -485,6 +485,11 @@ class Trajectory:
         kind, duration = rec.kind[contact], rec.duration[contact, None]
         phases = rec.phase[contact, None] + self.omega * duration * tables.chi[kind]
         return phases.ravel(), (duration * tables.weights[kind]).ravel()
+
+    @cached_property
+    def _steady(self) -> Complex:
+        """Amplitude of the steady response, (2n,)."""
+        return self.flow.system.steady(self.omega)
 
     def _evaluate(self, kernel: Any, *arguments: object) -> Real:
         """Call a kernel of `_sample` on the recorded pieces."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg as sla
@@ -46,7 +47,7 @@ class LinearPart:
     growth: Real
     condition: float
 
-    @property
+    @cached_property
     def fastest(self) -> float:
         """Largest imaginary part of an eigenvalue: the fastest vibration in rad/s."""
         return float(np.abs(np.linalg.eigvals(self.blocks).imag).max())
@@ -65,14 +66,29 @@ class LinearPart:
         SystemModelError
             If an undamped mode is excited exactly at its frequency.
         """
-        matrices = 1j * omega * np.eye(2) - self.blocks
-        size = np.abs(self.blocks).max(axis=(1, 2)) + omega
-        if np.any(np.abs(np.linalg.det(matrices)) < 1e-12 * size**2):
+        (a, b), (c, d) = self._entries
+        first, last = 1j * omega - a, 1j * omega - d
+        determinant = first * last - b * c
+        if np.any(np.abs(determinant) < 1e-12 * (self._size + omega) ** 2):
             raise SystemModelError(
                 f"the excitation at {omega / (2 * np.pi):g} Hz meets an undamped mode exactly; "
                 "give the mode some damping or move the frequency"
             )
-        return np.asarray(np.linalg.solve(matrices, drive.reshape(-1, 2, 1)).ravel())
+        x, y = drive[0::2] / determinant, drive[1::2] / determinant
+        response = np.empty(drive.size, dtype=complex)
+        response[0::2] = last * x + b * y
+        response[1::2] = first * y + c * x
+        return response
+
+    @cached_property
+    def _entries(self) -> Real:
+        """Blocks as (2, 2, n)."""
+        return np.ascontiguousarray(np.moveaxis(self.blocks, 0, -1))
+
+    @cached_property
+    def _size(self) -> Real:
+        """Largest entries of the blocks, (n,)."""
+        return np.asarray(np.abs(self.blocks).max(axis=(1, 2)))
 
 
 def linear_part(omega: Real, damping: Real) -> LinearPart:

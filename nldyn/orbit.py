@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
+from scipy.linalg.lapack import dgeev
 
 from nldyn.errors import SystemModelError, check_whole
 from nldyn.flow import FlowMap, Solution, Trajectory
@@ -172,8 +173,11 @@ class Orbit:
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
         """Floquet multipliers, largest first, shape (2n,)."""
-        values = np.linalg.eigvals(self.monodromy).astype(complex)
-        return values[np.argsort(-np.abs(values), kind="stable")]
+        real, imaginary, _, _, info = dgeev(self.monodromy, compute_vl=0, compute_vr=0)
+        if info:
+            raise ConvergenceError("the multipliers of an orbit could not be computed")
+        values = real + 1j * imaginary
+        return np.asarray(values[np.argsort(-np.abs(values), kind="stable")])
 
     @property
     def largest_multiplier(self) -> complex:

@@ -78,6 +78,7 @@ class ShootingProblem:
 
     def tangent(self, found: Solution, towards: Real) -> Real:
         """Unit tangent of the branch at a solution, on the side of the vector `towards`."""
-        weights = self.metric(found.point)
-        tangent = found.along / math.sqrt(float(np.sum(weights * found.along**2)))
-        return tangent if float(np.sum(weights * tangent * towards)) >= 0.0 else -tangent
+        along = found.along
+        weighted = self.metric(found.point) * along
+        length = math.sqrt(float(along @ weighted))
+        return along / (length if float(towards @ weighted) >= 0.0 else -length)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from nldyn._events import branch_point_test, flip_test, nearest, sign_changes, torus_test, travel
 from nldyn.branch import BranchPoint, SpecialPoint
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
@@ -19,32 +20,6 @@ BRACKET = 1e-10  # width in σ to which a special point is located
 
 class LocateError(RuntimeError):
     """An orbit between two points of a branch could not be corrected."""
-
-
-def flip_test(multipliers: Complex) -> float:
-    """∏(μ + 1), each factor divided by 1 + |μ|: changes sign where a multiplier crosses -1."""
-    return float(np.prod((multipliers + 1.0) / (1.0 + np.abs(multipliers))).real)
-
-
-def branch_point_test(multipliers: Complex) -> float:
-    """∏(μ - 1), each factor divided by 1 + |μ|: changes sign where a multiplier crosses +1."""
-    return float(np.prod((multipliers - 1.0) / (1.0 + np.abs(multipliers))).real)
-
-
-def torus_test(multipliers: Complex) -> float:
-    """∏(μᵢμⱼ - 1) over pairs i < j, scaled: zero where a pair is on the unit circle.
-
-    The product is the determinant of the bialternate product of Φ with itself minus the identity
-    (Kuznetsov 2004, section 10.2.2).
-    """
-    i, j = _pairs(multipliers.size)
-    products = multipliers[i] * multipliers[j]
-    return float(np.prod((products - 1.0) / (1.0 + np.abs(products))).real)
-
-
-@lru_cache(maxsize=8)
-def _pairs(size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    return np.triu_indices(size, 1)
 
 
 def tests(point: BranchPoint) -> dict[str, float]:
@@ -145,7 +120,7 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
     event does not explain the change in the number of contacts, the chord is halved first; so it
     is where multipliers near the unit circle move far, which may cross it twice.
     """
-    if depth < 3 and _travel(a.orbit.multipliers, b.orbit.multipliers) > 0.3:
+    if depth < 3 and travel(a.orbit.multipliers, b.orbit.multipliers) > 0.3:
         middle = Chord(a, b).at(0.5)
         return special_points_between(a, middle, depth + 1) + special_points_between(
             middle, b, depth + 1
@@ -170,13 +145,6 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
     return sorted(found, key=lambda s: s.point.arclength)
 
 
-def _travel(before: Complex, after: Complex) -> float:
-    """Longest way of a multiplier near the unit circle to the nearest one of the next orbit."""
-    distance = np.abs(before[:, None] - after[None, :])
-    near = np.abs(np.log(np.maximum(np.abs(before), 1e-3))) < 0.4
-    return float(distance.min(axis=1)[near].max(initial=0.0))
-
-
 @dataclass(frozen=True)
 class Touch:
     """An extremum of a stop's penetration whose sign differs between two neighbouring orbits."""
@@ -187,16 +155,12 @@ class Touch:
 
     def depth(self, point: BranchPoint) -> float:
         """Value of the extremum of this kind nearest in phase."""
-        orbit = point.orbit
-        found = orbit.extremes(self.output)
-        keep = found.is_maximum == self.is_maximum
-        index = _nearest_phase(orbit, found.phases[keep], self.phase)
-        return float(found.values[keep][index])
-
-
-def _nearest_phase(orbit: Orbit, phases: Real, phase: float) -> int:
-    full = 2.0 * np.pi * orbit.period
-    return int(np.argmin(np.abs((phases - phase + 0.5 * full) % full - 0.5 * full)))
+        found = point.orbit.extremes(self.output)
+        full = 2.0 * math.pi * point.orbit.period
+        index = nearest(found.phases, found.is_maximum, self.is_maximum, self.phase, full)
+        if index < 0:
+            raise LocateError("an extreme has vanished")
+        return float(found.values[index])
 
 
 def touching_extremes(a: Orbit, b: Orbit) -> list[Touch]:
@@ -205,20 +169,15 @@ def touching_extremes(a: Orbit, b: Orbit) -> list[Touch]:
     A maximum that becomes positive is a new contact; a minimum that becomes negative splits one.
     """
     touches = []
+    full = 2.0 * math.pi * a.period
     for output in range(len(a.system.stops)):
         first, last = a.extremes(output), b.extremes(output)
-        for is_maximum in (True, False):
-            here, there = first.is_maximum == is_maximum, last.is_maximum == is_maximum
-            phases, values = first.phases[here], first.values[here]
-            if not phases.size or not there.any():
-                continue
-            for phase, value in zip(last.phases[there], last.values[there], strict=True):
-                index = _nearest_phase(a, phases, phase)
-                back = _nearest_phase(a, last.phases[there], phases[index])
-                mutual = last.phases[there][back] == phase
-                if mutual and values[index] * value < 0.0:
-                    nearer = phase if abs(value) < abs(values[index]) else phases[index]
-                    touches.append(Touch(output, is_maximum, float(nearer)))
+        kinds, phases = sign_changes(
+            *(first.phases, first.values, first.is_maximum),
+            *(last.phases, last.values, last.is_maximum),
+            full,
+        )
+        touches += [Touch(output, bool(k), float(p)) for k, p in zip(kinds, phases, strict=True)]
     return touches
 
 

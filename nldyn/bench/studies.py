@@ -135,6 +135,7 @@ SUBJECTS = {
     "orbit.py": "extremes and multipliers",
     "_sample.py": "extremes and multipliers",
     "special.py": "special points",
+    "_events.py": "special points",
     "branch.py": "special points",
     "continuation.py": "walk",
     "linalg": "linear algebra (numpy)",

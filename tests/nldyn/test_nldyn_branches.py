@@ -23,15 +23,11 @@ from nldyn import (
     solve_orbit,
     switch_at_flip,
 )
+from nldyn._events import branch_point_test, flip_test, torus_test
 from nldyn.branch import minimal_period, same_orbit
 from nldyn.continuation import start_point, trace
 from nldyn.peaks import lowest_orbit
-from nldyn.special import (
-    branch_point_test,
-    flip_test,
-    special_points_between,
-    torus_test,
-)
+from nldyn.special import special_points_between
 
 
 @pytest.fixture(scope="module")
