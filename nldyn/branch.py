@@ -46,7 +46,7 @@ class SpecialPoint:
     point : BranchPoint
         The orbit at which it happens.
     frequency_error : float
-        Width of the final bracket in frequency and the last Newton step, relative.
+        Estimated error of the root in frequency and the last Newton step, relative.
     """
 
     kind: str

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import brentq
 
 from nldyn._events import branch_point_test, flip_test, nearest, sign_changes, torus_test, travel
 from nldyn.branch import BranchPoint, SpecialPoint
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
 
-BRACKET = 1e-10  # width in σ to which a special point is located
+PRECISION = 1e-9  # in σ, to which a special point is located
+STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
 
 
 class LocateError(RuntimeError):
@@ -88,9 +88,7 @@ class Chord:
         above = min((s for s in self.known if s > sigma), default=1.0)
         a, b = self.at(below), self.at(above)
         x = (sigma - below) / (above - below)
-        pace = float(self._row @ self._secant) * (above - below)
-        start = a.tangent * (pace / float(self._row @ a.tangent))
-        end = b.tangent * (pace / float(self._row @ b.tangent))
+        start, end = ((above - below) * self._slope(point) for point in (a, b))
         return np.asarray(
             (1.0 + 2.0 * x) * (1.0 - x) ** 2 * a.orbit.point
             + x * (1.0 - x) ** 2 * start
@@ -98,25 +96,87 @@ class Chord:
             + x * x * (x - 1.0) * end
         )
 
+    def frequency_slope(self, point: BranchPoint) -> float:
+        """Derivative of ln ω with respect to σ."""
+        return float(self._slope(point)[-1])
+
+    def _slope(self, point: BranchPoint) -> Real:
+        """Derivative of the shooting unknowns with respect to σ."""
+        pace = float(self._row @ self._secant) / float(self._row @ point.tangent)
+        return np.asarray(pace * point.tangent)
+
 
 def locate(kind: str, chord: Chord, test: Callable[[BranchPoint], float]) -> SpecialPoint:
-    """Root of a test function on a chord whose ends have opposite signs (Brent's method)."""
-    sigma, info = brentq(
-        lambda x: test(chord.at(x)), 0.0, 1.0, xtol=BRACKET, full_output=True, disp=False
-    )
-    if not info.converged:
-        raise LocateError(f"{kind} not located")
-    point = chord.at(float(sigma))
-    step = 1e-6 if sigma < 0.5 else -1e-6
-    near = chord.at(float(sigma) + step)
-    slope = abs(near.orbit.frequency_hz / point.orbit.frequency_hz - 1.0) / abs(step)
-    return SpecialPoint(kind, point, BRACKET * slope + point.orbit.error)
+    """Root of a test function on a chord whose ends have opposite signs."""
+    sigma, error = root(lambda x: test(chord.at(x)))
+    point = chord.at(sigma)
+    return SpecialPoint(kind, point, error * abs(chord.frequency_slope(point)) + point.orbit.error)
+
+
+def root(f: Callable[[float], float]) -> tuple[float, float]:
+    """Root of a function on [0, 1] with opposite signs at the ends, and its estimated error.
+
+    Trials come from inverse interpolation through the values nearest to zero, so that a function
+    that is smooth on one side of its root only (the depth at a grazing point) is followed on that
+    side; where trials do not come closer fast, the bracket is halved (after Brent 1973, ch. 4).
+    The error is how far the next trial would have moved. A short move that brings the function no
+    nearer to zero has met its rounding level; then the error is what secants say.
+
+    Raises
+    ------
+    LocateError
+        If no root is found.
+    """
+    known = sorted([(f(0.0), 0.0), (f(1.0), 1.0)], key=_size)
+    low, high, rising = 0.0, 1.0, max(known)[1] == 1.0
+    move, move_before = 1.0, 1.0
+    for _ in range(100):
+        y, best = known[0]
+        if y == 0.0:
+            return best, 0.0
+        x = _inverse_interpolation(known, low, high)
+        step = abs(x - best)
+        if step <= PRECISION or high - low <= PRECISION:
+            return best, min(step, high - low)
+        if step > 0.5 * move_before:
+            x = 0.5 * (low + high)
+        move_before, move = move, abs(x - best)
+        value = f(x)
+        if math.isnan(value):
+            break
+        if move < STALL and abs(value) > 0.5 * abs(y):
+            secants = (abs(y * (other - best) / (v - y)) for v, other in known[1:] if v != y)
+            reach = max(secants, default=1.0)
+            if reach < STALL:  # the rounding level of the function
+                return best, max(reach, move)
+        low, high = (low, x) if (value > 0.0) == rising else (x, high)
+        known = sorted([*known, (value, x)], key=_size)[:4]
+    raise LocateError("no root found")
+
+
+def _size(value: tuple[float, float]) -> float:
+    return abs(value[0])
+
+
+def _inverse_interpolation(known: list[tuple[float, float]], low: float, high: float) -> float:
+    """Where the polynomial x(y) through the most points has y = 0 within (low, high)."""
+    estimates = [x for _, x in known]
+    y = [value for value, _ in known]
+    found = 0.5 * (low + high)
+    for order in range(1, len(y)):  # Neville's scheme
+        for i in range(len(y) - order):
+            if y[i + order] == y[i]:
+                return found
+            estimates[i] += (estimates[i + 1] - estimates[i]) * y[i] / (y[i] - y[i + order])
+        if low < estimates[0] < high:
+            found = estimates[0]
+    return found
 
 
 def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[SpecialPoint]:
     """All special points between two neighbouring points, in order.
 
-    Each change of sign is followed by Brent's method. Where several happen in one step, or an
+    Each change of sign is followed to its root. Where several happen in one step, or an
     event does not explain the change in the number of contacts, the chord is halved first; so it
     is where multipliers near the unit circle move far, which may cross it twice.
     """
