@@ -69,14 +69,23 @@ def impulses(blocks, force, chi, gauss_nodes, kind, h, forces, shares):
 @inner
 def state_at(blocks, to_legendre, kind, h, start, shares, t, w):
     """Fill w with the homogeneous state a time t after the start of a piece."""
-    for k in range(w.size):
-        w[k] = start[k]
-    if kind != FLIGHT:
+    if kind == FLIGHT:
+        for k in range(w.size):
+            w[k] = start[k]
+        fly_state(blocks, w, t)
+    else:
         weights = np.empty(shares.shape[0])
         antiderivative_weights(to_legendre, stretched_time(kind, t / h), weights)
+        state_in_contact(blocks, start, shares, weights, t, w)
+
+
+@inner
+def state_in_contact(blocks, start, shares, weights, t, w):
+    """As `state_at` in a panel, with the weights of the nodes up to t."""
+    for k in range(w.size):
+        w[k] = start[k]
         for j in range(weights.size):
-            for k in range(w.size):
-                w[k] -= weights[j] * shares[j, k]
+            w[k] -= weights[j] * shares[j, k]
     fly_state(blocks, w, t)
 
 
@@ -130,8 +139,8 @@ def local_extremes(
     """Phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output.
 
     The rate is sampled sixteen times per period of the fastest mode (rad/s), its sign changes are
-    refined by the secant and bisection in turn. The motion is taken as periodic: an extreme at
-    its start counts once.
+    refined by the secant that weighs down an end kept twice (Anderson and Björck 1973). The motion
+    is taken as periodic: an extreme at its start counts once.
     """
     spacing = 2.0 * np.pi / (16.0 * fastest)
     found = np.empty((64, 3))
@@ -139,6 +148,7 @@ def local_extremes(
     w, v = np.empty(force.shape[0]), np.empty(force.shape[0])
     shares = np.empty((gauss_nodes.size, force.shape[0]))
     steps = np.empty((blocks.shape[0], 4))
+    weights = np.empty((0, gauss_nodes.size))
     first_value, first_sign, sign, t_old, rate_old = 0.0, 0, 0, 0.0, 0.0
     for piece in range(count):
         h = rec_duration[piece]
@@ -147,14 +157,21 @@ def local_extremes(
         if kind != FLIGHT:
             pieces += gauss_nodes.size
             impulses(blocks, force, chi, gauss_nodes, kind, h, rec_force[piece], shares)
+            if weights.shape[0] != pieces + 1:
+                weights = np.empty((pieces + 1, gauss_nodes.size))
+                for i in range(pieces + 1):
+                    antiderivative_weights(to_legendre, i / pieces, weights[i])
         for b in range(blocks.shape[0]):
             e00, e01, e10, e11 = block_exponential(blocks[b], h / pieces)
             steps[b, 0], steps[b, 1], steps[b, 2], steps[b, 3] = e00, e01, e10, e11
         for i in range(pieces + 1):
             x = i / pieces
             t = h * (x if kind == FLIGHT else map_fraction(kind, x))
-            if kind != FLIGHT or i == 0:
-                state_at(blocks, to_legendre, kind, h, rec_w[piece], shares, t, w)
+            if kind != FLIGHT:
+                state_in_contact(blocks, rec_w[piece], shares, weights[i], t, w)
+            elif i == 0:
+                for k in range(w.size):
+                    w[k] = rec_w[piece, k]
             else:
                 for b in range(blocks.shape[0]):
                     x, y = w[2 * b], w[2 * b + 1]
@@ -170,18 +187,23 @@ def local_extremes(
                 lo, hi, rate_lo, rate_hi = t_old, t, rate_old, rate
                 middle = t
                 for step in range(100 if i > 0 else 0):
-                    middle = 0.5 * (lo + hi)
-                    if step % 3 != 2 and rate_hi != rate_lo:
-                        middle = lo - rate_lo * (hi - lo) / (rate_hi - rate_lo)
+                    last = middle
+                    middle = lo - rate_lo * (hi - lo) / (rate_hi - rate_lo)
+                    if step > 10 and step % 2 == 0:
+                        middle = 0.5 * (lo + hi)
                     state_at(blocks, to_legendre, kind, h, rec_w[piece], shares, middle, v)
                     value, rate_middle = output_rate(
                         row, row1, forced, omega, rec_phase[piece] + omega * middle, v
                     )
                     if rate_middle * sign > 0.0:
+                        if step > 0 and last < middle:
+                            rate_hi *= shrink(rate_middle, rate_lo)
                         lo, rate_lo = middle, rate_middle
                     else:
+                        if step > 0 and last > middle:
+                            rate_lo *= shrink(rate_middle, rate_hi)
                         hi, rate_hi = middle, rate_middle
-                    if hi - lo <= 1e-9 * spacing or rate_middle == 0.0:
+                    if abs(middle - last) <= 1e-9 * spacing or rate_middle == 0.0:
                         break
                 found, n = append_extreme(found, n, rec_phase[piece] + omega * middle, value, sign)
                 sign = new_sign
@@ -189,6 +211,13 @@ def local_extremes(
     if sign != first_sign:
         found, n = append_extreme(found, n, rec_phase[0], first_value, sign)
     return found[:n]
+
+
+@inner
+def shrink(new, old):
+    """Weight of the value at the far end when the near end moves once more on the same side."""
+    weight = 1.0 - new / old if old != 0.0 else 0.5
+    return weight if weight > 0.0 else 0.5
 
 
 @inner
