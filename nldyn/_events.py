@@ -59,6 +59,16 @@ def travel(before, after):
 
 
 @njit(cache=True, error_model="numpy")
+def number_outside(multipliers, tolerance):
+    """Fewest and most multipliers outside the unit circle, if each modulus may be off so far."""
+    fewest, most = 0, 0
+    for mu in multipliers:
+        fewest += abs(mu) > 1.0 + tolerance
+        most += abs(mu) > 1.0 - tolerance
+    return fewest, most
+
+
+@njit(cache=True, error_model="numpy")
 def nearest(phases, kinds, kind, phase, full):
     """Index of the extreme of a kind nearest in phase on a circle of length `full`, or -1."""
     best, shortest = -1, np.inf

@@ -9,7 +9,15 @@ from functools import cached_property
 
 import numpy as np
 
-from nldyn._events import branch_point_test, flip_test, nearest, sign_changes, torus_test, travel
+from nldyn._events import (
+    branch_point_test,
+    flip_test,
+    nearest,
+    number_outside,
+    sign_changes,
+    torus_test,
+    travel,
+)
 from nldyn.branch import BranchPoint, SpecialPoint
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
@@ -176,9 +184,9 @@ def _inverse_interpolation(known: list[tuple[float, float]], low: float, high: f
 def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[SpecialPoint]:
     """All special points between two neighbouring points, in order.
 
-    Each change of sign is followed to its root. Where several happen in one step, or an
-    event does not explain the change in the number of contacts, the chord is halved first; so it
-    is where multipliers near the unit circle move far, which may cross it twice.
+    Each change of sign is followed to its root. Where several happen in one step, or the events do
+    not explain the change in the number of contacts or of unstable multipliers, the chord is
+    halved; so it is where multipliers near the unit circle move far, which may cross it twice.
     """
     if depth < 3 and travel(a.orbit.multipliers, b.orbit.multipliers) > 0.3:
         middle = Chord(a, b).at(0.5)
@@ -202,7 +210,40 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
     found = [s for s in found if s.kind != "NS" or _on_unit_circle(s.orbit.multipliers)]
     if contacts and touches:
         found.append(locate("GR", chord, touches[0].depth))
-    return sorted(found, key=lambda s: s.point.arclength)
+    found.sort(key=lambda s: s.point.arclength, reverse=bool(b.arclength < a.arclength))
+    if depth < 8 and not accounted(a.orbit, found, b.orbit):
+        middle = chord.at(0.5)
+        return special_points_between(a, middle, depth + 1) + special_points_between(
+            middle, b, depth + 1
+        )
+    return found
+
+
+def accounted(a: Orbit, found: list[SpecialPoint], b: Orbit) -> bool:
+    """Whether the special points from a to b explain how many multipliers leave the unit circle.
+
+    At each of them the other multipliers tell the number outside on either side.
+    """
+    outside = _possible_outside(a.multipliers)
+    for special in found:
+        if special.kind == "GR":
+            continue
+        mu = special.orbit.multipliers
+        if special.kind == "NS":
+            distance = np.where(mu.imag == 0.0, np.inf, np.abs(np.abs(mu) - 1.0))
+            crossing = np.argsort(distance, kind="stable")[:2]
+        else:
+            crossing = np.argsort(np.abs(mu + (1.0 if special.kind == "PD" else -1.0)))[:1]
+        size = crossing.size
+        others = _possible_outside(np.delete(mu, crossing))
+        outside = {n + size for n in others & outside} | {n for n in others if n + size in outside}
+    return bool(outside & _possible_outside(b.multipliers))
+
+
+def _possible_outside(multipliers: Complex) -> set[int]:
+    """Numbers of multipliers that may lie outside the unit circle, given their rounding."""
+    fewest, most = number_outside(multipliers, 1e-6)
+    return set(range(fewest, most + 1))
 
 
 @dataclass(frozen=True)
@@ -243,8 +284,10 @@ def touching_extremes(a: Orbit, b: Orbit) -> list[Touch]:
 
 def _on_unit_circle(multipliers: Complex) -> bool:
     """Whether a complex pair (not a real pair μ, 1/μ) is what makes the torus test vanish."""
-    complex_ones = multipliers[np.abs(multipliers.imag) > 1e-6 * np.abs(multipliers)]
-    return bool(np.any(np.abs(np.abs(complex_ones) - 1.0) < 1e-5))
+    i, j = np.triu_indices(multipliers.size, 1)
+    nearest_one = int(np.argmin(np.abs(multipliers[i] * multipliers[j] - 1.0)))
+    mu = multipliers[i[nearest_one]]
+    return bool(abs(mu.imag) > 1e-6 * abs(mu))
 
 
 def hidden_dip(z: BranchPoint, a: BranchPoint, b: BranchPoint, kind: str) -> float | None:

@@ -27,6 +27,8 @@ from nldyn._events import branch_point_test, flip_test, torus_test
 from nldyn.branch import minimal_period, same_orbit
 from nldyn.continuation import start_point, trace
 from nldyn.peaks import lowest_orbit
+from nldyn.resources import example
+from nldyn.scene import build_system, load_scene
 from nldyn.special import special_points_between
 
 
@@ -179,6 +181,40 @@ def test_neutral_saddle_is_not_a_neimark_sacker_point(torus_branch):
             real = [m.real for m in a.orbit.multipliers if m.imag == 0.0]
             assert max(real) > 1.0
     assert saddles == 2
+
+
+@pytest.fixture(scope="module", params=[0.05, 0.02])
+def lightly_damped(request):
+    """The two-mode harmonic branch at 0.1 % damping between 37.5 and 46 Hz."""
+    system = build_system(load_scene(example("two_dof_xi_0.001.toml")))
+    options = ContinuationOptions(max_step=request.param)
+    return system, continue_branch(solve_orbit(system, 38.0), (37.5, 46.0), options=options)
+
+
+def test_neimark_sacker_point_close_to_a_fold_is_found(lightly_damped):
+    """Within 1e-3 of arclength the branch folds, passes a neutral saddle, and a pair comes in.
+
+    The torus test changes sign twice there; only the number of unstable multipliers tells.
+    """
+    system, branch = lightly_damped
+    close = [s for s in branch.special_points if 42.4336 < s.frequency_hz < 42.43362]
+    assert sorted(s.kind for s in close) == ["LP", "NS"]
+    orbit = next(s.orbit for s in close if s.kind == "NS")
+    start = orbit.states(np.array([0.0]))[0]
+    _, jacobian = Motion(system).run(start, (0.0, 2 * np.pi), orbit.omega)
+    pair = max(np.linalg.eigvals(jacobian), key=lambda mu: mu.imag)
+    assert pair.imag > 0.1
+    assert abs(pair) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_number_of_unstable_multipliers_changes_at_special_points_only(lightly_damped):
+    _, branch = lightly_damped
+    where = [s.point.arclength for s in branch.special_points if s.kind != "GR"]
+    assert len(where) > 5
+    for a, b in itertools.pairwise(branch.nodes):
+        if not any(a.arclength < x < b.arclength for x in where):
+            outside = [int(np.sum(np.abs(n.orbit.multipliers) > 1.0)) for n in (a, b)]
+            assert outside[0] == outside[1]
 
 
 # --- test functions on made-up multipliers -------------------------------------------------------
