@@ -28,6 +28,8 @@ class ContinuationOptions:
         Arclength steps.
     max_angle : float
         Largest angle between the tangents of two neighbouring points, in radians.
+    max_miss : float
+        Largest distance of a point from where it was predicted, relative to the step.
     grazing_step : float
         Longest step over which the number of contacts may change.
     max_points : int
@@ -38,6 +40,7 @@ class ContinuationOptions:
     max_step: float = 0.05
     min_step: float = 1e-8
     max_angle: float = 0.25
+    max_miss: float = 0.1
     grazing_step: float = 0.004
     max_points: int = 5000
 
@@ -49,6 +52,10 @@ class ContinuationOptions:
         if not 0.0 < self.max_angle < 1.5:
             raise SystemModelError(
                 f"continuation: max_angle must lie in (0, 1.5), got {self.max_angle:g}"
+            )
+        if not 0.0 < self.max_miss < math.inf:
+            raise SystemModelError(
+                f"continuation: max_miss must be positive and finite, got {self.max_miss:g}"
             )
         check_whole("continuation: max_points", self.max_points, 2)
 
@@ -91,7 +98,7 @@ class Walk:
                     if step < self.options.min_step:
                         self.stop_reason = f"step below {self.options.min_step:g}"
                         return
-            point, angle, iterations = attempt
+            point, angle, miss = attempt
             low, high = self.range_hz
             if not low <= point.orbit.frequency_hz <= high:
                 end = self._range_end(here, point, low if point.orbit.frequency_hz < low else high)
@@ -115,27 +122,28 @@ class Walk:
             curvature = (point.tangent - here.tangent) / (point.arclength - here.arclength)
             here = point
             growth = 0.7 * self.options.max_angle / max(angle, 1e-3)
-            if iterations > 5:
-                growth = min(growth, 0.8)
+            growth = min(growth, math.sqrt(0.5 * self.options.max_miss / max(miss, 1e-6)))
             step = min(step * min(max(growth, 0.5), 1.6), self.options.max_step)
         self.stop_reason = f"{self.options.max_points} points"
 
     def _advance(
         self, problem: ShootingProblem, here: BranchPoint, curvature: Real, step: float
-    ) -> tuple[BranchPoint, float, int] | None:
-        """One predictor-corrector step; None when it must be shorter."""
+    ) -> tuple[BranchPoint, float, float] | None:
+        """Next point, its angle to this one and its relative distance from the predictor.
+
+        None when the step must be shorter.
+        """
         weights = problem.metric(here.orbit.point)
         direction = here.tangent / _length(weights, here.tangent)
         straight = here.orbit.point + step * direction
         row = weights * direction
         row /= math.sqrt(float(row @ row))
-        found = problem.correct(
-            straight + 0.5 * step**2 * curvature,
-            row,
-            offset=float(row @ straight),
-            max_iterations=8,
-        )
+        predicted = straight + 0.5 * step**2 * curvature
+        found = problem.correct(predicted, row, offset=float(row @ straight), max_iterations=8)
         if not found.converged:
+            return None
+        miss = _length(weights, found.point - predicted) / step
+        if miss > self.options.max_miss:
             return None
         # a curve that turns by max_angle leaves its tangent by half of that: a longer correction
         # has landed on another branch
@@ -153,7 +161,7 @@ class Walk:
         # behind a grazing point the branch may turn on a very short length
         if step > self.options.grazing_step and orbit.impacts != here.orbit.impacts:
             return None
-        return BranchPoint(orbit, tangent, here.arclength + step), angle, found.iterations
+        return BranchPoint(orbit, tangent, here.arclength + step), angle, miss
 
     def _range_end(self, a: BranchPoint, b: BranchPoint, end_hz: float) -> BranchPoint | None:
         """Point of the branch exactly at an end of the range."""

@@ -382,6 +382,21 @@ def test_steps_near_a_linear_resonance_stay_on_the_branch(max_step):
     assert same_orbit(*ends)
 
 
+@pytest.mark.parametrize("start_hz", [35.42, 35.55, 35.56])
+def test_long_steps_do_not_jump_over_a_fold(start_hz):
+    """At 35.615 Hz a 1/2 branch folds close to another one, which lies straight ahead."""
+    system = build_system(load_scene(example("two_dof_xi_0.01.toml")))
+    guess = np.array([-1.6706e-05, -2.6698e-07, 6.2759e-05, 5.0713e-04])
+    orbit = solve_orbit(system, start_hz, 2, guess=guess)
+    long, short = (
+        continue_branch(orbit, (35.3, 35.9), options=options)
+        for options in (ContinuationOptions(first_step=0.05), ContinuationOptions(max_step=0.01))
+    )
+    assert [s.kind for s in short.special_points] == [s.kind for s in long.special_points]
+    for a, b in zip(long.special_points, short.special_points, strict=True):
+        assert a.frequency_hz == pytest.approx(b.frequency_hz, rel=1e-9)
+
+
 def test_softer_stop_and_larger_unbalance_leave_the_special_points():
     """With zero gap only stiffness · force^(p-1) matters: the special points do not move."""
     base = continue_branch(solve_orbit(make_one_dof(), 20.0), (12.0, 20.0))

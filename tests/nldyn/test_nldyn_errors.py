@@ -261,7 +261,8 @@ def test_range_that_is_empty_or_elsewhere(orbit):
     [
         {"first_step": 0.0}, {"min_step": -1.0}, {"max_step": 1e-3}, {"max_step": math.nan},
         {"first_step": math.nan}, {"max_angle": 0.0}, {"max_angle": math.nan}, {"max_points": 1},
-        {"max_points": math.nan}, {"max_step": math.inf},
+        {"max_points": math.nan}, {"max_step": math.inf}, {"max_miss": 0.0},
+        {"max_miss": math.nan},
     ],
 )  # fmt: skip
 def test_continuation_options(options):
