@@ -285,7 +285,7 @@ class Orbit:
         values = [float(p.values.max()) for p in self.penetration_peaks if p.values.size]
         return max(0.0, *values) if values else 0.0
 
-    @property
+    @cached_property
     def impacts(self) -> int:
         """Number of contact phases in one period of the orbit, over all stops."""
         return int(self.trajectory.closings.sum())

@@ -55,8 +55,8 @@ class ShootingProblem:
 
     def metric(self, point: Real) -> Real:
         """Weights g of the arclength: ds² = Σ g Δ², relative in states and frequency."""
-        weights = np.full(point.size, 1.0 / (self.segments * self.scale(point) ** 2))
-        weights[-1] = 1.0
+        weights = np.empty(point.size)
+        weights[:-1], weights[-1] = self._weight(point), 1.0
         return weights
 
     def correct(
@@ -73,8 +73,12 @@ class ShootingProblem:
         A row (N + 1,) that is zero but for its last entry holds the frequency.
         """
         level = float(row @ guess) if offset is None else offset
-        weight = 1.0 / (self.segments * self.scale(guess) ** 2)
+        weight = self._weight(guess)
         return self.flow.newton(guess, row, level, self.phases, weight, rtol, max_iterations)
+
+    def _weight(self, point: Real) -> float:
+        """Weight of the square of a state's change."""
+        return 1.0 / (self.segments * self.scale(point) ** 2)
 
     def tangent(self, found: Solution, towards: Real) -> Real:
         """Unit tangent of the branch at a solution, on the side of the vector `towards`."""

@@ -295,9 +295,9 @@ def hidden_dip(z: BranchPoint, a: BranchPoint, b: BranchPoint, kind: str) -> flo
 
     The test has one sign at all three points but its parabola comes within a quarter of zero.
     """
-    (y0, y1, y2) = (tests(p)[kind] for p in (z, a, b))
+    y0, y1, y2 = tests(z)[kind], tests(a)[kind], tests(b)[kind]
     left, right = z.arclength - a.arclength, b.arclength - a.arclength
-    if min(y0, y1, y2) * max(y0, y1, y2) <= 0.0 or left == 0.0 or right == 0.0:
+    if y0 * y1 <= 0.0 or y1 * y2 <= 0.0 or left == 0.0 or right == 0.0:
         return None
     first, last = (y0 - y1) / left, (y2 - y1) / right
     curvature = (last - first) / (right - left)
