@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 from scipy.linalg.lapack import dgeev
+from scipy.optimize import minimize_scalar
 
 from nldyn.errors import SystemModelError, check_whole
 from nldyn.flow import FlowMap, Solution, Trajectory
