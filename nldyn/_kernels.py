@@ -1183,7 +1183,7 @@ def run_pieces(
     m = tab.nodes.size
     n_stops = closed.size
     fastest = fastest_rate(fl)
-    h_cap = 0.6 * m / fastest if fastest > 0.0 else np.inf
+    h_cap = 0.5 * m / fastest if fastest > 0.0 else np.inf
     shortest = 1e-10 / max(fastest, fl.omega)
     t = 0.0
     start_switch = 1 if duration < 0.0 else 0  # written so that one version is compiled, not two
