@@ -18,7 +18,7 @@ from nldyn.continuation import (
     switch_at_flip,
     trace,
 )
-from nldyn.errors import SystemModelError, check_whole
+from nldyn.errors import SystemModelError, check_frequency, check_whole
 from nldyn.flow import FlowMap
 from nldyn.orbit import ConvergenceError, Orbit, check_observe
 from nldyn.search import SearchOptions, orbits_from_strobe, simulate_strobe
@@ -45,8 +45,7 @@ class Seed:
 
     def __post_init__(self) -> None:
         check_whole("Seed: period", self.period, 1)
-        if not (math.isfinite(self.near_hz) and self.near_hz > 0.0):
-            raise SystemModelError(f"Seed: near_hz must be positive, got {self.near_hz:g}")
+        check_frequency("Seed: near_hz", self.near_hz)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,13 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nldyn.contact_law import ContactLaw, check_law
-from nldyn.errors import SystemModelError
+from nldyn.errors import SystemModelError, is_finite, shown
 from nldyn.linear import Real
+
+LARGEST_EXPONENT = 4.0
 
 
 def _finite(owner: str, name: str, value: float) -> None:
-    if not math.isfinite(value):
-        raise SystemModelError(f"{owner}: {name} must be a finite number, got {value}")
+    if not is_finite(value):
+        raise SystemModelError(f"{owner}: {name} must be a finite number, got {shown(value)}")
 
 
 def _positive(owner: str, name: str, value: float) -> None:
@@ -141,7 +143,7 @@ class Stop:
     stiffness : float
         k in N/m^p.
     exponent : float
-        p: 1.5 for Hertz's law, 1 for a linear one-sided spring; 1 to 4.
+        p: 1.5 for Hertz's law, 1 for a linear one-sided spring; from 1 to 4.
     gap : float
         Distance in m at rest; a negative gap preloads the stop.
     direction : {1, -1}
@@ -181,9 +183,9 @@ class Stop:
         owner = f"stop at '{self.at}'"
         _positive(owner, "stiffness", self.stiffness)
         _finite(owner, "exponent", self.exponent)
-        if not 1.0 <= self.exponent <= 4.0:
+        if not 1.0 <= self.exponent <= LARGEST_EXPONENT:
             raise SystemModelError(
-                f"{owner}: exponent must lie between 1 and 4, got {self.exponent:g}"
+                f"{owner}: exponent must lie in [1, {LARGEST_EXPONENT:g}], got {self.exponent:g}"
             )
         _finite(owner, "dissipation", self.dissipation)
         if self.dissipation < 0.0:

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from numbers import Integral
+import math
+from numbers import Integral, Real
+from reprlib import repr as shortened
+from typing import TypeGuard
+
+LARGEST_FREQUENCY = 1e12  # Hz, of an excitation
 
 
 class SystemModelError(ValueError):
@@ -13,9 +18,32 @@ class SceneError(ValueError):
     """A scene file that cannot be used; one sentence names the file, the key and the reason."""
 
 
+def shown(value: object) -> str:
+    """A value as an error text shows it: shortened to about 40 characters."""
+    return shortened(value)
+
+
+def is_finite(value: object) -> TypeGuard[float]:
+    """Whether a value is a finite real number: not text, not a truth value."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number beyond the floating-point numbers
+        return False
+
+
+def check_frequency(name: str, value: object) -> None:
+    """Refuse anything but a frequency in Hz that an excitation can have, under its name."""
+    if not (is_finite(value) and 0.0 < value <= LARGEST_FREQUENCY):
+        raise SystemModelError(
+            f"{name} must be positive and at most {LARGEST_FREQUENCY:g}, got {shown(value)}"
+        )
+
+
 def check_whole(name: str, value: object, least: int, most: int | None = None) -> None:
     """Refuse anything but a whole number from ``least`` to ``most``, under its name."""
     whole = isinstance(value, Integral) and not isinstance(value, bool)
     if not whole or value < least or (most is not None and value > most):  # type: ignore[operator]
         wanted = f"of at least {least}" if most is None else f"from {least} to {most}"
-        raise SystemModelError(f"{name} must be a whole number {wanted}, got {value}")
+        raise SystemModelError(f"{name} must be a whole number {wanted}, got {shown(value)}")

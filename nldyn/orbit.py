@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgeev
 from scipy.optimize import minimize_scalar
 
-from nldyn.errors import SystemModelError, check_whole
+from nldyn.errors import SystemModelError, check_frequency, check_whole
 from nldyn.flow import FlowMap, Solution, Trajectory
 from nldyn.linear import Real
 from nldyn.shooting import ShootingProblem
-from nldyn.system import System
+from nldyn.system import System, numbers
 
 SEGMENTS_PER_PERIOD = 2
 
@@ -454,8 +454,7 @@ def solve_orbit(
     0
     """
     flow = system if isinstance(system, FlowMap) else FlowMap(system)
-    if not (math.isfinite(frequency_hz) and frequency_hz > 0.0):
-        raise SystemModelError(f"frequency_hz must be positive, got {frequency_hz}")
+    check_frequency("frequency_hz", frequency_hz)
     observe = check_observe(flow.system, observe)
     problem = shooting_problem(flow, period, segments)
     omega = 2.0 * math.pi * frequency_hz
@@ -466,14 +465,12 @@ def solve_orbit(
         start = flow.shoot(start[None], warm, omega, sensitivities=False, chained=True).ends[-1]
         nodes = spread(problem, start, omega)
     else:
-        guess = np.atleast_2d(np.asarray(guess, dtype=float))
+        guess = np.atleast_2d(numbers("guess", guess))
         if guess.shape not in ((1, problem.size), (problem.segments, problem.size)):
             raise SystemModelError(
                 f"guess must have {problem.size} entries (or {problem.segments} such rows), "
                 f"got shape {guess.shape}"
             )
-        if not np.all(np.isfinite(guess)):
-            raise SystemModelError("guess has an entry that is not finite")
         if guess.shape[0] == problem.segments:
             nodes = flow.to_state(guess)
         else:

@@ -19,6 +19,8 @@ from pydantic import (
     model_validator,
 )
 
+from nldyn.elements import LARGEST_EXPONENT
+from nldyn.errors import LARGEST_FREQUENCY
 from nldyn.scene_messages import quoted, show
 
 SMALLEST, LARGEST = 1e-50, 1e50
@@ -34,7 +36,7 @@ def _plausible(value: float) -> float:
 Number = Annotated[float, AfterValidator(_plausible)]
 Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
-Frequency = Annotated[float, Field(ge=1e-6, le=1e12)]
+Frequency = Annotated[float, Field(ge=1e-6, le=LARGEST_FREQUENCY)]
 ModeFrequency = Annotated[NotNegative, Field(le=1e12)]
 Period = Annotated[int, Field(ge=1, le=100)]
 Matrix = list[list[Number]]
@@ -183,7 +185,7 @@ class StopTable(Table):
     at: str
     law: Literal["hertz", "linear"] = "hertz"
     stiffness: Positive | None = None
-    exponent: Annotated[float, Field(ge=1, le=4)] | None = None
+    exponent: Annotated[float, Field(ge=1, le=LARGEST_EXPONENT)] | None = None
     radius: Positive | None = None
     youngs_modulus: Positive | None = None
     poissons_ratio: Annotated[float, Field(gt=-1, le=0.5)] | None = None

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nldyn.branch import minimal_period, same_orbit
-from nldyn.errors import SystemModelError, check_whole
+from nldyn.errors import check_frequency, check_whole
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, check_observe, refine, shooting_problem, spread
@@ -148,8 +148,7 @@ def find_orbits(
     True
     """
     flow = system if isinstance(system, FlowMap) else FlowMap(system)
-    if not (math.isfinite(frequency_hz) and frequency_hz > 0.0):
-        raise SystemModelError(f"frequency_hz must be positive, got {frequency_hz}")
+    check_frequency("frequency_hz", frequency_hz)
     options = options or SearchOptions()
     strobe = simulate_strobe(flow, frequency_hz, options)
     return orbits_from_strobe(flow, strobe, period, check_observe(flow.system, observe), options)

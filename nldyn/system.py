@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 import scipy.linalg as sla
 from numpy.typing import ArrayLike
 
 from nldyn.elements import Damper, Excitation, Stop
-from nldyn.errors import SystemModelError
+from nldyn.errors import SystemModelError, shown
 from nldyn.linear import Complex, LinearPart, Real, linear_part
+
+Element = TypeVar("Element")
 
 
 class ReducedModelLike(Protocol):
@@ -106,14 +108,17 @@ class System:
         >>> System.from_modal([10.0, 20.0], {"tip": [1.0, -1.0]}, modal_damping=0.01).size
         2
         """
-        omega = 2.0 * np.pi * np.atleast_1d(_array("frequencies_hz", frequencies_hz))
+        omega = 2.0 * np.pi * np.atleast_1d(numbers("frequencies_hz", frequencies_hz))
         return cls(
             omega,
             _modal_damping(omega, modal_damping),
-            {name: np.atleast_1d(_array(name, phi)) for name, phi in participation.items()},
-            tuple(stops),
-            tuple(dampers),
-            tuple(excitation),
+            {
+                name: np.atleast_1d(numbers(name, phi))
+                for name, phi in _by_interface("participation", participation).items()
+            },
+            _listed("stops", stops),
+            _listed("dampers", dampers),
+            _listed("excitation", excitation),
         )
 
     @classmethod
@@ -175,15 +180,22 @@ class System:
                 raise SystemModelError(f"damping is {C.shape} but mass is {M.shape}")
             D = D + modes.T @ C @ modes
         participation = {}
-        for name, vector in interfaces.items():
-            b = np.atleast_1d(_array(f"interface '{name}'", vector))
+        for name, vector in _by_interface("interfaces", interfaces).items():
+            b = np.atleast_1d(numbers(f"interface '{name}'", vector))
             if b.shape != omega.shape:
                 raise SystemModelError(
                     f"interface '{name}' has {b.size} entries "
                     f"but the matrices have {omega.size} rows"
                 )
             participation[name] = modes.T @ b
-        return cls(omega, D, participation, tuple(stops), tuple(dampers), tuple(excitation))
+        return cls(
+            omega,
+            D,
+            participation,
+            _listed("stops", stops),
+            _listed("dampers", dampers),
+            _listed("excitation", excitation),
+        )
 
     @classmethod
     def from_reduced(
@@ -303,12 +315,14 @@ class System:
 
     def _check_interfaces(self) -> None:
         known = ", ".join(self.participation) or "none"
-        for kind, elements in (
-            ("stop", self.stops),
-            ("damper", self.dampers),
-            ("excitation", self.excitation),
+        for kind, elements, classes in (
+            ("stop", self.stops, Stop),
+            ("damper", self.dampers, Damper),
+            ("excitation", self.excitation, Excitation),
         ):
             for element in elements:
+                if not isinstance(element, classes):
+                    raise SystemModelError(f"{kind} cannot be {shown(element)}")
                 names = [element.at]
                 if isinstance(element, Stop) and element.against is not None:
                     names.append(element.against)
@@ -319,7 +333,23 @@ class System:
                         )
 
 
-def _array(name: str, values: ArrayLike) -> Real:
+def _listed(name: str, elements: Sequence[Element]) -> tuple[Element, ...]:
+    try:
+        return tuple(elements)
+    except TypeError:
+        raise SystemModelError(f"{name} must be a list, got {shown(elements)}") from None
+
+
+def _by_interface(name: str, vectors: Mapping[str, ArrayLike]) -> Mapping[str, ArrayLike]:
+    if not isinstance(vectors, Mapping):
+        raise SystemModelError(
+            f"{name} must be a dictionary from interfaces to numbers, got {shown(vectors)}"
+        )
+    return vectors
+
+
+def numbers(name: str, values: ArrayLike) -> Real:
+    """An array of finite floats, or a SystemModelError under the name."""
     try:
         array = np.array(values, dtype=float)  # a copy: the caller may change the original
     except (TypeError, ValueError):
@@ -330,7 +360,7 @@ def _array(name: str, values: ArrayLike) -> Real:
 
 
 def _symmetric(name: str, values: ArrayLike) -> Real:
-    matrix = np.atleast_2d(_array(name, values))
+    matrix = np.atleast_2d(numbers(name, values))
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
         raise SystemModelError(f"{name} must be a square matrix, got shape {matrix.shape}")
     if not np.allclose(matrix, matrix.T, rtol=1e-10, atol=1e-12 * float(np.abs(matrix).max())):
@@ -339,7 +369,7 @@ def _symmetric(name: str, values: ArrayLike) -> Real:
 
 
 def _modal_damping(omega: Real, ratios: float | ArrayLike) -> Real:
-    zeta = _array("modal_damping", ratios)
+    zeta = numbers("modal_damping", ratios)
     if zeta.ndim > 1 or zeta.size not in (1, omega.size):
         raise SystemModelError(
             f"modal_damping must be one number or one per mode ({omega.size}), got {zeta.size}"

@@ -30,6 +30,7 @@ from nldyn import (
 NOT_FINITE = st.sampled_from([math.nan, math.inf, -math.inf])
 NEGATIVE = st.floats(-1e100, -1e-100)
 BAD = NOT_FINITE | NEGATIVE
+NOT_A_NUMBER = st.sampled_from(["a", "1.0", None, True, [1.0], 1j, 10**400])
 FEW = settings(deadline=None, max_examples=25, derandomize=True)
 
 
@@ -64,6 +65,23 @@ def test_stop_exponent(value):
 def test_stop_gap(value):
     sentence(lambda: Stop("middle", 1e9, gap=value), "stop at 'middle'", "gap")
     assert Stop("middle", 1e9, gap=-1e-3).gap == -1e-3
+
+
+@FEW
+@given(NOT_A_NUMBER)
+def test_what_is_no_number(value):
+    sentence(lambda: Stop("middle", value), "stop at 'middle'", "stiffness must be a finite number")
+    sentence(lambda: Stop("middle", 1e9, exponent=value), "exponent must be a finite number")
+    sentence(lambda: Stop("middle", 1e9, gap=value), "gap must be a finite number")
+    sentence(lambda: Damper("middle", value), "damper at 'middle'", "coefficient must be a finite")
+    sentence(lambda: Unbalance("middle", value), "mass_times_radius must be a finite number")
+    sentence(lambda: HarmonicForce("middle", 1.0, value), "phase_deg must be a finite number")
+    sentence(lambda: hertz_stiffness(value, 2.1e11), "radius must be a finite number")
+
+
+def test_exponent_has_the_limit_that_it_has_in_a_scene():
+    assert Stop("middle", 1e9, exponent=4.0).exponent == 4.0
+    sentence(lambda: Stop("middle", 1e9, exponent=4.01), "exponent must lie in [1, 4]", "4.01")
 
 
 @pytest.mark.parametrize("direction", [0, 2, -2, math.nan])
@@ -163,6 +181,18 @@ def test_unknown_interface(elements):
     sentence(modal(modal_damping=0.1, **elements), "unknown interface 'left'", "m")
 
 
+def test_elements_of_another_kind():
+    sentence(modal(stops=Stop("m", 1e9)), "stops must be a list", "Stop(at='m'")
+    sentence(modal(stops=[Damper("m", 1.0)]), "stop cannot be Damper(at='m'")
+    sentence(modal(dampers=[1.0]), "damper cannot be 1.0")
+    sentence(modal(excitation=[Stop("m", 1e9)]), "excitation cannot be Stop(at='m'")
+
+
+def test_vectors_that_belong_to_no_interface():
+    sentence(modal(participation=[1.0, 2.0]), "participation must be a dictionary", "[1.0, 2.0]")
+    sentence(lambda: System.from_matrices([[1.0]], [[1.0]], [1.0]), "interfaces must be a dict")
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -210,10 +240,11 @@ def orbit(one_dof):
 
 
 @FEW
-@given(BAD | st.just(0.0))
+@given(BAD | NOT_A_NUMBER | st.sampled_from([0.0, 1.1e12, 1e300]))
 def test_frequency(one_dof, value):
     sentence(lambda: solve_orbit(one_dof, value), "frequency_hz must be positive")
     sentence(lambda: find_orbits(one_dof, value, 1), "frequency_hz must be positive")
+    sentence(lambda: Seed(2, value), "Seed: near_hz must be positive")
 
 
 @pytest.mark.parametrize("period", [0, -1, 1.5, math.nan])
@@ -239,6 +270,7 @@ def test_segments(one_dof, segments):
 def test_guess(one_dof):
     sentence(lambda: solve_orbit(one_dof, 26.0, guess=np.zeros(3)), "guess", "2 entries")
     sentence(lambda: solve_orbit(one_dof, 26.0, guess=np.array([math.nan, 0.0])), "guess", "finite")
+    sentence(lambda: solve_orbit(one_dof, 26.0, guess=["a", "b"]), "guess must hold numbers only")
 
 
 @FEW
@@ -247,7 +279,6 @@ def test_range(one_dof, orbit, value):
     sentence(lambda: continue_branch(orbit, (value, 90.0)), "range_hz")
     sentence(lambda: continue_branch(orbit, (20.0, value)), "range_hz")
     sentence(lambda: diagram(one_dof, (value, 90.0)), "range_hz")
-    sentence(lambda: Seed(2, value), "Seed: near_hz must be positive")
 
 
 def test_range_that_is_empty_or_elsewhere(orbit):
