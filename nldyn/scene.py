@@ -142,6 +142,8 @@ def build_component(scene: Scene) -> fem.Component:
         raise scene_error(scene.file, ("mesh",), "is missing: the structure is not given by a mesh")
     path = scene.file.parent / scene.mesh.file
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise ValueError("it is not a regular file")  # opening a pipe would wait without end
         path.open("rb").close()
     except (OSError, ValueError) as error:
         fault = f"names {path}, which {_unreadable(error)}"

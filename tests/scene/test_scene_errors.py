@@ -1,5 +1,6 @@
 """Every fault of a scene is told in one sentence, with the file, the key and exit code 2."""
 
+import os
 import re
 
 import pytest
@@ -327,6 +328,13 @@ def test_mode_count_too_large(tmp_path):
         r"scene.toml: reduction.modes = 1000, but the component has only \d+ degrees of freedom",
         said,
     )
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_mesh_that_is_a_pipe_is_refused_without_waiting_for_it(tmp_path):
+    os.mkfifo(tmp_path / "pipe.msh")
+    said = check(tmp_path, BEAM.replace(mesh("half_beam.msh").as_posix(), "pipe.msh"))
+    assert said.endswith("names pipe.msh, which cannot be read: it is not a regular file")
 
 
 @pytest.mark.parametrize("content", ["", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"])
