@@ -114,13 +114,18 @@ class ReducedModel:
         Raises
         ------
         ReductionError
-            If q does not have r rows.
+            If q does not have r rows, or holds what is not a finite number.
         """
-        states = np.asarray(q, dtype=np.float64)
+        try:
+            states = np.asarray(q, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ReductionError("q must hold numbers only") from None
         if states.ndim not in (1, 2) or states.shape[0] != self.size:
             raise ReductionError(
                 f"q has shape {states.shape}, it must be ({self.size},) or ({self.size}, m)"
             )
+        if not np.all(np.isfinite(states)):
+            raise ReductionError("q has an entry that is not a finite number")
         return self.basis @ states
 
     def static_flexibility(self, name: str, excited: str | None = None) -> float:
@@ -192,6 +197,11 @@ class ReducedModel:
         ----------
         path : path-like
             Name of the file; it is written as named, replacing what was there.
+
+        Raises
+        ------
+        ReductionError
+            If the file cannot be written.
         """
         arrays: dict[str, Any] = {
             "format": np.array(FORMAT),
@@ -210,6 +220,10 @@ class ReducedModel:
             with draft.open("wb") as file:
                 np.savez(file, **arrays)
             draft.replace(target)
+        except OSError as error:
+            raise ReductionError(
+                f"{target} cannot be written ({error.strerror or error})"
+            ) from error
         finally:
             draft.unlink(missing_ok=True)
 

@@ -125,8 +125,8 @@ def reduce(
 def check_request(modes: int | None, cutoff_hz: float | None) -> None:
     """Raise ReductionError unless exactly one of modes and cutoff_hz is given, and sensible."""
     if (modes is None) == (cutoff_hz is None):
-        given = "neither" if modes is None else "both"
-        raise ReductionError(f"give either modes or cutoff_hz; {given} is given")
+        given = "neither is" if modes is None else "both are"
+        raise ReductionError(f"give either modes or cutoff_hz; {given} given")
     if modes is not None:
         try:
             count = operator.index(modes)

@@ -46,10 +46,15 @@ def test_failed_save_leaves_the_old_file(tmp_path, cantilever, monkeypatch):
         raise OSError("disk full")
 
     monkeypatch.setattr(np, "savez", fails)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(cms.ReductionError, match=r"a\.npz cannot be written \(disk full\)"):
         cms.reduce(cantilever, modes=1).save(path)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_save_where_there_is_no_folder_names_the_file(tmp_path, cantilever):
+    with pytest.raises(cms.ReductionError, match=r"/none/x\.npz cannot be written \(No such file"):
+        cms.reduce(cantilever, modes=1).save(tmp_path / "none" / "x.npz")
 
 
 def test_load_names_the_file(tmp_path, cantilever):
@@ -85,7 +90,7 @@ def test_arrays_cannot_be_changed(cantilever):
     "request_, sentence",
     [
         ({}, "give either modes or cutoff_hz; neither is given"),
-        ({"modes": 1, "cutoff_hz": 5.0}, "both is given"),
+        ({"modes": 1, "cutoff_hz": 5.0}, "both are given"),
         ({"modes": -1}, "modes = -1 must be a whole number"),
         ({"modes": 1.5}, r"modes = 1\.5 must be a whole number"),
         ({"modes": True}, "modes = True must be a whole number"),
@@ -156,6 +161,10 @@ def test_unknown_interface(cantilever):
 def test_wrong_state(cantilever):
     with pytest.raises(cms.ReductionError, match=r"q has shape \(2,\), it must be \(3,\)"):
         cms.reduce(cantilever, modes=1).expand([1.0, 2.0])
+    with pytest.raises(cms.ReductionError, match="q must hold numbers only"):
+        cms.reduce(cantilever, modes=1).expand("x")
+    with pytest.raises(cms.ReductionError, match="q has an entry that is not a finite number"):
+        cms.reduce(cantilever, modes=1).expand([1.0, np.nan, 0.0])
 
 
 def test_errors_are_value_errors_of_one_line():
