@@ -7,6 +7,29 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from fem.errors import ModelError
+
+
+@contextmanager
+def plain_write_errors(target: Path) -> Iterator[None]:
+    """Tell what the system says when a file cannot be written as a ModelError that names it.
+
+    Examples
+    --------
+    >>> with plain_write_errors(Path("/no/such/folder/x.npz")):
+    ...     raise FileNotFoundError(2, "No such file or directory", "/no/such/folder/.x-1.npz")
+    Traceback (most recent call last):
+        ...
+    fem.errors.ModelError: /no/such/folder/x.npz: cannot be written: no such file or directory
+    """
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ModelError(
+            f"{target}: cannot be written: {reason[:1].lower() + reason[1:]}"
+        ) from error
+
 
 @contextmanager
 def draft_of(target: Path) -> Iterator[Path]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,7 @@ from fem.errors import ModelError, quoted
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+Number = TypeVar("Number", np.float64, np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +56,13 @@ class FrameMesh:
     source: str = "mesh"
 
     def __post_init__(self) -> None:
-        points = _frozen(self.points, np.float64)
-        lines = _frozen(self.lines, np.int64)
+        points = _numbers(f"{self.source}: points", self.points, np.float64)
+        lines = _numbers(f"{self.source}: lines", self.lines, np.int64)
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "lines", lines)
-        object.__setattr__(self, "parts", _index_sets(self.parts))
-        object.__setattr__(self, "point_sets", _index_sets(self.point_sets))
+        object.__setattr__(self, "parts", _index_sets(f"{self.source}: part", self.parts))
+        sets = _index_sets(f"{self.source}: point", self.point_sets)
+        object.__setattr__(self, "point_sets", sets)
         self._check_arrays()
         self._check_elements()
 
@@ -194,8 +197,8 @@ def frame_mesh(
         for name in (start, stop):
             if name not in ends:
                 raise ModelError(f"{source}: a member of part {part!r} ends at no point {name!r}")
-        if count < 1:
-            raise ModelError(f"{source}: a member of part {part!r} has {count} elements")
+        if not isinstance(count, int | np.integer) or count < 1:
+            raise ModelError(f"{source}: a member of part {part!r} has {count!r} elements")
         steps = np.arange(1, count)[:, None] / count
         inner = ends[start] + steps * (ends[stop] - ends[start])
         chain = [index[start], *range(len(nodes), len(nodes) + count - 1), index[stop]]
@@ -214,17 +217,22 @@ def frame_mesh(
 def _coordinates(source: str, name: str, xyz: Sequence[float]) -> FloatArray:
     if len(xyz) not in (2, 3):
         raise ModelError(f"{source}: point {name!r} needs two or three coordinates, not {len(xyz)}")
-    return np.array([*xyz, 0.0][:3], dtype=np.float64)
+    return _numbers(f"{source}: coordinates of point {name!r}", [*xyz, 0.0][:3], np.float64)
 
 
-def _frozen(values: npt.ArrayLike, dtype: type[np.generic]) -> npt.NDArray[np.generic]:
-    array = np.array(values, dtype=dtype)
+def _numbers(what: str, values: npt.ArrayLike, dtype: type[Number]) -> npt.NDArray[Number]:
+    """A copy that cannot be written to, or a ModelError that says what holds no numbers."""
+    try:
+        array = np.array(values, dtype=dtype)
+    except (TypeError, ValueError):
+        raise ModelError(f"{what} must be numbers, as many in each row") from None
     array.setflags(write=False)
     return array
 
 
-def _index_sets(sets: Mapping[str, npt.ArrayLike]) -> dict[str, IntArray]:
-    return {
-        str(name): np.asarray(_frozen(np.unique(np.asarray(indices, dtype=np.int64)), np.int64))
-        for name, indices in sets.items()
-    }
+def _index_sets(what: str, sets: Mapping[str, npt.ArrayLike]) -> dict[str, IntArray]:
+    found = {}
+    for name, indices in sets.items():
+        owner = f"{what} {name!r}"
+        found[str(name)] = _numbers(owner, np.unique(_numbers(owner, indices, np.int64)), np.int64)
+    return found

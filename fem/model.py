@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from fem.errors import ModelError, quoted
+from fem.errors import ModelError, is_finite, quoted
 from fem.mesh import FrameMesh, IntArray
 
 DIRECTIONS = ("x", "y", "rotation")
@@ -18,7 +18,7 @@ DIRECTIONS = ("x", "y", "rotation")
 
 def _positive(owner: object, **values: float) -> None:
     for name, value in values.items():
-        if not (math.isfinite(value) and value > 0.0):
+        if not (is_finite(value) and value > 0.0):
             raise ModelError(f"{owner}: {name} must be positive and finite, not {value!r}")
 
 
@@ -123,7 +123,7 @@ class CircularSection:
 
     def __post_init__(self) -> None:
         _positive("circular section", diameter=self.diameter)
-        if not 0.0 <= self.bore < self.diameter:
+        if not (is_finite(self.bore) and 0.0 <= self.bore < self.diameter):
             raise ModelError(
                 f"circular section: bore must be at least 0 and less than the diameter"
                 f" {self.diameter!r}, not {self.bore!r}"
@@ -148,6 +148,12 @@ class BeamPart:
     section: CrossSection
 
     def __post_init__(self) -> None:
+        if not isinstance(self.material, Material):
+            raise ModelError(f"part: material must be a Material, not {self.material!r}")
+        if not (hasattr(self.section, "area") and hasattr(self.section, "second_moment")):
+            raise ModelError(
+                f"part: section must have an area and a second_moment, not be {self.section!r}"
+            )
         _positive("section", area=self.section.area, second_moment=self.section.second_moment)
 
 
@@ -169,12 +175,17 @@ class Support:
     directions: Sequence[str]
 
     def __post_init__(self) -> None:
-        names = (self.directions,) if isinstance(self.directions, str) else tuple(self.directions)
-        object.__setattr__(self, "directions", names)
-        if not names:
-            raise ModelError(f"support at {self.point!r}: no direction is held")
-        for name in names:
-            _known_direction(f"support at {self.point!r}", name)
+        owner = f"support at {self.point!r}"
+        given = (self.directions,) if isinstance(self.directions, str) else self.directions
+        if not isinstance(given, Sequence):
+            raise ModelError(f"{owner}: directions must be a list of names, not {given!r}")
+        object.__setattr__(self, "directions", tuple(given))
+        if not given:
+            raise ModelError(f"{owner}: no direction is held")
+        for name in given:
+            _known_direction(owner, name)
+            if given.count(name) > 1:
+                raise ModelError(f"{owner}: direction {name!r} is given twice")
 
 
 @dataclass(frozen=True)
@@ -187,7 +198,7 @@ class PointMass:
 
     def __post_init__(self) -> None:
         for name, value in (("mass", self.mass), ("rotary inertia", self.rotary_inertia)):
-            if not (math.isfinite(value) and value >= 0.0):
+            if not (is_finite(value) and value >= 0.0):
                 raise ModelError(
                     f"point mass at {self.point!r}: {name} must be finite and not negative,"
                     f" not {value!r}"

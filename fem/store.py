@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fem.errors import ModelError
-from fem.files import draft_of
+from fem.files import draft_of, plain_write_errors
 from fem.mesh import FrameMesh
 from fem.model import (
     BeamPart,
@@ -38,6 +38,11 @@ def save_model(model: FrameModel, path: str | os.PathLike[str]) -> None:
 
     A cross-section of a class that is not from this package is kept as its area and second moment.
 
+    Raises
+    ------
+    ModelError
+        If the file cannot be written.
+
     Examples
     --------
     >>> import fem, pathlib, tempfile
@@ -57,7 +62,8 @@ def save_model(model: FrameModel, path: str | os.PathLike[str]) -> None:
     }
     arrays |= {f"part {name}": elements for name, elements in mesh.parts.items()}
     arrays |= {f"point {name}": nodes for name, nodes in mesh.point_sets.items()}
-    with draft_of(Path(path)) as draft, draft.open("wb") as file:
+    target = Path(path)
+    with plain_write_errors(target), draft_of(target) as draft, draft.open("wb") as file:
         np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
 
 

@@ -8,6 +8,7 @@ import meshio
 import numpy as np
 
 from fem.errors import ModelError, quoted
+from fem.files import plain_write_errors
 from fem.mesh import FrameMesh, IntArray
 from fem.read import SET_PREFIX
 
@@ -25,7 +26,8 @@ def write_mesh(mesh: FrameMesh, path: str | Path) -> None:
     Raises
     ------
     ModelError
-        For another extension, or for parts that overlap in a Gmsh file, which cannot say so.
+        For another extension, for parts that overlap in a Gmsh file, which cannot say so, or if
+        the file cannot be written.
 
     Examples
     --------
@@ -42,7 +44,8 @@ def write_mesh(mesh: FrameMesh, path: str | Path) -> None:
         raise ModelError(
             f"{path}: unknown mesh extension {path.suffix!r}; known are {quoted(writers)}"
         )
-    writers[path.suffix.lower()](mesh, path)
+    with plain_write_errors(path):
+        writers[path.suffix.lower()](mesh, path)
 
 
 def _write_gmsh(mesh: FrameMesh, path: Path) -> None:

@@ -271,6 +271,10 @@ LINE = {"points": [[0, 0, 0], [1, 0, 0], [2, 0, 0]], "lines": [[0, 1], [1, 2]]}
     [
         ({"points": np.zeros((0, 3)), "lines": np.zeros((0, 2))}, "the mesh is empty"),
         ({"lines": np.zeros((0, 2))}, "the mesh is empty"),
+        ({"points": [["x", 0, 0], [1, 0, 0]]}, "my.msh: points must be numbers"),
+        ({"points": [[0, 0, 0], [1, 0]]}, "points must be numbers, as many in each row"),
+        ({"lines": [["a", "b"]]}, "my.msh: lines must be numbers"),
+        ({"parts": {"p": ["a"]}}, "my.msh: part 'p' must be numbers"),
         ({"points": [[0, 0], [1, 0]]}, r"points must have shape \(n, 3\)"),
         ({"lines": [[0, 1, 2]]}, r"lines must have shape \(e, 2\)"),
         ({"points": [[0, 0, 0], [1, math.nan, 0], [2, 0, 0]]}, "coordinates of node 1"),
@@ -292,6 +296,8 @@ def test_a_bad_mesh_is_one_sentence(change, sentence):
     [
         ({"a": (0, 0)}, [("rod", "a", "b", 1)], "ends at no point 'b'"),
         ({"a": (0, 0), "b": (1, 0)}, [("rod", "a", "b", 0)], "has 0 elements"),
+        ({"a": (0, 0), "b": (1, 0)}, [("rod", "a", "b", "2")], "has '2' elements"),
+        ({"a": (0, "y"), "b": (1, 0)}, [("rod", "a", "b", 1)], "coordinates of point 'a' must be"),
         ({"a": (0, 0), "b": (1,)}, [("rod", "a", "b", 1)], "'b' needs two or three coordinates"),
         ({}, [], "the mesh is empty"),
     ],
@@ -302,9 +308,17 @@ def test_a_bad_member_is_one_sentence(points, members, sentence):
 
 
 def test_a_mesh_cannot_be_changed():
-    mesh = fem.FrameMesh(**LINE)
-    with pytest.raises(ValueError, match="read-only"):
-        mesh.points[0, 0] = 1.0
+    mesh = fem.FrameMesh(**LINE, parts={"p": [0]})
+    for array in (mesh.points, mesh.lines, mesh.parts["p"]):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+
+
+@pytest.mark.parametrize("extension", [".msh", ".vtu", ".inp"])
+def test_a_folder_that_is_not_there_is_one_sentence_with_the_path_given(tmp_path, extension):
+    target = tmp_path / "none" / f"mesh{extension}"
+    with pytest.raises(fem.ModelError, match=f"^{target}: cannot be written: no such file or"):
+        fem.write_mesh(fem.FrameMesh(**LINE), target)
 
 
 def test_gmsh_cannot_be_written_with_overlapping_parts(tmp_path):

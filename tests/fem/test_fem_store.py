@@ -63,6 +63,12 @@ def test_files_that_are_not_frames_are_one_sentence(tmp_path):
         fem.Component.load(path)
 
 
+def test_a_folder_that_is_not_there_is_one_sentence_with_the_path_given(tmp_path):
+    target = tmp_path / "none" / "frame.npz"
+    with pytest.raises(fem.ModelError, match=f"^{target}: cannot be written: no such file or"):
+        fem.assemble(frame()).save(target)
+
+
 def test_file_may_be_read_by_whom_the_system_lets_read_new_files(tmp_path):
     (tmp_path / "ordinary").touch()
     fem.assemble(frame()).save(tmp_path / "frame.npz")
