@@ -81,26 +81,23 @@ def judged(
     """A published claim with the verdict on what its check finds."""
     finding = check(results) if check else Finding(None, note="not computed")
     head = (row["id"], row["published"], row["unit"], row["kind"], row["quantity"], row["model"])
-    if finding.holds is not None:
-        verdict = "agrees" if finding.holds else "differs"
-        return Claim(*head, finding.text, "", verdict, finding.note)
-    if finding.value is None:
+    if finding.value is None and finding.holds is None:
         return Claim(*head, finding.text, "", "not decided", finding.note)
-    published = float(row["published"])
-    deviation = finding.value / published - 1.0
-    if row["kind"] == "bound":
-        agrees = finding.value <= published
-    else:
-        rounding = 0.5 * last_digit(row["published"]) / abs(published)
-        agrees = abs(deviation) <= max(READING_TOLERANCE, rounding)
-    computed = f"{finding.value:.6g}"
-    return Claim(
-        *head,
-        computed,
-        f"{100 * deviation:+.2f} %",
-        "agrees" if agrees else "differs",
-        finding.note,
-    )
+    agrees, deviation = finding.holds is not False, ""
+    if finding.value is not None:
+        agrees = agrees and number_agrees(finding.value, row["published"], row["kind"])
+        deviation = f"{100 * (finding.value / float(row['published']) - 1.0):+.2f} %"
+    computed = finding.text or f"{finding.value:.6g}"
+    return Claim(*head, computed, deviation, "agrees" if agrees else "differs", finding.note)
+
+
+def number_agrees(value: float, published: str, kind: str) -> bool:
+    """Whether a number is what was printed, within what was printed or can be read in a plot."""
+    printed = float(published)
+    if kind == "bound":
+        return value <= printed
+    tolerance = max(READING_TOLERANCE * abs(printed), 0.5 * last_digit(published))
+    return abs(value - printed) <= tolerance
 
 
 def last_digit(number: str) -> float:

@@ -16,14 +16,15 @@ READING_TOLERANCE = 0.01  # what a reader can measure in a plot
 
 @dataclass(frozen=True)
 class Finding:
-    """What a check found: a number to compare, or whether a statement holds, or neither.
+    """What a check found: a number to compare, whether a statement holds, both, or neither.
 
     Parameters
     ----------
     value : float, optional
         Number to compare with the published one.
     holds : bool, optional
-        Whether a statement holds.
+        Whether a statement holds. A statement with a number agrees if it holds and the number
+        agrees.
     text : str
         What was found, for a statement.
     note : str

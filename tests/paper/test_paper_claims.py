@@ -2,10 +2,13 @@
 
 import csv
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from fakes import FakeBranch, FakeDiagram, FakeNode, FakeOrbit, FakeSpecialPoint, resonance
 
+import nldyn.paper.checks
 from nldyn.paper.checks import CHECKS
 from nldyn.paper.claims import (
     judged,
@@ -64,6 +67,64 @@ def test_bound_is_met_from_below_only(computed, expected):
 @pytest.mark.parametrize(("holds", "expected"), [(True, "agrees"), (False, "differs")])
 def test_statement_is_judged_by_whether_it_holds(holds, expected):
     assert verdict("", Finding(holds=holds, text="found"), "statement") == expected
+
+
+@pytest.mark.parametrize(
+    ("computed", "holds", "expected"),
+    [(27.4, True, "agrees"), (26.16, True, "differs"), (27.0, False, "differs")],
+)
+def test_statement_with_a_number_agrees_if_both_do(computed, holds, expected):
+    row = judged(
+        claim("27", "statement"), lambda results: Finding(computed, holds, "tops: ..."), {}
+    )
+    assert (row.verdict, row.computed) == (expected, "tops: ...")
+    assert row.deviation == f"{100 * (computed / 27 - 1):+.2f} %"
+
+
+@dataclass(frozen=True)
+class FoundPeak:
+    frequency_hz: float
+    height: float
+    orbit: FakeOrbit
+
+
+def split_tops(monkeypatch, *frequencies):
+    tops = [FoundPeak(hz, 1e-5, FakeOrbit(hz, 1e-5)) for hz in frequencies]
+    monkeypatch.setattr(nldyn.paper.checks, "resonance_peaks", lambda branch, range_hz: tops)
+    row = {**claim("27", "statement"), "id": "fig7.split"}
+    return judged(row, CHECKS["fig7.split"], {"four_dof_xi_0.01": FakeDiagram([resonance()])})
+
+
+def test_split_peak_agrees_only_near_where_the_paper_has_it(monkeypatch):
+    row = split_tops(monkeypatch, 24.8, 25.6, 26.16)
+    assert (row.verdict, row.deviation) == ("differs", "-3.11 %")
+    assert split_tops(monkeypatch, 24.8, 25.6, 26.8).verdict == "agrees"
+    assert split_tops(monkeypatch, 26.4, 26.9).verdict == "differs"
+    assert split_tops(monkeypatch).verdict == "differs"
+
+
+@pytest.mark.parametrize(
+    ("owner", "stable", "expected"),
+    [("separate", False, "agrees"), ("separate", True, "differs"), ("main", False, "differs")],
+)
+def test_branch_b_is_judged_on_the_separate_branch_alone(monkeypatch, owner, stable, expected):
+    def node(hz):
+        return FakeNode(FakeOrbit(hz, 1e-5), 0.0)
+
+    points = [("LP", 21.75), ("LP", 23.71), ("GR", 21.76)]
+    special = [FakeSpecialPoint(kind, node(hz)) for kind, hz in points]
+    main = FakeBranch("main", 1, [node(hz) for hz in (15.0, 23.0, 90.0)], special)
+    separate = FakeBranch("separate", 1, [node(hz) for hz in (21.75, 23.71)], special)
+    top = FoundPeak(23.14, 7.5e-5, FakeOrbit(23.14, 7.5e-5, 1, stable, 2))
+
+    def highest_peak(branches, low_hz, high_hz):
+        return next(((b, top) for b in branches if b.name == owner), None)
+
+    monkeypatch.setattr(nldyn.paper.checks, "highest_peak", highest_peak)
+    found = FakeDiagram([main, separate])
+    results = dict.fromkeys(("two_dof_xi_0.01", "two_dof_xi_0.001"), found)
+    row = judged(claim("23", "statement"), CHECKS["fig4.branch.b"], results)
+    assert row.verdict == expected
 
 
 def test_claim_without_evidence_is_not_decided():

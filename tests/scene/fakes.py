@@ -33,6 +33,10 @@ class FakeSpecialPoint:
     def orbit(self):
         return self.point.orbit
 
+    @property
+    def frequency_hz(self):
+        return self.point.orbit.frequency_hz
+
 
 @dataclass(frozen=True)
 class FakeBranch:
@@ -41,6 +45,7 @@ class FakeBranch:
     nodes: list
     special_points: list
     stop_reason: str = "end of range"
+    stop_reasons: tuple = ("end of range", "end of range")
 
     @property
     def points(self):
@@ -64,6 +69,9 @@ class FakeDiagram:
     branches: list
     notes: tuple = ()
     range_hz: tuple = (5.0, 90.0)
+
+    def of_period(self, period):
+        return [branch for branch in self.branches if branch.period == period]
 
 
 def resonance(period=1, low=5.0, high=90.0, count=600, unstable=(30.0, 40.0)):
