@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from nldyn.branch import Branch
 from nldyn.diagrams import Diagram
@@ -16,6 +17,7 @@ from nldyn.plot import new_axes_pair, plot_diagram, plot_orbit, save_figure
 Results = Mapping[str, Diagram]
 
 SECOND_MODE_HZ = 125.1  # the dashed lines of Figure 4: superharmonics expected at 125.1 Hz / n
+DASHED = ("figure_4", "figure_5")
 
 CAPTIONS = {
     "figure_2": "Figure 2: 1-DOF model",
@@ -28,43 +30,69 @@ CAPTIONS = {
     "figure_9": "Figure 9: orbits of the 4-DOF model at 22.5 Hz, ξ = 0.001",
 }
 
+# The computations that a diagram shows; the first one's range is that of its harmonic branches.
+SHOWN = {
+    "figure_2": ("one_dof", "one_dof.listed"),
+    "figure_4": ("two_dof_xi_0.01",),
+    "figure_5": ("two_dof_xi_0.001", "two_dof.sub14"),
+    "figure_7": ("four_dof_xi_0.01",),
+    "figure_8": ("four_dof_xi_0.001",),
+}
+
+
+def title(name: str, results: Results) -> str:
+    """The caption of a figure, with the range that was computed if it is a diagram."""
+    job = SHOWN.get(name, ("",))[0]
+    if job not in results:
+        return CAPTIONS[name]
+    low, high = results[job].range_hz
+    return f"{CAPTIONS[name]}, computed from {low:g} to {high:g} Hz"
+
+
+def legend_text(name: str) -> str:
+    """What the page says below a figure beside its title."""
+    if name not in DASHED:
+        return ""
+    return (
+        f" Dashed lines: f₂/2 to f₂/5 with f₂ = {SECOND_MODE_HZ:g} Hz, the frequency of the second "
+        "mode; its superharmonic peaks lie near them."
+    )
+
 
 def write_figures(results: Results, folder: Path) -> None:
     """Write all figures to a folder."""
-    one = [*results["one_dof"].branches, *results["one_dof.listed"].branches]
-    save_figure(_diagram(one, "figure_2"), folder / "figure_2")
-    for name, key in (
-        ("figure_4", "two_dof_xi_0.01"),
-        ("figure_5", "two_dof_xi_0.001"),
-        ("figure_7", "four_dof_xi_0.01"),
-        ("figure_8", "four_dof_xi_0.001"),
-    ):
-        ax = _diagram(results[key].branches, name)
-        if name in ("figure_4", "figure_5"):
-            _dashed(ax, [SECOND_MODE_HZ / n for n in (2, 3, 4, 5)])
+    for name, jobs in SHOWN.items():
+        branches = [branch for job in jobs for branch in results[job].branches]
+        ax = _diagram(branches, title(name, results))
+        if name in DASHED:
+            _dashed(ax, (2, 3, 4, 5))
         if name == "figure_7":
-            _inset(ax, results[key].of_period(1), 24.5, 29.0)
+            _inset(ax, results[jobs[0]].of_period(1), 24.5, 29.0)
         save_figure(ax, folder / name)
     _orbits(orbits_at(results["one_dof"], 1, 25.3)[:1], "figure_3", folder)
     _orbits(orbits_at(results["two_dof_xi_0.001"], 1, 23.0)[:3], "figure_6", folder)
     _orbits(orbits_at(results["four_dof_xi_0.001"], 1, 22.5)[:3], "figure_9", folder)
 
 
-def _diagram(branches: Iterable[Branch], name: str) -> Axes:
+def _diagram(branches: Iterable[Branch], heading: str) -> Axes:
     ax = plot_diagram(branches, special_points=(), unit="mm")
     ax.set_xlim(0.0, 90.0)
-    ax.set_title(CAPTIONS[name])
+    ax.set_title(heading)
     return ax
 
 
-def _dashed(ax: Axes, frequencies_hz: Iterable[float]) -> None:
-    for hz in frequencies_hz:
+def _dashed(ax: Axes, orders: Iterable[int]) -> None:
+    """Mark and name where superharmonics of the second mode are expected."""
+    for n in orders:
+        hz = SECOND_MODE_HZ / n
         ax.axvline(hz, color="0.6", lw=0.8, ls="--", zorder=0)
+        text = f" f₂/{n}" + (f", f₂ = {SECOND_MODE_HZ:g} Hz" if n == 2 else "")
+        ax.text(hz, 0.97, text, color="0.4", fontsize=8, transform=ax.get_xaxis_transform())
 
 
 def _inset(ax: Axes, branches: list[Branch], low: float, high: float) -> None:
     """Enlarge a range of frequencies in the empty upper left corner."""
-    small = ax.inset_axes((0.055, 0.5, 0.16, 0.42))
+    small = ax.inset_axes((0.02, 0.5, 0.15, 0.42))
     plot_diagram(branches, small, special_points=(), unit="mm", legend=False)
     tops = [
         1e3 * o.max_abs_displacement
@@ -76,6 +104,9 @@ def _inset(ax: Axes, branches: list[Branch], low: float, high: float) -> None:
     small.set_ylim(0.0, 1.1 * max(tops, default=1.0))
     small.set_xlabel("")
     small.set_ylabel("")
+    small.yaxis.tick_right()
+    small.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+    small.yaxis.set_major_formatter("{x:g}")
     small.tick_params(labelsize=7)
     small.set_title(f"{low:g} to {high:g} Hz", fontsize=8)
 
@@ -87,5 +118,6 @@ def _orbits(orbits: list[Orbit], name: str, folder: Path) -> None:
         plot_orbit(orbit, (upper, lower))
         state = "stable" if orbit.stable else "unstable"
         impacts = f"{orbit.impacts} impact{'' if orbit.impacts == 1 else 's'}"
-        upper.set_title(f"{CAPTIONS[name]}, orbit {letter} ({state}, {impacts})")
+        which = f"orbit {letter}, " if len(orbits) > 1 else ""
+        upper.set_title(f"{CAPTIONS[name]} ({which}{state}, {impacts})")
         save_figure(upper, folder / (name if letter == "a" else f"{name}_{letter}"))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from nldyn.diagrams import Diagram
 from nldyn.paper.claims import Claim, verdict_counts
-from nldyn.paper.figures import CAPTIONS
+from nldyn.paper.figures import CAPTIONS, legend_text, title
 from nldyn.version import software_version
 
 STYLE = """
@@ -32,7 +32,7 @@ def write_page(
         f"computed in {seconds:.0f} s. A number agrees if it deviates by no more than 1 % or half "
         "a unit of the last digit printed. Stable orbits are drawn solid, unstable ones "
         "dotted.</p>",
-        *[_figure(folder, name, caption) for name, caption in CAPTIONS.items()],
+        *[_figure(folder, name, title(name, results)) for name in CAPTIONS],
         "<h2>Claims</h2>",
         _claims_table(rows),
         "<h2>What was computed</h2>",
@@ -45,7 +45,8 @@ def write_page(
 def _figure(folder: Path, name: str, caption: str) -> str:
     pictures = sorted(folder.glob(f"{name}*.png"))
     images = "".join(f"<img src='{p.name}' alt='{escape(caption)}'>" for p in pictures)
-    return f"<figure>{images}<figcaption>{escape(caption)}</figcaption></figure>"
+    text = escape(f"{caption}.{legend_text(name)}")
+    return f"<figure>{images}<figcaption>{text}</figcaption></figure>"
 
 
 def _claims_table(rows: Sequence[Claim]) -> str:
