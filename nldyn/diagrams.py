@@ -25,6 +25,8 @@ from nldyn.search import SearchOptions, orbits_from_strobe, simulate_strobe
 from nldyn.special import LocateError
 from nldyn.system import System
 
+MORE_STARTS = 4  # times as many in the second search, which looks for orbits with contact
+
 Progress = Callable[[str, float], None]
 
 
@@ -159,7 +161,9 @@ def diagram(
 
     Orbits of each period are looked for by simulation at `search_points` frequencies and at the
     seeds, continued in both directions, and at each flip the doubled branch is followed when its
-    period is wanted. What no simulation comes near (isolas of unstable orbits, say) is missed.
+    period is wanted. If no orbit found touches a stop, the search is repeated once with four
+    times as many initial states. What no simulation comes near (isolas of unstable orbits, say) is
+    missed.
 
     Parameters
     ----------
@@ -214,15 +218,11 @@ def diagram(
     )
     effort = search or SearchOptions()
     edges = np.geomspace(low, high, search_points + 1)
-    strobes = {}
-    for frequency in np.sqrt(edges[:-1] * edges[1:])[::-1] if wanted else ():
-        box.progress("search", float(frequency))
-        strobes[float(frequency)] = simulate_strobe(flow, float(frequency), effort)
-    for period in wanted:
-        if period % 2 == 0 and period // 2 in wanted:
-            _follow_flips(box, period // 2)
-        for strobe in strobes.values():
-            box.from_orbits(orbits_from_strobe(flow, strobe, period, box.observe, effort))
+    places = np.sqrt(edges[:-1] * edges[1:])[::-1].tolist() if wanted else []
+    _search(box, places, wanted, effort)
+    if places and not _touching(box):
+        more = replace(effort, starts=MORE_STARTS * effort.starts, seed=effort.seed + 1)
+        _search(box, places, wanted, more)
     for seed in seeds:
         _follow_seed(box, seed, effort)
     _follow_flips_of_new(box, wanted, doublings)
@@ -230,7 +230,33 @@ def diagram(
         if not any(branch.period == period for branch in box.branches):
             tried = f"{search_points} frequenc{'y' if search_points == 1 else 'ies'}"
             box.notes.append(f"no orbit of period {period} found by simulation at {tried}")
+    if not _touching(box):
+        box.notes.append(
+            "no orbit that touches a stop was found; there may be some all the same: try a range "
+            "that begins lower, or more search points"
+        )
     return Diagram(tuple(box.branches), (low, high), box.observe, tuple(box.notes))
+
+
+def _search(
+    box: _Collector, frequencies: Sequence[float], periods: Sequence[int], effort: SearchOptions
+) -> None:
+    """Follow what simulations at some frequencies come near, one period after the other."""
+    strobes = []
+    for frequency in frequencies:
+        box.progress("search", frequency)
+        strobes.append(simulate_strobe(box.flow, frequency, effort))
+    for period in periods:
+        if period % 2 == 0 and period // 2 in periods:
+            _follow_flips(box, period // 2)
+        for strobe in strobes:
+            box.from_orbits(orbits_from_strobe(box.flow, strobe, period, box.observe, effort))
+
+
+def _touching(box: _Collector) -> bool:
+    """Whether an orbit with contact is known, or nothing can be touched."""
+    orbits = (orbit for branch in box.branches for orbit in branch.points)
+    return not box.flow.system.stops or any(orbit.max_penetration > 0.0 for orbit in orbits)
 
 
 def _follow_seed(box: _Collector, seed: Seed, effort: SearchOptions) -> None:

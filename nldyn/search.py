@@ -63,15 +63,15 @@ class Strobe:
 def simulate_strobe(flow: FlowMap, frequency_hz: float, options: SearchOptions) -> Strobe:
     """Simulate from rest and from random states and record once per excitation period.
 
-    The random states have modal displacements of up to ten times the linear response, the size
-    of resonant motion.
+    The random states are up to ten times as large as the linear response, the size of resonant
+    motion, or as the smallest state that closes a gap, if that is larger.
     """
     omega = 2.0 * math.pi * frequency_hz
     total = options.transient + options.recorded
     phases = np.linspace(0.0, 2.0 * np.pi * total, total + 1)
     n = 2 * flow.system.size
     rng = np.random.default_rng(options.seed)
-    size = float(np.abs(flow.system.steady(omega)).max())
+    size = max(float(np.abs(flow.system.steady(omega)).max()), reach(flow.system))
     runs = []
     for index in range(options.starts):
         scale = 0.0 if index == 0 else size * 10.0 ** rng.uniform(-0.5, 1.0)
@@ -80,6 +80,28 @@ def simulate_strobe(flow: FlowMap, frequency_hz: float, options: SearchOptions) 
         if not found.failure:
             runs.append(found.ends[options.transient :])
     return Strobe(omega, tuple(runs))
+
+
+def reach(system: System) -> float:
+    """Size of the smallest state that closes one of the gaps; zero where none is open at rest.
+
+    Examples
+    --------
+    >>> from nldyn import Stop
+    >>> system = System.from_modal([10.0], {"tip": [2.0]}, modal_damping=0.1,
+    ...     stops=[Stop("tip", 1e9, gap=1e-3)])
+    >>> state = np.zeros(2)
+    >>> row = system.displacement_row(system.stop_vector(system.stops[0]))
+    >>> float(round(reach(system) * np.linalg.norm(row), 12))
+    0.001
+    """
+    rows = [system.displacement_row(system.stop_vector(stop)) for stop in system.stops]
+    needed = [
+        max(stop.gap, 0.0) / float(np.linalg.norm(row))
+        for stop, row in zip(system.stops, rows, strict=True)
+        if np.any(row)
+    ]
+    return min(needed, default=0.0)
 
 
 def orbits_from_strobe(

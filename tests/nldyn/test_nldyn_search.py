@@ -9,12 +9,18 @@ from one_dof import make_one_dof
 
 from nldyn import (
     ConvergenceError,
+    Damper,
     FlowMap,
     SearchOptions,
     Seed,
+    Stop,
+    System,
     SystemModelError,
+    Unbalance,
+    continue_branch,
     diagram,
     find_orbits,
+    solve_orbit,
 )
 from nldyn.branch import minimal_period, same_orbit
 
@@ -96,3 +102,33 @@ def test_diagram_says_what_it_did_not_find(one_dof):
     assert found.notes == ("no 1/2 orbit found near 26 Hz",)
     with pytest.raises(SystemModelError, match="near_hz = 95 lies outside"):
         diagram(one_dof, (84.0, 88.0), seeds=[Seed(2, 95.0)])
+
+
+def two_modes_before_a_gap(gap):
+    """The 2-DOF model: from 20 Hz on it either stays off a stop 10 µm away or hits it hard."""
+    return System.from_modal(
+        [13.1, 125.1],
+        {"middle": [0.6343, 0.6811]},
+        modal_damping=0.01,
+        dampers=[Damper("middle", 5.81)],
+        stops=[Stop("middle", 5.17e9, gap=gap)],
+        excitation=[Unbalance("middle", 4.92e-6)],
+    )
+
+
+def test_orbits_that_hit_a_stop_are_found_beside_those_that_miss_it():
+    system = two_modes_before_a_gap(1e-5)
+    branch = continue_branch(solve_orbit(system, 13.0), (12.0, 22.0))
+    (hitting,) = [orbit for orbit in branch.at(20.5) if orbit.stable and orbit.impacts]
+    for seed in (1, 2, 3):
+        effort = SearchOptions(starts=2, seed=seed)
+        found = diagram(system, (20.0, 30.0), [1], search=effort)
+        assert any(branch.contains(hitting) for branch in found.branches)
+        assert found.notes == ()
+
+
+def test_stop_that_nothing_touches_is_told():
+    (note,) = diagram(two_modes_before_a_gap(1.0), (20.0, 22.0), [1], search_points=1).notes
+    assert note.startswith("no orbit that touches a stop was found")
+    pressed = two_modes_before_a_gap(-1e-5)
+    assert diagram(pressed, (90.0, 91.0), [1], search_points=1).notes == ()
