@@ -317,8 +317,8 @@ def check_video(target: Path) -> None:
     """Raise RenderError where the file is to be an .mp4 and nothing here can write one."""
     if target.suffix.lower() == ".mp4" and importlib.util.find_spec("imageio_ffmpeg") is None:
         raise RenderError(
-            f"{target}: writing .mp4 needs imageio-ffmpeg (pip install imageio-ffmpeg), "
-            "or use a name that ends in .gif"
+            f"{target}: writing .mp4 needs imageio-ffmpeg (pip install imageio-ffmpeg); "
+            ".gif needs nothing more"
         )
 
 

@@ -1,7 +1,7 @@
 """The command line: ``nldyn run``, ``check``, ``render`` and ``paper``.
 
-Exit codes: 0 done, 2 something in the scene or on the command line is wrong, 3 a picture needs a
-graphics library that is not installed, 130 stopped with Ctrl-C.
+Exit codes: 0 done, 2 something in the scene or on the command line is wrong, 3 a picture or an
+animation needs something that is not installed, 130 stopped with Ctrl-C.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ def check(scene: Path) -> None:
     type=click.Choice(["gif", "mp4"]),
     default="gif",
     show_default=True,
-    help="Kind of animation.",
+    help="Kind of animation; mp4 needs imageio-ffmpeg.",
 )
 @quiet_option
 def render(
@@ -130,6 +130,7 @@ def render(
     if period != 1 and frequency_hz is None:
         raise click.UsageError("'--period' needs '--frequency-hz'")
     with plain_errors():
+        from fem.gl import RenderError
         from nldyn.progress import progress_line
         from nldyn.render import render_scene
         from nldyn.result_directory import check_directory
@@ -137,10 +138,19 @@ def render(
 
         loaded = load_scene(scene)
         check_directory(out)
-        with progress_line(quiet) as report:
-            made = render_scene(
-                loaded, out, frequency_hz=frequency_hz, period=period, video=video, progress=report
-            )
+        try:
+            with progress_line(quiet) as report:
+                made = render_scene(
+                    loaded,
+                    out,
+                    frequency_hz=frequency_hz,
+                    period=period,
+                    video=video,
+                    progress=report,
+                )
+        except RenderError as error:
+            click.echo(f"nldyn: {error}", err=True)
+            sys.exit(NO_GRAPHICS)
     click.echo(f"written to {out}")
     if made.missing:
         click.echo(f"nldyn: {made.missing}", err=True)

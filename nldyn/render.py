@@ -65,7 +65,8 @@ def render_scene(
         A scene with a ``[mesh]``. Without a ``[continuation]`` only its modes are drawn.
     directory : str or Path
         Gets ``modes.csv`` and ``mode_shapes.png``, and for the orbit ``orbit.png``,
-        ``orbit.svg``, ``deepest_contact.png`` and ``motion.gif``; all of them or nothing.
+        ``orbit.svg``, ``deepest_contact.png`` and ``motion.gif`` or ``.mp4``; all of them or
+        nothing.
     frequency_hz : float, optional
         Excitation frequency of the orbit in Hz; unless given, where the harmonic branch has its
         largest displacement.
@@ -88,6 +89,8 @@ def render_scene(
         If the scene has no mesh, or there is no such orbit.
     OutputError
         If the directory cannot be written.
+    fem.render.RenderError
+        If the animation is to be an .mp4 and imageio-ffmpeg is not installed; before any work.
 
     Examples
     --------
@@ -97,10 +100,14 @@ def render_scene(
     >>> scene = load_scene(example("two_dof_xi_0.01.toml"))
     >>> made = render_scene(scene, tempfile.mkdtemp(), frequency_hz=23.0)   # doctest: +SKIP
     """
+    from fem.render import check_video
+
     if scene.mesh is None:
         raise scene_error(scene.file, ("mesh",), "is missing: only a mesh can be drawn")
     if scene.continuation is not None or frequency_hz is not None:
         check_computable(scene, scene.file)
+    if scene.continuation is not None:
+        check_video(Path(directory) / f"motion.{video}")
     tell = progress or (lambda what, frequency_hz: None)
     tell("model", 0.0)
     component = build_component(scene)

@@ -37,6 +37,15 @@ def test_without_graphics_the_rest_is_written(tmp_path, monkeypatch):
     assert float(rows[0]["participation_middle"]) > 0
 
 
+def test_mp4_that_cannot_be_written_is_told_before_the_work(tmp_path, monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    monkeypatch.setattr("nldyn.render.build_component", lambda scene: pytest.fail("computed"))
+    result, out = render(tmp_path, BEAM, "--frequency-hz", "23.0", "--video", "mp4")
+    assert result.exit_code == 3
+    assert result.stderr.startswith(f"nldyn: {out}/motion.mp4: writing .mp4 needs imageio-ffmpeg")
+    assert result.stderr.count("\n") == 1 and not out.exists()
+
+
 def test_pictures_stand_beside_the_tables_of_a_run(tmp_path, monkeypatch):
     monkeypatch.setattr(fem.render, "gl_available", lambda: (False, "none"))
     for _ in range(2):
