@@ -11,6 +11,7 @@ import json
 import os
 import secrets
 import shutil
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -38,7 +39,7 @@ def check_directory(directory: str | Path) -> Path:
     Raises
     ------
     OutputError
-        If it is a file, holds only other files, or cannot be written to.
+        If it is a file, is read-only, holds only other files, or cannot be written to.
 
     Examples
     --------
@@ -64,9 +65,16 @@ def _checked(target: Path, directory: str | Path) -> Path:
         raise OutputError(
             f"{directory}: holds files that were not written by nldyn; choose another directory"
         )
+    if target.is_dir() and not _writable(target):
+        raise OutputError(f"{directory}: is read-only; choose another directory")
     if target.is_mount():
         raise OutputError(f"{directory}: cannot be replaced; choose a folder in it")
     return target
+
+
+def _writable(folder: Path) -> bool:
+    """Whether files may be put into a directory; where its mode says no, not by root either."""
+    return bool(folder.stat().st_mode & stat.S_IWUSR) and os.access(folder, os.W_OK)
 
 
 @contextmanager
@@ -167,6 +175,7 @@ def _swap(new: Path, target: Path) -> None:
     if not target.exists():
         new.rename(target)
         return
+    shutil.copymode(target, new)
     old = target.with_name(f".{target.name}.{secrets.token_hex(4)}.old")
     target.rename(old)
     try:

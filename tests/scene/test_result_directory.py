@@ -150,3 +150,22 @@ def test_permissions_are_those_of_any_new_directory(tmp_path):
     (tmp_path / "plain").mkdir()
     write(tmp_path / "results", table="1")
     assert (tmp_path / "results").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+def test_permissions_of_a_directory_that_is_there_are_kept(tmp_path):
+    place = tmp_path / "results"
+    write(place, table="1")
+    place.chmod(0o700)
+    write(place, table="2")
+    assert visible(place) == {"table": "2"}
+    assert place.stat().st_mode & 0o777 == 0o700
+
+
+def test_read_only_directory_is_refused(tmp_path):
+    place = tmp_path / "results"
+    write(place, table="1")
+    place.chmod(0o555)
+    with pytest.raises(OutputError, match="results: is read-only; choose another directory"):
+        write(place, table="2")
+    place.chmod(0o755)
+    assert visible(place) == {"table": "1"}
