@@ -5,6 +5,7 @@ This module joins `fem`, `cms` and `nldyn`.
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -102,7 +103,7 @@ def parse_scene(text: str, file: str | Path = "scene.toml") -> Scene:
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise SceneError(f"{file}: is not valid TOML: {_lower_first(str(error))}") from None
+        raise SceneError(f"{file}: is not valid TOML: {_toml_fault(str(error))}") from None
     try:
         scene = Scene.model_validate(tables)
     except ValidationError as error:
@@ -402,6 +403,16 @@ def _unreadable(error: OSError | ValueError) -> str:
     if isinstance(error, IsADirectoryError):
         return "is a folder"
     return f"cannot be read: {_lower_first(getattr(error, 'strerror', None) or str(error))}"
+
+
+def _toml_fault(text: str) -> str:
+    """What the TOML reader says, told in the words of TOML where it uses Python's."""
+    text = _lower_first(text).replace("cannot overwrite a value", "a key or table is given twice")
+    declared = re.match(r"cannot declare \((.*?),?\) twice", text)
+    if declared is None:
+        return text
+    name = ".".join(re.findall(r"'(.*?)'", declared[1]))
+    return f"the table [{name}] is given twice{text[declared.end() :]}"
 
 
 def _lower_first(text: str) -> str:

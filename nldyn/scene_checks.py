@@ -140,19 +140,29 @@ def _check_matrices(scene: Scene, report: Report) -> None:
     if table is None:
         return
     count = len(table.mass)
-    for key, matrix in (("mass", table.mass), ("stiffness", table.stiffness)):
-        _check_square(matrix, count, ("matrices", key), report)
-    if table.damping is not None:
-        _check_square(table.damping, count, ("matrices", "damping"), report)
+    for row in table.mass:
+        if len(row) != count:
+            fault = f"must be square, but has {_counted(count, 'row')} and one of "
+            raise report(("matrices", "mass"), fault + _counted(len(row), "number"))
+    for key, matrix in (
+        ("mass", table.mass), ("stiffness", table.stiffness), ("damping", table.damping)
+    ):  # fmt: skip
+        if matrix is not None:
+            _check_symmetric(matrix, count, ("matrices", key), report)
     if np.linalg.eigvalsh(np.array(table.mass))[0] <= 0:
         raise report(("matrices", "mass"), "must be positive definite")
     for name, values in table.interfaces.items():
         _check_length(values, count, "degree of freedom", ("matrices", "interfaces", name), report)
 
 
-def _check_square(matrix: Matrix, count: int, key: KeyPath, report: Report) -> None:
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def _check_symmetric(matrix: Matrix, count: int, key: KeyPath, report: Report) -> None:
     if len(matrix) != count or any(len(row) != count for row in matrix):
-        raise report(key, f"must have {count} rows of {count} numbers, as many as the mass matrix")
+        size = f"{_counted(count, 'row')} of {_counted(count, 'number')}"
+        raise report(key, f"must have {size}, like the mass matrix")
     values = np.array(matrix)
     if not np.allclose(values, values.T, rtol=1e-9, atol=1e-12 * np.abs(values).max()):
         raise report(key, "must be symmetric")

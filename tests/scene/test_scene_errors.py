@@ -79,6 +79,18 @@ def test_not_toml_names_the_line(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("[damping]\n[damping]\n", "the table [damping] is given twice (at line 2, column 9)"),
+        ("[a.b]\n[a.b]\n", "the table [a.b] is given twice (at line 2, column 5)"),
+        ("title = ''\ntitle = ''\n", "a key or table is given twice (at line 2, column 11)"),
+    ],
+)
+def test_what_is_given_twice_is_told_in_words_of_toml(tmp_path, text, fault):
+    assert check(tmp_path, text) == f"scene.toml: is not valid TOML: {fault}"
+
+
+@pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
         (
@@ -393,7 +405,7 @@ def test_matrices(tmp_path):
     base = "[matrices]\nmass = {}\nstiffness = {}\ninterfaces.a = [1.0, 0.0]\n"
     one = "[[1.0, 0.0], [0.0, 1.0]]"
     for mass, stiffness, sentence in (
-        ("[[1.0, 0.0]]", one, "matrices.mass must have 1 rows of 1 numbers"),
+        ("[[1.0, 0.0]]", one, "matrices.mass must be square, but has 1 row and one of 2 numbers"),
         ("1.0", one, "matrices.mass must be a list in square brackets, not 1.0"),
         (one, "[[1.0]]", "matrices.stiffness must have 2 rows of 2 numbers"),
         (one, "[[1.0, 0.5], [0.0, 1.0]]", "matrices.stiffness must be symmetric"),
