@@ -13,6 +13,34 @@ if TYPE_CHECKING:
     from nldyn.diagrams import Progress
 
 TERMINAL_PAUSE, FILE_PAUSE = 0.1, 60.0  # s
+COMPILING = "compiling, about 20 s the first time"
+
+
+@contextmanager
+def compilation_told(tell: Progress) -> Iterator[None]:
+    """Report numba's compilations, which take a while but leave nothing to do at later starts.
+
+    Code that is read from numba's cache is not reported.
+
+    Examples
+    --------
+    >>> import numba
+    >>> with compilation_told(lambda what, frequency_hz: print(what)):
+    ...     numba.njit(lambda x: x + 1)(1)
+    compiling, about 20 s the first time
+    2
+    """
+    from numba.core import event
+
+    class Teller(event.Listener):
+        def on_start(self, _: object) -> None:
+            tell(COMPILING, 0.0)
+
+        def on_end(self, _: object) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Teller()):
+        yield
 
 
 @contextmanager
@@ -58,7 +86,8 @@ def progress_line(quiet: bool = False) -> Iterator[Progress]:
         print(line, end="" if terminal else "\n", file=sys.stderr, flush=True)
 
     try:
-        yield report
+        with compilation_told(report):
+            yield report
     finally:
         if terminal and not quiet:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)

@@ -16,7 +16,7 @@ import cms
 from nldyn.continuation import ContinuationOptions
 from nldyn.diagrams import Diagram, Progress, Seed, diagram
 from nldyn.elements import Stop
-from nldyn.progress import progress_line
+from nldyn.progress import compilation_told, progress_line
 from nldyn.resources import example
 from nldyn.scene import build_component, build_system, load_scene
 from nldyn.system import System
@@ -179,7 +179,12 @@ def _end_with_parent() -> None:
 def run_job(name: str) -> Diagram:
     """Compute the job of one name (in a worker process), with what the figures need of it."""
     job = next(job for job in JOBS if job.name == name)
-    result = job.run(lambda what, frequency_hz: _tell((name, what, frequency_hz)))
+
+    def tell(what: str, frequency_hz: float) -> None:
+        _tell((name, what, frequency_hz))
+
+    with compilation_told(tell):
+        result = job.run(tell)
     for branch in result.branches:
         for orbit in branch.points:
             _ = orbit.max_abs_displacement, orbit.max_penetration, orbit.stable

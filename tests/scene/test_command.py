@@ -8,6 +8,7 @@ import sys
 import time
 import types
 
+import numba
 import pytest
 
 from nldyn import command, progress
@@ -91,3 +92,14 @@ def test_worker_processes_end_with_the_work():
         raise KeyboardInterrupt
     worker.join(10.0)
     assert not worker.is_alive()
+
+
+def test_compilation_is_told_and_compiled_code_is_not():
+    twice = numba.njit(lambda x: 2 * x)
+    said = []
+    with progress.compilation_told(lambda what, frequency_hz: said.append(what)):
+        twice(1)
+        assert said == ["compiling, about 20 s the first time"]
+        twice(2)
+    numba.njit(lambda x: 3 * x)(1)
+    assert len(said) == 1
