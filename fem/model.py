@@ -243,6 +243,10 @@ class Interface:
         _known_direction(f"interface at {self.point!r}", self.direction)
 
 
+LISTS = {"supports": Support, "point_masses": PointMass, "springs": PointSpring, "hinges": Hinge}
+TABLES = {"parts": BeamPart, "interfaces": Interface}
+
+
 @dataclass(frozen=True, eq=False)
 class FrameModel:
     """A plane frame in the x-y plane: a mesh and everything attached to it.
@@ -261,8 +265,8 @@ class FrameModel:
     Raises
     ------
     ModelError
-        If a name is not in the mesh, an element belongs to no part or to two, z varies, a hinge
-        joins nothing, or an interface is on a supported direction.
+        If something is not of its kind, a name is not in the mesh, an element belongs to no part
+        or to two, z varies, a hinge joins nothing, or an interface is on a supported direction.
 
     Examples
     --------
@@ -287,10 +291,12 @@ class FrameModel:
     interfaces: Mapping[str, Interface] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in ("supports", "point_masses", "springs", "hinges"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
-        for name in ("parts", "interfaces"):
-            object.__setattr__(self, name, dict(getattr(self, name)))
+        if not isinstance(self.mesh, FrameMesh):
+            raise ModelError(f"model: mesh must be a FrameMesh, not {self.mesh!r}")
+        for name, kind in LISTS.items():
+            object.__setattr__(self, name, self._listed(name, kind))
+        for name, kind in TABLES.items():
+            object.__setattr__(self, name, self._named(name, kind))
         self._check_plane()
         self._check_points()
         self._check_parts()
@@ -300,6 +306,24 @@ class FrameModel:
     def element_parts(self) -> dict[str, IntArray]:
         """Element indices of every part of the model."""
         return {name: self.mesh.part(name) for name in self.parts}
+
+    def _listed(self, name: str, kind: type[object]) -> tuple[object, ...]:
+        given = getattr(self, name)
+        if not (isinstance(given, Sequence) and all(isinstance(item, kind) for item in given)):
+            raise ModelError(
+                f"{self.mesh.source}: {name} must be a list of {kind.__name__}, not {given!r}"
+            )
+        return tuple(given)
+
+    def _named(self, name: str, kind: type[object]) -> dict[str, object]:
+        given = getattr(self, name)
+        items = given.values() if isinstance(given, Mapping) else [None]
+        if not all(isinstance(item, kind) for item in items):
+            raise ModelError(
+                f"{self.mesh.source}: {name} must be a dictionary of {kind.__name__} by name,"
+                f" not {given!r}"
+            )
+        return dict(given)
 
     def _check_plane(self) -> None:
         z = self.mesh.points[:, 2]

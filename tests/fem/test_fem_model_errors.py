@@ -64,6 +64,23 @@ def two_bars(**rest):
             lambda: two_bars(parts={"first": BAR}),
             "bars.msh: element 2 is in no part of the model, whose parts are 'first'",
         ),
+        (lambda: fem.FrameModel(None, {}), "model: mesh must be a FrameMesh, not None"),
+        (
+            lambda: two_bars(supports=fem.Support("a", "x")),
+            r"bars.msh: supports must be a list of Support, not Support\(point='a'",
+        ),
+        (
+            lambda: two_bars(springs=[fem.PointMass("a", 1.0)]),
+            r"bars.msh: springs must be a list of PointSpring, not \[PointMass\(",
+        ),
+        (
+            lambda: two_bars(parts=["first"]),
+            r"bars.msh: parts must be a dictionary of BeamPart by name, not \['first'\]",
+        ),
+        (
+            lambda: two_bars(interfaces={"tip": ("a", "y")}),
+            "bars.msh: interfaces must be a dictionary of Interface by name",
+        ),
         (lambda: two_bars(parts={}), "element 0 is in no part of the model, whose parts are none"),
         (
             lambda: two_bars(hinges=[fem.Hinge("b", "first")]),
