@@ -83,7 +83,7 @@ def judged(
     head = (row["id"], row["published"], row["unit"], row["kind"], row["quantity"], row["model"])
     if finding.value is None and finding.holds is None:
         return Claim(*head, finding.text, "", "not decided", finding.note)
-    agrees, deviation = finding.holds is not False, ""
+    agrees, deviation = finding.holds is None or bool(finding.holds), ""
     if finding.value is not None:
         agrees = agrees and number_agrees(finding.value, row["published"], row["kind"])
         deviation = f"{100 * (finding.value / float(row['published']) - 1.0):+.2f} %"

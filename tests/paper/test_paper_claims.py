@@ -5,6 +5,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 from fakes import FakeBranch, FakeDiagram, FakeNode, FakeOrbit, FakeSpecialPoint, resonance
 
@@ -64,7 +65,9 @@ def test_bound_is_met_from_below_only(computed, expected):
     assert verdict("4.5e-6", Finding(computed), "bound") == expected
 
 
-@pytest.mark.parametrize(("holds", "expected"), [(True, "agrees"), (False, "differs")])
+@pytest.mark.parametrize(
+    ("holds", "expected"), [(True, "agrees"), (False, "differs"), (np.bool_(False), "differs")]
+)
 def test_statement_is_judged_by_whether_it_holds(holds, expected):
     assert verdict("", Finding(holds=holds, text="found"), "statement") == expected
 
