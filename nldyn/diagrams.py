@@ -21,7 +21,7 @@ from nldyn.continuation import (
 from nldyn.errors import SystemModelError, check_frequency, check_whole
 from nldyn.flow import FlowMap
 from nldyn.orbit import ConvergenceError, Orbit, check_observe
-from nldyn.search import SearchOptions, orbits_from_strobe, simulate_strobe
+from nldyn.search import SearchOptions, orbits_from_strobe, reach, simulate_strobe
 from nldyn.special import LocateError
 from nldyn.system import System
 
@@ -161,9 +161,9 @@ def diagram(
 
     Orbits of each period are looked for by simulation at `search_points` frequencies and at the
     seeds, continued in both directions, and at each flip the doubled branch is followed when its
-    period is wanted. If no orbit found touches a stop, the search is repeated once with four
-    times as many initial states. What no simulation comes near (isolas of unstable orbits, say) is
-    missed.
+    period is wanted. If the stops are open at rest and no orbit found touches one, the search is
+    repeated once with four times as many initial states. What no simulation comes near (isolas of
+    unstable orbits, say) is missed.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def diagram(
     edges = np.geomspace(low, high, search_points + 1)
     places = np.sqrt(edges[:-1] * edges[1:])[::-1].tolist() if wanted else []
     _search(box, places, wanted, effort)
-    if places and not _touching(box):
+    if places and _contact_is_missing(box):
         more = replace(effort, starts=MORE_STARTS * effort.starts, seed=effort.seed + 1)
         _search(box, places, wanted, more)
     for seed in seeds:
@@ -230,7 +230,7 @@ def diagram(
         if not any(branch.period == period for branch in box.branches):
             tried = f"{search_points} frequenc{'y' if search_points == 1 else 'ies'}"
             box.notes.append(f"no orbit of period {period} found by simulation at {tried}")
-    if not _touching(box):
+    if _contact_is_missing(box):
         box.notes.append(
             "no orbit that touches a stop was found; there may be some all the same: try a range "
             "that begins lower, or more search points"
@@ -253,10 +253,10 @@ def _search(
             box.from_orbits(orbits_from_strobe(box.flow, strobe, period, box.observe, effort))
 
 
-def _touching(box: _Collector) -> bool:
-    """Whether an orbit with contact is known, or nothing can be touched."""
+def _contact_is_missing(box: _Collector) -> bool:
+    """Whether all stops are open at rest, and no orbit found touches one."""
     orbits = (orbit for branch in box.branches for orbit in branch.points)
-    return not box.flow.system.stops or any(orbit.max_penetration > 0.0 for orbit in orbits)
+    return reach(box.flow.system) > 0.0 and all(orbit.max_penetration == 0.0 for orbit in orbits)
 
 
 def _follow_seed(box: _Collector, seed: Seed, effort: SearchOptions) -> None:
