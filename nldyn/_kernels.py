@@ -1,7 +1,7 @@
 """Compiled kernels of the flow map: flights, contact phases, segments.
 
 All kernels that are called from here are in this one file, because the compile cache looks only
-at the file of the function that is called: a change in another file would go unnoticed.
+at the file of the function that is called; see `kernel_cache.resting_on` for the others.
 
 The state z is a list of pairs that move by themselves between contacts, z_b' = A_b z_b with real
 2×2 blocks; w is z without the steady response to the excitation.

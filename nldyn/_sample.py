@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from nldyn._kernels import block_exponential, inner, map_fraction
+from nldyn import _kernels
+from nldyn._kernels import FLIGHT, block_exponential, map_fraction, njit
+from nldyn.kernel_cache import resting_on
 
-FLIGHT = -1
+inner = resting_on(_kernels.inner, _kernels.__file__)
+compiled = resting_on(njit(cache=True, error_model="numpy"), _kernels.__file__)
 
 
 @inner
@@ -98,7 +100,7 @@ def fly_state(blocks, w, t):
         w[2 * b], w[2 * b + 1] = e00 * x + e01 * y, e10 * x + e11 * y
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def sample_states(
     blocks, force, omega, chi, to_legendre, gauss_nodes,
     rec_phase, rec_duration, rec_kind, rec_w, rec_force, count, phases,
@@ -131,7 +133,7 @@ def output_rate(row, row1, forced, omega, phase, w):
     return value, rate
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def local_extremes(
     blocks, force, omega, chi, to_legendre, gauss_nodes,
     rec_phase, rec_duration, rec_kind, rec_w, rec_force, count, row, row1, forced, fastest,
