@@ -297,12 +297,13 @@ def compute(scene: Scene, progress: Progress | None = None) -> Diagram:
     system = build_system(scene)
     from nldyn.continuation import ContinuationOptions
     from nldyn.diagrams import Seed, diagram
+    from nldyn.flow import FlowMap, FlowOptions
 
     table = scene.continuation
     assert table is not None
     with _told_as(scene, ("continuation",), SystemModelError):
         return diagram(
-            system,
+            FlowMap(system, FlowOptions(table.rtol)),
             (table.range_hz[0], table.range_hz[1]),
             table.periods,
             seeds=[Seed(seed.period, seed.near_hz) for seed in scene.subharmonics],
@@ -354,7 +355,7 @@ def _part(table: PartTable) -> fem.BeamPart:
 
 
 def _stop(table: StopTable) -> Stop:
-    from nldyn.elements import Stop, hertz_stiffness
+    from nldyn.elements import Stop, dissipation_for, hertz_stiffness
 
     stiffness = table.stiffness
     if stiffness is None:
@@ -362,7 +363,10 @@ def _stop(table: StopTable) -> Stop:
         ratio = 0.3 if table.poissons_ratio is None else table.poissons_ratio
         stiffness = hertz_stiffness(table.radius, table.youngs_modulus, ratio)
     exponent = 1.0 if table.law == "linear" else table.exponent or 1.5
-    return Stop(table.at, stiffness, exponent, table.gap, table.direction, table.against)
+    loss = table.dissipation or 0.0
+    if table.restitution is not None and table.impact_speed is not None:
+        loss = dissipation_for(table.restitution, table.impact_speed)
+    return Stop(table.at, stiffness, exponent, table.gap, table.direction, table.against, loss)
 
 
 def _excitation(table: ExcitationTable) -> Excitation:

@@ -190,6 +190,9 @@ class StopTable(Table):
     youngs_modulus: Positive | None = None
     poissons_ratio: Annotated[float, Field(gt=-1, le=0.5)] | None = None
     gap: Number = 0.0
+    dissipation: NotNegative | None = None
+    restitution: Annotated[float, Field(gt=0, le=1)] | None = None
+    impact_speed: Positive | None = None
     direction: Literal[1, -1] = 1
     against: str | None = None
 
@@ -197,6 +200,10 @@ class StopTable(Table):
     def _complete(self) -> StopTable:
         if self.against == self.at:
             raise ValueError("needs another interface than its own in 'against'")
+        if (self.restitution is None) != (self.impact_speed is None):
+            raise ValueError("needs both 'restitution' and 'impact_speed', or neither")
+        if self.restitution is not None:
+            _refuse(self, ("dissipation",), "a stop whose 'restitution' is given")
         sphere = ("radius", "youngs_modulus", "poissons_ratio")
         if self.law == "linear":
             _refuse(self, (*sphere, "exponent"), "a linear stop")
@@ -247,6 +254,7 @@ class ContinuationTable(Table):
     follow_doublings: Annotated[int, Field(ge=0, le=10)] = 0
     search_points: Annotated[int, Field(ge=1, le=1000)] = 12
     max_step: Annotated[float, Field(ge=0.01, le=1.0)] = 0.05
+    rtol: Annotated[float, Field(ge=1e-13, le=1e-2)] = 1e-9
 
     @field_validator("range_hz")
     @classmethod

@@ -6,8 +6,17 @@ import tomllib
 import numpy as np
 import pytest
 
+import nldyn.diagrams
+from nldyn.errors import SceneError
 from nldyn.resources import example, examples, mesh
-from nldyn.scene import build_component, build_reduced, build_system, load_scene, parse_scene
+from nldyn.scene import (
+    build_component,
+    build_reduced,
+    build_system,
+    compute,
+    load_scene,
+    parse_scene,
+)
 
 MODAL = """
 [modal]
@@ -142,3 +151,28 @@ def test_matrices_with_damping_matrix():
     system = build_system(parse_scene(text))
     assert system.natural_frequencies[0] == pytest.approx(200.0)
     assert system.damping[0, 0] == pytest.approx(3.0)
+
+
+def test_dissipation_of_a_stop_is_given_or_follows_from_restitution():
+    stop = "[[stops]]\nat='a'\nstiffness=1e9\n"
+    given = parse_scene(MODAL + stop + "dissipation=2.5\n")
+    assert build_system(given).stops[0].dissipation == 2.5
+    asked = parse_scene(MODAL + stop + "restitution=0.9\nimpact_speed=0.05\n")
+    assert build_system(asked).stops[0].dissipation == pytest.approx(0.75 * (1 - 0.81) / 0.05)
+    for wrong, words in (
+        ("restitution=0.9\n", "impact_speed"),
+        ("restitution=0.9\nimpact_speed=0.1\ndissipation=1.0\n", "dissipation"),
+        ("dissipation=-1.0\n", "dissipation"),
+        ("restitution=1.2\nimpact_speed=0.1\n", "restitution"),
+    ):
+        with pytest.raises(SceneError, match=words):
+            parse_scene(MODAL + stop + wrong)
+
+
+def test_tolerance_of_a_scene_is_that_of_its_flow_map(monkeypatch):
+    scene = load_scene(example("one_dof.toml"))
+    text = scene.text.replace("[continuation]", "[continuation]\nrtol = 1e-6")
+    taken = []
+    monkeypatch.setattr(nldyn.diagrams, "diagram", lambda flow, *_, **__: taken.append(flow))
+    compute(parse_scene(text, scene.file))
+    assert taken[0].options.rtol == 1e-6
