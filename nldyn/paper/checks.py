@@ -351,10 +351,16 @@ def _sub14(results: Results) -> Finding:
     branches = results["two_dof.sub14"].of_period(14)
     if not branches:
         return Finding(holds=False, text="no 1/14 orbit found near 57 Hz")
-    branch = branches[0]
-    hz = float(branch.frequency_hz[branch.max_abs_displacement.argmax()])
-    stable = int(branch.stable.sum())
-    return Finding(hz, note=f"{stable} of {len(branch.nodes)} points stable; top of the branch")
+    unstable = [(b, float(f)) for b in branches for f in b.frequency_hz[~b.stable]]
+    if not unstable:
+        return Finding(holds=False, text="the 1/14 orbits found near 57 Hz are stable")
+    branch, hz = min(unstable, key=lambda found: abs(found[1] - 57.0))
+    low, high = branch.frequency_hz.min(), branch.frequency_hz.max()
+    return Finding(
+        hz,
+        note=f"the unstable orbit nearest to 57 Hz; its branch was followed from {low:.2f} to "
+        f"{high:.2f} Hz, {int(branch.stable.sum())} of {len(branch.nodes)} points stable",
+    )
 
 
 def _undamped(results: Results) -> Finding:

@@ -109,10 +109,9 @@ LISTED = (
     Seed(10, 83.0), Seed(3, 18.4), Seed(5, 31.0), Seed(9, 56.0), Seed(13, 81.0),
 )  # fmt: skip
 
-# Branches of the larger models are long, and crowd: with the default angle the main 1/2 branch at
-# ξ = 0.01 jumps to its own shift near 36 Hz, with this one it ends at the flip at 32.28 Hz. One
-# that is cut off by max_points would be found and followed again from the next orbit.
-LONG = ContinuationOptions(max_points=20000, max_angle=0.1)
+# Branches of the larger models are long. One that is cut off by max_points would be found and
+# followed again from the next orbit.
+LONG = ContinuationOptions(max_points=20000)
 
 # The main 1/2 and 1/3 branches of each larger model, beside the harmonic branch.
 MAIN = (Seed(2, 45.0), Seed(3, 68.0))
@@ -151,7 +150,7 @@ JOBS = (
         _scene("two_dof_xi_0.001"),
         (50.0, 65.0),
         (),
-        (Seed(14, 57.0),),
+        (Seed(14, 56.75), Seed(14, 57.0)),
         options=ContinuationOptions(max_points=150),
     ),
     Job("two_dof.high", _scene("two_dof_xi_0.01"), (60.0, 135.0), (1,), search_points=4),
