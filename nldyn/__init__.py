@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from nldyn.errors import SceneError, SystemModelError
     from nldyn.flow import FlowMap, FlowOptions
     from nldyn.orbit import ConvergenceError, History, Orbit, solve_orbit
+    from nldyn.parameters import Parameter
     from nldyn.search import SearchOptions, find_orbits
     from nldyn.special import LocateError
     from nldyn.system import System
@@ -34,6 +35,7 @@ _HOMES = {
     "errors": "SceneError SystemModelError",
     "flow": "FlowMap FlowOptions",
     "orbit": "ConvergenceError History Orbit solve_orbit",
+    "parameters": "Parameter",
     "search": "SearchOptions find_orbits",
     "special": "LocateError",
     "system": "System",
@@ -52,6 +54,7 @@ __all__ = [
     "History",
     "LocateError",
     "Orbit",
+    "Parameter",
     "SceneError",
     "SearchOptions",
     "Seed",

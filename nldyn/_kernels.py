@@ -83,6 +83,10 @@ class FlowData(NamedTuple):
     laws: NDArray[np.int64]
     steady: Complex  # (2, 2n) z = w + Re(steady[0] e^{iωt}), and the derivative with respect to ω
     forced: Complex  # (2, n_out) the same of the outputs
+    # (n_parameters, 2): column of `stops`, or -1 for the excitation; and the index of the stop
+    parameters: NDArray[np.int64]
+    steady_by: Complex  # (n_parameters, 2n) derivative of steady[0] with respect to each
+    forced_by: Complex  # (n_parameters, n_out)
     omega: float
     tail: float
 
@@ -338,6 +342,20 @@ def law(fl, stop, delta, speed):
 def depends_on_speed(fl, stop):
     """Whether a force depends on the speed of penetration, as far as one knows."""
     return fl.laws[stop] != 0 or fl.stops[stop, DISSIPATION] != 0.0
+
+
+@inner
+def law_by(fl, stop, column, delta, speed):
+    """Derivative of the power law with respect to its own number in a column of `stops`."""
+    if delta <= 0.0 or column == GAP:
+        return 0.0
+    force, _, _ = law(fl, stop, delta, speed)
+    if column == STIFFNESS:
+        return force / fl.stops[stop, STIFFNESS]
+    if column == EXPONENT:
+        return force * math.log(delta)
+    factor = 1.0 + fl.stops[stop, DISSIPATION] * speed  # column == DISSIPATION
+    return speed * force / factor
 
 
 class Panel(NamedTuple):
@@ -636,8 +654,9 @@ def panel_end(fl, tab, kind, w, h, panel, w_end):
 def panel_columns(fl, tab, kind, phase, t0, h, panel, columns):
     """Advance sensitivities (2n, n_columns) in place over a panel.
 
-    The last column is the derivative with respect to ω at fixed time; t0 is the time from the
-    start of the segment at which its phase is fixed.
+    After those of the start come the derivatives with respect to parameters; the last column is
+    that with respect to ω at fixed time; t0 is the time from the start of the segment at which its
+    phase is fixed.
     """
     na, m = panel.F.shape
     n_columns = columns.shape[1]
@@ -659,6 +678,15 @@ def panel_columns(fl, tab, kind, phase, t0, h, panel, columns):
             else:
                 d_omega = fl.omega * d_omega + fl.forced[0, stop]
                 forces[p, n_columns - 1] -= slope * (d_omega * turn).imag
+            for c in range(fl.parameters.shape[0]):
+                q = columns.shape[0] + c
+                by = fl.forced_by[c, stop] * turn
+                forces[p, q] += slope * (by.real if o < na else -fl.omega * by.imag)
+                if o < na and fl.parameters[c, 1] == stop and fl.parameters[c, 0] == GAP:
+                    forces[p, q] -= slope
+                elif o < na and fl.parameters[c, 1] == stop and fl.parameters[c, 0] > GAP:
+                    speed = panel.output[na + o, i] if panel.slope.shape[0] > na else 0.0
+                    forces[p, q] += law_by(fl, stop, fl.parameters[c, 0], panel.output[o, i], speed)
     factor_panel(panel)
     lu_apply(panel.factors, panel.order, forces)
     for a in range(na):
@@ -1083,8 +1111,9 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, panel, w_end, 
 
 @inlined
 def propagate(
-    fl, tab, start, phase, duration, with_columns, rec, recording, end, jacobian, d_omega, closings
-):
+    fl, tab, start, phase, duration, with_columns, rec, recording, end, jacobian, d_omega,
+    d_parameters, closings,
+):  # fmt: skip
     """Carry a state over one segment.
 
     Parameters
@@ -1109,6 +1138,8 @@ def propagate(
         Filled with the derivative of the end with respect to the start, if wanted.
     d_omega : (2n,)
         Filled with the derivative of the end with respect to ω.
+    d_parameters : (2n, n_parameters)
+        Filled with the derivatives of the end with respect to the parameters.
     closings : (n_stops,)
         Increased by how often each stop closed.
 
@@ -1122,11 +1153,15 @@ def propagate(
     phase -= before
     turn = np.exp(1j * phase)
     w = np.empty(size)
-    columns = np.zeros((size, size + 1))
+    n_parameters = fl.parameters.shape[0]
+    last = size + n_parameters
+    columns = np.zeros((size, last + 1))
     for i in range(size):
         w[i] = start[i] - (fl.steady[0, i] * turn).real
         columns[i, i] = 1.0
-        columns[i, size] = -(fl.steady[1, i] * turn).real
+        columns[i, last] = -(fl.steady[1, i] * turn).real
+        for c in range(n_parameters):
+            columns[i, size + c] = -(fl.steady_by[c, i] * turn).real
     closed = np.zeros(n_stops, dtype=np.bool_)
     for s in range(n_stops):
         value, _, _, _ = output_derivatives(fl, s, w, phase, 0.0)
@@ -1149,11 +1184,13 @@ def propagate(
             rate[i] -= fl.force[i, s] * force
     for i in range(size):
         end[i] = w[i] + (fl.steady[0, i] * turn).real
-        d_omega[i] = columns[i, size] + (fl.steady[1, i] * turn).real
+        d_omega[i] = columns[i, last] + (fl.steady[1, i] * turn).real
         d_omega[i] -= rate[i] * (duration / fl.omega)
         if with_columns:
             for j in range(size):
                 jacobian[i, j] = columns[i, j]
+            for c in range(n_parameters):
+                d_parameters[i, c] = columns[i, size + c] + (fl.steady_by[c, i] * turn).real
     return status
 
 
@@ -1260,29 +1297,49 @@ def run_pieces(
 
 
 @inner
-def at_frequency(system, omega):
-    """Numbers of the system at an excitation frequency (rad/s)."""
-    blocks, rows, drive = system.blocks, system.rows, system.drive
-    n_out = rows.shape[1]
-    steady = np.empty(drive.shape, dtype=np.complex128)
+def resolvent(blocks, omega, x, y):
+    """Fill y (2n,) with the solution of (iω - A) y = x."""
     for b in range(blocks.shape[0]):
         i, j = 2 * b, 2 * b + 1
         m00, m01 = 1j * omega - blocks[b, 0, 0], -blocks[b, 0, 1]
         m10, m11 = -blocks[b, 1, 0], 1j * omega - blocks[b, 1, 1]
         det = m00 * m11 - m01 * m10
-        x = drive[0, i] + omega * omega * drive[1, i]
-        y = drive[0, j] + omega * omega * drive[1, j]
-        steady[0, i] = (m11 * x - m01 * y) / det
-        steady[0, j] = (m00 * y - m10 * x) / det
-        x = 2.0 * omega * drive[1, i] - 1j * steady[0, i]
-        y = 2.0 * omega * drive[1, j] - 1j * steady[0, j]
-        steady[1, i] = (m11 * x - m01 * y) / det
-        steady[1, j] = (m00 * y - m10 * x) / det
-    forced = np.zeros((2, n_out), dtype=np.complex128)
-    for d in range(2):
-        for out in range(n_out):
-            for j in range(drive.shape[1]):
-                forced[d, out] += rows[0, out, j] * steady[d, j]
+        u, v = x[i], x[j]
+        y[i] = (m11 * u - m01 * v) / det
+        y[j] = (m00 * v - m10 * u) / det
+
+
+@inner
+def of_outputs(rows, states, outputs):
+    """Fill outputs (k, n_out) of states (k, 2n)."""
+    for d in range(states.shape[0]):
+        for out in range(rows.shape[1]):
+            outputs[d, out] = 0.0
+            for j in range(states.shape[1]):
+                outputs[d, out] += rows[0, out, j] * states[d, j]
+
+
+@inner
+def at_frequency(system, omega, parameters, drive_by):
+    """Numbers of the system at an excitation frequency (rad/s), see `shoot`."""
+    blocks, rows, drive = system.blocks, system.rows, system.drive
+    steady = np.empty(drive.shape, dtype=np.complex128)
+    x = np.empty(drive.shape[1], dtype=np.complex128)
+    for i in range(x.size):
+        x[i] = drive[0, i] + omega * omega * drive[1, i]
+    resolvent(blocks, omega, x, steady[0])
+    for i in range(x.size):
+        x[i] = 2.0 * omega * drive[1, i] - 1j * steady[0, i]
+    resolvent(blocks, omega, x, steady[1])
+    steady_by = np.empty((parameters.shape[0], x.size), dtype=np.complex128)
+    for c in range(parameters.shape[0]):
+        for i in range(x.size):
+            x[i] = drive_by[c, 0, i] + omega * omega * drive_by[c, 1, i]
+        resolvent(blocks, omega, x, steady_by[c])
+    forced = np.empty((2, rows.shape[1]), dtype=np.complex128)
+    of_outputs(rows, steady, forced)
+    forced_by = np.empty((parameters.shape[0], rows.shape[1]), dtype=np.complex128)
+    of_outputs(rows, steady_by, forced_by)
     return FlowData(
         blocks,
         rows,
@@ -1292,24 +1349,32 @@ def at_frequency(system, omega):
         system.laws,
         steady,
         forced,
+        parameters,
+        steady_by,
+        forced_by,
         omega,
         system.tail,
     )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def shoot(system, tab, rec, recording, omega, nodes, phases, chained, with_columns):
+def shoot(
+    system, tab, rec, recording, omega, nodes, phases, chained, with_columns, parameters, drive_by
+):
     """Propagate each node (k, 2n) to the next phase; see `propagate` for what comes back.
 
     When `chained`, only the first node is used and each segment starts where the last one ended.
+    Derivatives are also taken with respect to parameters (n, 2), see `FlowData`; drive_by
+    (n, 2, 2n) is the derivative of `SystemData.drive` with respect to each.
     """
-    fl = at_frequency(system, omega)
+    fl = at_frequency(system, omega, parameters, drive_by)
     k = phases.size - 1
     size = nodes.shape[1]
     ends = np.zeros((k, size))
     kept = k if with_columns else 1
     jacobians = np.zeros((kept, size, size))
     d_omegas = np.zeros((kept, size))
+    d_parameters = np.zeros((kept, size, parameters.shape[0]))
     closings = np.zeros(system.stops.shape[0], dtype=np.int64)
     rec.used[1] = rec.used[0] if recording else 0
     rec.used[0] = 0
@@ -1319,11 +1384,11 @@ def shoot(system, tab, rec, recording, omega, nodes, phases, chained, with_colum
         j = i if with_columns else 0
         status = propagate(
             fl, tab, start, phases[i], duration, with_columns, rec, recording,
-            ends[i], jacobians[j], d_omegas[j], closings,
+            ends[i], jacobians[j], d_omegas[j], d_parameters[j], closings,
         )  # fmt: skip
         if status != OK:
-            return ends, jacobians, d_omegas, closings, status
-    return ends, jacobians, d_omegas, closings, OK
+            return ends, jacobians, d_omegas, d_parameters, closings, status
+    return ends, jacobians, d_omegas, d_parameters, closings, OK
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -1368,6 +1433,8 @@ def newton(system, tab, rec, point, row, level, phases, state_weight, rtol, max_
     along = np.zeros(unknowns)
     first, last = np.inf, np.inf
     yes = max_iterations > 0  # not a literal, so that `shoot` is compiled once
+    none = np.empty((0, 2), dtype=np.int64)
+    nothing = np.empty((0, 2, size), dtype=np.complex128)
     outcome = NOT_CONVERGED
     iteration = 0
     while True:
@@ -1376,8 +1443,8 @@ def newton(system, tab, rec, point, row, level, phases, state_weight, rtol, max_
         for s in range(k):
             for i in range(size):
                 nodes[s, i] = point[s * size + i]
-        ends, jacobians, d_omegas, closings, status = shoot(
-            system, tab, rec, yes, omega, nodes, phases, not yes, yes
+        ends, jacobians, d_omegas, _, closings, status = shoot(
+            system, tab, rec, yes, omega, nodes, phases, not yes, yes, none, nothing
         )
         if status != OK:
             outcome = status

@@ -344,7 +344,12 @@ class HarmonicForce:
     @property
     def phasor(self) -> complex:
         """Complex amplitude in N."""
-        return self.amplitude * _turn(self.phase_deg)
+        return self.amplitude * self.direction
+
+    @property
+    def direction(self) -> complex:
+        """Complex number of length 1 at the phase."""
+        return _turn(self.phase_deg)
 
 
 @dataclass(frozen=True)
@@ -378,7 +383,12 @@ class Unbalance:
     @property
     def phasor(self) -> complex:
         """Complex amplitude over ω² in kg m."""
-        return self.mass_times_radius * _turn(self.phase_deg)
+        return self.mass_times_radius * self.direction
+
+    @property
+    def direction(self) -> complex:
+        """Complex number of length 1 at the phase."""
+        return _turn(self.phase_deg)
 
 
 Excitation = HarmonicForce | Unbalance

@@ -7,7 +7,8 @@ the contact forces. See ``docs/theory.md``.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -32,6 +33,7 @@ from nldyn.contact_law import law_address
 from nldyn.errors import SystemModelError, check_whole
 from nldyn.gauss import GaussTables, gauss_tables
 from nldyn.linear import Complex, Real
+from nldyn.parameters import Parameter, parameter_tables
 from nldyn.system import System
 
 __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
@@ -123,6 +125,8 @@ class Segments:
         How often each stop closed.
     failure : str
         Empty, or why the segments could not be computed.
+    d_parameters : (k, 2n, n_parameters)
+        Derivatives of the ends with respect to the parameters asked for, at fixed phases.
     """
 
     ends: Real
@@ -130,6 +134,7 @@ class Segments:
     d_omega: Real
     closings: NDArray[np.int64]
     failure: str = ""
+    d_parameters: Real = field(default_factory=lambda: np.empty((0, 0, 0)))
 
     @property
     def monodromy(self) -> Real:
@@ -273,6 +278,7 @@ class FlowMap:
         *,
         sensitivities: bool = True,
         chained: bool = False,
+        parameters: Sequence[Parameter] = (),
     ) -> Segments:
         """Carry states over consecutive segments.
 
@@ -288,12 +294,20 @@ class FlowMap:
             Whether to compute the derivatives (without them the arrays hold no numbers of use).
         chained : bool
             Start each segment where the one before ended.
+        parameters : sequence of Parameter
+            Numbers of stops and excitation with respect to which derivatives are wanted, too.
 
         Returns
         -------
         Segments
+
+        Raises
+        ------
+        SystemModelError
+            For a parameter that the system does not have.
         """
-        ends, jacobians, d_omegas, closings, status = shoot(
+        chosen, drive_by = parameter_tables(self.system, parameters)
+        ends, jacobians, d_omegas, d_parameters, closings, status = shoot(
             self._data,
             self.tables,
             self._record(1),
@@ -303,8 +317,10 @@ class FlowMap:
             np.ascontiguousarray(phases, dtype=float),
             chained,
             sensitivities,
+            chosen,
+            drive_by,
         )
-        return Segments(ends, jacobians, d_omegas, closings, _REASONS[status])
+        return Segments(ends, jacobians, d_omegas, closings, _REASONS[status], d_parameters)
 
     def trajectory(self, nodes: Real, phases: Real, omega: float) -> Trajectory:
         """Record the motion from phase to phase, restarted from each node state.
@@ -325,7 +341,8 @@ class FlowMap:
         capacity = 64 * len(nodes)
         while True:
             record = self._record(capacity)
-            _, _, _, closings, status = shoot(
+            chosen, drive_by = parameter_tables(self.system, ())
+            _, _, _, _, closings, status = shoot(
                 self._data,
                 self.tables,
                 record,
@@ -335,6 +352,8 @@ class FlowMap:
                 np.ascontiguousarray(phases, dtype=float),
                 False,
                 False,
+                chosen,
+                drive_by,
             )
             if status != RECORD_FULL:
                 return self._motion(omega, record, closings, _REASONS[status])

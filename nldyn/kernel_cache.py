@@ -42,7 +42,7 @@ def resting_on(decorator: Any, *files: str | None) -> Any:
 
     def decorate(function: Any) -> Any:
         kernel = decorator(function)
-        cache_file = getattr(kernel._cache, "_cache_file", None)
+        cache_file = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
         if cache_file is not None:
             cache_file._source_stamp = (cache_file._source_stamp, stamp)
         return kernel
