@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from one_dof import make_one_dof
 
@@ -83,6 +83,8 @@ def test_liouville_error_of_an_orbit_is_small(one_dof, frequency):
 @given(STATES, st.sampled_from([1.0, 1.5, 2.0, 1.3]), st.floats(-3.0, 3.0))
 def test_without_a_gap_motion_scales_with_force(state, exponent, decades):
     """y → s y, force → s force, stiffness → s^(1-p) stiffness; for p = 1 nothing else changes."""
+    # at the very surface rounding decides whether the contact begins before the start or after
+    assume(abs(np.dot(PLACES["middle"], state[:3])) > 1e-12 * np.abs(state).max())
     s = 10.0**decades
     stiffness = 5e9 * 4e-6 ** (1.5 - exponent)
     omega, phases = 2 * np.pi * 25.0, np.array([0.3, 4.0])
