@@ -828,15 +828,18 @@ def stretch_profile(tab, old_kind, new_kind, ratio, old, new):
 
 
 @inner
-def map_fraction(kind, s):
+def map_fraction(tab, kind, s):
     """Fraction of the panel that belongs to the stretched time s (see `gauss.time_map`)."""
     if kind == 0:
         return s
     if kind == 1:
-        return s * (2.0 - s)
+        left = (1.0 - s) * (1.0 - s)
+        return 1.0 - (left if tab.power == 2 else left * left)
     if kind == 2:
-        return s * s
-    return 0.5 - 0.5 * np.cos(np.pi * s)
+        return s * s if tab.power == 2 else s * s * s * s
+    if tab.power == 2:
+        return 0.5 - 0.5 * np.cos(np.pi * s)
+    return s * s * s * s * (35.0 - s * (84.0 - s * (70.0 - 20.0 * s)))
 
 
 @inner
@@ -933,7 +936,7 @@ def first_event(fl, tab, kind, phase, w, h, closed, panel, w_end):
             values[i + 1] = inner[0, i]
         root = first_root(tab, values, noise + 4.0 * legendre_tail(tab, inner, 0))
         if root <= 1.0:
-            fraction = map_fraction(kind, root)
+            fraction = map_fraction(tab, kind, root)
             if fraction < where:
                 event, where = s, fraction
     return event, where

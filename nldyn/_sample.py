@@ -13,32 +13,36 @@ compiled = resting_on(njit(cache=True, error_model="numpy"), _kernels.__file__)
 
 
 @inner
-def stretched_time(kind, x):
+def stretched_time(tab, kind, x):
     """Inverse of `map_fraction`."""
     x = min(max(x, 0.0), 1.0)
     if kind == 0:
         return x
     if kind == 1:
-        return 1.0 - np.sqrt(1.0 - x)
+        left = np.sqrt(1.0 - x)
+        return 1.0 - (left if tab.power == 2 else np.sqrt(left))
     if kind == 2:
-        return np.sqrt(x)
-    return np.arccos(1.0 - 2.0 * x) / np.pi
+        root = np.sqrt(x)
+        return root if tab.power == 2 else np.sqrt(root)
+    s = np.arccos(1.0 - 2.0 * x) / np.pi
+    if tab.power == 4:
+        low, high = 0.0, 1.0
+        for _ in range(60):
+            error = map_fraction(tab, kind, s) - x
+            if error > 0.0:
+                high = s
+            else:
+                low = s
+            slope = 140.0 * (s * (1.0 - s)) ** 3
+            step = error / slope if slope > 0.0 else np.inf
+            s = s - step if low < s - step < high else 0.5 * (low + high)
+            if abs(step) <= 1e-15 or high - low <= 1e-15:
+                break
+    return s
 
 
 @inner
-def map_slope(kind, s):
-    """Derivative of `map_fraction`."""
-    if kind == 0:
-        return 1.0
-    if kind == 1:
-        return 2.0 - 2.0 * s
-    if kind == 2:
-        return 2.0 * s
-    return 0.5 * np.pi * np.sin(np.pi * s)
-
-
-@inner
-def antiderivative_weights(to_legendre, s, out):
+def antiderivative_weights(tab, s, out):
     """Weights of the node values in the integral of their interpolant from 0 to s."""
     m = out.size
     for j in range(m):
@@ -53,23 +57,23 @@ def antiderivative_weights(to_legendre, s, out):
             integral = 0.5 * (following - before) / (2 * degree + 1)
             before, here = here, following
         for j in range(m):
-            out[j] += integral * to_legendre[degree, j]
+            out[j] += integral * tab.to_legendre[degree, j]
 
 
 @inner
-def impulses(blocks, force, chi, gauss_nodes, kind, h, forces, shares):
+def impulses(blocks, force, tab, kind, h, forces, shares):
     """Fill shares (m, 2n): the nodes' impulses on the state, carried back to the panel's start."""
-    for j in range(gauss_nodes.size):
-        slope = h * map_slope(kind, gauss_nodes[j])
+    for j in range(tab.nodes.size):
+        slope = h * tab.slope[kind, j]
         for k in range(shares.shape[1]):
             shares[j, k] = 0.0
             for a in range(forces.shape[0]):
                 shares[j, k] += slope * force[k, a] * forces[a, j]
-        fly_state(blocks, shares[j], -h * chi[kind, j])
+        fly_state(blocks, shares[j], -h * tab.chi[kind, j])
 
 
 @inner
-def state_at(blocks, to_legendre, kind, h, start, shares, t, w):
+def state_at(blocks, tab, kind, h, start, shares, t, w):
     """Fill w with the homogeneous state a time t after the start of a piece."""
     if kind == FLIGHT:
         for k in range(w.size):
@@ -77,7 +81,7 @@ def state_at(blocks, to_legendre, kind, h, start, shares, t, w):
         fly_state(blocks, w, t)
     else:
         weights = np.empty(shares.shape[0])
-        antiderivative_weights(to_legendre, stretched_time(kind, t / h), weights)
+        antiderivative_weights(tab, stretched_time(tab, kind, t / h), weights)
         state_in_contact(blocks, start, shares, weights, t, w)
 
 
@@ -102,22 +106,22 @@ def fly_state(blocks, w, t):
 
 @compiled
 def sample_states(
-    blocks, force, omega, chi, to_legendre, gauss_nodes,
+    blocks, force, omega, tab,
     rec_phase, rec_duration, rec_kind, rec_w, rec_force, count, phases,
 ):  # fmt: skip
     """Homogeneous states (n_phases, 2n) at ascending forcing phases."""
     states = np.empty((phases.size, force.shape[0]))
-    shares = np.empty((gauss_nodes.size, force.shape[0]))
+    shares = np.empty((tab.nodes.size, force.shape[0]))
     piece, ready = 0, -1
     for i in range(phases.size):
         while piece + 1 < count and rec_phase[piece + 1] <= phases[i]:
             piece += 1
         kind, h = rec_kind[piece], rec_duration[piece]
         if ready != piece and kind != FLIGHT:
-            impulses(blocks, force, chi, gauss_nodes, kind, h, rec_force[piece], shares)
+            impulses(blocks, force, tab, kind, h, rec_force[piece], shares)
             ready = piece
         t = (phases[i] - rec_phase[piece]) / omega
-        state_at(blocks, to_legendre, kind, h, rec_w[piece], shares, t, states[i])
+        state_at(blocks, tab, kind, h, rec_w[piece], shares, t, states[i])
     return states
 
 
@@ -135,7 +139,7 @@ def output_rate(row, row1, forced, omega, phase, w):
 
 @compiled
 def local_extremes(
-    blocks, force, omega, chi, to_legendre, gauss_nodes,
+    blocks, force, omega, tab,
     rec_phase, rec_duration, rec_kind, rec_w, rec_force, count, row, row1, forced, fastest,
 ):  # fmt: skip
     """Phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output.
@@ -148,27 +152,27 @@ def local_extremes(
     found = np.empty((64, 3))
     n = 0
     w, v = np.empty(force.shape[0]), np.empty(force.shape[0])
-    shares = np.empty((gauss_nodes.size, force.shape[0]))
+    shares = np.empty((tab.nodes.size, force.shape[0]))
     steps = np.empty((blocks.shape[0], 4))
-    weights = np.empty((0, gauss_nodes.size))
+    weights = np.empty((0, tab.nodes.size))
     first_value, first_sign, sign, t_old, rate_old = 0.0, 0, 0, 0.0, 0.0
     for piece in range(count):
         h = rec_duration[piece]
         kind = rec_kind[piece]
         pieces = int(np.ceil(h / spacing)) + 1
         if kind != FLIGHT:
-            pieces += gauss_nodes.size
-            impulses(blocks, force, chi, gauss_nodes, kind, h, rec_force[piece], shares)
+            pieces += tab.nodes.size
+            impulses(blocks, force, tab, kind, h, rec_force[piece], shares)
             if weights.shape[0] != pieces + 1:
-                weights = np.empty((pieces + 1, gauss_nodes.size))
+                weights = np.empty((pieces + 1, tab.nodes.size))
                 for i in range(pieces + 1):
-                    antiderivative_weights(to_legendre, i / pieces, weights[i])
+                    antiderivative_weights(tab, i / pieces, weights[i])
         for b in range(blocks.shape[0]):
             e00, e01, e10, e11 = block_exponential(blocks[b], h / pieces)
             steps[b, 0], steps[b, 1], steps[b, 2], steps[b, 3] = e00, e01, e10, e11
         for i in range(pieces + 1):
             x = i / pieces
-            t = h * (x if kind == FLIGHT else map_fraction(kind, x))
+            t = h * (x if kind == FLIGHT else map_fraction(tab, kind, x))
             if kind != FLIGHT:
                 state_in_contact(blocks, rec_w[piece], shares, weights[i], t, w)
             elif i == 0:
@@ -193,7 +197,7 @@ def local_extremes(
                     middle = lo - rate_lo * (hi - lo) / (rate_hi - rate_lo)
                     if step > 10 and step % 2 == 0:
                         middle = 0.5 * (lo + hi)
-                    state_at(blocks, to_legendre, kind, h, rec_w[piece], shares, middle, v)
+                    state_at(blocks, tab, kind, h, rec_w[piece], shares, middle, v)
                     value, rate_middle = output_rate(
                         row, row1, forced, omega, rec_phase[piece] + omega * middle, v
                     )

@@ -224,7 +224,8 @@ class FlowMap:
     @cached_property
     def tables(self) -> GaussTables:
         """Collocation tables."""
-        return gauss_tables(self.options.panel_nodes)
+        smooth = all(float(2.0 * stop.exponent).is_integer() for stop in self.system.stops)
+        return gauss_tables(self.options.panel_nodes, 2 if smooth else 4)
 
     @cached_property
     def rows(self) -> Real:
@@ -517,9 +518,7 @@ class Trajectory:
             data.blocks,
             data.force,
             self.omega,
-            tables.chi,
-            tables.to_legendre,
-            tables.nodes,
+            tables,
             rec.phase,
             rec.duration,
             rec.kind,

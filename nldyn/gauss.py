@@ -38,6 +38,8 @@ class GaussTables(NamedTuple):
         Chebyshev points in s with both ends, four times as many.
     to_fine : (N, m + 2)
         Interpolation from `ends_nodes` to `fine_grid`.
+    power : int
+        Power of the maps at a switch, see `time_map`.
     """
 
     chi: Real
@@ -50,13 +52,15 @@ class GaussTables(NamedTuple):
     barycentric: Real
     fine_grid: Real
     to_fine: Real
+    power: int
 
 
-def time_map(kind: int, s: Real | float) -> tuple[Real | float, Real | float]:
-    """Fraction of the panel χ(s) and its slope; quadratic at an end where a contact switches.
+def time_map(kind: int, s: Real | float, power: int = 2) -> tuple[Real | float, Real | float]:
+    """Fraction of the panel χ(s) and its slope; flat at an end where a contact switches.
 
-    A force that starts like (t - t0)^p is smooth in s where t - t0 ~ s², if 2p is an integer.
-    The cosine has no other simple zeros in the complex plane, so it adds no branch points.
+    With t - t0 ~ s², a force that starts like (t - t0)^p is smooth in s if 2p is an integer; with
+    the power 4 it is smooth enough for any p (and all the more crowded at the switch). The cosine
+    has no other simple zeros in the complex plane, so it adds no branch points.
 
     Examples
     --------
@@ -66,15 +70,17 @@ def time_map(kind: int, s: Real | float) -> tuple[Real | float, Real | float]:
     if kind == SMOOTH:
         return s, 1.0 + 0.0 * s
     if kind == ENDS_AT_SWITCH:
-        return s * (2.0 - s), 2.0 - 2.0 * s
+        return 1.0 - (1.0 - s) ** power, power * (1.0 - s) ** (power - 1)
     if kind == STARTS_AT_SWITCH:
-        return s * s, 2.0 * s
-    return 0.5 - 0.5 * np.cos(np.pi * s), 0.5 * np.pi * np.sin(np.pi * s)
+        return s**power, power * s ** (power - 1)
+    if power == 2:
+        return 0.5 - 0.5 * np.cos(np.pi * s), 0.5 * np.pi * np.sin(np.pi * s)
+    return s**4 * (35.0 - s * (84.0 - s * (70.0 - 20.0 * s))), 140.0 * (s * (1.0 - s)) ** 3
 
 
 @lru_cache(maxsize=8)
-def gauss_tables(m: int) -> GaussTables:
-    """Tables for m Gauss nodes.
+def gauss_tables(m: int, power: int = 2) -> GaussTables:
+    """Tables for m Gauss nodes and a power (2 or 4) of the maps at a switch.
 
     Examples
     --------
@@ -90,7 +96,7 @@ def gauss_tables(m: int) -> GaussTables:
         [0.5 * legendre.legval(x, legendre.legint(unit, lbnd=-1)) for unit in np.eye(m)]
     ).T
     running = antiderivative @ to_legendre
-    maps = [time_map(kind, nodes) for kind in range(4)]
+    maps = [time_map(kind, nodes, power) for kind in range(4)]
     chi = np.array([c for c, _ in maps])
     slope = np.array([d for _, d in maps])
     ends_nodes = np.concatenate([[0.0], nodes, [1.0]])
@@ -107,6 +113,7 @@ def gauss_tables(m: int) -> GaussTables:
         barycentric,
         fine_grid,
         _interpolation(ends_nodes, barycentric, fine_grid),
+        power,
     )
 
 
