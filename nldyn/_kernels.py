@@ -234,8 +234,8 @@ def closing_time(fl, stop, w, phase, start, end):
     """First time in [start, end] at which a stop closes, or inf; no contact is passed over.
 
     Every step is bounded by the third derivative, so that it cannot cross a contact; the steps
-    converge to the contact at order three. Only contacts shorter than 1e-9 periods of the
-    fastest mode can be stepped over, and these carry no force.
+    converge to the contact at order three. Only contacts shorter than 1.6e-11 periods of the
+    excitation or of the fastest mode can be stepped over, and these carry no force.
     """
     shortest = 1e-10 / max(fl.omega, fastest_rate(fl))
     t = start
