@@ -144,9 +144,6 @@ def _read_elements(deck: _Deck, keyword: _Keyword) -> None:
         label, start, stop = (int(word) for word in row[:3])
         if label in deck.elements:
             raise deck.fail(f"element {label} is defined twice (write one part to a file)")
-        for node in (start, stop):
-            if node not in deck.nodes:
-                raise deck.fail(f"element {label} ends at node {node}, which is not defined")
         deck.elements[label] = (start, stop)
         if "ELSET" in keyword.parameters:
             deck.grow("ELSET", keyword.parameters["ELSET"], [label])
@@ -196,6 +193,10 @@ _ACTIONS: dict[str, Callable[[_Deck, _Keyword], None]] = {
 def _to_meshio(deck: _Deck) -> meshio.Mesh:
     node = {label: i for i, label in enumerate(deck.nodes)}
     element = {label: i for i, label in enumerate(deck.elements)}
+    for label, ends in deck.elements.items():
+        for end in ends:
+            if end not in node:
+                raise deck.fail(f"element {label} ends at node {end}, which is not defined")
     lines = [[node[start], node[stop]] for start, stop in deck.elements.values()]
     for name, labels in deck.sets["NSET"].values():
         missing = [label for label in labels if label not in node]

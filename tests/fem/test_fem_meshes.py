@@ -128,6 +128,12 @@ def test_abaqus_sets_grow_nest_and_ignore_case(tmp_path):
     }
 
 
+def test_abaqus_elements_may_stand_before_their_nodes(tmp_path):
+    path = tmp_path / "frame.inp"
+    path.write_text("*ELEMENT, TYPE=B23, ELSET=rod\n1, 1, 2\n*NODE\n1, 0, 0\n2, 3, 4\n")
+    assert fem.read_mesh(path).lengths.tolist() == [5.0]
+
+
 def test_abaqus_includes_another_file(tmp_path):
     (tmp_path / "nodes.inp").write_text("*NODE\n1, 0, 0\n2, 1, 0\n")
     (tmp_path / "main.inp").write_text(
