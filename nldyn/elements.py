@@ -250,6 +250,8 @@ class Stop:
         poissons_ratio: float = 0.3,
         gap: float = 0.0,
         direction: int = 1,
+        against: str | None = None,
+        dissipation: float = 0.0,
     ) -> Stop:
         """Stop of a sphere against the structure, both of one material.
 
@@ -261,7 +263,7 @@ class Stop:
             Radius of the sphere in m.
         youngs_modulus, poissons_ratio : float
             Elastic constants (Pa, 1), see `hertz_stiffness`.
-        gap, direction
+        gap, direction, against, dissipation
             As for `Stop`.
 
         Examples
@@ -270,18 +272,29 @@ class Stop:
         '1.0879e+10'
         """
         stiffness = hertz_stiffness(radius, youngs_modulus, poissons_ratio)
-        return cls(at, stiffness, 1.5, gap, direction)
+        return cls(at, stiffness, 1.5, gap, direction, against, dissipation)
 
     @classmethod
-    def linear(cls, at: str, stiffness: float, *, gap: float = 0.0, direction: int = 1) -> Stop:
+    def linear(
+        cls,
+        at: str,
+        stiffness: float,
+        *,
+        gap: float = 0.0,
+        direction: int = 1,
+        against: str | None = None,
+        dissipation: float = 0.0,
+    ) -> Stop:
         """Linear one-sided spring (the bilinear oscillator's), stiffness in N/m.
+
+        The other parameters are as for `Stop`.
 
         Examples
         --------
         >>> Stop.linear("middle", 1.33e7).exponent
         1.0
         """
-        return cls(at, stiffness, 1.0, gap, direction)
+        return cls(at, stiffness, 1.0, gap, direction, against, dissipation)
 
 
 @dataclass(frozen=True)

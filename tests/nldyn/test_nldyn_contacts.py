@@ -416,6 +416,13 @@ def free_impact(mass: float, stiffness: float, exponent: float, speed: float):
     return factor * peak / speed, peak
 
 
+def test_named_stops_take_what_every_stop_takes():
+    more = {"gap": 1e-5, "direction": -1, "against": "frame", "dissipation": 2.0}
+    assert Stop.linear("m", 1e6, **more) == Stop("m", 1e6, 1.0, **more)
+    ball = Stop.hertz("m", radius=0.005, youngs_modulus=2.1e11, **more)
+    assert ball == Stop("m", ball.stiffness, 1.5, **more)
+
+
 def test_free_impact_formula_is_that_of_hertz():
     mass, stiffness, speed = 2.48, 5.17e9, 0.01
     duration, peak = free_impact(mass, stiffness, 1.5, speed)
