@@ -11,11 +11,12 @@ import numpy as np
 from scipy.optimize import brentq
 
 from nldyn.branch import Branch, BranchPoint, SpecialPoint
-from nldyn.errors import SystemModelError, check_whole
+from nldyn.errors import SystemModelError, check_whole, is_finite, shown
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine
 from nldyn.shooting import ShootingProblem
 from nldyn.special import Chord, LocateError, hidden_dip, special_points_between, tests
+from nldyn.system import numbers
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,11 @@ class ContinuationOptions:
         Longest step over which the number of contacts may change.
     max_points : int
         Most points in one direction.
+
+    Raises
+    ------
+    SystemModelError
+        For a length or angle out of range, or steps out of order.
     """
 
     first_step: float = 0.01
@@ -45,17 +51,21 @@ class ContinuationOptions:
     max_points: int = 5000
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.min_step <= self.first_step <= self.max_step < math.inf:
+        for name in ("min_step", "first_step", "max_step", "max_angle", "max_miss", "grazing_step"):
+            value = getattr(self, name)
+            if not (is_finite(value) and value > 0.0):
+                raise SystemModelError(
+                    f"continuation: {name} must be positive and finite, got {shown(value)}"
+                )
+        if not self.min_step <= self.first_step <= self.max_step:
             raise SystemModelError(
-                "continuation: steps must satisfy 0 < min_step <= first_step <= max_step < inf"
+                "continuation: steps must satisfy min_step <= first_step <= max_step"
             )
-        if not 0.0 < self.max_angle < 1.5:
+        if self.grazing_step < self.min_step:
+            raise SystemModelError("continuation: grazing_step must not be below min_step")
+        if self.max_angle >= 1.5:
             raise SystemModelError(
-                f"continuation: max_angle must lie in (0, 1.5), got {self.max_angle:g}"
-            )
-        if not 0.0 < self.max_miss < math.inf:
-            raise SystemModelError(
-                f"continuation: max_miss must be positive and finite, got {self.max_miss:g}"
+                f"continuation: max_angle must lie below 1.5, got {self.max_angle:g}"
             )
         check_whole("continuation: max_points", self.max_points, 2)
 
@@ -378,6 +388,8 @@ def continue_branch(
     ------
     SystemModelError
         If the range is empty or the orbit lies outside.
+    ConvergenceError
+        If Newton's method does not meet the orbit again at its own frequency.
 
     References
     ----------
@@ -410,10 +422,11 @@ def make_branch(
 
 def check_range(range_hz: tuple[float, float]) -> tuple[float, float]:
     """A frequency range as two floats, or a SystemModelError that says what is wrong."""
-    if len(range_hz) != 2:
-        raise SystemModelError(f"range_hz must be two frequencies, got {len(range_hz)}")
-    low, high = (float(f) for f in range_hz)
-    if not (math.isfinite(low) and math.isfinite(high) and 0.0 < low < high):
+    ends = numbers("range_hz", range_hz)
+    if ends.shape != (2,):
+        raise SystemModelError(f"range_hz must be two frequencies, got {shown(range_hz)}")
+    low, high = ends.tolist()
+    if not 0.0 < low < high:
         raise SystemModelError(
             f"range_hz must be two positive frequencies, ascending; got ({low:g}, {high:g})"
         )

@@ -281,9 +281,16 @@ def test_range(one_dof, orbit, value):
     sentence(lambda: diagram(one_dof, (value, 90.0)), "range_hz")
 
 
+@pytest.mark.parametrize("range_hz", ["ab", None, ("a", 90.0), [[5.0], [90.0, 95.0]]])
+def test_range_that_is_not_two_numbers(one_dof, orbit, range_hz):
+    sentence(lambda: continue_branch(orbit, range_hz), "range_hz")
+    sentence(lambda: diagram(one_dof, range_hz), "range_hz")
+
+
 def test_range_that_is_empty_or_elsewhere(orbit):
     sentence(lambda: continue_branch(orbit, (90.0, 5.0)), "range_hz", "ascending")
-    sentence(lambda: continue_branch(orbit, (5.0,)), "range_hz", "two frequencies", "got 1")
+    sentence(lambda: continue_branch(orbit, (5.0,)), "range_hz", "two frequencies", "got (5.0,)")
+    sentence(lambda: continue_branch(orbit, 30.0), "range_hz", "two frequencies", "got 30.0")
     sentence(lambda: continue_branch(orbit, (30.0, 90.0)), "orbit at 26 Hz", "outside")
 
 
@@ -293,7 +300,8 @@ def test_range_that_is_empty_or_elsewhere(orbit):
         {"first_step": 0.0}, {"min_step": -1.0}, {"max_step": 1e-3}, {"max_step": math.nan},
         {"first_step": math.nan}, {"max_angle": 0.0}, {"max_angle": math.nan}, {"max_points": 1},
         {"max_points": math.nan}, {"max_step": math.inf}, {"max_miss": 0.0},
-        {"max_miss": math.nan},
+        {"max_miss": math.nan}, {"grazing_step": math.nan}, {"grazing_step": -1.0},
+        {"grazing_step": 1e-9}, {"max_step": "a"}, {"max_miss": None}, {"max_angle": 1.5},
     ],
 )  # fmt: skip
 def test_continuation_options(options):
