@@ -36,7 +36,7 @@ class LinearPart:
     right, left : (2n, 2n)
         Basis and its inverse.
     growth : (n,)
-        Largest value of the norm of exp(A_b t) over t >= 0 (infinite for a free rigid body).
+        Upper bounds of the norm of exp(A_b t) over t >= 0 (infinite for a free rigid body).
     condition : float
         Condition number of the basis in energy coordinates.
     """
@@ -173,14 +173,29 @@ def _separated(plane: Real, block: Real) -> tuple[Real, Real]:
 
 
 def _growth(block: Real) -> float:
-    """Upper bound of the norm of exp(block t) over all t >= 0."""
-    if np.linalg.eigvalsh(0.5 * (block + block.T))[-1] <= 1e-9 * np.abs(block).max():
-        return 1.0
+    """Upper bound of the norm of exp(Bt) over t >= 0 for a block B, at most three times too large.
+
+    With the slowest eigenvalue m, or the real part m of a pair m ± iω, and R = B - mI,
+
+    exp(Bt) = exp(mt) (I cos ωt + R sin(ωt)/ω), or exp(mt) I + R f(t) for real eigenvalues,
+
+    and f = exp(mt) sin(ωt)/ω or (exp(mt) - exp(at))/(m - a) has its largest value where f' = 0.
+    Without decay |R|/ω, the condition number of the eigenvectors, is sharper.
+    """
+    if np.linalg.eigvalsh(0.5 * (block + block.T))[-1] <= 1e-12 * np.abs(block).max():
+        return 1.0  # the length never grows
     values = np.linalg.eigvals(block)
-    slowest = np.abs(values).min()
-    if slowest <= 1e-12 * np.abs(values).max():
-        slowest = np.abs(values).max()
-    if slowest == 0.0:
+    slow, fast = sorted(values, key=abs)
+    if fast == 0.0:
         return np.inf
-    times = np.geomspace(1e-4, 40.0, 200) / slowest
-    return 1.1 * max(float(np.linalg.norm(sla.expm(block * t), 2)) for t in times)
+    rest = float(np.linalg.norm(block - slow.real * np.eye(2), 2))
+    if slow.imag:
+        turn = abs(slow.imag)
+        top = np.exp(slow.real * np.arctan2(turn, -slow.real) / turn) / abs(fast)
+        return float(max(1.0, min(rest / turn, 1.0 + rest * top)))
+    excess = abs(fast) - abs(slow)
+    if excess and slow:
+        share = abs(slow) / excess * np.log1p(excess / abs(slow))
+    else:
+        share = 0.0 if excess else 1.0
+    return float(1.0 + rest * np.exp(-share) / abs(fast))

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.linalg as sla
+from hypothesis import assume, example, given, settings
+from hypothesis import strategies as st
 from independent import state_map
 
 from nldyn import Damper, FlowMap, HarmonicForce, System, Unbalance
+from nldyn.linear import _growth
 
 RNG = np.random.default_rng(1)
 FACTOR = RNG.standard_normal((4, 4))
@@ -104,6 +107,34 @@ def test_forced_response_is_the_receptance_of_the_matrices():
         found = state[:4] @ system.participation["b"]
         exact = ((u[2] - u[3]) * np.exp(1j * phase)).real
         assert abs(found - exact) < 1e-12 * abs(u[2] - u[3])
+
+
+ENTRY = st.tuples(st.floats(-1.0, 1.0), st.integers(-3, 3)).map(lambda e: e[0] * 10.0 ** e[1])
+DECAY = st.just(0.0) | st.floats(1e-6, 10.0)
+
+
+@settings(deadline=None, max_examples=150, derandomize=True)
+@given(st.tuples(ENTRY, ENTRY, ENTRY, ENTRY), DECAY)
+@example((0.0, 1.0, -1.0, -2.0), 0.0)  # critically damped
+@example((0.0, 10.0, -0.1, 0.0), 0.0)  # without decay
+def test_growth_bounds_the_matrix_exponential_from_above_closely(entries, decay):
+    block = np.array(entries).reshape(2, 2)
+    size = np.abs(block).max()
+    assume(size > 1e-3)
+    block -= (max(np.linalg.eigvals(block).real.max(), 0.0) + decay * size) * np.eye(2)
+    bound = _growth(block)
+    rates = np.abs(np.linalg.eigvals(block))
+    assume(rates.min() > 1e-5 * size)  # else the time is longer than can be sampled
+    times = np.geomspace(1e-3 / rates.max(), 10.0 / rates.min(), 200)
+    largest = max(np.linalg.norm(sla.expm(block * t), 2) for t in times)
+    assert max(largest, 1.0) <= bound * (1.0 + 1e-7) <= 3.3 * max(largest, 1.0)
+
+
+def test_growth_of_a_free_body_ends_with_a_damper_only():
+    """From speed v it goes v/c far; without a damper there is no end."""
+    assert _growth(np.array([[0.0, 1.0], [0.0, 0.0]])) == np.inf
+    damped = _growth(np.array([[0.0, 1.0], [0.0, -1e-3]]))
+    assert 1000.0 <= damped < 1002.0
 
 
 def test_rigid_body_mode_with_a_damper():
