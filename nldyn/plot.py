@@ -233,8 +233,8 @@ def plot_orbit(
     Returns
     -------
     pair of matplotlib.axes.Axes
-        Those for the displacement, with the begin of every contact marked, and for the contact
-        force.
+        Those for the displacement and for the contact force. The instants of `Orbit.impact_list`
+        are marked in both, also those of contacts too short for the samples.
 
     Examples
     --------
@@ -249,28 +249,11 @@ def plot_orbit(
     upper, lower = axes if axes is not None else new_axes_pair()
     _draw_displacement(upper, history.time, history.displacement[orbit.observe])
     _draw_forces(lower, history.time, history.force, [s.at for s in orbit.system.stops])
-    starts = [contact_starts(history.time, depth) for depth in history.penetration.T]
-    _mark_impacts((upper, lower), np.concatenate([[], *starts]))
+    _mark_impacts((upper, lower), [impact.time for impact in orbit.impact_list])
     name = period_name(orbit.period)
     upper.set_title(f"{name} orbit at {orbit.frequency_hz:.6g} Hz")
     lower.set_xlabel("time (s)")
     return upper, lower
-
-
-def contact_starts(
-    time: NDArray[np.float64], penetration: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Give the instants at which a sampled penetration turns positive.
-
-    Examples
-    --------
-    >>> contact_starts(np.array([0.0, 1.0, 2.0, 3.0]), np.array([-1.0, 1.0, -2.0, -1.0]))
-    array([0.5])
-    """
-    before, after = penetration[:-1], penetration[1:]
-    closing = (before <= 0.0) & (after > 0.0)
-    share = before[closing] / (before[closing] - after[closing])
-    return time[:-1][closing] + share * (time[1:] - time[:-1])[closing]
 
 
 def save_diagram(
@@ -382,12 +365,12 @@ def _draw_forces(
         ax.legend(fontsize="small", loc="upper right")
 
 
-def _mark_impacts(axes: Sequence[Axes], times: NDArray[np.float64]) -> None:
+def _mark_impacts(axes: Sequence[Axes], times: Sequence[float]) -> None:
     for ax in axes:
         for number, instant in enumerate(times):
             label = "impact" if number == 0 else None
-            ax.axvline(float(instant), color="0.35", linewidth=0.8, linestyle="--", label=label)
-    if times.size:
+            ax.axvline(instant, color="0.35", linewidth=0.8, linestyle="--", label=label)
+    if times:
         axes[0].legend(fontsize="small", loc="upper right")
 
 

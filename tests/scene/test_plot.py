@@ -102,8 +102,17 @@ def test_orbit_shows_displacement_impacts_and_force():
     force = lower.lines[0]
     impacts = upper.lines[2:]
     assert len(impacts) == orbit.impacts == 1
-    first_push = force.get_xdata()[np.argmax(force.get_ydata() > 0)]
-    assert impacts[0].get_xdata()[0] == pytest.approx(first_push, abs=2e-5)
+    hardest = force.get_xdata()[np.argmax(force.get_ydata())]
+    assert impacts[0].get_xdata()[0] == pytest.approx(hardest, abs=2e-5)
+
+
+def test_impacts_shorter_than_a_sample_are_marked():
+    system = build_system(load_scene(example("one_dof.toml")))
+    orbit = solve_orbit(system, frequency_hz=25.3)
+    assert not orbit.history(23).force.any()
+    for axes in plot_orbit(orbit, samples=23):
+        (mark,) = [line for line in axes.lines if line.get_linestyle() == "--"]
+        assert mark.get_xdata()[0] == orbit.impact_list[0].time
 
 
 def test_library_functions_leave_pyplot_alone():
