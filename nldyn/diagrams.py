@@ -92,6 +92,9 @@ class _Collector:
     def known(self, orbit: Orbit) -> bool:
         return any(branch.contains(orbit) for branch in self.branches)
 
+    def of_period(self, period: int) -> list[Branch]:
+        return [branch for branch in self.branches if branch.period == period]
+
     def add(self, branch: Branch) -> None:
         count = len(self.branches) + 1
         label = "harmonic" if branch.period == 1 else f"1/{branch.period}"
@@ -178,7 +181,7 @@ def diagram(
     search_points : int
         Number of frequencies searched, equally spaced on a logarithmic axis.
     doublings : int
-        How many further doublings to follow at flips of branches beyond `periods`.
+        How many doublings to follow at flips whose doubled period is not in `periods`.
     observe : str, optional
         Interface whose displacement is reported; the first unless given.
     options, search : optional
@@ -248,7 +251,7 @@ def _search(
         strobes.append(simulate_strobe(box.flow, frequency, effort))
     for period in periods:
         if period % 2 == 0 and period // 2 in periods:
-            _follow_flips(box, period // 2)
+            _follow_flips(box, box.of_period(period // 2))
         for strobe in strobes:
             box.from_orbits(orbits_from_strobe(box.flow, strobe, period, box.observe, effort))
 
@@ -274,8 +277,8 @@ def _follow_seed(box: _Collector, seed: Seed, effort: SearchOptions) -> None:
     box.notes.append(f"no 1/{seed.period} orbit found near {seed.near_hz:g} Hz")
 
 
-def _follow_flips(box: _Collector, period: int) -> None:
-    for branch in [b for b in box.branches if b.period == period]:
+def _follow_flips(box: _Collector, branches: Sequence[Branch]) -> None:
+    for branch in branches:
         for special in branch.special_points:
             if special.kind == "PD":
                 box.from_flip(special)
@@ -285,10 +288,9 @@ def _follow_flips_of_new(box: _Collector, wanted: Sequence[int], doublings: int)
     """Doubled branches of wanted periods from branches found late, then further doublings."""
     for period in wanted:
         if 2 * period in wanted:
-            _follow_flips(box, period)
-    largest = max(wanted, default=1)
+            _follow_flips(box, box.of_period(period))
+    fresh = [b for b in box.branches if not {b.period, 2 * b.period} <= set(wanted)]
     for _ in range(doublings):
-        for period in sorted({b.period for b in box.branches}):
-            if 2 * period > largest:
-                _follow_flips(box, period)
-        largest *= 2
+        count = len(box.branches)
+        _follow_flips(box, fresh)
+        fresh = box.branches[count:]

@@ -83,6 +83,16 @@ def test_diagram_finds_the_doubled_branch_between_two_flips(one_dof):
     assert len(set(names)) == len(names)
 
 
+def test_doublings_are_followed_whatever_other_periods_are_wanted(one_dof):
+    effort = SearchOptions(starts=1)
+    for doublings, count in ((1, 0), (2, 1)):
+        found = diagram(
+            one_dof, (8.0, 11.0), [1, 3], search_points=1, doublings=doublings, search=effort
+        )
+        assert any("flip at 8.7" in branch.stop_reason for branch in found.of_period(2))
+        assert len(found.of_period(4)) == count
+
+
 def test_diagram_says_which_orbit_it_could_not_follow(monkeypatch):
     def fails(orbit, *_, **__):
         raise ConvergenceError(f"no orbit at {orbit.frequency_hz:g} Hz: singular Jacobian")
