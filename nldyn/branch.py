@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine
 
+CLOSED = "closed branch"  # why a continuation stopped
+
 
 @dataclass(frozen=True, eq=False)
 class BranchPoint:
@@ -92,6 +94,11 @@ class Branch:
     def points(self) -> list[Orbit]:
         """The orbits, in order."""
         return [node.orbit for node in self.nodes]
+
+    @property
+    def closed(self) -> bool:
+        """Whether the branch ends where it began: its last point lies just beyond its first."""
+        return CLOSED in self.stop_reasons
 
     @property
     def stop_reason(self) -> str:

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq
 
-from nldyn.branch import Branch, BranchPoint, SpecialPoint
+from nldyn.branch import CLOSED, Branch, BranchPoint, SpecialPoint
 from nldyn.errors import SystemModelError, check_whole, is_finite, shown
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine
@@ -125,7 +125,7 @@ class Walk:
                 yield end
                 return
             if self._closed(here, point):
-                self.stop_reason = "closed branch"
+                self.stop_reason = CLOSED
                 yield point
                 return
             yield point
@@ -401,7 +401,7 @@ def continue_branch(
             f"the orbit at {orbit.frequency_hz:g} Hz lies outside range_hz = ({low:g}, {high:g})"
         )
     up, up_special, up_reason = trace(start_point(orbit, 1.0), (low, high), options, progress)
-    if up_reason == "closed branch":
+    if up_reason == CLOSED:
         return make_branch(name, up, up_special, (up_reason, up_reason))
     down, down_special, down_reason = trace(
         start_point(orbit, -1.0), (low, high), options, progress

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from scipy.optimize import minimize_scalar
 
-from nldyn.branch import Branch
+from nldyn.branch import Branch, BranchPoint
 from nldyn.orbit import Orbit
 from nldyn.special import Chord, LocateError
 
@@ -55,12 +55,13 @@ def resonance_peaks(branch: Branch, range_hz: tuple[float, float] | None = None)
     25.371
     """
     low, high = range_hz or (0.0, float("inf"))
-    heights = branch.max_abs_displacement
     peaks = []
-    for i in range(1, len(heights) - 1):
-        top = heights[i] >= heights[i - 1] and heights[i] > heights[i + 1]
-        if top and low <= branch.nodes[i].orbit.frequency_hz <= high:
-            peaks.append(Peak(_refined(branch, i, 1.0)))
+    for around in _neighbourhoods(branch):
+        if len(around) < 3:
+            continue
+        before, here, after = (node.orbit.max_abs_displacement for node in around)
+        if before <= here > after and low <= around[1].orbit.frequency_hz <= high:
+            peaks.append(Peak(_refined(around, 1.0)))
     return peaks
 
 
@@ -70,21 +71,34 @@ def lowest_orbit(branch: Branch, range_hz: tuple[float, float]) -> Orbit | None:
     None if the branch has no computed point there.
     """
     low, high = range_hz
-    inside = [i for i, o in enumerate(branch.points) if low <= o.frequency_hz <= high]
-    if not inside:
-        return None
-    lowest = min(inside, key=lambda i: branch.nodes[i].orbit.max_abs_displacement)
-    return _refined(branch, lowest, -1.0)
+    inside = [
+        (node.orbit.max_abs_displacement, around)
+        for node, around in zip(branch.nodes, _neighbourhoods(branch), strict=False)
+        if low <= node.orbit.frequency_hz <= high
+    ]
+    return _refined(min(inside, key=lambda pair: pair[0])[1], -1.0) if inside else None
 
 
-def _refined(branch: Branch, i: int, sense: float) -> Orbit:
-    """Highest orbit on the two chords beside point i, or the lowest for the sense -1."""
+def _neighbourhoods(branch: Branch) -> list[tuple[BranchPoint, ...]]:
+    """Every point between those beside it, which an end has on one side only.
+
+    A closed branch has no end: its last point, which lies just beyond its first, is left out.
+    """
+    nodes = branch.nodes
+    if branch.closed:
+        ring = (nodes[-2], *nodes[:-1], nodes[0])
+        return [ring[i : i + 3] for i in range(len(nodes) - 1)]
+    return [nodes[max(i - 1, 0) : i + 2] for i in range(len(nodes))]
+
+
+def _refined(around: tuple[BranchPoint, ...], sense: float) -> Orbit:
+    """Highest orbit on the chords between neighbouring points, or the lowest for the sense -1."""
 
     def height(orbit: Orbit) -> float:
         return sense * orbit.max_abs_displacement
 
-    best = branch.nodes[i].orbit
-    for a, b in pairwise(branch.nodes[max(i - 1, 0) : i + 2]):
+    best = max((node.orbit for node in around), key=height)
+    for a, b in pairwise(around):
         chord = Chord(a, b)
         try:
             found = minimize_scalar(

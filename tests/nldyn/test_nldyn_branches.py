@@ -26,7 +26,7 @@ from nldyn import (
 from nldyn._events import branch_point_test, flip_test, torus_test
 from nldyn.branch import minimal_period, same_orbit
 from nldyn.continuation import start_point, trace
-from nldyn.peaks import lowest_orbit
+from nldyn.peaks import lowest_orbit, resonance_peaks
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
 from nldyn.special import special_points_between
@@ -112,6 +112,20 @@ def test_isola_is_walked_round_once(one_dof):
     ends = [sorted(s.frequency_hz for s in b.special_points if s.kind == "LP") for b in isolas]
     for other in ends[1:]:
         assert other == pytest.approx(ends[0], rel=1e-9)
+
+
+def test_top_of_an_isola_is_found_wherever_the_walk_starts(one_dof):
+    branch = next(
+        b for b in (continue_branch(o, RANGE_HZ) for o in find_orbits(one_dof, 9.3, 2)) if b.closed
+    )
+    tops = sorted(p.height for p in resonance_peaks(branch))
+    assert tops
+    highest = int(np.argmax(branch.max_abs_displacement))
+    starts = [branch.points[(highest + k) % len(branch.points)] for k in (-1, 0, 1)]
+    starts += [p.orbit for p in resonance_peaks(branch)]
+    for start in starts:
+        again = continue_branch(start, RANGE_HZ)
+        assert sorted(p.height for p in resonance_peaks(again)) == pytest.approx(tops, rel=1e-7)
 
 
 # --- Neimark-Sacker ------------------------------------------------------------------------------
