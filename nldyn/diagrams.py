@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -21,7 +22,7 @@ from nldyn.continuation import (
 from nldyn.errors import SystemModelError, check_frequency, check_whole
 from nldyn.flow import FlowMap
 from nldyn.orbit import ConvergenceError, Orbit, check_observe
-from nldyn.search import SearchOptions, orbits_from_strobe, reach, simulate_strobe
+from nldyn.search import SearchOptions, Strobe, orbits_from_strobe, reach, simulate_strobe
 from nldyn.special import LocateError
 from nldyn.system import System
 
@@ -63,7 +64,7 @@ class Diagram:
     observe : str
         Interface whose displacement is reported.
     notes : tuple of str
-        What was tried and gave nothing.
+        What was tried and gave nothing, and what may be missing.
     """
 
     branches: tuple[Branch, ...]
@@ -248,12 +249,22 @@ def _search(
     strobes = []
     for frequency in frequencies:
         box.progress("search", frequency)
-        strobes.append(simulate_strobe(box.flow, frequency, effort))
+        strobes.append(_simulate(box, frequency, effort))
     for period in periods:
         if period % 2 == 0 and period // 2 in periods:
             _follow_flips(box, box.of_period(period // 2))
         for strobe in strobes:
             box.from_orbits(orbits_from_strobe(box.flow, strobe, period, box.observe, effort))
+
+
+def _simulate(box: _Collector, frequency: float, effort: SearchOptions) -> Strobe:
+    """Simulations at one frequency; those that fail are noted."""
+    strobe = simulate_strobe(box.flow, frequency, effort)
+    for reason, count in Counter(strobe.failures).items():
+        box.notes.append(
+            f"{count} of {effort.starts} simulations at {frequency:.6g} Hz failed: {reason}"
+        )
+    return strobe
 
 
 def _contact_is_missing(box: _Collector) -> bool:
@@ -269,7 +280,7 @@ def _follow_seed(box: _Collector, seed: Seed, effort: SearchOptions) -> None:
         if not box.range_hz[0] <= frequency <= box.range_hz[1]:
             continue
         box.progress(f"search 1/{seed.period}", frequency)
-        strobe = simulate_strobe(box.flow, frequency, effort)
+        strobe = _simulate(box, frequency, effort)
         orbits = orbits_from_strobe(box.flow, strobe, seed.period, box.observe, effort)
         if orbits:
             box.from_orbits(orbits)

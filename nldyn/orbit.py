@@ -240,7 +240,12 @@ class Orbit:
         if self.motion is not None:
             return self.motion
         problem = self.problem
-        return problem.flow.trajectory(problem.nodes(self.point), problem.phases, self.omega)
+        motion = problem.flow.trajectory(problem.nodes(self.point), problem.phases, self.omega)
+        if motion.failure:
+            raise ConvergenceError(
+                f"the orbit at {self.frequency_hz:g} Hz could not be recorded: {motion.failure}"
+            )
+        return motion
 
     def extremes(self, output: int) -> Extremes:
         """Local extremes of an output: the stops' penetrations first, then the interfaces."""
@@ -442,7 +447,7 @@ def solve_orbit(
     SystemModelError
         For input that makes no sense.
     ConvergenceError
-        If Newton's method does not converge; the text gives the last step.
+        If the simulation fails or Newton's method does not converge; the text says why.
 
     Examples
     --------
@@ -462,8 +467,13 @@ def solve_orbit(
     if guess is None:
         start = np.zeros(problem.size)
         warm = np.linspace(0.0, 400.0 * np.pi, 201)
-        start = flow.shoot(start[None], warm, omega, sensitivities=False, chained=True).ends[-1]
-        nodes = spread(problem, start, omega)
+        found = flow.shoot(start[None], warm, omega, sensitivities=False, chained=True)
+        if found.failure:
+            raise ConvergenceError(
+                f"the simulation from rest at {frequency_hz:g} Hz failed: {found.failure}; "
+                "give a guess"
+            )
+        nodes = spread(problem, found.ends[-1], omega)
     else:
         guess = np.atleast_2d(numbers("guess", guess))
         if guess.shape not in ((1, problem.size), (problem.segments, problem.size)):

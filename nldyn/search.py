@@ -54,10 +54,13 @@ class Strobe:
         Excitation frequency in rad/s.
     runs : tuple of (k, 2n) arrays
         States at the start of each recorded excitation period.
+    failures : tuple of str
+        Why each of the other simulations failed.
     """
 
     omega: float
     runs: tuple[Real, ...]
+    failures: tuple[str, ...]
 
 
 def simulate_strobe(flow: FlowMap, frequency_hz: float, options: SearchOptions) -> Strobe:
@@ -72,14 +75,16 @@ def simulate_strobe(flow: FlowMap, frequency_hz: float, options: SearchOptions) 
     n = 2 * flow.system.size
     rng = np.random.default_rng(options.seed)
     size = max(float(np.abs(flow.system.steady(omega)).max()), reach(flow.system))
-    runs = []
+    runs, failures = [], []
     for index in range(options.starts):
         scale = 0.0 if index == 0 else size * 10.0 ** rng.uniform(-0.5, 1.0)
         start = scale * rng.standard_normal(n) / math.sqrt(n)
         found = flow.shoot(start[None], phases, omega, sensitivities=False, chained=True)
-        if not found.failure:
+        if found.failure:
+            failures.append(found.failure)
+        else:
             runs.append(found.ends[options.transient :])
-    return Strobe(omega, tuple(runs))
+    return Strobe(omega, tuple(runs), tuple(failures))
 
 
 def reach(system: System) -> float:
@@ -158,6 +163,8 @@ def find_orbits(
     ------
     SystemModelError
         For input that makes no sense.
+    ConvergenceError
+        If every simulation fails.
 
     Examples
     --------
@@ -173,6 +180,10 @@ def find_orbits(
     check_frequency("frequency_hz", frequency_hz)
     options = options or SearchOptions()
     strobe = simulate_strobe(flow, frequency_hz, options)
+    if not strobe.runs:
+        raise ConvergenceError(
+            f"every simulation at {frequency_hz:g} Hz failed: {strobe.failures[0]}"
+        )
     return orbits_from_strobe(flow, strobe, period, check_observe(flow.system, observe), options)
 
 

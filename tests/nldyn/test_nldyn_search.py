@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from independent import Motion
@@ -112,6 +114,37 @@ def test_diagram_says_what_it_did_not_find(one_dof):
     assert found.notes == ("no 1/2 orbit found near 26 Hz",)
     with pytest.raises(SystemModelError, match="near_hz = 95 lies outside"):
         diagram(one_dof, (84.0, 88.0), seeds=[Seed(2, 95.0)])
+
+
+@pytest.fixture
+def failing_simulations(monkeypatch):
+    shoot = FlowMap.shoot
+
+    def fails(*arguments, chained=False, **options):
+        found = shoot(*arguments, chained=chained, **options)
+        return dataclasses.replace(found, failure="too many contacts") if chained else found
+
+    monkeypatch.setattr(FlowMap, "shoot", fails)
+
+
+@pytest.mark.usefixtures("failing_simulations")
+def test_simulations_that_fail_are_told():
+    system = make_one_dof(stops=[])
+    with pytest.raises(ConvergenceError, match="from rest at 26 Hz failed: too many contacts"):
+        solve_orbit(system, 26.0)
+    with pytest.raises(ConvergenceError, match="every simulation at 26 Hz failed: too many"):
+        find_orbits(system, 26.0, 1)
+    effort = SearchOptions(starts=3)
+    found = diagram(system, (25.0, 27.0), [1], search_points=1, search=effort)
+    assert found.notes[0] == "3 of 3 simulations at 25.9808 Hz failed: too many contacts"
+
+
+def test_orbit_whose_motion_cannot_be_recorded_says_why(monkeypatch):
+    orbit = dataclasses.replace(solve_orbit(make_one_dof(stops=[]), 26.0), motion=None)
+    motion = dataclasses.replace(orbit.trajectory, failure="too many contacts")
+    monkeypatch.setattr(FlowMap, "trajectory", lambda *_: motion)
+    with pytest.raises(ConvergenceError, match="26 Hz could not be recorded: too many contacts"):
+        _ = dataclasses.replace(orbit).impacts
 
 
 def two_modes_before_a_gap(gap):
