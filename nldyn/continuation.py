@@ -117,11 +117,16 @@ class Walk:
                     yield end
                 return
             if passed_flip(here.orbit, point.orbit):
-                end = _flip_between(here, point)
-                self.stop_reason = (
-                    f"joins the branch of period {problem.period // 2} at the flip at "
-                    f"{end.orbit.frequency_hz:.6g} Hz"
-                )
+                half = f"the branch of period {problem.period // 2}"
+                try:
+                    end = _flip_between(here, point)
+                except ConvergenceError:
+                    self.stop_reason = (
+                        f"meets {half} beyond {here.orbit.frequency_hz:.6g} Hz, where no orbit of "
+                        "that period was found"
+                    )
+                    return
+                self.stop_reason = f"joins {half} at the flip at {end.orbit.frequency_hz:.6g} Hz"
                 yield end
                 return
             if self._closed(here, point):
@@ -234,6 +239,11 @@ def _flip_between(a: BranchPoint, b: BranchPoint) -> BranchPoint:
     The shooting equations of the doubled branch are singular at the flip, so the point where the
     halves agree is interpolated and solved as an orbit of half the period: the states are exact,
     the frequency is that of the interpolation.
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton's method finds no such orbit.
     """
     chord = Chord(a, b)
     problem = a.orbit.problem
@@ -248,10 +258,7 @@ def _flip_between(a: BranchPoint, b: BranchPoint) -> BranchPoint:
     half = nodes.shape[0] // 2
     single = ShootingProblem(problem.flow, problem.period // 2, half)
     mean = 0.5 * (nodes[:half] + nodes[half:])
-    try:
-        orbit = refine(single, mean, float(np.exp(point[-1])), a.orbit.observe)
-    except ConvergenceError:
-        return a
+    orbit = refine(single, mean, float(np.exp(point[-1])), a.orbit.observe)
     states = np.tile(single.nodes(orbit.point), (2, 1)).ravel()
     doubled = Orbit(
         problem,

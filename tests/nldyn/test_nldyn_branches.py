@@ -12,6 +12,7 @@ from scipy.optimize import minimize_scalar
 
 from nldyn import (
     ContinuationOptions,
+    ConvergenceError,
     FlowMap,
     Stop,
     System,
@@ -80,6 +81,17 @@ def test_doubled_branch_joins_two_flips(harmonic_branch):
         end = nodes[-1].orbit
         assert end.frequency_hz == pytest.approx(last.frequency_hz, rel=1e-4)
         assert minimal_period(end) == 1
+
+
+def test_flip_that_is_not_found_leaves_no_point_twice(harmonic_branch, monkeypatch):
+    def fails(*_, **__):
+        raise ConvergenceError("no orbit")
+
+    monkeypatch.setattr("nldyn.continuation.refine", fails)
+    flip = next(f for f in flips(harmonic_branch) if 8.0 < f.frequency_hz < 11.0)
+    nodes, _, reason = trace(switch_at_flip(flip), (5.7, 90.0))
+    assert reason.startswith("meets the branch of period 1 beyond 10.4")
+    assert np.all(np.diff([node.arclength for node in nodes]) > 0.0)
 
 
 def test_switching_needs_a_flip(harmonic_branch):
