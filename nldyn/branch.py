@@ -82,6 +82,8 @@ class Branch:
         In the same order.
     stop_reasons : tuple of str
         Why the continuation stopped at the first and at the last point.
+    notes : tuple of str
+        What may be missing.
     """
 
     name: str
@@ -89,6 +91,7 @@ class Branch:
     nodes: tuple[BranchPoint, ...]
     special_points: tuple[SpecialPoint, ...]
     stop_reasons: tuple[str, str]
+    notes: tuple[str, ...] = ()
 
     @property
     def points(self) -> list[Orbit]:

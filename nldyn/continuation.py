@@ -305,11 +305,15 @@ def trace(
     range_hz: tuple[float, float],
     options: ContinuationOptions | None = None,
     progress: Callable[[float], None] | None = None,
-) -> tuple[list[BranchPoint], list[SpecialPoint], str]:
-    """Walk from a point in the direction of its tangent and collect special points."""
+) -> tuple[list[BranchPoint], list[SpecialPoint], str, list[str]]:
+    """Walk from a point in the direction of its tangent and collect special points.
+
+    Returns the points, the special points, why the walk stopped, and notes on what may be missing.
+    """
     walk = Walk(start, range_hz, options or ContinuationOptions())
     nodes: list[BranchPoint] = []
     special: list[SpecialPoint] = []
+    notes: list[str] = []
     for point in walk:
         nodes.append(point)
         if progress is not None:
@@ -319,11 +323,13 @@ def trace(
     for a, b in pairwise(nodes):
         try:
             special += special_points_between(a, b)
-        except LocateError:
-            special += _by_halves(a, b)
+        except LocateError as error:
+            more, lost = _by_halves(a, b, error)
+            special += more
+            notes += lost
     if walk.stop_reason.startswith("joins"):  # the flip itself: a branch point of this branch
         special = [s for s in special if s.kind != "BP" or s.point.arclength < nodes[-2].arclength]
-    return nodes, special, walk.stop_reason
+    return nodes, special, walk.stop_reason, notes
 
 
 def _insert_dips(nodes: list[BranchPoint]) -> None:
@@ -347,21 +353,32 @@ def _insert_dips(nodes: list[BranchPoint]) -> None:
             return
 
 
-def _by_halves(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[SpecialPoint]:
-    """Special points of a chord on which a correction failed: try again on its halves."""
-    if depth > 3:
-        return []
+def _by_halves(
+    a: BranchPoint, b: BranchPoint, reason: LocateError, depth: int = 0
+) -> tuple[list[SpecialPoint], list[str]]:
+    """Special points of a chord on which a correction failed: try again on its halves.
+
+    With notes on the pieces where it failed again.
+    """
     try:
+        if depth > 3:
+            raise reason
         middle = Chord(a, b).at(0.5)
-    except LocateError:
-        return []
+    except LocateError as error:
+        hz = sorted(point.orbit.frequency_hz for point in (a, b))
+        return [], [
+            f"special points between {hz[0]:.8g} and {hz[1]:.8g} Hz may be missing: {error}"
+        ]
     found: list[SpecialPoint] = []
+    notes: list[str] = []
     for first, last in ((a, middle), (middle, b)):
         try:
             found += special_points_between(first, last)
-        except LocateError:
-            found += _by_halves(first, last, depth + 1)
-    return found
+        except LocateError as error:
+            more, lost = _by_halves(first, last, error, depth + 1)
+            found += more
+            notes += lost
+    return found, notes
 
 
 def continue_branch(
@@ -407,24 +424,31 @@ def continue_branch(
         raise SystemModelError(
             f"the orbit at {orbit.frequency_hz:g} Hz lies outside range_hz = ({low:g}, {high:g})"
         )
-    up, up_special, up_reason = trace(start_point(orbit, 1.0), (low, high), options, progress)
+    up, up_special, up_reason, up_notes = trace(
+        start_point(orbit, 1.0), (low, high), options, progress
+    )
     if up_reason == CLOSED:
-        return make_branch(name, up, up_special, (up_reason, up_reason))
-    down, down_special, down_reason = trace(
+        return make_branch(name, up, up_special, (up_reason, up_reason), up_notes)
+    down, down_special, down_reason, down_notes = trace(
         start_point(orbit, -1.0), (low, high), options, progress
     )
     nodes = [_reversed(p) for p in down[:0:-1]] + up
     special = [
         SpecialPoint(s.kind, _reversed(s.point), s.frequency_error) for s in reversed(down_special)
     ] + up_special
-    return make_branch(name, nodes, special, (down_reason, up_reason))
+    return make_branch(name, nodes, special, (down_reason, up_reason), down_notes + up_notes)
 
 
 def make_branch(
-    name: str, nodes: list[BranchPoint], special: list[SpecialPoint], reasons: tuple[str, str]
+    name: str,
+    nodes: list[BranchPoint],
+    special: list[SpecialPoint],
+    reasons: tuple[str, str],
+    notes: list[str],
 ) -> Branch:
     """Branch from its parts; the period is that of its orbits."""
-    return Branch(name, nodes[0].orbit.period, tuple(nodes), tuple(special), reasons)
+    period = nodes[0].orbit.period
+    return Branch(name, period, tuple(nodes), tuple(special), reasons, tuple(notes))
 
 
 def check_range(range_hz: tuple[float, float]) -> tuple[float, float]:

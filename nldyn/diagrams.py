@@ -99,7 +99,9 @@ class _Collector:
     def add(self, branch: Branch) -> None:
         count = len(self.branches) + 1
         label = "harmonic" if branch.period == 1 else f"1/{branch.period}"
-        self.branches.append(replace(branch, name=f"{count:02d} {label}"))
+        named = replace(branch, name=f"{count:02d} {label}")
+        self.branches.append(named)
+        self.notes += [f"branch {named.name}: {note}" for note in named.notes]
 
     def from_orbits(self, orbits: Iterable[Orbit]) -> None:
         """Follow each orbit both ways, unless its branch is known."""
@@ -131,9 +133,9 @@ class _Collector:
         if not low < start.orbit.frequency_hz < high or self.known(start.orbit):
             return
         progress = partial(self.progress, f"1/{start.orbit.period}")
-        nodes, specials, reason = trace(start, self.range_hz, self.options, progress)
+        nodes, specials, reason, notes = trace(start, self.range_hz, self.options, progress)
         origin = f"born at the flip at {special.frequency_hz:.6g} Hz"
-        self.add(make_branch("", nodes, specials, (origin, reason)))
+        self.add(make_branch("", nodes, specials, (origin, reason), notes))
         if reason.startswith("joins"):
             self.flip_ends.append(nodes[-1].orbit)
 

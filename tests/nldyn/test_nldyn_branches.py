@@ -14,12 +14,14 @@ from nldyn import (
     ContinuationOptions,
     ConvergenceError,
     FlowMap,
+    SearchOptions,
     Stop,
     System,
     SystemModelError,
     Unbalance,
     Walk,
     continue_branch,
+    diagram,
     find_orbits,
     solve_orbit,
     switch_at_flip,
@@ -30,7 +32,7 @@ from nldyn.continuation import start_point, trace
 from nldyn.peaks import lowest_orbit, resonance_peaks
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
-from nldyn.special import special_points_between
+from nldyn.special import LocateError, special_points_between
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +78,7 @@ def test_doubled_branch_joins_two_flips(harmonic_branch):
     """From the flip at 8.71 Hz to the one at 10.43 Hz, both ways round."""
     low, high = (f for f in flips(harmonic_branch) if 8.0 < f.frequency_hz < 11.0)
     for first, last in ((high, low), (low, high)):
-        nodes, _, reason = trace(switch_at_flip(first), (5.7, 90.0))
+        nodes, _, reason, _ = trace(switch_at_flip(first), (5.7, 90.0))
         assert reason.startswith("joins the branch of period 1 at the flip")
         end = nodes[-1].orbit
         assert end.frequency_hz == pytest.approx(last.frequency_hz, rel=1e-4)
@@ -89,7 +91,7 @@ def test_flip_that_is_not_found_leaves_no_point_twice(harmonic_branch, monkeypat
 
     monkeypatch.setattr("nldyn.continuation.refine", fails)
     flip = next(f for f in flips(harmonic_branch) if 8.0 < f.frequency_hz < 11.0)
-    nodes, _, reason = trace(switch_at_flip(flip), (5.7, 90.0))
+    nodes, _, reason, _ = trace(switch_at_flip(flip), (5.7, 90.0))
     assert reason.startswith("meets the branch of period 1 beyond 10.4")
     assert np.all(np.diff([node.arclength for node in nodes]) > 0.0)
 
@@ -338,6 +340,24 @@ def test_smaller_steps_give_the_same_special_points(one_dof):
     for a, b in zip(coarse.special_points, fine.special_points, strict=True):
         assert a.kind == b.kind
         assert a.frequency_hz == pytest.approx(b.frequency_hz, rel=1e-9)
+
+
+@pytest.mark.parametrize("middle_fails", [True, False])
+def test_branch_notes_where_special_points_may_be_missing(one_dof, monkeypatch, middle_fails):
+    def fails(*_):
+        raise LocateError("no root found")
+
+    monkeypatch.setattr("nldyn.continuation.special_points_between", fails)
+    if middle_fails:
+        monkeypatch.setattr("nldyn.continuation.Chord.at", fails)
+    branch = continue_branch(solve_orbit(one_dof, 33.0), (32.9, 33.1))
+    pieces = (1 if middle_fails else 16) * (len(branch.points) - 1)
+    assert len(branch.notes) == pieces
+    assert branch.notes[0].endswith("Hz may be missing: no root found")
+    found = diagram(one_dof, (32.9, 33.1), [1], search_points=1, search=SearchOptions(starts=1))
+    assert any(
+        note.startswith("branch 01 harmonic: special points between 3") for note in found.notes
+    )
 
 
 def test_no_special_points_between_the_same_two_points_in_either_direction(harmonic_branch):
