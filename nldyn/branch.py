@@ -126,6 +126,9 @@ class Branch:
     def at(self, frequency_hz: float) -> list[Orbit]:
         """All orbits of the branch at one frequency, corrected from its neighbours.
 
+        These are its points and special points: between a fold and the points beside it there may
+        be two orbits.
+
         Examples
         --------
         >>> branch.at(20.0)[0].frequency_hz        # doctest: +SKIP
@@ -133,7 +136,9 @@ class Branch:
         """
         p = math.log(2.0 * math.pi * frequency_hz)
         found: list[Orbit] = []
-        for a, b in pairwise(self.nodes):
+        places = [*self.nodes, *(special.point for special in self.special_points)]
+        places.sort(key=lambda place: place.arclength)
+        for a, b in pairwise(places):
             pa, pb = a.orbit.point[-1], b.orbit.point[-1]
             if min(pa, pb) <= p <= max(pa, pb):
                 share = 0.5 if pa == pb else (p - pa) / (pb - pa)
