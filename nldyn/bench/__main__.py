@@ -24,8 +24,12 @@ def main() -> None:
     out = parser.parse_args().out
     on_one_thread()
     from nldyn.bench.run import run
+    from nldyn.result_directory import OutputError
 
-    print(f"written to {run(out)}")
+    try:
+        print(f"written to {run(out)}")
+    except OutputError as error:
+        parser.error(str(error))
 
 
 if __name__ == "__main__":

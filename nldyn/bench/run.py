@@ -18,6 +18,7 @@ from nldyn.bench.page import Row, write_page
 from nldyn.bench.studies import BranchTime
 from nldyn.bench.targets import all_targets, fastest_rows, ratio_rows
 from nldyn.flow import FlowOptions
+from nldyn.result_directory import check_directory, result_directory
 
 WANTED = (1e-4, 1e-6, 1e-8, 1e-10)
 
@@ -28,7 +29,7 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
     Parameters
     ----------
     folder : Path
-        Where to write.
+        Where to write; it is written whole or not at all.
     models : sequence of str
         Some of `MODELS`.
     first_call : bool
@@ -38,13 +39,15 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
     -------
     Path
         The page.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written or holds something else.
     """
+    check_directory(folder)
     start = time.perf_counter()
-    folder.mkdir(parents=True, exist_ok=True)
     samples = [s for model in models for s in measure_model(model)]
-    for model in models:
-        extra = auto_flip_points() if model == "one_dof" else {}
-        draw_model(samples, model, folder, extra)
     tell("number of modes, grazing")
     modes = studies.time_modes()
     grazing = studies.grazing_errors()
@@ -95,7 +98,12 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
         ],
         "Work and precision": [sample_row(s) for s in samples],
     }
-    return write_page(tables, models, time.perf_counter() - start, folder)
+    with result_directory(folder, "bench") as new:
+        for model in models:
+            extra = auto_flip_points() if model == "one_dof" else {}
+            draw_model(samples, model, new, extra)
+        page = write_page(tables, models, time.perf_counter() - start, new)
+    return folder / page.name
 
 
 def measure_model(model: str) -> list[Sample]:

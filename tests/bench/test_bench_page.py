@@ -5,6 +5,7 @@ import csv
 import numpy as np
 import pytest
 
+from nldyn.bench import run
 from nldyn.bench.figures import draw_model
 from nldyn.bench.measure import Sample
 from nldyn.bench.page import write_page
@@ -19,6 +20,7 @@ from nldyn.bench.studies import (
     profile_branch,
 )
 from nldyn.bench.targets import all_targets, fastest_rows, ratio_rows
+from nldyn.result_directory import OutputError
 
 ENGINES = ("nldyn", "solve_ivp DOP853", "solve_ivp DOP853 in numpy")
 
@@ -109,9 +111,47 @@ def test_page_holds_tables_and_diagrams(tmp_path):
         assert len(list(csv.DictReader(stream))) == len(samples)
 
 
+def test_folder_that_holds_something_else_is_refused_before_measuring(tmp_path, monkeypatch):
+    (tmp_path / "thesis.txt").write_text("mine")
+    monkeypatch.setattr(run, "measure_model", lambda model: pytest.fail("measured"))
+    with pytest.raises(OutputError, match="not written by nldyn"):
+        run.run(tmp_path)
+
+
+def test_results_of_a_benchmark_that_stops_are_not_left_half_written(tmp_path, monkeypatch):
+    stub_measurements(monkeypatch)
+    folder = tmp_path / "bench"
+    page = run.run(folder, ["one_dof"], first_call=False)
+    assert page == folder / "page.md"
+    before = {file.name: file.read_bytes() for file in folder.iterdir()}
+    assert {"page.md", "targets.csv", "work_precision_one_dof.png"} <= set(before)
+
+    def stops(*_):
+        raise RuntimeError
+
+    monkeypatch.setattr(run, "write_page", stops)
+    with pytest.raises(RuntimeError):
+        run.run(folder, ["one_dof"], first_call=False)
+    assert {file.name: file.read_bytes() for file in folder.iterdir()} == before
+
+
+def stub_measurements(monkeypatch):
+    samples = [s for s in made_up_samples() if s.model == "one_dof"]
+    monkeypatch.setattr(run, "measure_model", lambda model: samples)
+    studies = run.studies
+    modes = [ModesTime(4, 1.0, 1, 0.0), ModesTime(64, 15.0, 1, 0.0)]
+    monkeypatch.setattr(studies, "time_modes", lambda: modes)
+    grazing = [GrazingError(0.1, 1.0, 0.0, 1e-9), GrazingError(0.01, 1.5, 0.0, 1e-10)]
+    monkeypatch.setattr(studies, "grazing_errors", lambda: grazing)
+    monkeypatch.setattr(
+        studies, "time_branch", lambda task: BranchTime(task, 0.2, 10, 2, 0, 1e-10, (("PD", 33.0),))
+    )
+    monkeypatch.setattr(studies, "profile_branch", lambda task: {"flow map": 0.6, "walk": 0.4})
+
+
 def test_special_points_stand_beside_the_published_ones():
-    run = BranchTime(BRANCHES[0], 0.2, 10, 1, 0, 0.0, (("PD", 33.654364273 * (1 + 1e-9)),))
-    row = special_point_rows(run)[-1]
+    timed = BranchTime(BRANCHES[0], 0.2, 10, 1, 0, 0.0, (("PD", 33.654364273 * (1 + 1e-9)),))
+    row = special_point_rows(timed)[-1]
     assert row["nldyn"] == "1e-09"
     assert row["AUTO 200"] == "-5e-05"
 
