@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -85,11 +85,14 @@ class Walk:
         Frequencies between which to stay.
     options : ContinuationOptions
         Step control.
+    open_ends : sequence of (N + 1,) arrays
+        Where other branches were broken off: the walk stops at the first of these that it passes.
     """
 
     start: BranchPoint
     range_hz: tuple[float, float]
     options: ContinuationOptions
+    open_ends: Sequence[Real] = ()
     stop_reason: str = "not finished"
 
     def __iter__(self) -> Iterator[BranchPoint]:
@@ -131,6 +134,10 @@ class Walk:
                 return
             if self._closed(here, point):
                 self.stop_reason = CLOSED
+                yield point
+                return
+            if any(_passes(here, point, end) for end in self.open_ends):
+                self.stop_reason = "meets another branch where that was broken off"
                 yield point
                 return
             yield point
@@ -207,12 +214,34 @@ class Walk:
         step = b.orbit.point - a.orbit.point
         if float(step @ (weights * start.tangent)) <= 0.0:
             return False
-        along = float(step @ (weights * (start.orbit.point - a.orbit.point)))
-        length2 = float(step @ (weights * step))
-        if not 0.0 <= along <= length2:
-            return False
-        off = start.orbit.point - a.orbit.point - along / length2 * step
-        return float(off @ (weights * off)) < 0.01 * length2
+        return _passes(a, b, start.orbit.point)
+
+
+def _passes(a: BranchPoint, b: BranchPoint, place: Real) -> bool:
+    """Whether a place lies beside the step from a to b, nearer than a tenth of its length."""
+    if place.size != a.orbit.point.size:
+        return False
+    weights = a.orbit.problem.metric(place)
+    step, way = b.orbit.point - a.orbit.point, place - a.orbit.point
+    along = float(step @ (weights * way))
+    length2 = float(step @ (weights * step))
+    if not 0.0 <= along <= length2:
+        return False
+    off = way - along / length2 * step
+    return float(off @ (weights * off)) < 0.01 * length2
+
+
+def open_ends(branch: Branch) -> list[Real]:
+    """Shooting unknowns where a branch was broken off, shifted by all its excitation periods."""
+    ends = zip((branch.nodes[0], branch.nodes[-1]), branch.stop_reasons, strict=True)
+    found = []
+    for end, reason in ends:
+        if reason.endswith(" points") or reason.startswith("step below"):
+            problem, point = end.orbit.problem, end.orbit.point
+            for shift in range(0, problem.segments, problem.segments // problem.period):
+                states = np.roll(problem.nodes(point), shift, axis=0)
+                found.append(np.append(states.ravel(), point[-1]))
+    return found
 
 
 def _length(weights: Real, vector: Real) -> float:
@@ -305,12 +334,13 @@ def trace(
     range_hz: tuple[float, float],
     options: ContinuationOptions | None = None,
     progress: Callable[[float], None] | None = None,
+    open_ends: Sequence[Real] = (),
 ) -> tuple[list[BranchPoint], list[SpecialPoint], str, list[str]]:
     """Walk from a point in the direction of its tangent and collect special points.
 
     Returns the points, the special points, why the walk stopped, and notes on what may be missing.
     """
-    walk = Walk(start, range_hz, options or ContinuationOptions())
+    walk = Walk(start, range_hz, options or ContinuationOptions(), open_ends)
     nodes: list[BranchPoint] = []
     special: list[SpecialPoint] = []
     notes: list[str] = []
@@ -388,6 +418,7 @@ def continue_branch(
     name: str = "",
     options: ContinuationOptions | None = None,
     progress: Callable[[float], None] | None = None,
+    open_ends: Sequence[Real] = (),
 ) -> Branch:
     """Continue an orbit in both directions through a range of frequencies.
 
@@ -403,6 +434,8 @@ def continue_branch(
         Step control.
     progress : callable, optional
         Called with the frequency of every point.
+    open_ends : sequence of (N + 1,) arrays
+        Where other branches were broken off, see `Walk`.
 
     Returns
     -------
@@ -425,12 +458,12 @@ def continue_branch(
             f"the orbit at {orbit.frequency_hz:g} Hz lies outside range_hz = ({low:g}, {high:g})"
         )
     up, up_special, up_reason, up_notes = trace(
-        start_point(orbit, 1.0), (low, high), options, progress
+        start_point(orbit, 1.0), (low, high), options, progress, open_ends
     )
     if up_reason == CLOSED:
         return make_branch(name, up, up_special, (up_reason, up_reason), up_notes)
     down, down_special, down_reason, down_notes = trace(
-        start_point(orbit, -1.0), (low, high), options, progress
+        start_point(orbit, -1.0), (low, high), options, progress, open_ends
     )
     nodes = [_reversed(p) for p in down[:0:-1]] + up
     special = [

@@ -16,11 +16,13 @@ from nldyn.continuation import (
     check_range,
     continue_branch,
     make_branch,
+    open_ends,
     switch_at_flip,
     trace,
 )
 from nldyn.errors import SystemModelError, check_frequency, check_whole
 from nldyn.flow import FlowMap
+from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, check_observe
 from nldyn.search import SearchOptions, Strobe, orbits_from_strobe, reach, simulate_strobe
 from nldyn.special import LocateError
@@ -96,6 +98,10 @@ class _Collector:
     def of_period(self, period: int) -> list[Branch]:
         return [branch for branch in self.branches if branch.period == period]
 
+    def open_ends(self, period: int) -> list[Real]:
+        """Where branches of a period were broken off: what lies beyond is followed up to there."""
+        return [end for branch in self.of_period(period) for end in open_ends(branch)]
+
     def add(self, branch: Branch) -> None:
         count = len(self.branches) + 1
         label = "harmonic" if branch.period == 1 else f"1/{branch.period}"
@@ -114,6 +120,7 @@ class _Collector:
                     self.range_hz,
                     options=self.options,
                     progress=partial(self.progress, f"1/{orbit.period}"),
+                    open_ends=self.open_ends(orbit.period),
                 )
             except ConvergenceError as error:
                 self.notes.append(f"orbit of period {orbit.period} found but not followed: {error}")
@@ -133,7 +140,9 @@ class _Collector:
         if not low < start.orbit.frequency_hz < high or self.known(start.orbit):
             return
         progress = partial(self.progress, f"1/{start.orbit.period}")
-        nodes, specials, reason, notes = trace(start, self.range_hz, self.options, progress)
+        nodes, specials, reason, notes = trace(
+            start, self.range_hz, self.options, progress, self.open_ends(start.orbit.period)
+        )
         origin = f"born at the flip at {special.frequency_hz:.6g} Hz"
         self.add(make_branch("", nodes, specials, (origin, reason), notes))
         if reason.startswith("joins"):

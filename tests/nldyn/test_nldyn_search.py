@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from independent import Motion
 from one_dof import make_one_dof
 
 from nldyn import (
+    ContinuationOptions,
     ConvergenceError,
     Damper,
     FlowMap,
@@ -25,6 +27,7 @@ from nldyn import (
     solve_orbit,
 )
 from nldyn.branch import minimal_period, same_orbit
+from nldyn.continuation import open_ends
 
 # where the paper's text sees subharmonics: 1/3 near 37.1, 1/5 near 62.2, 1/7 near 58, 1/13 near 81
 PLACES = [(3, 37.1), (5, 62.2), (7, 58.0), (13, 80.19), (2, 50.6), (3, 76.0)]
@@ -93,6 +96,38 @@ def test_doublings_are_followed_whatever_other_periods_are_wanted(one_dof):
         )
         assert any("flip at 8.7" in branch.stop_reason for branch in found.of_period(2))
         assert len(found.of_period(4)) == count
+
+
+def test_branch_that_was_broken_off_is_not_followed_twice():
+    """Pieces of few points from several frequencies overlap by no more than the last step."""
+    found = diagram(
+        make_one_dof(stops=[]), (20.0, 30.0), [1], search_points=3,
+        search=SearchOptions(starts=1, transient=200),
+        options=ContinuationOptions(max_points=20, first_step=1e-2, max_step=1e-2),
+    )  # fmt: skip
+    reasons = [reason for branch in found.branches for reason in branch.stop_reasons]
+    assert "20 points" in reasons
+    assert "meets another branch where that was broken off" in reasons
+    for one, other in itertools.permutations(found.branches, 2):
+        assert sum(other.contains(orbit) for orbit in one.points) <= 1
+
+
+def test_walk_meets_an_open_end_whatever_the_shift_of_the_orbit(one_dof):
+    options = ContinuationOptions(max_points=5)
+    short = continue_branch(find_orbits(one_dof, 37.1, 3)[0], (37.0, 37.2), options=options)
+    long = continue_branch(
+        short.points[5], (37.0, 37.2), options=dataclasses.replace(options, max_points=15)
+    )
+    beyond = long.points[-1]
+    states = beyond.states(2 * np.pi + beyond.problem.phases[:-1])
+    shifted = solve_orbit(one_dof, beyond.frequency_hz, 3, guess=states)
+    assert same_orbit(shifted, beyond) and not np.allclose(shifted.point, beyond.point)
+    ends = open_ends(short)
+    rest = continue_branch(shifted, (37.0, 37.2), options=options, open_ends=ends)
+    assert "meets another branch where that was broken off" not in rest.stop_reasons
+    rest = continue_branch(shifted, (37.0, 37.2), open_ends=ends)
+    assert "meets another branch where that was broken off" in rest.stop_reasons
+    assert sum(short.contains(orbit) for orbit in rest.points) <= 1
 
 
 def test_diagram_says_which_orbit_it_could_not_follow(monkeypatch):
