@@ -194,8 +194,10 @@ def _growth(block: Real) -> float:
         top = np.exp(slow.real * np.arctan2(turn, -slow.real) / turn) / abs(fast)
         return float(max(1.0, min(rest / turn, 1.0 + rest * top)))
     excess = abs(fast) - abs(slow)
-    if excess and slow:
+    if not excess:
+        share = 1.0
+    elif abs(slow) > 1e-16 * abs(fast):
         share = abs(slow) / excess * np.log1p(excess / abs(slow))
     else:
-        share = 0.0 if excess else 1.0
+        share = 0.0
     return float(1.0 + rest * np.exp(-share) / abs(fast))

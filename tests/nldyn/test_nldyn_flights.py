@@ -135,6 +135,7 @@ def test_growth_of_a_free_body_ends_with_a_damper_only():
     assert _growth(np.array([[0.0, 1.0], [0.0, 0.0]])) == np.inf
     damped = _growth(np.array([[0.0, 1.0], [0.0, -1e-3]]))
     assert 1000.0 <= damped < 1002.0
+    assert _growth(np.array([[-1e-320, 1.0], [0.0, -1e-3]])) == damped
 
 
 def test_rigid_body_mode_with_a_damper():
