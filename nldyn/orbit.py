@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -432,7 +433,8 @@ def solve_orbit(
         Period multiple n.
     guess : (2n,) or (k, 2n) array, optional
         Modal displacements and velocities at phase zero, or at the k shooting phases. Without it
-        the system is simulated from rest for 200 periods.
+        the system is simulated from rest for 200 periods; where the motion does not settle,
+        Newton's method starts where it nearly repeats.
     observe : str, optional
         Interface whose displacement is reported; the first unless given.
     segments : int, optional
@@ -473,7 +475,12 @@ def solve_orbit(
                 f"the simulation from rest at {frequency_hz:g} Hz failed: {found.failure}; "
                 "give a guess"
             )
-        nodes = spread(problem, found.ends[-1], omega)
+        strobe = found.ends[20:]
+        # beside a subharmonic attractor lies, in its middle, the orbit that it branched from
+        counts = (2, 3, 4, len(strobe)) if period == 1 else ()
+        middles = [strobe[-count:].mean(axis=0) for count in counts]
+        near = strobe[near_returns(strobe, period, 8)]
+        starts = [spread(problem, z, omega) for z in (strobe[-1], *near, *middles)]
     else:
         guess = np.atleast_2d(numbers("guess", guess))
         if guess.shape not in ((1, problem.size), (problem.segments, problem.size)):
@@ -482,10 +489,35 @@ def solve_orbit(
                 f"got shape {guess.shape}"
             )
         if guess.shape[0] == problem.segments:
-            nodes = flow.to_state(guess)
+            starts = [flow.to_state(guess)]
         else:
-            nodes = spread(problem, flow.to_state(guess[0]), omega)
-    return refine(problem, nodes, omega, observe)
+            starts = [spread(problem, flow.to_state(guess[0]), omega)]
+    for nodes in starts[:-1]:
+        with contextlib.suppress(ConvergenceError):
+            return refine(problem, nodes, omega, observe)
+    return refine(problem, starts[-1], omega, observe)
+
+
+def near_returns(states: Real, period: int, count: int) -> list[int]:
+    """Indices where the state comes back after `period` more nearly than before and after.
+
+    A motion that settles on an attractor also lingers near the saddles that it passes. The
+    closest returns come first; states near a chosen one are left out.
+    """
+    if len(states) <= period:
+        return []
+    distance = np.linalg.norm(states[period:] - states[:-period], axis=1)
+    scale = float(np.linalg.norm(states, axis=1).max()) or 1.0
+    before, after = np.append(np.inf, distance[:-1]), np.append(distance[1:], np.inf)
+    returns = np.flatnonzero((distance <= before) & (distance <= after) & (distance < 0.3 * scale))
+    chosen: list[int] = []
+    for index in returns[np.argsort(distance[returns], kind="stable")]:
+        if len(chosen) == count:
+            break
+        apart = [np.linalg.norm(states[index] - states[c]) for c in chosen]
+        if all(a > 1e-2 * scale for a in apart):
+            chosen.append(int(index))
+    return chosen
 
 
 def refine(

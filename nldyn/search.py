@@ -11,7 +11,15 @@ from nldyn.branch import minimal_period, same_orbit
 from nldyn.errors import check_frequency, check_whole
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
-from nldyn.orbit import ConvergenceError, Orbit, check_observe, refine, shooting_problem, spread
+from nldyn.orbit import (
+    ConvergenceError,
+    Orbit,
+    check_observe,
+    near_returns,
+    refine,
+    shooting_problem,
+    spread,
+)
 from nldyn.system import System
 
 
@@ -116,7 +124,7 @@ def orbits_from_strobe(
     problem = shooting_problem(flow, period)
     found: list[Orbit] = []
     for states in strobe.runs:
-        for start in _near_returns(states, period, options.candidates):
+        for start in near_returns(states, period, options.candidates):
             nodes = spread(problem, states[start], strobe.omega)
             try:
                 orbit = refine(problem, nodes, strobe.omega, observe, max_iterations=10)
@@ -185,25 +193,3 @@ def find_orbits(
             f"every simulation at {frequency_hz:g} Hz failed: {strobe.failures[0]}"
         )
     return orbits_from_strobe(flow, strobe, period, check_observe(flow.system, observe), options)
-
-
-def _near_returns(states: Real, period: int, count: int) -> list[int]:
-    """Indices where the state comes back after `period` more nearly than before and after.
-
-    A motion that settles on an attractor also lingers near the saddles that it passes. The
-    closest returns come first; states near a chosen one are left out.
-    """
-    if len(states) <= period:
-        return []
-    distance = np.linalg.norm(states[period:] - states[:-period], axis=1)
-    scale = float(np.linalg.norm(states, axis=1).max()) or 1.0
-    before, after = np.append(np.inf, distance[:-1]), np.append(distance[1:], np.inf)
-    returns = np.flatnonzero((distance <= before) & (distance <= after) & (distance < 0.3 * scale))
-    chosen: list[int] = []
-    for index in returns[np.argsort(distance[returns], kind="stable")]:
-        if len(chosen) == count:
-            break
-        apart = [np.linalg.norm(states[index] - states[c]) for c in chosen]
-        if all(a > 1e-2 * scale for a in apart):
-            chosen.append(int(index))
-    return chosen

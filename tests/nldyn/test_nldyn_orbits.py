@@ -276,3 +276,9 @@ def test_states_are_periodic_in_the_phase():
     np.testing.assert_allclose(
         orbit.states(phases + 2 * np.pi), orbit.states(phases), rtol=0, atol=1e-9
     )
+
+
+@pytest.mark.parametrize("frequency_hz", [34.0, 40.0, 42.0])
+def test_an_unstable_orbit_is_found_beside_the_attractor_of_twice_its_period(frequency_hz):
+    orbit = solve_orbit(make_one_dof(), frequency_hz)
+    assert orbit.period == 1 and not orbit.stable and orbit.error < 1e-10
