@@ -79,6 +79,20 @@ def test_liouville_error_of_an_orbit_is_small(one_dof, frequency):
     assert orbit.liouville_error < 1e-8
 
 
+def test_liouvilles_formula_is_not_judged_where_rounding_hides_the_determinant():
+    system = System.from_matrices(
+        np.diag([2.0, 1.0]),
+        [[2e4, -6e3], [-6e3, 1.2e4]],
+        {"a": [1.0, 0.0]},
+        damping=[[4000.0, -500.0], [-500.0, 3000.0]],
+        stops=[Stop.linear("a", 1e6)],
+        excitation=[HarmonicForce("a", 10.0)],
+    )
+    orbit = solve_orbit(system, 5.0)
+    assert orbit.impacts == 1 and orbit.error < 1e-10
+    assert math.isnan(orbit.liouville_error)
+
+
 @LAW
 @given(STATES, st.sampled_from([1.0, 1.5, 2.0, 1.3]), st.floats(-3.0, 3.0))
 def test_without_a_gap_motion_scales_with_force(state, exponent, decades):
