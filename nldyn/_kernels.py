@@ -614,13 +614,14 @@ def solve_panel(fl, tab, kind, phase, w, h, noise, panel):
             force[p] += step[p]
         change = 0.0
         for o in range(outputs):
-            scale, longest = 0.0, 0.0
+            scale, longest, total = 0.0, 0.0, 0.0
             for i in range(m):
                 value = less_forced(panel.G, free, force, o, i, m)
                 scale = max(scale, abs(output[o, i]))
                 longest = max(longest, abs(value - output[o, i]))
+                total += value
                 output[o, i] = value
-            if not np.isfinite(longest):
+            if not np.isfinite(total):  # a maximum may pass over nan
                 panel.kept[0] = False
                 return False
             if o < na and longest > noise[o]:
@@ -1274,6 +1275,8 @@ def run_pieces(
         )
         if status != OK:
             return status
+        if not np.isfinite(w_end.sum()):
+            return CONTACT_FAILED
         if h > 0.0:
             if recording:
                 n = record_piece(rec, before + here, h, kind, event, w)
@@ -1493,4 +1496,6 @@ def newton(system, tab, rec, point, row, level, phases, state_weight, rtol, max_
             break
         if iteration == max_iterations:
             break
+        if last > 0.5 * before:  # panels that change with what is remembered may keep it going
+            rec.used[0] = 0
     return outcome, iteration, first, last, along, jacobians, closings

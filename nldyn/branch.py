@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from nldyn.errors import check_frequency
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine
 
@@ -129,11 +130,17 @@ class Branch:
         These are its points and special points: between a fold and the points beside it there may
         be two orbits.
 
+        Raises
+        ------
+        SystemModelError
+            If the frequency is not a positive number.
+
         Examples
         --------
         >>> branch.at(20.0)[0].frequency_hz        # doctest: +SKIP
         20.0
         """
+        check_frequency("frequency_hz", frequency_hz)
         p = math.log(2.0 * math.pi * frequency_hz)
         found: list[Orbit] = []
         places = [*self.nodes, *(special.point for special in self.special_points)]

@@ -40,7 +40,7 @@ __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
 
 _REASONS = {
     OK: "",
-    TOO_MANY_PIECES: "too many contacts, or too fast a mode, for one segment",
+    TOO_MANY_PIECES: "too many contacts, or too fast a mode, for one segment (more segments help)",
     CONTACT_FAILED: "a contact phase could not be resolved",
     DIVERGED: "Newton's method diverged",
     SINGULAR: "singular Jacobian",

@@ -536,10 +536,11 @@ def refine(
     row[-1] = 1.0
     found = problem.correct(guess, row, max_iterations=max_iterations)
     if not found.converged:
+        step = f", last relative step {found.last_step:.1e}" if found.last_step < math.inf else ""
         raise ConvergenceError(
             f"no orbit of period {problem.period} found at {omega / (2 * math.pi):g} Hz: "
-            f"{found.failure}, last relative step {found.last_step:.1e} "
-            f"after {found.iterations} iterations"
+            f"{found.failure}{step} after {found.iterations} "
+            f"iteration{'' if found.iterations == 1 else 's'}"
         )
     return Orbit.of(problem, found, observe)
 

@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 from nldyn import (
     FlowMap,
     FlowOptions,
+    HarmonicForce,
     Stop,
     System,
     SystemModelError,
@@ -180,6 +181,22 @@ def test_the_largest_force_of_a_lossy_impact_comes_before_the_deepest_point():
     phi = orbit.system.participation["middle"]
     sampled = stop.force(states[:, :1] @ phi, states[:, 1:] @ phi)
     assert impact.force == pytest.approx(sampled.max(), rel=1e-6)
+
+
+@pytest.mark.parametrize("loss", [2000.0, 1e4])
+def test_an_orbit_with_a_stop_that_is_all_but_a_dashpot_is_found(loss):
+    """The contact creeps; panels remembered from the step before must not keep Newton going."""
+    system = System.from_matrices(
+        [[1.0]], [[(20 * np.pi) ** 2]], {"a": [1.0]}, modal_damping=0.02,
+        stops=[Stop("a", 1e8, 1.5, dissipation=loss)], excitation=[HarmonicForce("a", 1.0)],
+    )  # fmt: skip
+    state = np.array([-0.00010089, 0.02278614])  # of the strongest loss, by simulation with LSODA
+    for guess in (None, state):
+        orbit = solve_orbit(system, 12.0, guess=guess)
+        exact, _ = Motion(system).run(
+            orbit.states(np.zeros(1))[0], (0.0, 2 * np.pi), orbit.omega, max_step=0.002
+        )
+        assert orbit.states(np.zeros(1))[0] == pytest.approx(exact, rel=1e-8)
 
 
 def test_laws_that_cannot_be_used_are_refused():

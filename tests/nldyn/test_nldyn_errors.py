@@ -342,3 +342,9 @@ def test_diagram(one_dof):
 def test_history_without_samples(orbit):
     with pytest.raises(ValueError, match="samples must be positive, got 0"):
         orbit.history(0)
+
+
+@pytest.mark.parametrize("frequency", [0.0, -1.0, math.nan, "a"])
+def test_frequency_at_which_a_branch_is_asked_for(one_dof, frequency):
+    branch = continue_branch(solve_orbit(one_dof, 60.0), (59.0, 61.0))
+    sentence(lambda: branch.at(frequency), "frequency_hz")
