@@ -560,6 +560,21 @@ def less_forced(G, free, force, o, i, m):
 
 
 @inner
+def guess_rates(fl, panel, free, slope, force):
+    """Fill the rates of the outputs with what the guessed penetrations lead to without them."""
+    na, m = panel.F.shape
+    for o in range(na, panel.output.shape[0]):
+        for i in range(m):
+            panel.output[o, i] = 0.0
+    panel_forces(fl, panel, slope)
+    for p in range(force.size):
+        force[p] = panel.F[p // m, p % m]
+    for o in range(na, panel.output.shape[0]):
+        for i in range(m):
+            panel.output[o, i] = less_forced(panel.G, free, force, o, i, m)
+
+
+@inner
 def solve_panel(fl, tab, kind, phase, w, h, noise, panel):
     """Newton's method for the forces at the nodes; the penetrations in `output` are the guess.
 
@@ -577,16 +592,8 @@ def solve_panel(fl, tab, kind, phase, w, h, noise, panel):
     new = np.empty(slope.shape)
     force = np.empty(size)
     step = np.zeros(size)
-    if outputs > na:  # rates that belong to the guess
-        for o in range(na, outputs):
-            for i in range(m):
-                output[o, i] = 0.0
-        panel_forces(fl, panel, new)
-        for p in range(size):
-            force[p] = panel.F[p // m, p % m]
-        for o in range(na, outputs):
-            for i in range(m):
-                output[o, i] = less_forced(panel.G, free, force, o, i, m)
+    if outputs > na:
+        guess_rates(fl, panel, free, new, force)
     before = np.inf
     for iteration in range(60):
         panel_forces(fl, panel, new)
