@@ -8,6 +8,7 @@ from chains import chain, fixed_free_hz, free_free_hz
 from scipy import linalg
 
 import cms
+import fem
 
 
 def full_receptance(component, frequency_hz, at, excited):
@@ -248,3 +249,83 @@ def test_all_modes_of_an_ill_conditioned_pair():
     squares = (2 * np.pi * reduced.frequencies_hz) ** 2
     np.testing.assert_allclose(squares, stiffness, rtol=1e-5)
     np.testing.assert_allclose(squares[-4:], stiffness[-4:], rtol=1e-11)
+
+
+@pytest.mark.parametrize("size", [52, 88, 142])
+def test_all_modes_of_a_small_frame_are_those_of_the_direct_problem(size):
+    """Just below w_n^2 / w_1^2 = 1e6 the inverse problem gives all modes, the fastest too."""
+    component = portal_frame(size)
+    K, M = component.stiffness.toarray(), component.mass.toarray()
+    exact = np.sqrt(linalg.eigvalsh(K, M)) / (2 * np.pi)
+    whole = cms.reduce(component, cutoff_hz=1e9)
+    assert whole.modes == size
+    for modes in (size, size - 2, 3 * size // 4, size // 2):
+        reduced = cms.reduce(component, modes=modes)
+        fast = slice(modes // 2, modes)
+        np.testing.assert_allclose(reduced.frequencies_hz[fast], exact[fast], rtol=1e-8)
+        assert np.max(reduced.residuals[:modes]) < 1e-9
+
+
+@pytest.mark.parametrize("mode, other", [(0, 29), (0, 1), (14, 15)])
+@pytest.mark.parametrize("share", [1e-3, 1e-6])
+def test_residual_of_a_mode_is_its_share_of_another_times_their_distance(
+    cantilever, monkeypatch, mode, other, share
+):
+    """|w_i^2 - w_j^2| / (w_i w_j); both modes have it, and the slower one is told."""
+    monkeypatch.setattr("cms.eigen.dense_modes", mixing(mode, other, share))
+    squares = fixed_free_hz(30, 7.0, 0.3) ** 2
+    distance = abs(squares[mode] - squares[other]) / np.sqrt(squares[mode] * squares[other])
+    with pytest.raises(cms.ReductionError) as caught:
+        cms.reduce(cantilever, modes=30)
+    text = str(caught.value)
+    assert f"mode {mode + 1} of the component fails its residual check" in text
+    assert f"({share * distance:.1e} > 1.0e-08)" in text
+    assert "the eigen-solver did not find the lowest 30 modes to that accuracy" in text
+
+
+def test_component_too_stiff_for_double_precision_is_told_as_such():
+    """Springs from 1 to 1e15 N/m in coordinates that mix them all."""
+    stiffness = np.geomspace(1.0, 1e15, 8)
+    turn = linalg.hadamard(8) / np.sqrt(8.0)
+    component = cms.Matrices(turn * stiffness @ turn.T, np.eye(8), {"one": turn[0]})
+    with pytest.raises(cms.ReductionError, match="too much for double precision; use a coarser"):
+        cms.reduce(component, modes=1)
+
+
+def mixing(mode, other, share):
+    """A solver that puts a share of one mode into another."""
+    solve = cms.eigen.dense_modes
+
+    def mixed(pencil, shifted, count):
+        squares, vectors = solve(pencil, shifted, count)
+        vectors = vectors.copy()
+        vectors[:, mode] += share * vectors[:, other]
+        vectors[:, other] -= share * vectors[:, mode]
+        return squares, vectors
+
+    return mixed
+
+
+def portal_frame(size):
+    """A steel portal of unequal members: 9 e - 2 degrees of freedom with e elements in each."""
+    steel = fem.Material(2.1e11, 7800.0)
+    elements = (size + 2) // 9
+    mesh = fem.frame_mesh(
+        {"a": (0, 0), "b": (0, 0.5), "c": (0.8, 0.5), "d": (0.8, 0)},
+        [("left", "a", "b", elements), ("beam", "b", "c", elements), ("right", "c", "d", elements)],
+    )
+    sections = {
+        "left": fem.RectangularSection(0.03, 0.02),
+        "beam": fem.CircularSection(0.03, bore=0.02),
+        "right": fem.RectangularSection(0.01, 0.01),
+    }
+    component = fem.assemble(
+        fem.FrameModel(
+            mesh,
+            parts={name: fem.BeamPart(steel, section) for name, section in sections.items()},
+            supports=[fem.Support("a", ("x", "y", "rotation")), fem.Support("d", ("x", "y"))],
+            interfaces={"b": fem.Interface("b", "x")},
+        )
+    )
+    assert component.stiffness.shape == (size, size)
+    return component
