@@ -177,6 +177,6 @@ def _branch_summary(branch: Branch, range_hz: tuple[float, float]) -> dict[str, 
 
 
 def worst(values: Iterable[float]) -> float | None:
-    """Give the largest of some error figures; none if there are none or one is not finite."""
+    """Give the largest of some error figures; none if there are none or one is nan or inf."""
     figures = [float(value) for value in values]
     return max(figures) if figures and all(map(math.isfinite, figures)) else None

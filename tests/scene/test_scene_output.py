@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -73,6 +74,23 @@ def test_summary(tmp_path):
     assert summary["largest_relative_error"] == 1e-14
     assert summary["largest_liouville_error"] == 1e-12
     assert [b["stop_reason"] for b in summary["branches"]] == ["end of range"] * 3
+
+
+@pytest.mark.parametrize("unknown", [float("nan"), float("inf")])
+def test_an_error_that_is_no_number_is_null_in_the_summary(tmp_path, unknown):
+    """JSON has no word for it."""
+    orbits = [FakeOrbit(hz, 1e-4) for hz in (10.0, 20.0, 30.0)]
+    orbits[1] = replace(orbits[1], liouville_error=unknown)
+    nodes = [FakeNode(orbit, orbit.frequency_hz) for orbit in orbits]
+    write_results(FakeDiagram([FakeBranch("a", 1, nodes, [])]), tmp_path / "out")
+
+    def refuse(word):
+        raise AssertionError(word)
+
+    text = (tmp_path / "out" / "summary.json").read_text()
+    summary = json.loads(text, parse_constant=refuse)
+    assert summary["largest_liouville_error"] is None
+    assert summary["largest_relative_error"] == 1e-14
 
 
 def test_no_directory_if_the_picture_fails(tmp_path, monkeypatch):
