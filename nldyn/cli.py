@@ -46,7 +46,20 @@ def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> N
         context.exit()
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+class PlainGroup(click.Group):
+    """Commands that tell a fault on their command line in one sentence, without their usage."""
+
+    def invoke(self, ctx: click.Context) -> object:
+        """Run the command that is asked for."""
+        try:
+            return super().invoke(ctx)
+        except click.UsageError as error:
+            fault = error.format_message().rstrip(".")
+            click.echo(f"nldyn: {fault[:1].lower()}{fault[1:]}", err=True)
+            sys.exit(BAD_INPUT)
+
+
+@click.group(cls=PlainGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--version",
     is_flag=True,
