@@ -170,7 +170,8 @@ def _check_symmetric(matrix: Matrix, count: int, key: KeyPath, report: Report) -
 
 def _check_length(values: list[float], count: int, unit: str, key: KeyPath, report: Report) -> None:
     if len(values) != count:
-        raise report(key, f"must have {count} numbers, one per {unit}, not {show(values)}")
+        fault = f"must have {_counted(count, 'number')}, one per {unit}, not {show(values)}"
+        raise report(key, fault)
     if not any(values):
         raise report(key, "must not be zero throughout: nothing could move there")
 

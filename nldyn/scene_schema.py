@@ -265,6 +265,13 @@ class ContinuationTable(Table):
             raise ValueError(f"must run from the lower to the higher frequency, not {show(value)}")
         return value
 
+    @field_validator("periods")
+    @classmethod
+    def _different(cls, value: list[int]) -> list[int]:
+        if len(set(value)) < len(value):
+            raise ValueError(f"must name each period once, not {show(value)}")
+        return value
+
 
 class SeedTable(Table):
     """``[[subharmonics]]``: where to look for the start of a branch by time simulation."""
