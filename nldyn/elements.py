@@ -199,7 +199,7 @@ class Stop:
         _finite(owner, "gap", self.gap)
         if self.against == self.at:
             raise SystemModelError(f"{owner}: against must be another interface")
-        if self.direction not in (1, -1):
+        if isinstance(self.direction, bool | np.bool_) or self.direction not in (1, -1):
             raise SystemModelError(f"{owner}: direction must be +1 or -1, got {self.direction}")
 
     @property

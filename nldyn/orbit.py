@@ -362,11 +362,10 @@ class Orbit:
 
         Raises
         ------
-        ValueError
-            If `samples` is not positive.
+        SystemModelError
+            If `samples` is not a whole number of at least 1.
         """
-        if samples < 1:
-            raise ValueError(f"history: samples must be positive, got {samples}")
+        check_whole("history: samples", samples, 1)
         phases = np.linspace(0.0, 2.0 * np.pi * self.period, samples + 1)
         states = self.states(phases)
         system = self.system

@@ -84,7 +84,7 @@ def test_exponent_has_the_limit_that_it_has_in_a_scene():
     sentence(lambda: Stop("middle", 1e9, exponent=4.01), "exponent must lie in [1, 4]", "4.01")
 
 
-@pytest.mark.parametrize("direction", [0, 2, -2, math.nan])
+@pytest.mark.parametrize("direction", [0, 2, -2, math.nan, True, np.True_])
 def test_stop_direction(direction):
     sentence(lambda: Stop("middle", 1e9, direction=direction), "direction must be +1 or -1")
 
@@ -339,9 +339,9 @@ def test_diagram(one_dof):
     )
 
 
-def test_history_without_samples(orbit):
-    with pytest.raises(ValueError, match="samples must be positive, got 0"):
-        orbit.history(0)
+@pytest.mark.parametrize("samples", [0, -4, 2.5, True, "many"])
+def test_history_needs_a_whole_number_of_samples(orbit, samples):
+    sentence(lambda: orbit.history(samples), "history: samples must be a whole number of at least")
 
 
 @pytest.mark.parametrize("frequency", [0.0, -1.0, math.nan, "a"])
