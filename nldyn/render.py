@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import fem
     from fem.render import StopSphere
     from nldyn.diagrams import Progress
-    from nldyn.orbit import Orbit
+    from nldyn.orbit import Impact, Orbit
     from nldyn.scene_schema import Scene
     from nldyn.system import System
 
@@ -149,11 +149,20 @@ def orbit_to_draw(
     return max(orbits, key=lambda orbit: orbit.max_abs_displacement)
 
 
-def deepest_state(orbit: Orbit) -> NDArray[np.float64]:
-    """Modal displacements at the instant of deepest contact, or of largest displacement."""
-    impacts = orbit.impact_list
-    if impacts:
-        phase = orbit.omega * max(impacts, key=lambda impact: impact.penetration).time
+def deepest_impact(scene: Scene, orbit: Orbit) -> Impact | None:
+    """Give the deepest contact of an orbit, if it touches a stop.
+
+    Stops that can be drawn come first: the others are penetrated by angles, not by lengths.
+    """
+    drawable = [hit for hit in orbit.impact_list if stop_sphere(scene, hit.stop) is not None]
+    hits = drawable or orbit.impact_list
+    return max(hits, key=lambda hit: hit.penetration, default=None)
+
+
+def deepest_state(orbit: Orbit, impact: Impact | None) -> NDArray[np.float64]:
+    """Modal displacements at a contact's deepest instant, or without one at the largest extreme."""
+    if impact is not None:
+        phase = orbit.omega * impact.time
     else:
         extremes = orbit.observed_extremes
         phase = float(extremes.phases[np.argmax(np.abs(extremes.values))])
@@ -174,18 +183,26 @@ def save_orbit(orbit: Orbit, folder: Path) -> None:
     save_figure(plot_orbit(orbit)[0], folder / "orbit")
 
 
-def stop_to_draw(scene: Scene) -> StopSphere | None:
-    """Give the first stop that acts along an axis of the frame, as a sphere to be drawn."""
+def stop_sphere(scene: Scene, index: int) -> StopSphere | None:
+    """Give a stop as a sphere to be drawn, if it acts along an axis of the frame."""
     from fem.render import StopSphere
 
     axes = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
-    for stop in scene.stops:
-        place = scene.interfaces[stop.at]
-        if place.direction in axes:
-            x, y = axes[place.direction]
-            way = (stop.direction * x, stop.direction * y)
-            return StopSphere(place.at, stop.radius or DRAWN_RADIUS, way, stop.gap)
-    return None
+    stop = scene.stops[index]
+    place = scene.interfaces[stop.at]
+    if place.direction not in axes:
+        return None
+    x, y = axes[place.direction]
+    way = (stop.direction * x, stop.direction * y)
+    return StopSphere(place.at, stop.radius or DRAWN_RADIUS, way, stop.gap)
+
+
+def stop_to_draw(scene: Scene, impact: Impact | None) -> StopSphere | None:
+    """Give the stop of a contact; where nothing is touched, the first that can be drawn."""
+    if impact is not None:
+        return stop_sphere(scene, impact.stop)
+    spheres = (stop_sphere(scene, index) for index in range(len(scene.stops)))
+    return next((sphere for sphere in spheres if sphere is not None), None)
 
 
 @dataclass(frozen=True)
@@ -232,15 +249,16 @@ class _Drawing:
         from fem.render import render_shape
 
         self.tell("deepest contact", 0.0)
-        what = "deepest contact" if orbit.impact_list else "largest deflection"
-        state = self.reduced.expand(deepest_state(orbit))
-        stop = stop_to_draw(self.scene)
+        impact = deepest_impact(self.scene, orbit)
+        what = "largest deflection" if impact is None else "deepest contact"
+        state = self.reduced.expand(deepest_state(orbit, impact))
+        stop = stop_to_draw(self.scene, impact)
         render_shape(
             self.component,
             state,
             self.folder / "deepest_contact.png",
             title=f"{what} at {orbit.frequency_hz:.4g} Hz",
-            scale=self.visible_scale(state, orbit.max_penetration, stop),
+            scale=self.visible_scale(state, impact.penetration if impact else 0.0, stop),
             stop=stop,
             mirror=_mirror(self.scene),
         )
@@ -258,7 +276,7 @@ class _Drawing:
         return min(factor, round_number(2.0 * stop.radius / penetration))
 
     def motion(self, orbit: Orbit, video: str) -> None:
-        """Animate one period of the orbit."""
+        """Animate one period of the orbit, with the stop of the deepest contact."""
         from fem.render import animate
 
         self.tell("animation", 0.0)
@@ -269,7 +287,7 @@ class _Drawing:
             self.folder / f"motion.{video}",
             times=history.time[:-1],
             title=f"one period of the orbit at {orbit.frequency_hz:.4g} Hz",
-            stop=stop_to_draw(self.scene),
+            stop=stop_to_draw(self.scene, deepest_impact(self.scene, orbit)),
             mirror=_mirror(self.scene),
         )
 

@@ -7,9 +7,9 @@ from click.testing import CliRunner
 
 import fem.render
 from nldyn.cli import main
-from nldyn.render import deepest_state, orbit_to_draw, stop_to_draw
-from nldyn.resources import example
-from nldyn.scene import build_system, load_scene
+from nldyn.render import deepest_impact, deepest_state, orbit_to_draw, render_scene, stop_to_draw
+from nldyn.resources import example, mesh
+from nldyn.scene import build_system, load_scene, parse_scene
 
 BEAM = example("two_dof_xi_0.01.toml")
 
@@ -61,7 +61,7 @@ def test_scene_without_mesh_cannot_be_drawn(tmp_path):
 
 
 def test_stop_is_drawn_where_the_interface_is():
-    stop = stop_to_draw(load_scene(BEAM))
+    stop = stop_to_draw(load_scene(BEAM), None)
     assert (stop.point, stop.direction, stop.gap) == ("middle", (0.0, 1.0), 0.0)
 
 
@@ -69,8 +69,43 @@ def test_deepest_state_is_at_the_largest_penetration():
     scene = load_scene(BEAM)
     system = build_system(scene)
     orbit = orbit_to_draw(scene, system, 23.0, 1)
-    depth = system.participation["middle"] @ deepest_state(orbit)
+    depth = system.participation["middle"] @ deepest_state(orbit, deepest_impact(scene, orbit))
     assert depth == pytest.approx(orbit.max_penetration, rel=1e-9)
+
+
+def beam_between_stops():
+    """A stop never touched, the hard one above, a soft one below, one that stops a rotation."""
+    text = BEAM.read_text().replace("../../meshes/half_beam.msh", mesh("half_beam.msh").as_posix())
+    never = '[[stops]]\nat = "middle"\nlaw = "linear"\nstiffness = 1e6\ngap = 1.0\n'
+    below = '[[stops]]\nat = "middle"\nlaw = "linear"\nstiffness = 1e3\ndirection = -1\n'
+    turning = '[[stops]]\nat = "turn"\nlaw = "linear"\nstiffness = 0.1\n'
+    turn = '[interfaces.turn]\nat = "corner"\ndirection = "rotation"\n'
+    head, tail = text.split("[[stops]]")
+    excitation = tail.index("[[excitation]]")
+    hard, rest = "[[stops]]" + tail[:excitation], tail[excitation:]
+    return parse_scene(head + turn + never + hard + below + turning + rest, BEAM)
+
+
+def test_pictures_show_the_stop_of_the_deepest_contact(tmp_path, monkeypatch):
+    drawn = {}
+
+    def draw(component, states, path, **options):
+        drawn[path.name] = (component, states, options)
+
+    monkeypatch.setattr(fem.render, "gl_available", lambda: (True, ""))
+    monkeypatch.setattr(fem.render, "render_modes", lambda *_, **__: None)
+    for name in ("render_shape", "animate"):
+        monkeypatch.setattr(fem.render, name, draw)
+    scene = beam_between_stops()
+    orbit = render_scene(scene, tmp_path / "out", frequency_hz=23.0).orbit
+    depth = orbit.history(20_000).penetration.max(axis=0)
+    assert depth[0] < 0.0 < depth[1] < depth[2] < depth[3]
+    component, u, options = drawn["deepest_contact.png"]
+    for stop in (options["stop"], drawn["motion.gif"][2]["stop"]):
+        assert (stop.point, stop.direction, stop.gap) == ("middle", (0.0, -1.0), 0.0)
+    assert -component.interfaces["middle"] @ u == pytest.approx(depth[2], rel=1e-6)
+    within_stop = fem.render.round_number(2.0 * options["stop"].radius / depth[2])
+    assert options["scale"] == pytest.approx(within_stop)
 
 
 def test_all_pictures(tmp_path, monkeypatch):
