@@ -49,14 +49,26 @@ def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> N
 class PlainGroup(click.Group):
     """Commands that tell a fault on their command line in one sentence, without their usage."""
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Read the options that stand before the command."""
+        with plain_usage(click.NoSuchOption):  # without any argument the help is shown
+            return super().parse_args(ctx, args)
+
     def invoke(self, ctx: click.Context) -> object:
         """Run the command that is asked for."""
-        try:
+        with plain_usage(click.UsageError):
             return super().invoke(ctx)
-        except click.UsageError as error:
-            fault = error.format_message().rstrip(".")
-            click.echo(f"nldyn: {fault[:1].lower()}{fault[1:]}", err=True)
-            sys.exit(BAD_INPUT)
+
+
+@contextmanager
+def plain_usage(kind: type[click.UsageError]) -> Iterator[None]:
+    """Tell a fault of the command line in one line on stderr, and exit."""
+    try:
+        yield
+    except kind as error:
+        fault = error.format_message().rstrip(".")
+        click.echo(f"nldyn: {fault[:1].lower()}{fault[1:]}", err=True)
+        sys.exit(BAD_INPUT)
 
 
 @click.group(cls=PlainGroup, context_settings={"help_option_names": ["-h", "--help"]})

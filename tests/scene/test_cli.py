@@ -127,6 +127,11 @@ def test_missing_option_is_a_user_error():
     assert (result.exit_code, result.stderr) == (2, "nldyn: missing option '--out'\n")
 
 
+def test_unknown_option_before_the_command_is_a_user_error():
+    result = invoke("--quiet", "run", ONE_DOF)
+    assert (result.exit_code, result.stderr) == (2, "nldyn: no such option '--quiet'\n")
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
