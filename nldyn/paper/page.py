@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
@@ -75,7 +76,8 @@ def _diagrams_table(results: Mapping[str, Diagram]) -> str:
         diagram = results[name]
         orbits = [orbit for branch in diagram.branches for orbit in branch.points]
         error = max((o.error for o in orbits), default=0.0)
-        liouville = max((o.liouville_error for o in orbits), default=0.0)
+        judged = [o.liouville_error for o in orbits if not math.isnan(o.liouville_error)]
+        liouville = max(judged, default=0.0)
         low, high = diagram.range_hz
         body.append(
             f"<tr><td>{escape(name)}</td><td>{low:g} to {high:g} Hz</td>"
