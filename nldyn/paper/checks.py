@@ -294,7 +294,15 @@ def _third_unstable(results: Results) -> Finding:
         for b in low
     )
     near = [b for b in low if b.frequency_hz.min() <= 33.33 and b.frequency_hz.max() >= 32.67]
-    return Finding(holds=any(not b.stable.any() for b in near), text=text)
+    return Finding(holds=any(not _has_stable_part(b) for b in near), text=text)
+
+
+def _has_stable_part(branch: Branch) -> bool:
+    """Whether a point is stable, or a bifurcation is the end of a stable part between points."""
+    ends = (s for s in branch.special_points if s.kind in ("LP", "PD", "NS"))
+    return bool(branch.stable.any()) or any(
+        abs(end.orbit.largest_multiplier) < 1.0 + 1e-6 for end in ends
+    )
 
 
 def _antiresonance(results: Results) -> Finding:
