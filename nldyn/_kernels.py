@@ -254,10 +254,10 @@ def closing_time(fl, stop, w, phase, start, end):
 
 
 @inner
-def fly_state(fl, w, t):
+def fly_state(blocks, w, t):
     """Advance a state (2n,) in place by a flight of duration t."""
-    for b in range(fl.blocks.shape[0]):
-        e00, e01, e10, e11 = block_exponential(fl.blocks[b], t)
+    for b in range(blocks.shape[0]):
+        e00, e01, e10, e11 = block_exponential(blocks[b], t)
         x, y = w[2 * b], w[2 * b + 1]
         w[2 * b], w[2 * b + 1] = e00 * x + e01 * y, e10 * x + e11 * y
 
@@ -346,10 +346,12 @@ def depends_on_speed(fl, stop):
 
 @inner
 def law_by(fl, stop, column, delta, speed):
-    """Derivative of the power law with respect to its own number in a column of `stops`."""
-    if delta <= 0.0 or column == GAP:
+    """Derivative of a stop's force with respect to its own number in a column of `stops`."""
+    if delta <= 0.0:
         return 0.0
-    force, _, _ = law(fl, stop, delta, speed)
+    force, slope, _ = law(fl, stop, delta, speed)
+    if column == GAP:
+        return -slope
     if column == STIFFNESS:
         return force / fl.stops[stop, STIFFNESS]
     if column == EXPONENT:
@@ -655,7 +657,7 @@ def panel_end(fl, tab, kind, w, h, panel, w_end):
         for k in range(w.size):
             for j in range(tab.nodes.size):
                 w_end[k] -= h * tab.weights[kind, j] * panel.F[a, j] * panel.back[a, k, j]
-    fly_state(fl, w_end, h)
+    fly_state(fl.blocks, w_end, h)
 
 
 @inner
@@ -690,9 +692,7 @@ def panel_columns(fl, tab, kind, phase, t0, h, panel, columns):
                 q = columns.shape[0] + c
                 by = fl.forced_by[c, stop] * turn
                 forces[p, q] += slope * (by.real if o < na else -fl.omega * by.imag)
-                if o < na and fl.parameters[c, 1] == stop and fl.parameters[c, 0] == GAP:
-                    forces[p, q] -= slope
-                elif o < na and fl.parameters[c, 1] == stop and fl.parameters[c, 0] > GAP:
+                if o < na and fl.parameters[c, 1] == stop and fl.parameters[c, 0] >= GAP:
                     speed = panel.output[na + o, i] if panel.slope.shape[0] > na else 0.0
                     forces[p, q] += law_by(fl, stop, fl.parameters[c, 0], panel.output[o, i], speed)
     factor_panel(panel)
@@ -1256,7 +1256,7 @@ def run_pieces(
                     first, stop = at, s
             if recording and record_piece(rec, before + here, first, FLIGHT, stop, w) < 0:
                 return RECORD_FULL
-            fly_state(fl, w, first)
+            fly_state(fl.blocks, w, first)
             if with_columns:
                 fly(fl, columns, first)
             t = duration if stop < 0 else t + first

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nldyn import _kernels
-from nldyn._kernels import FLIGHT, block_exponential, map_fraction, njit
+from nldyn._kernels import FLIGHT, block_exponential, fly_state, map_fraction, njit
 from nldyn.kernel_cache import resting_on
 
 inner = resting_on(_kernels.inner, _kernels.__file__)
@@ -93,15 +93,6 @@ def state_in_contact(blocks, start, shares, weights, t, w):
         for j in range(weights.size):
             w[k] -= weights[j] * shares[j, k]
     fly_state(blocks, w, t)
-
-
-@inner
-def fly_state(blocks, w, t):
-    """Advance a homogeneous state in place by a time t without contact."""
-    for b in range(blocks.shape[0]):
-        e00, e01, e10, e11 = block_exponential(blocks[b], t)
-        x, y = w[2 * b], w[2 * b + 1]
-        w[2 * b], w[2 * b + 1] = e00 * x + e01 * y, e10 * x + e11 * y
 
 
 @compiled

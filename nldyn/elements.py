@@ -357,12 +357,7 @@ class HarmonicForce:
     @property
     def phasor(self) -> complex:
         """Complex amplitude in N."""
-        return self.amplitude * self.direction
-
-    @property
-    def direction(self) -> complex:
-        """Complex number of length 1 at the phase."""
-        return _turn(self.phase_deg)
+        return self.amplitude * turn(self.phase_deg)
 
 
 @dataclass(frozen=True)
@@ -396,12 +391,7 @@ class Unbalance:
     @property
     def phasor(self) -> complex:
         """Complex amplitude over ω² in kg m."""
-        return self.mass_times_radius * self.direction
-
-    @property
-    def direction(self) -> complex:
-        """Complex number of length 1 at the phase."""
-        return _turn(self.phase_deg)
+        return self.mass_times_radius * turn(self.phase_deg)
 
 
 Excitation = HarmonicForce | Unbalance
@@ -415,6 +405,7 @@ def _check_excitation(at: str, name: str, value: float, phase_deg: float) -> Non
     _finite(owner, "phase_deg", phase_deg)
 
 
-def _turn(phase_deg: float) -> complex:
+def turn(phase_deg: float) -> complex:
+    """Complex number of length 1 at a phase."""
     phase = math.radians(phase_deg)
     return complex(math.cos(phase), math.sin(phase))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -121,20 +121,20 @@ class Segments:
         Derivatives of the ends with respect to the starts.
     d_omega : (k, 2n)
         Derivatives of the ends with respect to ω at fixed phases.
+    d_parameters : (k, 2n, n_parameters)
+        Derivatives of the ends with respect to the parameters asked for, at fixed phases.
     closings : (n_stops,)
         How often each stop closed.
     failure : str
         Empty, or why the segments could not be computed.
-    d_parameters : (k, 2n, n_parameters)
-        Derivatives of the ends with respect to the parameters asked for, at fixed phases.
     """
 
     ends: Real
     jacobians: Real
     d_omega: Real
+    d_parameters: Real
     closings: NDArray[np.int64]
-    failure: str = ""
-    d_parameters: Real = field(default_factory=lambda: np.empty((0, 0, 0)))
+    failure: str
 
     @property
     def monodromy(self) -> Real:
@@ -321,7 +321,7 @@ class FlowMap:
             chosen,
             drive_by,
         )
-        return Segments(ends, jacobians, d_omegas, closings, _REASONS[status], d_parameters)
+        return Segments(ends, jacobians, d_omegas, d_parameters, closings, _REASONS[status])
 
     def trajectory(self, nodes: Real, phases: Real, omega: float) -> Trajectory:
         """Record the motion from phase to phase, restarted from each node state.
@@ -417,16 +417,7 @@ class FlowMap:
     ) -> Trajectory:
         """The motion in a record, of which only the used part is kept."""
         n = int(rec.used[0])
-        pieces = Record(
-            rec.phase[:n].copy(),
-            rec.duration[:n].copy(),
-            rec.kind[:n].copy(),
-            rec.event[:n].copy(),
-            rec.w[:n].copy(),
-            rec.force[:n].copy(),
-            rec.depth[:n].copy(),
-            rec.used,
-        )
+        pieces = Record._make([*(array[:n].copy() for array in rec[:-1]), rec.used])
         return Trajectory(self, omega, pieces, closings, failure)
 
     @cached_property

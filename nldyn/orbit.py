@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgeev
 from scipy.optimize import minimize_scalar
 
+from nldyn.elements import Stop
 from nldyn.errors import SystemModelError, check_frequency, check_whole
 from nldyn.flow import FlowMap, Solution, Trajectory
 from nldyn.linear import Real
@@ -234,8 +235,9 @@ class Orbit:
         total = 0.0
         for stop in system.stops:
             v = system.stop_vector(stop)
-            depth = states[:, : system.size] @ v - stop.gap
-            total += float(v @ v * weights @ stop.viscosity(depth, states[:, system.size :] @ v))
+            total += float(
+                v @ v * weights @ stop.viscosity(*_depth_and_speed(system, stop, states))
+            )
         return total
 
     @cached_property
@@ -319,14 +321,13 @@ class Orbit:
 
     def _largest_force(self, index: int, phase: float, depth: float) -> float:
         """Largest force of the contact whose penetration is deepest at a phase."""
-        stop, v = self.system.stops[index], self.system.stop_vector(self.system.stops[index])
+        stop = self.system.stops[index]
         if not stop.depends_on_speed:
             return float(stop.force(depth))
 
         def force(where: float) -> float:
-            state = self.states(np.array([where]))[0]
-            n = self.system.size
-            return float(stop.force(state[:n] @ v - stop.gap, state[n:] @ v))
+            state = self.states(np.array([where]))
+            return stop.force(*_depth_and_speed(self.system, stop, state)).item()
 
         pieces = self.trajectory.record
         within = (pieces.kind >= 0) & (pieces.force[:, index].max(axis=1) > 0.0)
@@ -371,11 +372,10 @@ class Orbit:
         system = self.system
         q = states[:, : system.size]
         stops = system.stops
-        rate = states[:, system.size :]
-        depth = np.array([q @ system.stop_vector(s) - s.gap for s in stops]).reshape(len(stops), -1)
-        force = np.array(
-            [s.force(d, rate @ system.stop_vector(s)) for s, d in zip(stops, depth, strict=True)]
-        ).reshape(depth.shape)
+        depth, force = np.empty((len(stops), phases.size)), np.empty((len(stops), phases.size))
+        for row, stop in enumerate(stops):
+            depth[row], speed = _depth_and_speed(system, stop, states)
+            force[row] = stop.force(depth[row], speed)
         return History(
             phases / self.omega,
             q,
@@ -384,6 +384,12 @@ class Orbit:
             depth.T,
             force.T,
         )
+
+
+def _depth_and_speed(system: System, stop: Stop, states: Real) -> tuple[Real, Real]:
+    """Penetration of a stop (negative when open) and its rate at modal states (k, 2n)."""
+    v = system.stop_vector(stop)
+    return states[:, : system.size] @ v - stop.gap, states[:, system.size :] @ v
 
 
 def check_observe(system: System, observe: str | None) -> str:
@@ -468,6 +474,7 @@ def solve_orbit(
     problem = shooting_problem(flow, period, segments)
     omega = 2.0 * math.pi * frequency_hz
     flow.system.steady(omega)  # refuses the resonance of an undamped mode
+    starts: Iterator[Real]
     if guess is None:
         start = np.zeros(problem.size)
         warm = np.linspace(0.0, 400.0 * np.pi, 201)
@@ -482,7 +489,7 @@ def solve_orbit(
         counts = (2, 3, 4, len(strobe)) if period == 1 else ()
         middles = [strobe[-count:].mean(axis=0) for count in counts]
         near = strobe[near_returns(strobe, period, 8)]
-        starts = [spread(problem, z, omega) for z in (strobe[-1], *near, *middles)]
+        starts = (spread(problem, z, omega) for z in (strobe[-1], *near, *middles))
     else:
         guess = np.atleast_2d(numbers("guess", guess))
         if guess.shape not in ((1, problem.size), (problem.segments, problem.size)):
@@ -491,13 +498,16 @@ def solve_orbit(
                 f"got shape {guess.shape}"
             )
         if guess.shape[0] == problem.segments:
-            starts = [flow.to_state(guess)]
+            starts = iter([flow.to_state(guess)])
         else:
-            starts = [spread(problem, flow.to_state(guess[0]), omega)]
-    for nodes in starts[:-1]:
-        with contextlib.suppress(ConvergenceError):
+            starts = iter([spread(problem, flow.to_state(guess[0]), omega)])
+    failure = ConvergenceError()
+    for nodes in starts:
+        try:
             return refine(problem, nodes, omega, observe)
-    return refine(problem, starts[-1], omega, observe)
+        except ConvergenceError as error:
+            failure = error
+    raise failure
 
 
 def near_returns(states: Real, period: int, count: int) -> list[int]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn._kernels import DISSIPATION, EXPONENT, GAP, STIFFNESS
+from nldyn.elements import turn
 from nldyn.errors import SystemModelError
 from nldyn.linear import Complex
 from nldyn.system import System
@@ -81,7 +82,7 @@ def parameter_tables(
                 raise SystemModelError(f"parameter '{name}': excitation {index} has no {name}")
             table[row] = _EXCITATION, index
             column = system.force_column(system.participation[source.at])
-            drive_by[row, source.order // 2] = source.direction * column
+            drive_by[row, source.order // 2] = turn(source.phase_deg) * column
         else:
             known = ", ".join([*_COLUMNS, *_SOURCES])
             raise SystemModelError(f"unknown parameter '{name}'; there are: {known}")
