@@ -70,6 +70,7 @@ class SystemData(NamedTuple):
     stops: Real
     laws: NDArray[np.int64]  # (n_stops,) address of a compiled law, or 0 for the power law
     tail: float  # largest relative Legendre tail accepted on a contact panel
+    node_angle: float  # phase of the fastest mode from node to node, in rad
 
 
 class FlowData(NamedTuple):
@@ -89,6 +90,7 @@ class FlowData(NamedTuple):
     forced_by: Complex  # (n_parameters, n_out)
     omega: float
     tail: float
+    node_angle: float
 
 
 @inner
@@ -363,8 +365,9 @@ def law_by(fl, stop, column, delta, speed):
 class Panel(NamedTuple):
     """Arrays of a contact panel with na stops, m nodes and n modes.
 
-    They are filled by `solve_panel` and used until the next panel. Outputs are the na
-    penetrations and, if a force depends on them, their na rates.
+    They are filled by `solve_panel`; what depends on kind and length alone serves the next panel
+    of the same stops too. Outputs are the na penetrations and, if a force depends on them, their
+    na rates.
     """
 
     active: NDArray[np.int64]  # (na,) closed stops
@@ -377,6 +380,7 @@ class Panel(NamedTuple):
     factors: Real  # (na m, na m) of the matrix 1 + slope G, at these slopes or earlier ones
     order: NDArray[np.int64]  # (na m,) its row swaps
     kept: NDArray[np.bool_]  # (1,) whether `factors` are worth keeping
+    made: Real  # (2,) kind and length for which to, back and G were filled
 
 
 @inner
@@ -398,7 +402,19 @@ def new_panel(fl, m, n_states, active):
         np.empty((na * m, na * m)),
         np.empty(na * m, dtype=np.int64),
         np.zeros(1, dtype=np.bool_),
+        np.zeros(2),
     )
+
+
+@inner
+def same_stops(active, other):
+    """Whether two lists of stops are equal."""
+    if active.size != other.size:
+        return False
+    for a in range(active.size):
+        if active[a] != other[a]:
+            return False
+    return True
 
 
 @inner
@@ -407,6 +423,9 @@ def panel_responses(fl, tab, kind, h, panel):
     m = tab.nodes.size
     na = panel.active.size
     to, back, G = panel.to, panel.back, panel.G
+    if panel.made[0] == kind and panel.made[1] == h:
+        return
+    panel.made[0], panel.made[1] = kind, h
     for i in range(m):
         t = h * tab.chi[kind, i]
         for b in range(fl.blocks.shape[0]):
@@ -421,17 +440,13 @@ def panel_responses(fl, tab, kind, h, panel):
                 x, y = fl.force[j, panel.active[a]], fl.force[j + 1, panel.active[a]]
                 back[a, j, i] = i00 * x + i01 * y
                 back[a, j + 1, i] = i10 * x + i11 * y
+    product = np.empty((m, m))
     for o in range(to.shape[0]):
-        for b in range(na):
+        for a in range(na):
+            np.dot(to[o], back[a], product)
             for i in range(m):
                 for j in range(m):
-                    G[o * m + i, b * m + j] = 0.0
-                for k in range(to.shape[2]):
-                    z = h * to[o, i, k]
-                    for j in range(m):
-                        G[o * m + i, b * m + j] += z * back[b, k, j]
-                for j in range(m):
-                    G[o * m + i, b * m + j] *= tab.integrate[kind, i, j]
+                    G[o * m + i, a * m + j] = h * tab.integrate[kind, i, j] * product[i, j]
 
 
 @inner
@@ -671,15 +686,15 @@ def panel_columns(fl, tab, kind, phase, t0, h, panel, columns):
     na, m = panel.F.shape
     n_columns = columns.shape[1]
     forces = np.zeros((na * m, n_columns))
+    part = np.empty((m, n_columns))
     for o in range(panel.to.shape[0]):
         stop = panel.active[o % na]
+        np.dot(panel.to[o], columns, part)
         for i in range(m):
             p = (o % na) * m + i
             slope = panel.slope[o, i]
-            for k in range(columns.shape[0]):
-                z = slope * panel.to[o, i, k]
-                for c in range(n_columns):
-                    forces[p, c] += z * columns[k, c]
+            for c in range(n_columns):
+                forces[p, c] += slope * part[i, c]
             t = h * tab.chi[kind, i]
             turn = np.exp(1j * (phase + fl.omega * t))
             d_omega = fl.forced[1, stop] + 1j * (t0 + t) * fl.forced[0, stop]
@@ -697,12 +712,15 @@ def panel_columns(fl, tab, kind, phase, t0, h, panel, columns):
                     forces[p, q] += law_by(fl, stop, fl.parameters[c, 0], panel.output[o, i], speed)
     factor_panel(panel)
     lu_apply(panel.factors, panel.order, forces)
+    change = np.empty(columns.shape)
     for a in range(na):
+        for j in range(m):
+            for c in range(n_columns):
+                part[j, c] = h * tab.weights[kind, j] * forces[a * m + j, c]
+        np.dot(panel.back[a], part, change)
         for k in range(columns.shape[0]):
-            for j in range(m):
-                z = h * tab.weights[kind, j] * panel.back[a, k, j]
-                for c in range(n_columns):
-                    columns[k, c] -= z * forces[a * m + j, c]
+            for c in range(n_columns):
+                columns[k, c] -= change[k, c]
     fly(fl, columns, h)
 
 
@@ -982,8 +1000,10 @@ def free_output(fl, out, w, t):
 
 
 @inner
-def guess_panel(fl, tab, phase, w, h, start_switch, panel):
-    """Choose the kind and length of a panel and guess its penetrations; h bounds the length.
+def guess_panel(fl, tab, phase, w, h, h_mapped, start_switch, panel):
+    """Choose the kind and length of a panel and guess its penetrations.
+
+    h bounds the length, h_mapped that of a panel that is to end with a release.
 
     A contact is covered by two panels, so that no panel has to resolve more than a quarter wave.
     """
@@ -992,7 +1012,7 @@ def guess_panel(fl, tab, phase, w, h, start_switch, panel):
     length = h
     for a in range(active.size):
         _, duration, left = expected_contact(fl, active[a], w, phase)
-        if left > 0.6 * duration:
+        if left > min(0.6 * duration, h_mapped):
             if 0.5 * left < length:
                 ends = False
                 length = 0.5 * left
@@ -1058,13 +1078,14 @@ def time_to_event(fl, stop, closed, w, phase):
 
 
 @inner
-def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, panel, w_end, rec):
-    """Solve one panel and choose its length, at most h_max.
+def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec):
+    """Solve one panel and choose its length, at most h_max, and h_mapped to aim at an event.
 
     Returns (status, kind, h, event): a panel that ends where stop `event` opens or closes, or
     (event = -1) one short enough to be resolved.
     """
     active = panel.active
+    panel.kept[0] = False
     guess = np.empty(tab.nodes.size)
     noise = np.empty(active.size)
     for a in range(active.size):
@@ -1073,7 +1094,7 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, panel, w_end, 
     limit = h_max
     kind, h, aim = remembered_panel(rec, start_switch, h_max, panel)
     if kind < 0:
-        kind, h = guess_panel(fl, tab, phase, w, limit, start_switch, panel)
+        kind, h = guess_panel(fl, tab, phase, w, limit, h_mapped, start_switch, panel)
     tried = h
     for _ in range(100):
         if h <= 0.0 or phase + fl.omega * h == phase:
@@ -1081,7 +1102,7 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, panel, w_end, 
         if not solve_panel(fl, tab, kind, phase, w, h, noise, panel):
             limit = 0.4 * min(h, tried)
             aim = -1
-            kind, h = guess_panel(fl, tab, phase, w, limit, start_switch, panel)
+            kind, h = guess_panel(fl, tab, phase, w, limit, h_mapped, start_switch, panel)
             tried = h
             continue
         panel_end(fl, tab, kind, w, h, panel, w_end)
@@ -1090,9 +1111,12 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, panel, w_end, 
         event, where = first_event(fl, tab, kind, phase, w, h, closed, panel, w_end)
         at_end = where > (0.999 if event == aim else 1.0 - 1e-7)
         if event >= 0 and (aim < 0 or not at_end):
+            goal = switch
             aim = event
-            keep_profile(tab, kind, switch, where, panel, guess)
-            kind = switch
+            if h * where > h_mapped:  # half the way first
+                goal, aim, where = smooth, -1, 0.5 * where
+            keep_profile(tab, kind, goal, where, panel, guess)
+            kind = goal
             h *= where
             continue
         if aim < 0 and kind % 2 == 1 and h < h_max:  # a release was expected here: follow it
@@ -1231,7 +1255,10 @@ def run_pieces(
     m = tab.nodes.size
     n_stops = closed.size
     fastest = fastest_rate(fl)
-    h_cap = 0.5 * m / fastest if fastest > 0.0 else np.inf
+    # lengths of panels that resolve the fastest mode: the maps spread the nodes at one end
+    h_even = fl.node_angle * m / fastest if fastest > 0.0 else np.inf
+    h_mapped = 0.75 * h_even / tab.power
+    panel = new_panel(fl, m, w.size, np.empty(0, dtype=np.int64))
     shortest = 1e-10 / max(fastest, fl.omega)
     t = 0.0
     start_switch = 1 if duration < 0.0 else 0  # written so that one version is compiled, not two
@@ -1268,6 +1295,8 @@ def run_pieces(
                 start_switch = 1
             continue
         active = active[:n_active]
+        if not same_stops(active, panel.active):
+            panel = new_panel(fl, m, w.size, active)
         if n_active == 1 and start_switch == 1:
             peak, _, left = expected_contact(fl, active[0], w, here)
             if peak <= 100.0 * output_noise(fl, active[0], w):  # a touch without force
@@ -1275,10 +1304,9 @@ def run_pieces(
                 closings[active[0]] -= 1
                 start_switch, skip = 0, max(left, shortest)
                 continue
-        panel = new_panel(fl, m, w.size, active)
-        h_max = min(remain, h_cap)
+        h_max = min(remain, h_mapped if start_switch == 1 else h_even)
         status, kind, h, event = contact_panel(
-            fl, tab, here, w, h_max, start_switch, closed, panel, w_end, rec
+            fl, tab, here, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec
         )
         if status != OK:
             return status
@@ -1367,6 +1395,7 @@ def at_frequency(system, omega, parameters, drive_by):
         forced_by,
         omega,
         system.tail,
+        system.node_angle,
     )
 
 

@@ -94,6 +94,14 @@ class FlowOptions:
         return self.tail or 0.3 * math.sqrt(self.rtol)
 
     @property
+    def node_angle(self) -> float:
+        """Phase of the fastest mode from node to node of a panel, in rad.
+
+        Found by trials with up to 64 modes: with it, an undamped mode costs less than `rtol`.
+        """
+        return 1.0 + 0.08 * (math.log10(self.rtol) + 9.0)
+
+    @property
     def finer(self) -> FlowOptions:
         """A setting whose errors are negligible beside those of this one."""
         return FlowOptions(
@@ -269,6 +277,7 @@ class FlowMap:
             np.array(stops, dtype=float).reshape(-1, 7),
             np.array([law_address(stop.law) for stop in s.stops], dtype=np.int64),
             self.options.panel_tail,
+            self.options.node_angle,
         )
 
     def shoot(

@@ -26,7 +26,7 @@ from nldyn.orbit import solve_orbit
 from nldyn.system import System
 
 DEFAULT = FlowOptions()
-TIGHT = FlowOptions(nodes=16, tail=1e-7)
+TIGHT = FlowOptions(rtol=1e-13)
 MODES = (4, 8, 16, 32, 64)
 MODES_HZ = 38.0
 
