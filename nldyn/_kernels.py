@@ -409,12 +409,10 @@ def new_panel(fl, m, n_states, active):
 @inner
 def same_stops(active, other):
     """Whether two lists of stops are equal."""
-    if active.size != other.size:
-        return False
-    for a in range(active.size):
-        if active[a] != other[a]:
-            return False
-    return True
+    equal = active.size == other.size
+    for a in range(min(active.size, other.size)):
+        equal = equal and active[a] == other[a]
+    return equal
 
 
 @inner
@@ -1399,7 +1397,7 @@ def at_frequency(system, omega, parameters, drive_by):
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inlined
 def shoot(
     system, tab, rec, recording, omega, nodes, phases, chained, with_columns, parameters, drive_by
 ):
@@ -1420,6 +1418,7 @@ def shoot(
     closings = np.zeros(system.stops.shape[0], dtype=np.int64)
     rec.used[1] = rec.used[0] if recording else 0
     rec.used[0] = 0
+    status = OK
     for i in range(k):
         start = ends[i - 1] if chained and i > 0 else nodes[i]
         duration = (phases[i + 1] - phases[i]) / omega
@@ -1429,28 +1428,58 @@ def shoot(
             ends[i], jacobians[j], d_omegas[j], d_parameters[j], closings,
         )  # fmt: skip
         if status != OK:
-            return ends, jacobians, d_omegas, d_parameters, closings, status
-    return ends, jacobians, d_omegas, d_parameters, closings, OK
+            break
+    return ends, jacobians, d_omegas, d_parameters, closings, status
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def newton(system, tab, rec, point, row, level, phases, state_weight, rtol, max_iterations):
-    """Newton's method for the shooting equations and ``row @ point = level``, in place.
+class Corrector(NamedTuple):
+    """What Newton's method for the shooting equations needs to know.
 
     Parameters
     ----------
-    system, tab, rec : SystemData, GaussTables, Record
-        As for `shoot`.
-    point : (N + 1,)
-        States at the k phases and ln ω; the guess, then the solution.
     row, level : (N + 1,), float
-        Plane on which to stay.
-    phases : (k + 1,)
-        Forcing phases of the segment ends.
+        The plane ``row @ point = level`` on which to stay.
     state_weight : float
         Weight of a state's square in the squared length of a step (that of ln ω is 1).
-    rtol, max_iterations : float, int
-        Longest last step, most steps.
+    rtol : float
+        Longest last step.
+    longest : float
+        Longest first step: a longer one means failure.
+    max_iterations : int
+        Most steps; none means the flow map alone.
+    """
+
+    row: NDArray[np.float64]
+    level: float
+    state_weight: float
+    rtol: float
+    longest: float
+    max_iterations: int
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def newton(
+    system, tab, rec, recording, omega, point, phases, chained, with_columns, parameters, drive_by,
+    corrector,
+):  # fmt: skip
+    """Newton's method for the shooting equations on a plane, in place, or the flow map alone.
+
+    All compiled work begins here, since a second entry would be compiled anew.
+
+    Parameters
+    ----------
+    system, tab, rec, recording : SystemData, GaussTables, Record, bool
+        See `propagate`.
+    omega : float
+        Excitation frequency, of the flow map alone.
+    point : (N + 1,)
+        States at the k phases and ln ω; the guess, then the solution.
+    phases : (k + 1,)
+        Forcing phases of the segment ends.
+    chained, with_columns, parameters, drive_by
+        See `shoot`.
+    corrector : Corrector
+        The plane and when to stop.
 
     Returns
     -------
@@ -1461,34 +1490,32 @@ def newton(system, tab, rec, point, row, level, phases, state_weight, rtol, max_
         Lengths of the first and the last step.
     along : (N + 1,)
         Vector along the branch, of no particular length.
-    jacobians : (k, 2n, 2n)
-        At the point before the last step, as the record and the closings.
-    closings : (n_stops,)
+    ends, jacobians, d_omegas, d_parameters, closings
+        What `shoot` gives at the point before the last step, where the record is from, too.
     """
+    row, max_iterations = corrector.row, corrector.max_iterations
     k = phases.size - 1
-    size = (point.size - 1) // k
+    size = 2 * system.blocks.shape[0]
     unknowns = point.size
     matrix = np.empty((unknowns, unknowns))
     sides = np.empty((unknowns, 2))
     order = np.empty(unknowns, dtype=np.int64)
-    nodes = np.empty((k, size))
+    nodes = np.empty((unknowns // size, size))
     along = np.zeros(unknowns)
     first, last = np.inf, np.inf
-    yes = max_iterations > 0  # not a literal, so that `shoot` is compiled once
-    none = np.empty((0, 2), dtype=np.int64)
-    nothing = np.empty((0, 2, size), dtype=np.complex128)
     outcome = NOT_CONVERGED
     iteration = 0
     while True:
         iteration += 1
-        omega = math.exp(point[unknowns - 1])
-        for s in range(k):
-            for i in range(size):
-                nodes[s, i] = point[s * size + i]
-        ends, jacobians, d_omegas, _, closings, status = shoot(
-            system, tab, rec, yes, omega, nodes, phases, not yes, yes, none, nothing
-        )
-        if status != OK:
+        if max_iterations > 0:
+            omega = math.exp(point[unknowns - 1])
+        for i in range(unknowns - 1):
+            nodes[i // size, i % size] = point[i]
+        ends, jacobians, d_omegas, d_parameters, closings, status = shoot(
+            system, tab, rec, recording, omega, nodes, phases, chained, with_columns,
+            parameters, drive_by,
+        )  # fmt: skip
+        if status != OK or max_iterations == 0:
             outcome = status
             break
         for i in range(unknowns):
@@ -1504,7 +1531,7 @@ def newton(system, tab, rec, point, row, level, phases, state_weight, rtol, max_
                 for j in range(size):
                     matrix[r, s * size + j] += jacobians[s, i, j]
                 matrix[r, unknowns - 1] = omega * d_omegas[s, i]
-        sides[unknowns - 1, 0] = level
+        sides[unknowns - 1, 0] = corrector.level
         for j in range(unknowns):
             matrix[unknowns - 1, j] = row[j]
             sides[unknowns - 1, 0] -= row[j] * point[j]
@@ -1514,24 +1541,28 @@ def newton(system, tab, rec, point, row, level, phases, state_weight, rtol, max_
         before = last
         length = sides[unknowns - 1, 0] ** 2
         for i in range(unknowns - 1):
-            length += state_weight * sides[i, 0] ** 2
+            length += corrector.state_weight * sides[i, 0] ** 2
         last = math.sqrt(length)
         if iteration == 1:
             first = last
         if not np.isfinite(last):
             outcome = SINGULAR
             break
-        if last >= 1e3 or abs(sides[unknowns - 1, 0]) >= 0.5:
+        longest = corrector.longest if iteration == 1 else 1e3
+        if last >= longest or abs(sides[unknowns - 1, 0]) >= 0.5:
             outcome = DIVERGED
             break
         for i in range(unknowns):
             point[i] += sides[i, 0]
             along[i] = sides[i, 1]
-        if last <= rtol or (last < 1e-8 and last > 0.5 * before):  # stagnant: rounding level
+        stagnant = last < 1e-8 and last > 0.5 * before  # the rounding level
+        if last <= corrector.rtol or stagnant:
             outcome = OK
             break
         if iteration == max_iterations:
             break
         if last > 0.5 * before:  # panels that change with what is remembered may keep it going
             rec.used[0] = 0
-    return outcome, iteration, first, last, along, jacobians, closings
+    return (
+        outcome, iteration, first, last, along, ends, jacobians, d_omegas, d_parameters, closings
+    )  # fmt: skip

@@ -99,13 +99,13 @@ class Walk:
         """Walk along the branch."""
         problem = self.start.orbit.problem
         here = self.start
-        curvature = np.zeros(here.tangent.size)
+        behind: BranchPoint | None = None
         step = self.options.first_step
         yield here
         for _ in range(self.options.max_points):
             attempt = None
             while attempt is None:
-                attempt = self._advance(problem, here, curvature, step)
+                attempt = self._advance(problem, behind, here, step)
                 if attempt is None:
                     step *= 0.5
                     if step < self.options.min_step:
@@ -141,15 +141,18 @@ class Walk:
                 yield point
                 return
             yield point
-            curvature = (point.tangent - here.tangent) / (point.arclength - here.arclength)
-            here = point
+            behind, here = here, point
             growth = 0.7 * self.options.max_angle / max(angle, 1e-3)
             growth = min(growth, math.sqrt(0.5 * self.options.max_miss / max(miss, 1e-6)))
             step = min(step * min(max(growth, 0.5), 1.6), self.options.max_step)
         self.stop_reason = f"{self.options.max_points} points"
 
     def _advance(
-        self, problem: ShootingProblem, here: BranchPoint, curvature: Real, step: float
+        self,
+        problem: ShootingProblem,
+        behind: BranchPoint | None,
+        here: BranchPoint,
+        step: float,
     ) -> tuple[BranchPoint, float, float] | None:
         """Next point, its angle to this one and its relative distance from the predictor.
 
@@ -160,8 +163,14 @@ class Walk:
         straight = here.orbit.point + step * direction
         row = weights * direction
         row /= math.sqrt(float(row @ row))
-        predicted = straight + 0.5 * step**2 * curvature
-        found = problem.correct(predicted, row, offset=float(row @ straight), max_iterations=8)
+        predicted = straight if behind is None else _extrapolate(weights, behind, here, step)
+        found = problem.correct(
+            predicted,
+            row,
+            offset=float(row @ straight),
+            longest=2.0 * self.options.max_miss * step,
+            max_iterations=8,
+        )
         if not found.converged:
             return None
         miss = _length(weights, found.point - predicted) / step
@@ -242,6 +251,22 @@ def open_ends(branch: Branch) -> list[Real]:
                 states = np.roll(problem.nodes(point), shift, axis=0)
                 found.append(np.append(states.ravel(), point[-1]))
     return found
+
+
+def _extrapolate(weights: Real, behind: BranchPoint, here: BranchPoint, step: float) -> Real:
+    """Point at a distance along the tangent on the cubic through two points and their tangents."""
+    a, b = behind.orbit.point, here.orbit.point
+    direction = here.tangent / _length(weights, here.tangent)
+    row = weights * direction
+    back = float(row @ (a - b))
+    slope_a, slope_b = behind.tangent / float(row @ behind.tangent), direction
+    x = step / back  # 0 here, 1 behind
+    return np.asarray(
+        (1.0 + 2.0 * x) * (1.0 - x) ** 2 * b
+        + x * (1.0 - x) ** 2 * back * slope_b
+        + x * x * (3.0 - 2.0 * x) * a
+        + x * x * (x - 1.0) * back * slope_a
+    )
 
 
 def _length(weights: Real, vector: Real) -> float:

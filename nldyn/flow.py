@@ -23,10 +23,10 @@ from nldyn._kernels import (
     RECORD_FULL,
     SINGULAR,
     TOO_MANY_PIECES,
+    Corrector,
     Record,
     SystemData,
     newton,
-    shoot,
 )
 from nldyn._sample import local_extremes, sample_states
 from nldyn.contact_law import law_address
@@ -316,19 +316,8 @@ class FlowMap:
         SystemModelError
             For a parameter that the system does not have.
         """
-        chosen, drive_by = parameter_tables(self.system, parameters)
-        ends, jacobians, d_omegas, d_parameters, closings, status = shoot(
-            self._data,
-            self.tables,
-            self._record(1),
-            False,
-            float(omega),
-            np.ascontiguousarray(nodes, dtype=float),
-            np.ascontiguousarray(phases, dtype=float),
-            chained,
-            sensitivities,
-            chosen,
-            drive_by,
+        status, *_, ends, jacobians, d_omegas, d_parameters, closings = self._fly(
+            self._record(1), False, nodes, phases, omega, chained, sensitivities, parameters
         )
         return Segments(ends, jacobians, d_omegas, d_parameters, closings, _REASONS[status])
 
@@ -351,20 +340,7 @@ class FlowMap:
         capacity = 64 * len(nodes)
         while True:
             record = self._record(capacity)
-            chosen, drive_by = parameter_tables(self.system, ())
-            _, _, _, _, closings, status = shoot(
-                self._data,
-                self.tables,
-                record,
-                True,
-                float(omega),
-                np.ascontiguousarray(nodes, dtype=float),
-                np.ascontiguousarray(phases, dtype=float),
-                False,
-                False,
-                chosen,
-                drive_by,
-            )
+            status, *_, closings = self._fly(record, True, nodes, phases, omega, False, False)
             if status != RECORD_FULL:
                 return self._motion(omega, record, closings, _REASONS[status])
             capacity *= 4
@@ -377,9 +353,10 @@ class FlowMap:
         phases: Real,
         state_weight: float,
         rtol: float,
+        longest: float,
         max_iterations: int,
     ) -> Solution:
-        """Solve the shooting equations with ``row @ point = level``; see `_kernels.newton`.
+        """Solve the shooting equations with ``row @ point = level``; see `_kernels.Corrector`.
 
         Parameters
         ----------
@@ -391,27 +368,20 @@ class FlowMap:
             Forcing phases of the segment ends.
         state_weight : float
             Weight of the states in the squared length of a step.
-        rtol, max_iterations : float, int
+        rtol, longest, max_iterations : float, float, int
             When to stop.
 
         Returns
         -------
         Solution
         """
+        row = np.ascontiguousarray(row, dtype=float)
+        corrector = Corrector(row, float(level), float(state_weight), rtol, longest, max_iterations)
         capacity = 64 * phases.size
         while True:
             point, record = guess.copy(), self._record(capacity)
-            status, iterations, first, last, along, jacobians, closings = newton(
-                self._data,
-                self.tables,
-                record,
-                point,
-                np.ascontiguousarray(row, dtype=float),
-                float(level),
-                phases,
-                float(state_weight),
-                rtol,
-                max_iterations,
+            status, iterations, first, last, along, _, jacobians, *_, closings = self._call(
+                record, True, 0.0, point, phases, False, True, (), corrector
             )
             if status != RECORD_FULL:
                 omega = math.exp(point[-1])
@@ -420,6 +390,45 @@ class FlowMap:
                     point, along, jacobians, motion, iterations, first, last, _REASONS[status]
                 )
             capacity *= 4
+
+    def _fly(
+        self,
+        record: Record,
+        recording: bool,
+        nodes: Real,
+        phases: Real,
+        omega: float,
+        chained: bool,
+        sensitivities: bool,
+        parameters: Sequence[Parameter] = (),
+    ) -> tuple[Any, ...]:
+        """The flow map alone; see `_kernels.newton` for what comes back."""
+        point = np.append(np.asarray(nodes, dtype=float), 0.0)
+        phases = np.ascontiguousarray(phases, dtype=float)
+        corrector = Corrector(point, 0.0, 0.0, 0.0, 0.0, 0)
+        return self._call(
+            record, recording, float(omega), point, phases, chained, sensitivities, parameters,
+            corrector,
+        )  # fmt: skip
+
+    def _call(
+        self,
+        record: Record,
+        recording: bool,
+        omega: float,
+        point: Real,
+        phases: Real,
+        chained: bool,
+        sensitivities: bool,
+        parameters: Sequence[Parameter],
+        corrector: Corrector,
+    ) -> tuple[Any, ...]:
+        table, drive_by = parameter_tables(self.system, parameters)
+        found = newton(
+            self._data, self.tables, record, recording, omega, point, phases, chained,
+            sensitivities, table, drive_by, corrector,
+        )  # fmt: skip
+        return tuple(found)
 
     def _motion(
         self, omega: float, rec: Record, closings: NDArray[np.int64], failure: str

@@ -66,15 +66,19 @@ class ShootingProblem:
         *,
         offset: float | None = None,
         rtol: float = 1e-10,
+        longest: float = 1e3,
         max_iterations: int = 12,
     ) -> Solution:
         """Newton's method on the plane ``row @ point = offset`` (through the guess by default).
 
-        A row (N + 1,) that is zero but for its last entry holds the frequency.
+        A row (N + 1,) that is zero but for its last entry holds the frequency. A first step longer
+        than `longest` (relative, as in `metric`) means failure.
         """
         level = float(row @ guess) if offset is None else offset
         weight = self._weight(guess)
-        return self.flow.newton(guess, row, level, self.phases, weight, rtol, max_iterations)
+        return self.flow.newton(
+            guess, row, level, self.phases, weight, rtol, longest, max_iterations
+        )
 
     def _weight(self, point: Real) -> float:
         """Weight of the square of a state's change."""
