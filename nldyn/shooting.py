@@ -65,7 +65,7 @@ class ShootingProblem:
         row: Real,
         *,
         offset: float | None = None,
-        rtol: float = 1e-10,
+        rtol: float = 1e-11,
         longest: float = 1e3,
         max_iterations: int = 12,
     ) -> Solution:
