@@ -317,7 +317,7 @@ def _flip_between(a: BranchPoint, b: BranchPoint) -> BranchPoint:
     doubled = Orbit(
         problem,
         np.append(states, orbit.point[-1]),
-        orbit.monodromy @ orbit.monodromy,
+        np.concatenate([orbit.jacobians, orbit.jacobians]),
         orbit.error,
         orbit.observe,
     )

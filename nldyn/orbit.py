@@ -9,13 +9,23 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgeev
 from scipy.optimize import minimize_scalar
 
 from nldyn.elements import Stop
 from nldyn.errors import SystemModelError, check_frequency, check_whole
-from nldyn.flow import FlowMap, Solution, Trajectory
+from nldyn.flow import FlowMap, Solution, Trajectory, chain
 from nldyn.linear import Real
+from nldyn.multipliers import (
+    COARSE,
+    MOST_PARTS,
+    MultiplierError,
+    Spectrum,
+    Stability,
+    log_determinant,
+    parts_for,
+    spectrum,
+    uncertainties,
+)
 from nldyn.shooting import ShootingProblem
 from nldyn.system import System, numbers
 
@@ -115,8 +125,9 @@ class Orbit:
         The equations that it solves.
     point : (N + 1,)
         States z at the shooting phases and ln ω.
-    monodromy : (2n, 2n)
-        Derivative of the state after a period with respect to the state before.
+    jacobians : (k, 2n, 2n)
+        Derivatives of the states z at the ends of the shooting segments with respect to those at
+        their starts.
     error : float
         Length of the last Newton step relative to the orbit: an estimate of its error.
     observe : str
@@ -137,7 +148,7 @@ class Orbit:
 
     problem: ShootingProblem
     point: Real
-    monodromy: Real
+    jacobians: Real
     error: float
     observe: str
     motion: Trajectory | None = field(default=None, repr=False)
@@ -145,7 +156,7 @@ class Orbit:
     @classmethod
     def of(cls, problem: ShootingProblem, found: Solution, observe: str) -> Orbit:
         """Orbit from a solution of its equations."""
-        return cls(problem, found.point, found.monodromy, found.last_step, observe, found.motion)
+        return cls(problem, found.point, found.jacobians, found.last_step, observe, found.motion)
 
     @property
     def system(self) -> System:
@@ -173,13 +184,64 @@ class Orbit:
         return self.period / self.frequency_hz
 
     @cached_property
+    def monodromy(self) -> Real:
+        """Derivative of the state z after a period with respect to the one before, (2n, 2n).
+
+        It is the product of the Jacobians, in which large multipliers drown the small ones.
+        """
+        return chain(self.jacobians)
+
+    @property
     def multipliers(self) -> NDArray[np.complex128]:
         """Floquet multipliers, largest first, shape (2n,)."""
-        real, imaginary, _, _, info = dgeev(self.monodromy, compute_vl=0, compute_vr=0)
-        if info:
-            raise ConvergenceError("the multipliers of an orbit could not be computed")
-        values = real + 1j * imaginary
-        return np.asarray(values[np.argsort(-np.abs(values), kind="stable")])
+        return self._spectrum[0].multipliers
+
+    @property
+    def log_moduli(self) -> Real:
+        """Natural logarithms of the moduli of the multipliers, (2n,), however small these are."""
+        return self._spectrum[0].log_moduli
+
+    @cached_property
+    def _spectrum(self) -> tuple[Spectrum, Real]:
+        """Multipliers and the Jacobians they come from.
+
+        Segments that squeeze a direction almost to their own rounding error are cut into parts.
+        """
+        try:
+            found, jacobians = spectrum(self.jacobians), self.jacobians
+            parts = parts_for(found.squeeze)
+            while found.squeeze < COARSE and parts <= MOST_PARTS:
+                finer = self.problem.jacobians(self.point, parts)
+                if finer is None:
+                    break
+                found, jacobians = spectrum(finer), finer
+                parts *= 2
+        except MultiplierError as error:
+            raise ConvergenceError(str(error)) from None
+        return found, jacobians
+
+    @cached_property
+    def log_modulus_uncertainties(self) -> Real:
+        """Estimate of how far each of the `log_moduli` may be off, (2n,).
+
+        Of each segment's Jacobian a relative error of ten times the flow map's `rtol` is assumed
+        (or of ten times `error`, where that is more); see `nldyn.multipliers.uncertainties`.
+        """
+        found, jacobians = self._spectrum
+        error = 10.0 * max(self.problem.flow.options.rtol, self.error)
+        try:
+            return uncertainties(jacobians, found, error)
+        except MultiplierError as failure:
+            raise ConvergenceError(str(failure)) from None
+
+    @property
+    def stability(self) -> Stability:
+        """The multiplier that decides stability, how far from the unit circle, and how sure."""
+        return Stability(
+            self.largest_multiplier,
+            float(self.log_moduli[0]),
+            float(self.log_modulus_uncertainties[0]),
+        )
 
     @property
     def largest_multiplier(self) -> complex:
@@ -215,15 +277,16 @@ class Orbit:
     def liouville_error(self) -> float:
         """|det Φ / exp(-∫ (tr D + Σ v² ∂F/∂δ') dt) - 1|: Liouville's formula.
 
-        v² is the velocity jump per unit impulse at a stop whose force depends on the speed. It is
-        nan where damping makes the determinant so small that rounding hides its third digit.
+        v² is the velocity jump per unit impulse at a stop whose force depends on the speed. The
+        determinant is the product of those of the segments. The error is nan where damping is so
+        strong that rounding hides the third digit of 1e-6 even so.
         """
-        if np.finfo(float).eps * np.linalg.cond(self.monodromy) > 1e-6:
+        value, rounding = log_determinant(self._spectrum[1])
+        if rounding > 1e-6:
             return math.nan
         exact = -float(np.trace(self.system.total_damping)) * self.duration
         exact -= self._contact_damping()
-        sign, logdet = np.linalg.slogdet(self.monodromy)
-        return abs(math.expm1(min(logdet - exact, 700.0))) if sign > 0.0 else math.inf
+        return math.inf if math.isnan(value) else abs(math.expm1(min(value - exact, 700.0)))
 
     def _contact_damping(self) -> float:
         """∫ Σ v² ∂F/∂δ' dt over the contacts, by the quadrature of their panels."""

@@ -59,6 +59,22 @@ class ShootingProblem:
         weights[:-1], weights[-1] = self._weight(point), 1.0
         return weights
 
+    def jacobians(self, point: Real, parts: int) -> Real | None:
+        """Jacobians (k · parts, 2n, 2n) of the segments cut into equal parts.
+
+        Each segment starts from its own state, so that errors grow over one segment only. None if
+        the flow map fails.
+        """
+        pieces = []
+        ends = zip(self.nodes(point), self.phases[:-1], self.phases[1:], strict=True)
+        for state, start, end in ends:
+            phases, omega = np.linspace(start, end, parts + 1), math.exp(point[-1])
+            found = self.flow.shoot(state[None], phases, omega, chained=True)
+            if found.failure:
+                return None
+            pieces.append(found.jacobians)
+        return np.concatenate(pieces)
+
     def correct(
         self,
         guess: Real,

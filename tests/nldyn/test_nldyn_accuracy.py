@@ -16,7 +16,7 @@ def orbit_at(case, rtol: float) -> Orbit:
     """The reference's start as an orbit in one segment."""
     flow = FlowMap(case.system, FlowOptions(rtol=rtol))
     point = np.append(flow.to_state(case.start), np.log(case.omega))
-    return Orbit(ShootingProblem(flow, 1, 1), point, np.eye(2 * case.size), 0.0, "")
+    return Orbit(ShootingProblem(flow, 1, 1), point, np.eye(2 * case.size)[None], 0.0, "")
 
 
 def true_errors(case, orbit: Orbit) -> tuple[float, float]:
