@@ -18,8 +18,8 @@ import numpy as np
 from nldyn._kernels import inner, njit
 
 EPS = 2.0**-52
-MAX_STEPS = 90  # per eigenvalue; three or four are usual
-PATIENCE = 30  # steps before a subdiagonal entry at H's own rounding level counts as zero
+MAX_STEPS = 150  # for one or two eigenvalues; three or four are usual, thirty at a triple one
+PATIENCE = 90  # steps before a subdiagonal entry at H's own rounding level counts as zero
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -140,21 +140,33 @@ def turn_columns(A, j, i, cosine, sine, first, last):
 
 @inner
 def pass_on(A, j, i, cosine, sine, lo, hi):
-    """Turn the coordinates before triangular factor j; the rotation behind it that keeps it so."""
+    """Turn the coordinates before triangular factor j; the rotation behind it that keeps it so.
+
+    A zero on the diagonal moves on and stays exact.
+    """
+    singular = A[j, i, i] == 0.0 or A[j, i + 1, i + 1] == 0.0
     turn_columns(A, j, i, cosine, sine, lo, i + 1)
     cosine, sine = rotation(A[j, i, i], A[j, i + 1, i])
     turn_rows(A, j, i, cosine, sine, i, hi)
     A[j, i + 1, i] = 0.0
+    if singular:
+        A[j, i + 1, i + 1] = 0.0
     return cosine, sine
 
 
 @inner
 def pass_back(A, j, i, cosine, sine, lo, hi):
-    """Turn the coordinates behind triangular factor j; the rotation before it that keeps it so."""
+    """Turn the coordinates behind triangular factor j; the rotation before it that keeps it so.
+
+    A zero on the diagonal moves on and stays exact.
+    """
+    singular = A[j, i, i] == 0.0 or A[j, i + 1, i + 1] == 0.0
     turn_rows(A, j, i, cosine, sine, i, hi)
     cosine, sine = rotation(A[j, i + 1, i + 1], -A[j, i + 1, i])
     turn_columns(A, j, i, cosine, sine, lo, i + 1)
     A[j, i + 1, i] = 0.0
+    if singular:
+        A[j, i, i] = 0.0
     return cosine, sine
 
 
@@ -225,7 +237,7 @@ def deflate_all(A, values, exponents):
         elif not split_at_zero(A, lo, hi):
             if steps == MAX_STEPS:
                 return squeeze, False
-            double_step(A, lo, hi, steps % 10 == 9)
+            double_step(A, lo, hi, steps % 40 == 39)
             steps += 1
     return squeeze, True
 
