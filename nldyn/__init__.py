@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     )
     from nldyn.errors import SceneError, SystemModelError
     from nldyn.flow import FlowMap, FlowOptions
+    from nldyn.multipliers import Stability
     from nldyn.orbit import ConvergenceError, History, Orbit, solve_orbit
     from nldyn.parameters import Parameter
     from nldyn.search import SearchOptions, find_orbits
@@ -34,6 +35,7 @@ _HOMES = {
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
     "errors": "SceneError SystemModelError",
     "flow": "FlowMap FlowOptions",
+    "multipliers": "Stability",
     "orbit": "ConvergenceError History Orbit solve_orbit",
     "parameters": "Parameter",
     "search": "SearchOptions find_orbits",
@@ -59,6 +61,7 @@ __all__ = [
     "SearchOptions",
     "Seed",
     "SpecialPoint",
+    "Stability",
     "Stop",
     "System",
     "SystemModelError",

@@ -19,7 +19,7 @@ from nldyn._kernels import inner, njit
 
 EPS = 2.0**-52
 MAX_STEPS = 150  # for one or two eigenvalues; three or four are usual, thirty at a triple one
-PATIENCE = 90  # steps before a subdiagonal entry at H's own rounding level counts as zero
+PATIENCE = 50  # steps before entries at the rounding level of a factor count as zero
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -70,7 +70,7 @@ def insertion_place(value, exponent, logarithms, count):
 
 @inner
 def logarithm(value, exponent):
-    """ln |value · 2^exponent|."""
+    """Natural logarithm of |value · 2^exponent|."""
     size = math.hypot(value.real, value.imag)
     return math.log(size) + exponent * math.log(2.0) if size > 0.0 else -math.inf
 
@@ -234,7 +234,7 @@ def deflate_all(A, values, exponents):
             pair(A, lo, values, exponents)
             squeeze = min(squeeze, pair_squeeze(A, lo), smallest(A, lo), smallest(A, hi))
             hi, steps = hi - 2, 0
-        elif not split_at_zero(A, lo, hi):
+        elif not split_at_zero(A, lo, hi, 16.0 * EPS if steps > PATIENCE else 0.0):
             if steps == MAX_STEPS:
                 return squeeze, False
             double_step(A, lo, hi, steps % 40 == 39)
@@ -401,11 +401,12 @@ def shifts(A, hi):
 
 
 @inner
-def split_at_zero(A, lo, hi):
+def split_at_zero(A, lo, hi, negligible):
     """Split off the zero eigenvalue of a triangular factor's zero on the diagonal, if any."""
     for j in range(1, A.shape[0]):
         for i in range(lo, hi + 1):
-            if A[j, i, i] == 0.0:
+            if abs(A[j, i, i]) <= negligible:
+                A[j, i, i] = 0.0
                 decouple_above(A, j, i, lo, hi)
                 decouple_below(A, j, i, lo, hi)
                 return True

@@ -30,6 +30,8 @@ BRANCH_COLUMNS = (
     "impacts",
     "stable",
     "largest_multiplier",
+    "relative_uncertainty",
+    "liouville_error",
 )
 SPECIAL_COLUMNS = (
     "branch",
@@ -111,7 +113,14 @@ def branch_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
                 int(orbit.impacts),
                 int(orbit.stable),
                 abs(orbit.largest_multiplier),
+                if_known(orbit.stability.uncertainty),
+                if_known(orbit.liouville_error),
             )
+
+
+def if_known(value: float) -> float | None:
+    """Give a figure, or None (an empty cell) if it is nan or infinite."""
+    return float(value) if math.isfinite(value) else None
 
 
 def at_end(frequency_hz: float, range_hz: tuple[float, float]) -> float:
@@ -159,6 +168,7 @@ def summary(diagram: Diagram) -> Mapping[str, object]:
         "points": len(orbits),
         "largest_relative_error": worst(orbit.error for orbit in orbits),
         "largest_liouville_error": worst(orbit.liouville_error for orbit in orbits),
+        "stability_undecided": sum(orbit.stability.verdict == "undecided" for orbit in orbits),
         "notes": list(diagram.notes),
         "branches": [_branch_summary(branch, diagram.range_hz) for branch in diagram.branches],
     }

@@ -134,6 +134,8 @@ SUBJECTS = {
     "shooting.py": "corrector and tangent",
     "orbit.py": "extremes and multipliers",
     "_sample.py": "extremes and multipliers",
+    "multipliers.py": "extremes and multipliers",
+    "_periodic_qr.py": "extremes and multipliers",
     "special.py": "special points",
     "_events.py": "special points",
     "branch.py": "special points",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import mpmath as mp
 import numpy as np
@@ -76,15 +77,14 @@ def test_random_products_have_the_eigenvalues_of_high_precision(n, k):
 )  # fmt: skip
 def test_large_and_tiny_multipliers_are_both_right(decades, k):
     factors = graded(np.random.default_rng(7), decades, k)
-    exact, logarithms = exact_multipliers(factors)
+    _, logarithms = exact_multipliers(factors)
     # in one factor the directions spread by 10^(spread / k), which is what rounding grows by
     spread = 10.0 ** ((max(decades) - min(decades)) / k)
     repeated = len(set(decades)) < len(decades)
     error = 1e3 * k * len(decades) * EPS * spread
     assert error < 1e-6
-    np.testing.assert_allclose(
-        spectrum(factors).log_moduli, logarithms, rtol=0, atol=math.sqrt(error) if repeated else error
-    )
+    error = math.sqrt(error) if repeated else error
+    np.testing.assert_allclose(spectrum(factors).log_moduli, logarithms, rtol=0, atol=error)
     assert logarithms[-1] == pytest.approx(min(decades) * math.log(10.0), abs=1e-3)
 
 
@@ -246,10 +246,8 @@ def test_coordinates_between_the_segments_do_not_matter(case, seed):
 @given(SEQUENCES)
 def test_log_moduli_add_up_to_the_log_determinant(case):
     factors = sequence(case)
-    value, rounding = log_determinant(np.array([f * np.sign(np.linalg.det(f)) ** (
-        1 if f.shape[0] % 2 else 2) for f in factors]))  # fmt: skip
-    if math.isnan(value):  # an even size with a negative determinant
-        return
+    factors[:, :, 0] *= np.sign(np.linalg.det(factors))[:, None]
+    value, rounding = log_determinant(factors)
     found = spectrum(factors)
     unsure = uncertainties(factors, found, 4.0 * EPS * factors.shape[1])
     assert abs(found.log_moduli.sum() - value) <= 100.0 * (unsure.sum() + rounding) + 1e-12
@@ -289,16 +287,17 @@ def mathieu_segments(a, q, k, rtol=1e-12):
         return np.concatenate([y[2:], -(a - 2.0 * q * math.cos(2.0 * x)) * y[:2]])
 
     pieces = []
-    for start, end in zip(*(np.linspace(0.0, math.pi, k + 1)[s] for s in (slice(k), slice(1, None))),
-                          strict=True):  # fmt: skip
+    for start, end in pairwise(np.linspace(0.0, math.pi, k + 1)):
         ends = solve_ivp(rate, (start, end), [1.0, 0.0, 0.0, 1.0], "DOP853", rtol=rtol, atol=1e-14)
         pieces.append(ends.y[:, -1].reshape(2, 2))
     return np.array(pieces)
 
 
 @pytest.mark.parametrize("k", [1, 2, 8])
-@pytest.mark.parametrize(("function", "order", "sign"), [(mathieu_a, 0, 1), (mathieu_b, 1, -1),
-                                                         (mathieu_a, 1, -1), (mathieu_b, 2, 1)])
+@pytest.mark.parametrize(
+    ("function", "order", "sign"),
+    [(mathieu_a, 0, 1), (mathieu_b, 1, -1), (mathieu_a, 1, -1), (mathieu_b, 2, 1)],
+)
 def test_mathieus_multipliers_meet_on_the_edges_of_the_tongues(k, function, order, sign):
     """Characteristic values a(q), b(q) are where both multipliers are +1 or both are -1."""
     q = 2.0
@@ -446,10 +445,6 @@ def test_multipliers_lost_to_damping_say_so():
     assert orbit.stability.verdict == "stable"
 
 
-def test_liouvilles_formula_is_judged_under_strong_damping():
-    assert solve_orbit(overdamped(), 5.0).liouville_error < 1e-8
-
-
 def test_liouvilles_discrepancy_shows_a_wrong_matrix():
     """A change of a Jacobian that changes its determinant by 1e-5 is told as 1e-5."""
     orbit = solve_orbit(make_one_dof(), 60.0)
@@ -468,7 +463,8 @@ def test_bifurcations_are_undecided_and_the_branch_points_beside_them_are_sure(h
     for orbit in harmonic_branch.points[::10]:
         stability = orbit.stability
         assert stability.verdict == ("stable" if orbit.stable else "unstable")
-        assert stability.log_modulus == pytest.approx(math.log(abs(orbit.multipliers[0])), abs=1e-12)
+        expected = math.log(abs(orbit.multipliers[0]))
+        assert stability.log_modulus == pytest.approx(expected, abs=1e-12)
 
 
 def test_stated_uncertainty_holds_against_a_finer_map(harmonic_branch):

@@ -4,6 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nldyn.multipliers import Stability
+
+SURE = Stability(0.5 + 0.2j, -0.62, 1e-7)
+
 
 @dataclass(frozen=True)
 class FakeOrbit:
@@ -16,6 +20,7 @@ class FakeOrbit:
     error: float = 1e-14
     liouville_error: float = 1e-12
     largest_multiplier: complex = 0.5 + 0.2j
+    stability: Stability = SURE
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from fakes import FakeBranch, FakeDiagram, FakeNode, FakeOrbit, FakeSpecialPoint, diagram
 
+from nldyn.multipliers import Stability
 from nldyn.output import write_results
 from nldyn.resources import example
 from nldyn.scene import load_scene
@@ -34,7 +35,7 @@ def test_files_and_columns(tmp_path):
     branches, special = read(place / "branches.csv"), read(place / "special_points.csv")
     assert ",".join(branches[0]) == (
         "branch,point,period,frequency_hz,max_abs_displacement_m,max_penetration_m,impacts,"
-        "stable,largest_multiplier"
+        "stable,largest_multiplier,relative_uncertainty,liouville_error"
     )
     assert ",".join(special[0]) == (
         "branch,period,type,frequency_hz,max_abs_displacement_m,impacts"
@@ -52,7 +53,7 @@ def test_numbers_come_back_bit_for_bit(tmp_path):
     write_results(FakeDiagram([branch]), tmp_path / "out")
     row = read(tmp_path / "out" / "branches.csv")[1]
     assert [float(row[3]), float(row[4]), float(row[5])] == [third, tiny, tiny / 7]
-    assert row[:3] + row[6:] == ["a", "0", "3", "2", "0", "1.1"]
+    assert row[:3] + row[6:] == ["a", "0", "3", "2", "0", "1.1", "1e-07", "1e-12"]
     assert float(read(tmp_path / "out" / "special_points.csv")[1][3]) == third
 
 
@@ -73,7 +74,18 @@ def test_summary(tmp_path):
     assert summary["software"].startswith("nldyn ")
     assert summary["largest_relative_error"] == 1e-14
     assert summary["largest_liouville_error"] == 1e-12
+    assert summary["stability_undecided"] == 0
     assert [b["stop_reason"] for b in summary["branches"]] == ["end of range"] * 3
+
+
+def test_what_is_not_known_of_an_orbit_is_an_empty_cell_and_undecided(tmp_path):
+    unsure = Stability(1.0 + 0j, 0.0, float("inf"))
+    orbit = FakeOrbit(10.0, 1e-4, liouville_error=float("nan"), stability=unsure)
+    nodes = [FakeNode(FakeOrbit(9.0, 1e-4), 9.0), FakeNode(orbit, 10.0)]
+    write_results(FakeDiagram([FakeBranch("a", 1, nodes, [])]), tmp_path / "out")
+    assert read(tmp_path / "out" / "branches.csv")[2][-2:] == ["", ""]
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["stability_undecided"] == 1
 
 
 @pytest.mark.parametrize("unknown", [float("nan"), float("inf")])
