@@ -1,7 +1,7 @@
 """Compiled eigenvalues of a product of matrices, by the periodic QR algorithm.
 
 The product A[k-1] ... A[0] is never formed. Rotations of the coordinates between the factors make
-A[0] = H upper Hessenberg and all others upper triangular; QR steps on the product, chased through
+A[k-1] = H upper Hessenberg and all others upper triangular; QR steps on the product, chased through
 the factors, make H block triangular [Bojanczyk, Golub and Van Dooren 1992]. What comes out are the
 eigenvalues of factors that differ from the given ones by rounding relative to each factor's norm.
 
@@ -173,9 +173,10 @@ def pass_back(A, j, i, cosine, sine, lo, hi):
 @inner
 def annihilate(A, i, column, bottom, lo, hi):
     """Make H[i + 1, column] zero by turning coordinates i and i + 1; the column lies before i."""
-    cosine, sine = rotation(A[0, i, column], A[0, i + 1, column])
+    h = A.shape[0] - 1
+    cosine, sine = rotation(A[h, i, column], A[h, i + 1, column])
     turn_around(A, i, cosine, sine, column, bottom, lo, hi)
-    A[0, i + 1, column] = 0.0
+    A[h, i + 1, column] = 0.0
 
 
 @inner
@@ -185,36 +186,42 @@ def turn_around(A, i, cosine, sine, left, bottom, lo, hi):
     Only the diagonal blocks from `lo` to `hi` are kept up to date. Left of column `left` the two
     rows of H are zero, and below row `bottom` the two columns.
     """
-    turn_rows(A, 0, i, cosine, sine, left, hi)
-    for j in range(1, A.shape[0]):
+    h = A.shape[0] - 1
+    turn_rows(A, h, i, cosine, sine, left, hi)
+    for j in range(h):
         cosine, sine = pass_on(A, j, i, cosine, sine, lo, hi)
-    turn_columns(A, 0, i, cosine, sine, lo, bottom)
+    turn_columns(A, h, i, cosine, sine, lo, bottom)
 
 
 # Reduction
 
 
 @inner
+def all_coordinates(A):
+    """First and last coordinate; the first is no literal, for which functions compile anew."""
+    return 0 * A.shape[1], A.shape[1] - 1
+
+
+@inner
 def triangularise(A):
-    """Make all factors but A[0] upper triangular."""
-    k, n = A.shape[0], A.shape[1]
-    for j in range(1, k):
-        after = (j + 1) % k
-        for c in range(n - 1):
-            for i in range(n - 2, c - 1, -1):
+    """Make all factors but the last upper triangular."""
+    lo, hi = all_coordinates(A)
+    for j in range(A.shape[0] - 1):
+        for c in range(hi):
+            for i in range(hi - 1, c - 1, -1):
                 cosine, sine = rotation(A[j, i, c], A[j, i + 1, c])
-                turn_rows(A, j, i, cosine, sine, c, n - 1)
+                turn_rows(A, j, i, cosine, sine, c, hi)
                 A[j, i + 1, c] = 0.0
-                turn_columns(A, after, i, cosine, sine, 0, n - 1)
+                turn_columns(A, j + 1, i, cosine, sine, lo, hi)
 
 
 @inner
 def make_hessenberg(A):
-    """Make A[0] upper Hessenberg, the others staying triangular."""
-    n = A.shape[1]
-    for c in range(n - 2):
-        for i in range(n - 2, c, -1):
-            annihilate(A, i, c, n - 1, 0, n - 1)
+    """Make the last factor upper Hessenberg, the others staying triangular."""
+    lo, hi = all_coordinates(A)
+    for c in range(hi - 1):
+        for i in range(hi - 1, c, -1):
+            annihilate(A, i, c, hi, lo, hi)
 
 
 # Iteration
@@ -223,12 +230,14 @@ def make_hessenberg(A):
 @inner
 def deflate_all(A, values, exponents):
     """Split off one or two eigenvalues after the other; the squeeze, and whether it converged."""
+    h = A.shape[0] - 1
     hi, steps, squeeze = A.shape[1] - 1, 0, 1.0
     while hi >= 0:
         lo = decoupled_from(A, hi, steps > PATIENCE)
         if lo == hi:
-            values[hi], exponents[hi] = diagonal(A, hi, 0)
-            squeeze = min(squeeze, abs(A[0, hi, hi]), smallest(A, hi))
+            mantissa, exponents[hi] = diagonal(A, hi)
+            values[hi] = mantissa * A[h, hi, hi]
+            squeeze = min(squeeze, abs(A[h, hi, hi]), smallest(A, hi))
             hi, steps = hi - 1, 0
         elif lo == hi - 1:
             pair(A, lo, values, exponents)
@@ -245,21 +254,22 @@ def deflate_all(A, values, exponents):
 @inner
 def decoupled_from(A, hi, patient):
     """First coordinate of the diagonal block that ends at `hi` and cannot be split."""
+    h = A.shape[0] - 1
     for i in range(hi, 0, -1):
-        neighbours = abs(A[0, i - 1, i - 1]) + abs(A[0, i, i])
+        neighbours = abs(A[h, i - 1, i - 1]) + abs(A[h, i, i])
         if neighbours == 0.0 or patient:
             neighbours = 1.0
-        if abs(A[0, i, i - 1]) <= EPS * neighbours:
-            A[0, i, i - 1] = 0.0
+        if abs(A[h, i, i - 1]) <= EPS * neighbours:
+            A[h, i, i - 1] = 0.0
             return i
     return 0
 
 
 @inner
-def diagonal(A, i, first):
-    """Product of the diagonal entries i of the factors from `first` on: mantissa, exponent."""
+def diagonal(A, i):
+    """Product of the diagonal entries i of the triangular factors: mantissa, exponent."""
     mantissa, exponent = 1.0, 0.0
-    for j in range(first, A.shape[0]):
+    for j in range(A.shape[0] - 1):
         mantissa, power = math.frexp(mantissa * A[j, i, i])
         exponent += power
     return mantissa, exponent
@@ -268,8 +278,9 @@ def diagonal(A, i, first):
 @inner
 def smallest(A, i):
     """Smallest of the diagonal entries i of the triangular factors."""
+    h = A.shape[0] - 1
     least = 1.0
-    for j in range(1, A.shape[0]):
+    for j in range(h):
         least = min(least, abs(A[j, i, i]))
     return least
 
@@ -277,17 +288,20 @@ def smallest(A, i):
 @inner
 def pair_squeeze(A, lo):
     """Smaller singular value of a block of two of H, nearly."""
-    a, b, c, d = A[0, lo, lo], A[0, lo, lo + 1], A[0, lo + 1, lo], A[0, lo + 1, lo + 1]
+    h = A.shape[0] - 1
+    a, b, c, d = A[h, lo, lo], A[h, lo, lo + 1], A[h, lo + 1, lo], A[h, lo + 1, lo + 1]
     size = max(abs(a), abs(b), abs(c), abs(d))
     return abs(a * d - b * c) / size if size > 0.0 else 0.0
 
 
 @inner
-def corner(A, first, size):
-    """Product of the diagonal blocks of all triangular factors, (size, size), and its exponent."""
+def corner(A, first, last):
+    """Product of the diagonal blocks of all triangular factors, and its exponent."""
+    h = A.shape[0] - 1
+    size = last - first + 1
     P = np.eye(size)
     exponent = 0.0
-    for j in range(1, A.shape[0]):
+    for j in range(h):
         largest = 0.0
         for r in range(size):
             for c in range(r, size):
@@ -313,12 +327,13 @@ def pair(A, lo, values, exponents):
     entries differ by rounding; the smaller root from the determinants of the factors, so that it
     keeps its digits however small it is.
     """
-    T, exponent = corner(A, lo, 2)
-    h00, h01, h10, h11 = A[0, lo, lo], A[0, lo, lo + 1], A[0, lo + 1, lo], A[0, lo + 1, lo + 1]
+    h = A.shape[0] - 1
+    T, exponent = corner(A, lo, lo + 1)
+    h00, h01, h10, h11 = A[h, lo, lo], A[h, lo, lo + 1], A[h, lo + 1, lo], A[h, lo + 1, lo + 1]
     a, b = h00 * T[0, 0], h00 * T[0, 1] + h01 * T[1, 1]
     c, d = h10 * T[0, 0], h10 * T[0, 1] + h11 * T[1, 1]
-    first, first_exponent = diagonal(A, lo, 1)
-    second, second_exponent = diagonal(A, lo + 1, 1)
+    first, first_exponent = diagonal(A, lo)
+    second, second_exponent = diagonal(A, lo + 1)
     det, power = math.frexp((h00 * h11 - h01 * h10) * first * second)
     det_exponent = first_exponent + second_exponent + power
     half, mean = 0.5 * (a - d), 0.5 * (a + d)
@@ -360,12 +375,13 @@ def double_step(A, lo, hi, exceptional):
 @inner
 def start_of_step(A, lo, hi):
     """First column of (M - σ₁)(M - σ₂), of any length, for the product M and its shifts σ."""
-    T, exponent = corner(A, lo, 2)
-    a = A[0, lo, lo] * T[0, 0]
-    b = A[0, lo, lo] * T[0, 1] + A[0, lo, lo + 1] * T[1, 1]
-    c = A[0, lo + 1, lo] * T[0, 0]
-    d = A[0, lo + 1, lo] * T[0, 1] + A[0, lo + 1, lo + 1] * T[1, 1]
-    e = A[0, lo + 2, lo + 1] * T[1, 1]
+    h = A.shape[0] - 1
+    T, exponent = corner(A, lo, lo + 1)
+    a = A[h, lo, lo] * T[0, 0]
+    b = A[h, lo, lo] * T[0, 1] + A[h, lo, lo + 1] * T[1, 1]
+    c = A[h, lo + 1, lo] * T[0, 0]
+    d = A[h, lo + 1, lo] * T[0, 1] + A[h, lo + 1, lo + 1] * T[1, 1]
+    e = A[h, lo + 2, lo + 1] * T[1, 1]
     real, imaginary, power = shifts(A, hi)
     power = int(min(max(power - exponent, -2000.0), 2000.0))
     if power > 0:
@@ -383,12 +399,13 @@ def shifts(A, hi):
 
     Of two real eigenvalues the one nearer to the last diagonal entry is taken twice.
     """
-    T, exponent = corner(A, hi - 2, 3)
+    h = A.shape[0] - 1
+    T, exponent = corner(A, hi - 2, hi)
     i = hi - 1
-    a = A[0, i, i - 1] * T[0, 1] + A[0, i, i] * T[1, 1]
-    b = A[0, i, i - 1] * T[0, 2] + A[0, i, i] * T[1, 2] + A[0, i, hi] * T[2, 2]
-    c = A[0, hi, i] * T[1, 1]
-    d = A[0, hi, i] * T[1, 2] + A[0, hi, hi] * T[2, 2]
+    a = A[h, i, i - 1] * T[0, 1] + A[h, i, i] * T[1, 1]
+    b = A[h, i, i - 1] * T[0, 2] + A[h, i, i] * T[1, 2] + A[h, i, hi] * T[2, 2]
+    c = A[h, hi, i] * T[1, 1]
+    d = A[h, hi, i] * T[1, 2] + A[h, hi, hi] * T[2, 2]
     half = 0.5 * (a - d)
     square = half * half + b * c
     if square < 0.0:
@@ -403,7 +420,8 @@ def shifts(A, hi):
 @inner
 def split_at_zero(A, lo, hi, negligible):
     """Split off the zero eigenvalue of a triangular factor's zero on the diagonal, if any."""
-    for j in range(1, A.shape[0]):
+    h = A.shape[0] - 1
+    for j in range(h):
         for i in range(lo, hi + 1):
             if abs(A[j, i, i]) <= negligible:
                 A[j, i, i] = 0.0
@@ -416,32 +434,34 @@ def split_at_zero(A, lo, hi, negligible):
 @inner
 def decouple_above(A, j, zero, lo, hi):
     """Make H[zero, zero - 1] zero: a QR step whose last rotation ends at the zero of factor j."""
+    h = A.shape[0] - 1
     turns = np.empty((hi + 1, 2))
     for i in range(lo, zero):
-        cosine, sine = rotation(A[0, i, i], A[0, i + 1, i])
-        turn_rows(A, 0, i, cosine, sine, i, hi)
-        A[0, i + 1, i] = 0.0
-        for between in range(1, A.shape[0]):
+        cosine, sine = rotation(A[h, i, i], A[h, i + 1, i])
+        turn_rows(A, h, i, cosine, sine, i, hi)
+        A[h, i + 1, i] = 0.0
+        for between in range(h):
             cosine, sine = pass_on(A, between, i, cosine, sine, lo, hi)
             if i == zero - 1 and between == j:
                 cosine, sine = 1.0, 0.0
         turns[i, 0], turns[i, 1] = cosine, sine
     for i in range(lo, zero):
-        turn_columns(A, 0, i, turns[i, 0], turns[i, 1], lo, hi)
+        turn_columns(A, h, i, turns[i, 0], turns[i, 1], lo, hi)
 
 
 @inner
 def decouple_below(A, j, zero, lo, hi):
     """Make H[zero + 1, zero] zero: a QR step from the right, ending at the zero of factor j."""
+    h = A.shape[0] - 1
     turns = np.empty((hi + 1, 2))
     for i in range(hi - 1, zero - 1, -1):
-        cosine, sine = rotation(A[0, i + 1, i + 1], -A[0, i + 1, i])
-        turn_columns(A, 0, i, cosine, sine, lo, i + 1)
-        A[0, i + 1, i] = 0.0
-        for between in range(A.shape[0] - 1, 0, -1):
+        cosine, sine = rotation(A[h, i + 1, i + 1], -A[h, i + 1, i])
+        turn_columns(A, h, i, cosine, sine, lo, i + 1)
+        A[h, i + 1, i] = 0.0
+        for between in range(h - 1, -1, -1):
             cosine, sine = pass_back(A, between, i, cosine, sine, lo, hi)
             if i == zero and between == j:
                 cosine, sine = 1.0, 0.0
         turns[i, 0], turns[i, 1] = cosine, sine
     for i in range(hi - 1, zero - 1, -1):
-        turn_rows(A, 0, i, turns[i, 0], turns[i, 1], lo, hi)
+        turn_rows(A, h, i, turns[i, 0], turns[i, 1], lo, hi)

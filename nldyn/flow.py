@@ -185,11 +185,6 @@ class Solution:
         """Whether a solution was found."""
         return not self.failure
 
-    @cached_property
-    def monodromy(self) -> Real:
-        """Product of the segments' Jacobians, (2n, 2n)."""
-        return chain(self.jacobians)
-
 
 def chain(jacobians: Real) -> Real:
     """Product of the Jacobians (k, 2n, 2n) of consecutive segments, (2n, 2n)."""

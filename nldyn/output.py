@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import cmath
 import csv
 import json
 import math
@@ -30,6 +31,7 @@ BRANCH_COLUMNS = (
     "impacts",
     "stable",
     "largest_multiplier",
+    "multiplier_angle_deg",
     "relative_uncertainty",
     "liouville_error",
 )
@@ -113,6 +115,7 @@ def branch_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
                 int(orbit.impacts),
                 int(orbit.stable),
                 abs(orbit.largest_multiplier),
+                math.degrees(cmath.phase(orbit.largest_multiplier)),
                 if_known(orbit.stability.uncertainty),
                 if_known(orbit.liouville_error),
             )

@@ -160,8 +160,8 @@ def test_defective_multipliers_are_as_sure_as_the_root_of_the_error(order):
 def test_zero_of_a_triangular_factor_is_an_exactly_zero_multiplier(k, place):
     """Any place of the zero; the other multipliers are those of high precision."""
     factors = np.triu(np.random.default_rng(8).normal(size=(k, 4, 4)))
-    factors[0] += np.tril(np.random.default_rng(9).normal(size=(4, 4)), -1)
-    factors[-1, place, place] = 0.0
+    factors[-1] += np.tril(np.random.default_rng(9).normal(size=(4, 4)), -1)
+    factors[0, place, place] = 0.0
     found = spectrum(factors)
     assert np.sum(found.multipliers == 0.0) == 1
     assert found.log_moduli[-1] == -math.inf
@@ -171,8 +171,8 @@ def test_zero_of_a_triangular_factor_is_an_exactly_zero_multiplier(k, place):
 
 def test_two_zeros_in_different_factors_are_two_zero_multipliers():
     factors = np.triu(np.random.default_rng(12).normal(size=(4, 5, 5)))
-    factors[0] += np.tril(np.random.default_rng(13).normal(size=(5, 5)), -1)
-    factors[1, 3, 3] = factors[3, 1, 1] = 0.0
+    factors[-1] += np.tril(np.random.default_rng(13).normal(size=(5, 5)), -1)
+    factors[0, 3, 3] = factors[2, 1, 1] = 0.0
     found = spectrum(factors)
     assert np.sum(found.multipliers == 0.0) == 2
     _, logarithms = exact_multipliers(factors)

@@ -35,7 +35,7 @@ def test_files_and_columns(tmp_path):
     branches, special = read(place / "branches.csv"), read(place / "special_points.csv")
     assert ",".join(branches[0]) == (
         "branch,point,period,frequency_hz,max_abs_displacement_m,max_penetration_m,impacts,"
-        "stable,largest_multiplier,relative_uncertainty,liouville_error"
+        "stable,largest_multiplier,multiplier_angle_deg,relative_uncertainty,liouville_error"
     )
     assert ",".join(special[0]) == (
         "branch,period,type,frequency_hz,max_abs_displacement_m,impacts"
@@ -53,7 +53,7 @@ def test_numbers_come_back_bit_for_bit(tmp_path):
     write_results(FakeDiagram([branch]), tmp_path / "out")
     row = read(tmp_path / "out" / "branches.csv")[1]
     assert [float(row[3]), float(row[4]), float(row[5])] == [third, tiny, tiny / 7]
-    assert row[:3] + row[6:] == ["a", "0", "3", "2", "0", "1.1", "1e-07", "1e-12"]
+    assert row[:3] + row[6:] == ["a", "0", "3", "2", "0", "1.1", "180.0", "1e-07", "1e-12"]
     assert float(read(tmp_path / "out" / "special_points.csv")[1][3]) == third
 
 
