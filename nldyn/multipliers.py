@@ -157,7 +157,7 @@ def uncertainties(jacobians: Real, found: Spectrum, error: float) -> Real:
     return np.where(np.isnan(total), math.inf, np.sqrt(total))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)
 def _directions(k: int, n: int) -> Real:
     """Random perturbations (SAMPLES, k, n, n) for `uncertainties`.
 
