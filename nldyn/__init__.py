@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         hertz_stiffness,
     )
     from nldyn.errors import SceneError, SystemModelError
+    from nldyn.exploration import Coverage, Exploration, ExploreOptions, explore
     from nldyn.flow import FlowMap, FlowOptions
     from nldyn.multipliers import Stability
     from nldyn.orbit import ConvergenceError, History, Orbit, solve_orbit
@@ -33,6 +34,7 @@ _HOMES = {
     "continuation": "ContinuationOptions Walk continue_branch switch_at_flip",
     "diagrams": "Diagram Seed diagram",
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
+    "exploration": "Coverage Exploration ExploreOptions explore",
     "errors": "SceneError SystemModelError",
     "flow": "FlowMap FlowOptions",
     "multipliers": "Stability",
@@ -48,8 +50,11 @@ __all__ = [
     "BranchPoint",
     "ContinuationOptions",
     "ConvergenceError",
+    "Coverage",
     "Damper",
     "Diagram",
+    "Exploration",
+    "ExploreOptions",
     "FlowMap",
     "FlowOptions",
     "HarmonicForce",
@@ -70,6 +75,7 @@ __all__ = [
     "continue_branch",
     "diagram",
     "dissipation_for",
+    "explore",
     "find_orbits",
     "hertz_stiffness",
     "solve_orbit",

@@ -80,7 +80,7 @@ class Diagram:
 
 
 @dataclass
-class _Collector:
+class Collector:
     """Branches found so far, with the tools to add more."""
 
     flow: FlowMap
@@ -224,7 +224,7 @@ def diagram(
             )
     check_whole("search_points", search_points, 1)
     check_whole("doublings", doublings, 0)
-    box = _Collector(
+    box = Collector(
         flow,
         (low, high),
         check_observe(flow.system, observe),
@@ -254,7 +254,7 @@ def diagram(
 
 
 def _search(
-    box: _Collector, frequencies: Sequence[float], periods: Sequence[int], effort: SearchOptions
+    box: Collector, frequencies: Sequence[float], periods: Sequence[int], effort: SearchOptions
 ) -> None:
     """Follow what simulations at some frequencies come near, one period after the other."""
     strobes = []
@@ -268,7 +268,7 @@ def _search(
             box.from_orbits(orbits_from_strobe(box.flow, strobe, period, box.observe, effort))
 
 
-def _simulate(box: _Collector, frequency: float, effort: SearchOptions) -> Strobe:
+def _simulate(box: Collector, frequency: float, effort: SearchOptions) -> Strobe:
     """Simulations at one frequency; those that fail are noted."""
     strobe = simulate_strobe(box.flow, frequency, effort)
     for reason, count in Counter(strobe.failures).items():
@@ -278,13 +278,13 @@ def _simulate(box: _Collector, frequency: float, effort: SearchOptions) -> Strob
     return strobe
 
 
-def _contact_is_missing(box: _Collector) -> bool:
+def _contact_is_missing(box: Collector) -> bool:
     """Whether all stops are open at rest, and no orbit found touches one."""
     orbits = (orbit for branch in box.branches for orbit in branch.points)
     return reach(box.flow.system) > 0.0 and all(orbit.max_penetration == 0.0 for orbit in orbits)
 
 
-def _follow_seed(box: _Collector, seed: Seed, effort: SearchOptions) -> None:
+def _follow_seed(box: Collector, seed: Seed, effort: SearchOptions) -> None:
     """Look around a seed's frequency, nearest first, until a new branch turns up."""
     for shift in (0.0, 0.005, -0.005, 0.01, -0.01, 0.02, -0.02, 0.03, -0.03):
         frequency = seed.near_hz * (1.0 + shift)
@@ -299,14 +299,14 @@ def _follow_seed(box: _Collector, seed: Seed, effort: SearchOptions) -> None:
     box.notes.append(f"no 1/{seed.period} orbit found near {seed.near_hz:g} Hz")
 
 
-def _follow_flips(box: _Collector, branches: Sequence[Branch]) -> None:
+def _follow_flips(box: Collector, branches: Sequence[Branch]) -> None:
     for branch in branches:
         for special in branch.special_points:
             if special.kind == "PD":
                 box.from_flip(special)
 
 
-def _follow_flips_of_new(box: _Collector, wanted: Sequence[int], doublings: int) -> None:
+def _follow_flips_of_new(box: Collector, wanted: Sequence[int], doublings: int) -> None:
     """Doubled branches of wanted periods from branches found late, then further doublings."""
     for period in wanted:
         if 2 * period in wanted:

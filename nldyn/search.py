@@ -78,20 +78,33 @@ def simulate_strobe(flow: FlowMap, frequency_hz: float, options: SearchOptions) 
     motion, or as the smallest state that closes a gap, if that is larger.
     """
     omega = 2.0 * math.pi * frequency_hz
-    total = options.transient + options.recorded
-    phases = np.linspace(0.0, 2.0 * np.pi * total, total + 1)
+    starts = random_states(flow, omega, options.starts, options.seed)
+    return simulate(flow, omega, starts, options.transient, options.recorded)
+
+
+def random_states(flow: FlowMap, omega: float, count: int, seed: int) -> Real:
+    """Initial states (count, 2n): rest, then random ones, see `simulate_strobe`."""
     n = 2 * flow.system.size
-    rng = np.random.default_rng(options.seed)
+    rng = np.random.default_rng(seed)
     size = max(float(np.abs(flow.system.steady(omega)).max()), reach(flow.system))
-    runs, failures = [], []
-    for index in range(options.starts):
+    states = np.empty((count, n))
+    for index in range(count):
         scale = 0.0 if index == 0 else size * 10.0 ** rng.uniform(-0.5, 1.0)
-        start = scale * rng.standard_normal(n) / math.sqrt(n)
+        states[index] = scale * rng.standard_normal(n) / math.sqrt(n)
+    return states
+
+
+def simulate(flow: FlowMap, omega: float, starts: Real, transient: int, recorded: int) -> Strobe:
+    """Simulate from each state (k, 2n) and record the state after each period of the excitation."""
+    total = transient + recorded
+    phases = np.linspace(0.0, 2.0 * np.pi * total, total + 1)
+    runs, failures = [], []
+    for start in starts:
         found = flow.shoot(start[None], phases, omega, sensitivities=False, chained=True)
         if found.failure:
             failures.append(found.failure)
         else:
-            runs.append(found.ends[options.transient :])
+            runs.append(found.ends[transient:])
     return Strobe(omega, tuple(runs), tuple(failures))
 
 

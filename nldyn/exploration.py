@@ -1,0 +1,417 @@
+"""The whole picture without guesses: sweeps, deflation and branches, and how much they explain."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from nldyn.branch import Branch, minimal_period, same_orbit, stroboscopic
+from nldyn.continuation import ContinuationOptions, check_range
+from nldyn.diagrams import Collector, Diagram, Progress
+from nldyn.errors import SystemModelError, check_whole, is_finite, shown
+from nldyn.flow import FlowMap
+from nldyn.linear import Real
+from nldyn.orbit import (
+    ConvergenceError,
+    Orbit,
+    check_observe,
+    near_returns,
+    refine,
+    shooting_problem,
+    spread,
+)
+from nldyn.search import random_states, simulate
+from nldyn.shooting import ShootingProblem
+from nldyn.system import System
+
+RETURNS = 3.0  # recorded periods after settling, over the longest period looked for
+DECAYS = 4.0  # time allowed for settling, over the slowest decay time of the linear part
+SETTLING = (30, 600)  # fewest and most periods of it
+NEAR = 0.1  # a return within this share of the motion is worth a Newton iteration
+
+
+@dataclass(frozen=True)
+class ExploreOptions:
+    """Effort of `explore`.
+
+    Parameters
+    ----------
+    spacing : float
+        Largest relative distance of the frequencies at which motions are simulated. A branch that
+        is stable only in a narrower window may be missed.
+    starts : int
+        Random initial states at each of them, beside the motions of the frequency before.
+    unstable_period : int
+        Largest period multiple of unstable orbits looked for by near returns and deflation.
+    seed : int
+        Seed of the random initial states: results are repeatable.
+
+    Raises
+    ------
+    SystemModelError
+        If one of them is not a number in its range.
+    """
+
+    spacing: float = 0.005
+    starts: int = 12
+    unstable_period: int = 2
+    seed: int = 20
+
+    def __post_init__(self) -> None:
+        if not (is_finite(self.spacing) and 0.0 < self.spacing < 1.0):
+            raise SystemModelError(
+                f"explore: spacing must lie between 0 and 1, got {shown(self.spacing)}"
+            )
+        check_whole("explore: starts", self.starts, 1)
+        check_whole("explore: unstable_period", self.unstable_period, 0)
+        check_whole("explore: seed", self.seed, 0)
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """What simulations at one frequency came to.
+
+    Parameters
+    ----------
+    frequency_hz : float
+        Excitation frequency in Hz.
+    periods : tuple of int
+        Period multiples of the different attractors found, ascending.
+    settled, unsettled, failed : int
+        Numbers of simulations that ended on one of them, that did not (chaotic motion, longer
+        periods or slow transients), and that could not be computed.
+    """
+
+    frequency_hz: float
+    periods: tuple[int, ...]
+    settled: int
+    unsettled: int
+    failed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Exploration:
+    """The branches found and how much of the simulated motion they explain.
+
+    Parameters
+    ----------
+    diagram : Diagram
+        All branches, with notes.
+    coverage : tuple of Coverage
+        One for each frequency, ascending.
+    """
+
+    diagram: Diagram
+    coverage: tuple[Coverage, ...]
+
+    @property
+    def settled_share(self) -> float:
+        """Share of all simulations that ended on an orbit of one of the branches."""
+        settled = sum(c.settled for c in self.coverage)
+        total = sum(c.settled + c.unsettled + c.failed for c in self.coverage)
+        return settled / total
+
+    def report(self) -> str:
+        """What was found, tried and left unexplained, in a few lines."""
+        counts: dict[str, int] = {}
+        for branch in self.diagram.branches:
+            kind = "harmonic" if branch.period == 1 else f"1/{branch.period}"
+            counts[kind] = counts.get(kind, 0) + 1
+        low, high = self.diagram.range_hz
+        simulations = sum(c.settled + c.unsettled + c.failed for c in self.coverage)
+        lines = [
+            f"{low:g} to {high:g} Hz: {len(self.diagram.branches)} branches ("
+            + ", ".join(f"{n} {kind}" for kind, n in counts.items())
+            + ")",
+            f"{simulations} simulations at {len(self.coverage)} frequencies, "
+            f"{100.0 * self.settled_share:.1f} % ended on one of them",
+        ]
+        open_ranges = ", ".join(f"{a:.4g}-{b:.4g}" for a, b in self.unsettled_ranges())
+        if open_ranges:
+            lines.append(f"motions that did not settle (chaos or longer periods): {open_ranges} Hz")
+        return "\n".join(lines + list(self.diagram.notes))
+
+    def unsettled_ranges(self) -> list[tuple[float, float]]:
+        """Ranges of neighbouring frequencies in Hz at which some simulations did not settle."""
+        ranges: list[tuple[float, float]] = []
+        before = False
+        for c in self.coverage:
+            if c.unsettled and before:
+                ranges[-1] = (ranges[-1][0], c.frequency_hz)
+            elif c.unsettled:
+                ranges.append((c.frequency_hz, c.frequency_hz))
+            before = c.unsettled > 0
+        return ranges
+
+
+def explore(
+    system: System | FlowMap,
+    range_hz: tuple[float, float],
+    max_period: int = 8,
+    *,
+    observe: str | None = None,
+    effort: ExploreOptions | None = None,
+    options: ContinuationOptions | None = None,
+    progress: Progress | None = None,
+) -> Exploration:
+    """Find the branches of periodic orbits in a range of frequencies, without initial guesses.
+
+    Motions are simulated at many frequencies from random states and swept up and down, each
+    frequency starting from the attractors of the one before. What they settle on is solved for as
+    an orbit, and its branch continued in both directions unless it is known. Unstable orbits come
+    from near returns of motions that wander, from Newton's method deflated by the known orbits
+    [Farrell, Birkisson and Funke 2015], and from flips, at each of which the doubled branch is
+    followed as long as its period is within `max_period`.
+
+    Isolas of unstable orbits that no motion passes, attractors with small basins that exist
+    between two of the frequencies only, and orbits of longer periods can still be missing.
+
+    Parameters
+    ----------
+    system : System or FlowMap
+        What to explore.
+    range_hz : (float, float)
+        Frequencies in Hz, ascending.
+    max_period : int
+        Longest orbits wanted, in excitation periods.
+    observe : str, optional
+        Interface whose displacement is reported; the first unless given.
+    effort : ExploreOptions, optional
+        How much to simulate.
+    options : ContinuationOptions, optional
+        Step control.
+    progress : callable, optional
+        Called as ``progress(what, frequency_hz)``.
+
+    Returns
+    -------
+    Exploration
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense.
+
+    Examples
+    --------
+    >>> from nldyn import ExploreOptions, Stop, System, Unbalance, explore
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> found = explore(system, (48.0, 52.0), 2, effort=ExploreOptions(spacing=0.05, starts=4))
+    >>> sorted({branch.period for branch in found.diagram.branches})
+    [1, 2]
+    """
+    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    low, high = check_range(range_hz)
+    check_whole("max_period", max_period, 1)
+    effort = effort or ExploreOptions()
+    box = Collector(
+        flow,
+        (low, high),
+        check_observe(flow.system, observe),
+        options or ContinuationOptions(),
+        progress or (lambda what, frequency_hz: None),
+    )
+    survey = _Survey(box, max_period, effort)
+    count = math.ceil(math.log(high / low) / effort.spacing) + 1
+    frequencies = np.geomspace(low, high, count).tolist()
+    coverage = survey.sweep(frequencies, effort.starts)
+    survey.sweep(frequencies[::-1], 0)
+    diagram = Diagram(tuple(box.branches), (low, high), box.observe, tuple(box.notes))
+    return Exploration(diagram, tuple(coverage))
+
+
+@dataclass
+class _Survey:
+    """Simulations over frequencies that fill a box of branches."""
+
+    box: Collector
+    max_period: int
+    effort: ExploreOptions
+
+    def sweep(self, frequencies: Sequence[float], starts: int) -> list[Coverage]:
+        """Simulate at one frequency after the other, from random states and what came before."""
+        size = 2 * self.box.flow.system.size
+        carried = np.empty((0, size))
+        found = []
+        for frequency in frequencies:
+            self.box.progress("explore", frequency)
+            flow, omega = self.box.flow, 2.0 * math.pi * frequency
+            fresh = random_states(flow, omega, starts, self.effort.seed)
+            settling = settling_periods(flow.system, frequency)
+            recorded = math.ceil(RETURNS * self.max_period) + 1
+            strobe = simulate(flow, omega, np.concatenate([carried, fresh]), 5, settling + recorded)
+            orbits, settled, wandering = self._attractors(strobe.runs, omega)
+            if starts:
+                self._unstable(wandering, orbits, omega)
+            ends = [stroboscopic(orbit)[0] for orbit in orbits]
+            carried = np.array(ends + [run[-1] for run in wandering[:1]]).reshape(-1, size)
+            found.append(
+                Coverage(
+                    frequency,
+                    tuple(sorted({orbit.period for orbit in orbits})),
+                    settled,
+                    len(wandering),
+                    len(strobe.failures),
+                )
+            )
+        return found
+
+    def _attractors(
+        self, runs: Sequence[Real], omega: float
+    ) -> tuple[list[Orbit], int, list[Real]]:
+        """Different orbits on which runs have settled, how many runs did, and the other runs."""
+        orbits: list[Orbit] = []
+        wandering = []
+        for run in runs:
+            orbit = self._settled_on(run, omega, orbits)
+            if orbit is None:
+                wandering.append(run)
+            elif not any(orbit is other for other in orbits):
+                orbits.append(orbit)
+        for orbit in orbits:
+            self._follow(orbit)
+        return orbits, len(runs) - len(wandering), wandering
+
+    def _settled_on(self, run: Real, omega: float, known: Sequence[Orbit]) -> Orbit | None:
+        """Stable orbit to which a run comes near at its end, one of the known ones if it can be."""
+        scale = float(np.linalg.norm(run, axis=1).max()) or 1.0
+        for orbit in known:
+            states = stroboscopic(orbit)
+            if float(np.linalg.norm(states - run[-1], axis=1).min()) < 1e-4 * scale:
+                return orbit
+        for period in range(1, self.max_period + 1):
+            tail = run[-period - self.max_period :]
+            off = np.linalg.norm(tail[period:] - tail[:-period], axis=1)
+            if float(np.median(off)) > NEAR * scale:
+                continue
+            found = solve_from(self.box, run[-1 - period], period, omega)
+            if found is None or not found.stable:
+                continue
+            nearest = np.linalg.norm(stroboscopic(found) - run[-1], axis=1).min()
+            if nearest < NEAR * scale:
+                return next((other for other in known if same_orbit(found, other)), found)
+        return None
+
+    def _unstable(self, runs: Sequence[Real], stable: Sequence[Orbit], omega: float) -> None:
+        """Look for unstable orbits of short periods near wandering motions and by deflation."""
+        for period in range(1, self.effort.unstable_period + 1):
+            for run in runs:
+                for start in near_returns(run, period, 2):
+                    orbit = solve_from(self.box, run[start], period, omega)
+                    if orbit is not None and orbit.period == period:
+                        self._follow(orbit)
+            known = [o for branch in self.box.of_period(period) for o in _at(branch, omega)]
+            starts = [run[-1] for run in runs] + [stroboscopic(o)[0] for o in stable]
+            for start in starts:
+                other = deflated_orbit(self.box, start, period, omega, known)
+                if other is not None:
+                    known.append(other)
+                    self._follow(other)
+
+    def _follow(self, orbit: Orbit) -> None:
+        """Follow an orbit's branch unless it is known, and those born at its flips."""
+        count = len(self.box.branches)
+        self.box.from_orbits([orbit])
+        while count < len(self.box.branches):
+            branch = self.box.branches[count]
+            count += 1
+            if 2 * branch.period <= self.max_period:
+                for special in branch.special_points:
+                    if special.kind == "PD":
+                        self.box.from_flip(special)
+
+
+def settling_periods(system: System, frequency_hz: float) -> int:
+    """Excitation periods after which the slowest linear motion has decayed to e^-4, within bounds.
+
+    Examples
+    --------
+    >>> from nldyn import System
+    >>> system = System.from_modal([10.0], {"tip": [1.0]}, modal_damping=0.01)
+    >>> settling_periods(system, 10.0)
+    64
+    """
+    slowest = min(-float(np.linalg.eigvals(block).real.max()) for block in system.linear.blocks)
+    fewest, most = SETTLING
+    if slowest <= 0.0:
+        return most
+    return int(min(max(math.ceil(DECAYS * frequency_hz / slowest), fewest), most))
+
+
+def solve_from(box: Collector, start: Real, period: int, omega: float) -> Orbit | None:
+    """Orbit that Newton's method finds from a state, by its minimal period; None if none."""
+    problem = shooting_problem(box.flow, period)
+    try:
+        nodes = spread(problem, start, omega)
+        orbit = refine(problem, nodes, omega, box.observe, max_iterations=10)
+        shorter = minimal_period(orbit)
+        if shorter < period:
+            problem = shooting_problem(box.flow, shorter)
+            nodes = spread(problem, stroboscopic(orbit)[0], omega)
+            orbit = refine(problem, nodes, omega, box.observe, max_iterations=10)
+    except ConvergenceError:
+        return None
+    return orbit
+
+
+def deflated_orbit(
+    box: Collector, start: Real, period: int, omega: float, known: Sequence[Orbit]
+) -> Orbit | None:
+    """Orbit other than the known ones, by Newton's method on the deflated equations.
+
+    The equations are multiplied by ∏ (1/|x - xᵢ|² + 1) over the known orbits and their shifts, so
+    that Newton's steps are only stretched [Farrell, Birkisson and Funke 2015, section 2].
+    """
+    problem = shooting_problem(box.flow, period)
+    try:
+        point = np.append(spread(problem, start, omega).ravel(), math.log(omega))
+    except ConvergenceError:
+        return None
+    row = np.zeros(point.size)
+    row[-1] = 1.0
+    repelled = [states for orbit in known for states in _shifts(problem, orbit)]
+    for _ in range(25):
+        found = problem.correct(point, row, max_iterations=1)
+        step = found.point - point
+        size = problem.scale(point) * math.sqrt(problem.segments)
+        if not np.all(np.isfinite(step)) or np.linalg.norm(step) > 1e3 * size:
+            return None
+        if np.linalg.norm(step) < 1e-3 * size:
+            break
+        point = point + step * _stretch(point[:-1], step[:-1], repelled, size)
+    else:
+        return None
+    try:
+        orbit = refine(problem, problem.nodes(point), omega, box.observe, max_iterations=10)
+    except ConvergenceError:
+        return None
+    if minimal_period(orbit) < period or any(same_orbit(orbit, other) for other in known):
+        return None
+    return orbit
+
+
+def _stretch(x: Real, step: Real, repelled: Sequence[Real], size: float) -> float:
+    """Factor 1/(1 - m'·step/m) of a Newton step, m being the product that repels."""
+    slope = 0.0
+    for other in repelled:
+        away = (x - other) / size
+        square = float(away @ away) or 1e-300
+        slope += -2.0 * float(away @ step) / size / (square * (1.0 + square))
+    factor = 1.0 / (1.0 - slope) if slope != 1.0 else 1.0
+    return min(max(factor, -2.0), 2.0)
+
+
+def _shifts(problem: ShootingProblem, orbit: Orbit) -> Iterator[Real]:
+    """States of an orbit at the shooting phases, shifted by each of its excitation periods."""
+    nodes = orbit.problem.nodes(orbit.point)
+    for shift in range(0, problem.segments, problem.segments // problem.period):
+        yield np.roll(nodes, shift, axis=0).ravel()
+
+
+def _at(branch: Branch, omega: float) -> list[Orbit]:
+    return branch.at(omega / (2.0 * math.pi))
