@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from nldyn.parameters import Parameter
     from nldyn.search import SearchOptions, find_orbits
     from nldyn.special import LocateError
+    from nldyn.store import load_branch, load_branches, load_diagram
     from nldyn.system import System
 
 _HOMES = {
@@ -38,6 +39,7 @@ _HOMES = {
     "parameters": "Parameter",
     "search": "SearchOptions find_orbits",
     "special": "LocateError",
+    "store": "load_branch load_branches load_diagram",
     "system": "System",
 }
 
@@ -69,6 +71,9 @@ __all__ = [
     "dissipation_for",
     "find_orbits",
     "hertz_stiffness",
+    "load_branch",
+    "load_branches",
+    "load_diagram",
     "solve_orbit",
     "switch_at_flip",
 ]

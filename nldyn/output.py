@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from nldyn.result_directory import result_directory
+from nldyn.tables import at_known, orbit_columns
 from nldyn.version import software_version
 
 if TYPE_CHECKING:
@@ -100,32 +101,11 @@ def write_results(
 def branch_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
     """Give the rows of ``branches.csv``, one for each point of each branch."""
     for branch in diagram.branches:
-        for number, orbit in enumerate(branch.points):
-            yield (
-                branch.name,
-                number,
-                orbit.period,
-                at_end(orbit.frequency_hz, diagram.range_hz),
-                float(orbit.max_abs_displacement),
-                float(orbit.max_penetration),
-                int(orbit.impacts),
-                int(orbit.stable),
-                abs(orbit.largest_multiplier),
-            )
-
-
-def at_end(frequency_hz: float, range_hz: tuple[float, float]) -> float:
-    """Give the end of the range that a frequency meets, else the frequency itself.
-
-    Orbits keep the logarithm of their frequency, so that 90 Hz come back as 89.99999999999999.
-
-    Examples
-    --------
-    >>> at_end(89.99999999999999, (5.0, 90.0)), at_end(89.999, (5.0, 90.0))
-    (90.0, 89.999)
-    """
-    ends = (end for end in range_hz if math.isclose(frequency_hz, end, rel_tol=1e-14))
-    return float(next(ends, frequency_hz))
+        columns = orbit_columns(branch.points, diagram.range_hz)
+        columns["stable"] = columns["stable"].astype(int)
+        rows = zip(*(columns[name].tolist() for name in BRANCH_COLUMNS[2:]), strict=True)
+        for number, row in enumerate(rows):
+            yield (branch.name, number, *row)
 
 
 def special_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
@@ -165,7 +145,7 @@ def summary(diagram: Diagram) -> Mapping[str, object]:
 
 
 def _branch_summary(branch: Branch, range_hz: tuple[float, float]) -> dict[str, object]:
-    hz = [at_end(orbit.frequency_hz, range_hz) for orbit in branch.points]
+    hz = [at_known(orbit.frequency_hz, range_hz) for orbit in branch.points]
     return {
         "name": branch.name,
         "period": branch.period,
