@@ -7,10 +7,11 @@ the time allows.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from nldyn.errors import SystemModelError
 
 if TYPE_CHECKING:
     from nldyn.branch import Branch, Course
+    from nldyn.flow import FlowMap
     from nldyn.orbit import Orbit
 
 PAUSE = 5.0  # s, at least, between two writings
@@ -26,6 +28,8 @@ SHARE = 20.0  # times as long as it took to write
 
 class Checkpoint:
     """A file with the finished branches of a computation and the one at work.
+
+    As a context it writes the file at the end, also when an exception such as Ctrl-C ends the work.
 
     Parameters
     ----------
@@ -37,6 +41,11 @@ class Checkpoint:
         What the file held before.
     strict : str
         Name of the file, if it shall hold nothing but the computation asked for.
+
+    Attributes
+    ----------
+    work : callable or None
+        Gives the branch at work, as far as it is known.
     """
 
     def __init__(
@@ -46,23 +55,33 @@ class Checkpoint:
         earlier: Sequence[Branch] = (),
         strict: str = "",
     ) -> None:
+        self.work: Callable[[], Branch | None] | None = None
         self._write = write_branches
         self._finished = [] if finished is None else finished
-        self._earlier = earlier
+        self._earlier = list(earlier)
         self._strict = strict
         self._due = time.monotonic() + PAUSE
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, error: type[BaseException] | None, *_: object) -> None:
+        if error is None:
+            self._earlier.clear()
+        if self.work or self._finished:
+            self.write()
+
     def branch_from(self, orbit: Orbit, course: Course) -> Branch | None:
-        """The branch in the file that was begun at an orbit in the same way.
+        """Take from the file the branch that was begun at an orbit in the same way.
 
         Raises
         ------
         SystemModelError
             If the file is strict and holds something else.
         """
-        for branch in self._earlier:
+        for number, branch in enumerate(self._earlier):
             if _is_begun_at(branch, orbit, course):
-                return branch
+                return self._earlier.pop(number)
         if self._strict and self._earlier:
             raise SystemModelError(
                 f"{self._strict}: holds another continuation (other system, start, range or "
@@ -70,32 +89,28 @@ class Checkpoint:
             )
         return None
 
-    def offer(self, whole: Callable[[], Branch | None]) -> None:
-        """Write, if it is time, what a function gives."""
+    def offer(self) -> None:
+        """Write, if it is time."""
         if self._write is not None and time.monotonic() >= self._due:
-            self.write(whole())
+            self.write()
 
-    def write(self, branch: Branch | None) -> None:
-        """Write the finished branches and one more."""
-        if self._write is None or branch is None:
+    def write(self) -> None:
+        """Write what is finished, what is at work, and what the file held and is not yet used."""
+        if self._write is None:
             return
         start = time.monotonic()
-        self._write([*self._finished, branch])
+        branch = self.work() if self.work else None
+        self._write([*self._finished, *([branch] if branch else []), *self._earlier])
         end = time.monotonic()
         self._due = end + max(PAUSE, SHARE * (end - start))
 
-    @contextmanager
-    def at_failure(self, whole: Callable[[], Branch | None]) -> Iterator[None]:
-        """Write what a function gives if the work ends with an exception, also with Ctrl-C."""
-        try:
-            yield
-        except BaseException:
-            self.write(whole())
-            raise
 
-
-def checkpoint_at(place: str | Path | Checkpoint | None) -> Checkpoint:
+def checkpoint_at(
+    place: str | Path | Checkpoint | None,
+) -> AbstractContextManager[Checkpoint]:
     """The checkpoint of one continuation in a file; one that keeps nothing for None.
+
+    One that is given is left to the giver to end.
 
     Raises
     ------
@@ -105,20 +120,18 @@ def checkpoint_at(place: str | Path | Checkpoint | None) -> Checkpoint:
         If it cannot be written.
     """
     if isinstance(place, Checkpoint):
-        return place
+        return nullcontext(place)
     if place is None:
         return Checkpoint()
-    from nldyn.store import check_writable, load_branches, save_branches
-
-    path = check_writable(place)
-    earlier = load_branches(path) if path.exists() else []
-    return Checkpoint(lambda branches: save_branches(path, branches), None, earlier, str(place))
+    return Checkpoint(*_file(place), strict=str(place))
 
 
-def checkpoint_of_several(place: str | Path | None, finished: list[Branch]) -> Checkpoint:
-    """The checkpoint of a computation of several branches, which adds them to a list.
+def checkpoint_of_several(
+    place: str | Path | None, finished: list[Branch], flow: FlowMap
+) -> Checkpoint:
+    """The checkpoint of a computation of several branches of a system, added to a list.
 
-    Branches in the file that it does not ask for are dropped.
+    Branches of other systems in the file are dropped.
 
     Raises
     ------
@@ -127,11 +140,19 @@ def checkpoint_of_several(place: str | Path | None, finished: list[Branch]) -> C
     """
     if place is None:
         return Checkpoint()
+    from nldyn.store import same_flow
+
+    write, _, earlier = _file(place)
+    mine = [b for b in earlier if same_flow(b.points[0].problem.flow, flow)]
+    return Checkpoint(write, finished, mine)
+
+
+def _file(place: str | Path) -> tuple[Callable[[Sequence[Branch]], None], None, list[Branch]]:
+    """What writes a file, no branches finished, and the branches in it."""
     from nldyn.store import check_writable, load_branches, save_branches
 
     path = check_writable(place)
-    earlier = load_branches(path) if path.exists() else []
-    return Checkpoint(lambda branches: save_branches(path, branches), finished, earlier)
+    return partial(save_branches, path), None, load_branches(path) if path.exists() else []
 
 
 def _is_begun_at(branch: Branch, orbit: Orbit, course: Course) -> bool:

@@ -455,7 +455,7 @@ class Trail:
     def follow(
         self,
         progress: Callable[[float], None] | None = None,
-        keep: Callable[[Trail], None] | None = None,
+        keep: Callable[[], None] | None = None,
     ) -> Leg:
         """Walk to the end.
 
@@ -464,7 +464,7 @@ class Trail:
         progress : callable, optional
             Called with the frequency of every point.
         keep : callable, optional
-            Called with the trail after every point, when `so_far` tells of that point.
+            Called after every point, when `so_far` tells of it.
         """
         for point in self.walk:
             self.nodes.append(point)
@@ -476,7 +476,7 @@ class Trail:
             if self.walk.stride is not None and self.walk.stride.here is point:
                 self._mark = self._here()
                 if keep is not None:
-                    keep(self)
+                    keep()
         self._search(len(self.nodes) - 1)
         special = self.special_points
         if self.walk.stop_reason.startswith("joins"):  # the flip itself: a branch point of this one
@@ -639,11 +639,11 @@ def continue_branch(
         tuple(open_ends),
         check_requested(at, (low, high)),
     )
-    kept = checkpoint_at(checkpoint)
-    known = kept.branch_from(orbit, course)
-    if known is not None:
-        return known.extend(at=at, progress=progress, checkpoint=kept)
-    return complete(name, None, None, start_point(orbit, 1.0), course, progress, kept)
+    with checkpoint_at(checkpoint) as kept:
+        known = kept.branch_from(orbit, course)
+        if known is not None:
+            return known.extend(at=at, progress=progress, checkpoint=kept)
+        return complete(name, None, None, start_point(orbit, 1.0), course, progress, kept)
 
 
 def complete(
@@ -686,8 +686,8 @@ def complete(
             part = trail.so_far()
             return whole(part) if part else None
 
-        with checkpoint.at_failure(so_far):
-            return trail.follow(progress, lambda _: checkpoint.offer(so_far))
+        checkpoint.work = so_far
+        return trail.follow(progress, checkpoint.offer)
 
     forward = walked(forward, start, lambda leg: join(name, leg, backward, course, origin))
     if forward.reason == CLOSED:
@@ -701,7 +701,8 @@ def complete(
     points, lost = requested(branch)
     lost = [note for note in lost if note not in branch.notes]
     branch = replace(branch, requested=tuple(points), notes=(*branch.notes, *lost))
-    checkpoint.write(branch)
+    checkpoint.work = lambda: branch
+    checkpoint.offer()
     return branch
 
 

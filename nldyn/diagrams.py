@@ -120,6 +120,7 @@ class _Collector:
         count = len(self.branches) + 1
         label = "harmonic" if branch.period == 1 else f"1/{branch.period}"
         named = replace(branch, name=f"{count:02d} {label}")
+        self.checkpoint.work = None
         self.branches.append(named)
         self.notes += [f"branch {named.name}: {note}" for note in named.notes]
 
@@ -256,17 +257,18 @@ def diagram(
         options or ContinuationOptions(),
         progress or (lambda what, frequency_hz: None),
     )
-    box.checkpoint = checkpoint_of_several(checkpoint, box.branches)
-    effort = search or SearchOptions()
-    edges = np.geomspace(low, high, search_points + 1)
-    places = np.sqrt(edges[:-1] * edges[1:])[::-1].tolist() if wanted else []
-    _search(box, places, wanted, effort)
-    if places and _contact_is_missing(box):
-        more = replace(effort, starts=MORE_STARTS * effort.starts, seed=effort.seed + 1)
-        _search(box, places, wanted, more)
-    for seed in seeds:
-        _follow_seed(box, seed, effort)
-    _follow_flips_of_new(box, wanted, doublings)
+    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flow)
+    with box.checkpoint:
+        effort = search or SearchOptions()
+        edges = np.geomspace(low, high, search_points + 1)
+        places = np.sqrt(edges[:-1] * edges[1:])[::-1].tolist() if wanted else []
+        _search(box, places, wanted, effort)
+        if places and _contact_is_missing(box):
+            more = replace(effort, starts=MORE_STARTS * effort.starts, seed=effort.seed + 1)
+            _search(box, places, wanted, more)
+        for seed in seeds:
+            _follow_seed(box, seed, effort)
+        _follow_flips_of_new(box, wanted, doublings)
     for period in wanted:
         if not any(branch.period == period for branch in box.branches):
             tried = f"{search_points} frequenc{'y' if search_points == 1 else 'ies'}"

@@ -1,6 +1,7 @@
 """Write branches, special points and diagrams to a directory.
 
-``branches.csv`` and ``special_points.csv`` hold every number to the last digit, in SI units.
+``branches.csv`` and ``special_points.csv`` hold every number to the last digit, in SI units;
+``branches.h5`` has the branches themselves, see `nldyn.store`.
 """
 
 from __future__ import annotations
@@ -57,8 +58,8 @@ def write_results(
         What `nldyn.scene.compute` gave.
     directory : str or Path
         New, empty, or written by an earlier run, whose files are replaced; other files in it
-        are kept. Gets ``branches.csv``, ``special_points.csv``, ``diagram.png``,
-        ``diagram.svg``, ``summary.json`` and, with a scene, ``scene.toml``.
+        are kept. Gets ``branches.csv``, ``special_points.csv``, ``branches.h5``,
+        ``diagram.png``, ``diagram.svg``, ``summary.json`` and, with a scene, ``scene.toml``.
     scene : Scene, optional
         The scene it was computed from; its text is copied.
     yscale : {"linear", "log"}
@@ -90,6 +91,7 @@ def write_results(
     with result_directory(directory, "run") as folder:
         write_table(folder / "branches.csv", BRANCH_COLUMNS, branch_rows(diagram))
         write_table(folder / "special_points.csv", SPECIAL_COLUMNS, special_rows(diagram))
+        diagram.save(folder / "branches.h5")
         save_diagram(diagram, folder, title=scene.title if scene else "", yscale=yscale)
         text = json.dumps(summary(diagram), indent=1, allow_nan=False)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")

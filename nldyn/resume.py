@@ -42,13 +42,6 @@ def extend(
         options=options or course.options,
         at=check_requested(course.at if at is None else at, (low, high)),
     )
-    return complete(
-        branch.name,
-        forward,
-        backward,
-        branch.nodes[course.start],
-        new,
-        progress,
-        checkpoint_at(checkpoint),
-        first if has_origin else "",
-    )
+    start, origin = branch.nodes[course.start], first if has_origin else ""
+    with checkpoint_at(checkpoint) as kept:
+        return complete(branch.name, forward, backward, start, new, progress, kept, origin)

@@ -256,7 +256,7 @@ def test_checkpoints_are_not_written_more_often_than_a_share_of_the_time(monkeyp
     kept = checkpoint.Checkpoint(write)
     for _ in range(1000):
         now[0] += 0.1
-        kept.offer(lambda: "branch")
+        kept.offer()
     assert checkpoint.PAUSE <= written[0] < checkpoint.PAUSE + 0.2
     assert np.diff(written).min() >= checkpoint.SHARE
     assert len(written) >= 4
@@ -276,6 +276,19 @@ def points_computed(monkeypatch):
 
     monkeypatch.setattr(continuation.Walk, "_advance", counted)
     return made
+
+
+def test_branches_of_an_earlier_run_are_kept_until_they_are_reached(one_dof, picture, tmp_path):
+    """A run that goes on and is soon stopped again has still all that the first one had."""
+    path = tmp_path / "diagram.h5"
+    total = sum(len(branch.nodes) for branch in picture.branches)
+    for count in (int(0.8 * total), 0, 8, 60):
+        with pytest.raises(RuntimeError):
+            diagram(one_dof, **WANTED, progress=stopper(count), checkpoint=path)
+        found = load_branches(path)
+        assert sum(len(branch.nodes) for branch in found) > 0.7 * total
+        starts = {branch.points[branch.course.start].point.tobytes() for branch in found}
+        assert len(starts) == len(found)
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
