@@ -21,8 +21,16 @@ if TYPE_CHECKING:
     )
     from nldyn.errors import SceneError, SystemModelError
     from nldyn.flow import FlowMap, FlowOptions
+    from nldyn.fourier import Spectrum, spectrum
     from nldyn.orbit import ConvergenceError, History, Orbit, solve_orbit
+    from nldyn.orbit_plots import (
+        plot_contact_force,
+        plot_history,
+        plot_phase_portrait,
+        plot_spectrum,
+    )
     from nldyn.parameters import Parameter
+    from nldyn.plot import plot_diagram
     from nldyn.search import SearchOptions, find_orbits
     from nldyn.special import LocateError
     from nldyn.store import load_branch, load_branches, load_diagram
@@ -35,8 +43,11 @@ _HOMES = {
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
     "errors": "SceneError SystemModelError",
     "flow": "FlowMap FlowOptions",
+    "fourier": "Spectrum spectrum",
     "orbit": "ConvergenceError History Orbit solve_orbit",
+    "orbit_plots": "plot_contact_force plot_history plot_phase_portrait plot_spectrum",
     "parameters": "Parameter",
+    "plot": "plot_diagram",
     "search": "SearchOptions find_orbits",
     "special": "LocateError",
     "store": "load_branch load_branches load_diagram",
@@ -61,6 +72,7 @@ __all__ = [
     "SearchOptions",
     "Seed",
     "SpecialPoint",
+    "Spectrum",
     "Stop",
     "System",
     "SystemModelError",
@@ -74,7 +86,13 @@ __all__ = [
     "load_branch",
     "load_branches",
     "load_diagram",
+    "plot_contact_force",
+    "plot_diagram",
+    "plot_history",
+    "plot_phase_portrait",
+    "plot_spectrum",
     "solve_orbit",
+    "spectrum",
     "switch_at_flip",
 ]
 
