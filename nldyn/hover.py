@@ -14,11 +14,11 @@ from nldyn.linear import Real
 REACH = 8.0  # pixels
 
 
-def show_labels(ax: Axes, places: Real, label: Callable[[int], str]) -> Annotation:
+def show_labels(ax: Axes, places: Real, label: Callable[[int], str]) -> None:
     """Let a label appear beside the place next to the pointer.
 
     It needs a figure that is told of the pointer: one of a window, or in a notebook one of
-    ``%matplotlib widget``. A figure of another kind stays as it is.
+    ``%matplotlib widget``. In any other figure nothing is drawn.
 
     Parameters
     ----------
@@ -29,31 +29,17 @@ def show_labels(ax: Axes, places: Real, label: Callable[[int], str]) -> Annotati
     label : callable
         Gives the text of a place by its number.
 
-    Returns
-    -------
-    matplotlib.text.Annotation
-        The label, hidden at first.
-
     Examples
     --------
     >>> from nldyn.plot import new_axes
-    >>> show_labels(new_axes(), np.array([[0.5, 0.5]]), str).get_visible()
-    False
+    >>> ax = new_axes()
+    >>> show_labels(ax, np.array([[0.5, 0.5]]), str)
+    >>> len(ax.texts)
+    0
     """
-    note = ax.annotate(
-        "",
-        (0.0, 0.0),
-        (10.0, 10.0),
-        textcoords="offset points",
-        fontsize="small",
-        bbox={"boxstyle": "round", "facecolor": "white", "edgecolor": "0.5", "alpha": 0.95},
-        zorder=10,
-        visible=False,
-        parse_math=False,
-    )
-    note.set_in_layout(False)
     figure = ax.get_figure(root=True)
     assert figure is not None
+    notes: list[Annotation] = []
     shown = -1
 
     def follow(event: Event) -> None:
@@ -64,6 +50,9 @@ def show_labels(ax: Axes, places: Real, label: Callable[[int], str]) -> Annotati
         if nearest == shown:
             return
         shown = nearest
+        if not notes:
+            notes.append(_empty_label(ax))
+        (note,) = notes
         note.set_visible(nearest >= 0)
         if nearest >= 0:
             note.xy = (float(places[nearest, 0]), float(places[nearest, 1]))
@@ -72,6 +61,20 @@ def show_labels(ax: Axes, places: Real, label: Callable[[int], str]) -> Annotati
         figure.canvas.draw_idle()
 
     figure.canvas.mpl_connect("motion_notify_event", follow)
+
+
+def _empty_label(ax: Axes) -> Annotation:
+    note = ax.annotate(
+        "",
+        (0.0, 0.0),
+        (10.0, 10.0),
+        textcoords="offset points",
+        fontsize="small",
+        bbox={"boxstyle": "round", "facecolor": "white", "edgecolor": "0.5", "alpha": 0.95},
+        zorder=10,
+        parse_math=False,
+    )
+    note.set_in_layout(False)
     return note
 
 

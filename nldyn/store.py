@@ -29,7 +29,7 @@ from nldyn.contact_law import ContactLaw
 from nldyn.continuation import ContinuationOptions
 from nldyn.diagrams import Diagram
 from nldyn.elements import Damper, Excitation, HarmonicForce, Stop, Unbalance
-from nldyn.errors import SystemModelError
+from nldyn.errors import SystemModelError, shown
 from nldyn.flow import FlowMap, FlowOptions, Trajectory
 from nldyn.linear import LinearPart, Real
 from nldyn.orbit import Orbit
@@ -171,18 +171,18 @@ def check_writable(path: str | Path) -> Path:
         ...
     nldyn.result_directory.OutputError: /no/such/folder/branch.h5: there is no such folder
     """
-    target = Path(path)
     try:
+        target = Path(path)
         if target.is_dir():
             raise OutputError(f"{path}: is a folder, not a file")
         if not target.parent.is_dir():
             raise OutputError(f"{path}: there is no such folder")
         if not is_writable(target.parent):
             raise OutputError(f"{path}: the folder is read-only")
-    except ValueError as error:  # a null character in the name
+    except (TypeError, ValueError) as error:  # such as a null character
         if isinstance(error, OutputError):
             raise
-        raise OutputError(f"{path!r}: cannot be the name of a file: {error}") from None
+        raise OutputError(f"{shown(path)} cannot be the name of a file: {error}") from None
     return target
 
 
@@ -286,20 +286,23 @@ def _write_points(group: Any, points: Sequence[BranchPoint], problem: ShootingPr
 
 def _write_motions(group: Any, motions: Sequence[Trajectory | None], flow: FlowMap) -> None:
     """Recorded motions, one after the other; an orbit without one has no pieces."""
-    stops, panel = len(flow.system.stops), flow.options.panel_nodes
-    shapes = {"w": (2 * flow.system.size,), "force": (stops, panel), "depth": (stops, panel)}
+    stops = len(flow.system.stops)
     known = [motion for motion in motions if motion is not None]
     pieces = [0 if motion is None else motion.record.phase.size for motion in motions]
     _put(group, "pieces", np.array(pieces, dtype=np.int64), "1")
     omega = [math.nan if motion is None else motion.omega for motion in motions]
     _put(group, "omega", np.array(omega, dtype=float), "rad/s")
     closings = [np.zeros(stops) if motion is None else motion.closings for motion in motions]
-    _put(group, "closings", np.array(closings, dtype=np.int64).reshape(-1, stops), "1")
-    for name in Record._fields[:-1]:
+    _put(group, "closings", np.array(closings, dtype=np.int64).reshape(len(motions), stops), "1")
+    for name, empty in _record_columns(flow):
         parts = [getattr(motion.record, name) for motion in known]
-        kind = np.int64 if name in ("kind", "event") else float
-        empty = np.empty((0, *shapes.get(name, ())), dtype=kind)
         _put(group, name, np.concatenate([empty, *parts]), RECORD_UNITS.get(name, "1"))
+
+
+def _record_columns(flow: FlowMap) -> list[tuple[str, NDArray[Any]]]:
+    """Names of the columns of a record, and empty ones."""
+    empty = flow._record(0)
+    return [(name, getattr(empty, name)) for name in Record._fields if name != "used"]
 
 
 def _write_course(group: Any, course: Course) -> None:
@@ -504,6 +507,8 @@ def _opened(path: str | Path) -> Iterator[_Group]:
     """The root of a file that this version can read."""
     try:
         content = Path(path).read_bytes()
+    except TypeError:
+        raise SystemModelError(f"{shown(path)} is not the name of a file") from None
     except FileNotFoundError:
         raise SystemModelError(f"{path}: there is no such file") from None
     except (OSError, ValueError) as error:
@@ -515,18 +520,25 @@ def _opened(path: str | Path) -> Iterator[_Group]:
         raise SystemModelError(f"{path}: is not an HDF5 file, or is cut off or damaged") from None
     with file:
         root = _Group(path, file)
-        if "format" not in file.attrs or root.text("format") != FORMAT:
-            raise SystemModelError(f"{path}: is not a file of branches of nldyn")
-        version = root.whole("format_version")
-        if version > FORMAT_VERSION:
-            raise SystemModelError(
-                f"{path}: has format version {version}, written by {root.text('software')}; this "
-                f"is nldyn {software_version()}, which reads versions up to {FORMAT_VERSION}"
-            )
         try:
+            _check_format(root)
             yield root
-        except (OSError, RuntimeError, KeyError, UnicodeDecodeError) as error:
+        except SystemModelError:
+            raise
+        except (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError) as error:
+            # what h5py raises where a text or a type cannot be decoded
             raise SystemModelError(f"{path}: is damaged: {error}") from error
+
+
+def _check_format(root: _Group) -> None:
+    if not root.has_attribute("format") or root.text("format") != FORMAT:
+        raise SystemModelError(f"{root.path}: is not a file of branches of nldyn")
+    version = root.whole("format_version")
+    if version > FORMAT_VERSION:
+        raise SystemModelError(
+            f"{root.path}: has format version {version}, written by {root.text('software')}; this "
+            f"is nldyn {software_version()}, which reads versions up to {FORMAT_VERSION}"
+        )
 
 
 def _read_branches(root: _Group, laws: Laws) -> list[Branch]:
@@ -586,25 +598,20 @@ def _read_points(group: _Group, problem: ShootingProblem, observe: str) -> list[
 
 def _read_motions(group: _Group, count: int, flow: FlowMap) -> list[Trajectory | None]:
     pieces = group.array("pieces", count, kind=np.int64)
-    total, stops, panel = int(pieces.sum()), len(flow.system.stops), flow.options.panel_nodes
-    shapes = {"w": (2 * flow.system.size,), "force": (stops, panel), "depth": (stops, panel)}
+    total = int(pieces.sum())
     omega = group.array("omega", count)
-    closings = group.array("closings", count, stops, kind=np.int64)
-    columns = [
-        group.array(
-            name,
-            total,
-            *shapes.get(name, ()),
-            kind=np.int64 if name in ("kind", "event") else float,
-        )
-        for name in Record._fields[:-1]
-    ]
+    closings = group.array("closings", count, len(flow.system.stops), kind=np.int64)
+    columns = {
+        name: group.array(name, total, *empty.shape[1:], kind=empty.dtype.type)
+        for name, empty in _record_columns(flow)
+    }
     motions: list[Trajectory | None] = []
     end = 0
     for i, number in enumerate(pieces.tolist()):
         start, end = end, end + number
         used = np.array([number, number], dtype=np.int64)
-        record = Record._make([*(column[start:end] for column in columns), used])
+        part = {name: column[start:end] for name, column in columns.items()}
+        record = Record(**part, used=used)
         motion = Trajectory(flow, float(omega[i]), record, closings[i], "")
         motions.append(motion if number else None)
     return motions
@@ -622,7 +629,8 @@ def _read_course(group: _Group, nodes: int) -> Course:
     if not 0 <= start < nodes:
         raise group.fault("attribute", "start", f"is {start}, but there are {nodes} points")
     backward, forward = (
-        _read_end(group.group(name)) if name in group else None for name in ("backward", "forward")
+        _read_end(group.group(name), count) if name in group else None
+        for name, count in (("backward", start + 1), ("forward", nodes - start))
     )
     return Course(
         (low, high),
@@ -636,13 +644,16 @@ def _read_course(group: _Group, nodes: int) -> Course:
     )
 
 
-def _read_end(group: _Group) -> WalkEnd:
+def _read_end(group: _Group, nodes: int) -> WalkEnd:
+    node, kept = group.whole("node"), group.whole("kept")
+    if not 0 <= kept <= node < nodes:
+        raise group.fault("attribute", "node", f"is {node} with {kept} before, of {nodes} points")
     return WalkEnd(
         group.number("step"),
         group.array("curvature", -1),
         group.whole("count"),
-        group.whole("node"),
-        group.whole("kept"),
+        node,
+        kept,
         group.whole("special_points"),
         group.whole("notes"),
     )

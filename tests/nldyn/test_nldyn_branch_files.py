@@ -115,6 +115,15 @@ def test_special_points_and_folds_of_a_long_branch_come_back(harmonic_branch, tm
     assert_same_branches(loaded, harmonic_branch)
 
 
+def test_a_branch_without_a_stop_comes_back(tmp_path):
+    system = System.from_modal(
+        [13.0], {"tip": [0.6]}, modal_damping=0.02, excitation=[Unbalance("tip", 5e-6)]
+    )
+    branch = continue_branch(solve_orbit(system, 10.0), (9.0, 12.0))
+    branch.save(tmp_path / "linear.h5")
+    assert_same_branches(load_branch(tmp_path / "linear.h5"), branch)
+
+
 def test_saving_a_loaded_branch_gives_the_same_file(saved, tmp_path):
     load_branch(saved).save(tmp_path / "again.h5")
     assert (tmp_path / "again.h5").read_bytes() == saved.read_bytes()
@@ -294,6 +303,7 @@ def test_wrong_shape_or_type_is_named(copy, place, change, words):
         ("observe", "nowhere"),
         ("stop_reasons", "once"),
         ("course/start", 10_000),
+        ("course/forward/node", 10_000),
     ],
 )
 def test_wrong_attribute_is_named(copy, place, value):
@@ -359,6 +369,14 @@ def test_places_that_cannot_be_written_are_named(branch, tmp_path):
             branch.save(place)
     locked.chmod(0o755)
     assert list(locked.iterdir()) == []
+
+
+def test_what_is_not_a_name_of_a_file_is_refused(branch):
+    with pytest.raises(SystemModelError, match="3 is not the name of a file"):
+        load_branch(3)
+    for name in (3, "a\0b"):
+        with pytest.raises(OutputError, match="cannot be the name of a file"):
+            branch.save(name)
 
 
 def test_an_empty_list_of_branches_comes_back_empty(tmp_path):
