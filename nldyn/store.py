@@ -173,13 +173,15 @@ def check_writable(path: str | Path) -> Path:
     """
     try:
         target = Path(path)
+        if "\0" in str(target):
+            raise ValueError("it has a null character")
         if target.is_dir():
             raise OutputError(f"{path}: is a folder, not a file")
         if not target.parent.is_dir():
             raise OutputError(f"{path}: there is no such folder")
         if not is_writable(target.parent):
             raise OutputError(f"{path}: the folder is read-only")
-    except (TypeError, ValueError) as error:  # such as a null character
+    except (TypeError, ValueError) as error:
         if isinstance(error, OutputError):
             raise
         raise OutputError(f"{shown(path)} cannot be the name of a file: {error}") from None
