@@ -74,7 +74,7 @@ def picture(one_dof):
 # --- extension -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("count", [2, 3, 40, 201, 420])
+@pytest.mark.parametrize("count", [2, 40, 420])
 def test_a_run_stopped_after_some_points_goes_on_as_if_uninterrupted(start, whole, tmp_path, count):
     part = continue_branch(start, RANGE_HZ, options=ContinuationOptions(max_points=count), at=AT)
     assert len(part.nodes) < len(whole.nodes)
@@ -139,7 +139,7 @@ def test_extensions_that_make_no_sense_are_refused(whole):
 # --- checkpoints ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("count", [0, 1, 2, 30, 150, 500, 630])
+@pytest.mark.parametrize("count", [0, 2, 150, 500])
 def test_an_interrupted_run_loses_nothing(start, whole, tmp_path, count):
     path = tmp_path / "run.h5"
     with pytest.raises(KeyboardInterrupt):
@@ -291,7 +291,7 @@ def test_branches_of_an_earlier_run_are_kept_until_they_are_reached(one_dof, pic
         assert len(starts) == len(found)
 
 
-@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("share", [0.2, 0.8])
 def test_an_interrupted_diagram_goes_on(one_dof, picture, tmp_path, monkeypatch, share):
     path = tmp_path / "diagram.h5"
     total = sum(len(branch.nodes) for branch in picture.branches)
