@@ -267,7 +267,7 @@ class Branch:
         at : sequence of float, optional
             Frequencies in Hz at which orbits are wanted; those of before unless given.
         progress, checkpoint
-            As for `continue_branch`.
+            As for `continue_branch`; the file may hold the branch, or part of this extension.
 
         Returns
         -------
@@ -276,8 +276,8 @@ class Branch:
         Raises
         ------
         SystemModelError
-            If the new range does not contain the old one, or the branch is one put together by
-            hand, without a course.
+            If the new range does not contain the old one, the branch is one put together by
+            hand, without a course, or `checkpoint` holds something else.
 
         Examples
         --------

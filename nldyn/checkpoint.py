@@ -71,17 +71,20 @@ class Checkpoint:
         if self.work or self._finished:
             self.write()
 
-    def branch_from(self, orbit: Orbit, course: Course) -> Branch | None:
-        """Take from the file the branch that was begun at an orbit in the same way.
+    def branch_from(self, orbit: Orbit, *courses: Course) -> Branch | None:
+        """Take from the file the branch that was begun at an orbit with one of some courses.
+
+        The first of them counts most.
 
         Raises
         ------
         SystemModelError
             If the file is strict and holds something else.
         """
-        for number, branch in enumerate(self._earlier):
-            if _is_begun_at(branch, orbit, course):
-                return self._earlier.pop(number)
+        for course in courses:
+            for number, branch in enumerate(self._earlier):
+                if _is_begun_at(branch, orbit, course):
+                    return self._earlier.pop(number)
         if self._strict and self._earlier:
             raise SystemModelError(
                 f"{self._strict}: holds another continuation (other system, start, range or "

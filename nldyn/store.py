@@ -143,7 +143,7 @@ def load_diagram(path: str | Path, *, laws: Laws | None = None) -> Diagram:
 
 
 def same_flow(a: FlowMap, b: FlowMap) -> bool:
-    """Whether two flow maps have the same numbers and laws."""
+    """Whether two flow maps have the same numbers and laws, and states in the same coordinates."""
     if a is b:
         return True
     first, second = a.system, b.system
@@ -151,6 +151,7 @@ def same_flow(a: FlowMap, b: FlowMap) -> bool:
         a.options == b.options
         and np.array_equal(first.natural_frequencies, second.natural_frequencies)
         and np.array_equal(first.damping, second.damping)
+        and np.array_equal(first.linear.right, second.linear.right)
         and first.interfaces == second.interfaces
         and all(
             np.array_equal(first.participation[name], second.participation[name])
@@ -236,7 +237,7 @@ def _write_branch(group: Any, branch: Branch, flows: list[FlowMap]) -> None:
     for point in (*branch.nodes, *others, *branch.requested):
         mine = point.orbit.problem
         if (
-            mine.flow is not problem.flow
+            not same_flow(mine.flow, problem.flow)
             or (mine.period, mine.segments) != (problem.period, problem.segments)
             or point.orbit.observe != observe
         ):
@@ -244,9 +245,9 @@ def _write_branch(group: Any, branch: Branch, flows: list[FlowMap]) -> None:
                 f"branch '{branch.name}' cannot be saved: its points are of different systems, "
                 "flow maps or shooting problems"
             )
-    if not any(problem.flow is flow for flow in flows):
+    if not any(same_flow(problem.flow, flow) for flow in flows):
         flows.append(problem.flow)
-    number = next(i for i, flow in enumerate(flows) if flow is problem.flow)
+    number = next(i for i, flow in enumerate(flows) if same_flow(flow, problem.flow))
     for key, value in {
         "name": branch.name,
         "period": branch.period,

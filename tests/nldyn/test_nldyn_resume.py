@@ -210,6 +210,32 @@ def test_a_killed_run_goes_on(start, whole, tmp_path):
     assert_same_branches(part.extend(at=AT), whole)
 
 
+def test_an_interrupted_extension_goes_on(start, whole, tmp_path):
+    """From the branch that was to be extended, and from what the file has of the extension."""
+    part = continue_branch(start, (20.0, 40.0))
+    kept = tmp_path / "part.h5"
+    part.save(kept)
+    for path in (kept, tmp_path / "other.h5"):
+        with pytest.raises(RuntimeError):
+            part.extend(RANGE_HZ, at=AT, progress=stopper(30), checkpoint=path)
+        assert len(load_branch(path).nodes) > len(part.nodes)
+        seen = []
+        longer = part.extend(RANGE_HZ, at=AT, progress=seen.append, checkpoint=path)
+        assert_same_branches(longer, whole)
+        assert_same_branches(load_branch(path), whole)
+        assert len(seen) < len(whole.nodes) - len(part.nodes) - 20
+
+
+def test_an_extension_does_not_replace_another_branch(start, tmp_path):
+    path = tmp_path / "run.h5"
+    continue_branch(solve_orbit(start.system, 30.0), (29.0, 31.0), checkpoint=path)
+    before = path.read_bytes()
+    branch = continue_branch(start, (25.5, 26.5))
+    with pytest.raises(SystemModelError, match="holds another continuation"):
+        branch.extend((25.0, 27.0), checkpoint=path, progress=stopper(0))
+    assert path.read_bytes() == before
+
+
 def test_another_continuation_in_the_file_is_refused(one_dof, start, tmp_path):
     path = tmp_path / "run.h5"
     continue_branch(start, (25.0, 27.0), checkpoint=path)
@@ -306,4 +332,6 @@ def test_an_interrupted_diagram_goes_on(one_dof, picture, tmp_path, monkeypatch,
     assert again.notes == picture.notes
     for mine, other in zip(again.branches, picture.branches, strict=True):
         assert_same_branches(mine, other)
-    assert_same_branches(load_branches(path)[-1], picture.branches[-1])
+    again.save(tmp_path / "again.h5")
+    picture.save(tmp_path / "once.h5")
+    assert (tmp_path / "again.h5").read_bytes() == (tmp_path / "once.h5").read_bytes()
