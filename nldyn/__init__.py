@@ -22,11 +22,20 @@ if TYPE_CHECKING:
     from nldyn.errors import SceneError, SystemModelError
     from nldyn.exploration import Coverage, Exploration, ExploreOptions, explore
     from nldyn.flow import FlowMap, FlowOptions
+    from nldyn.fourier import Spectrum, spectrum
     from nldyn.multipliers import Stability
     from nldyn.orbit import ConvergenceError, History, Orbit, solve_orbit
+    from nldyn.orbit_plots import (
+        plot_contact_force,
+        plot_history,
+        plot_phase_portrait,
+        plot_spectrum,
+    )
     from nldyn.parameters import Parameter
+    from nldyn.plot import plot_diagram
     from nldyn.search import SearchOptions, find_orbits
     from nldyn.special import LocateError
+    from nldyn.store import load_branch, load_branches, load_diagram
     from nldyn.system import System
 
 _HOMES = {
@@ -38,10 +47,14 @@ _HOMES = {
     "errors": "SceneError SystemModelError",
     "flow": "FlowMap FlowOptions",
     "multipliers": "Stability",
+    "fourier": "Spectrum spectrum",
     "orbit": "ConvergenceError History Orbit solve_orbit",
+    "orbit_plots": "plot_contact_force plot_history plot_phase_portrait plot_spectrum",
     "parameters": "Parameter",
+    "plot": "plot_diagram",
     "search": "SearchOptions find_orbits",
     "special": "LocateError",
+    "store": "load_branch load_branches load_diagram",
     "system": "System",
 }
 
@@ -66,6 +79,7 @@ __all__ = [
     "SearchOptions",
     "Seed",
     "SpecialPoint",
+    "Spectrum",
     "Stability",
     "Stop",
     "System",
@@ -78,7 +92,16 @@ __all__ = [
     "explore",
     "find_orbits",
     "hertz_stiffness",
+    "load_branch",
+    "load_branches",
+    "load_diagram",
+    "plot_contact_force",
+    "plot_diagram",
+    "plot_history",
+    "plot_phase_portrait",
+    "plot_spectrum",
     "solve_orbit",
+    "spectrum",
     "switch_at_flip",
 ]
 

@@ -3,17 +3,33 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.errors import check_frequency
 from nldyn.linear import Real
-from nldyn.orbit import ConvergenceError, Orbit, refine
+from nldyn.orbit import Orbit
 
-CLOSED = "closed branch"  # why a continuation stopped
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas
+    import xarray
+
+    from nldyn.checkpoint import Checkpoint
+    from nldyn.continuation import ContinuationOptions
+
+Part = Literal["points", "special_points", "requested"]
+
+# why a continuation stopped
+CLOSED = "closed branch"
+RANGE_END = "end of the frequency range"
+NOT_FINISHED = "not finished"
+POINTS = " points"  # after their number
+SHORT_STEP = "step below "  # before its length
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +84,67 @@ class SpecialPoint:
 
 
 @dataclass(frozen=True, eq=False)
+class WalkEnd:
+    """How a continuation would go on from one end of a branch as if it had not stopped.
+
+    Parameters
+    ----------
+    step : float
+        Arclength of the next step.
+    behind : (2, N + 1)
+        Shooting unknowns and tangent of the point before the one to go on from; no rows at a start.
+    count : int
+        Steps made.
+    node : int
+        Number of the point to go on from, counted from where the continuation started.
+    kept : int
+        Number of points before it that stay, whatever follows.
+    special_points, notes : int
+        How many belong to these.
+    """
+
+    step: float
+    behind: Real
+    count: int
+    node: int
+    kept: int
+    special_points: int
+    notes: int
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """How a branch was continued, as far as its extension depends on that.
+
+    Parameters
+    ----------
+    range_hz : (float, float)
+        Frequencies between which to stay.
+    options : ContinuationOptions
+        Step control.
+    open_ends : tuple of (N + 1,) arrays
+        Where other branches were broken off.
+    at : sequence of float
+        Frequencies in Hz at which orbits were requested.
+    start : int
+        Point at which the continuation started; it went forward, then backward.
+    special_points_before, notes_before : int
+        How many of these were found on the way backward.
+    ends : pair of WalkEnd
+        How the ways backward and forward would go on; None for a way that there is not.
+    """
+
+    range_hz: tuple[float, float]
+    options: ContinuationOptions
+    open_ends: tuple[Real, ...] = ()
+    at: Sequence[float] = ()
+    start: int = 0
+    special_points_before: int = 0
+    notes_before: int = 0
+    ends: tuple[WalkEnd | None, WalkEnd | None] = (None, None)
+
+
+@dataclass(frozen=True, eq=False)
 class Branch:
     """A curve of periodic orbits of one period multiple.
 
@@ -85,6 +162,10 @@ class Branch:
         Why the continuation stopped at the first and at the last point.
     notes : tuple of str
         What may be missing.
+    requested : tuple of BranchPoint
+        Points at the requested frequencies, in order along the branch.
+    course : Course, optional
+        How it was continued.
     """
 
     name: str
@@ -93,6 +174,8 @@ class Branch:
     special_points: tuple[SpecialPoint, ...]
     stop_reasons: tuple[str, str]
     notes: tuple[str, ...] = ()
+    requested: tuple[BranchPoint, ...] = ()
+    course: Course | None = None
 
     @property
     def points(self) -> list[Orbit]:
@@ -125,10 +208,18 @@ class Branch:
         return np.array([orbit.stable for orbit in self.points])
 
     def at(self, frequency_hz: float) -> list[Orbit]:
-        """All orbits of the branch at one frequency, corrected from its neighbours.
+        """All orbits of the branch at one frequency, in order along it.
 
-        These are its points and special points: between a fold and the points beside it there may
-        be two orbits.
+        Parameters
+        ----------
+        frequency_hz : float
+            In Hz; that of the orbits differs from it by the rounding error of its logarithm only.
+
+        Returns
+        -------
+        list of Orbit
+            One for each passage of the branch, also of both that are close to a fold; an orbit
+            passed again, if only shifted by whole periods of the excitation, counts once.
 
         Raises
         ------
@@ -137,27 +228,133 @@ class Branch:
 
         Examples
         --------
-        >>> branch.at(20.0)[0].frequency_hz        # doctest: +SKIP
-        20.0
+        >>> from nldyn import System, Unbalance, continue_branch, solve_orbit
+        >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+        ...     excitation=[Unbalance("middle", 4.92e-6)])
+        >>> branch = continue_branch(solve_orbit(system, frequency_hz=10.0), (5.0, 20.0))
+        >>> [round(orbit.frequency_hz, 12) for orbit in branch.at(12.5)]
+        [12.5]
         """
-        check_frequency("frequency_hz", frequency_hz)
-        p = math.log(2.0 * math.pi * frequency_hz)
+        from nldyn.crossings import crossings
+
         found: list[Orbit] = []
-        places = [*self.nodes, *(special.point for special in self.special_points)]
-        places.sort(key=lambda place: place.arclength)
-        for a, b in pairwise(places):
-            pa, pb = a.orbit.point[-1], b.orbit.point[-1]
-            if min(pa, pb) <= p <= max(pa, pb):
-                share = 0.5 if pa == pb else (p - pa) / (pb - pa)
-                guess = (1.0 - share) * a.orbit.point + share * b.orbit.point
-                problem = a.orbit.problem
-                try:
-                    orbit = refine(problem, problem.nodes(guess), math.exp(p), a.orbit.observe)
-                except ConvergenceError:
-                    continue
-                if not any(same_orbit(orbit, other) for other in found):
-                    found.append(orbit)
+        for point in crossings(self, frequency_hz):
+            if not any(same_orbit(point.orbit, other) for other in found):
+                found.append(point.orbit)
         return found
+
+    def extend(
+        self,
+        range_hz: tuple[float, float] | None = None,
+        *,
+        options: ContinuationOptions | None = None,
+        at: Sequence[float] | None = None,
+        progress: Callable[[float], None] | None = None,
+        checkpoint: str | Path | Checkpoint | None = None,
+    ) -> Branch:
+        """Finish what was interrupted, or follow the branch beyond the ends of its range.
+
+        The points are those of one continuation through the new range, to the last digit; those
+        at the ends of the old range are left out.
+
+        Parameters
+        ----------
+        range_hz : (float, float), optional
+            A range in Hz that contains the one of before, which is kept unless given.
+        options : ContinuationOptions, optional
+            Step control from here on, unless that of before. With more `max_points`, or a smaller
+            `min_step`, an end goes on that had come to the limit.
+        at : sequence of float, optional
+            Frequencies in Hz at which orbits are wanted; those of before unless given.
+        progress, checkpoint
+            As for `continue_branch`; the file may hold the branch, or part of this extension.
+
+        Returns
+        -------
+        Branch
+
+        Raises
+        ------
+        SystemModelError
+            If the new range does not contain the old one, the branch is one put together by
+            hand, without a course, or `checkpoint` holds something else.
+
+        Examples
+        --------
+        >>> from nldyn import System, Unbalance, continue_branch, solve_orbit
+        >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+        ...     excitation=[Unbalance("middle", 4.92e-6)])
+        >>> orbit = solve_orbit(system, frequency_hz=10.0)
+        >>> longer = continue_branch(orbit, (9.0, 12.0)).extend((5.0, 20.0))
+        >>> whole = continue_branch(orbit, (5.0, 20.0))
+        >>> longer.frequency_hz.tolist() == whole.frequency_hz.tolist()
+        True
+        """
+        from nldyn.resume import extend
+
+        return extend(self, range_hz, options, at, progress, checkpoint)
+
+    def save(self, path: str | Path) -> None:
+        """Write the branch to an HDF5 file that `load_branch` reads, whole or not at all.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        SystemModelError
+            If the points are of different systems.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> from nldyn import System, Unbalance, continue_branch, load_branch, solve_orbit
+        >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+        ...     excitation=[Unbalance("middle", 4.92e-6)])
+        >>> branch = continue_branch(solve_orbit(system, frequency_hz=10.0), (9.0, 12.0))
+        >>> path = Path(tempfile.mkdtemp()) / "resonance.h5"
+        >>> branch.save(path)
+        >>> load_branch(path).frequency_hz.tolist() == branch.frequency_hz.tolist()
+        True
+        """
+        from nldyn.store import save_branches
+
+        save_branches(path, [self])
+
+    def table(self, part: Part = "points") -> dict[str, NDArray[Any]]:
+        """Columns of numbers, one row per orbit; ``pandas.DataFrame`` takes them as they are.
+
+        Parameters
+        ----------
+        part : {"points", "special_points", "requested"}
+            Which orbits: row i belongs to ``branch.points[i]``, ``branch.special_points[i]`` or
+            ``branch.requested[i]``.
+
+        Returns
+        -------
+        dict of str to (n,) array
+            Units stand in the names; `largest_multiplier` is a modulus, `error` relative.
+
+        Raises
+        ------
+        SystemModelError
+            For an unknown part.
+        """
+        from nldyn.tables import branch_table
+
+        return branch_table(self, part)
+
+    def to_pandas(self, part: Part = "points") -> pandas.DataFrame:
+        """As `table`, as a DataFrame (needs pandas)."""
+        from nldyn.tables import to_pandas
+
+        return to_pandas(self, part)
+
+    def to_xarray(self, part: Part = "points") -> xarray.Dataset:
+        """As `table`, with the Floquet multipliers, as a Dataset over ``point`` (needs xarray)."""
+        from nldyn.tables import to_xarray
+
+        return to_xarray(self, part)
 
     def contains(self, orbit: Orbit) -> bool:
         """Whether the branch passes through an orbit (up to a shift by whole periods)."""

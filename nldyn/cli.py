@@ -99,11 +99,12 @@ def run(scene: Path, out: Path, log: bool, quiet: bool) -> None:
         start = time.perf_counter()
         loaded = load_scene(scene)
         check_directory(out)
-        with progress_line(quiet) as report:
-            diagram = compute(loaded, report)
-        from nldyn.output import write_results
+        with kept_at_interrupt(out) as unfinished:
+            with progress_line(quiet) as report:
+                diagram = compute(loaded, report, unfinished)
+            from nldyn.output import write_results
 
-        write_results(diagram, out, loaded, yscale="log" if log else "linear")
+            write_results(diagram, out, loaded, yscale="log" if log else "linear")
         click.echo(describe(diagram, time.perf_counter() - start, out))
         if not diagram.branches:
             click.echo("nldyn: no periodic orbit was found; the tables are empty", err=True)
@@ -208,6 +209,25 @@ def plain_errors() -> Iterator[None]:
             raise
         click.echo(STOPPED, err=True)
         sys.exit(INTERRUPTED)
+
+
+@contextmanager
+def kept_at_interrupt(out: Path) -> Iterator[Path]:
+    """Give the file that keeps what is computed, and name it after Ctrl-C if there is one."""
+    from nldyn.unfinished import unfinished_file
+
+    with unfinished_file(out) as unfinished:
+        try:
+            yield unfinished
+        except (KeyboardInterrupt, SystemError) as error:
+            if not (interrupted(error) and unfinished.exists()):
+                raise
+            click.echo(
+                f"nldyn: stopped by Ctrl-C; {unfinished} keeps what was computed, and the same "
+                "command goes on from there",
+                err=True,
+            )
+            sys.exit(INTERRUPTED)
 
 
 def describe(diagram: Diagram, seconds: float, out: Path) -> str:

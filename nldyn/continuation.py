@@ -4,13 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 from scipy.optimize import brentq
 
-from nldyn.branch import CLOSED, Branch, BranchPoint, SpecialPoint
+from nldyn.branch import (
+    CLOSED,
+    NOT_FINISHED,
+    POINTS,
+    RANGE_END,
+    SHORT_STEP,
+    Branch,
+    BranchPoint,
+    Course,
+    SpecialPoint,
+    WalkEnd,
+)
+from nldyn.checkpoint import Checkpoint, checkpoint_at
+from nldyn.crossings import check_requested, requested
 from nldyn.errors import SystemModelError, check_whole, is_finite, shown
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine
@@ -70,12 +83,34 @@ class ContinuationOptions:
         check_whole("continuation: max_points", self.max_points, 2)
 
 
+@dataclass(frozen=True, eq=False)
+class Stride:
+    """Where a walk is, and its step control there: all that the next points depend on.
+
+    Parameters
+    ----------
+    here : BranchPoint
+        The last point.
+    step : float
+        Arclength of the next step.
+    behind : (2, N + 1)
+        Shooting unknowns and tangent of the point before; no rows at the start.
+    count : int
+        Steps made.
+    """
+
+    here: BranchPoint
+    step: float
+    behind: Real
+    count: int
+
+
 @dataclass
 class Walk:
     """Iterator over the points of a branch in one direction.
 
     Yields `BranchPoint`s; when it ends, `stop_reason` says why. The caller may stop between any
-    two points.
+    two points; asked for points again, the walk goes on where it was.
 
     Parameters
     ----------
@@ -87,35 +122,39 @@ class Walk:
         Step control.
     open_ends : sequence of (N + 1,) arrays
         Where other branches were broken off: the walk stops at the first of these that it passes.
+    stride : Stride, optional
+        Where to go on, if not at the start.
     """
 
     start: BranchPoint
     range_hz: tuple[float, float]
     options: ContinuationOptions
     open_ends: Sequence[Real] = ()
-    stop_reason: str = "not finished"
+    stop_reason: str = NOT_FINISHED
+    stride: Stride | None = None
 
     def __iter__(self) -> Iterator[BranchPoint]:
         """Walk along the branch."""
         problem = self.start.orbit.problem
-        here = self.start
-        behind: BranchPoint | None = None
-        step = self.options.first_step
-        yield here
-        for _ in range(self.options.max_points):
+        if self.stride is None:
+            behind = np.empty((0, self.start.tangent.size))
+            self.stride = Stride(self.start, self.options.first_step, behind, 0)
+            yield self.start
+        while self.stride.count < self.options.max_points:
+            here, step, behind = self.stride.here, self.stride.step, self.stride.behind
             attempt = None
             while attempt is None:
                 attempt = self._advance(problem, behind, here, step)
                 if attempt is None:
                     step *= 0.5
                     if step < self.options.min_step:
-                        self.stop_reason = f"step below {self.options.min_step:g}"
+                        self.stop_reason = f"{SHORT_STEP}{self.options.min_step:g}"
                         return
             point, angle, miss = attempt
             low, high = self.range_hz
             if not low <= point.orbit.frequency_hz <= high:
                 end = self._range_end(here, point, low if point.orbit.frequency_hz < low else high)
-                self.stop_reason = "end of the frequency range"
+                self.stop_reason = RANGE_END
                 if end is not None:
                     yield end
                 return
@@ -140,17 +179,18 @@ class Walk:
                 self.stop_reason = "meets another branch where that was broken off"
                 yield point
                 return
-            yield point
-            behind, here = here, point
             growth = 0.7 * self.options.max_angle / max(angle, 1e-3)
             growth = min(growth, math.sqrt(0.5 * self.options.max_miss / max(miss, 1e-6)))
             step = min(step * min(max(growth, 0.5), 1.6), self.options.max_step)
-        self.stop_reason = f"{self.options.max_points} points"
+            behind = np.array([here.orbit.point, here.tangent])
+            self.stride = Stride(point, step, behind, self.stride.count + 1)
+            yield point
+        self.stop_reason = f"{self.options.max_points}{POINTS}"
 
     def _advance(
         self,
         problem: ShootingProblem,
-        behind: BranchPoint | None,
+        behind: Real,
         here: BranchPoint,
         step: float,
     ) -> tuple[BranchPoint, float, float] | None:
@@ -163,7 +203,7 @@ class Walk:
         straight = here.orbit.point + step * direction
         row = weights * direction
         row /= math.sqrt(float(row @ row))
-        predicted = straight if behind is None else _extrapolate(weights, behind, here, step)
+        predicted = _extrapolate(weights, behind, here, step) if behind.size else straight
         found = problem.correct(
             predicted,
             row,
@@ -245,7 +285,7 @@ def open_ends(branch: Branch) -> list[Real]:
     ends = zip((branch.nodes[0], branch.nodes[-1]), branch.stop_reasons, strict=True)
     found = []
     for end, reason in ends:
-        if reason.endswith(" points") or reason.startswith("step below"):
+        if reason.endswith(POINTS) or reason.startswith(SHORT_STEP):
             problem, point = end.orbit.problem, end.orbit.point
             for shift in range(0, problem.segments, problem.segments // problem.period):
                 states = np.roll(problem.nodes(point), shift, axis=0)
@@ -253,13 +293,13 @@ def open_ends(branch: Branch) -> list[Real]:
     return found
 
 
-def _extrapolate(weights: Real, behind: BranchPoint, here: BranchPoint, step: float) -> Real:
+def _extrapolate(weights: Real, behind: Real, here: BranchPoint, step: float) -> Real:
     """Point at a distance along the tangent on the cubic through two points and their tangents."""
-    a, b = behind.orbit.point, here.orbit.point
+    (a, tangent), b = behind, here.orbit.point
     direction = here.tangent / _length(weights, here.tangent)
     row = weights * direction
     back = float(row @ (a - b))
-    slope_a, slope_b = behind.tangent / float(row @ behind.tangent), direction
+    slope_a, slope_b = tangent / float(row @ tangent), direction
     x = step / back  # 0 here, 1 behind
     return np.asarray(
         (1.0 + 2.0 * x) * (1.0 - x) ** 2 * b
@@ -365,26 +405,151 @@ def trace(
 
     Returns the points, the special points, why the walk stopped, and notes on what may be missing.
     """
-    walk = Walk(start, range_hz, options or ContinuationOptions(), open_ends)
-    nodes: list[BranchPoint] = []
-    special: list[SpecialPoint] = []
-    notes: list[str] = []
-    for point in walk:
-        nodes.append(point)
-        if progress is not None:
-            progress(point.orbit.frequency_hz)
-        if len(nodes) > 2:
-            _insert_dips(nodes)
-    for a, b in pairwise(nodes):
-        try:
-            special += special_points_between(a, b)
-        except LocateError as error:
-            more, lost = _by_halves(a, b, error)
-            special += more
-            notes += lost
-    if walk.stop_reason.startswith("joins"):  # the flip itself: a branch point of this branch
-        special = [s for s in special if s.kind != "BP" or s.point.arclength < nodes[-2].arclength]
-    return nodes, special, walk.stop_reason, notes
+    trail = Trail(Walk(start, range_hz, options or ContinuationOptions(), open_ends))
+    leg = trail.follow(progress)
+    return leg.nodes, leg.special_points, leg.reason, leg.notes
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """What a walk in one direction has found, in its own order.
+
+    Parameters
+    ----------
+    nodes, special_points, notes : list
+        As in `Branch`.
+    reason : str
+        Why the walk stopped.
+    end : WalkEnd, optional
+        How it would go on.
+    """
+
+    nodes: list[BranchPoint]
+    special_points: list[SpecialPoint]
+    notes: list[str]
+    reason: str
+    end: WalkEnd | None
+
+
+@dataclass
+class Trail:
+    """A walk with what is found on the way.
+
+    Special points of a pair of neighbouring points are located as soon as the next point is known,
+    since that may put another point between them.
+
+    Parameters
+    ----------
+    walk : Walk
+        The walk.
+    nodes, special_points, notes : list
+        What was found before, if the walk goes on; of the pairs of nodes all but the last have
+        been searched.
+    """
+
+    walk: Walk
+    nodes: list[BranchPoint] = field(default_factory=list)
+    special_points: list[SpecialPoint] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._searched = max(len(self.nodes) - 2, 0)
+        self._mark = self._here() if self.nodes else None
+
+    @classmethod
+    def going_on(
+        cls,
+        leg: Leg,
+        range_hz: tuple[float, float],
+        options: ContinuationOptions,
+        open_ends: Sequence[Real],
+    ) -> Trail:
+        """The same walk with another end of its range or other options."""
+        walk = Walk(leg.nodes[0], range_hz, options, open_ends)
+        end = leg.end
+        if end is None:
+            return cls(walk)
+        here = leg.nodes[end.node]
+        walk.stride = Stride(here, end.step, end.behind, end.count)
+        return cls(
+            walk,
+            [*leg.nodes[: end.kept], here],
+            leg.special_points[: end.special_points],
+            leg.notes[: end.notes],
+        )
+
+    def follow(
+        self,
+        progress: Callable[[float], None] | None = None,
+        keep: Callable[[], None] | None = None,
+    ) -> Leg:
+        """Walk to the end.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called with the frequency of every point.
+        keep : callable, optional
+            Called after every point, when `so_far` tells of it.
+        """
+        for point in self.walk:
+            self.nodes.append(point)
+            if progress is not None:
+                progress(point.orbit.frequency_hz)
+            if len(self.nodes) > 2:
+                _insert_dips(self.nodes)
+            self._search(len(self.nodes) - 2)
+            if self.walk.stride is not None and self.walk.stride.here is point:
+                self._mark = self._here()
+                if keep is not None:
+                    keep()
+        self._search(len(self.nodes) - 1)
+        special = self.special_points
+        if self.walk.stop_reason.startswith("joins"):  # the flip itself: a branch point of this one
+            last = self.nodes[-2].arclength
+            special = [s for s in special if s.kind != "BP" or s.point.arclength < last]
+        end = self._end(next(i for i, p in enumerate(self.nodes) if p is self._stride.here))
+        return Leg(self.nodes, special, self.notes, self.walk.stop_reason, end)
+
+    def so_far(self) -> Leg | None:
+        """What was found up to the last complete point; None before the first."""
+        if self._mark is None:
+            return None
+        kept, special, notes, stride = self._mark
+        return Leg(
+            [*self.nodes[:kept], stride.here],
+            self.special_points[:special],
+            self.notes[:notes],
+            NOT_FINISHED,
+            self._end(kept),
+        )
+
+    @property
+    def _stride(self) -> Stride:
+        assert self.walk.stride is not None
+        return self.walk.stride
+
+    def _here(self) -> tuple[int, int, int, Stride]:
+        """How much will stay as it is, whatever follows."""
+        return len(self.nodes) - 1, len(self.special_points), len(self.notes), self._stride
+
+    def _end(self, node: int) -> WalkEnd | None:
+        if self._mark is None:
+            return None
+        kept, special, notes, stride = self._mark
+        return WalkEnd(stride.step, stride.behind, stride.count, node, kept, special, notes)
+
+    def _search(self, pairs: int) -> None:
+        """Locate the special points of the first pairs of nodes, as far as that is not done."""
+        for index in range(self._searched, pairs):
+            a, b = self.nodes[index : index + 2]
+            try:
+                self.special_points += special_points_between(a, b)
+            except LocateError as error:
+                found, lost = _by_halves(a, b, error)
+                self.special_points += found
+                self.notes += lost
+        self._searched = max(self._searched, pairs)
 
 
 def _insert_dips(nodes: list[BranchPoint]) -> None:
@@ -444,6 +609,8 @@ def continue_branch(
     options: ContinuationOptions | None = None,
     progress: Callable[[float], None] | None = None,
     open_ends: Sequence[Real] = (),
+    at: Sequence[float] = (),
+    checkpoint: str | Path | Checkpoint | None = None,
 ) -> Branch:
     """Continue an orbit in both directions through a range of frequencies.
 
@@ -461,6 +628,13 @@ def continue_branch(
         Called with the frequency of every point.
     open_ends : sequence of (N + 1,) arrays
         Where other branches were broken off, see `Walk`.
+    at : sequence of float
+        Frequencies in Hz at which orbits are wanted: `Branch.requested` has all of them, at each
+        passage of the branch.
+    checkpoint : str or Path, optional
+        File that keeps what is computed, written now and then, at the end, and when an exception
+        such as Ctrl-C ends the computation. If it holds this very continuation, that one goes on
+        and gives the points of an uninterrupted one.
 
     Returns
     -------
@@ -469,7 +643,10 @@ def continue_branch(
     Raises
     ------
     SystemModelError
-        If the range is empty or the orbit lies outside.
+        If the range is empty, the orbit or a requested frequency lies outside, or `checkpoint`
+        holds something else.
+    OutputError
+        If `checkpoint` cannot be written.
     ConvergenceError
         If Newton's method does not meet the orbit again at its own frequency.
 
@@ -482,19 +659,134 @@ def continue_branch(
         raise SystemModelError(
             f"the orbit at {orbit.frequency_hz:g} Hz lies outside range_hz = ({low:g}, {high:g})"
         )
-    up, up_special, up_reason, up_notes = trace(
-        start_point(orbit, 1.0), (low, high), options, progress, open_ends
+    course = Course(
+        (low, high),
+        options or ContinuationOptions(),
+        tuple(open_ends),
+        check_requested(at, (low, high)),
     )
-    if up_reason == CLOSED:
-        return make_branch(name, up, up_special, (up_reason, up_reason), up_notes)
-    down, down_special, down_reason, down_notes = trace(
-        start_point(orbit, -1.0), (low, high), options, progress, open_ends
+    with checkpoint_at(checkpoint) as kept:
+        known = kept.branch_from(orbit, course)
+        if known is not None:
+            return known.extend(at=at, progress=progress, checkpoint=kept)
+        return complete(name, None, None, start_point(orbit, 1.0), course, progress, kept)
+
+
+def complete(
+    name: str,
+    forward: Leg | None,
+    backward: Leg | None,
+    start: BranchPoint,
+    course: Course,
+    progress: Callable[[float], None] | None,
+    checkpoint: Checkpoint,
+    origin: str = "",
+) -> Branch:
+    """Walk the legs of a branch that are missing or may go on, forward first, and join them.
+
+    Parameters
+    ----------
+    name : str
+        Name of the branch.
+    forward, backward : Leg, optional
+        What is known.
+    start : BranchPoint
+        Where both began, heading forward.
+    course : Course
+        Range, options and requested frequencies.
+    progress : callable, optional
+        Called with the frequency of every point.
+    checkpoint : Checkpoint
+        Keeps what is computed.
+    origin : str
+        Why the branch begins at the start, if nothing lies behind it.
+    """
+
+    def walked(leg: Leg | None, first: BranchPoint, whole: Callable[[Leg], Branch]) -> Leg:
+        if leg is not None and not goes_on(leg, course):
+            return leg
+        leg = leg or Leg([first], [], [], NOT_FINISHED, None)
+        trail = Trail.going_on(leg, course.range_hz, course.options, course.open_ends)
+
+        def so_far() -> Branch | None:
+            part = trail.so_far()
+            return whole(part) if part else None
+
+        checkpoint.work = so_far
+        return trail.follow(progress, checkpoint.offer)
+
+    forward = walked(forward, start, lambda leg: join(name, leg, backward, course, origin))
+    if forward.reason == CLOSED:
+        backward = None
+    elif not origin:
+        first, done = start_point(start.orbit, -1.0), forward
+        if backward is not None:
+            backward.nodes[0] = first
+        backward = walked(backward, first, lambda leg: join(name, done, leg, course, origin))
+    branch = join(name, forward, backward, course, origin)
+    points, lost = requested(branch)
+    lost = [note for note in lost if note not in branch.notes]
+    branch = replace(branch, requested=tuple(points), notes=(*branch.notes, *lost))
+    checkpoint.work = lambda: branch
+    checkpoint.offer()
+    return branch
+
+
+def goes_on(leg: Leg, course: Course) -> bool:
+    """Whether a walk would go on with the range and the options of a course."""
+    end, options = leg.end, course.options
+    if leg.reason == NOT_FINISHED:
+        return True
+    if end is None:
+        return False
+    if leg.reason == RANGE_END:
+        low, high = course.range_hz
+        return low * (1.0 + 1e-9) < leg.nodes[-1].orbit.frequency_hz < high * (1.0 - 1e-9)
+    if leg.reason.endswith(POINTS):
+        return options.max_points > end.count
+    return leg.reason != f"{SHORT_STEP}{options.min_step:g}" and leg.reason.startswith(SHORT_STEP)
+
+
+def join(name: str, forward: Leg, backward: Leg | None, course: Course, origin: str) -> Branch:
+    """Branch of two legs from one start."""
+    if backward is None:
+        first = CLOSED if forward.reason == CLOSED else origin or NOT_FINISHED
+        backward = Leg([forward.nodes[0]], [], [], first, None)
+    branch = make_branch(
+        name,
+        [_reversed(point) for point in backward.nodes[:0:-1]] + forward.nodes,
+        [_reversed_special(s) for s in reversed(backward.special_points)] + forward.special_points,
+        (backward.reason, forward.reason),
+        backward.notes + forward.notes,
     )
-    nodes = [_reversed(p) for p in down[:0:-1]] + up
-    special = [
-        SpecialPoint(s.kind, _reversed(s.point), s.frequency_error) for s in reversed(down_special)
-    ] + up_special
-    return make_branch(name, nodes, special, (down_reason, up_reason), down_notes + up_notes)
+    whole = replace(
+        course,
+        start=len(backward.nodes) - 1,
+        special_points_before=len(backward.special_points),
+        notes_before=len(backward.notes),
+        ends=(backward.end, forward.end),
+    )
+    return replace(branch, course=whole)
+
+
+def split(branch: Branch, course: Course) -> tuple[Leg, Leg | None]:
+    """The legs of which a branch was joined: forward and, if it was begun, backward."""
+    nodes, special, notes = branch.nodes, branch.special_points, branch.notes
+    start, specials, lines = course.start, course.special_points_before, course.notes_before
+    first, last = branch.stop_reasons
+    forward = Leg(
+        list(nodes[start:]), list(special[specials:]), list(notes[lines:]), last, course.ends[1]
+    )
+    if course.ends[0] is None:
+        return forward, None
+    backward = Leg(
+        [_reversed(point) for point in nodes[start::-1]],
+        [_reversed_special(s) for s in reversed(special[:specials])],
+        list(notes[:lines]),
+        first,
+        course.ends[0],
+    )
+    return forward, backward
 
 
 def make_branch(
@@ -524,6 +816,10 @@ def check_range(range_hz: tuple[float, float]) -> tuple[float, float]:
 
 def _reversed(point: BranchPoint) -> BranchPoint:
     return BranchPoint(point.orbit, -point.tangent, -point.arclength)
+
+
+def _reversed_special(special: SpecialPoint) -> SpecialPoint:
+    return SpecialPoint(special.kind, _reversed(special.point), special.frequency_error)
 
 
 def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoint:

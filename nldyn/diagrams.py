@@ -7,18 +7,19 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
-from nldyn.branch import Branch, SpecialPoint
+from nldyn.branch import Branch, Course, SpecialPoint
+from nldyn.checkpoint import Checkpoint, checkpoint_of_several
 from nldyn.continuation import (
     ContinuationOptions,
     check_range,
+    complete,
     continue_branch,
-    make_branch,
     open_ends,
     switch_at_flip,
-    trace,
 )
 from nldyn.errors import SystemModelError, check_frequency, check_whole
 from nldyn.flow import FlowMap
@@ -78,6 +79,18 @@ class Diagram:
         """Branches of one period multiple."""
         return [b for b in self.branches if b.period == period]
 
+    def save(self, path: str | Path) -> None:
+        """Write all branches to one HDF5 file that `load_diagram` reads, whole or not at all.
+
+        Raises
+        ------
+        OutputError, SystemModelError
+            As `Branch.save`.
+        """
+        from nldyn.store import save_diagram
+
+        save_diagram(path, self)
+
 
 @dataclass
 class Collector:
@@ -88,6 +101,7 @@ class Collector:
     observe: str
     options: ContinuationOptions
     progress: Progress
+    checkpoint: Checkpoint = field(default_factory=Checkpoint)
     branches: list[Branch] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     flip_ends: list[Orbit] = field(default_factory=list)
@@ -106,6 +120,7 @@ class Collector:
         count = len(self.branches) + 1
         label = "harmonic" if branch.period == 1 else f"1/{branch.period}"
         named = replace(branch, name=f"{count:02d} {label}")
+        self.checkpoint.work = None
         self.branches.append(named)
         self.notes += [f"branch {named.name}: {note}" for note in named.notes]
 
@@ -121,6 +136,7 @@ class Collector:
                     options=self.options,
                     progress=partial(self.progress, f"1/{orbit.period}"),
                     open_ends=self.open_ends(orbit.period),
+                    checkpoint=self.checkpoint,
                 )
             except ConvergenceError as error:
                 self.notes.append(f"orbit of period {orbit.period} found but not followed: {error}")
@@ -140,13 +156,17 @@ class Collector:
         if not low < start.orbit.frequency_hz < high or self.known(start.orbit):
             return
         progress = partial(self.progress, f"1/{start.orbit.period}")
-        nodes, specials, reason, notes = trace(
-            start, self.range_hz, self.options, progress, self.open_ends(start.orbit.period)
-        )
         origin = f"born at the flip at {special.frequency_hz:.6g} Hz"
-        self.add(make_branch("", nodes, specials, (origin, reason), notes))
-        if reason.startswith("joins"):
-            self.flip_ends.append(nodes[-1].orbit)
+        open_ends = tuple(self.open_ends(start.orbit.period))
+        course = Course(self.range_hz, self.options, open_ends)
+        branch = self.checkpoint.branch_from(start.orbit, course)
+        if branch is not None:
+            branch = branch.extend(progress=progress, checkpoint=self.checkpoint)
+        else:
+            branch = complete("", None, None, start, course, progress, self.checkpoint, origin)
+        self.add(branch)
+        if branch.stop_reasons[1].startswith("joins"):
+            self.flip_ends.append(branch.nodes[-1].orbit)
 
 
 def _is_at(end: Orbit, special: SpecialPoint) -> bool:
@@ -171,6 +191,7 @@ def diagram(
     options: ContinuationOptions | None = None,
     search: SearchOptions | None = None,
     progress: Progress | None = None,
+    checkpoint: str | Path | None = None,
 ) -> Diagram:
     """Compute the branches of the wanted periods over a range of frequencies.
 
@@ -200,6 +221,9 @@ def diagram(
         Step control and search effort.
     progress : callable, optional
         Called as ``progress(what, frequency_hz)``.
+    checkpoint : str or Path, optional
+        File that keeps the branches computed so far, as for `continue_branch`. If it exists, the
+        simulations are repeated, but of the branches only what is not in it is computed.
 
     Returns
     -------
@@ -209,6 +233,8 @@ def diagram(
     ------
     SystemModelError
         For input that makes no sense.
+    OutputError
+        If `checkpoint` cannot be written.
     """
     flow = system if isinstance(system, FlowMap) else FlowMap(system)
     low, high = check_range(range_hz)
@@ -231,16 +257,18 @@ def diagram(
         options or ContinuationOptions(),
         progress or (lambda what, frequency_hz: None),
     )
-    effort = search or SearchOptions()
-    edges = np.geomspace(low, high, search_points + 1)
-    places = np.sqrt(edges[:-1] * edges[1:])[::-1].tolist() if wanted else []
-    _search(box, places, wanted, effort)
-    if places and _contact_is_missing(box):
-        more = replace(effort, starts=MORE_STARTS * effort.starts, seed=effort.seed + 1)
-        _search(box, places, wanted, more)
-    for seed in seeds:
-        _follow_seed(box, seed, effort)
-    _follow_flips_of_new(box, wanted, doublings)
+    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flow)
+    with box.checkpoint:
+        effort = search or SearchOptions()
+        edges = np.geomspace(low, high, search_points + 1)
+        places = np.sqrt(edges[:-1] * edges[1:])[::-1].tolist() if wanted else []
+        _search(box, places, wanted, effort)
+        if places and _contact_is_missing(box):
+            more = replace(effort, starts=MORE_STARTS * effort.starts, seed=effort.seed + 1)
+            _search(box, places, wanted, more)
+        for seed in seeds:
+            _follow_seed(box, seed, effort)
+        _follow_flips_of_new(box, wanted, doublings)
     for period in wanted:
         if not any(branch.period == period for branch in box.branches):
             tried = f"{search_points} frequenc{'y' if search_points == 1 else 'ies'}"

@@ -1,11 +1,11 @@
 """Write branches, special points and diagrams to a directory.
 
-``branches.csv`` and ``special_points.csv`` hold every number to the last digit, in SI units.
+``branches.csv`` and ``special_points.csv`` hold every number to the last digit, in SI units;
+``branches.h5`` has the branches themselves, see `nldyn.store`.
 """
 
 from __future__ import annotations
 
-import cmath
 import csv
 import json
 import math
@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from nldyn.result_directory import result_directory
+from nldyn.tables import at_known, orbit_columns
 from nldyn.version import software_version
 
 if TYPE_CHECKING:
@@ -60,8 +61,8 @@ def write_results(
         What `nldyn.scene.compute` gave.
     directory : str or Path
         New, empty, or written by an earlier run, whose files are replaced; other files in it
-        are kept. Gets ``branches.csv``, ``special_points.csv``, ``diagram.png``,
-        ``diagram.svg``, ``summary.json`` and, with a scene, ``scene.toml``.
+        are kept. Gets ``branches.csv``, ``special_points.csv``, ``branches.h5``,
+        ``diagram.png``, ``diagram.svg``, ``summary.json`` and, with a scene, ``scene.toml``.
     scene : Scene, optional
         The scene it was computed from; its text is copied.
     yscale : {"linear", "log"}
@@ -93,6 +94,7 @@ def write_results(
     with result_directory(directory, "run") as folder:
         write_table(folder / "branches.csv", BRANCH_COLUMNS, branch_rows(diagram))
         write_table(folder / "special_points.csv", SPECIAL_COLUMNS, special_rows(diagram))
+        diagram.save(folder / "branches.h5")
         save_diagram(diagram, folder, title=scene.title if scene else "", yscale=yscale)
         text = json.dumps(summary(diagram), indent=1, allow_nan=False)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
@@ -104,40 +106,16 @@ def write_results(
 def branch_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
     """Give the rows of ``branches.csv``, one for each point of each branch."""
     for branch in diagram.branches:
-        for number, orbit in enumerate(branch.points):
-            yield (
-                branch.name,
-                number,
-                orbit.period,
-                at_end(orbit.frequency_hz, diagram.range_hz),
-                float(orbit.max_abs_displacement),
-                float(orbit.max_penetration),
-                int(orbit.impacts),
-                int(orbit.stable),
-                abs(orbit.largest_multiplier),
-                math.degrees(cmath.phase(orbit.largest_multiplier)),
-                if_known(orbit.stability.uncertainty),
-                if_known(orbit.liouville_error),
-            )
+        columns = orbit_columns(branch.points, diagram.range_hz)
+        columns["stable"] = columns["stable"].astype(int)
+        rows = zip(*(columns[name].tolist() for name in BRANCH_COLUMNS[2:]), strict=True)
+        for number, row in enumerate(rows):
+            yield (branch.name, number, *map(if_known, row))
 
 
-def if_known(value: float) -> float | None:
-    """Give a figure, or None (an empty cell) if it is nan or infinite."""
-    return float(value) if math.isfinite(value) else None
-
-
-def at_end(frequency_hz: float, range_hz: tuple[float, float]) -> float:
-    """Give the end of the range that a frequency meets, else the frequency itself.
-
-    Orbits keep the logarithm of their frequency, so that 90 Hz come back as 89.99999999999999.
-
-    Examples
-    --------
-    >>> at_end(89.99999999999999, (5.0, 90.0)), at_end(89.999, (5.0, 90.0))
-    (90.0, 89.999)
-    """
-    ends = (end for end in range_hz if math.isclose(frequency_hz, end, rel_tol=1e-14))
-    return float(next(ends, frequency_hz))
+def if_known(value: object) -> object:
+    """Give a value, or None (an empty cell) if it is nan or infinite."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def special_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
@@ -178,7 +156,7 @@ def summary(diagram: Diagram) -> Mapping[str, object]:
 
 
 def _branch_summary(branch: Branch, range_hz: tuple[float, float]) -> dict[str, object]:
-    hz = [at_end(orbit.frequency_hz, range_hz) for orbit in branch.points]
+    hz = [at_known(orbit.frequency_hz, range_hz) for orbit in branch.points]
     return {
         "name": branch.name,
         "period": branch.period,

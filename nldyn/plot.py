@@ -17,6 +17,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
+from nldyn.hover import show_labels
+
 if TYPE_CHECKING:
     from nldyn.branch import Branch
     from nldyn.diagrams import Diagram
@@ -160,6 +162,7 @@ def plot_diagram(
     special_points: Sequence[str] = tuple(MARKERS),
     unit: str | None = None,
     legend: bool = True,
+    hover: bool = True,
 ) -> Axes:
     """Draw the largest displacement of each orbit against its excitation frequency.
 
@@ -177,6 +180,9 @@ def plot_diagram(
         Unit of the displacement axis; chosen by the largest value unless given.
     legend : bool
         Whether to explain colours, lines and marks.
+    hover : bool
+        Whether orbits and special points show their numbers under the pointer, where the figure is
+        live: in a window, or in a notebook after ``%matplotlib widget``, drawn in axes of pyplot.
 
     Returns
     -------
@@ -213,6 +219,8 @@ def plot_diagram(
         ax.set_ylim(bottom=-0.02 * ax.get_ylim()[1])
     if legend and branches:
         _draw_legend(ax, colours, branches, marked)
+    if hover:
+        _label_orbits(ax, branches, marked, factor, unit)
     return ax
 
 
@@ -329,6 +337,42 @@ def _mark_style(kind: str, size: float = 4.5) -> dict[str, Any]:
         "markeredgewidth": 0.18 * size,
         "zorder": 4,
     }
+
+
+def _label_orbits(
+    ax: Axes, branches: Sequence[Branch], marked: Sequence[str], factor: float, unit: str
+) -> None:
+    """Let special points, which come first, and points show what they are."""
+    entries = [
+        (branch.name, f"{MARKER_NAMES[special.kind]} ({special.kind})", special.orbit)
+        for branch in branches
+        for special in branch.special_points
+        if special.kind in marked
+    ]
+    count = len(entries)  # at the special points stability changes
+    entries += [
+        (branch.name, f"point {number}", orbit)
+        for branch in branches
+        for number, orbit in enumerate(branch.points)
+    ]
+    places = [(orbit.frequency_hz, orbit.max_abs_displacement / factor) for _, _, orbit in entries]
+
+    def label(index: int) -> str:
+        name, what, orbit = entries[index]
+        title = f"{name or period_name(orbit.period)}, {what}"
+        return f"{title}\n{orbit_text(orbit, factor, unit, stability=index >= count)}"
+
+    show_labels(ax, np.array(places, dtype=float).reshape(-1, 2), label)
+
+
+def orbit_text(orbit: Orbit, factor: float, unit: str, *, stability: bool = True) -> str:
+    """Say in two lines what an orbit is, with displacements in a unit of `factor` metres."""
+    word = ("stable, " if orbit.stable else "unstable, ") if stability else ""
+    impacts = f"{orbit.impacts} impact{'' if orbit.impacts == 1 else 's'}"
+    return (
+        f"{orbit.frequency_hz:.7g} Hz, max |y| {orbit.max_abs_displacement / factor:.5g} {unit}\n"
+        f"{word}largest multiplier {abs(orbit.largest_multiplier):.4g}, {impacts}"
+    )
 
 
 def _draw_legend(

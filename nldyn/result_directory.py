@@ -65,14 +65,14 @@ def _checked(target: Path, directory: str | Path) -> Path:
         raise OutputError(
             f"{directory}: holds files that were not written by nldyn; choose another directory"
         )
-    if target.is_dir() and not _writable(target):
+    if target.is_dir() and not is_writable(target):
         raise OutputError(f"{directory}: is read-only; choose another directory")
     if target.is_mount():
         raise OutputError(f"{directory}: cannot be replaced; choose a folder in it")
     return target
 
 
-def _writable(folder: Path) -> bool:
+def is_writable(folder: Path) -> bool:
     """Whether files may be put into a directory; where its mode says no, not by root either."""
     return bool(folder.stat().st_mode & stat.S_IWUSR) and os.access(folder, os.W_OK)
 

@@ -252,7 +252,9 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
         )
 
 
-def compute(scene: Scene, progress: Progress | None = None) -> Diagram:
+def compute(
+    scene: Scene, progress: Progress | None = None, checkpoint: str | Path | None = None
+) -> Diagram:
     """Compute all branches that a scene asks for.
 
     The whole scene is built and checked before the first orbit is sought.
@@ -263,6 +265,8 @@ def compute(scene: Scene, progress: Progress | None = None) -> Diagram:
         A scene with an ``[[excitation]]`` and a ``[continuation]``.
     progress : callable, optional
         Called as ``progress(what, frequency_hz)`` at every orbit.
+    checkpoint : str or Path, optional
+        File that keeps what is computed, see `nldyn.diagram`.
 
     Returns
     -------
@@ -311,6 +315,7 @@ def compute(scene: Scene, progress: Progress | None = None) -> Diagram:
             doublings=table.follow_doublings,
             options=ContinuationOptions(max_step=table.max_step),
             progress=progress,
+            checkpoint=checkpoint,
         )
 
 

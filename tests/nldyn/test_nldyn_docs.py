@@ -5,7 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from nldyn.tables import UNITS
+
 ROOT = Path(__file__).parents[2]
+BRANCHES = (ROOT / "docs" / "branches.md").read_text(encoding="utf-8")
 THEORY = ROOT / "docs" / "theory.md"
 
 
@@ -32,3 +35,21 @@ def test_example_of_the_readme_prints_what_it_says(capsys):
     exec(code, {})
     (said,) = re.findall(r"^It prints `(.*?)`", text, flags=re.M)
     assert capsys.readouterr().out == f"{said}\n"
+
+
+def test_example_of_the_branches_prints_what_it_says(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (code,) = re.findall(r"```python\n(.*?)```", BRANCHES, flags=re.S)
+    exec(code, {})
+    (said,) = re.findall(r"It prints\n\n```\n(.*?)```", BRANCHES, flags=re.S)
+    assert capsys.readouterr().out == said
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "harmonic.h5",
+        "harmonic.png",
+        "force.png",
+    }
+
+
+def test_every_column_of_a_table_is_documented():
+    rows = re.findall(r"^\| `(\w+)` \| (.*?) ?\|", BRANCHES, flags=re.M)
+    assert dict(rows) == {"type": "", **{key: u.strip("1") for key, u in UNITS.items()}}

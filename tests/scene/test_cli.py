@@ -1,6 +1,7 @@
 """The verbs of the command line, their output and their exit codes."""
 
 import csv
+import shutil
 import subprocess
 import sys
 import types
@@ -12,6 +13,7 @@ from fakes import diagram
 
 import nldyn.progress
 import nldyn.scene
+from nldyn import continuation, load_branches, load_diagram
 from nldyn.cli import main
 from nldyn.resources import example, mesh
 
@@ -26,7 +28,7 @@ def invoke(*arguments):
 def computed(monkeypatch):
     """Let every scene give the same ready diagram."""
 
-    def compute(scene, progress):
+    def compute(scene, progress, checkpoint):
         progress("harmonic branch", 25.3)
         return replace(diagram(), notes=("no 1/5 orbit found near 62.2 Hz",))
 
@@ -97,6 +99,67 @@ def test_ctrl_c(tmp_path, monkeypatch, interrupt):
     assert result.exit_code == 130
     assert result.stderr == "nldyn: stopped by Ctrl-C, nothing is written\n"
     assert list(tmp_path.iterdir()) == []
+
+
+def short_scene(folder):
+    """A scene of the harmonic branch between 20 and 30 Hz."""
+    text = example("one_dof.toml").read_text()
+    text = text.replace("[5.0, 90.0]", "[20.0, 30.0]\nsearch_points = 1")
+    scene = folder / "short.toml"
+    scene.write_text(text.replace("periods = [1, 2, 3]", "periods = [1]"))
+    return scene
+
+
+def test_a_run_goes_on_after_ctrl_c(tmp_path, monkeypatch):
+    scene, out = short_scene(tmp_path), tmp_path / "new" / "out"
+    assert invoke("run", scene, "--out", tmp_path / "whole", "--quiet").exit_code == 0
+    advance = continuation.Walk._advance
+    steps = []
+
+    def counted(*arguments):
+        steps.append(None)
+        if len(steps) == limit:
+            raise KeyboardInterrupt
+        return advance(*arguments)
+
+    monkeypatch.setattr(continuation.Walk, "_advance", counted)
+    limit = 60
+    stopped = invoke("run", scene, "--out", out, "--quiet")
+    unfinished = tmp_path / "new" / "out.unfinished.h5"
+    assert stopped.exit_code == 130
+    assert stopped.stderr == (
+        f"nldyn: stopped by Ctrl-C; {unfinished} keeps what was computed, and the same command "
+        "goes on from there\n"
+    )
+    assert [entry.name for entry in out.parent.iterdir()] == [unfinished.name]
+    known = len(load_branches(unfinished)[0].nodes)
+    steps.clear()
+    limit = None
+    assert invoke("run", scene, "--out", out, "--quiet").exit_code == 0
+    assert [entry.name for entry in out.parent.iterdir()] == ["out"]
+    for name in ("branches.csv", "special_points.csv", "branches.h5", "summary.json"):
+        assert (out / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+    (branch,) = load_diagram(out / "branches.h5").branches
+    assert known > 20 and len(steps) < 1.5 * (len(branch.nodes) - known)
+
+
+def test_another_scene_does_not_go_on_from_an_unfinished_one(tmp_path, monkeypatch):
+    scene, out = short_scene(tmp_path), tmp_path / "out"
+    assert invoke("run", scene, "--out", tmp_path / "whole", "--quiet").exit_code == 0
+    scene.write_text(scene.read_text().replace("4.92e-6", "4.93e-6"))
+    assert invoke("run", scene, "--out", tmp_path / "other", "--quiet").exit_code == 0
+    shutil.copy(tmp_path / "whole" / "branches.h5", tmp_path / "out.unfinished.h5")
+    assert invoke("run", scene, "--out", out, "--quiet").exit_code == 0
+    results = [(tmp_path / name / "branches.h5").read_bytes() for name in ("out", "other", "whole")]
+    assert results[0] == results[1] != results[2]
+
+
+def test_a_foreign_file_in_the_place_of_an_unfinished_run_is_named(tmp_path):
+    (tmp_path / "out.unfinished.h5").write_text("mine")
+    result = invoke("run", ONE_DOF, "--out", tmp_path / "out", "--quiet")
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1 and "is not an HDF5 file" in result.stderr
+    assert (tmp_path / "out.unfinished.h5").read_text() == "mine"
 
 
 def test_check_prints_the_model():

@@ -13,7 +13,14 @@ from nldyn.output import write_results
 from nldyn.resources import example
 from nldyn.scene import load_scene
 
-FILES = {"branches.csv", "special_points.csv", "diagram.png", "diagram.svg", "summary.json"}
+FILES = {
+    "branches.csv",
+    "special_points.csv",
+    "branches.h5",
+    "diagram.png",
+    "diagram.svg",
+    "summary.json",
+}
 
 
 def read(path):

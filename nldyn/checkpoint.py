@@ -1,0 +1,178 @@
+"""What a running continuation has found, kept in a file so that nothing is lost if it ends early.
+
+The file is written anew each time, whole or not at all, and not more often than a twentieth of
+the time allows.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from nldyn.errors import SystemModelError
+
+if TYPE_CHECKING:
+    from nldyn.branch import Branch, Course
+    from nldyn.flow import FlowMap
+    from nldyn.orbit import Orbit
+
+PAUSE = 5.0  # s, at least, between two writings
+SHARE = 20.0  # times as long as it took to write
+
+
+class Checkpoint:
+    """A file with the finished branches of a computation and the one at work.
+
+    As a context it writes the file at the end, also when an exception such as Ctrl-C ends the work.
+
+    Parameters
+    ----------
+    write_branches : callable, optional
+        Writes a list of branches; nothing is kept without it.
+    finished : list of Branch
+        Branches to be kept besides; the caller may add more.
+    earlier : sequence of Branch
+        What the file held before.
+    strict : str
+        Name of the file, if it shall hold nothing but the computation asked for.
+
+    Attributes
+    ----------
+    work : callable or None
+        Gives the branch at work, as far as it is known.
+    """
+
+    def __init__(
+        self,
+        write_branches: Callable[[Sequence[Branch]], None] | None = None,
+        finished: list[Branch] | None = None,
+        earlier: Sequence[Branch] = (),
+        strict: str = "",
+    ) -> None:
+        self.work: Callable[[], Branch | None] | None = None
+        self._write = write_branches
+        self._finished = [] if finished is None else finished
+        self._earlier = list(earlier)
+        self._strict = strict
+        self._due = time.monotonic() + PAUSE
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, error: type[BaseException] | None, *_: object) -> None:
+        if error is None:
+            self._earlier.clear()
+        if self.work or self._finished:
+            self.write()
+
+    def branch_from(self, orbit: Orbit, *courses: Course) -> Branch | None:
+        """Take from the file the branch that was begun at an orbit with one of some courses.
+
+        The first of them counts most.
+
+        Raises
+        ------
+        SystemModelError
+            If the file is strict and holds something else.
+        """
+        for course in courses:
+            for number, branch in enumerate(self._earlier):
+                if _is_begun_at(branch, orbit, course):
+                    return self._earlier.pop(number)
+        if self._strict and self._earlier:
+            raise SystemModelError(
+                f"{self._strict}: holds another continuation (other system, start, range or "
+                "options); choose another file, or delete it"
+            )
+        return None
+
+    def offer(self) -> None:
+        """Write, if it is time."""
+        if self._write is not None and time.monotonic() >= self._due:
+            self.write()
+
+    def write(self) -> None:
+        """Write what is finished, what is at work, and what the file held and is not yet used."""
+        if self._write is None:
+            return
+        start = time.monotonic()
+        branch = self.work() if self.work else None
+        self._write([*self._finished, *([branch] if branch else []), *self._earlier])
+        end = time.monotonic()
+        self._due = end + max(PAUSE, SHARE * (end - start))
+
+
+def checkpoint_at(
+    place: str | Path | Checkpoint | None,
+) -> AbstractContextManager[Checkpoint]:
+    """The checkpoint of one continuation in a file; one that keeps nothing for None.
+
+    One that is given is left to the giver to end.
+
+    Raises
+    ------
+    SystemModelError
+        If the file exists but is not one of branches.
+    OutputError
+        If it cannot be written.
+    """
+    if isinstance(place, Checkpoint):
+        return nullcontext(place)
+    if place is None:
+        return Checkpoint()
+    return Checkpoint(*_file(place), strict=str(place))
+
+
+def checkpoint_of_several(
+    place: str | Path | None, finished: list[Branch], flow: FlowMap
+) -> Checkpoint:
+    """The checkpoint of a computation of several branches of a system, added to a list.
+
+    Branches of other systems in the file are dropped.
+
+    Raises
+    ------
+    SystemModelError, OutputError
+        As `checkpoint_at`.
+    """
+    if place is None:
+        return Checkpoint()
+    from nldyn.store import same_flow
+
+    write, _, earlier = _file(place)
+    mine = [b for b in earlier if same_flow(b.points[0].problem.flow, flow)]
+    return Checkpoint(write, finished, mine)
+
+
+def _file(place: str | Path) -> tuple[Callable[[Sequence[Branch]], None], None, list[Branch]]:
+    """What writes a file, no branches finished, and the branches in it."""
+    from nldyn.store import check_writable, load_branches, save_branches
+
+    path = check_writable(place)
+    return partial(save_branches, path), None, load_branches(path) if path.exists() else []
+
+
+def _is_begun_at(branch: Branch, orbit: Orbit, course: Course) -> bool:
+    """Whether a branch comes from a continuation of an orbit with the same range and options."""
+    from nldyn.store import same_flow
+
+    mine = branch.course
+    if mine is None or branch.period != orbit.period:
+        return False
+    start = branch.nodes[mine.start].orbit
+    return (
+        np.array_equal(start.point, orbit.point)
+        and start.observe == orbit.observe
+        and mine.range_hz == course.range_hz
+        and mine.options == course.options
+        and len(mine.open_ends) == len(course.open_ends)
+        and all(map(np.array_equal, mine.open_ends, course.open_ends))
+        and start.problem.segments == orbit.problem.segments
+        and same_flow(start.problem.flow, orbit.problem.flow)
+    )

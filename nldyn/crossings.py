@@ -1,0 +1,131 @@
+"""Where a branch passes a frequency: all of its orbits there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import brentq
+
+from nldyn.branch import Branch, BranchPoint
+from nldyn.errors import SystemModelError, check_frequency, shown
+from nldyn.linear import Real
+from nldyn.orbit import Orbit
+from nldyn.special import Chord, LocateError, root
+
+SAME = 4e-15  # difference of two logarithms of a frequency that is rounding
+
+
+def crossings(branch: Branch, frequency_hz: float) -> list[BranchPoint]:
+    """Points of a branch at one frequency, one for each passage, in order along the branch.
+
+    A passage lies between two neighbours among the computed and the special points, so that on
+    either side of a fold there may be one.
+
+    Raises
+    ------
+    SystemModelError
+        If the frequency is not a positive number.
+    """
+    return _crossings(branch, frequency_hz)[0]
+
+
+def requested(branch: Branch) -> tuple[list[BranchPoint], list[str]]:
+    """Points of a branch at the frequencies that its course asks for, in order along it.
+
+    With notes on passages whose orbit was not found.
+    """
+    points: list[BranchPoint] = []
+    notes: list[str] = []
+    for frequency in branch.course.at if branch.course else ():
+        found, lost = _crossings(branch, frequency)
+        points += found
+        notes += lost
+    return sorted(points, key=_arclength), notes
+
+
+def check_requested(at: Sequence[float], range_hz: tuple[float, float]) -> tuple[float, ...]:
+    """The requested frequencies, or a SystemModelError if one of them is outside of the range."""
+    try:
+        wanted = tuple(at)
+    except TypeError:
+        raise SystemModelError(f"at must be a list of frequencies, got {shown(at)}") from None
+    low, high = range_hz
+    for frequency in wanted:
+        check_frequency("at: each frequency", frequency)
+        if not low <= frequency <= high:
+            raise SystemModelError(
+                f"at: {frequency:g} Hz lies outside range_hz = ({low:g}, {high:g})"
+            )
+    return tuple(float(frequency) for frequency in wanted)
+
+
+def _arclength(point: BranchPoint) -> float:
+    return point.arclength
+
+
+def _crossings(branch: Branch, frequency_hz: float) -> tuple[list[BranchPoint], list[str]]:
+    check_frequency("frequency_hz", frequency_hz)
+    p = math.log(2.0 * math.pi * frequency_hz)
+    places = [*branch.nodes, *(special.point for special in branch.special_points)]
+    places.sort(key=_arclength)
+    found: list[BranchPoint] = []
+    lost: list[str] = []
+    for a, b in pairwise(places):
+        before, after = _log_frequency(a) - p, _log_frequency(b) - p
+        if abs(before) <= SAME:
+            found.append(a)
+        elif before * after < 0.0 and abs(after) > SAME:
+            try:
+                found.append(_crossing(a, b, p))
+            except LocateError as error:
+                lost.append(f"the orbit of the branch at {frequency_hz:.8g} Hz is missing: {error}")
+    if places and abs(_log_frequency(places[-1]) - p) <= SAME:
+        found.append(places[-1])
+    return found, lost
+
+
+def _log_frequency(point: BranchPoint) -> float:
+    return float(point.orbit.point[-1])
+
+
+def _crossing(a: BranchPoint, b: BranchPoint, p: float) -> BranchPoint:
+    """Point between two neighbours with ln ω = p.
+
+    Beside a fold Newton's method at a fixed frequency may miss; then the point is first located
+    along the branch.
+
+    Raises
+    ------
+    LocateError
+        If no such orbit is found.
+    """
+    chord = Chord(a, b)
+    sigma = float(brentq(lambda x: chord.between(x)[-1] - p, 0.0, 1.0))
+    try:
+        return _held(chord, sigma, chord.between(sigma), p)
+    except LocateError:
+        sigma, _ = root(lambda x: _log_frequency(chord.at(x)) - p)
+        return _held(chord, sigma, chord.at(sigma).orbit.point, p)
+
+
+def _held(chord: Chord, sigma: float, guess: Real, p: float) -> BranchPoint:
+    """Point of the branch at a fixed frequency, near a guess at σ of a chord."""
+    a, b = chord.first, chord.last
+    problem = a.orbit.problem
+    start = np.append(guess[:-1], p)
+    row = np.zeros(start.size)
+    row[-1] = 1.0
+    found = problem.correct(start, row)
+    if not found.converged:
+        raise LocateError(found.failure)
+    secant = b.orbit.point - a.orbit.point
+    weights = problem.metric(a.orbit.point)
+    off = found.point - start
+    if float(off @ (weights * off)) > 0.0625 * float(secant @ (weights * secant)):
+        raise LocateError("Newton's method left the branch")
+    length = a.arclength + sigma * (b.arclength - a.arclength)
+    orbit = Orbit.of(problem, found, a.orbit.observe)
+    return BranchPoint(orbit, problem.tangent(found, secant), length)

@@ -1,0 +1,337 @@
+"""A continuation that goes on gives the points of one that was never interrupted."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from branches_alike import assert_same_branches
+from one_dof import RANGE_HZ
+
+from nldyn import (
+    Branch,
+    ContinuationOptions,
+    Stop,
+    System,
+    SystemModelError,
+    Unbalance,
+    checkpoint,
+    continuation,
+    continue_branch,
+    diagram,
+    load_branch,
+    load_branches,
+    solve_orbit,
+)
+from nldyn.branch import CLOSED, NOT_FINISHED
+from nldyn.result_directory import OutputError
+
+AT = (12.2, 26.0, 45.0)
+
+
+@pytest.fixture(scope="module")
+def start(one_dof):
+    return solve_orbit(one_dof, 26.0)
+
+
+@pytest.fixture(scope="module")
+def whole(start):
+    return continue_branch(start, RANGE_HZ, at=AT)
+
+
+@pytest.fixture
+def often(monkeypatch):
+    """Checkpoints are written at every point."""
+    monkeypatch.setattr(checkpoint, "PAUSE", 0.0)
+    monkeypatch.setattr(checkpoint, "SHARE", 0.0)
+
+
+def stopper(count, error=RuntimeError):
+    """Progress that raises an error at a point."""
+    seen = iter(range(count))
+
+    def report(*_):
+        if next(seen, None) is None:
+            raise error
+
+    return report
+
+
+WANTED = {"range_hz": (20.0, 60.0), "periods": [1, 2], "search_points": 4}
+
+
+@pytest.fixture(scope="module")
+def picture(one_dof):
+    found = diagram(one_dof, **WANTED)
+    assert any(b.stop_reasons[0].startswith("born at the flip") for b in found.branches)
+    assert any(b.closed for b in found.branches)
+    return found
+
+
+# --- extension -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("count", [2, 40, 420])
+def test_a_run_stopped_after_some_points_goes_on_as_if_uninterrupted(start, whole, tmp_path, count):
+    part = continue_branch(start, RANGE_HZ, options=ContinuationOptions(max_points=count), at=AT)
+    assert len(part.nodes) < len(whole.nodes)
+    part.save(tmp_path / "part.h5")
+    loaded = load_branch(tmp_path / "part.h5")
+    assert_same_branches(loaded.extend(options=ContinuationOptions()), whole)
+
+
+@pytest.mark.parametrize("range_hz", [(25.9, 26.1), (11.6, 26.0), (26.0, 31.0), (11.9, 60.0)])
+def test_a_wider_range_gives_the_points_of_one_continuation(start, whole, tmp_path, range_hz):
+    part = continue_branch(start, range_hz)
+    part.save(tmp_path / "part.h5")
+    assert_same_branches(load_branch(tmp_path / "part.h5").extend(RANGE_HZ, at=AT), whole)
+
+
+def test_extension_in_many_small_pieces(start, whole):
+    branch = continue_branch(start, (25.0, 27.0))
+    for width in (1.1, 1.15, 1.9, 2.5, 3.3):
+        branch = branch.extend((25.0 / width, 27.0 * width))
+    assert_same_branches(branch.extend(RANGE_HZ, at=AT), whole)
+
+
+def test_a_shorter_smallest_step_goes_on_where_the_longer_one_gave_up(start, whole):
+    part = continue_branch(start, RANGE_HZ, options=ContinuationOptions(min_step=1e-3), at=AT)
+    assert "step below 0.001" in part.stop_reasons
+    assert_same_branches(part.extend(options=ContinuationOptions()), whole)
+
+
+def test_nothing_is_computed_where_nothing_is_to_be_done(whole):
+    assert_same_branches(whole.extend(progress=stopper(0)), whole)
+
+
+def test_a_closed_branch_stays_as_it_is(picture):
+    loop = next(branch for branch in picture.branches if branch.closed)
+    assert_same_branches(loop.extend((20.0, 80.0), progress=stopper(0)), loop)
+
+
+def test_a_branch_that_closes_in_a_wider_range_is_kept_once(picture):
+    loop = next(branch for branch in picture.branches if branch.closed)
+    hz = loop.frequency_hz
+    first = loop.points[0]
+    narrow = (0.5 * (hz.min() + first.frequency_hz), 0.5 * (first.frequency_hz + hz.max()))
+    part = continue_branch(first, narrow)
+    assert part.stop_reasons == ("end of the frequency range",) * 2
+    longer, once = part.extend((20.0, 80.0)), continue_branch(first, (20.0, 80.0))
+    assert once.stop_reasons == (CLOSED, CLOSED)
+    assert_same_branches(longer, once)
+
+
+def test_extensions_that_make_no_sense_are_refused(whole):
+    with pytest.raises(
+        SystemModelError, match=r"must contain the range of the branch, \(5.7, 90\)"
+    ):
+        whole.extend((6.0, 80.0))
+    with pytest.raises(SystemModelError, match="at: 95 Hz lies outside"):
+        whole.extend(at=[95.0])
+    bare = Branch("bare", 1, whole.nodes, (), whole.stop_reasons)
+    with pytest.raises(SystemModelError, match="'bare' cannot be extended"):
+        bare.extend()
+
+
+# --- checkpoints ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("count", [0, 2, 150, 500])
+def test_an_interrupted_run_loses_nothing(start, whole, tmp_path, count):
+    path = tmp_path / "run.h5"
+    with pytest.raises(KeyboardInterrupt):
+        continue_branch(
+            start, RANGE_HZ, at=AT, progress=stopper(count, KeyboardInterrupt), checkpoint=path
+        )
+    if count:
+        part = load_branch(path)
+        assert len(part.nodes) >= count - 1
+        assert NOT_FINISHED in part.stop_reasons
+        assert_same_branches(part.extend(), whole)
+    again = continue_branch(start, RANGE_HZ, at=AT, checkpoint=path)
+    assert_same_branches(again, whole)
+    assert_same_branches(load_branch(path), whole)
+
+
+def test_points_known_are_not_computed_again(start, tmp_path):
+    path = tmp_path / "run.h5"
+    with pytest.raises(RuntimeError):
+        continue_branch(start, (20.0, 40.0), progress=stopper(60), checkpoint=path)
+    known = len(load_branch(path).nodes)
+    seen = []
+    branch = continue_branch(start, (20.0, 40.0), progress=seen.append, checkpoint=path)
+    assert len(seen) <= len(branch.nodes) - known + 2
+
+
+def test_every_checkpoint_on_the_way_goes_on_to_the_same_branch(
+    start, tmp_path, often, monkeypatch
+):
+    """As after a loss of power at any time."""
+    path, range_hz = tmp_path / "run.h5", (25.5, 26.5)
+    kept = []
+
+    def keep(*_):
+        if path.exists():
+            kept.append(path.read_bytes())
+
+    branch = continue_branch(start, range_hz, progress=keep, checkpoint=path)
+    assert len(kept) > 20
+    for number, content in enumerate(kept[::5]):
+        file = tmp_path / f"{number}.h5"
+        file.write_bytes(content)
+        assert_same_branches(load_branch(file).extend(), branch)
+
+
+KILLED = """
+import os, signal
+from nldyn import checkpoint, continue_branch, solve_orbit
+from one_dof import RANGE_HZ, make_one_dof
+
+checkpoint.PAUSE = checkpoint.SHARE = 0.0
+seen = iter(range(25))
+die = lambda _: next(seen, None) is None and os.kill(os.getpid(), signal.SIGKILL)
+continue_branch(solve_orbit(make_one_dof(), 26.0), RANGE_HZ, progress=die, checkpoint="run.h5")
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+def test_a_killed_run_goes_on(start, whole, tmp_path):
+    here = Path(__file__).parent
+    folders = os.pathsep.join([str(here), str(here.parents[1]), os.environ.get("PYTHONPATH", "")])
+    run = subprocess.run(
+        [sys.executable, "-c", KILLED], cwd=tmp_path, env={**os.environ, "PYTHONPATH": folders}
+    )
+    assert run.returncode == -signal.SIGKILL
+    part = load_branch(tmp_path / "run.h5")
+    assert len(part.nodes) == 25
+    assert_same_branches(part.extend(at=AT), whole)
+
+
+def test_an_interrupted_extension_goes_on(start, whole, tmp_path):
+    """From the branch that was to be extended, and from what the file has of the extension."""
+    part = continue_branch(start, (20.0, 40.0))
+    kept = tmp_path / "part.h5"
+    part.save(kept)
+    for path in (kept, tmp_path / "other.h5"):
+        with pytest.raises(RuntimeError):
+            part.extend(RANGE_HZ, at=AT, progress=stopper(30), checkpoint=path)
+        assert len(load_branch(path).nodes) > len(part.nodes)
+        seen = []
+        longer = part.extend(RANGE_HZ, at=AT, progress=seen.append, checkpoint=path)
+        assert_same_branches(longer, whole)
+        assert_same_branches(load_branch(path), whole)
+        assert len(seen) < len(whole.nodes) - len(part.nodes) - 20
+
+
+def test_an_extension_does_not_replace_another_branch(start, tmp_path):
+    path = tmp_path / "run.h5"
+    continue_branch(solve_orbit(start.system, 30.0), (29.0, 31.0), checkpoint=path)
+    before = path.read_bytes()
+    branch = continue_branch(start, (25.5, 26.5))
+    with pytest.raises(SystemModelError, match="holds another continuation"):
+        branch.extend((25.0, 27.0), checkpoint=path, progress=stopper(0))
+    assert path.read_bytes() == before
+
+
+def test_another_continuation_in_the_file_is_refused(one_dof, start, tmp_path):
+    path = tmp_path / "run.h5"
+    continue_branch(start, (25.0, 27.0), checkpoint=path)
+    before = path.read_bytes()
+    other = System.from_matrices(
+        [[2.48]],
+        [[16877.0]],
+        {"middle": [1.0]},
+        modal_damping=0.0142,
+        stops=[Stop("middle", stiffness=5.17e9, dissipation=1e-6)],
+        excitation=[Unbalance("middle", 4.92e-6)],
+    )
+    for orbit, range_hz, options in (
+        (start, (25.0, 28.0), None),
+        (start, (25.0, 27.0), ContinuationOptions(max_step=0.04)),
+        (solve_orbit(one_dof, 26.1), (25.0, 27.0), None),
+        (solve_orbit(other, 26.0), (25.0, 27.0), None),
+    ):
+        with pytest.raises(SystemModelError, match="holds another continuation"):
+            continue_branch(orbit, range_hz, options=options, checkpoint=path, progress=stopper(0))
+    assert path.read_bytes() == before
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(start, tmp_path):
+    with pytest.raises(OutputError, match="no such folder"):
+        continue_branch(
+            start, RANGE_HZ, checkpoint=tmp_path / "none" / "run.h5", progress=stopper(0)
+        )
+    text = tmp_path / "text.h5"
+    text.write_text("mine")
+    with pytest.raises(SystemModelError, match="is not an HDF5 file"):
+        continue_branch(start, RANGE_HZ, checkpoint=text, progress=stopper(0))
+    assert text.read_text() == "mine"
+
+
+def test_checkpoints_are_not_written_more_often_than_a_share_of_the_time(monkeypatch):
+    now, written = [0.0], []
+
+    def write(branches):
+        written.append(now[0])
+        now[0] += 1.0
+
+    monkeypatch.setattr(checkpoint.time, "monotonic", lambda: now[0])
+    kept = checkpoint.Checkpoint(write)
+    for _ in range(1000):
+        now[0] += 0.1
+        kept.offer()
+    assert checkpoint.PAUSE <= written[0] < checkpoint.PAUSE + 0.2
+    assert np.diff(written).min() >= checkpoint.SHARE
+    assert len(written) >= 4
+
+
+# --- diagrams ------------------------------------------------------------------------------------
+
+
+def points_computed(monkeypatch):
+    """Count the points that walks compute."""
+    made = []
+    advance = continuation.Walk._advance
+
+    def counted(*arguments):
+        made.append(None)
+        return advance(*arguments)
+
+    monkeypatch.setattr(continuation.Walk, "_advance", counted)
+    return made
+
+
+def test_branches_of_an_earlier_run_are_kept_until_they_are_reached(one_dof, picture, tmp_path):
+    """A run that goes on and is soon stopped again has still all that the first one had."""
+    path = tmp_path / "diagram.h5"
+    total = sum(len(branch.nodes) for branch in picture.branches)
+    for count in (int(0.8 * total), 0, 8, 60):
+        with pytest.raises(RuntimeError):
+            diagram(one_dof, **WANTED, progress=stopper(count), checkpoint=path)
+        found = load_branches(path)
+        assert sum(len(branch.nodes) for branch in found) > 0.7 * total
+        starts = {branch.points[branch.course.start].point.tobytes() for branch in found}
+        assert len(starts) == len(found)
+
+
+@pytest.mark.parametrize("share", [0.2, 0.8])
+def test_an_interrupted_diagram_goes_on(one_dof, picture, tmp_path, monkeypatch, share):
+    path = tmp_path / "diagram.h5"
+    total = sum(len(branch.nodes) for branch in picture.branches)
+    with pytest.raises(RuntimeError):
+        diagram(one_dof, **WANTED, progress=stopper(int(share * total)), checkpoint=path)
+    known = sum(len(branch.nodes) for branch in load_branches(path))
+    assert 0.5 * share * total < known < total
+    made = points_computed(monkeypatch)
+    again = diagram(one_dof, **WANTED, checkpoint=path)
+    assert len(made) < 1.5 * (total - known) + 30
+    assert [b.name for b in again.branches] == [b.name for b in picture.branches]
+    assert again.notes == picture.notes
+    for mine, other in zip(again.branches, picture.branches, strict=True):
+        assert_same_branches(mine, other)
+    again.save(tmp_path / "again.h5")
+    picture.save(tmp_path / "once.h5")
+    assert (tmp_path / "again.h5").read_bytes() == (tmp_path / "once.h5").read_bytes()
