@@ -10,6 +10,14 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from nldyn.branch import Branch, BranchPoint, SpecialPoint
     from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
+    from nldyn.curves import (
+        Curve,
+        LocatedPoint,
+        continue_constant,
+        continue_in,
+        continue_special,
+        refine_special,
+    )
     from nldyn.diagrams import Diagram, Seed, diagram
     from nldyn.elements import (
         Damper,
@@ -30,6 +38,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "branch": "Branch BranchPoint SpecialPoint",
     "continuation": "ContinuationOptions Walk continue_branch switch_at_flip",
+    "curves": "Curve LocatedPoint continue_constant continue_in continue_special refine_special",
     "diagrams": "Diagram Seed diagram",
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
     "errors": "SceneError SystemModelError",
@@ -46,6 +55,7 @@ __all__ = [
     "BranchPoint",
     "ContinuationOptions",
     "ConvergenceError",
+    "Curve",
     "Damper",
     "Diagram",
     "FlowMap",
@@ -53,6 +63,7 @@ __all__ = [
     "HarmonicForce",
     "History",
     "LocateError",
+    "LocatedPoint",
     "Orbit",
     "Parameter",
     "SceneError",
@@ -65,10 +76,14 @@ __all__ = [
     "Unbalance",
     "Walk",
     "continue_branch",
+    "continue_constant",
+    "continue_in",
+    "continue_special",
     "diagram",
     "dissipation_for",
     "find_orbits",
     "hertz_stiffness",
+    "refine_special",
     "solve_orbit",
     "switch_at_flip",
 ]
