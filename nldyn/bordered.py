@@ -41,6 +41,7 @@ DIFFERENCE = 1e-4
 LARGEST_CHANGE = 1e-3
 SHORTEST_DIFFERENCE = 1e-7
 ROUNDING = 1e-7  # a Newton step below this that is no shorter than the last has met rounding
+KEEP_SLOPES = 1e-3  # after a Newton step shorter than this the slopes of g still serve
 SATISFIED = 1e-7  # residual of a condition up to which a solution counts
 
 
@@ -398,10 +399,13 @@ def correct(
     Corrected
     """
     point, before, step = guess, math.inf, math.inf
-    along = np.zeros(guess.size)
+    along, slopes = np.zeros(guess.size), None
     for iteration in range(1, max_iterations + 1):
         try:
-            change, along = _newton_step(family.at(point), condition, row, level)
+            if not (step < KEEP_SLOPES and step < 0.1 * before):
+                slopes = None
+            before = step
+            change, along, slopes = _newton_step(family.at(point), condition, slopes, row, level)
             step = math.sqrt(float(change @ (family.metric(point) * change)))
             point = point + change
             if not step < 2.0:
@@ -412,19 +416,25 @@ def correct(
                     return found
         except (ConvergenceError, SystemModelError, np.linalg.LinAlgError, OverflowError) as error:
             return Corrected(family.at(point), along, step, iteration, str(error))
-        before = step
     failure = f"Newton's method did not converge, last relative step {step:.1e}"
     return Corrected(family.at(point), along, step, max_iterations, failure)
 
 
 def _newton_step(
-    at: Evaluation, condition: Condition, row: Real | None, level: float
-) -> tuple[Real, Real]:
-    """The change of the unknowns, and the direction in which all equations stay as they are."""
+    at: Evaluation, condition: Condition, slopes: Real | None, row: Real | None, level: float
+) -> tuple[Real, Real, Real]:
+    """The change of the unknowns, the direction that leaves all equations as they are, and g'.
+
+    The derivatives of g, as rows (n_conditions, N + m) that hold on the surface, are computed
+    unless given.
+    """
     normal, surface = tangent_surface(at)
-    g, by_surface = gradient(at, surface, condition)
-    if g.size and float(np.abs(normal).max()) > 0.0:
-        g = condition.value(at.family.at(at.point + normal))
+    if slopes is None:
+        by_surface = gradient(at, surface, condition)
+        slopes = by_surface @ surface.T * at.family.metric(at.point)
+    else:
+        by_surface = slopes @ surface
+    g = condition.value(at.family.at(at.point + normal))
     rows, right = by_surface, -g
     if row is not None:
         rows = np.vstack([by_surface, row @ surface])
@@ -432,7 +442,7 @@ def _newton_step(
     change = normal + surface @ np.linalg.solve(rows, right)
     if not np.all(np.isfinite(change)):
         raise ConvergenceError("singular Jacobian")
-    return change, surface @ _kernel(by_surface)
+    return change, surface @ _kernel(by_surface), slopes
 
 
 def _kernel(by_surface: Real) -> Real:
@@ -452,13 +462,9 @@ def tangent_surface(at: Evaluation) -> tuple[Real, Real]:
     return unit * normal, unit[:, None] * q[:, n:]
 
 
-def gradient(at: Evaluation, directions: Real, condition: Condition) -> tuple[Real, Real]:
-    """Values g and their derivatives (n_conditions, d) along unit directions (N + m, d)."""
-    here = condition.value(at)
-    if not here.size:
-        return here, np.zeros((0, directions.shape[1]))
-    columns = [_slope(at, direction, condition) for direction in directions.T]
-    return here, np.array(columns).T
+def gradient(at: Evaluation, directions: Real, condition: Condition) -> Real:
+    """Derivatives of g along unit directions (N + m, d), shape (n_conditions, d)."""
+    return np.array([_slope(at, direction, condition) for direction in directions.T]).T
 
 
 def _slope(at: Evaluation, direction: Real, condition: Condition) -> Real:
@@ -468,7 +474,7 @@ def _slope(at: Evaluation, direction: Real, condition: Condition) -> Real:
         first, last = (
             condition.value(at.family.at(at.point + sign * h * direction)) for sign in (-1.0, 1.0)
         )
-        change = float(np.abs(last - first).max())
+        change = float(np.abs(last - first).max(initial=0.0))
         if not change > LARGEST_CHANGE or h <= SHORTEST_DIFFERENCE:
             return (last - first) / (2.0 * h)
         h = max(0.2 * LARGEST_CHANGE / change * h, SHORTEST_DIFFERENCE)

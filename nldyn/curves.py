@@ -326,8 +326,8 @@ def continue_in(
     ...     stops=[Stop("middle", stiffness=5.17e9, gap=2e-6)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])
     >>> curve = continue_in(solve_orbit(system, 20.0), "gap", (1e-6, 1e-5))
-    >>> curve.values[[0, -1], 0].tolist()
-    [1e-06, 1e-05]
+    >>> [f"{value:.6g}" for value in curve.values[[0, -1], 0]]
+    ['1e-06', '1e-05']
     """
     charts = _charts(orbit, [parameter], [limits])
     return _curve("orbit", orbit, charts, Free(), options, progress)
@@ -495,7 +495,7 @@ def _start(family: OrbitFamily, orbit: Orbit, condition: Condition) -> CurvePoin
     else:
         at = family.at(guess)
         _, surface = tangent_surface(at)
-        _, by_surface = gradient(at, surface, condition)
+        by_surface = gradient(at, surface, condition)
         along = surface @ np.linalg.svd(by_surface)[2][-1] if by_surface.size else surface[:, 0]
         row = family.metric(guess) * along
         row /= np.linalg.norm(row)
@@ -556,7 +556,7 @@ def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> CurvePoint |
 def _tangent_behind(at: Evaluation, condition: Condition, grazing: Grazing, deep: bool) -> Real:
     """Unit tangent of a curve on the side of a grazing where the extreme is positive, or not."""
     _, surface = tangent_surface(at)
-    _, by_surface = gradient(at, surface, grazing)
+    by_surface = gradient(at, surface, grazing)
     slopes = by_surface[0] if deep else -by_surface[0]
     across = slopes / np.linalg.norm(slopes)
     beside = np.array([-across[1], across[0]])
