@@ -10,14 +10,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from nldyn.branch import Branch, BranchPoint, SpecialPoint
     from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
-    from nldyn.curves import (
-        Curve,
-        LocatedPoint,
-        continue_constant,
-        continue_in,
-        continue_special,
-        refine_special,
-    )
+    from nldyn.curve_marks import LocatedPoint, refine_special
+    from nldyn.curves import Curve, continue_constant, continue_in, continue_special
     from nldyn.diagrams import Diagram, Seed, diagram
     from nldyn.elements import (
         Damper,
@@ -38,7 +32,8 @@ if TYPE_CHECKING:
 _HOMES = {
     "branch": "Branch BranchPoint SpecialPoint",
     "continuation": "ContinuationOptions Walk continue_branch switch_at_flip",
-    "curves": "Curve LocatedPoint continue_constant continue_in continue_special refine_special",
+    "curve_marks": "LocatedPoint refine_special",
+    "curves": "Curve continue_constant continue_in continue_special",
     "diagrams": "Diagram Seed diagram",
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
     "errors": "SceneError SystemModelError",

@@ -16,6 +16,8 @@ from nldyn.orbit import ConvergenceError, Orbit
 
 KINDS = ("LP", "PD", "NS", "GR")
 
+SMALLEST_OVERLAP = 1e-3  # of null vectors: it vanishes where a multiplier is double
+
 Monitor = str | Callable[[Orbit], float]
 
 
@@ -62,6 +64,9 @@ class Singular:
 
     [[A, b], [cᵀ, 0]] [v, g] = [0, 1], is zero (Govaerts 2000, ch. 3; Kuznetsov 2004, 10.3).
 
+    The value is g/bᵀc: nearly the distance of the multiplier, or of the product of two, from where
+    it should be.
+
     Parameters
     ----------
     kind : {"LP", "PD", "NS"}
@@ -81,13 +86,14 @@ class Singular:
         return cls(kind, u[:, -1], vh[-1])
 
     def value(self, at: Evaluation) -> Real:
-        """g, shape (1,)."""
+        """Relative value of g, shape (1,)."""
         matrix = critical_matrix(self.kind, at.segments.monodromy)
         size = len(matrix)
         bordered = np.zeros((size + 1, size + 1))
         bordered[:size, :size] = matrix
         bordered[:size, -1], bordered[-1, :size] = self.left, self.right
-        return np.linalg.solve(bordered, np.eye(size + 1)[-1])[-1:]
+        overlap = max(abs(float(self.left @ self.right)), SMALLEST_OVERLAP)
+        return np.linalg.solve(bordered, np.eye(size + 1)[-1])[-1:] / overlap
 
     def reach(self, at: Evaluation) -> float:
         """Not across a grazing."""

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from one_dof import RANGE_HZ, make_one_dof
+from one_dof import RANGE_HZ
 
 from nldyn import (
     ContinuationOptions,
@@ -205,7 +205,7 @@ def test_derivatives_without_kernels_of_their_own(name):
     assert misses[0] / misses[1] == pytest.approx(4.0, rel=0.05)
 
 
-# --- two parameters: closed forms ------------------------------------------------------------------
+# --- two parameters: closed forms ----------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -250,7 +250,7 @@ def test_folds_of_a_linear_stop_scale_with_unbalance_and_gap():
         assert orbit.multipliers == pytest.approx(special.orbit.multipliers, abs=1e-8)
 
 
-# --- two parameters: against continuation in frequency -----------------------------------------------
+# --- two parameters: against continuation in frequency -------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -303,7 +303,7 @@ def test_neimark_sacker_curve_keeps_a_pair_on_the_unit_circle(torus_curve):
 
 
 def test_neimark_sacker_curve_passes_through_those_of_another_structure(torus_curve):
-    system, special, curve = torus_curve
+    system, _, curve = torus_curve
     parameter = Parameter("natural_frequency_hz", 1)
     crossing = curve.at("natural_frequency_hz", 33.8)
     assert crossing
@@ -313,7 +313,7 @@ def test_neimark_sacker_curve_passes_through_those_of_another_structure(torus_cu
         assert np.abs(frequencies / orbit.frequency_hz - 1.0).min() < 1e-8
 
 
-# --- points of codimension two ---------------------------------------------------------------------
+# --- points of codimension two -------------------------------------------------------------------
 
 
 def test_curves_of_flips_and_of_grazing_meet_where_both_say(harmonic_branch):
@@ -329,26 +329,50 @@ def test_curves_of_flips_and_of_grazing_meet_where_both_say(harmonic_branch):
 
 
 @pytest.fixture(scope="module")
-def cusp(harmonic_branch):
-    """Where two folds of the preloaded stop meet near 5.42 Hz and a gap of 0.2 μm."""
-    special = of_kind(harmonic_branch, "LP", 5.7, 5.8)[0]
-    curve = continue_special(special, ("frequency_hz", "gap"), ((5.3, 5.8), (-1e-8, 2.1e-7)))
-    (mark,) = [m for m in curve.marks if m.kind == "CP"]
-    return mark
+def preloaded() -> System:
+    """Pressed against its stop: softening, as the contact opens with larger amplitudes."""
+    return System.from_matrices(
+        [[1.0]], [[100.0]], {"m": [1.0]}, modal_damping=0.05,
+        stops=[Stop("m", 1e4, gap=-1e-2)], excitation=[HarmonicForce("m", 0.2)],
+    )  # fmt: skip
 
 
-def test_folds_come_together_in_a_cusp(one_dof, cusp):
-    """Two folds on one side, apart by the distance to the power 3/2; none on the other."""
-    frequency, gap = cusp.values
+@pytest.fixture(scope="module")
+def folds_of_preloaded(preloaded):
+    branch = continue_branch(solve_orbit(preloaded, 1.0), (1.0, 12.0))
+    folds = of_kind(branch, "LP")
+    assert len(folds) == 2
+    window = ((1.5, 6.5), (0.02, 0.25))
+    return [continue_special(fold, ("frequency_hz", "amplitude"), window) for fold in folds]
+
+
+def test_curve_through_a_cusp_joins_the_two_folds(folds_of_preloaded):
+    """Started at either fold, it passes the same cusp and the same corner at a grazing point."""
+    first, second = folds_of_preloaded
+    for kind in ("CP", "GRLP"):
+        (one,), (other,) = ([m for m in c.marks if m.kind == kind] for c in (first, second))
+        assert one.values == pytest.approx(other.values, rel=1e-8)
+    for curve in (first, second):
+        assert curve.residuals.max() < 1e-10
+        assert curve.values[[0, -1], 1] == pytest.approx([0.25, 0.25], rel=1e-14)
+    ends = [sorted(curve.values[[0, -1], 0]) for curve in (first, second)]
+    assert ends[0] == pytest.approx(ends[1], rel=1e-9)
+
+
+def test_folds_come_together_in_a_cusp(preloaded, folds_of_preloaded):
+    """Two folds beyond it, apart by the distance to the power 3/2, and none before it."""
+    (cusp,) = [m for m in folds_of_preloaded[0].marks if m.kind == "CP"]
+    frequency, amplitude = cusp.values
     apart = []
-    for distance in (1e-3, 4e-3, -1e-3):
-        orbit = cusp.orbit
-        changed = with_value(one_dof, Parameter("gap"), gap * (1.0 - distance))
-        print(frequency, gap, distance)
-        start = solve_orbit(changed, frequency * 1.01, guess=orbit.states(np.array([0.0])))
-        branch = continue_branch(start, (0.985 * frequency, 1.015 * frequency))
+    for distance in (-1e-3, 1e-3, 4e-3):
+        changed = with_value(preloaded, Parameter("amplitude"), amplitude * (1.0 + distance))
+        start = solve_orbit(changed, 1.5 * frequency)
+        branch = continue_branch(start, (0.8 * frequency, 1.5 * frequency))
         folds = [s.frequency_hz for s in of_kind(branch, "LP")]
-        print(folds)
+        assert len(folds) == (0 if distance < 0.0 else 2)
+        if folds:
+            apart.append(abs(folds[1] - folds[0]))
+    assert apart[1] / apart[0] == pytest.approx(8.0, rel=0.02)
 
 
 def test_coefficient_of_a_flip_tells_on_which_side_doubled_orbits_are(harmonic_branch):
@@ -371,7 +395,7 @@ def test_coefficient_of_a_flip_tells_on_which_side_doubled_orbits_are(harmonic_b
     assert signs == {True, False}
 
 
-# --- held quantities -------------------------------------------------------------------------------
+# --- held quantities -----------------------------------------------------------------------------
 
 
 def finer_orbit(orbit: Orbit) -> Orbit:
@@ -408,11 +432,11 @@ def test_a_function_of_ones_own_is_held_as_the_monitor_of_that_name_is(one_dof):
     assert heights == pytest.approx([start.max_abs_displacement] * len(heights), rel=1e-7)
 
 
-def test_depth_and_unbalance_of_a_linear_stop_scale(first_touch):
+def test_depth_and_unbalance_of_a_linear_stop_scale():
     """Deeper by s at a gap and an unbalance greater by s: one orbit after scaling."""
-    start = solve_orbit(linear_stop(gap=5e-4), 12.0)
+    start = solve_orbit(linear_stop(gap=1e-4), 12.0)
     assert start.impacts == 1
-    window = ((1e-4, 5e-4), (2e-4, 2e-3))
+    window = ((1e-4, 5e-4), (2e-5, 1e-3))
     curve = continue_constant(start, "max_penetration", ("mass_times_radius", "gap"), window)
     unbalance, gap = curve.values[-1]
     depth = start.max_penetration
@@ -420,7 +444,7 @@ def test_depth_and_unbalance_of_a_linear_stop_scale(first_touch):
     assert scaled.max_penetration == pytest.approx(5.0 * depth, rel=1e-6)
 
 
-# --- bad input ---------------------------------------------------------------------------------------
+# --- bad input -----------------------------------------------------------------------------------
 
 WINDOW = ((20.0, 30.0), (-1e-6, 1e-6))
 
@@ -491,12 +515,17 @@ def test_bad_input_is_told_in_one_sentence(one_dof, call, words):
 
 
 def test_a_start_that_is_no_special_point_is_refused(one_dof):
-    orbit = solve_orbit(one_dof, 26.0)
-    beside = SimpleNamespace(kind="LP", orbit=orbit)
-    with pytest.raises(ConvergenceError, match="start of the curve at 26 Hz was not found"):
+    beside = SimpleNamespace(kind="LP", orbit=solve_orbit(one_dof, 26.0))
+    with pytest.raises(SystemModelError, match="the orbit at 26 Hz is no LP"):
         continue_special(beside, ("frequency_hz", "gap"), WINDOW)
-    with pytest.raises(LocateError, match="LP near 26 Hz was not refined"):
-        refine_special(beside)
+    with pytest.raises(LocateError, match="LP near 26 Hz was not refined: Newton's method did not"):
+        refine_special(beside, max_iterations=1)
+
+
+def test_a_value_that_no_orbit_has_is_not_found(one_dof):
+    start = solve_orbit(one_dof, 26.0)
+    with pytest.raises(ConvergenceError, match="start of the curve at 26 Hz was not found"):
+        continue_constant(start, "peak_force", ("frequency_hz", "gap"), WINDOW, value=1e9)
 
 
 def test_a_curve_has_no_other_parameters_than_its_own(one_dof):
