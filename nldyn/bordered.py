@@ -9,7 +9,7 @@ conditions g needed. There they are central differences.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
@@ -256,11 +256,10 @@ class Evaluation:
 
     def _difference(self, place: int) -> Real:
         """Derivative of the ends by a parameter, from the maps of two changed systems."""
-        before, after = self.point.copy(), self.point.copy()
-        before[place] -= DIFFERENCE
-        after[place] += DIFFERENCE
-        ends = [Evaluation(self.family, point)._ends() for point in (before, after)]
-        return np.asarray((ends[1] - ends[0]).ravel() / (2.0 * DIFFERENCE))
+        step = np.zeros(self.point.size)
+        step[place] = DIFFERENCE
+        before, after, length = _pair(self, step, Evaluation._ends)
+        return np.asarray((after - before).ravel() / (length * DIFFERENCE))
 
     @cached_property
     def orbit(self) -> Orbit:
@@ -434,7 +433,10 @@ def _newton_step(
         slopes = by_surface @ surface.T * at.family.metric(at.point)
     else:
         by_surface = slopes @ surface
-    g = condition.value(at.family.at(at.point + normal))
+    try:
+        g = condition.value(at.family.at(at.point + normal))
+    except SystemModelError:  # beyond what a parameter can be; the next step starts nearer
+        g = condition.value(at)
     rows, right = by_surface, -g
     if row is not None:
         rows = np.vstack([by_surface, row @ surface])
@@ -471,10 +473,27 @@ def _slope(at: Evaluation, direction: Real, condition: Condition) -> Real:
     """Derivatives of g along a unit direction, over a length on which g changes little."""
     h = condition.reach(at)
     while True:
-        first, last = (
-            condition.value(at.family.at(at.point + sign * h * direction)) for sign in (-1.0, 1.0)
-        )
+        first, last, length = _pair(at, h * direction, condition.value)
         change = float(np.abs(last - first).max(initial=0.0))
         if not change > LARGEST_CHANGE or h <= SHORTEST_DIFFERENCE:
-            return (last - first) / (2.0 * h)
+            return (last - first) / (h * length)
         h = max(0.2 * LARGEST_CHANGE / change * h, SHORTEST_DIFFERENCE)
+
+
+def _pair(
+    at: Evaluation, step: Real, function: Callable[[Evaluation], Real]
+) -> tuple[Real, Real, float]:
+    """A function a step before and a step behind a point, and how many steps are between.
+
+    Where the system has no such value on one side (a damping below zero), the point itself serves.
+    """
+    found, length = [], 0.0
+    for sign in (-1.0, 1.0):
+        try:
+            found.append(function(at.family.at(at.point + sign * step)))
+            length += 1.0
+        except SystemModelError:
+            found.append(function(at))
+    if not length:
+        raise ConvergenceError("no derivative, for there are no systems on either side")
+    return found[0], found[1], length

@@ -41,9 +41,9 @@ def codimension_tests(
     mu = at.orbit.multipliers
     if isinstance(condition, Singular):
         return {
-            "LP": _along_folds,
-            "PD": _along_flips,
-            "NS": _along_tori,
+            "LP": along_folds,
+            "PD": along_flips,
+            "NS": along_tori,
         }[condition.kind](condition, at.orbit, mu)
     tests = {"PD": flip_test(mu), "NS": torus_test(mu) if mu.size > 2 else 1.0}
     if parameter_tangent is None:
@@ -55,7 +55,8 @@ def codimension_tests(
     return {prefix + name: value for name, value in tests.items()}
 
 
-def _along_folds(condition: Singular, orbit: Orbit, mu: Complex) -> dict[str, float]:
+def along_folds(condition: Singular, orbit: Orbit, mu: Complex) -> dict[str, float]:
+    """Tests on a curve of folds: cusp, and what the other multipliers do."""
     others = np.delete(mu, int(np.argmin(np.abs(mu - 1.0))))
     tests = {
         "CP": fold_coefficient(orbit, condition.left, condition.right),
@@ -67,7 +68,8 @@ def _along_folds(condition: Singular, orbit: Orbit, mu: Complex) -> dict[str, fl
     return tests
 
 
-def _along_flips(condition: Singular, orbit: Orbit, mu: Complex) -> dict[str, float]:
+def along_flips(condition: Singular, orbit: Orbit, mu: Complex) -> dict[str, float]:
+    """Tests on a curve of flips: degenerate flip, and what the other multipliers do."""
     others = np.delete(mu, int(np.argmin(np.abs(mu + 1.0))))
     tests = {
         "GPD": flip_coefficient(orbit, condition.left, condition.right),
@@ -79,7 +81,8 @@ def _along_flips(condition: Singular, orbit: Orbit, mu: Complex) -> dict[str, fl
     return tests
 
 
-def _along_tori(_: Singular, orbit: Orbit, mu: Complex) -> dict[str, float]:
+def along_tori(_: Singular | None, orbit: Orbit | None, mu: Complex) -> dict[str, float]:
+    """Tests on a Neimark-Sacker curve: strong resonances, and what the other multipliers do."""
     pair = torus_pair(mu)
     cosine = 0.5 * float((mu[pair[0]] + mu[pair[1]]).real)
     others = np.delete(mu, pair)

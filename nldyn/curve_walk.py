@@ -105,19 +105,20 @@ def on_chart_plane(a: CurvePoint, b: CurvePoint, which: int, value: float) -> Cu
     """Point of the curve between a and b at which a parameter has a value."""
     family = a.found.at.family
     place = family.n_states + which
-    target = family.charts[which].coordinate(value)
     if a.point[place] == b.point[place]:
         return None
+    target = family.charts[which].coordinate(value)
     share = (target - float(a.point[place])) / float(b.point[place] - a.point[place])
-    row = np.zeros(a.point.size)
-    row[place] = 1.0
-    guess = (1.0 - share) * a.point + share * b.point
-    guess[place] = target
-    found = correct(family, guess, a.condition, row, target)
-    if not found.converged:
-        return None
-    length = a.arclength + share * (b.arclength - a.arclength)
-    return curve_point(found, a.condition, b.point - a.point, length)
+    return _on_plane(a, share * (b.point - a.point), share * (b.arclength - a.arclength), which)
+
+
+def _on_plane(a: CurvePoint, way: Real, length: float, which: int) -> CurvePoint | None:
+    """Point of the curve near the end of a way from a, where a parameter is as it is there."""
+    guess = a.point + way
+    row = np.zeros(guess.size)
+    row[a.found.at.family.n_states + which] = 1.0
+    found = correct(a.found.at.family, guess, a.condition, row, float(row @ guess))
+    return curve_point(found, a.condition, way, a.arclength + length) if found.converged else None
 
 
 def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> CurvePoint | None:
@@ -192,6 +193,10 @@ class CurveWalk:
             while attempt is None:
                 attempt = self._advance(here, curvature, step)
                 if attempt is None:
+                    limit = self._limit_ahead(here, step)
+                    if limit is not None:
+                        yield limit
+                        return
                     step *= 0.5
                     if step < CORNER_STEP and not seen:
                         seen = True
@@ -252,6 +257,28 @@ class CurveWalk:
         if step > self.options.grazing_step and touched and not grazes:
             return None
         return there, angle, miss
+
+    def _limit_ahead(self, here: CurvePoint, step: float) -> CurvePoint | None:
+        """Point at the end of a range, if a failed step would have passed it.
+
+        Behind the end there may be no systems: no exponent below 1, no damping below zero.
+        """
+        for which, chart in enumerate(here.found.at.family.charts):
+            place = here.found.at.family.n_states + which
+            slope, limit = float(here.tangent[place]), chart.high
+            if slope < 0.0:
+                limit = chart.low
+            ahead = (chart.coordinate(limit) - float(here.point[place])) / (slope or 1e-300)
+            if not 0.0 < ahead <= step:
+                continue
+            end = _on_plane(here, ahead * here.tangent, ahead, which)
+            if end is not None:
+                weights = here.found.at.family.metric(here.point)
+                off = _length(weights, end.point - here.point - ahead * here.tangent)
+                if off <= self.options.max_angle * ahead:
+                    self.stop_reason = f"{RANGE_END}{chart.parameter.name}"
+                    return end
+        return None
 
     def _end(self, here: CurvePoint, there: CurvePoint) -> list[CurvePoint] | None:
         """The last points of the walk if it ends in this step."""

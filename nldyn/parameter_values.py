@@ -210,10 +210,12 @@ class Chart:
         return math.log(value) if self.logarithmic else value / (self.high - self.low)
 
     def value(self, coordinate: float) -> float:
-        """Value at a coordinate."""
-        if self.logarithmic:
-            return math.exp(coordinate)
-        return coordinate * (self.high - self.low)
+        """Value at a coordinate; rounding does not carry it past an end of the range."""
+        value = math.exp(coordinate) if self.logarithmic else coordinate * (self.high - self.low)
+        for end in (self.low, self.high):
+            if abs(value - end) <= 1e-14 * max(abs(self.low), abs(self.high)):
+                return end
+        return value
 
     def slope(self, coordinate: float) -> float:
         """Derivative of the value with respect to the coordinate."""

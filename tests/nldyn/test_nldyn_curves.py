@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from one_dof import RANGE_HZ
+from one_dof import RANGE_HZ, make_one_dof
 
 from nldyn import (
     ContinuationOptions,
@@ -32,7 +32,7 @@ from nldyn import (
     switch_at_flip,
 )
 from nldyn.bordered import OrbitFamily
-from nldyn.codimension import flip_coefficient, is_torus
+from nldyn.codimension import along_tori, flip_coefficient, is_torus
 from nldyn.conditions import Singular, bialternate, max_abs_displacement, peak_force
 from nldyn.orbit import Orbit, shooting_problem
 from nldyn.parameter_values import EVERY_MODE, Chart, value_of, with_value
@@ -179,6 +179,30 @@ def test_end_of_a_continuation_is_the_orbit_of_the_changed_system(parameter, val
     assert again.multipliers == pytest.approx(end.multipliers, rel=1e-7, abs=1e-9)
 
 
+@pytest.mark.parametrize("name", ["exponent", "dissipation", "coefficient"])
+def test_a_range_may_end_where_the_parameter_does(name):
+    """There is no exponent below 1, and no dissipation or damping below zero."""
+    least = 1.0 if name == "exponent" else 0.0
+    start = solve_orbit(two_modes(), 20.0)
+    value = value_of(start.system, 20.0, Parameter(name))
+    curve = continue_in(start, name, (least, value))
+    assert least in curve.values[[0, -1], 0]
+    assert curve.residuals.max() < 1e-11
+
+
+def test_a_curve_of_flips_ends_at_the_linear_law():
+    soft = make_one_dof(stops=[Stop("middle", 1e6, 1.2)])
+    branch = continue_branch(solve_orbit(soft, 26.0), (15.0, 40.0))
+    special = of_kind(branch, "PD")[0]
+    curve = continue_special(special, ("frequency_hz", "exponent"), ((10.0, 60.0), (1.0, 1.3)))
+    end = min((curve.points[0], curve.points[-1]), key=lambda p: p.values[1])
+    assert end.values[1] == 1.0
+    linear = make_one_dof(stops=[Stop("middle", 1e6, 1.0)])
+    other = continue_branch(solve_orbit(linear, 26.0), (10.0, 60.0))
+    found = np.array([s.frequency_hz for s in of_kind(other, "PD")])
+    assert np.abs(found / end.values[0] - 1.0).min() < 1e-8
+
+
 def test_damping_of_all_modes_at_once():
     system = replace(two_modes(), damping=two_modes().damping * 0.5)
     with pytest.raises(SystemModelError, match="different ratios"):
@@ -289,13 +313,14 @@ def torus_curve():
         stops=[Stop("m", stiffness=1.2e7, gap=1e-5)], excitation=[Unbalance("m", 4.92e-6)],
     )  # fmt: skip
     branch = continue_branch(solve_orbit(system, 60.0), (5.0, 80.0))
-    special = of_kind(branch, "NS")[0]
     parameters = ("frequency_hz", Parameter("natural_frequency_hz", 1))
-    return system, special, continue_special(special, parameters, ((5.0, 40.0), (30.0, 36.0)))
+    window = ((10.5, 14.0), (30.0, 38.0))
+    special, fold = of_kind(branch, "NS")[0], of_kind(branch, "LP")[0]
+    return system, *(continue_special(start, parameters, window) for start in (special, fold))
 
 
 def test_neimark_sacker_curve_keeps_a_pair_on_the_unit_circle(torus_curve):
-    _, _, curve = torus_curve
+    _, curve, _ = torus_curve
     for orbit in curve.orbits[1:-1]:
         mu = orbit.multipliers
         assert is_torus(mu)
@@ -303,7 +328,7 @@ def test_neimark_sacker_curve_keeps_a_pair_on_the_unit_circle(torus_curve):
 
 
 def test_neimark_sacker_curve_passes_through_those_of_another_structure(torus_curve):
-    system, _, curve = torus_curve
+    system, curve, _ = torus_curve
     parameter = Parameter("natural_frequency_hz", 1)
     crossing = curve.at("natural_frequency_hz", 33.8)
     assert crossing
@@ -393,6 +418,35 @@ def test_coefficient_of_a_flip_tells_on_which_side_doubled_orbits_are(harmonic_b
         signs.add(b > 0.0)
     assert len(flips) == 8
     assert signs == {True, False}
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "angle"),
+    [("R3", "NS", 2.0 * math.pi / 3.0), ("R4", "NS", 0.5 * math.pi), ("R1", "NS", 0.0)],
+)
+def test_resonances_are_told_by_the_angle_of_the_pair(name, kind, angle):
+    rest = np.array([0.3 + 0.1j, 0.3 - 0.1j])
+    values = []
+    for turned in (angle - 0.01, angle + 0.01):
+        pair = (
+            np.exp([1j * turned, -1j * turned]) if angle else [1.0 + turned, 1.0 / (1.0 + turned)]
+        )
+        mu = np.concatenate([pair, rest])
+        values.append(along_tori(None, None, mu)[name])
+    if angle:
+        assert values[0] * values[1] < 0.0
+    else:  # behind the resonance the pair is real
+        assert max(values) < 0.0
+
+
+def test_fold_and_neimark_sacker_curves_share_their_resonances(torus_curve):
+    """Where the angle of the pair comes to zero, a second multiplier of a fold is 1, too."""
+    _, tori, folds = torus_curve
+    first = sorted(tuple(m.values) for m in tori.marks if m.kind == "R1")
+    second = sorted(tuple(m.values) for m in folds.marks if m.kind == "R1")
+    assert len(first) == 2
+    assert np.array(first) == pytest.approx(np.array(second), rel=1e-7)
+    assert all(reason.endswith("at a resonance") for reason in tori.stop_reasons)
 
 
 # --- held quantities -----------------------------------------------------------------------------
