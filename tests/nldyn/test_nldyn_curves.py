@@ -34,8 +34,11 @@ from nldyn import (
 from nldyn.bordered import OrbitFamily
 from nldyn.codimension import along_tori, flip_coefficient, is_torus
 from nldyn.conditions import Singular, bialternate, max_abs_displacement, peak_force
+from nldyn.continuation import trace
 from nldyn.orbit import Orbit, shooting_problem
 from nldyn.parameter_values import EVERY_MODE, Chart, value_of, with_value
+from nldyn.resources import example
+from nldyn.scene import build_system, load_scene
 
 MASS, NATURAL, RATIO = 2.0, 2.0 * math.pi * 10.0, 0.03
 
@@ -274,6 +277,21 @@ def test_folds_of_a_linear_stop_scale_with_unbalance_and_gap():
         assert orbit.multipliers == pytest.approx(special.orbit.multipliers, abs=1e-8)
 
 
+def test_flips_of_doubled_orbits_scale_with_force_and_stiffness(harmonic_branch):
+    """Without a gap, force times s and stiffness times s^(1-p) give displacements times s."""
+    start = switch_at_flip(of_kind(harmonic_branch, "PD", 33.0)[0])
+    _, located, _, _ = trace(start, (27.0, 40.0))
+    special = next(s for s in located if s.kind == "PD")
+    assert special.orbit.period == 2
+    curve = continue_special(
+        special, ("mass_times_radius", "stiffness"), ((1e-6, 2e-5), (1e9, 2e10))
+    )
+    unbalance, stiffness = curve.values.T
+    assert unbalance.max() > 4.0 * unbalance.min()
+    expected = 5.17e9 * np.sqrt(4.92e-6 / unbalance)
+    assert np.abs(stiffness / expected - 1.0).max() < 1e-7
+
+
 # --- two parameters: against continuation in frequency -------------------------------------------
 
 
@@ -338,6 +356,12 @@ def test_neimark_sacker_curve_passes_through_those_of_another_structure(torus_cu
         assert np.abs(frequencies / orbit.frequency_hz - 1.0).min() < 1e-8
 
 
+@pytest.fixture(scope="module")
+def four_modes() -> System:
+    """The paper's beam with four modes and 1 % damping."""
+    return build_system(load_scene(example("four_dof_xi_0.01.toml")))
+
+
 # --- points of codimension two -------------------------------------------------------------------
 
 
@@ -398,6 +422,23 @@ def test_folds_come_together_in_a_cusp(preloaded, folds_of_preloaded):
         if folds:
             apart.append(abs(folds[1] - folds[0]))
     assert apart[1] / apart[0] == pytest.approx(8.0, rel=0.02)
+
+
+def test_special_points_of_four_modes(four_modes):
+    """Each solves its defining system; grazing and Neimark-Sacker curves meet in one GRNS."""
+    branch = continue_branch(solve_orbit(four_modes, 25.6), (25.0, 26.6))
+    assert {s.kind for s in branch.special_points} == {"LP", "PD", "NS", "GR"}
+    for special in branch.special_points:
+        refined = refine_special(special)
+        assert refined.residual < 1e-10
+        assert refined.frequency_hz == pytest.approx(special.frequency_hz, rel=1e-9)
+    window = ((25.0, 26.0), (3.5e-6, 5.2e-6))
+    places = []
+    for start in (of_kind(branch, "GR")[0], of_kind(branch, "NS")[0]):
+        curve = continue_special(start, ("frequency_hz", "mass_times_radius"), window)
+        places += [m.values for m in curve.marks if m.kind == "GRNS"]
+    assert len(places) == 2
+    assert places[0] == pytest.approx(places[1], rel=1e-7)
 
 
 def test_coefficient_of_a_flip_tells_on_which_side_doubled_orbits_are(harmonic_branch):
