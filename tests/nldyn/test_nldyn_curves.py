@@ -124,6 +124,37 @@ def test_branch_point_of_doubled_orbits_is_the_flip(harmonic_branch):
     assert found.frequency_hz == pytest.approx(special.frequency_hz, rel=1e-10)
 
 
+def between_two_stops(**changes) -> System:
+    upper = Stop.linear("m", 3000.0, gap=0.01)
+    lower = replace(upper, direction=-1, **changes)
+    return System.from_matrices(
+        [[1.0]], [[100.0]], {"m": [1.0]}, modal_damping=0.02, stops=[upper, lower],
+        excitation=[HarmonicForce("m", 1.0)],
+    )  # fmt: skip
+
+
+def test_branch_point_at_which_a_symmetry_breaks():
+    """There the orbit is still its own mirror image half a period later; λ is zero.
+
+    With unequal stops there is no such point: λ stays, in proportion to what they differ by.
+    """
+    branch = continue_branch(solve_orbit(between_two_stops(), 1.0), (0.5, 1.0))
+    (special,) = of_kind(branch, "BP")
+    found = refine_special(special)
+    assert found.residual < 1e-9
+    assert found.frequency_hz == pytest.approx(special.frequency_hz, rel=1e-9)
+    first, second = found.orbit.problem.nodes(found.orbit.point)
+    assert np.abs(first + second).max() < 1e-10 * np.abs(first).max()
+    assert np.abs(found.orbit.multipliers - 1.0).min() < 1e-8
+    left = []
+    for excess in (1e-6, 4e-6):
+        problem = shooting_problem(FlowMap(between_two_stops(gap=0.01 * (1.0 + excess))), 1)
+        unequal = replace(found.orbit, problem=problem, motion=None)
+        left.append(refine_special(SimpleNamespace(kind="BP", orbit=unequal)).residual)
+    assert left[0] > 1e-7
+    assert left[1] / left[0] == pytest.approx(4.0, rel=1e-3)
+
+
 def test_bialternate_product_has_the_products_of_eigenvalues():
     matrix = np.random.default_rng(5).standard_normal((4, 4))
     mu = np.linalg.eigvals(matrix)
