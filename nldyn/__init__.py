@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from nldyn.branch import Branch, BranchPoint, SpecialPoint
     from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
+    from nldyn.curve_marks import LocatedPoint, refine_special
+    from nldyn.curves import Curve, continue_constant, continue_in, continue_special
     from nldyn.diagrams import Diagram, Seed, diagram
     from nldyn.elements import (
         Damper,
@@ -41,6 +43,8 @@ if TYPE_CHECKING:
 _HOMES = {
     "branch": "Branch BranchPoint SpecialPoint",
     "continuation": "ContinuationOptions Walk continue_branch switch_at_flip",
+    "curve_marks": "LocatedPoint refine_special",
+    "curves": "Curve continue_constant continue_in continue_special",
     "diagrams": "Diagram Seed diagram",
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
     "exploration": "Coverage Exploration ExploreOptions explore",
@@ -64,6 +68,7 @@ __all__ = [
     "ContinuationOptions",
     "ConvergenceError",
     "Coverage",
+    "Curve",
     "Damper",
     "Diagram",
     "Exploration",
@@ -73,6 +78,7 @@ __all__ = [
     "HarmonicForce",
     "History",
     "LocateError",
+    "LocatedPoint",
     "Orbit",
     "Parameter",
     "SceneError",
@@ -87,6 +93,9 @@ __all__ = [
     "Unbalance",
     "Walk",
     "continue_branch",
+    "continue_constant",
+    "continue_in",
+    "continue_special",
     "diagram",
     "dissipation_for",
     "explore",
@@ -100,6 +109,7 @@ __all__ = [
     "plot_history",
     "plot_phase_portrait",
     "plot_spectrum",
+    "refine_special",
     "solve_orbit",
     "spectrum",
     "switch_at_flip",

@@ -28,6 +28,8 @@ _EXCITATION = -1
 class Parameter:
     """A number of a stop or of an excitation.
 
+    `continue_in` and the like know more names, see `nldyn.parameter_values`.
+
     Parameters
     ----------
     name : str

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -292,6 +293,24 @@ class System:
             If an undamped mode is excited exactly at its frequency.
         """
         return self.linear.steady(self.drive[0] + omega**2 * self.drive[1], omega)
+
+    def with_elements(
+        self,
+        *,
+        stops: tuple[Stop, ...] | None = None,
+        excitation: tuple[Excitation, ...] | None = None,
+    ) -> System:
+        """The same structure with stops or excitation whose numbers differ, at the same interfaces.
+
+        The linear part is shared, which saves most of the work of making a system.
+        """
+        other = copy.copy(self)
+        vars(other).pop("drive", None)
+        if stops is not None:
+            object.__setattr__(other, "stops", stops)
+        if excitation is not None:
+            object.__setattr__(other, "excitation", excitation)
+        return other
 
     def _check_shapes(self) -> None:
         n = self.natural_frequencies.size

@@ -23,6 +23,15 @@ def test_example_runs(capsys):
     assert kinds == ["LP", "LP", "GR", "PD", "PD", "PD"]
 
 
+def test_example_of_the_curves_runs(capsys):
+    text = (ROOT / "docs" / "curves.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.S)
+    exec(code, {})
+    said = re.findall(r"^print.*?# (.*)$", code, flags=re.M)
+    assert capsys.readouterr().out.splitlines() == said
+    assert len(said) == 4
+
+
 def test_every_kind_of_special_point_is_in_the_table():
     text = THEORY.read_text(encoding="utf-8")
     for kind in ("LP", "PD", "BP", "NS", "GR"):

@@ -1,0 +1,407 @@
+"""Defining conditions of special points, and monitors held constant: scalar functions of orbits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nldyn._events import nearest
+from nldyn.bordered import DIFFERENCE, Condition, Evaluation, length_unit, reach_of_grazing
+from nldyn.errors import SystemModelError, is_finite, shown
+from nldyn.linear import Real
+from nldyn.orbit import ConvergenceError, Orbit
+
+KINDS = ("LP", "PD", "NS", "GR")
+
+SMALLEST_OVERLAP = 1e-3  # of null vectors: it vanishes where a multiplier is double
+
+Monitor = str | Callable[[Orbit], float]
+
+
+def bialternate(matrix: Real) -> Real:
+    """Bialternate product of a matrix (m, m) with itself: its eigenvalues are μᵢμⱼ with i < j.
+
+    Parameters
+    ----------
+    matrix : (m, m) array
+        Any matrix.
+
+    Returns
+    -------
+    (m (m - 1) / 2, m (m - 1) / 2) array
+
+    References
+    ----------
+    Yu. A. Kuznetsov (2004), *Elements of Applied Bifurcation Theory*, section 10.2.2.
+
+    Examples
+    --------
+    >>> bialternate(np.diag([2.0, 3.0, 5.0])).diagonal().tolist()
+    [6.0, 10.0, 15.0]
+    """
+    p, q = np.triu_indices(matrix.shape[0], 1)
+    return np.asarray(
+        matrix[np.ix_(p, p)] * matrix[np.ix_(q, q)] - matrix[np.ix_(q, p)] * matrix[np.ix_(p, q)]
+    )
+
+
+def critical_matrix(kind: str, monodromy: Real) -> Real:
+    """Matrix that is singular at a fold (LP), a flip (PD) or a Neimark-Sacker point (NS)."""
+    if kind == "LP":
+        return monodromy - np.eye(len(monodromy))
+    if kind == "PD":
+        return monodromy + np.eye(len(monodromy))
+    product = bialternate(monodromy)
+    return np.asarray(product - np.eye(len(product)))
+
+
+@dataclass(frozen=True, eq=False)
+class Singular:
+    """A matrix of the monodromy is singular: the last entry g of the bordered system's solution,
+
+    [[A, b], [cᵀ, 0]] [v, g] = [0, 1], is zero (Govaerts 2000, ch. 3; Kuznetsov 2004, 10.3).
+
+    The value is g/bᵀc: nearly the distance of the multiplier, or of the product of two, from where
+    it should be.
+
+    Parameters
+    ----------
+    kind : {"LP", "PD", "NS"}
+        Which matrix A.
+    left, right : arrays
+        Borders b and c: unit singular vectors of A to its smallest singular value.
+    """
+
+    kind: str
+    left: Real
+    right: Real
+
+    @classmethod
+    def of(cls, kind: str, orbit: Orbit) -> Singular:
+        """The condition with the borders of an orbit."""
+        u, _, vh = np.linalg.svd(critical_matrix(kind, orbit.monodromy))
+        return cls(kind, u[:, -1], vh[-1])
+
+    def value(self, at: Evaluation) -> Real:
+        """Relative value of g, shape (1,)."""
+        matrix = critical_matrix(self.kind, at.segments.monodromy)
+        size = len(matrix)
+        bordered = np.zeros((size + 1, size + 1))
+        bordered[:size, :size] = matrix
+        bordered[:size, -1], bordered[-1, :size] = self.left, self.right
+        overlap = max(abs(float(self.left @ self.right)), SMALLEST_OVERLAP)
+        return np.linalg.solve(bordered, np.eye(size + 1)[-1])[-1:] / overlap
+
+    def reach(self, at: Evaluation) -> float:
+        """Not across a grazing."""
+        return reach_of_grazing(at)
+
+    def renewed(self, at: Evaluation) -> Singular:
+        """The same with the borders of another orbit, of the same sense."""
+        other = Singular.of(self.kind, at.orbit)
+        left, right = other.left, other.right
+        return Singular(
+            self.kind,
+            left if left @ self.left >= 0.0 else -left,
+            right if right @ self.right >= 0.0 else -right,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class BranchPoint:
+    """[R_u, R_p] has lost a rank (Moore 1980): with a left border ψ and right borders c₁, c₂
+
+    ψᵀ[R_u, R_p] + h₁c₁ᵀ + h₂c₂ᵀ = 0 with ψᵀb = 1 gives h₁ = h₂ = 0. The equations are unfolded,
+    R + λb = 0, which makes the system for (u, p, λ) regular; at a true branch point λ = 0.
+
+    Parameters
+    ----------
+    left : (N,) array
+        b.
+    right : (2, N + 1) array
+        c₁ and c₂.
+    unit : (N + 1,) array
+        Units of the unknowns, so that h has no dimension.
+    """
+
+    left: Real
+    right: Real
+    unit: Real
+
+    @classmethod
+    def of(cls, at: Evaluation) -> BranchPoint:
+        """The condition with the borders of a point in one parameter, not yet unfolded."""
+        unit = 1.0 / np.sqrt(at.family.metric(at.point))
+        u, _, vh = np.linalg.svd(at.jacobian * unit)
+        return cls(u[:, -1], vh[-2:], unit)
+
+    def value(self, at: Evaluation) -> Real:
+        """h₁ and h₂, relative to the size of the states, shape (2,)."""
+        n = self.left.size
+        matrix = np.zeros((n + 2, n + 2))
+        matrix[:n, : n + 1] = at.jacobian[:, : n + 1] * self.unit / self.unit[0]
+        matrix[:n, -1] = self.left
+        matrix[n:, : n + 1] = self.right
+        return np.linalg.solve(matrix.T, np.eye(n + 2)[-1])[n:]
+
+    def reach(self, at: Evaluation) -> float:
+        """Not across a grazing."""
+        return reach_of_grazing(at)
+
+    def renewed(self, at: Evaluation) -> BranchPoint:
+        """The same: a branch point is not followed."""
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class Grazing:
+    """An extreme of a stop's penetration is zero.
+
+    Parameters
+    ----------
+    stop : int
+        Which stop.
+    is_maximum : bool
+        Whether a contact begins there; else one splits.
+    phase : float
+        Forcing phase: the extreme nearest to it is meant.
+    unit : float
+        Length by which the depth is divided, in m.
+    """
+
+    stop: int
+    is_maximum: bool
+    phase: float
+    unit: float
+
+    @classmethod
+    def of(cls, orbit: Orbit) -> Grazing:
+        """The extreme nearest to zero of all stops.
+
+        Raises
+        ------
+        SystemModelError
+            If the orbit has none within 1 % of its size.
+        """
+        unit = length_unit(orbit)
+        best, shortest = None, 1e-2 * unit
+        for stop in range(len(orbit.system.stops)):
+            found = orbit.extremes(stop)
+            for phase, depth, kind in zip(
+                found.phases, found.values, found.is_maximum, strict=True
+            ):
+                if abs(depth) < shortest:
+                    shortest = abs(float(depth))
+                    best = cls(stop, bool(kind), float(phase), unit)
+        if best is None:
+            raise SystemModelError(f"the orbit at {orbit.frequency_hz:g} Hz does not graze a stop")
+        return best
+
+    def value(self, at: Evaluation) -> Real:
+        """Depth of the extreme, shape (1,)."""
+        return np.array([self.extreme(at.orbit)[1] / self.unit])
+
+    def reach(self, at: Evaluation) -> float:
+        """The depth of an extreme has a continuous derivative also where it is zero."""
+        return DIFFERENCE
+
+    def renewed(self, at: Evaluation) -> Grazing:
+        """The same with the phase of another orbit."""
+        unit = length_unit(at.orbit)
+        return replace(self, phase=self.extreme(at.orbit)[0], unit=unit)
+
+    def is_of(self, stop: int, is_maximum: bool, phase: float, period: int) -> bool:
+        """Whether an extreme near a phase is this one."""
+        full = 2.0 * math.pi * period
+        apart = abs((phase - self.phase + 0.5 * full) % full - 0.5 * full)
+        return stop == self.stop and is_maximum == self.is_maximum and apart < 0.2
+
+    def extreme(self, orbit: Orbit) -> tuple[float, float]:
+        """Phase and depth of the extreme."""
+        found = orbit.extremes(self.stop)
+        full = 2.0 * math.pi * orbit.period
+        index = nearest(found.phases, found.is_maximum, self.is_maximum, self.phase, full)
+        if index < 0:
+            raise ConvergenceError("an extreme has vanished")
+        phase = float(found.phases[index])
+        return phase, exact_output(orbit, self.stop, phase) - orbit.system.stops[self.stop].gap
+
+
+def exact_output(orbit: Orbit, output: int, phase: float) -> float:
+    """An output of `FlowMap.rows` at a phase, by the flow map from the segment's start.
+
+    The recorded motion is a polynomial inside a contact, good to 1e-6; at an extreme, whose phase
+    it gives, an error of the phase matters to second order only.
+    """
+    problem = orbit.problem
+    phases = problem.phases
+    phase = phase % phases[-1]
+    j = min(int(np.searchsorted(phases, phase, side="right")) - 1, problem.segments - 1)
+    state = problem.nodes(orbit.point)[j]
+    if phase - phases[j] > 1e-12:
+        found = problem.flow.shoot(
+            state[None], np.array([phases[j], phase]), orbit.omega, sensitivities=False
+        )
+        if found.failure:
+            raise ConvergenceError(found.failure)
+        state = found.ends[0]
+    return float(problem.flow.rows[output] @ state)
+
+
+def max_penetration(orbit: Orbit) -> float:
+    """Deepest penetration over all stops in m, zero if none is touched."""
+    return max(0.0, *(depth for _, depth in _depths(orbit)), 0.0)
+
+
+def peak_force(orbit: Orbit) -> float:
+    """Largest contact force over all stops in N, zero if none is touched.
+
+    Where a force depends on the speed, it is that of the recorded motion.
+    """
+    stops = orbit.system.stops
+    if any(stop.depends_on_speed for stop in stops):
+        return max((impact.force for impact in orbit.impact_list), default=0.0)
+    return max((float(stops[i].force(depth)) for i, depth in _depths(orbit)), default=0.0)
+
+
+def max_abs_displacement(orbit: Orbit) -> float:
+    """Largest absolute displacement of the observed interface in m."""
+    extremes = orbit.observed_extremes
+    if not extremes.values.size:
+        return 0.0
+    phase = float(extremes.phases[int(np.argmax(np.abs(extremes.values)))])
+    output = len(orbit.system.stops) + orbit.system.interfaces.index(orbit.observe)
+    return abs(exact_output(orbit, output, phase))
+
+
+def _depths(orbit: Orbit) -> list[tuple[int, float]]:
+    """Each stop with the depth of its deepest penetration."""
+    found = []
+    for index, peaks in enumerate(orbit.penetration_peaks):
+        if peaks.values.size:
+            phase = float(peaks.phases[int(np.argmax(peaks.values))])
+            depth = exact_output(orbit, index, phase) - orbit.system.stops[index].gap
+            found.append((index, depth))
+    return found
+
+
+MONITORS: dict[str, Callable[[Orbit], float]] = {
+    "peak_force": peak_force,
+    "max_penetration": max_penetration,
+    "max_abs_displacement": max_abs_displacement,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Both:
+    """Two conditions at once.
+
+    Parameters
+    ----------
+    first, second : Condition
+        Both are to hold.
+    """
+
+    first: Condition
+    second: Condition
+
+    def value(self, at: Evaluation) -> Real:
+        """Values of both."""
+        return np.append(self.first.value(at), self.second.value(at))
+
+    def reach(self, at: Evaluation) -> float:
+        """The shorter one."""
+        return min(self.first.reach(at), self.second.reach(at))
+
+    def renewed(self, at: Evaluation) -> Both:
+        """Both renewed."""
+        return Both(self.first.renewed(at), self.second.renewed(at))
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """A monitored quantity has a given value.
+
+    Parameters
+    ----------
+    monitor : callable
+        A number of an orbit.
+    target : float
+        Its value.
+    """
+
+    monitor: Callable[[Orbit], float]
+    target: float
+
+    @classmethod
+    def of(cls, monitor: Monitor, target: float | None, orbit: Orbit) -> Held:
+        """The condition, checked; without a target, the orbit's own value is held.
+
+        Raises
+        ------
+        SystemModelError
+            For an unknown monitor, one that is zero on the orbit, or a target that is zero or of
+            the other sign.
+        """
+        if isinstance(monitor, str):
+            if monitor not in MONITORS:
+                raise SystemModelError(
+                    f"unknown monitor {shown(monitor)}; there are: {', '.join(MONITORS)}, "
+                    "or a function of an orbit"
+                )
+            function = MONITORS[monitor]
+        elif callable(monitor):
+            function = monitor
+        else:
+            raise SystemModelError(
+                f"monitor must be a name or a function of an orbit, got {shown(monitor)}"
+            )
+        name = monitor_name(monitor)
+        present = function(orbit)
+        if not (is_finite(present) and present != 0.0):
+            raise SystemModelError(f"the start has {name} = {shown(present)}, which cannot be held")
+        if target is None:
+            target = present
+        if not (is_finite(target) and target * present > 0.0):
+            raise SystemModelError(
+                f"{name} to be held must be finite and of the sign of the start's "
+                f"({present:g}), got {shown(target)}"
+            )
+        return cls(function, float(target))
+
+    def value(self, at: Evaluation) -> Real:
+        """Relative difference from the target, shape (1,)."""
+        return np.array([self.monitor(at.orbit) / self.target - 1.0])
+
+    def reach(self, at: Evaluation) -> float:
+        """Not across a grazing."""
+        return reach_of_grazing(at)
+
+    def renewed(self, at: Evaluation) -> Held:
+        """The same."""
+        return self
+
+
+def monitor_name(monitor: Monitor) -> str:
+    """Name of a monitor in tables and errors."""
+    return monitor if isinstance(monitor, str) else getattr(monitor, "__name__", "monitor")
+
+
+def condition_of(kind: str, orbit: Orbit) -> Condition:
+    """Defining condition of a special point.
+
+    Raises
+    ------
+    SystemModelError
+        For a kind that has none here, or an orbit that has no such point.
+    """
+    if kind == "GR":
+        return Grazing.of(orbit)
+    if kind in KINDS:
+        if kind == "NS" and orbit.system.size < 2:
+            raise SystemModelError("a Neimark-Sacker point needs at least two modes")
+        return Singular.of(kind, orbit)
+    raise SystemModelError(f"unknown kind of special point {shown(kind)}; there are: {KINDS}")

@@ -1,0 +1,250 @@
+"""Special points solved by their defining systems, and those met along curves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from nldyn.bordered import Condition, Free, OrbitFamily, correct
+from nldyn.codimension import is_torus, torus_pair
+from nldyn.conditions import BranchPoint, Grazing, Singular, condition_of
+from nldyn.curve_walk import CurvePoint, curve_point, is_torus_curve
+from nldyn.linear import Real
+from nldyn.orbit import ConvergenceError, Orbit
+from nldyn.parameter_values import FREQUENCY, Chart, checked_parameter, value_of
+from nldyn.parameters import Parameter
+from nldyn.special import LocateError, root, touching_extremes
+
+
+class Located(Protocol):
+    """A special point of a branch or of a curve."""
+
+    @property
+    def kind(self) -> str:
+        """LP, PD, NS, BP or GR."""
+
+    @property
+    def orbit(self) -> Orbit:
+        """Its orbit."""
+
+
+@dataclass(frozen=True, eq=False)
+class LocatedPoint:
+    """A special point found by Newton's method, or a point marked on a curve.
+
+    Parameters
+    ----------
+    kind : str
+        LP, PD, NS, BP, GR; on curves also CP, GPD, LPPD, R1 to R4 and pairs, see the theory.
+    orbit : Orbit
+        The orbit.
+    parameters : tuple of Parameter
+        The numbers that were free.
+    values : (n_parameters,) array
+        Their values.
+    residual : float
+        Largest of the relative error of closing and the defining conditions.
+    error : float
+        Relative length of the last step: of Newton's method, or along the curve.
+    """
+
+    kind: str
+    orbit: Orbit
+    parameters: tuple[Parameter, ...]
+    values: Real
+    residual: float
+    error: float
+
+    @property
+    def frequency_hz(self) -> float:
+        """Excitation frequency in Hz."""
+        return self.orbit.frequency_hz
+
+
+def refine_special(
+    special: Located, parameter: str | Parameter = FREQUENCY, *, max_iterations: int = 12
+) -> LocatedPoint:
+    """Solve the defining system of a special point by Newton's method in one parameter.
+
+    Parameters
+    ----------
+    special : SpecialPoint or LocatedPoint
+        LP, PD, NS, GR or BP.
+    parameter : str or Parameter
+        Which number is free: see `nldyn.parameter_values.checked_parameter`.
+    max_iterations : int
+        Most steps.
+
+    Returns
+    -------
+    LocatedPoint
+
+    Raises
+    ------
+    SystemModelError
+        For an unknown kind or parameter.
+    LocateError
+        If Newton's method does not converge.
+
+    References
+    ----------
+    G. Moore (1980), *Numer. Funct. Anal. Optim.* 2, 441-472 (branch points);
+    W. J. F. Govaerts (2000); Yu. A. Kuznetsov (2004), section 10.3.
+    """
+    orbit = special.orbit
+    chosen = checked_parameter(orbit.system, parameter)
+    value = value_of(orbit.system, orbit.frequency_hz, chosen)
+    span = (0.5 * value, 2.0 * value) if value > 0.0 else (value - 1.0, value + 1.0)
+    if chosen.name == "gap" and value <= 0.0:
+        size = orbit.max_abs_displacement
+        span = (value - size, value + size)
+    family = OrbitFamily.around(orbit, (Chart(chosen, *span),))
+    guess = family.unknowns(orbit)
+    condition: Condition
+    if special.kind == "BP":
+        condition = BranchPoint.of(family.at(guess))
+        family = family.unfolded(condition.left * family.scale(guess))
+        guess = np.append(guess, 0.0)
+    else:
+        condition = condition_of(special.kind, orbit)
+    found = correct(family, guess, condition, max_iterations=max_iterations)
+    if not found.converged:
+        raise LocateError(
+            f"{special.kind} near {orbit.frequency_hz:.6g} Hz was not refined: {found.failure}"
+        )
+    values = found.at.values
+    residual = found.residual(condition)
+    if special.kind == "BP":  # an unfolding that stays is a branch point that is none
+        residual = max(residual, abs(float(found.at.point[-1])))
+    return LocatedPoint(special.kind, found.orbit, (chosen,), values, residual, found.step)
+
+
+@dataclass
+class CurveChord:
+    """The piece of a curve between two neighbouring points, as a function of σ in [0, 1]."""
+
+    first: CurvePoint
+    last: CurvePoint
+
+    def __post_init__(self) -> None:
+        self._known: dict[float, CurvePoint] = {0.0: self.first, 1.0: self.last}
+
+    def at(self, sigma: float) -> CurvePoint:
+        """Point of the curve on the plane through σ of the secant.
+
+        Raises
+        ------
+        LocateError
+            If Newton's method fails there.
+        """
+        sigma = min(max(sigma, 0.0), 1.0)
+        if sigma not in self._known:
+            a, b = self.first, self.last
+            family = a.found.at.family
+            secant = b.point - a.point
+            row = family.metric(a.point) * secant
+            row /= np.linalg.norm(row)
+            level = float(row @ (a.point + sigma * secant))
+            found = correct(family, self._between(sigma), a.condition, row, level)
+            if not found.converged:
+                raise LocateError(found.failure)
+            length = a.arclength + sigma * (b.arclength - a.arclength)
+            self._known[sigma] = curve_point(found, a.condition, secant, length)
+        return self._known[sigma]
+
+    def _between(self, sigma: float) -> Real:
+        """Cubic interpolation of the unknowns between the nearest known points."""
+        below = max(s for s in self._known if s < sigma)
+        above = min(s for s in self._known if s > sigma)
+        a, b = self._known[below], self._known[above]
+        x, span = (sigma - below) / (above - below), b.arclength - a.arclength
+        return np.asarray(
+            (1.0 + 2.0 * x) * (1.0 - x) ** 2 * a.point
+            + x * (1.0 - x) ** 2 * span * a.tangent
+            + x * x * (3.0 - 2.0 * x) * b.point
+            + x * x * (x - 1.0) * span * b.tangent
+        )
+
+
+def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], list[str]]:
+    """What is met between two neighbouring points of a curve, in order, and what may be missing."""
+    chord = CurveChord(a, b)
+    found: list[tuple[float, LocatedPoint]] = []
+    notes: list[str] = []
+    for name, test in _changes_of_sign(a, b):
+        try:
+            sigma, error = root(lambda x, test=test: test(chord.at(x)))  # type: ignore[misc]
+            point = chord.at(sigma)
+            if _is_true(name, point):
+                found.append((sigma, _marked(name, point, error * (b.arclength - a.arclength))))
+        except (LocateError, ConvergenceError) as error:
+            notes.append(f"{name} near {_place(a)} may be missing: {error}")
+    if b.corner:
+        found.append((1.0, _marked(b.corner, b, b.found.step)))
+    found.sort(key=lambda pair: pair[0])
+    return [mark for _, mark in found], notes
+
+
+def _changes_of_sign(
+    a: CurvePoint, b: CurvePoint
+) -> list[tuple[str, Callable[[CurvePoint], float]]]:
+    """Tests that change sign between two points, with the names of what they tell of."""
+    names = [name for name in a.tests if a.tests[name] * b.tests[name] < 0.0]
+    if "LP" in names and "BP" in names:  # at a fold both change sign
+        names.remove("BP")
+    found: list[tuple[str, Callable[[CurvePoint], float]]] = [
+        (name, lambda point, name=name: point.tests[name])  # type: ignore[misc]
+        for name in names
+    ]
+    condition = a.condition
+    if a.corner or b.corner:
+        return found
+    for touch in touching_extremes(a.orbit, b.orbit):
+        own = isinstance(condition, Grazing) and condition.is_of(
+            touch.output, touch.is_maximum, touch.phase, a.orbit.period
+        )
+        if not own:
+            found.append((_touch_name(condition), touch.depth))  # type: ignore[arg-type]
+    return found
+
+
+def _touch_name(condition: Condition) -> str:
+    if isinstance(condition, Grazing):
+        return "GRGR"
+    return f"GR{condition.kind}" if isinstance(condition, Singular) else "GR"
+
+
+def _is_true(name: str, point: CurvePoint) -> bool:
+    """Whether a pair of multipliers is complex where a test tells of one on the unit circle."""
+    mu = point.orbit.multipliers
+    if name in ("NS", "GRNS"):
+        return is_torus(mu)
+    if name in ("LPNS", "PDNS") and not is_torus_curve(point.condition):
+        target = 1.0 if name == "LPNS" else -1.0
+        return is_torus(np.delete(mu, int(np.argmin(np.abs(mu - target)))))
+    if name == "NSNS":
+        return is_torus(np.delete(mu, torus_pair(mu)))
+    if name == "CP":  # the parameters turn back
+        return bool(np.abs(point.tangent[-2:]).max() < 1e-3)
+    return True
+
+
+def _marked(name: str, point: CurvePoint, error: float) -> LocatedPoint:
+    """A mark on a curve; on a branch in one parameter it is polished by its defining system."""
+    parameters = tuple(chart.parameter for chart in point.found.at.family.charts)
+    mark = LocatedPoint(name, point.orbit, parameters, point.values, point.residual, abs(error))
+    if isinstance(point.condition, Free):
+        try:
+            return refine_special(mark, parameters[0])
+        except LocateError:
+            return mark
+    return mark
+
+
+def _place(point: CurvePoint) -> str:
+    charts = point.found.at.family.charts
+    pairs = zip(charts, point.values.tolist(), strict=True)
+    return ", ".join(f"{chart.parameter.name} = {value:.8g}" for chart, value in pairs)

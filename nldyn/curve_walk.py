@@ -1,0 +1,330 @@
+"""Walking along a curve of orbits that meet a condition in one or two parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from nldyn.bordered import (
+    SHORTEST_DIFFERENCE,
+    Condition,
+    Corrected,
+    Evaluation,
+    Free,
+    correct,
+    gradient,
+    tangent_surface,
+)
+from nldyn.codimension import codimension_tests, is_torus
+from nldyn.conditions import Both, Grazing, Singular
+from nldyn.continuation import ContinuationOptions, passed_flip
+from nldyn.errors import SystemModelError
+from nldyn.linear import Real
+from nldyn.orbit import ConvergenceError, Orbit
+
+RANGE_END = "end of the range of "
+RESONANCE_END = "becomes a curve of neutral saddles at a resonance"
+CLOSED_CURVE = "closed curve"
+CORNER_STEP = 1e-3  # a step shorter than this may have met a corner
+
+
+@dataclass(frozen=True, eq=False)
+class CurvePoint:
+    """An orbit on a curve.
+
+    Parameters
+    ----------
+    found : Corrected
+        The solution.
+    condition : Condition
+        The condition that it meets, with borders of its own.
+    tangent : (N + m,) array
+        Unit tangent in the family's metric.
+    arclength : float
+        Relative arclength from the start.
+    corner : str
+        Kind of the mark where the curve has a corner at a grazing point, else empty.
+    """
+
+    found: Corrected
+    condition: Condition
+    tangent: Real
+    arclength: float
+
+    corner: str = ""
+
+    @property
+    def point(self) -> Real:
+        """Unknowns of the family."""
+        return self.found.at.point
+
+    @property
+    def values(self) -> Real:
+        """Values of the parameters."""
+        return self.found.at.values
+
+    @property
+    def orbit(self) -> Orbit:
+        """The orbit."""
+        return self.found.orbit
+
+    @cached_property
+    def residual(self) -> float:
+        """Largest of the relative error of closing and the condition."""
+        return self.found.residual(self.condition)
+
+    @cached_property
+    def tests(self) -> dict[str, float]:
+        """Test functions of what may be met on the curve."""
+        one = isinstance(self.condition, Free)
+        return codimension_tests(
+            self.condition, self.found.at, float(self.tangent[-1]) if one else None
+        )
+
+    def reversed(self) -> CurvePoint:
+        """The same point of the curve run through the other way."""
+        return replace(self, tangent=-self.tangent, arclength=-self.arclength)
+
+
+def curve_point(
+    found: Corrected, condition: Condition, towards: Real, arclength: float
+) -> CurvePoint:
+    """Curve point from a solution, its tangent on the side of a vector."""
+    weighted = found.at.family.metric(found.at.point) * found.along
+    length = math.sqrt(float(found.along @ weighted))
+    if float(towards @ weighted) < 0.0:
+        length = -length
+    return CurvePoint(found, condition.renewed(found.at), found.along / length, arclength)
+
+
+def on_chart_plane(a: CurvePoint, b: CurvePoint, which: int, value: float) -> CurvePoint | None:
+    """Point of the curve between a and b at which a parameter has a value."""
+    family = a.found.at.family
+    place = family.n_states + which
+    if a.point[place] == b.point[place]:
+        return None
+    target = family.charts[which].coordinate(value)
+    share = (target - float(a.point[place])) / float(b.point[place] - a.point[place])
+    return _on_plane(a, share * (b.point - a.point), share * (b.arclength - a.arclength), which)
+
+
+def _on_plane(a: CurvePoint, way: Real, length: float, which: int) -> CurvePoint | None:
+    """Point of the curve near the end of a way from a, where a parameter is as it is there."""
+    guess = a.point + way
+    row = np.zeros(guess.size)
+    row[a.found.at.family.n_states + which] = 1.0
+    found = correct(a.found.at.family, guess, a.condition, row, float(row @ guess))
+    return curve_point(found, a.condition, way, a.arclength + length) if found.converged else None
+
+
+def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> CurvePoint | None:
+    """The grazing point close ahead at which a curve has a corner, with its tangent behind it.
+
+    The derivative of the monodromy matrix jumps at a grazing, and with it the direction of a
+    curve on which a condition of that matrix holds.
+    """
+    if not isinstance(here.condition, Singular):
+        return None
+    try:
+        grazing = Grazing.of(here.orbit)
+        family = here.found.at.family
+        found = correct(family, here.point, Both(here.condition, grazing), max_iterations=25)
+        weights = family.metric(here.point)
+        way = found.at.point - here.point
+        length = _length(weights, way)
+        ahead = float(way @ (weights * here.tangent)) > 0.9 * length
+        if not (found.converged and ahead and length < 10.0 * options.grazing_step):
+            return None
+        before = float(grazing.value(here.found.at)[0])
+        tangent = _tangent_behind(found.at, here.condition, grazing, before < 0.0)
+    except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
+        return None
+    condition = here.condition.renewed(found.at)
+    kind = f"GR{here.condition.kind}"
+    return CurvePoint(found, condition, tangent, here.arclength + length, kind)
+
+
+def _tangent_behind(at: Evaluation, condition: Condition, grazing: Grazing, deep: bool) -> Real:
+    """Unit tangent of a curve on the side of a grazing where the extreme is positive, or not."""
+    _, surface = tangent_surface(at)
+    by_surface = gradient(at, surface, grazing)
+    slopes = by_surface[0] if deep else -by_surface[0]
+    across = slopes / np.linalg.norm(slopes)
+    beside = np.array([-across[1], across[0]])
+    # both legs of the differences lead to the same side of the grazing
+    legs = [surface @ (across + sign * 0.5 * beside) for sign in (-1.0, 1.0)]
+    h = 10.0 * SHORTEST_DIFFERENCE
+    g = [
+        (condition.value(at.family.at(at.point + h * leg)) - condition.value(at))[0] for leg in legs
+    ]
+    by_beside, by_across = g[1] - g[0], 0.5 * (g[0] + g[1])
+    tangent = surface @ (by_beside * across - by_across * beside)
+    return np.asarray(tangent / math.copysign(math.hypot(by_beside, by_across), by_beside))
+
+
+@dataclass
+class CurveWalk:
+    """Iterator over the points of a curve in one direction, as `Walk` is over a branch's.
+
+    Parameters
+    ----------
+    start : CurvePoint
+        First point, yielded first; its tangent gives the direction.
+    options : ContinuationOptions
+        Step control.
+    """
+
+    start: CurvePoint
+    options: ContinuationOptions
+    stop_reason: str = "not finished"
+
+    def __iter__(self) -> Iterator[CurvePoint]:
+        """Walk along the curve."""
+        here, step = self.start, self.options.first_step
+        curvature = np.zeros(here.tangent.size)
+        yield here
+        for _ in range(self.options.max_points):
+            attempt = None
+            seen = bool(here.corner)
+            while attempt is None:
+                attempt = self._advance(here, curvature, step)
+                if attempt is None:
+                    limit = self._limit_ahead(here, step)
+                    if limit is not None:
+                        yield limit
+                        return
+                    step *= 0.5
+                    if step < CORNER_STEP and not seen:
+                        seen = True
+                        corner = corner_ahead(here, self.options)
+                        if corner is not None:
+                            attempt = corner, self.options.max_angle, self.options.max_miss
+                    if step < self.options.min_step:
+                        self.stop_reason = f"step below {self.options.min_step:g}"
+                        return
+            there, angle, miss = attempt
+            last = self._end(here, there)
+            if last is not None:
+                yield from last
+                return
+            yield there
+            curvature = (there.tangent - here.tangent) / (there.arclength - here.arclength)
+            if there.corner:
+                curvature = np.zeros(here.tangent.size)
+            here = there
+            growth = 0.7 * self.options.max_angle / max(angle, 1e-3)
+            growth = min(growth, math.sqrt(0.5 * self.options.max_miss / max(miss, 1e-6)))
+            step = min(step * min(max(growth, 0.5), 1.6), self.options.max_step)
+        self.stop_reason = f"{self.options.max_points} points"
+
+    def _advance(
+        self, here: CurvePoint, curvature: Real, step: float
+    ) -> tuple[CurvePoint, float, float] | None:
+        """Next point, its angle to this one and its relative distance from the predictor.
+
+        None when the step must be shorter.
+        """
+        family = here.found.at.family
+        weights = family.metric(here.point)
+        direction = here.tangent
+        straight = here.point + step * direction
+        row = weights * direction
+        row /= np.linalg.norm(row)
+        predicted = straight + 0.5 * step**2 * curvature
+        found = correct(
+            family, predicted, here.condition, row, float(row @ straight), max_iterations=8
+        )
+        if not found.converged:
+            return None
+        miss = _length(weights, found.at.point - predicted) / step
+        off = _length(weights, found.at.point - straight)
+        if miss > self.options.max_miss or off > 0.75 * self.options.max_angle * step:
+            return None
+        try:
+            there = curve_point(found, here.condition, direction, here.arclength + step)
+        except ConvergenceError:
+            return None
+        cosine = float(direction @ (weights * there.tangent)) / _length(weights, there.tangent)
+        angle = math.acos(min(max(cosine, -1.0), 1.0))
+        if angle > self.options.max_angle:
+            return None
+        touched = there.orbit.impacts != here.orbit.impacts
+        grazes = isinstance(here.condition, Grazing)
+        if step > self.options.grazing_step and touched and not grazes:
+            return None
+        return there, angle, miss
+
+    def _limit_ahead(self, here: CurvePoint, step: float) -> CurvePoint | None:
+        """Point at the end of a range, if a failed step would have passed it.
+
+        Behind the end there may be no systems: no exponent below 1, no damping below zero.
+        """
+        for which, chart in enumerate(here.found.at.family.charts):
+            place = here.found.at.family.n_states + which
+            slope, limit = float(here.tangent[place]), chart.high
+            if slope < 0.0:
+                limit = chart.low
+            ahead = (chart.coordinate(limit) - float(here.point[place])) / (slope or 1e-300)
+            if not 0.0 < ahead <= step:
+                continue
+            end = _on_plane(here, ahead * here.tangent, ahead, which)
+            if end is not None:
+                weights = here.found.at.family.metric(here.point)
+                off = _length(weights, end.point - here.point - ahead * here.tangent)
+                if off <= self.options.max_angle * ahead:
+                    self.stop_reason = f"{RANGE_END}{chart.parameter.name}"
+                    return end
+        return None
+
+    def _end(self, here: CurvePoint, there: CurvePoint) -> list[CurvePoint] | None:
+        """The last points of the walk if it ends in this step."""
+        charts = here.found.at.family.charts
+        ends = []
+        for which, chart in enumerate(charts):
+            a, b = float(here.values[which]), float(there.values[which])
+            if not chart.low <= b <= chart.high:
+                limit = chart.low if b < chart.low else chart.high
+                share = 1.0 if a == b else (limit - a) / (b - a)
+                ends.append((share, which, limit))
+        if ends:
+            share, which, limit = min(ends)
+            self.stop_reason = f"{RANGE_END}{charts[which].parameter.name}"
+            end = on_chart_plane(here, there, which, limit) if share > 1e-9 else None
+            return [] if end is None else [end]
+        if passed_flip(here.orbit, there.orbit):
+            self.stop_reason = f"meets orbits of period {here.orbit.period // 2}"
+            return []
+        if is_torus_curve(here.condition) and not is_torus(there.orbit.multipliers):
+            self.stop_reason = RESONANCE_END
+            return [there]
+        if self._closed(here, there):
+            self.stop_reason = CLOSED_CURVE
+            return [there]
+        return None
+
+    def _closed(self, a: CurvePoint, b: CurvePoint) -> bool:
+        """Whether the walk from a to b passes the start again, in the same direction."""
+        start = self.start
+        if b.arclength - start.arclength < 10.0 * (b.arclength - a.arclength):
+            return False
+        weights = start.found.at.family.metric(start.point)
+        step, way = b.point - a.point, start.point - a.point
+        length2 = float(step @ (weights * step))
+        along = float(step @ (weights * way))
+        if float(step @ (weights * start.tangent)) <= 0.0 or not 0.0 <= along <= length2:
+            return False
+        off = way - along / length2 * step
+        return float(off @ (weights * off)) < 0.01 * length2
+
+
+def is_torus_curve(condition: Condition) -> bool:
+    return isinstance(condition, Singular) and condition.kind == "NS"
+
+
+def _length(weights: Real, vector: Real) -> float:
+    """Length of a vector in the metric of the arclength."""
+    return math.sqrt(float(vector @ (weights * vector)))

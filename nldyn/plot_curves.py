@@ -1,0 +1,87 @@
+"""Draw curves of special points and of held quantities in the plane of two parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from nldyn.curves import Curve
+from nldyn.errors import SystemModelError
+from nldyn.parameters import Parameter
+from nldyn.plot import MARKER_NAMES, PERIOD_COLOURS, length_unit, new_axes
+
+LABELS = {
+    "frequency_hz": "excitation frequency (Hz)",
+    "stiffness": "contact stiffness (N/m$^p$)",
+    "exponent": "exponent of the contact law",
+    "dissipation": "dissipation (s/m)",
+    "amplitude": "force amplitude (N)",
+    "mass_times_radius": "unbalance (kg m)",
+    "coefficient": "damper (N s/m)",
+    "modal_damping": "damping ratio",
+    "natural_frequency_hz": "frequency of a mode (Hz)",
+}
+MONITOR_NAMES = {
+    "peak_force": "constant peak force",
+    "max_penetration": "constant penetration",
+    "max_abs_displacement": "constant displacement",
+}
+
+
+def plot_curves(curves: Sequence[Curve], ax: Axes | None = None) -> Axes:
+    """Draw curves in two parameters, with the points marked on them.
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+        All in the same two parameters.
+    ax : Axes, optional
+        Where to draw; a new figure unless given.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    SystemModelError
+        If there are no curves, or not all in the same two parameters.
+    """
+    if not curves or any(
+        len(c.parameters) != 2 or c.parameters != curves[0].parameters for c in curves
+    ):
+        raise SystemModelError("plot_curves needs curves in the same two parameters")
+    ax = ax or new_axes(7.5, 5.0)
+    everything = np.vstack([curve.values for curve in curves])
+    scales, labels = [], []
+    for which, parameter in enumerate(curves[0].parameters):
+        scale, label = _scale_and_label(parameter, float(np.abs(everything[:, which]).max()))
+        scales.append(scale)
+        labels.append(label)
+    kinds = list(dict.fromkeys(curve.kind for curve in curves))
+    for curve in curves:
+        colour = PERIOD_COLOURS[kinds.index(curve.kind) % len(PERIOD_COLOURS)]
+        name = MARKER_NAMES.get(curve.kind) or MONITOR_NAMES.get(curve.kind, curve.kind)
+        first = curve is next(c for c in curves if c.kind == curve.kind)
+        x, y = (curve.values * scales).T
+        ax.plot(x, y, color=colour, lw=1.4, label=name if first else None)
+        for mark in curve.marks:
+            place = (float(mark.values[0] * scales[0]), float(mark.values[1] * scales[1]))
+            ax.plot(*place, "o", color=colour, ms=4.5, zorder=3)
+            ax.annotate(
+                mark.kind, place, xytext=(5, 4), textcoords="offset points", size=8, color=colour
+            )
+    ax.set_xlabel(labels[0])
+    ax.set_ylabel(labels[1])
+    ax.legend(frameon=False)
+    return ax
+
+
+def _scale_and_label(parameter: Parameter, largest: float) -> tuple[float, str]:
+    """Factor from SI to the unit drawn, and the label of an axis."""
+    if parameter.name == "gap":
+        factor, unit = length_unit(largest)
+        return 1.0 / factor, f"gap ({unit})"
+    return 1.0, LABELS[parameter.name]
