@@ -4,7 +4,9 @@ All kernels that are called from here are in this one file, because the compile 
 at the file of the function that is called; see `kernel_cache.resting_on` for the others.
 
 The state z is a list of pairs that move by themselves between contacts, z_b' = A_b z_b with real
-2×2 blocks; w is z without the steady response to the excitation.
+2×2 blocks; w is z without the response to the excitation: the steady one, but for a mode excited
+at, or almost at, an eigenvalue λ of its own, whose share in it starts from rest at phase zero
+(`growth`), since the steady one would be huge, or none.
 
 **Flights** are propagated in closed form; the first contact is found with steps that are bounded
 by the third derivative of the gap, so that none is passed over.
@@ -47,6 +49,10 @@ inlined = njit(cache=True, error_model="numpy", inline="always")
 
 OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_FULL = range(7)
 FLIGHT = -1
+# |λ - iω| below this share of ω makes an eigenvalue λ near: a steady response is at most 1/NEAR
+# times as large as what the excitation brings about in 1/ω, and so are its rounding errors; in the
+# derivative by ω they are up to 1/NEAR² times as large
+NEAR = 3e-3
 
 
 # columns of `stops`
@@ -81,12 +87,14 @@ class FlowData(NamedTuple):
     force: Real
     stops: Real
     laws: NDArray[np.int64]
-    steady: Complex  # (2, 2n) z = w + Re(steady[0] e^{iωt}), and the derivative with respect to ω
-    forced: Complex  # (2, n_out) the same of the outputs
+    near: Complex  # (k,) eigenvalues near iω; k = 0 for most systems
+    # (1 + k, 2 + n_parameters, 2n): amplitude of the steady response, z = w + Re(response[0, 0]
+    # e^{iωt}), and of the `growth` of each near eigenvalue; then their derivatives with respect to
+    # ω and to each parameter
+    response: Complex
+    forced: Complex  # (1 + k, 2 + n_parameters, n_out) the same of the outputs
     # (n_parameters, 2): column of `stops`, or -1 for the excitation; and the index of the stop
     parameters: NDArray[np.int64]
-    steady_by: Complex  # (n_parameters, 2n) derivative of steady[0] with respect to each
-    forced_by: Complex  # (n_parameters, n_out)
     omega: float
     tail: float
 
@@ -135,14 +143,141 @@ def there_and_back(block, t):
     )  # fmt: skip
 
 
+@intrinsic
+def never_inline(typing):
+    """Keep the function it is called from apart, so that its callers compile sooner."""
+
+    def codegen(context, builder, signature, arguments):
+        builder.function.attributes.add("noinline")
+        return context.get_dummy_value()
+
+    return types.void(), codegen
+
+
+@inner
+def turned(phase):
+    """e^{i phase}."""
+    return complex(math.cos(phase), math.sin(phase))
+
+
+@inner
+def from_rest(rate, t):
+    """∫ exp(rate u) du from 0 to t for a complex rate, to full precision also where it is small."""
+    x, y = rate.real * t, rate.imag * t
+    square = x * x + y * y
+    if square < 1e-18:
+        return complex(t + 0.5 * t * x, 0.5 * t * y)
+    half, size = math.sin(0.5 * y), math.expm1(x)
+    real = size * math.cos(y) - 2.0 * half * half
+    imag = (size + 1.0) * math.sin(y)
+    share = t / square
+    return complex((real * x + imag * y) * share, (imag * x - real * y) * share)
+
+
+@inner
+def growth(fl, k, phase):
+    """Solution of e' = λe + e^{iωt} for a near eigenvalue λ, at rest at phase zero; and e^{iωt}.
+
+    e = (e^{λt} - e^{iωt})/(λ - iω) without its cancellation; at resonance e = t e^{iωt}.
+    """
+    never_inline()
+    turn = turned(phase)
+    return turn * from_rest(fl.near[k] - 1j * fl.omega, phase / fl.omega), turn
+
+
+@inner
+def growth_by_omega(fl, k, phase):
+    """Derivative of `growth` with respect to ω at a fixed phase.
+
+    With off = λ - iω, growth = e^{iφ} ∫ exp(off u) du from 0 to t = φ/ω, so that the derivative is
+    -e^{iφ} (i ∫ u exp(off u) du + exp(off t) t/ω).
+    """
+    never_inline()
+    e, turn = growth(fl, k, phase)
+    t = phase / fl.omega
+    off = fl.near[k] - 1j * fl.omega
+    x = off * t
+    end = turned(x.imag) * math.exp(x.real)
+    if abs(x) > 1.0:
+        by_rate = (t * end * turn - e) / off
+    else:
+        series, power = 0.0 * x, turn * (t * t)
+        for j in range(18):
+            series += power / (j + 2)
+            power *= x / (j + 1)
+        by_rate = series
+    return -1j * by_rate - end * turn * (t / fl.omega)
+
+
+@inner
+def swelling(fl, out, phase):
+    """Value, two time derivatives, and bound of the third over a period, of an output's growth.
+
+    e grows by at most the time that passes, since no eigenvalue grows.
+    """
+    never_inline()
+    value, first, second, bound = 0.0, 0.0, 0.0, 0.0
+    for k in range(fl.near.size):
+        share, rate = fl.forced[1 + k, 0, out], fl.near[k]
+        e, turn = growth(fl, k, phase)
+        size, later = abs(rate), abs(e) + 2.0 * math.pi / fl.omega
+        value += (share * e).real
+        e = rate * e + turn
+        first += (share * e).real
+        second += (share * (rate * e + 1j * fl.omega * turn)).real
+        bound += abs(share) * (size * size * (size * later + 1.0) + fl.omega * (size + fl.omega))
+    return value, first, second, bound
+
+
+@inner
+def add_swelling_by(fl, out, phase, t, rate, factor, sums):
+    """Add the derivatives of an output's growth, or its rate's, at time t after a fixed phase.
+
+    sums (n_columns,) ends with the columns of the parameters and of ω, as in `panel_columns`.
+    """
+    never_inline()
+    last = sums.size - 1
+    first = last - fl.parameters.shape[0]
+    for k in range(fl.near.size):
+        e, turn = growth(fl, k, phase)
+        e1 = fl.near[k] * e + turn
+        d = growth_by_omega(fl, k, phase) + e1 * (t / fl.omega)
+        if rate:
+            e, d = e1, fl.near[k] * d + 1j * t * turn
+        sums[last] += factor * (fl.forced[1 + k, 1, out] * e + fl.forced[1 + k, 0, out] * d).real
+        for c in range(first, last):
+            sums[c] += factor * (fl.forced[1 + k, 2 + c - first, out] * e).real
+
+
+@inner
+def add_growth(fl, phase, sign, w, columns):
+    """Add sign times the growth to the state w (2n,) and its derivatives to its last columns."""
+    never_inline()
+    last = columns.shape[1] - 1
+    first = last - fl.parameters.shape[0]
+    for k in range(fl.near.size):
+        e, _ = growth(fl, k, phase)
+        d = sign * growth_by_omega(fl, k, phase)
+        e *= sign
+        for i in range(w.size):
+            w[i] += (fl.response[1 + k, 0, i] * e).real
+            columns[i, last] += (fl.response[1 + k, 1, i] * e + fl.response[1 + k, 0, i] * d).real
+            for c in range(first, last):
+                columns[i, c] += (fl.response[1 + k, 2 + c - first, i] * e).real
+
+
 @inner
 def output_derivatives(fl, out, w, phase, t):
-    """Value and first two time derivatives of output `out`, and a bound on the third, after t."""
-    turn = fl.forced[0, out] * np.exp(1j * (phase + fl.omega * t))
-    value = turn.real
-    first = -fl.omega * turn.imag
-    second = -fl.omega * fl.omega * turn.real
-    bound = abs(turn) * fl.omega**3
+    """Value and first two time derivatives of output `out`, and a bound on the third, after t.
+
+    The bound holds for one excitation period at least.
+    """
+    turn = fl.forced[0, 0, out] * turned(phase + fl.omega * t)
+    value, first, second, bound = swelling(fl, out, phase + fl.omega * t)
+    value += turn.real
+    first -= fl.omega * turn.imag
+    second -= fl.omega * fl.omega * turn.real
+    bound += abs(turn) * fl.omega**3
     for b in range(fl.blocks.shape[0]):
         j = 2 * b
         x, y = w[j], w[j + 1]
@@ -170,7 +305,9 @@ def distance(fl, stop, w, phase):
 @inner
 def output_noise(fl, out, w):
     """Rounding error to expect in an output: 4 units in the last place of its terms."""
-    total = abs(fl.forced[0, out])
+    total = abs(fl.forced[0, 0, out])
+    for k in range(fl.near.size):
+        total += abs(fl.forced[1 + k, 0, out]) * (2.0 * math.pi / fl.omega)
     for j in range(w.size):
         total += abs(fl.rows[0, out, j] * w[j])
     return 1e-15 * total
@@ -238,6 +375,7 @@ def closing_time(fl, stop, w, phase, start, end):
     excitation or of the fastest mode can be stepped over, and these carry no force.
     """
     shortest = 1e-10 / max(fl.omega, fastest_rate(fl))
+    longest = 2.0 * math.pi / fl.omega
     t = start
     while t <= end:
         value, h1, h2, bound = output_derivatives(fl, stop, w, phase, t)
@@ -249,7 +387,7 @@ def closing_time(fl, stop, w, phase, start, end):
             if h1 > 0.0 and h + h1 * shortest >= 0.0:
                 return min(t + max(tau, 0.0), end)
             tau = shortest
-        t += tau
+        t += min(tau, longest)
     return np.inf
 
 
@@ -284,8 +422,8 @@ class Record(NamedTuple):
         -1 for a flight, else the kind of the panel's ends.
     event : (n_pieces,)
         Stop that opens or closes at the end, or -1.
-    w : (n_pieces, 2n)
-        State at the start without the steady response.
+    start : (n_pieces, 2n)
+        State z at the start.
     force, depth : (n_pieces, n_stops, m)
         Forces and penetrations at the nodes of a panel (zero where a stop is open).
     used : (2,)
@@ -297,7 +435,7 @@ class Record(NamedTuple):
     duration: NDArray[np.float64]
     kind: NDArray[np.int64]
     event: NDArray[np.int64]
-    w: NDArray[np.float64]
+    start: NDArray[np.float64]
     force: NDArray[np.float64]
     depth: NDArray[np.float64]
     used: NDArray[np.int64]
@@ -498,8 +636,9 @@ def lu_apply_vector(A, order, b):
 
 @inner
 def forced_output(fl, out, phase):
-    """Steady output at a forcing phase."""
-    return (fl.forced[0, out] * np.exp(1j * phase)).real
+    """Response of an output to the excitation at a forcing phase."""
+    value, _, _, _ = swelling(fl, out, phase)
+    return value + (fl.forced[0, 0, out] * turned(phase)).real
 
 
 @inner
@@ -508,13 +647,15 @@ def free_outputs(fl, tab, kind, phase, w, h, panel, free):
     m = tab.nodes.size
     na = panel.active.size
     for i in range(m):
-        turn = np.exp(1j * (phase + fl.omega * h * tab.chi[kind, i]))
+        here = phase + fl.omega * h * tab.chi[kind, i]
+        turn = turned(here)
         for o in range(panel.to.shape[0]):
-            steady = fl.forced[0, panel.active[o % na]] * turn
+            steady = fl.forced[0, 0, panel.active[o % na]] * turn
+            value, first, _, _ = swelling(fl, panel.active[o % na], here)
             if o < na:
-                value = steady.real - fl.stops[panel.active[o], GAP]
+                value += steady.real - fl.stops[panel.active[o], GAP]
             else:
-                value = -fl.omega * steady.imag
+                value = first - fl.omega * steady.imag
             for k in range(w.size):
                 value += panel.to[o, i, k] * w[k]
             free[o * m + i] = value
@@ -681,16 +822,17 @@ def panel_columns(fl, tab, kind, phase, t0, h, panel, columns):
                 for c in range(n_columns):
                     forces[p, c] += z * columns[k, c]
             t = h * tab.chi[kind, i]
-            turn = np.exp(1j * (phase + fl.omega * t))
-            d_omega = fl.forced[1, stop] + 1j * (t0 + t) * fl.forced[0, stop]
+            turn = turned(phase + fl.omega * t)
+            d_omega = fl.forced[0, 1, stop] + 1j * (t0 + t) * fl.forced[0, 0, stop]
             if o < na:
                 forces[p, n_columns - 1] += slope * (d_omega * turn).real
             else:
-                d_omega = fl.omega * d_omega + fl.forced[0, stop]
+                d_omega = fl.omega * d_omega + fl.forced[0, 0, stop]
                 forces[p, n_columns - 1] -= slope * (d_omega * turn).imag
+            add_swelling_by(fl, stop, phase + fl.omega * t, t0 + t, o >= na, slope, forces[p])
             for c in range(fl.parameters.shape[0]):
                 q = columns.shape[0] + c
-                by = fl.forced_by[c, stop] * turn
+                by = fl.forced[0, 2 + c, stop] * turn
                 forces[p, q] += slope * (by.real if o < na else -fl.omega * by.imag)
                 if o < na and fl.parameters[c, 1] == stop and fl.parameters[c, 0] >= GAP:
                     speed = panel.output[na + o, i] if panel.slope.shape[0] > na else 0.0
@@ -753,17 +895,22 @@ def resolved(fl, tab, kind, noise, panel):
 
 
 @inner
-def record_piece(rec, phase, h, kind, event, w):
+def record_piece(fl, rec, before, phase, h, kind, event, w):
     """Append a piece; return its index, or -1 when the record is full."""
     n = rec.used[0]
     if n >= rec.phase.size:
         return -1
-    rec.phase[n] = phase
+    rec.phase[n] = before + phase
     rec.duration[n] = h
     rec.kind[n] = kind
     rec.event[n] = event
-    for k in range(w.size):
-        rec.w[n, k] = w[k]
+    for p in range(fl.response.shape[0]):
+        e = turned(phase)
+        if p > 0:
+            e, _ = growth(fl, p - 1, phase)
+        for k in range(w.size):
+            share = (fl.response[p, 0, k] * e).real
+            rec.start[n, k] = (w[k] if p == 0 else rec.start[n, k]) + share
     for a in range(rec.force.shape[1]):
         for i in range(rec.force.shape[2]):
             rec.force[n, a, i] = 0.0
@@ -1097,7 +1244,10 @@ def contact_panel(fl, tab, phase, w, h_max, start_switch, closed, panel, w_end, 
             continue
         if aim < 0 and kind % 2 == 1 and h < h_max:  # a release was expected here: follow it
             for a in range(active.size):
-                if aim < 0 and time_to_event(fl, active[a], True, w_end, end_phase) < h:
+                if (
+                    aim < 0
+                    and time_to_event(fl, active[a], closed[active[a]], w_end, end_phase) < h
+                ):
                     aim = active[a]
         if aim >= 0:
             dh = time_to_event(fl, aim, closed[aim], w_end, end_phase)
@@ -1162,17 +1312,18 @@ def propagate(
     n_stops = fl.stops.shape[0]
     before = 2.0 * math.pi * math.floor(phase / (2.0 * math.pi))  # whole turns cost digits
     phase -= before
-    turn = np.exp(1j * phase)
+    turn = turned(phase)
     w = np.empty(size)
     n_parameters = fl.parameters.shape[0]
     last = size + n_parameters
     columns = np.zeros((size, last + 1))
     for i in range(size):
-        w[i] = start[i] - (fl.steady[0, i] * turn).real
+        w[i] = start[i] - (fl.response[0, 0, i] * turn).real
         columns[i, i] = 1.0
-        columns[i, last] = -(fl.steady[1, i] * turn).real
+        columns[i, last] = -(fl.response[0, 1, i] * turn).real
         for c in range(n_parameters):
-            columns[i, size + c] = -(fl.steady_by[c, i] * turn).real
+            columns[i, size + c] = -(fl.response[0, 2 + c, i] * turn).real
+    add_growth(fl, phase, -1.0, w, columns)
     closed = np.zeros(n_stops, dtype=np.bool_)
     for s in range(n_stops):
         value, _, _, _ = output_derivatives(fl, s, w, phase, 0.0)
@@ -1182,7 +1333,7 @@ def propagate(
         recording,
     )  # fmt: skip
     end_phase = phase + fl.omega * duration
-    turn = np.exp(1j * end_phase)
+    turn = turned(end_phase)
     rate = np.zeros(size)
     for b in range(fl.blocks.shape[0]):
         for i in range(2):
@@ -1193,15 +1344,16 @@ def propagate(
         force, _, _ = law(fl, s, value - fl.stops[s, GAP], speed)
         for i in range(size):
             rate[i] -= fl.force[i, s] * force
+    add_growth(fl, end_phase, 1.0, w, columns)
     for i in range(size):
-        end[i] = w[i] + (fl.steady[0, i] * turn).real
-        d_omega[i] = columns[i, last] + (fl.steady[1, i] * turn).real
+        end[i] = w[i] + (fl.response[0, 0, i] * turn).real
+        d_omega[i] = columns[i, last] + (fl.response[0, 1, i] * turn).real
         d_omega[i] -= rate[i] * (duration / fl.omega)
         if with_columns:
             for j in range(size):
                 jacobian[i, j] = columns[i, j]
             for c in range(n_parameters):
-                d_parameters[i, c] = columns[i, size + c] + (fl.steady_by[c, i] * turn).real
+                d_parameters[i, c] = columns[i, size + c] + (fl.response[0, 2 + c, i] * turn).real
     return status
 
 
@@ -1236,6 +1388,7 @@ def run_pieces(
     t = 0.0
     start_switch = 1 if duration < 0.0 else 0  # written so that one version is compiled, not two
     skip = 0.0
+    flight, none = (FLIGHT, -1) if duration >= 0.0 else (0, 0)  # as above
     w_end = np.empty(w.size)
     for _ in range(5000):
         remain = duration - t
@@ -1249,12 +1402,12 @@ def run_pieces(
                 active[n_active] = s
                 n_active += 1
         if n_active == 0:
-            first, stop = remain, -1
+            first, stop = remain, none
             for s in range(n_stops):
                 at = closing_time(fl, s, w, here, skip, first)
                 if at < first:
                     first, stop = at, s
-            if recording and record_piece(rec, before + here, first, FLIGHT, stop, w) < 0:
+            if recording and record_piece(fl, rec, before, here, first, flight, stop, w) < 0:
                 return RECORD_FULL
             fly_state(fl.blocks, w, first)
             if with_columns:
@@ -1286,7 +1439,7 @@ def run_pieces(
             return CONTACT_FAILED
         if h > 0.0:
             if recording:
-                n = record_piece(rec, before + here, h, kind, event, w)
+                n = record_piece(fl, rec, before, here, h, kind, event, w)
                 if n < 0:
                     return RECORD_FULL
                 for a in range(n_active):
@@ -1310,49 +1463,75 @@ def run_pieces(
 
 
 @inner
-def resolvent(blocks, omega, x, y):
-    """Fill y (2n,) with the solution of (iω - A) y = x."""
-    for b in range(blocks.shape[0]):
-        i, j = 2 * b, 2 * b + 1
-        m00, m01 = 1j * omega - blocks[b, 0, 0], -blocks[b, 0, 1]
-        m10, m11 = -blocks[b, 1, 0], 1j * omega - blocks[b, 1, 1]
-        det = m00 * m11 - m01 * m10
-        u, v = x[i], x[j]
-        y[i] = (m11 * u - m01 * v) / det
-        y[j] = (m00 * v - m10 * u) / det
+def near_rate(block, omega):
+    """Eigenvalue λ of a block with |λ - iω| < NEAR ω, or zero."""
+    mean = 0.5 * (block[0, 0] + block[1, 1])
+    half = 0.5 * (block[0, 0] - block[1, 1])
+    square = half * half + block[0, 1] * block[1, 0]
+    rate = math.sqrt(abs(square))
+    near = square < 0.0 and math.hypot(mean, rate - omega) < NEAR * omega
+    return complex(mean, rate) if near else complex(0.0, 0.0)
 
 
 @inner
-def of_outputs(rows, states, outputs):
-    """Fill outputs (k, n_out) of states (k, 2n)."""
-    for d in range(states.shape[0]):
-        for out in range(rows.shape[1]):
-            outputs[d, out] = 0.0
-            for j in range(states.shape[1]):
-                outputs[d, out] += rows[0, out, j] * states[d, j]
+def respond(blocks, omega, x, row, response):
+    """Fill a row of `FlowData.response` with what an excitation x (2n,) brings about.
+
+    That is (iω - A)⁻¹ x, but for a block with a near eigenvalue λ. There x falls into its parts
+    along the two eigenvectors: that of λ is the drive of the growth, that of its conjugate has a
+    steady response.
+    """
+    k = 0
+    for b in range(blocks.shape[0]):
+        block = blocks[b]
+        i, j = 2 * b, 2 * b + 1
+        u, v = x[i], x[j]
+        rate = near_rate(block, omega)
+        if rate.imag > 0.0:
+            k += 1
+            half = 0.5 * (block[0, 0] - block[1, 1])
+            p = 0.5 * u - 0.5j * (half * u + block[0, 1] * v) / rate.imag
+            q = 0.5 * v - 0.5j * (block[1, 0] * u - half * v) / rate.imag
+            for c in range(x.size):
+                response[k, row, c] = 0.0
+            response[k, row, i], response[k, row, j] = p, q
+            away = complex(-rate.real, omega + rate.imag)
+            response[0, row, i], response[0, row, j] = (u - p) / away, (v - q) / away
+        else:
+            m00, m01 = 1j * omega - block[0, 0], -block[0, 1]
+            m10, m11 = -block[1, 0], 1j * omega - block[1, 1]
+            det = m00 * m11 - m01 * m10
+            response[0, row, i] = (m11 * u - m01 * v) / det
+            response[0, row, j] = (m00 * v - m10 * u) / det
 
 
 @inner
 def at_frequency(system, omega, parameters, drive_by):
     """Numbers of the system at an excitation frequency (rad/s), see `shoot`."""
     blocks, rows, drive = system.blocks, system.rows, system.drive
-    steady = np.empty(drive.shape, dtype=np.complex128)
+    near = np.empty(blocks.shape[0], dtype=np.complex128)
+    k = 0
+    for b in range(blocks.shape[0]):
+        near[k] = near_rate(blocks[b], omega)
+        if near[k].imag > 0.0:
+            k += 1
     x = np.empty(drive.shape[1], dtype=np.complex128)
-    for i in range(x.size):
-        x[i] = drive[0, i] + omega * omega * drive[1, i]
-    resolvent(blocks, omega, x, steady[0])
-    for i in range(x.size):
-        x[i] = 2.0 * omega * drive[1, i] - 1j * steady[0, i]
-    resolvent(blocks, omega, x, steady[1])
-    steady_by = np.empty((parameters.shape[0], x.size), dtype=np.complex128)
-    for c in range(parameters.shape[0]):
+    response = np.empty((1 + k, 2 + parameters.shape[0], x.size), dtype=np.complex128)
+    for row in range(response.shape[1]):
         for i in range(x.size):
-            x[i] = drive_by[c, 0, i] + omega * omega * drive_by[c, 1, i]
-        resolvent(blocks, omega, x, steady_by[c])
-    forced = np.empty((2, rows.shape[1]), dtype=np.complex128)
-    of_outputs(rows, steady, forced)
-    forced_by = np.empty((parameters.shape[0], rows.shape[1]), dtype=np.complex128)
-    of_outputs(rows, steady_by, forced_by)
+            if row == 0:
+                x[i] = drive[0, i] + omega * omega * drive[1, i]
+            elif row == 1:
+                x[i] = 2.0 * omega * drive[1, i] - 1j * response[0, 0, i]
+            else:
+                x[i] = drive_by[row - 2, 0, i] + omega * omega * drive_by[row - 2, 1, i]
+        respond(blocks, omega, x, row, response)
+    forced = np.zeros((1 + k, response.shape[1], rows.shape[1]), dtype=np.complex128)
+    for p in range(1 + k):
+        for row in range(response.shape[1]):
+            for out in range(rows.shape[1]):
+                for i in range(x.size):
+                    forced[p, row, out] += rows[0, out, i] * response[p, row, i]
     return FlowData(
         blocks,
         rows,
@@ -1360,11 +1539,10 @@ def at_frequency(system, omega, parameters, drive_by):
         system.force,
         system.stops,
         system.laws,
-        steady,
+        near[:k],
+        response,
         forced,
         parameters,
-        steady_by,
-        forced_by,
         omega,
         system.tail,
     )

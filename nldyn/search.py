@@ -20,6 +20,7 @@ from nldyn.orbit import (
     shooting_problem,
     spread,
 )
+from nldyn.shooting import ShootingProblem
 from nldyn.system import System
 
 
@@ -82,7 +83,7 @@ def simulate_strobe(flow: FlowMap, frequency_hz: float, options: SearchOptions) 
     phases = np.linspace(0.0, 2.0 * np.pi * total, total + 1)
     n = 2 * flow.system.size
     rng = np.random.default_rng(options.seed)
-    size = max(float(np.abs(flow.system.steady(omega)).max()), reach(flow.system))
+    size = max(response_size(flow.system, omega), reach(flow.system))
     runs, failures = [], []
     for index in range(options.starts):
         scale = 0.0 if index == 0 else size * 10.0 ** rng.uniform(-0.5, 1.0)
@@ -93,6 +94,21 @@ def simulate_strobe(flow: FlowMap, frequency_hz: float, options: SearchOptions) 
         else:
             runs.append(found.ends[options.transient :])
     return Strobe(omega, tuple(runs), tuple(failures))
+
+
+def response_size(system: System, omega: float) -> float:
+    """Size of the linear response at ω (rad/s), for modes near resonance within one period.
+
+    Examples
+    --------
+    >>> from nldyn import HarmonicForce
+    >>> system = System.from_modal([10.0], {"tip": [1.0]}, excitation=[HarmonicForce("tip", 1.0)])
+    >>> bool(np.isfinite(response_size(system, 20.0 * np.pi)))
+    True
+    """
+    _, response = system.response(omega)
+    growth = 2.0 * np.pi / omega * np.abs(response[1:]).sum(axis=0)
+    return float((np.abs(response[0]) + growth).max())
 
 
 def reach(system: System) -> float:
@@ -124,15 +140,25 @@ def orbits_from_strobe(
     problem = shooting_problem(flow, period)
     found: list[Orbit] = []
     for states in strobe.runs:
-        for start in near_returns(states, period, options.candidates):
-            nodes = spread(problem, states[start], strobe.omega)
-            try:
-                orbit = refine(problem, nodes, strobe.omega, observe, max_iterations=10)
-            except ConvergenceError:
+        starts = [states[i] for i in near_returns(states, period, options.candidates)]
+        orbits = [_refined(problem, start, strobe.omega, observe) for start in starts]
+        if not any(orbits):  # an undamped motion goes round an orbit without coming near it
+            middle = states[::period].mean(axis=0)
+            orbits = [_refined(problem, middle, strobe.omega, observe)]
+        for orbit in orbits:
+            if orbit is None or minimal_period(orbit) != period:
                 continue
-            if minimal_period(orbit) == period and not any(same_orbit(orbit, o) for o in found):
+            if not any(same_orbit(orbit, other) for other in found):
                 found.append(orbit)
     return found
+
+
+def _refined(problem: ShootingProblem, start: Real, omega: float, observe: str) -> Orbit | None:
+    """Orbit that Newton's method finds from a state at phase zero, if it finds one soon."""
+    try:
+        return refine(problem, spread(problem, start, omega), omega, observe, max_iterations=10)
+    except ConvergenceError:
+        return None
 
 
 def find_orbits(

@@ -289,9 +289,20 @@ class System:
         Raises
         ------
         SystemModelError
-            If an undamped mode is excited exactly at its frequency.
+            If an undamped mode is excited exactly at its frequency: then there is none.
         """
-        return self.linear.steady(self.drive[0] + omega**2 * self.drive[1], omega)
+        return self.linear.steady(self._drive_at(omega), omega)
+
+    def response(self, omega: float) -> tuple[Complex, Complex]:
+        """Linear response at ω (rad/s), near or at a resonance, too: see `LinearPart.response`."""
+        return self.linear.response(self._drive_at(omega), omega)
+
+    def grows(self, omega: float) -> bool:
+        """Whether an undamped mode is excited at its own frequency ω (rad/s), but for rounding."""
+        return self.linear.at_resonance(omega) and bool(np.any(self.response(omega)[1][1:]))
+
+    def _drive_at(self, omega: float) -> Complex:
+        return np.asarray(self.drive[0] + omega**2 * self.drive[1])
 
     def _check_shapes(self) -> None:
         n = self.natural_frequencies.size
