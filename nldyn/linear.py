@@ -108,17 +108,19 @@ class LinearPart:
             If an undamped mode is excited exactly at its frequency.
         """
         near, response = self.response(drive, omega)
-        if self.at_resonance(omega):
+        exact = at_resonance(near, omega)
+        if np.any(response[1:][exact]):
             raise SystemModelError(
                 f"the excitation at {omega / (2 * np.pi):g} Hz meets an undamped mode exactly; "
                 "give the mode some damping or move the frequency"
             )
-        return np.asarray(response[0] + (1.0 / (1j * omega - near)) @ response[1:])
+        away = np.where(exact, 1.0, 1j * omega - near)
+        return np.asarray(response[0] + (1.0 / away) @ response[1:])
 
-    def at_resonance(self, omega: float) -> bool:
-        """Whether an undamped mode has the frequency ω (rad/s), but for rounding."""
-        values = np.linalg.eigvals(self.blocks)
-        return bool(np.any(np.abs(values - 1j * omega) < 1e-12 * omega))
+
+def at_resonance(eigenvalues: Complex, omega: float) -> NDArray[np.bool_]:
+    """Which eigenvalues are iω but for rounding: of an undamped mode at its own frequency."""
+    return np.asarray(np.abs(eigenvalues - 1j * omega) < 1e-12 * omega)
 
 
 def linear_part(omega: Real, damping: Real) -> LinearPart:

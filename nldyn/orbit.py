@@ -473,6 +473,7 @@ def solve_orbit(
     observe = check_observe(flow.system, observe)
     problem = shooting_problem(flow, period, segments)
     omega = 2.0 * math.pi * frequency_hz
+    check_bounded(flow.system, omega)
     starts: Iterator[Real]
     if guess is None:
         start = np.zeros(problem.size)
@@ -507,6 +508,12 @@ def solve_orbit(
         except ConvergenceError as error:
             failure = error
     raise failure
+
+
+def check_bounded(system: System, omega: float) -> None:
+    """Refuse the resonance of an undamped mode where no stop can limit the motion."""
+    if not system.stops:
+        system.steady(omega)
 
 
 def near_returns(states: Real, period: int, count: int) -> list[int]:

@@ -14,6 +14,7 @@ from nldyn.linear import Real
 from nldyn.orbit import (
     ConvergenceError,
     Orbit,
+    check_bounded,
     check_observe,
     near_returns,
     refine,
@@ -212,6 +213,7 @@ def find_orbits(
     """
     flow = system if isinstance(system, FlowMap) else FlowMap(system)
     check_frequency("frequency_hz", frequency_hz)
+    check_bounded(flow.system, 2.0 * math.pi * frequency_hz)
     options = options or SearchOptions()
     strobe = simulate_strobe(flow, frequency_hz, options)
     if not strobe.runs:

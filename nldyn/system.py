@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from nldyn.elements import Damper, Excitation, Stop
 from nldyn.errors import SystemModelError, shown
-from nldyn.linear import Complex, LinearPart, Real, linear_part
+from nldyn.linear import Complex, LinearPart, Real, at_resonance, linear_part
 
 Element = TypeVar("Element")
 
@@ -299,7 +299,8 @@ class System:
 
     def grows(self, omega: float) -> bool:
         """Whether an undamped mode is excited at its own frequency ω (rad/s), but for rounding."""
-        return self.linear.at_resonance(omega) and bool(np.any(self.response(omega)[1][1:]))
+        near, response = self.response(omega)
+        return bool(np.any(response[1:][at_resonance(near, omega)]))
 
     def _drive_at(self, omega: float) -> Complex:
         return np.asarray(self.drive[0] + omega**2 * self.drive[1])

@@ -19,6 +19,7 @@ from nldyn import (
     Parameter,
     Stop,
     System,
+    SystemModelError,
     Unbalance,
     continue_branch,
     find_orbits,
@@ -288,13 +289,26 @@ def test_search_finds_an_orbit_on_two_stops():
     assert np.abs((end - start) / size(start)).max() < 1e-9
 
 
-@pytest.mark.parametrize(
-    "system",
-    [one_mode(), one_mode(stops=[Stop("m", 1e5, gap=1e3)])],
-    ids=["no stop", "stop out of reach"],
-)
-def test_without_contact_there_is_no_orbit_at_resonance(system):
+@pytest.mark.parametrize("find", (solve_orbit, lambda s, hz: find_orbits(s, hz, 1)))
+def test_without_stops_the_resonance_is_refused(find):
+    with pytest.raises(SystemModelError, match=r"10 Hz meets an undamped mode exactly"):
+        find(one_mode(), HZ)
+
+
+def test_out_of_reach_of_the_stops_there_is_no_orbit_at_resonance():
+    system = one_mode(stops=[Stop("m", 1e5, gap=1e3)])
     with pytest.raises(ConvergenceError, match=r"10 Hz.*undamped mode.*without bound") as caught:
         solve_orbit(system, HZ)
     assert "\n" not in str(caught.value)
     assert find_orbits(system, HZ, period=1) == []
+
+
+def test_a_resonant_mode_that_nothing_excites_does_no_harm():
+    """Its free vibration has the forcing's period: the other mode's response remains."""
+    system = System.from_modal(
+        [HZ, 25.0], {"m": [0.0, 1.0]}, excitation=[HarmonicForce("m", FORCE)]
+    )
+    steady = FlowMap(system).to_modal(system.steady(OWN).real)
+    assert steady[1] == pytest.approx(FORCE / ((2 * np.pi * 25.0) ** 2 - OWN**2), rel=1e-13)
+    found = FlowMap(system).shoot(system.steady(OWN).real[None], np.array([0.0, 2 * np.pi]), OWN)
+    assert found.ends[0] == pytest.approx(system.steady(OWN).real, rel=1e-13)
