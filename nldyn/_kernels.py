@@ -145,13 +145,24 @@ def there_and_back(block, t):
 
 @intrinsic
 def never_inline(typing):
-    """Keep the function it is called from apart, so that its callers compile sooner."""
+    """Keep the function apart from which it is called: rare code that would cost compile time."""
+    return types.void(), _marking("noinline")
+
+
+@intrinsic
+def always_inline(typing):
+    """Inline the function from which it is called, though rare code makes it look long."""
+    return types.void(), _marking("alwaysinline")
+
+
+def _marking(attribute):
+    """Code generator that only gives the function at hand an attribute."""
 
     def codegen(context, builder, signature, arguments):
-        builder.function.attributes.add("noinline")
+        builder.function.attributes.add(attribute)
         return context.get_dummy_value()
 
-    return types.void(), codegen
+    return codegen
 
 
 @inner
@@ -175,27 +186,27 @@ def from_rest(rate, t):
 
 
 @inner
-def growth(fl, k, phase):
-    """Solution of e' = λe + e^{iωt} for a near eigenvalue λ, at rest at phase zero; and e^{iωt}.
+def growth(rate, omega, phase):
+    """Solution of e' = rate e + e^{iωt} at rest at phase zero, and e^{iωt}, for a rate near iω.
 
-    e = (e^{λt} - e^{iωt})/(λ - iω) without its cancellation; at resonance e = t e^{iωt}.
+    e = (e^{rate t} - e^{iωt})/(rate - iω) without its cancellation; at resonance e = t e^{iωt}.
     """
     never_inline()
     turn = turned(phase)
-    return turn * from_rest(fl.near[k] - 1j * fl.omega, phase / fl.omega), turn
+    return turn * from_rest(rate - 1j * omega, phase / omega), turn
 
 
 @inner
-def growth_by_omega(fl, k, phase):
+def growth_by_omega(rate, omega, phase):
     """Derivative of `growth` with respect to ω at a fixed phase.
 
-    With off = λ - iω, growth = e^{iφ} ∫ exp(off u) du from 0 to t = φ/ω, so that the derivative is
+    With off = rate - iω it is e^{iφ} ∫ exp(off u) du from 0 to t = φ/ω, and its derivative
     -e^{iφ} (i ∫ u exp(off u) du + exp(off t) t/ω).
     """
     never_inline()
-    e, turn = growth(fl, k, phase)
-    t = phase / fl.omega
-    off = fl.near[k] - 1j * fl.omega
+    e, turn = growth(rate, omega, phase)
+    t = phase / omega
+    off = rate - 1j * omega
     x = off * t
     end = turned(x.imag) * math.exp(x.real)
     if abs(x) > 1.0:
@@ -206,64 +217,64 @@ def growth_by_omega(fl, k, phase):
             series += power / (j + 2)
             power *= x / (j + 1)
         by_rate = series
-    return -1j * by_rate - end * turn * (t / fl.omega)
+    return -1j * by_rate - end * turn * (t / omega)
 
 
 @inner
-def swelling(fl, out, phase):
+def swelling(near, forced, omega, out, phase):
     """Value, two time derivatives, and bound of the third over a period, of an output's growth.
 
     e grows by at most the time that passes, since no eigenvalue grows.
     """
     never_inline()
     value, first, second, bound = 0.0, 0.0, 0.0, 0.0
-    for k in range(fl.near.size):
-        share, rate = fl.forced[1 + k, 0, out], fl.near[k]
-        e, turn = growth(fl, k, phase)
-        size, later = abs(rate), abs(e) + 2.0 * math.pi / fl.omega
+    for k in range(near.size):
+        share, rate = forced[1 + k, 0, out], near[k]
+        e, turn = growth(rate, omega, phase)
+        size, later = abs(rate), abs(e) + 2.0 * math.pi / omega
         value += (share * e).real
         e = rate * e + turn
         first += (share * e).real
-        second += (share * (rate * e + 1j * fl.omega * turn)).real
-        bound += abs(share) * (size * size * (size * later + 1.0) + fl.omega * (size + fl.omega))
+        second += (share * (rate * e + 1j * omega * turn)).real
+        bound += abs(share) * (size * size * (size * later + 1.0) + omega * (size + omega))
     return value, first, second, bound
 
 
 @inner
-def add_swelling_by(fl, out, phase, t, rate, factor, sums):
+def add_swelling_by(near, forced, omega, out, phase, t, rate, factor, sums):
     """Add the derivatives of an output's growth, or its rate's, at time t after a fixed phase.
 
     sums (n_columns,) ends with the columns of the parameters and of ω, as in `panel_columns`.
     """
     never_inline()
     last = sums.size - 1
-    first = last - fl.parameters.shape[0]
-    for k in range(fl.near.size):
-        e, turn = growth(fl, k, phase)
-        e1 = fl.near[k] * e + turn
-        d = growth_by_omega(fl, k, phase) + e1 * (t / fl.omega)
+    first = sums.size + 1 - forced.shape[1]
+    for k in range(near.size):
+        e, turn = growth(near[k], omega, phase)
+        e1 = near[k] * e + turn
+        d = growth_by_omega(near[k], omega, phase) + e1 * (t / omega)
         if rate:
-            e, d = e1, fl.near[k] * d + 1j * t * turn
-        sums[last] += factor * (fl.forced[1 + k, 1, out] * e + fl.forced[1 + k, 0, out] * d).real
+            e, d = e1, near[k] * d + 1j * t * turn
+        sums[last] += factor * (forced[1 + k, 1, out] * e + forced[1 + k, 0, out] * d).real
         for c in range(first, last):
-            sums[c] += factor * (fl.forced[1 + k, 2 + c - first, out] * e).real
+            sums[c] += factor * (forced[1 + k, 2 + c - first, out] * e).real
 
 
 @inner
-def add_growth(fl, phase, sign, w, columns):
+def add_growth(near, response, omega, phase, sign, w, columns):
     """Add sign times the growth to the state w (2n,) and its derivatives to its last columns."""
     never_inline()
     last = columns.shape[1] - 1
-    first = last - fl.parameters.shape[0]
-    for k in range(fl.near.size):
-        e, _ = growth(fl, k, phase)
-        d = sign * growth_by_omega(fl, k, phase)
+    first = columns.shape[1] + 1 - response.shape[1]
+    for k in range(near.size):
+        e, _ = growth(near[k], omega, phase)
+        d = sign * growth_by_omega(near[k], omega, phase)
         e *= sign
         for i in range(w.size):
-            w[i] += (fl.response[1 + k, 0, i] * e).real
-            columns[i, last] += (fl.response[1 + k, 1, i] * e + fl.response[1 + k, 0, i] * d).real
+            w[i] += (response[1 + k, 0, i] * e).real
+            columns[i, last] += (response[1 + k, 1, i] * e + response[1 + k, 0, i] * d).real
             for c in range(first, last):
-                columns[i, c] += (fl.response[1 + k, 2 + c - first, i] * e).real
+                columns[i, c] += (response[1 + k, 2 + c - first, i] * e).real
 
 
 @inner
@@ -272,12 +283,12 @@ def output_derivatives(fl, out, w, phase, t):
 
     The bound holds for one excitation period at least.
     """
+    always_inline()
     turn = fl.forced[0, 0, out] * turned(phase + fl.omega * t)
-    value, first, second, bound = swelling(fl, out, phase + fl.omega * t)
-    value += turn.real
-    first -= fl.omega * turn.imag
-    second -= fl.omega * fl.omega * turn.real
-    bound += abs(turn) * fl.omega**3
+    value = turn.real
+    first = -fl.omega * turn.imag
+    second = -fl.omega * fl.omega * turn.real
+    bound = abs(turn) * fl.omega**3
     for b in range(fl.blocks.shape[0]):
         j = 2 * b
         x, y = w[j], w[j + 1]
@@ -292,12 +303,19 @@ def output_derivatives(fl, out, w, phase, t):
         else:
             size = math.hypot(fl.bound3[out, j], fl.bound3[out, j + 1])
             bound += size * math.hypot(x, y)
+    if fl.near.size > 0:
+        s, s1, s2, s3 = swelling(fl.near, fl.forced, fl.omega, out, phase + fl.omega * t)
+        value += s
+        first += s1
+        second += s2
+        bound += s3
     return value, first, second, bound
 
 
 @inner
 def distance(fl, stop, w, phase):
     """Penetration of a stop, negative when it is open."""
+    always_inline()
     value, _, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
     return value - fl.stops[stop, GAP]
 
@@ -637,28 +655,34 @@ def lu_apply_vector(A, order, b):
 @inner
 def forced_output(fl, out, phase):
     """Response of an output to the excitation at a forcing phase."""
-    value, _, _, _ = swelling(fl, out, phase)
+    value, _, _, _ = swelling(fl.near, fl.forced, fl.omega, out, phase)
     return value + (fl.forced[0, 0, out] * turned(phase)).real
 
 
 @inner
 def free_outputs(fl, tab, kind, phase, w, h, panel, free):
     """Fill the panel's outputs at the nodes (n_outputs m,) without contact forces."""
+    always_inline()
     m = tab.nodes.size
     na = panel.active.size
     for i in range(m):
-        here = phase + fl.omega * h * tab.chi[kind, i]
-        turn = turned(here)
+        turn = turned(phase + fl.omega * h * tab.chi[kind, i])
         for o in range(panel.to.shape[0]):
             steady = fl.forced[0, 0, panel.active[o % na]] * turn
-            value, first, _, _ = swelling(fl, panel.active[o % na], here)
             if o < na:
-                value += steady.real - fl.stops[panel.active[o], GAP]
+                value = steady.real - fl.stops[panel.active[o], GAP]
             else:
-                value = first - fl.omega * steady.imag
+                value = -fl.omega * steady.imag
             for k in range(w.size):
                 value += panel.to[o, i, k] * w[k]
             free[o * m + i] = value
+    if fl.near.size > 0:
+        for i in range(m):
+            here = phase + fl.omega * h * tab.chi[kind, i]
+            for o in range(panel.to.shape[0]):
+                stop = panel.active[o % na]
+                s, s1, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, here)
+                free[o * m + i] += s if o < na else s1
 
 
 @inner
@@ -829,7 +853,11 @@ def panel_columns(fl, tab, kind, phase, t0, h, panel, columns):
             else:
                 d_omega = fl.omega * d_omega + fl.forced[0, 0, stop]
                 forces[p, n_columns - 1] -= slope * (d_omega * turn).imag
-            add_swelling_by(fl, stop, phase + fl.omega * t, t0 + t, o >= na, slope, forces[p])
+            if fl.near.size > 0:
+                add_swelling_by(
+                    fl.near, fl.forced, fl.omega, stop, phase + fl.omega * t, t0 + t, o >= na,
+                    slope, forces[p],
+                )  # fmt: skip
             for c in range(fl.parameters.shape[0]):
                 q = columns.shape[0] + c
                 by = fl.forced[0, 2 + c, stop] * turn
@@ -904,13 +932,13 @@ def record_piece(fl, rec, before, phase, h, kind, event, w):
     rec.duration[n] = h
     rec.kind[n] = kind
     rec.event[n] = event
-    for p in range(fl.response.shape[0]):
-        e = turned(phase)
-        if p > 0:
-            e, _ = growth(fl, p - 1, phase)
-        for k in range(w.size):
-            share = (fl.response[p, 0, k] * e).real
-            rec.start[n, k] = (w[k] if p == 0 else rec.start[n, k]) + share
+    turn = turned(phase)
+    for i in range(w.size):
+        rec.start[n, i] = w[i] + (fl.response[0, 0, i] * turn).real
+    for k in range(fl.near.size):
+        e, _ = growth(fl.near[k], fl.omega, phase)
+        for i in range(w.size):
+            rec.start[n, i] += (fl.response[1 + k, 0, i] * e).real
     for a in range(rec.force.shape[1]):
         for i in range(rec.force.shape[2]):
             rec.force[n, a, i] = 0.0
@@ -1195,6 +1223,7 @@ def time_to_event(fl, stop, closed, w, phase):
 
     The nearer root of the parabola through the present; inf where the gap changes the wrong way.
     """
+    always_inline()
     value, speed, accel, _ = output_derivatives(fl, stop, w, phase, 0.0)
     value -= fl.stops[stop, GAP]
     if (speed >= 0.0) if closed else (speed <= 0.0):
@@ -1323,7 +1352,7 @@ def propagate(
         columns[i, last] = -(fl.response[0, 1, i] * turn).real
         for c in range(n_parameters):
             columns[i, size + c] = -(fl.response[0, 2 + c, i] * turn).real
-    add_growth(fl, phase, -1.0, w, columns)
+    add_growth(fl.near, fl.response, fl.omega, phase, -1.0, w, columns)
     closed = np.zeros(n_stops, dtype=np.bool_)
     for s in range(n_stops):
         value, _, _, _ = output_derivatives(fl, s, w, phase, 0.0)
@@ -1344,7 +1373,7 @@ def propagate(
         force, _, _ = law(fl, s, value - fl.stops[s, GAP], speed)
         for i in range(size):
             rate[i] -= fl.force[i, s] * force
-    add_growth(fl, end_phase, 1.0, w, columns)
+    add_growth(fl.near, fl.response, fl.omega, end_phase, 1.0, w, columns)
     for i in range(size):
         end[i] = w[i] + (fl.response[0, 0, i] * turn).real
         d_omega[i] = columns[i, last] + (fl.response[0, 1, i] * turn).real
