@@ -4,7 +4,9 @@ All kernels that are called from here are in this one file, because the compile 
 at the file of the function that is called; see `kernel_cache.resting_on` for the others.
 
 The state z is a list of pairs that move by themselves between contacts, z_b' = A_b z_b with real
-2×2 blocks; w is z without the steady response to the excitation.
+2×2 blocks; w is z without the response to the excitation: the steady one, but for a mode excited
+at, or almost at, an eigenvalue λ of its own, whose share in it starts from rest at phase zero
+(`growth`), since the steady one would be huge, or none.
 
 **Flights** are propagated in closed form; the first contact is found with steps that are bounded
 by the third derivative of the gap, so that none is passed over.
@@ -47,6 +49,10 @@ inlined = njit(cache=True, error_model="numpy", inline="always")
 
 OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_FULL = range(7)
 FLIGHT = -1
+# |λ - iω| below this share of ω makes an eigenvalue λ near: a steady response is at most 1/NEAR
+# times as large as what the excitation brings about in 1/ω, and so are its rounding errors; in the
+# derivative by ω they are up to 1/NEAR² times as large
+NEAR = 3e-3
 
 
 # columns of `stops`
@@ -82,12 +88,14 @@ class FlowData(NamedTuple):
     force: Real
     stops: Real
     laws: NDArray[np.int64]
-    steady: Complex  # (2, 2n) z = w + Re(steady[0] e^{iωt}), and the derivative with respect to ω
-    forced: Complex  # (2, n_out) the same of the outputs
+    near: Complex  # (k,) eigenvalues near iω; k = 0 for most systems
+    # (1 + k, 2 + n_parameters, 2n): amplitude of the steady response, z = w + Re(response[0, 0]
+    # e^{iωt}), and of the `growth` of each near eigenvalue; then their derivatives with respect to
+    # ω and to each parameter
+    response: Complex
+    forced: Complex  # (1 + k, 2 + n_parameters, n_out) the same of the outputs
     # (n_parameters, 2): column of `stops`, or -1 for the excitation; and the index of the stop
     parameters: NDArray[np.int64]
-    steady_by: Complex  # (n_parameters, 2n) derivative of steady[0] with respect to each
-    forced_by: Complex  # (n_parameters, n_out)
     omega: float
     tail: float
     node_angle: float
@@ -137,10 +145,148 @@ def there_and_back(block, t):
     )  # fmt: skip
 
 
+@intrinsic
+def never_inline(typing):
+    """Keep the function apart from which it is called: rare code that would cost compile time."""
+    return types.void(), _marking("noinline")
+
+
+@intrinsic
+def always_inline(typing):
+    """Inline the function from which it is called, though rare code makes it look long."""
+    return types.void(), _marking("alwaysinline")
+
+
+def _marking(attribute):
+    """Code generator that only gives the function at hand an attribute."""
+
+    def codegen(context, builder, signature, arguments):
+        builder.function.attributes.add(attribute)
+        return context.get_dummy_value()
+
+    return codegen
+
+
+@inner
+def turned(phase):
+    """e^{i phase}."""
+    return complex(math.cos(phase), math.sin(phase))
+
+
+@inner
+def from_rest(rate, t):
+    """∫ exp(rate u) du from 0 to t for a complex rate, to full precision also where it is small."""
+    x, y = rate.real * t, rate.imag * t
+    square = x * x + y * y
+    if square < 1e-18:
+        return complex(t + 0.5 * t * x, 0.5 * t * y)
+    half, size = math.sin(0.5 * y), math.expm1(x)
+    real = size * math.cos(y) - 2.0 * half * half
+    imag = (size + 1.0) * math.sin(y)
+    share = t / square
+    return complex((real * x + imag * y) * share, (imag * x - real * y) * share)
+
+
+@inner
+def growth(rate, omega, phase):
+    """Solution of e' = rate e + e^{iωt} at rest at phase zero, and e^{iωt}, for a rate near iω.
+
+    e = (e^{rate t} - e^{iωt})/(rate - iω) without its cancellation; at resonance e = t e^{iωt}.
+    """
+    never_inline()
+    turn = turned(phase)
+    return turn * from_rest(rate - 1j * omega, phase / omega), turn
+
+
+@inner
+def growth_by_omega(rate, omega, phase):
+    """Derivative of `growth` with respect to ω at a fixed phase.
+
+    With off = rate - iω it is e^{iφ} ∫ exp(off u) du from 0 to t = φ/ω, and its derivative
+    -e^{iφ} (i ∫ u exp(off u) du + exp(off t) t/ω).
+    """
+    never_inline()
+    e, turn = growth(rate, omega, phase)
+    t = phase / omega
+    off = rate - 1j * omega
+    x = off * t
+    end = turned(x.imag) * math.exp(x.real)
+    if abs(x) > 1.0:
+        by_rate = (t * end * turn - e) / off
+    else:
+        series, power = 0.0 * x, turn * (t * t)
+        for j in range(18):
+            series += power / (j + 2)
+            power *= x / (j + 1)
+        by_rate = series
+    return -1j * by_rate - end * turn * (t / omega)
+
+
+@inner
+def swelling(near, forced, omega, out, phase):
+    """Value, two time derivatives, and bound of the third over a period, of an output's growth.
+
+    e grows by at most the time that passes, since no eigenvalue grows.
+    """
+    never_inline()
+    value, first, second, bound = 0.0, 0.0, 0.0, 0.0
+    for k in range(near.size):
+        share, rate = forced[1 + k, 0, out], near[k]
+        e, turn = growth(rate, omega, phase)
+        size, later = abs(rate), abs(e) + 2.0 * math.pi / omega
+        value += (share * e).real
+        e = rate * e + turn
+        first += (share * e).real
+        second += (share * (rate * e + 1j * omega * turn)).real
+        bound += abs(share) * (size * size * (size * later + 1.0) + omega * (size + omega))
+    return value, first, second, bound
+
+
+@inner
+def add_swelling_by(near, forced, omega, out, phase, t, rate, factor, sums):
+    """Add the derivatives of an output's growth, or its rate's, at time t after a fixed phase.
+
+    sums (n_columns,) ends with the columns of the parameters and of ω, as in `panel_columns`.
+    """
+    never_inline()
+    last = sums.size - 1
+    first = sums.size + 1 - forced.shape[1]
+    for k in range(near.size):
+        e, turn = growth(near[k], omega, phase)
+        e1 = near[k] * e + turn
+        d = growth_by_omega(near[k], omega, phase) + e1 * (t / omega)
+        if rate:
+            e, d = e1, near[k] * d + 1j * t * turn
+        sums[last] += factor * (forced[1 + k, 1, out] * e + forced[1 + k, 0, out] * d).real
+        for c in range(first, last):
+            sums[c] += factor * (forced[1 + k, 2 + c - first, out] * e).real
+
+
+@inner
+def add_growth(near, response, omega, phase, sign, w, columns):
+    """Add sign times the growth to the state w (2n,) and its derivatives to its last columns."""
+    never_inline()
+    last = columns.shape[1] - 1
+    first = columns.shape[1] + 1 - response.shape[1]
+    for k in range(near.size):
+        e, _ = growth(near[k], omega, phase)
+        d = sign * growth_by_omega(near[k], omega, phase)
+        e *= sign
+        for i in range(w.size):
+            w[i] += (response[1 + k, 0, i] * e).real
+            columns[i, last] += (response[1 + k, 1, i] * e + response[1 + k, 0, i] * d).real
+            for c in range(first, last):
+                columns[i, c] += (response[1 + k, 2 + c - first, i] * e).real
+
+
 @inner
 def output_derivatives(fl, out, w, phase, t):
-    """Value and first two time derivatives of output `out`, and a bound on the third, after t."""
-    turn = fl.forced[0, out] * np.exp(1j * (phase + fl.omega * t))
+    """Value and first two time derivatives of output `out`, and a bound on the third, after t.
+
+    The bound holds for one excitation period at least.
+    """
+    always_inline()
+    turn = fl.forced[0, 0, out] * turned(phase + fl.omega * t)
     value = turn.real
     first = -fl.omega * turn.imag
     second = -fl.omega * fl.omega * turn.real
@@ -159,12 +305,19 @@ def output_derivatives(fl, out, w, phase, t):
         else:
             size = math.hypot(fl.bound3[out, j], fl.bound3[out, j + 1])
             bound += size * math.hypot(x, y)
+    if fl.near.size > 0:
+        s, s1, s2, s3 = swelling(fl.near, fl.forced, fl.omega, out, phase + fl.omega * t)
+        value += s
+        first += s1
+        second += s2
+        bound += s3
     return value, first, second, bound
 
 
 @inner
 def distance(fl, stop, w, phase):
     """Penetration of a stop, negative when it is open."""
+    always_inline()
     value, _, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
     return value - fl.stops[stop, GAP]
 
@@ -172,7 +325,9 @@ def distance(fl, stop, w, phase):
 @inner
 def output_noise(fl, out, w):
     """Rounding error to expect in an output: 4 units in the last place of its terms."""
-    total = abs(fl.forced[0, out])
+    total = abs(fl.forced[0, 0, out])
+    for k in range(fl.near.size):
+        total += abs(fl.forced[1 + k, 0, out]) * (2.0 * math.pi / fl.omega)
     for j in range(w.size):
         total += abs(fl.rows[0, out, j] * w[j])
     return 1e-15 * total
@@ -240,6 +395,7 @@ def closing_time(fl, stop, w, phase, start, end):
     excitation or of the fastest mode can be stepped over, and these carry no force.
     """
     shortest = 1e-10 / max(fl.omega, fastest_rate(fl))
+    longest = 2.0 * math.pi / fl.omega
     t = start
     while t <= end:
         value, h1, h2, bound = output_derivatives(fl, stop, w, phase, t)
@@ -251,7 +407,7 @@ def closing_time(fl, stop, w, phase, start, end):
             if h1 > 0.0 and h + h1 * shortest >= 0.0:
                 return min(t + max(tau, 0.0), end)
             tau = shortest
-        t += tau
+        t += min(tau, longest)
     return np.inf
 
 
@@ -286,8 +442,8 @@ class Record(NamedTuple):
         -1 for a flight, else the kind of the panel's ends.
     event : (n_pieces,)
         Stop that opens or closes at the end, or -1.
-    w : (n_pieces, 2n)
-        State at the start without the steady response.
+    start : (n_pieces, 2n)
+        State z at the start.
     force, depth : (n_pieces, n_stops, m)
         Forces and penetrations at the nodes of a panel (zero where a stop is open).
     used : (2,)
@@ -299,7 +455,7 @@ class Record(NamedTuple):
     duration: NDArray[np.float64]
     kind: NDArray[np.int64]
     event: NDArray[np.int64]
-    w: NDArray[np.float64]
+    start: NDArray[np.float64]
     force: NDArray[np.float64]
     depth: NDArray[np.float64]
     used: NDArray[np.int64]
@@ -511,19 +667,21 @@ def lu_apply_vector(A, order, b):
 
 @inner
 def forced_output(fl, out, phase):
-    """Steady output at a forcing phase."""
-    return (fl.forced[0, out] * np.exp(1j * phase)).real
+    """Response of an output to the excitation at a forcing phase."""
+    value, _, _, _ = swelling(fl.near, fl.forced, fl.omega, out, phase)
+    return value + (fl.forced[0, 0, out] * turned(phase)).real
 
 
 @inner
 def free_outputs(fl, tab, kind, phase, w, h, panel, free):
     """Fill the panel's outputs at the nodes (n_outputs m,) without contact forces."""
+    always_inline()
     m = tab.nodes.size
     na = panel.active.size
     for i in range(m):
-        turn = np.exp(1j * (phase + fl.omega * h * tab.chi[kind, i]))
+        turn = turned(phase + fl.omega * h * tab.chi[kind, i])
         for o in range(panel.to.shape[0]):
-            steady = fl.forced[0, panel.active[o % na]] * turn
+            steady = fl.forced[0, 0, panel.active[o % na]] * turn
             if o < na:
                 value = steady.real - fl.stops[panel.active[o], GAP]
             else:
@@ -531,6 +689,13 @@ def free_outputs(fl, tab, kind, phase, w, h, panel, free):
             for k in range(w.size):
                 value += panel.to[o, i, k] * w[k]
             free[o * m + i] = value
+    if fl.near.size > 0:
+        for i in range(m):
+            here = phase + fl.omega * h * tab.chi[kind, i]
+            for o in range(panel.to.shape[0]):
+                stop = panel.active[o % na]
+                s, s1, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, here)
+                free[o * m + i] += s if o < na else s1
 
 
 @inner
@@ -694,16 +859,21 @@ def panel_columns(fl, tab, kind, phase, t0, h, panel, columns):
             for c in range(n_columns):
                 forces[p, c] += slope * part[i, c]
             t = h * tab.chi[kind, i]
-            turn = np.exp(1j * (phase + fl.omega * t))
-            d_omega = fl.forced[1, stop] + 1j * (t0 + t) * fl.forced[0, stop]
+            turn = turned(phase + fl.omega * t)
+            d_omega = fl.forced[0, 1, stop] + 1j * (t0 + t) * fl.forced[0, 0, stop]
             if o < na:
                 forces[p, n_columns - 1] += slope * (d_omega * turn).real
             else:
-                d_omega = fl.omega * d_omega + fl.forced[0, stop]
+                d_omega = fl.omega * d_omega + fl.forced[0, 0, stop]
                 forces[p, n_columns - 1] -= slope * (d_omega * turn).imag
+            if fl.near.size > 0:
+                add_swelling_by(
+                    fl.near, fl.forced, fl.omega, stop, phase + fl.omega * t, t0 + t, o >= na,
+                    slope, forces[p],
+                )  # fmt: skip
             for c in range(fl.parameters.shape[0]):
                 q = columns.shape[0] + c
-                by = fl.forced_by[c, stop] * turn
+                by = fl.forced[0, 2 + c, stop] * turn
                 forces[p, q] += slope * (by.real if o < na else -fl.omega * by.imag)
                 if o < na and fl.parameters[c, 1] == stop and fl.parameters[c, 0] >= GAP:
                     speed = panel.output[na + o, i] if panel.slope.shape[0] > na else 0.0
@@ -769,17 +939,22 @@ def resolved(fl, tab, kind, noise, panel):
 
 
 @inner
-def record_piece(rec, phase, h, kind, event, w):
+def record_piece(fl, rec, before, phase, h, kind, event, w):
     """Append a piece; return its index, or -1 when the record is full."""
     n = rec.used[0]
     if n >= rec.phase.size:
         return -1
-    rec.phase[n] = phase
+    rec.phase[n] = before + phase
     rec.duration[n] = h
     rec.kind[n] = kind
     rec.event[n] = event
-    for k in range(w.size):
-        rec.w[n, k] = w[k]
+    turn = turned(phase)
+    for i in range(w.size):
+        rec.start[n, i] = w[i] + (fl.response[0, 0, i] * turn).real
+    for k in range(fl.near.size):
+        e, _ = growth(fl.near[k], fl.omega, phase)
+        for i in range(w.size):
+            rec.start[n, i] += (fl.response[1 + k, 0, i] * e).real
     for a in range(rec.force.shape[1]):
         for i in range(rec.force.shape[2]):
             rec.force[n, a, i] = 0.0
@@ -1066,6 +1241,7 @@ def time_to_event(fl, stop, closed, w, phase):
 
     The nearer root of the parabola through the present; inf where the gap changes the wrong way.
     """
+    always_inline()
     value, speed, accel, _ = output_derivatives(fl, stop, w, phase, 0.0)
     value -= fl.stops[stop, GAP]
     if (speed >= 0.0) if closed else (speed <= 0.0):
@@ -1119,7 +1295,10 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
             continue
         if aim < 0 and kind % 2 == 1 and h < h_max:  # a release was expected here: follow it
             for a in range(active.size):
-                if aim < 0 and time_to_event(fl, active[a], True, w_end, end_phase) < h:
+                if (
+                    aim < 0
+                    and time_to_event(fl, active[a], closed[active[a]], w_end, end_phase) < h
+                ):
                     aim = active[a]
         if aim >= 0:
             dh = time_to_event(fl, aim, closed[aim], w_end, end_phase)
@@ -1184,17 +1363,18 @@ def propagate(
     n_stops = fl.stops.shape[0]
     before = 2.0 * math.pi * math.floor(phase / (2.0 * math.pi))  # whole turns cost digits
     phase -= before
-    turn = np.exp(1j * phase)
+    turn = turned(phase)
     w = np.empty(size)
     n_parameters = fl.parameters.shape[0]
     last = size + n_parameters
     columns = np.zeros((size, last + 1))
     for i in range(size):
-        w[i] = start[i] - (fl.steady[0, i] * turn).real
+        w[i] = start[i] - (fl.response[0, 0, i] * turn).real
         columns[i, i] = 1.0
-        columns[i, last] = -(fl.steady[1, i] * turn).real
+        columns[i, last] = -(fl.response[0, 1, i] * turn).real
         for c in range(n_parameters):
-            columns[i, size + c] = -(fl.steady_by[c, i] * turn).real
+            columns[i, size + c] = -(fl.response[0, 2 + c, i] * turn).real
+    add_growth(fl.near, fl.response, fl.omega, phase, -1.0, w, columns)
     closed = np.zeros(n_stops, dtype=np.bool_)
     for s in range(n_stops):
         value, _, _, _ = output_derivatives(fl, s, w, phase, 0.0)
@@ -1204,7 +1384,7 @@ def propagate(
         recording,
     )  # fmt: skip
     end_phase = phase + fl.omega * duration
-    turn = np.exp(1j * end_phase)
+    turn = turned(end_phase)
     rate = np.zeros(size)
     for b in range(fl.blocks.shape[0]):
         for i in range(2):
@@ -1215,15 +1395,16 @@ def propagate(
         force, _, _ = law(fl, s, value - fl.stops[s, GAP], speed)
         for i in range(size):
             rate[i] -= fl.force[i, s] * force
+    add_growth(fl.near, fl.response, fl.omega, end_phase, 1.0, w, columns)
     for i in range(size):
-        end[i] = w[i] + (fl.steady[0, i] * turn).real
-        d_omega[i] = columns[i, last] + (fl.steady[1, i] * turn).real
+        end[i] = w[i] + (fl.response[0, 0, i] * turn).real
+        d_omega[i] = columns[i, last] + (fl.response[0, 1, i] * turn).real
         d_omega[i] -= rate[i] * (duration / fl.omega)
         if with_columns:
             for j in range(size):
                 jacobian[i, j] = columns[i, j]
             for c in range(n_parameters):
-                d_parameters[i, c] = columns[i, size + c] + (fl.steady_by[c, i] * turn).real
+                d_parameters[i, c] = columns[i, size + c] + (fl.response[0, 2 + c, i] * turn).real
     return status
 
 
@@ -1261,6 +1442,7 @@ def run_pieces(
     t = 0.0
     start_switch = 1 if duration < 0.0 else 0  # written so that one version is compiled, not two
     skip = 0.0
+    flight, none = (FLIGHT, -1) if duration >= 0.0 else (0, 0)  # as above
     w_end = np.empty(w.size)
     for _ in range(5000):
         remain = duration - t
@@ -1274,12 +1456,12 @@ def run_pieces(
                 active[n_active] = s
                 n_active += 1
         if n_active == 0:
-            first, stop = remain, -1
+            first, stop = remain, none
             for s in range(n_stops):
                 at = closing_time(fl, s, w, here, skip, first)
                 if at < first:
                     first, stop = at, s
-            if recording and record_piece(rec, before + here, first, FLIGHT, stop, w) < 0:
+            if recording and record_piece(fl, rec, before, here, first, flight, stop, w) < 0:
                 return RECORD_FULL
             fly_state(fl.blocks, w, first)
             if with_columns:
@@ -1312,7 +1494,7 @@ def run_pieces(
             return CONTACT_FAILED
         if h > 0.0:
             if recording:
-                n = record_piece(rec, before + here, h, kind, event, w)
+                n = record_piece(fl, rec, before, here, h, kind, event, w)
                 if n < 0:
                     return RECORD_FULL
                 for a in range(n_active):
@@ -1336,49 +1518,75 @@ def run_pieces(
 
 
 @inner
-def resolvent(blocks, omega, x, y):
-    """Fill y (2n,) with the solution of (iω - A) y = x."""
-    for b in range(blocks.shape[0]):
-        i, j = 2 * b, 2 * b + 1
-        m00, m01 = 1j * omega - blocks[b, 0, 0], -blocks[b, 0, 1]
-        m10, m11 = -blocks[b, 1, 0], 1j * omega - blocks[b, 1, 1]
-        det = m00 * m11 - m01 * m10
-        u, v = x[i], x[j]
-        y[i] = (m11 * u - m01 * v) / det
-        y[j] = (m00 * v - m10 * u) / det
+def near_rate(block, omega):
+    """Eigenvalue λ of a block with |λ - iω| < NEAR ω, or zero."""
+    mean = 0.5 * (block[0, 0] + block[1, 1])
+    half = 0.5 * (block[0, 0] - block[1, 1])
+    square = half * half + block[0, 1] * block[1, 0]
+    rate = math.sqrt(abs(square))
+    near = square < 0.0 and math.hypot(mean, rate - omega) < NEAR * omega
+    return complex(mean, rate) if near else complex(0.0, 0.0)
 
 
 @inner
-def of_outputs(rows, states, outputs):
-    """Fill outputs (k, n_out) of states (k, 2n)."""
-    for d in range(states.shape[0]):
-        for out in range(rows.shape[1]):
-            outputs[d, out] = 0.0
-            for j in range(states.shape[1]):
-                outputs[d, out] += rows[0, out, j] * states[d, j]
+def respond(blocks, omega, x, row, response):
+    """Fill a row of `FlowData.response` with what an excitation x (2n,) brings about.
+
+    That is (iω - A)⁻¹ x, but for a block with a near eigenvalue λ. There x falls into its parts
+    along the two eigenvectors: that of λ is the drive of the growth, that of its conjugate has a
+    steady response.
+    """
+    k = 0
+    for b in range(blocks.shape[0]):
+        block = blocks[b]
+        i, j = 2 * b, 2 * b + 1
+        u, v = x[i], x[j]
+        rate = near_rate(block, omega)
+        if rate.imag > 0.0:
+            k += 1
+            half = 0.5 * (block[0, 0] - block[1, 1])
+            p = 0.5 * u - 0.5j * (half * u + block[0, 1] * v) / rate.imag
+            q = 0.5 * v - 0.5j * (block[1, 0] * u - half * v) / rate.imag
+            for c in range(x.size):
+                response[k, row, c] = 0.0
+            response[k, row, i], response[k, row, j] = p, q
+            away = complex(-rate.real, omega + rate.imag)
+            response[0, row, i], response[0, row, j] = (u - p) / away, (v - q) / away
+        else:
+            m00, m01 = 1j * omega - block[0, 0], -block[0, 1]
+            m10, m11 = -block[1, 0], 1j * omega - block[1, 1]
+            det = m00 * m11 - m01 * m10
+            response[0, row, i] = (m11 * u - m01 * v) / det
+            response[0, row, j] = (m00 * v - m10 * u) / det
 
 
 @inner
 def at_frequency(system, omega, parameters, drive_by):
     """Numbers of the system at an excitation frequency (rad/s), see `shoot`."""
     blocks, rows, drive = system.blocks, system.rows, system.drive
-    steady = np.empty(drive.shape, dtype=np.complex128)
+    near = np.empty(blocks.shape[0], dtype=np.complex128)
+    k = 0
+    for b in range(blocks.shape[0]):
+        near[k] = near_rate(blocks[b], omega)
+        if near[k].imag > 0.0:
+            k += 1
     x = np.empty(drive.shape[1], dtype=np.complex128)
-    for i in range(x.size):
-        x[i] = drive[0, i] + omega * omega * drive[1, i]
-    resolvent(blocks, omega, x, steady[0])
-    for i in range(x.size):
-        x[i] = 2.0 * omega * drive[1, i] - 1j * steady[0, i]
-    resolvent(blocks, omega, x, steady[1])
-    steady_by = np.empty((parameters.shape[0], x.size), dtype=np.complex128)
-    for c in range(parameters.shape[0]):
+    response = np.empty((1 + k, 2 + parameters.shape[0], x.size), dtype=np.complex128)
+    for row in range(response.shape[1]):
         for i in range(x.size):
-            x[i] = drive_by[c, 0, i] + omega * omega * drive_by[c, 1, i]
-        resolvent(blocks, omega, x, steady_by[c])
-    forced = np.empty((2, rows.shape[1]), dtype=np.complex128)
-    of_outputs(rows, steady, forced)
-    forced_by = np.empty((parameters.shape[0], rows.shape[1]), dtype=np.complex128)
-    of_outputs(rows, steady_by, forced_by)
+            if row == 0:
+                x[i] = drive[0, i] + omega * omega * drive[1, i]
+            elif row == 1:
+                x[i] = 2.0 * omega * drive[1, i] - 1j * response[0, 0, i]
+            else:
+                x[i] = drive_by[row - 2, 0, i] + omega * omega * drive_by[row - 2, 1, i]
+        respond(blocks, omega, x, row, response)
+    forced = np.zeros((1 + k, response.shape[1], rows.shape[1]), dtype=np.complex128)
+    for p in range(1 + k):
+        for row in range(response.shape[1]):
+            for out in range(rows.shape[1]):
+                for i in range(x.size):
+                    forced[p, row, out] += rows[0, out, i] * response[p, row, i]
     return FlowData(
         blocks,
         rows,
@@ -1386,11 +1594,10 @@ def at_frequency(system, omega, parameters, drive_by):
         system.force,
         system.stops,
         system.laws,
-        steady,
+        near[:k],
+        response,
         forced,
         parameters,
-        steady_by,
-        forced_by,
         omega,
         system.tail,
         system.node_angle,

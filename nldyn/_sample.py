@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from nldyn import _kernels
-from nldyn._kernels import FLIGHT, block_exponential, fly_state, map_fraction, njit
+from nldyn._kernels import (
+    FLIGHT,
+    block_exponential,
+    fly_state,
+    from_rest,
+    map_fraction,
+    njit,
+    turned,
+)
 from nldyn.kernel_cache import resting_on
 
 inner = resting_on(_kernels.inner, _kernels.__file__)
@@ -95,33 +103,68 @@ def state_in_contact(blocks, start, shares, weights, t, w):
     fly_state(blocks, w, t)
 
 
+@inner
+def without_steady(response, phase, state, w):
+    """Fill w with a state less the steady response, (2n,)."""
+    turn = turned(phase)
+    for k in range(w.size):
+        w[k] = state[k] - (response[0, k] * turn).real
+
+
+@inner
+def grown(rate, omega, phase, t):
+    """Growth of a near eigenvalue a time t after rest, and its rate; the phase is that at its end.
+
+    See `_kernels.growth`.
+    """
+    turn = turned(phase)
+    e = turn * from_rest(rate - 1j * omega, t)
+    return e, rate * e + turn
+
+
 @compiled
 def sample_states(
     blocks, force, omega, tab,
-    rec_phase, rec_duration, rec_kind, rec_w, rec_force, count, phases,
+    rec_phase, rec_duration, rec_kind, rec_start, rec_force, count, near, response, phases,
 ):  # fmt: skip
-    """Homogeneous states (n_phases, 2n) at ascending forcing phases."""
+    """States (n_phases, 2n) at ascending forcing phases.
+
+    near (k,) and response (1 + k, 2n) are those of `LinearPart.response`.
+    """
     states = np.empty((phases.size, force.shape[0]))
     shares = np.empty((tab.nodes.size, force.shape[0]))
+    start = np.empty(force.shape[0])
     piece, ready = 0, -1
     for i in range(phases.size):
         while piece + 1 < count and rec_phase[piece + 1] <= phases[i]:
             piece += 1
         kind, h = rec_kind[piece], rec_duration[piece]
-        if ready != piece and kind != FLIGHT:
-            impulses(blocks, force, tab, kind, h, rec_force[piece], shares)
+        if ready != piece:
+            without_steady(response, rec_phase[piece], rec_start[piece], start)
+            if kind != FLIGHT:
+                impulses(blocks, force, tab, kind, h, rec_force[piece], shares)
             ready = piece
         t = (phases[i] - rec_phase[piece]) / omega
-        state_at(blocks, tab, kind, h, rec_w[piece], shares, t, states[i])
+        state_at(blocks, tab, kind, h, start, shares, t, states[i])
+        for p in range(response.shape[0]):
+            e = turned(phases[i])
+            if p > 0:
+                e, _ = grown(near[p - 1], omega, phases[i], t)
+            for j in range(states.shape[1]):
+                states[i, j] += (response[p, j] * e).real
     return states
 
 
 @inner
-def output_rate(row, row1, forced, omega, phase, w):
-    """Value and rate of the output ``row @ w + Re(forced e^{i phase})``."""
-    turn = forced * np.exp(1j * phase)
+def output_rate(row, row1, near, forced, omega, phase, t, w):
+    """Value and rate of the output ``row @ w + Re(forced[0] e^{i phase})`` and its growth."""
+    turn = forced[0] * turned(phase)
     value = turn.real
     rate = -omega * turn.imag
+    for k in range(near.size):
+        e, e1 = grown(near[k], omega, phase, t)
+        value += (forced[1 + k] * e).real
+        rate += (forced[1 + k] * e1).real
     for k in range(w.size):
         value += row[k] * w[k]
         rate += row1[k] * w[k]
@@ -131,7 +174,8 @@ def output_rate(row, row1, forced, omega, phase, w):
 @compiled
 def local_extremes(
     blocks, force, omega, tab,
-    rec_phase, rec_duration, rec_kind, rec_w, rec_force, count, row, row1, forced, fastest,
+    rec_phase, rec_duration, rec_kind, rec_start, rec_force, count, near, response,
+    row, row1, fastest,
 ):  # fmt: skip
     """Phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output.
 
@@ -142,7 +186,11 @@ def local_extremes(
     spacing = 2.0 * np.pi / (16.0 * fastest)
     found = np.empty((64, 3))
     n = 0
-    w, v = np.empty(force.shape[0]), np.empty(force.shape[0])
+    w, v, start = np.empty(force.shape[0]), np.empty(force.shape[0]), np.empty(force.shape[0])
+    forced = np.zeros(response.shape[0], dtype=np.complex128)
+    for p in range(forced.size):
+        for k in range(row.size):
+            forced[p] += row[k] * response[p, k]
     shares = np.empty((tab.nodes.size, force.shape[0]))
     steps = np.empty((blocks.shape[0], 4))
     weights = np.empty((0, tab.nodes.size))
@@ -150,6 +198,7 @@ def local_extremes(
     for piece in range(count):
         h = rec_duration[piece]
         kind = rec_kind[piece]
+        without_steady(response, rec_phase[piece], rec_start[piece], start)
         pieces = int(np.ceil(h / spacing)) + 1
         if kind != FLIGHT:
             pieces += tab.nodes.size
@@ -165,16 +214,18 @@ def local_extremes(
             x = i / pieces
             t = h * (x if kind == FLIGHT else map_fraction(tab, kind, x))
             if kind != FLIGHT:
-                state_in_contact(blocks, rec_w[piece], shares, weights[i], t, w)
+                state_in_contact(blocks, start, shares, weights[i], t, w)
             elif i == 0:
                 for k in range(w.size):
-                    w[k] = rec_w[piece, k]
+                    w[k] = start[k]
             else:
                 for b in range(blocks.shape[0]):
                     x, y = w[2 * b], w[2 * b + 1]
                     w[2 * b] = steps[b, 0] * x + steps[b, 1] * y
                     w[2 * b + 1] = steps[b, 2] * x + steps[b, 3] * y
-            value, rate = output_rate(row, row1, forced, omega, rec_phase[piece] + omega * t, w)
+            value, rate = output_rate(
+                row, row1, near, forced, omega, rec_phase[piece] + omega * t, t, w
+            )
             new_sign = 1 if rate > 0.0 else -1 if rate < 0.0 else sign
             if piece == 0 and i == 0:
                 first_value = value
@@ -188,9 +239,9 @@ def local_extremes(
                     middle = lo - rate_lo * (hi - lo) / (rate_hi - rate_lo)
                     if step > 10 and step % 2 == 0:
                         middle = 0.5 * (lo + hi)
-                    state_at(blocks, tab, kind, h, rec_w[piece], shares, middle, v)
+                    state_at(blocks, tab, kind, h, start, shares, middle, v)
                     value, rate_middle = output_rate(
-                        row, row1, forced, omega, rec_phase[piece] + omega * middle, v
+                        row, row1, near, forced, omega, rec_phase[piece] + omega * middle, middle, v
                     )
                     if rate_middle * sign > 0.0:
                         if step > 0 and last < middle:

@@ -485,10 +485,7 @@ class Trajectory:
 
     def states(self, phases: Real) -> Real:
         """States z (k, 2n) at ascending forcing phases within the motion."""
-        phases = np.asarray(phases, dtype=float)
-        turn = np.exp(1j * phases)[:, None]
-        steady = (self._steady * turn).real
-        return np.asarray(self._evaluate(sample_states, phases) + steady)
+        return self._evaluate(sample_states, np.asarray(phases, dtype=float))
 
     def extremes(self, output: int) -> Real:
         """Phase, value and kind (+1 maximum, -1 minimum) of an output's local extremes, (k, 3).
@@ -497,10 +494,8 @@ class Trajectory:
         then the interfaces' displacements.
         """
         flow = self.flow
-        row = flow.rows[output]
-        forced = complex(row @ self._steady)
         fastest = max(self.omega, flow.system.linear.fastest)
-        return self._evaluate(local_extremes, row, flow.rate_rows[output], forced, fastest)
+        return self._evaluate(local_extremes, flow.rows[output], flow.rate_rows[output], fastest)
 
     def contact_quadrature(self) -> tuple[Real, Real]:
         """Forcing phases (k,) of all nodes of contact panels, and their weights in s (k,)."""
@@ -511,9 +506,9 @@ class Trajectory:
         return phases.ravel(), (duration * tables.weights[kind]).ravel()
 
     @cached_property
-    def _steady(self) -> Complex:
-        """Amplitude of the steady response, (2n,)."""
-        return self.flow.system.steady(self.omega)
+    def _response(self) -> tuple[Complex, Complex]:
+        """Near eigenvalues (k,), amplitudes (1 + k, 2n) of steady response and growths."""
+        return self.flow.system.response(self.omega)
 
     def _evaluate(self, kernel: Any, *arguments: object) -> Real:
         """Call a kernel of `_sample` on the recorded pieces."""
@@ -526,9 +521,10 @@ class Trajectory:
             rec.phase,
             rec.duration,
             rec.kind,
-            rec.w,
+            rec.start,
             rec.force,
             int(rec.used[0]),
+            *self._response,
             *arguments,
         )
         return np.asarray(found)

@@ -10,6 +10,7 @@ import scipy.linalg as sla
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from nldyn._kernels import NEAR
 from nldyn.errors import SystemModelError
 
 Real = NDArray[np.float64]
@@ -58,6 +59,46 @@ class LinearPart:
         product = np.einsum("...bi,bij->...bj", pairs, self.blocks)
         return np.ascontiguousarray(product.reshape(rows.shape))
 
+    def response(self, drive: Complex, omega: float) -> tuple[Complex, Complex]:
+        """Response to Re(drive e^{iωt}), also where a mode has no steady response.
+
+        An eigenvalue λ with |λ - iω| < `NEAR` ω is near: the excitation along its eigenvector is
+        not divided by iω - λ.
+
+        Parameters
+        ----------
+        drive : (2n,) array
+            Amplitude of the excitation of z.
+        omega : float
+            Excitation frequency in rad/s.
+
+        Returns
+        -------
+        near : (k,)
+            The near eigenvalues λ.
+        response : (1 + k, 2n)
+            Amplitudes f, then s_k: Re(f e^{iωt} + Σ s_k e_k(t)) is a solution for every solution
+            of e_k' = λ_k e_k + e^{iωt}.
+        """
+        (a, b), (c, d) = np.moveaxis(self.blocks, 0, -1)
+        mean, half = 0.5 * (a + d), 0.5 * (a - d)
+        square = half * half + b * c
+        rates = mean + 1j * np.sqrt(np.abs(square))
+        near = np.flatnonzero((square < 0.0) & (np.abs(rates - 1j * omega) < NEAR * omega))
+        x, y = drive[0::2], drive[1::2]
+        first, last = 1j * omega - a, 1j * omega - d
+        determinant = first * last - b * c
+        determinant[near] = 1.0
+        response = np.zeros((1 + near.size, drive.size), dtype=complex)
+        response[0, 0::2] = (last * x + b * y) / determinant
+        response[0, 1::2] = (first * y + c * x) / determinant
+        for k, block in enumerate(near):
+            pair, rate = slice(2 * block, 2 * block + 2), rates[block]
+            turned = (self.blocks[block] - rate.real * np.eye(2)) @ drive[pair] / (1j * rate.imag)
+            response[1 + k, pair] = 0.5 * (drive[pair] + turned)
+            response[0, pair] = 0.5 * (drive[pair] - turned) / (1j * omega - rate.conjugate())
+        return rates[near], response
+
     def steady(self, drive: Complex, omega: float) -> Complex:
         """Amplitude f (2n,) of the steady response Re(f e^{iωt}) to Re(drive e^{iωt}).
 
@@ -66,29 +107,20 @@ class LinearPart:
         SystemModelError
             If an undamped mode is excited exactly at its frequency.
         """
-        (a, b), (c, d) = self._entries
-        first, last = 1j * omega - a, 1j * omega - d
-        determinant = first * last - b * c
-        if np.any(np.abs(determinant) < 1e-12 * (self._size + omega) ** 2):
+        near, response = self.response(drive, omega)
+        exact = at_resonance(near, omega)
+        if np.any(response[1:][exact]):
             raise SystemModelError(
                 f"the excitation at {omega / (2 * np.pi):g} Hz meets an undamped mode exactly; "
                 "give the mode some damping or move the frequency"
             )
-        x, y = drive[0::2] / determinant, drive[1::2] / determinant
-        response = np.empty(drive.size, dtype=complex)
-        response[0::2] = last * x + b * y
-        response[1::2] = first * y + c * x
-        return response
+        away = np.where(exact, 1.0, 1j * omega - near)
+        return np.asarray(response[0] + (1.0 / away) @ response[1:])
 
-    @cached_property
-    def _entries(self) -> Real:
-        """Blocks as (2, 2, n)."""
-        return np.ascontiguousarray(np.moveaxis(self.blocks, 0, -1))
 
-    @cached_property
-    def _size(self) -> Real:
-        """Largest entries of the blocks, (n,)."""
-        return np.asarray(np.abs(self.blocks).max(axis=(1, 2)))
+def at_resonance(eigenvalues: Complex, omega: float) -> NDArray[np.bool_]:
+    """Which eigenvalues are iω but for rounding: of an undamped mode at its own frequency."""
+    return np.asarray(np.abs(eigenvalues - 1j * omega) < 1e-12 * omega)
 
 
 def linear_part(omega: Real, damping: Real) -> LinearPart:

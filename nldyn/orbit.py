@@ -536,7 +536,7 @@ def solve_orbit(
     observe = check_observe(flow.system, observe)
     problem = shooting_problem(flow, period, segments)
     omega = 2.0 * math.pi * frequency_hz
-    flow.system.steady(omega)  # refuses the resonance of an undamped mode
+    check_bounded(flow.system, omega)
     starts: Iterator[Real]
     if guess is None:
         start = np.zeros(problem.size)
@@ -571,6 +571,12 @@ def solve_orbit(
         except ConvergenceError as error:
             failure = error
     raise failure
+
+
+def check_bounded(system: System, omega: float) -> None:
+    """Refuse the resonance of an undamped mode where no stop can limit the motion."""
+    if not system.stops:
+        system.steady(omega)
 
 
 def near_returns(states: Real, period: int, count: int) -> list[int]:
@@ -608,10 +614,16 @@ def refine(
     row[-1] = 1.0
     found = problem.correct(guess, row, max_iterations=max_iterations)
     if not found.converged:
+        where = f"no orbit of period {problem.period} found at {omega / (2 * math.pi):g} Hz"
+        contact = np.any(found.motion.record.kind >= 0)
+        if not contact and problem.flow.system.grows(omega):
+            raise ConvergenceError(
+                f"{where}: an undamped mode is excited at its own frequency, and its motion grows "
+                "without bound where it touches no stop"
+            )
         step = f", last relative step {found.last_step:.1e}" if found.last_step < math.inf else ""
         raise ConvergenceError(
-            f"no orbit of period {problem.period} found at {omega / (2 * math.pi):g} Hz: "
-            f"{found.failure}{step} after {found.iterations} "
+            f"{where}: {found.failure}{step} after {found.iterations} "
             f"iteration{'' if found.iterations == 1 else 's'}"
         )
     return Orbit.of(problem, found, observe)

@@ -14,12 +14,14 @@ from nldyn.linear import Real
 from nldyn.orbit import (
     ConvergenceError,
     Orbit,
+    check_bounded,
     check_observe,
     near_returns,
     refine,
     shooting_problem,
     spread,
 )
+from nldyn.shooting import ShootingProblem
 from nldyn.system import System
 
 
@@ -86,7 +88,7 @@ def random_states(flow: FlowMap, omega: float, count: int, seed: int) -> Real:
     """Initial states (count, 2n): rest, then random ones, see `simulate_strobe`."""
     n = 2 * flow.system.size
     rng = np.random.default_rng(seed)
-    size = max(float(np.abs(flow.system.steady(omega)).max()), reach(flow.system))
+    size = max(response_size(flow.system, omega), reach(flow.system))
     states = np.empty((count, n))
     for index in range(count):
         scale = 0.0 if index == 0 else size * 10.0 ** rng.uniform(-0.5, 1.0)
@@ -106,6 +108,21 @@ def simulate(flow: FlowMap, omega: float, starts: Real, transient: int, recorded
         else:
             runs.append(found.ends[transient:])
     return Strobe(omega, tuple(runs), tuple(failures))
+
+
+def response_size(system: System, omega: float) -> float:
+    """Size of the linear response at ω (rad/s), for modes near resonance within one period.
+
+    Examples
+    --------
+    >>> from nldyn import HarmonicForce
+    >>> system = System.from_modal([10.0], {"tip": [1.0]}, excitation=[HarmonicForce("tip", 1.0)])
+    >>> bool(np.isfinite(response_size(system, 20.0 * np.pi)))
+    True
+    """
+    _, response = system.response(omega)
+    growth = 2.0 * np.pi / omega * np.abs(response[1:]).sum(axis=0)
+    return float((np.abs(response[0]) + growth).max())
 
 
 def reach(system: System) -> float:
@@ -137,15 +154,25 @@ def orbits_from_strobe(
     problem = shooting_problem(flow, period)
     found: list[Orbit] = []
     for states in strobe.runs:
-        for start in near_returns(states, period, options.candidates):
-            nodes = spread(problem, states[start], strobe.omega)
-            try:
-                orbit = refine(problem, nodes, strobe.omega, observe, max_iterations=10)
-            except ConvergenceError:
+        starts = [states[i] for i in near_returns(states, period, options.candidates)]
+        orbits = [_refined(problem, start, strobe.omega, observe) for start in starts]
+        if not any(orbits):  # an undamped motion goes round an orbit without coming near it
+            middle = states[::period].mean(axis=0)
+            orbits = [_refined(problem, middle, strobe.omega, observe)]
+        for orbit in orbits:
+            if orbit is None or minimal_period(orbit) != period:
                 continue
-            if minimal_period(orbit) == period and not any(same_orbit(orbit, o) for o in found):
+            if not any(same_orbit(orbit, other) for other in found):
                 found.append(orbit)
     return found
+
+
+def _refined(problem: ShootingProblem, start: Real, omega: float, observe: str) -> Orbit | None:
+    """Orbit that Newton's method finds from a state at phase zero, if it finds one soon."""
+    try:
+        return refine(problem, spread(problem, start, omega), omega, observe, max_iterations=10)
+    except ConvergenceError:
+        return None
 
 
 def find_orbits(
@@ -199,6 +226,7 @@ def find_orbits(
     """
     flow = system if isinstance(system, FlowMap) else FlowMap(system)
     check_frequency("frequency_hz", frequency_hz)
+    check_bounded(flow.system, 2.0 * math.pi * frequency_hz)
     options = options or SearchOptions()
     strobe = simulate_strobe(flow, frequency_hz, options)
     if not strobe.runs:

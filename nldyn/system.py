@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from nldyn.elements import Damper, Excitation, Stop
 from nldyn.errors import SystemModelError, shown
-from nldyn.linear import Complex, LinearPart, Real, linear_part
+from nldyn.linear import Complex, LinearPart, Real, at_resonance, linear_part
 
 Element = TypeVar("Element")
 
@@ -290,9 +290,21 @@ class System:
         Raises
         ------
         SystemModelError
-            If an undamped mode is excited exactly at its frequency.
+            If an undamped mode is excited exactly at its frequency: then there is none.
         """
-        return self.linear.steady(self.drive[0] + omega**2 * self.drive[1], omega)
+        return self.linear.steady(self._drive_at(omega), omega)
+
+    def response(self, omega: float) -> tuple[Complex, Complex]:
+        """Linear response at ω (rad/s), near or at a resonance, too: see `LinearPart.response`."""
+        return self.linear.response(self._drive_at(omega), omega)
+
+    def grows(self, omega: float) -> bool:
+        """Whether an undamped mode is excited at its own frequency ω (rad/s), but for rounding."""
+        near, response = self.response(omega)
+        return bool(np.any(response[1:][at_resonance(near, omega)]))
+
+    def _drive_at(self, omega: float) -> Complex:
+        return np.asarray(self.drive[0] + omega**2 * self.drive[1])
 
     def with_elements(
         self,

@@ -1,8 +1,9 @@
-"""Motions computed without the flow map: adaptive Runge-Kutta on the equations as they stand."""
+"""Motions computed without the flow map: adaptive Runge-Kutta, and the matrix exponential."""
 
 from __future__ import annotations
 
 import numpy as np
+import scipy.linalg as sla
 from scipy.integrate import solve_ivp
 
 from nldyn import Stop, System
@@ -109,6 +110,24 @@ class Motion:
             atol=atol,
             max_step=max_step,
         ).y
+
+
+def exact_flight(
+    system: System, x0: np.ndarray, phases: tuple[float, float], omega: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """End state and Jacobian from one matrix exponential of the system and its oscillator."""
+    n = system.size
+    A = np.zeros((2 * n + 2, 2 * n + 2))
+    A[:n, n : 2 * n] = np.eye(n)
+    A[n : 2 * n, :n] = -np.diag(system.natural_frequencies**2)
+    A[n : 2 * n, n : 2 * n] = -system.total_damping
+    A[-2:, -2:] = [[0.0, -omega], [omega, 0.0]]  # (cos ωt, sin ωt)
+    for source in system.excitation:
+        f = source.phasor * omega**source.order
+        A[n : 2 * n, -2:] += np.outer(system.participation[source.at], [f.real, -f.imag])
+    E = sla.expm(A * (phases[1] - phases[0]) / omega)
+    start = np.concatenate([x0, [np.cos(phases[0]), np.sin(phases[0])]])
+    return (E @ start)[: 2 * n], E[: 2 * n, : 2 * n]
 
 
 def state_map(system: System) -> np.ndarray:

@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg as sla
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
-from independent import state_map
+from independent import exact_flight, state_map
 
 from nldyn import Damper, FlowMap, HarmonicForce, System, Unbalance
 from nldyn.linear import _growth
@@ -34,24 +34,6 @@ def make(name: str) -> System:
         excitation=[Unbalance("a", 3e-4, phase_deg=25.0), HarmonicForce("b", 2.0)],
         **SYSTEMS[name],
     )
-
-
-def exact_flight(
-    system: System, x0: np.ndarray, phases: tuple[float, float], omega: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """End state and Jacobian from one matrix exponential of the system and its oscillator."""
-    n = system.size
-    A = np.zeros((2 * n + 2, 2 * n + 2))
-    A[:n, n : 2 * n] = np.eye(n)
-    A[n : 2 * n, :n] = -np.diag(system.natural_frequencies**2)
-    A[n : 2 * n, n : 2 * n] = -system.total_damping
-    A[-2:, -2:] = [[0.0, -omega], [omega, 0.0]]  # (cos ωt, sin ωt)
-    for source in system.excitation:
-        f = source.phasor * omega**source.order
-        A[n : 2 * n, -2:] += np.outer(system.participation[source.at], [f.real, -f.imag])
-    E = sla.expm(A * (phases[1] - phases[0]) / omega)
-    start = np.concatenate([x0, [np.cos(phases[0]), np.sin(phases[0])]])
-    return (E @ start)[: 2 * n], E[: 2 * n, : 2 * n]
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
