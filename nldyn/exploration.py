@@ -31,6 +31,8 @@ RETURNS = 3.0  # recorded periods after settling, over the longest period looked
 DECAYS = 4.0  # time allowed for settling, over the slowest decay time of the linear part
 SETTLING = (30, 600)  # fewest and most periods of it
 NEAR = 0.1  # a return within this share of the motion is worth a Newton iteration
+LONGEST = 0.5  # step of a deflated iteration, relative to the orbit
+ITERATIONS = 40  # of a deflated iteration
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,7 @@ class ExploreOptions:
 
     spacing: float = 0.005
     starts: int = 12
-    unstable_period: int = 2
+    unstable_period: int = 3
     seed: int = 20
 
     def __post_init__(self) -> None:
@@ -365,7 +367,8 @@ def deflated_orbit(
     """Orbit other than the known ones, by Newton's method on the deflated equations.
 
     The equations are multiplied by ∏ (1/|x - xᵢ|² + 1) over the known orbits and their shifts, so
-    that Newton's steps are only stretched [Farrell, Birkisson and Funke 2015, section 2].
+    that Newton's steps are only stretched [Farrell, Birkisson and Funke 2015, section 2]; long
+    steps are shortened.
     """
     problem = shooting_problem(box.flow, period)
     try:
@@ -375,15 +378,17 @@ def deflated_orbit(
     row = np.zeros(point.size)
     row[-1] = 1.0
     repelled = [states for orbit in known for states in _shifts(problem, orbit)]
-    for _ in range(25):
-        found = problem.correct(point, row, max_iterations=1)
-        step = found.point - point
+    for _ in range(ITERATIONS):
+        step = problem.correct(point, row, max_iterations=1).point - point
         size = problem.scale(point) * math.sqrt(problem.segments)
-        if not np.all(np.isfinite(step)) or np.linalg.norm(step) > 1e3 * size:
+        length = float(np.linalg.norm(step)) / size
+        if not math.isfinite(length):
             return None
-        if np.linalg.norm(step) < 1e-3 * size:
+        away = min((float(np.linalg.norm(point[:-1] - x)) / size for x in repelled), default=1.0)
+        if length < min(1e-4, 0.1 * away):
             break
-        point = point + step * _stretch(point[:-1], step[:-1], repelled, size)
+        stretch = _stretch(point[:-1], step[:-1], repelled, size)
+        point = point + step * math.copysign(min(abs(stretch), LONGEST / length), stretch)
     else:
         return None
     try:
@@ -402,8 +407,7 @@ def _stretch(x: Real, step: Real, repelled: Sequence[Real], size: float) -> floa
         away = (x - other) / size
         square = float(away @ away) or 1e-300
         slope += -2.0 * float(away @ step) / size / (square * (1.0 + square))
-    factor = 1.0 / (1.0 - slope) if slope != 1.0 else 1.0
-    return min(max(factor, -2.0), 2.0)
+    return 1.0 / (1.0 - slope) if slope != 1.0 else 1.0
 
 
 def _shifts(problem: ShootingProblem, orbit: Orbit) -> Iterator[Real]:
