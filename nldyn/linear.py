@@ -80,11 +80,8 @@ class LinearPart:
             Amplitudes f, then s_k: Re(f e^{iωt} + Σ s_k e_k(t)) is a solution for every solution
             of e_k' = λ_k e_k + e^{iωt}.
         """
-        (a, b), (c, d) = np.moveaxis(self.blocks, 0, -1)
-        mean, half = 0.5 * (a + d), 0.5 * (a - d)
-        square = half * half + b * c
-        rates = mean + 1j * np.sqrt(np.abs(square))
-        near = np.flatnonzero((square < 0.0) & (np.abs(rates - 1j * omega) < NEAR * omega))
+        a, b, c, d, rates = self._entries
+        near = np.flatnonzero(np.abs(rates - 1j * omega) < NEAR * omega)
         x, y = drive[0::2], drive[1::2]
         first, last = 1j * omega - a, 1j * omega - d
         determinant = first * last - b * c
@@ -98,6 +95,15 @@ class LinearPart:
             response[1 + k, pair] = 0.5 * (drive[pair] + turned)
             response[0, pair] = 0.5 * (drive[pair] - turned) / (1j * omega - rate.conjugate())
         return rates[near], response
+
+    @cached_property
+    def _entries(self) -> tuple[Real, Real, Real, Real, Complex]:
+        """Entries of the blocks, row by row, and their upper eigenvalues (nan for two decays)."""
+        a, b, c, d = np.ascontiguousarray(self.blocks.reshape(-1, 4).T)
+        half = 0.5 * (a - d)
+        square = half * half + b * c
+        with np.errstate(invalid="ignore"):
+            return a, b, c, d, 0.5 * (a + d) + 1j * np.sqrt(-square)
 
     def steady(self, drive: Complex, omega: float) -> Complex:
         """Amplitude f (2n,) of the steady response Re(f e^{iωt}) to Re(drive e^{iωt}).
