@@ -62,3 +62,12 @@ def test_example_of_the_branches_prints_what_it_says(capsys, tmp_path, monkeypat
 def test_every_column_of_a_table_is_documented():
     rows = re.findall(r"^\| `(\w+)` \| (.*?) ?\|", BRANCHES, flags=re.M)
     assert dict(rows) == {"type": "", **{key: u.strip("1") for key, u in UNITS.items()}}
+
+
+def test_example_of_exploring_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / "exploring.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.S)
+    exec(code, {})
+    assert "1/3" in capsys.readouterr().out
+    assert (tmp_path / "explored.png").is_file()
