@@ -256,6 +256,11 @@ class System:
         return D
 
     @cached_property
+    def conservative(self) -> bool:
+        """Whether nothing takes energy out: no damping, and no stop whose force knows the speed."""
+        return not np.any(self.total_damping) and not any(s.depends_on_speed for s in self.stops)
+
+    @cached_property
     def linear(self) -> LinearPart:
         """Independent pairs of coordinates of the linear part."""
         return linear_part(self.natural_frequencies, self.total_damping)

@@ -312,3 +312,18 @@ def test_a_resonant_mode_that_nothing_excites_does_no_harm():
     assert steady[1] == pytest.approx(FORCE / ((2 * np.pi * 25.0) ** 2 - OWN**2), rel=1e-13)
     found = FlowMap(system).shoot(system.steady(OWN).real[None], np.array([0.0, 2 * np.pi]), OWN)
     assert found.ends[0] == pytest.approx(system.steady(OWN).real, rel=1e-13)
+
+
+def test_no_torus_is_invented_where_all_multipliers_lie_on_the_unit_circle():
+    """Two undamped modes: the torus test vanishes along the whole branch."""
+    system = System.from_modal(
+        [10.0, 27.0],
+        {"tip": [1.0, 0.8]},
+        modal_damping=0.0,
+        stops=[Stop("tip", 1e8, gap=0.0)],
+        excitation=[HarmonicForce("tip", 1.0)],
+    )
+    orbit = find_orbits(system, 12.0, 1)[0]
+    branch = continue_branch(orbit, (11.8, 12.2))
+    assert len(branch.points) > 3
+    assert "NS" not in {special.kind for special in branch.special_points}
