@@ -100,3 +100,49 @@ def sign_changes(phases_a, values_a, kinds_a, phases_b, values_b, kinds_b, full)
                 phases[n] = phases_b[j] if abs(values_b[j]) < abs(values_a[i]) else phases_a[i]
                 n += 1
     return kinds[:n], phases[:n]
+
+
+@njit(cache=True, error_model="numpy")
+def dip(left, right, before, here, after):
+    """Where a function may touch zero unseen between `left` and `right` of here, or nan.
+
+    Its three values have one sign, but the parabola through them comes within a quarter of zero.
+    """
+    if before * here <= 0.0 or here * after <= 0.0 or left == 0.0 or right == 0.0:
+        return np.nan
+    first, last = (before - here) / left, (after - here) / right
+    curvature = (last - first) / (right - left)
+    slope = first - curvature * left
+    if curvature * here <= 0.0:  # bends away from zero
+        return np.nan
+    where = -0.5 * slope / curvature
+    value = here - 0.25 * slope * slope / curvature
+    least = min(abs(before), abs(here), abs(after))
+    close = left < where < right and value * here < 0.25 * least * abs(here)
+    return where if close else np.nan
+
+
+@njit(cache=True, error_model="numpy")
+def extreme_dip(
+    left,
+    right,
+    phases_z,
+    values_z,
+    kinds_z,
+    phases,
+    values,
+    kinds,
+    phases_b,
+    values_b,
+    kinds_b,
+    full,
+):
+    """The same for the first of the extremes that does so, each with the nearest ones beside it."""
+    for i in range(phases.size):
+        z = nearest(phases_z, kinds_z, kinds[i], phases[i], full)
+        b = nearest(phases_b, kinds_b, kinds[i], phases[i], full)
+        if z >= 0 and b >= 0:
+            where = dip(left, right, values_z[z], values[i], values_b[b])
+            if where == where:
+                return where
+    return np.nan

@@ -28,7 +28,7 @@ from nldyn.errors import SystemModelError, check_whole, is_finite, shown
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine
 from nldyn.shooting import ShootingProblem
-from nldyn.special import Chord, LocateError, hidden_dip, special_points_between, tests
+from nldyn.special import Chord, LocateError, differs, hidden_dips, special_points_between
 from nldyn.system import numbers
 
 
@@ -553,10 +553,9 @@ class Trail:
 
 
 def _insert_dips(nodes: list[BranchPoint]) -> None:
-    """Add points where a test function may have changed sign twice between two points."""
-    for kind in ("LP", "PD", "BP", "NS"):
-        where = hidden_dip(nodes[-3], nodes[-2], nodes[-1], kind)
-        if where is None:
+    """Add a point where a test or an extreme may have changed sign twice between two points."""
+    for where in hidden_dips(*nodes[-3:]):
+        if math.isnan(where):
             continue
         index = len(nodes) - 2 if where < nodes[-2].arclength else len(nodes) - 1
         a, b = nodes[index - 1], nodes[index]
@@ -568,7 +567,7 @@ def _insert_dips(nodes: list[BranchPoint]) -> None:
             extra = Chord(a, b).at(sigma)
         except LocateError:
             continue
-        if tests(extra)[kind] * tests(a)[kind] < 0.0:
+        if differs(a, extra):
             nodes.insert(index, extra)
             return
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -11,6 +11,8 @@ import numpy as np
 
 from nldyn._events import (
     branch_point_test,
+    dip,
+    extreme_dip,
     flip_test,
     nearest,
     number_outside,
@@ -295,23 +297,23 @@ def _on_unit_circle(multipliers: Complex) -> bool:
     return bool(abs(mu.imag) > 1e-6 * abs(mu))
 
 
-def hidden_dip(z: BranchPoint, a: BranchPoint, b: BranchPoint, kind: str) -> float | None:
-    """Arclength between z and b at which a test may touch zero unseen, from a parabola.
+def hidden_dips(z: BranchPoint, a: BranchPoint, b: BranchPoint) -> Iterator[float]:
+    """Arclengths between z and b at which a test or an extreme may touch zero unseen.
 
-    The test has one sign at all three points but its parabola comes within a quarter of zero.
+    See `_events.dip`; the extremes are those of the stops' penetrations.
     """
-    y0, y1, y2 = tests(z)[kind], tests(a)[kind], tests(b)[kind]
     left, right = z.arclength - a.arclength, b.arclength - a.arclength
-    if y0 * y1 <= 0.0 or y1 * y2 <= 0.0 or left == 0.0 or right == 0.0:
-        return None
-    first, last = (y0 - y1) / left, (y2 - y1) / right
-    curvature = (last - first) / (right - left)
-    slope = first - curvature * left
-    if curvature * y1 <= 0.0:  # bends away from zero
-        return None
-    where = -0.5 * slope / curvature
-    value = y1 - 0.25 * slope**2 / curvature
-    if not left < where < right:
-        return None
-    close = value * y1 < 0.25 * min(abs(y0), abs(y1), abs(y2)) * abs(y1)
-    return where + a.arclength if close else None
+    for kind, value in tests(a).items():
+        yield a.arclength + dip(left, right, tests(z)[kind], value, tests(b)[kind])
+    full = 2.0 * math.pi * a.orbit.period
+    for output in range(len(a.orbit.system.stops)):
+        beside = (point.orbit.extremes(output) for point in (z, a, b))
+        columns = [x for e in beside for x in (e.phases, e.values, e.is_maximum)]
+        yield a.arclength + extreme_dip(left, right, *columns, full)
+
+
+def differs(a: BranchPoint, b: BranchPoint) -> bool:
+    """Whether a test or an extreme changes its sign between two points."""
+    before, after = tests(a), tests(b)
+    changed = any(before[kind] * after[kind] < 0.0 for kind in before)
+    return changed or bool(touching_extremes(a.orbit, b.orbit))
