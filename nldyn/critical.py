@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -88,6 +88,11 @@ class Loop:
         return self._here[0]
 
     @property
+    def pattern(self) -> Hashable:
+        """What stays the same around the fixed point as long as the maps are smooth."""
+        return self._here[2]
+
+    @property
     def by_parameter(self) -> Real:
         """Derivatives (k, n) of the maps with respect to P."""
         return self._here[1]
@@ -134,53 +139,80 @@ class Loop:
         right = np.append(-rest.ravel(), 0.0)
         return np.asarray(np.linalg.solve(bordered, right)[:size].reshape(q.shape))
 
-    def differences(self, direction: Real, pace: float, h: float) -> tuple[Real, Real, Real]:
-        """First and second derivatives of the Jacobians along a direction, and the first of ∂Φ/∂P.
 
-        Central differences with the step h, shapes (k, n, n), (k, n, n) and (k, n); the direction
-        is (k, n) in the nodes and `pace` in P. Their errors are series in h².
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A straight line through the fixed point of a loop, along which the maps are differentiated.
+
+    Parameters
+    ----------
+    loop : Loop
+        The maps.
+    direction : (k, n)
+        Change of the nodes for a step of 1.
+    pace : float
+        Change of P for a step of 1.
+    """
+
+    loop: Loop
+    direction: Real
+    pace: float = 0.0
+    _known: dict[float, tuple[Real, Real, Real]] = field(default_factory=dict, repr=False)
+
+    def differences(self, h: float) -> tuple[Real, Real, Real]:
+        """First and second derivatives of the Jacobians, and the first of ∂Φ/∂P.
+
+        Central differences with the step h, shapes (k, n, n), (k, n, n) and (k, n). Their errors
+        are series in h².
 
         Raises
         ------
         CoefficientError
             If the maps are not smooth within the step.
         """
-        ends = [
-            self.evaluate(self.nodes + step * direction, self.parameter + step * pace)
-            for step in (h, -h)
-        ]
-        if any(end[2] != self._here[2] for end in ends):
-            raise CoefficientError("a stop is touched or left within the step")
-        (first, first_by, _), (last, last_by, _) = ends
-        return (
-            (first - last) / (2.0 * h),
-            (first - 2.0 * self.jacobians + last) / h**2,
-            (first_by - last_by) / (2.0 * h),
-        )
+        if h not in self._known:
+            loop = self.loop
+            ends = [
+                loop.evaluate(loop.nodes + step * self.direction, loop.parameter + step * self.pace)
+                for step in (h, -h)
+            ]
+            if any(end[2] != loop.pattern for end in ends):
+                raise CoefficientError("a stop is touched or left within the step")
+            (first, first_by, _), (last, last_by, _) = ends
+            self._known[h] = (
+                (first - last) / (2.0 * h),
+                (first - 2.0 * loop.jacobians + last) / h**2,
+                (first_by - last_by) / (2.0 * h),
+            )
+        return self._known[h]
 
-    def first_step(self, *directions: tuple[Real, float]) -> float:
-        """Longest step, at most `LARGEST_STEP`, within which the maps stay smooth.
 
-        Halved until nothing is touched or left at its ends, and once more: the derivatives of the
-        map grow towards the place where a stop is touched.
+def estimated(value: Callable[[float], float], *lines: Line) -> Estimate:
+    """Limit for h → 0 of a value that is made of differences along lines.
 
-        Raises
-        ------
-        CoefficientError
-            If a stop is touched or left within `SMALLEST_STEP`.
-        """
-        h = LARGEST_STEP
-        while h > SMALLEST_STEP:
-            try:
-                for direction, pace in directions:
-                    self.differences(direction, pace, h)
-                return 0.5 * h if h < LARGEST_STEP else h
-            except CoefficientError:
-                h *= 0.5
-        raise CoefficientError(
-            "a contact begins, ends or grazes so close to a node that the flow map has no second "
-            "derivative of use"
-        )
+    The first step is at most `LARGEST_STEP`. It is shortened until nothing is touched or left at
+    the ends of any of the `STEPS` steps, and further: the derivatives of the maps grow towards the
+    place where a stop is touched.
+
+    Raises
+    ------
+    CoefficientError
+        If a stop is touched or left within `SMALLEST_STEP`.
+    """
+    h = LARGEST_STEP
+    while h > SMALLEST_STEP:
+        try:
+            for line in lines:
+                for i in range(STEPS):
+                    line.differences(h / RATIO**i)
+        except CoefficientError:
+            h /= RATIO
+            continue
+        return extrapolated(value, h if h == LARGEST_STEP else h / RATIO)
+    raise CoefficientError(
+        "a contact begins, ends or grazes so close by that the flow map has no second derivative "
+        "of use"
+    )
 
 
 def operator(jacobians: Real, mu: complex) -> Vectors:
@@ -349,12 +381,14 @@ def fold(loop: Loop) -> tuple[Coefficients, Real]:
     """
     q, y = loop.critical(1.0)
 
+    line = Line(loop, q)
+
     def quadratic(h: float) -> float:
-        return 0.5 * float(np.einsum("ji,jil,jl->", y, loop.differences(q, 0.0, h)[0], q))
+        return 0.5 * float(np.einsum("ji,jil,jl->", y, line.differences(h)[0], q))
 
     slope = float(np.sum(y * loop.by_parameter))
     known = Estimate(slope, 1e-8 * float(np.sum(np.abs(y * loop.by_parameter))))
-    return Coefficients(known, extrapolated(quadratic, loop.first_step((q, 0.0)))), q
+    return Coefficients(known, estimated(quadratic, line)), q
 
 
 def slope_of_multiplier(
@@ -362,13 +396,13 @@ def slope_of_multiplier(
 ) -> Estimate:
     """Derivative of ln|μ| along a direction (`tangent`, `pace`), divided by `pace`."""
     length = math.hypot(loop.size(tangent) / loop.scale, pace)
-    direction, rate = tangent / length, pace / length
+    line = Line(loop, tangent / length, pace / length)
 
     def derivative(h: float) -> float:
-        change = loop.differences(direction, rate, h)[0]
-        return float(np.einsum("ji,jil,jl->", y, change, q).real) / rate
+        change = line.differences(h)[0]
+        return float(np.einsum("ji,jil,jl->", y, change, q).real) / line.pace
 
-    return extrapolated(derivative, loop.first_step((direction, rate)))
+    return estimated(derivative, line)
 
 
 def flip(loop: Loop) -> tuple[Coefficients, Real]:
@@ -380,16 +414,17 @@ def flip(loop: Loop) -> tuple[Coefficients, Real]:
     Source: Kuznetsov (2004), section 5.4.2.
     """
     q, y = loop.critical(-1.0)
+    line = Line(loop, q)
 
     def cubic(h: float) -> float:
-        first, second, _ = loop.differences(q, 0.0, h)
+        first, second, _ = line.differences(h)
         bend = loop.solve(1.0, np.einsum("jil,jl->ji", first, q))
         terms = np.einsum("jil,jl->ji", second, q) + 3.0 * np.einsum("jil,jl->ji", first, bend)
         return -float(np.sum(y * terms)) / 6.0  # y ends at -1 times the adjoint vector
 
     tangent = loop.solve(1.0, loop.by_parameter)
     slope = slope_of_multiplier(loop, -1.0, q, y, tangent, 1.0)
-    return Coefficients(slope, extrapolated(cubic, loop.first_step((q, 0.0)))), q
+    return Coefficients(slope, estimated(cubic, line)), q
 
 
 def doubled_parameter(form: Coefficients) -> Estimate:
@@ -406,11 +441,11 @@ def torus(loop: Loop, mu: complex) -> Coefficients:
     """
     mu = mu / abs(mu)
     q, y = loop.critical(mu)
-    r, s = q.real, q.imag
+    r, s = Line(loop, q.real), Line(loop, q.imag)
 
     def cubic(h: float) -> float:
-        by_r, by_rr, _ = loop.differences(r, 0.0, h)
-        by_s, by_ss, _ = loop.differences(s, 0.0, h)
+        by_r, by_rr, _ = r.differences(h)
+        by_s, by_ss, _ = s.differences(h)
         by_q = by_r + 1j * by_s
         steady = loop.solve(1.0, np.einsum("jil,jl->ji", by_q, q.conj()).real)
         second = loop.solve(mu * mu, np.einsum("jil,jl->ji", by_q, q))
@@ -421,8 +456,7 @@ def torus(loop: Loop, mu: complex) -> Coefficients:
 
     tangent = loop.solve(1.0, loop.by_parameter)
     slope = slope_of_multiplier(loop, mu, q, y, tangent, 1.0)
-    step = loop.first_step((r, 0.0), (s, 0.0))
-    return Coefficients(slope, extrapolated(cubic, step))
+    return Coefficients(slope, estimated(cubic, r, s))
 
 
 @dataclass(frozen=True)
@@ -485,29 +519,29 @@ def crossing(loop: Loop) -> Crossing:
     q, y = loop.critical(1.0)
     v = loop.solve_beside(q, y, loop.by_parameter)
     length = math.hypot(loop.size(v) / loop.scale, 1.0)
-    direction, rate = v / length, 1.0 / length
+    along_q, along_v = Line(loop, q), Line(loop, v / length, 1.0 / length)
 
     def project(change: Real, x: Real) -> float:
         return float(np.einsum("ji,jil,jl->", y, change, x))
 
+    def twice_q(h: float) -> float:
+        return project(along_q.differences(h)[0], q)
+
+    def mixed(h: float) -> float:
+        return project(along_v.differences(h)[0], q) * length
+
+    def twice_v(h: float) -> float:
+        change, _, by_parameter = along_v.differences(h)
+        return (project(change, v) + float(np.sum(y * by_parameter))) * length
+
     def cubic(h: float) -> float:
-        first, second, _ = loop.differences(q, 0.0, h)
+        first, second, _ = along_q.differences(h)
         bend = loop.solve_beside(q, y, np.einsum("jil,jl->ji", first, q))
         return (project(second, q) + 3.0 * project(first, bend)) / 6.0
 
-    along_q = loop.first_step((q, 0.0))
-    along_v = loop.first_step((direction, rate))
-
-    def mixed(h: float) -> float:
-        return project(loop.differences(direction, rate, h)[0], q) / rate
-
-    def by_parameter(h: float) -> float:
-        change, _, change_by = loop.differences(direction, rate, h)
-        return (project(change, v) + float(np.sum(y * change_by))) / rate
-
     quadratic = (
-        extrapolated(lambda h: project(loop.differences(q, 0.0, h)[0], q), along_q),
-        extrapolated(mixed, along_v),
-        extrapolated(by_parameter, along_v),
+        estimated(twice_q, along_q),
+        estimated(mixed, along_v),
+        estimated(twice_v, along_v),
     )
-    return Crossing(q, v, quadratic, extrapolated(cubic, along_q))
+    return Crossing(q, v, quadratic, estimated(cubic, along_q))

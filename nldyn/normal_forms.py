@@ -146,7 +146,9 @@ def _fold(special: SpecialPoint, loop: Loop) -> NormalForm:
     else:
         growth = -form.nonlinear.value * displacement_along(special.orbit, q)
         which = f"the one of {'larger' if growth > 0.0 else 'smaller'} displacement is stable"
-    sentence = f"Fold at {hz}: two orbits exist {SIDES[side]} {hz}, none of the two {SIDES[-side]}; {which}."
+    sentence = (
+        f"Fold at {hz}: two orbits exist {SIDES[side]} {hz} and neither {SIDES[-side]} it; {which}."
+    )
     return NormalForm("fold", sentence, form.nonlinear, shift, side, not others)
 
 
@@ -294,7 +296,10 @@ def _transcritical(special: SpecialPoint, found: Crossing) -> NormalForm:
         if others
         else "the stable one becomes unstable and the other stable"
     )
-    sentence = f"Branch point at {hz}, transcritical: two branches cross, both go on to either side; {which}."
+    sentence = (
+        f"Branch point at {hz}, transcritical: two branches cross, each goes on to either side; "
+        f"{which}."
+    )
     return NormalForm("transcritical", sentence, found.quadratic[0], stable=not others)
 
 
