@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from nldyn.branch import Branch, BranchPoint, SpecialPoint
+    from nldyn.cascades import Cascade, cascade
     from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
     from nldyn.diagrams import Diagram, Seed, diagram
     from nldyn.elements import (
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from nldyn.errors import SceneError, SystemModelError
     from nldyn.flow import FlowMap, FlowOptions
     from nldyn.multipliers import Stability
+    from nldyn.normal_forms import NormalForm, describe, normal_form, switch_at_branch_point
     from nldyn.orbit import ConvergenceError, History, Orbit, solve_orbit
     from nldyn.parameters import Parameter
     from nldyn.search import SearchOptions, find_orbits
@@ -30,12 +32,14 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "branch": "Branch BranchPoint SpecialPoint",
+    "cascades": "Cascade cascade",
     "continuation": "ContinuationOptions Walk continue_branch switch_at_flip",
     "diagrams": "Diagram Seed diagram",
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
     "errors": "SceneError SystemModelError",
     "flow": "FlowMap FlowOptions",
     "multipliers": "Stability",
+    "normal_forms": "NormalForm describe normal_form switch_at_branch_point",
     "orbit": "ConvergenceError History Orbit solve_orbit",
     "parameters": "Parameter",
     "search": "SearchOptions find_orbits",
@@ -46,6 +50,7 @@ _HOMES = {
 __all__ = [
     "Branch",
     "BranchPoint",
+    "Cascade",
     "ContinuationOptions",
     "ConvergenceError",
     "Damper",
@@ -55,6 +60,7 @@ __all__ = [
     "HarmonicForce",
     "History",
     "LocateError",
+    "NormalForm",
     "Orbit",
     "Parameter",
     "SceneError",
@@ -67,12 +73,16 @@ __all__ = [
     "SystemModelError",
     "Unbalance",
     "Walk",
+    "cascade",
     "continue_branch",
+    "describe",
     "diagram",
     "dissipation_for",
     "find_orbits",
     "hertz_stiffness",
+    "normal_form",
     "solve_orbit",
+    "switch_at_branch_point",
     "switch_at_flip",
 ]
 

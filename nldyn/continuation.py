@@ -15,7 +15,14 @@ from nldyn.errors import SystemModelError, check_whole, is_finite, shown
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine
 from nldyn.shooting import ShootingProblem
-from nldyn.special import Chord, LocateError, hidden_dip, special_points_between, tests
+from nldyn.special import (
+    Chord,
+    LocateError,
+    hidden_dip,
+    special_points_between,
+    tests,
+    without_repeats,
+)
 from nldyn.system import numbers
 
 
@@ -382,6 +389,7 @@ def trace(
             more, lost = _by_halves(a, b, error)
             special += more
             notes += lost
+    special = without_repeats(special)
     if walk.stop_reason.startswith("joins"):  # the flip itself: a branch point of this branch
         special = [s for s in special if s.kind != "BP" or s.point.arclength < nodes[-2].arclength]
     return nodes, special, walk.stop_reason, notes

@@ -23,6 +23,7 @@ from nldyn.shooting import ShootingProblem
 
 LARGEST_STEP = 0.1  # in ξ, of the differences
 SMALLEST_STEP = 1e-7
+LOCATED = 1e-4  # of an orbit's size: branch points are located no better where branches turn
 RATIO = 1.6  # of successive steps
 STEPS = 8
 
@@ -298,20 +299,22 @@ def correct_across(
     return None
 
 
-def turns_at_crossing(orbit: Orbit, tolerance: float = 1e-4) -> bool:
+def turns_at_crossing(orbit: Orbit) -> bool:
     """Whether a branch that turns at an orbit crosses another one there, and is not folded.
 
     At a fold the equations' derivative with respect to P has a part that no change of the states
-    balances; where branches cross it has none. The part is compared with the whole. An orbit for
-    which this cannot be computed counts as a fold.
+    balances; where branches cross it has none. The part changes along the branch: it must vanish
+    within `LOCATED` of the orbit's size. An orbit for which this cannot be computed is a fold.
     """
     try:
         loop = loop_of(orbit)
-        _, y = loop.critical(1.0)
+        q, y = loop.critical(1.0)
+        part = abs(float(np.sum(y * loop.by_parameter)))
+        if part > 1e-3 * float(np.linalg.norm(y) * np.linalg.norm(loop.by_parameter)):
+            return False  # a plain fold, at no further cost
+        return part < LOCATED * abs(mixed_derivative(loop, q, y).value)
     except CoefficientError:
         return False
-    whole = float(np.linalg.norm(y) * np.linalg.norm(loop.by_parameter))
-    return abs(float(np.sum(y * loop.by_parameter))) < tolerance * whole
 
 
 def extrapolated(value: Callable[[float], float], first: float) -> Estimate:
@@ -391,12 +394,10 @@ def fold(loop: Loop) -> tuple[Coefficients, Real]:
     return Coefficients(known, estimated(quadratic, line)), q
 
 
-def slope_of_multiplier(
-    loop: Loop, mu: complex, q: Vectors, y: Vectors, tangent: Real, pace: float
-) -> Estimate:
-    """Derivative of ln|μ| along a direction (`tangent`, `pace`), divided by `pace`."""
-    length = math.hypot(loop.size(tangent) / loop.scale, pace)
-    line = Line(loop, tangent / length, pace / length)
+def slope_of_multiplier(loop: Loop, q: Vectors, y: Vectors, tangent: Real) -> Estimate:
+    """Derivative of ln|μ| by P along the direction (`tangent`, 1)."""
+    length = math.hypot(loop.size(tangent) / loop.scale, 1.0)
+    line = Line(loop, tangent / length, 1.0 / length)
 
     def derivative(h: float) -> float:
         change = line.differences(h)[0]
@@ -423,7 +424,7 @@ def flip(loop: Loop) -> tuple[Coefficients, Real]:
         return -float(np.sum(y * terms)) / 6.0  # y ends at -1 times the adjoint vector
 
     tangent = loop.solve(1.0, loop.by_parameter)
-    slope = slope_of_multiplier(loop, -1.0, q, y, tangent, 1.0)
+    slope = slope_of_multiplier(loop, q, y, tangent)
     return Coefficients(slope, estimated(cubic, line)), q
 
 
@@ -455,7 +456,7 @@ def torus(loop: Loop, mu: complex) -> Coefficients:
         return 0.5 * float(np.sum(y * terms).real)
 
     tangent = loop.solve(1.0, loop.by_parameter)
-    slope = slope_of_multiplier(loop, mu, q, y, tangent, 1.0)
+    slope = slope_of_multiplier(loop, q, y, tangent)
     return Coefficients(slope, estimated(cubic, r, s))
 
 
@@ -483,9 +484,13 @@ class Crossing:
 
     @property
     def is_pitchfork(self) -> bool:
-        """Whether one of the branches has the tangent (q, 0): its other half has the same P."""
-        aa, ab, _ = self.quadratic
-        return abs(aa.value) <= max(3.0 * aa.error, 1e-3 * abs(ab.value))
+        """Whether one of the branches has the tangent (q, 0): its other half has the same P.
+
+        So it is if the first coefficient vanishes within its error, or within what a shift of the
+        orbit by `LOCATED` of its size would do.
+        """
+        aa = self.quadratic[0]
+        return abs(aa.value) <= max(3.0 * aa.error, 6.0 * LOCATED * abs(self.cubic.value))
 
     @property
     def pitchfork(self) -> Coefficients:
@@ -505,6 +510,12 @@ class Crossing:
             far = -(ab + math.copysign(math.sqrt(inner), ab))
             pairs = [(far, aa), (bb, far)]
         return tuple((a / math.hypot(a, b), b / math.hypot(a, b)) for a, b in pairs)
+
+
+def mixed_derivative(loop: Loop, q: Real, y: Real) -> Estimate:
+    """⟨y, G'' (q, 0) (v, 1)⟩ with the v of `Crossing`."""
+    v = loop.solve_beside(q, y, loop.by_parameter)
+    return slope_of_multiplier(loop, q, y, v)
 
 
 def crossing(loop: Loop) -> Crossing:
@@ -527,9 +538,6 @@ def crossing(loop: Loop) -> Crossing:
     def twice_q(h: float) -> float:
         return project(along_q.differences(h)[0], q)
 
-    def mixed(h: float) -> float:
-        return project(along_v.differences(h)[0], q) * length
-
     def twice_v(h: float) -> float:
         change, _, by_parameter = along_v.differences(h)
         return (project(change, v) + float(np.sum(y * by_parameter))) * length
@@ -541,7 +549,7 @@ def crossing(loop: Loop) -> Crossing:
 
     quadratic = (
         estimated(twice_q, along_q),
-        estimated(mixed, along_v),
+        mixed_derivative(loop, q, y),
         estimated(twice_v, along_v),
     )
     return Crossing(q, v, quadratic, estimated(cubic, along_q))

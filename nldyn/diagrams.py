@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from nldyn.branch import Branch, SpecialPoint
+from nldyn.branch import CLOSED, Branch, BranchPoint, SpecialPoint
 from nldyn.continuation import (
     ContinuationOptions,
     check_range,
@@ -23,6 +23,7 @@ from nldyn.continuation import (
 from nldyn.errors import SystemModelError, check_frequency, check_whole
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
+from nldyn.normal_forms import switch_at_branch_point
 from nldyn.orbit import ConvergenceError, Orbit, check_observe
 from nldyn.search import SearchOptions, Strobe, orbits_from_strobe, reach, simulate_strobe
 from nldyn.special import LocateError
@@ -91,6 +92,7 @@ class _Collector:
     branches: list[Branch] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     flip_ends: list[Orbit] = field(default_factory=list)
+    crossings: list[SpecialPoint] = field(default_factory=list)
 
     def known(self, orbit: Orbit) -> bool:
         return any(branch.contains(orbit) for branch in self.branches)
@@ -136,17 +138,35 @@ class _Collector:
         except LocateError as error:
             self.notes.append(str(error))
             return
+        branch = self.from_start(start, f"born at the flip at {special.frequency_hz:.6g} Hz")
+        if branch is not None and branch.stop_reasons[1].startswith("joins"):
+            self.flip_ends.append(branch.nodes[-1].orbit)
+
+    def from_branch_point(self, special: SpecialPoint) -> None:
+        """Follow the other branch through a branch point both ways, unless it is known."""
+        if any(_is_same_crossing(special, other) for other in self.crossings):
+            return
+        self.crossings.append(special)
+        try:
+            starts = switch_at_branch_point(special)
+        except LocateError as error:
+            self.notes.append(str(error))
+            return
+        for start in starts:
+            self.from_start(start, f"from the branch point at {special.frequency_hz:.6g} Hz")
+
+    def from_start(self, start: BranchPoint, origin: str) -> Branch | None:
+        """Follow a branch from its first point one way, unless it is known or out of range."""
         low, high = self.range_hz
         if not low < start.orbit.frequency_hz < high or self.known(start.orbit):
-            return
+            return None
         progress = partial(self.progress, f"1/{start.orbit.period}")
         nodes, specials, reason, notes = trace(
             start, self.range_hz, self.options, progress, self.open_ends(start.orbit.period)
         )
-        origin = f"born at the flip at {special.frequency_hz:.6g} Hz"
-        self.add(make_branch("", nodes, specials, (origin, reason), notes))
-        if reason.startswith("joins"):
-            self.flip_ends.append(nodes[-1].orbit)
+        reasons = (reason, reason) if reason == CLOSED else (origin, reason)
+        self.add(make_branch("", nodes, specials, reasons, notes))
+        return self.branches[-1]
 
 
 def _is_at(end: Orbit, special: SpecialPoint) -> bool:
@@ -156,6 +176,15 @@ def _is_at(end: Orbit, special: SpecialPoint) -> bool:
         end.period == 2 * flip.period
         and math.isclose(end.frequency_hz, flip.frequency_hz, rel_tol=2e-3)
         and math.isclose(end.max_abs_displacement, flip.max_abs_displacement, rel_tol=2e-2)
+    )
+
+
+def _is_same_crossing(a: SpecialPoint, b: SpecialPoint) -> bool:
+    """Whether two branch points, found on the two branches that cross there, are one."""
+    return (
+        a.orbit.period == b.orbit.period
+        and math.isclose(a.frequency_hz, b.frequency_hz, rel_tol=1e-6)
+        and math.isclose(a.orbit.max_abs_displacement, b.orbit.max_abs_displacement, rel_tol=1e-3)
     )
 
 
@@ -176,9 +205,10 @@ def diagram(
 
     Orbits of each period are looked for by simulation at `search_points` frequencies and at the
     seeds, continued in both directions, and at each flip the doubled branch is followed when its
-    period is wanted. If the stops are open at rest and no orbit found touches one, the search is
-    repeated once with four times as many initial states. What no simulation comes near (isolas of
-    unstable orbits, say) is missed.
+    period is wanted. At a branch point the other branch is followed both ways; where a symmetry
+    breaks, these are its two halves. If the stops are open at rest and no orbit found touches one,
+    the search is repeated once with four times as many initial states. What no simulation comes
+    near (isolas of unstable orbits, say) is missed.
 
     Parameters
     ----------
@@ -240,7 +270,9 @@ def diagram(
         _search(box, places, wanted, more)
     for seed in seeds:
         _follow_seed(box, seed, effort)
+    _follow_branch_points(box)
     _follow_flips_of_new(box, wanted, doublings)
+    _follow_branch_points(box)
     for period in wanted:
         if not any(branch.period == period for branch in box.branches):
             tried = f"{search_points} frequenc{'y' if search_points == 1 else 'ies'}"
@@ -304,6 +336,14 @@ def _follow_flips(box: _Collector, branches: Sequence[Branch]) -> None:
         for special in branch.special_points:
             if special.kind == "PD":
                 box.from_flip(special)
+
+
+def _follow_branch_points(box: _Collector) -> None:
+    """Branches that cross those found, and those that cross these."""
+    for branch in box.branches:  # which grow
+        for special in branch.special_points:
+            if special.kind == "BP":
+                box.from_branch_point(special)
 
 
 def _follow_flips_of_new(box: _Collector, wanted: Sequence[int], doublings: int) -> None:

@@ -42,6 +42,11 @@ SPECIAL_COLUMNS = (
     "frequency_hz",
     "max_abs_displacement_m",
     "impacts",
+    "normal_form",
+    "coefficient",
+    "coefficient_error",
+    "relative_shift",
+    "meaning",
 )
 
 
@@ -141,10 +146,14 @@ def at_end(frequency_hz: float, range_hz: tuple[float, float]) -> float:
 
 
 def special_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
-    """Give the rows of ``special_points.csv``, branch by branch."""
+    """Give the rows of ``special_points.csv``, branch by branch; the normal forms take time."""
+    from nldyn.normal_forms import normal_form
+
     for branch in diagram.branches:
         for point in branch.special_points:
             orbit = point.orbit
+            form = normal_form(point, branch.special_points)
+            coefficient, shift = form.coefficient, form.frequency_shift
             yield (
                 branch.name,
                 orbit.period,
@@ -152,6 +161,11 @@ def special_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
                 float(orbit.frequency_hz),
                 float(orbit.max_abs_displacement),
                 int(orbit.impacts),
+                form.name,
+                None if coefficient is None else if_known(coefficient.value),
+                None if coefficient is None else if_known(coefficient.error),
+                None if shift is None else if_known(shift.value),
+                form.sentence,
             )
 
 

@@ -25,6 +25,7 @@ from nldyn.orbit import Orbit
 
 PRECISION = 1e-9  # in σ, to which a special point is located
 CROSSING_ERROR = 1e-8  # relative, of an orbit where branches cross
+REPEAT = 1e-7  # arclength between two branch points that are one
 STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
 
 
@@ -222,8 +223,7 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
         )
     found = [locate(k, chord, lambda point, k=k: tests(point)[k]) for k in kinds]  # type: ignore[misc]
     found = [s for s in found if s.kind != "NS" or _on_unit_circle(s.orbit.multipliers)]
-    if lonely_fold:
-        found = [_crossing_or_fold(s) for s in found]
+    found = [_crossing_or_fold(s) for s in found]
     if contacts and touches:
         found.append(locate("GR", chord, touches[0].depth))
     found.sort(key=lambda s: s.point.arclength, reverse=bool(b.arclength < a.arclength))
@@ -235,8 +235,22 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
     return found
 
 
+def without_repeats(found: list[SpecialPoint]) -> list[SpecialPoint]:
+    """Branch points within rounding of the one before are that one.
+
+    A branch that turns where it meets another one has a multiplier that touches 1 there without
+    passing it, so that rounding decides how often its test changes sign.
+    """
+    kept: list[SpecialPoint] = []
+    for special in found:
+        again = kept and special.kind == kept[-1].kind == "BP"
+        if not again or abs(special.point.arclength - kept[-1].point.arclength) > REPEAT:
+            kept.append(special)
+    return kept
+
+
 def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
-    """A fold at which no multiplier changes sides may be where this branch crosses another one.
+    """What looks like a fold may be where this branch crosses another one.
 
     So a branch of broken symmetry turns at the branch point that its two halves share.
     """
