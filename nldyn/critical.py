@@ -321,8 +321,9 @@ def extrapolated(value: Callable[[float], float], first: float) -> Estimate:
     """Limit for h → 0 of a value whose error is a series in h², with its error.
 
     Richardson's extrapolation over falling steps: long steps suffer from the series, short ones
-    from rounding; of all entries of the table the one is taken that differs least from its
-    neighbours (Ridders 1982), and that difference is the error.
+    from rounding. Of all entries of the table the one is taken that differs least from the two that
+    it was made of (Ridders 1982). Such a difference may be small by chance: the error is the
+    largest distance to the four next best entries.
 
     Examples
     --------
@@ -331,18 +332,17 @@ def extrapolated(value: Callable[[float], float], first: float) -> Estimate:
     >>> abs(found.value - 1.0) <= found.error < 1e-10
     True
     """
-    best = Estimate(math.nan, math.inf)
+    entries: list[tuple[float, float]] = []
     above: list[float] = []
     for i in range(STEPS):
         row = [value(first / RATIO**i)]
         for j, coarser in enumerate(above):
             power = RATIO ** (2 * (j + 1))
             row.append(row[j] + (row[j] - coarser) / (power - 1.0))
-            error = max(abs(row[-1] - row[j]), abs(row[-1] - coarser))
-            if error < best.error:
-                best = Estimate(row[-1], error)
+            entries.append((max(abs(row[-1] - row[j]), abs(row[-1] - coarser)), row[-1]))
         above = row
-    return best
+    (error, best), *others = sorted(entries)[:5]
+    return Estimate(best, max(error, *(abs(best - other) for _, other in others)))
 
 
 def _ratio(top: Estimate, bottom: Estimate) -> Estimate:

@@ -25,7 +25,7 @@ from nldyn.orbit import Orbit
 
 PRECISION = 1e-9  # in σ, to which a special point is located
 CROSSING_ERROR = 1e-8  # relative, of an orbit where branches cross
-REPEAT = 1e-7  # arclength between two branch points that are one
+NEIGHBOUR = 1e-3  # arclength between two branch points at one turn
 STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
 
 
@@ -236,17 +236,31 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
 
 
 def without_repeats(found: list[SpecialPoint]) -> list[SpecialPoint]:
-    """Branch points within rounding of the one before are that one.
+    """Of neighbouring branch points where one branch turns, only the one nearest to the turn.
 
     A branch that turns where it meets another one has a multiplier that touches 1 there without
-    passing it, so that rounding decides how often its test changes sign.
+    passing it, so that rounding decides how often the branch point's test changes sign.
     """
     kept: list[SpecialPoint] = []
     for special in found:
-        again = kept and special.kind == kept[-1].kind == "BP"
-        if not again or abs(special.point.arclength - kept[-1].point.arclength) > REPEAT:
+        if kept and _turns_twice(kept[-1], special):
+            kept[-1] = min(kept[-1], special, key=_pace)
+        else:
             kept.append(special)
     return kept
+
+
+def _turns_twice(a: SpecialPoint, b: SpecialPoint) -> bool:
+    return (
+        a.kind == b.kind == "BP"
+        and abs(a.point.arclength - b.point.arclength) < NEIGHBOUR
+        and max(_pace(a), _pace(b)) < NEIGHBOUR
+    )
+
+
+def _pace(special: SpecialPoint) -> float:
+    """How fast the frequency changes along the branch."""
+    return abs(float(special.point.tangent[-1]))
 
 
 def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
