@@ -26,6 +26,7 @@ SMALLEST_STEP = 1e-7
 LOCATED = 1e-4  # of an orbit's size: branch points are located no better where branches turn
 RATIO = 1.6  # of successive steps
 STEPS = 8
+LEAST_ERROR = 1e-8  # relative, of a coefficient: special points are located no better
 
 Evaluation = tuple[Real, Real, Hashable]
 Vectors = NDArray[Any]  # real or complex
@@ -193,7 +194,7 @@ def estimated(value: Callable[[float], float], *lines: Line) -> Estimate:
 
     The first step is at most `LARGEST_STEP`. It is shortened until nothing is touched or left at
     the ends of any of the `STEPS` steps, and further: the derivatives of the maps grow towards the
-    place where a stop is touched.
+    place where a stop is touched. The error is at least `LEAST_ERROR` of the value.
 
     Raises
     ------
@@ -209,7 +210,8 @@ def estimated(value: Callable[[float], float], *lines: Line) -> Estimate:
         except CoefficientError:
             h /= RATIO
             continue
-        return extrapolated(value, h if h == LARGEST_STEP else h / RATIO)
+        found = extrapolated(value, h if h == LARGEST_STEP else h / RATIO)
+        return Estimate(found.value, found.error + LEAST_ERROR * abs(found.value))
     raise CoefficientError(
         "a contact begins, ends or grazes so close by that the flow map has no second derivative "
         "of use"
