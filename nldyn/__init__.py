@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from nldyn.branch import Branch, BranchPoint, SpecialPoint
-    from nldyn.cascades import Cascade, cascade
+    from nldyn.cascades import Cascade, cascade, cascades_in
     from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
     from nldyn.diagrams import Diagram, Seed, diagram
     from nldyn.elements import (
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "branch": "Branch BranchPoint SpecialPoint",
-    "cascades": "Cascade cascade",
+    "cascades": "Cascade cascade cascades_in",
     "continuation": "ContinuationOptions Walk continue_branch switch_at_flip",
     "diagrams": "Diagram Seed diagram",
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
@@ -74,6 +74,7 @@ __all__ = [
     "Unbalance",
     "Walk",
     "cascade",
+    "cascades_in",
     "continue_branch",
     "describe",
     "diagram",

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from nldyn.branch import Branch, BranchPoint, SpecialPoint
 from nldyn.continuation import (
+    BORN,
     ContinuationOptions,
     Walk,
+    born_at,
     check_range,
     make_branch,
     switch_at_flip,
@@ -146,6 +150,52 @@ def cascade(
     return Cascade(tuple(flips), tuple(branches), reason)
 
 
+def cascades_in(branches: Sequence[Branch]) -> list[Cascade]:
+    """Cascades of at least three flips among branches that `nldyn.diagram` has found.
+
+    Parameters
+    ----------
+    branches : sequence of Branch
+        Those of a diagram with several doublings.
+
+    Returns
+    -------
+    list of Cascade
+        Each from the flip of an orbit that is not itself born at a flip.
+    """
+    origins = {branch.stop_reasons[0]: branch for branch in branches}
+    found = []
+    for branch in branches:
+        if branch.stop_reasons[0].startswith(BORN):
+            continue
+        for first in branch.special_points:
+            if first.kind == "PD":
+                flips, grown = [first], list[Branch]()
+                child = origins.get(born_at(first))
+                while child is not None and child.period == 2 * flips[-1].orbit.period:
+                    grown.append(child)
+                    following = _loss_of_stability(child)
+                    if following is None:
+                        break
+                    flips.append(following)
+                    child = origins.get(born_at(following))
+                if len(flips) > 2:
+                    found.append(Cascade(tuple(flips), tuple(grown), "no further branch"))
+    return found
+
+
+def _loss_of_stability(branch: Branch) -> SpecialPoint | None:
+    """The flip at which a branch, followed from where it was born, loses its stability."""
+    lengths = [node.arclength for node in branch.nodes]
+    stable = [node.orbit.stable for node in branch.nodes]
+    for special in branch.special_points:
+        after = int(np.searchsorted(lengths, special.point.arclength))
+        inside = special.kind == "PD" and 0 < after < len(stable)
+        if inside and stable[after - 1] and not stable[after]:
+            return special
+    return None
+
+
 def _up_to_flip(
     flips: list[SpecialPoint], window: tuple[float, float], options: ContinuationOptions
 ) -> tuple[Branch, SpecialPoint | None]:
@@ -163,9 +213,8 @@ def _up_to_flip(
         nodes.append(point)
         if following is not None:
             break
-    origin = f"born at the flip at {flips[-1].frequency_hz:.6g} Hz"
     reason = walk.stop_reason if following is None else "a flip"
-    return make_branch("", nodes, specials, (origin, reason), []), following
+    return make_branch("", nodes, specials, (born_at(flips[-1]), reason), []), following
 
 
 def _with_special_points(walk: Walk) -> Iterator[tuple[BranchPoint, list[SpecialPoint]]]:

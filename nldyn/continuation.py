@@ -25,6 +25,8 @@ from nldyn.special import (
 )
 from nldyn.system import numbers
 
+BORN = "born at the flip at"
+
 
 @dataclass(frozen=True)
 class ContinuationOptions:
@@ -532,6 +534,11 @@ def check_range(range_hz: tuple[float, float]) -> tuple[float, float]:
 
 def _reversed(point: BranchPoint) -> BranchPoint:
     return BranchPoint(point.orbit, -point.tangent, -point.arclength)
+
+
+def born_at(flip: SpecialPoint) -> str:
+    """Where a doubled branch begins, in place of why its continuation stopped there."""
+    return f"{BORN} {flip.frequency_hz:.6g} Hz"
 
 
 def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoint:

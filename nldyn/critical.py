@@ -526,8 +526,7 @@ def crossing(loop: Loop) -> Crossing:
     With the null vectors (q, 0) and (v, 1) of the equations and the left vector y it says
     ⟨y, G''(αq + βv, β)²⟩ = 0.
 
-    Source: H. B. Keller (1977), section 4 (the algebraic bifurcation equation); Kuznetsov (2004),
-    section 7.4.1, for the pitchfork of a symmetric map.
+    Source: H. B. Keller (1977), the algebraic bifurcation equation; the pitchfork as for a flip.
     """
     q, y = loop.critical(1.0)
     v = loop.solve_beside(q, y, loop.by_parameter)

@@ -13,6 +13,7 @@ import numpy as np
 from nldyn.branch import CLOSED, Branch, BranchPoint, SpecialPoint
 from nldyn.continuation import (
     ContinuationOptions,
+    born_at,
     check_range,
     continue_branch,
     make_branch,
@@ -138,7 +139,7 @@ class _Collector:
         except LocateError as error:
             self.notes.append(str(error))
             return
-        branch = self.from_start(start, f"born at the flip at {special.frequency_hz:.6g} Hz")
+        branch = self.from_start(start, born_at(special))
         if branch is not None and branch.stop_reasons[1].startswith("joins"):
             self.flip_ends.append(branch.nodes[-1].orbit)
 

@@ -18,6 +18,7 @@ from nldyn.version import software_version
 
 if TYPE_CHECKING:
     from nldyn.branch import Branch
+    from nldyn.cascades import Cascade
     from nldyn.diagrams import Diagram
     from nldyn.scene_schema import Scene
 
@@ -179,6 +180,8 @@ def write_table(path: Path, columns: Iterable[str], rows: Iterable[Iterable[obje
 
 def summary(diagram: Diagram) -> Mapping[str, object]:
     """Say what was computed and how exactly, as plain numbers for ``summary.json``."""
+    from nldyn.cascades import cascades_in
+
     orbits = [orbit for branch in diagram.branches for orbit in branch.points]
     return {
         "software": f"nldyn {software_version()}",
@@ -188,6 +191,15 @@ def summary(diagram: Diagram) -> Mapping[str, object]:
         "stability_undecided": sum(orbit.stability.verdict == "undecided" for orbit in orbits),
         "notes": list(diagram.notes),
         "branches": [_branch_summary(branch, diagram.range_hz) for branch in diagram.branches],
+        "cascades": [_cascade_summary(cascade) for cascade in cascades_in(diagram.branches)],
+    }
+
+
+def _cascade_summary(cascade: Cascade) -> dict[str, object]:
+    return {
+        "periods": [flip.orbit.period for flip in cascade.flips],
+        "flips_hz": [float(flip.frequency_hz) for flip in cascade.flips],
+        "ratios": [float(ratio.value) for ratio in cascade.ratios],
     }
 
 

@@ -19,6 +19,7 @@ from nldyn import (
     SystemModelError,
     Unbalance,
     cascade,
+    cascades_in,
     continue_branch,
     describe,
     diagram,
@@ -101,7 +102,7 @@ def test_flip_of_the_henon_map(b):
 
 
 def test_torus_of_the_delayed_logistic_map():
-    """Kuznetsov (2004), example 4.2: θ = π/3 and a(0) = -2 for |q|² = 2, at r = 2."""
+    """Kuznetsov (2004), chapter 4: at r = 2 θ = π/3 and a(0) = -2 for |q|² = 2."""
 
     def delayed(x, r):
         return [[r * (1.0 - x[1]), -r * x[0]], [1.0, 0.0]], [x[0] * (1.0 - x[1]), 0.0]
@@ -118,7 +119,7 @@ def test_torus_of_the_delayed_logistic_map():
     st.floats(-1.0, 1.0), st.floats(-1.0, 1.0),
 )  # fmt: skip
 def test_torus_of_a_polynomial_map(theta, a20, a11, a02, c, d):
-    """z' = e^{iθ}z + ½g20 z² + g11 z z̄ + ½g02 z̄² + (c + id) z² z̄: Kuznetsov's equation 4.20."""
+    """z' = e^{iθ}z + ½g20 z² + g11 z z̄ + ½g02 z̄² + (c + id) z² z̄ [Kuznetsov 2004, ch. 4]."""
     if min(abs(theta - angle) for angle in (math.pi / 2, 2 * math.pi / 3)) < 0.1:
         return
     mu = cmath.exp(1j * theta)
@@ -594,6 +595,19 @@ def test_flips_of_a_cascade_are_those_of_the_diagram():
     _, special, *_ = trace(switch_at_flip(of_kind(branch, "PD")[0]), (33.0, 35.0))
     first = next(s for s in special if s.kind == "PD")
     assert found.flips[1].frequency_hz == pytest.approx(first.frequency_hz, rel=1e-9)
+
+
+def test_diagram_with_doublings_holds_the_cascade():
+    system = make_one_dof()
+    found = diagram(system, (33.0, 35.5), [1], search_points=1, doublings=3)
+    (picked,) = cascades_in(found.branches)
+    assert [s.orbit.period for s in picked.flips] == [1, 2, 4, 8]
+    alone = cascade(picked.flips[0], 3)
+    for a, b in zip(picked.flips, alone.flips, strict=True):
+        assert a.frequency_hz == pytest.approx(b.frequency_hz, rel=1e-8)
+    ratios = [ratio.value for ratio in picked.ratios]
+    assert ratios == pytest.approx([ratio.value for ratio in alone.ratios], rel=1e-4)
+    assert [branch.period for branch in picked.branches] == [2, 4, 8]
 
 
 def test_cascade_ends_where_the_doubled_branch_comes_back():

@@ -79,6 +79,7 @@ def test_summary(tmp_path):
     assert summary["largest_relative_error"] == 1e-14
     assert summary["largest_liouville_error"] == 1e-12
     assert summary["stability_undecided"] == 0
+    assert summary["cascades"] == []
     assert [b["stop_reason"] for b in summary["branches"]] == ["end of range"] * 3
 
 
