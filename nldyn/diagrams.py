@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from nldyn.branch import CLOSED, Branch, BranchPoint, SpecialPoint
+from nldyn.branch import CLOSED, Branch, BranchPoint, SpecialPoint, stroboscopic
 from nldyn.continuation import (
     ContinuationOptions,
     born_at,
@@ -176,7 +176,7 @@ def _is_at(end: Orbit, special: SpecialPoint) -> bool:
     return (
         end.period == 2 * flip.period
         and math.isclose(end.frequency_hz, flip.frequency_hz, rel_tol=2e-3)
-        and math.isclose(end.max_abs_displacement, flip.max_abs_displacement, rel_tol=2e-2)
+        and _alike(end, flip, 2e-2)
     )
 
 
@@ -185,7 +185,21 @@ def _is_same_crossing(a: SpecialPoint, b: SpecialPoint) -> bool:
     return (
         a.orbit.period == b.orbit.period
         and math.isclose(a.frequency_hz, b.frequency_hz, rel_tol=1e-6)
-        and math.isclose(a.orbit.max_abs_displacement, b.orbit.max_abs_displacement, rel_tol=1e-3)
+        and _alike(a.orbit, b.orbit, 1e-3)
+    )
+
+
+def _alike(a: Orbit, b: Orbit, rtol: float) -> bool:
+    """Whether the states of two orbits agree once a period, up to a shift; mirror images do not.
+
+    The period of the first is a multiple of that of the second.
+    """
+    first, second = stroboscopic(a), stroboscopic(b)
+    second = np.tile(second, (len(first) // len(second), 1))
+    size = rtol * float(np.abs(second).max())
+    return any(
+        float(np.abs(first - np.roll(second, shift, axis=0)).max()) <= size
+        for shift in range(b.period)
     )
 
 
