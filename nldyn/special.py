@@ -25,7 +25,8 @@ from nldyn.orbit import Orbit
 
 PRECISION = 1e-9  # in σ, to which a special point is located
 CROSSING_ERROR = 1e-8  # relative, of an orbit where branches cross
-NEIGHBOUR = 1e-3  # arclength between two branch points at one turn
+NEIGHBOUR = 1e-3  # arclength between two branch points at one turn, and dP/ds there
+SAME = 1e-7  # arclength between two branch points that cannot be told apart
 STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
 
 
@@ -251,11 +252,9 @@ def without_repeats(found: list[SpecialPoint]) -> list[SpecialPoint]:
 
 
 def _turns_twice(a: SpecialPoint, b: SpecialPoint) -> bool:
-    return (
-        a.kind == b.kind == "BP"
-        and abs(a.point.arclength - b.point.arclength) < NEIGHBOUR
-        and max(_pace(a), _pace(b)) < NEIGHBOUR
-    )
+    apart = abs(a.point.arclength - b.point.arclength)
+    turning = apart < NEIGHBOUR and max(_pace(a), _pace(b)) < NEIGHBOUR
+    return a.kind == b.kind == "BP" and (turning or apart < SAME)
 
 
 def _pace(special: SpecialPoint) -> float:

@@ -421,7 +421,7 @@ def test_symmetry_breaks_at_the_same_frequencies_on_both_branches(symmetric_bran
     assert all(is_symmetric(orbit) for orbit in symmetric_branch.points)
     assert not any(is_symmetric(orbit, 1e-6) for orbit in broken_branch.points)
     symmetric, broken = (
-        sorted({round(s.frequency_hz, 7) for s in of_kind(b, "BP")})
+        sorted(round(s.frequency_hz, 7) for s in of_kind(b, "BP"))
         for b in (symmetric_branch, broken_branch)
     )
     assert len(broken) == 2
