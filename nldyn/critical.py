@@ -26,6 +26,7 @@ SMALLEST_STEP = 1e-7
 LOCATED = 1e-4  # of an orbit's size: branch points are located no better where branches turn
 RATIO = 1.6  # of successive steps
 STEPS = 8
+ENOUGH = 1e-6  # relative error of a coefficient that needs no more steps
 LEAST_ERROR = 1e-8  # relative, of a coefficient: special points are located no better
 
 Evaluation = tuple[Real, Real, Hashable]
@@ -193,8 +194,8 @@ def estimated(value: Callable[[float], float], *lines: Line) -> Estimate:
     """Limit for h → 0 of a value that is made of differences along lines.
 
     The first step is at most `LARGEST_STEP`. It is shortened until nothing is touched or left at
-    the ends of any of the `STEPS` steps, and further: the derivatives of the maps grow towards the
-    place where a stop is touched. The error is at least `LEAST_ERROR` of the value.
+    the ends of any step, and further: the derivatives of the maps grow towards the place where a
+    stop is touched. The error is at least `LEAST_ERROR` of the value.
 
     Raises
     ------
@@ -203,14 +204,14 @@ def estimated(value: Callable[[float], float], *lines: Line) -> Estimate:
     """
     h = LARGEST_STEP
     while h > SMALLEST_STEP:
+        first = h if h == LARGEST_STEP else h / RATIO
         try:
             for line in lines:
-                for i in range(STEPS):
-                    line.differences(h / RATIO**i)
+                line.differences(h)
+            found = extrapolated(value, first)
         except CoefficientError:
             h /= RATIO
             continue
-        found = extrapolated(value, h if h == LARGEST_STEP else h / RATIO)
         return Estimate(found.value, found.error + LEAST_ERROR * abs(found.value))
     raise CoefficientError(
         "a contact begins, ends or grazes so close by that the flow map has no second derivative "
@@ -325,17 +326,18 @@ def extrapolated(value: Callable[[float], float], first: float) -> Estimate:
     Richardson's extrapolation over falling steps: long steps suffer from the series, short ones
     from rounding. Of all entries of the table the one is taken that differs least from the two that
     it was made of (Ridders 1982). Such a difference may be small by chance: the error is the
-    largest distance to the four next best entries.
+    largest distance to the four next best entries. Steps end once the error is below `ENOUGH`.
 
     Examples
     --------
     >>> import math
     >>> found = extrapolated(lambda h: (math.exp(h) - math.exp(-h)) / (2 * h), 0.5)
-    >>> abs(found.value - 1.0) <= found.error < 1e-10
+    >>> abs(found.value - 1.0) <= found.error < 1e-6
     True
     """
     entries: list[tuple[float, float]] = []
     above: list[float] = []
+    found = Estimate(math.nan, math.inf)
     for i in range(STEPS):
         row = [value(first / RATIO**i)]
         for j, coarser in enumerate(above):
@@ -343,8 +345,13 @@ def extrapolated(value: Callable[[float], float], first: float) -> Estimate:
             row.append(row[j] + (row[j] - coarser) / (power - 1.0))
             entries.append((max(abs(row[-1] - row[j]), abs(row[-1] - coarser)), row[-1]))
         above = row
-    (error, best), *others = sorted(entries)[:5]
-    return Estimate(best, max(error, *(abs(best - other) for _, other in others)))
+        if len(entries) < 5:
+            continue
+        (error, best), *others = sorted(entries)[:5]
+        found = Estimate(best, max(error, *(abs(best - other) for _, other in others)))
+        if found.error < ENOUGH * abs(best):
+            break
+    return found
 
 
 def _ratio(top: Estimate, bottom: Estimate) -> Estimate:

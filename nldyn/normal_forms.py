@@ -33,6 +33,7 @@ from nldyn.special import LocateError
 CLOSE = 1e-3  # relative distance in frequency of a special point that counts as close
 NEAR_RESONANCE_DEG = 5.0
 SIDES = {1: "above", -1: "below"}
+LOST = "the coefficient is lost in its error"
 NUMBERS = {1: "one", 2: "two", 3: "three"}
 
 
@@ -138,7 +139,7 @@ def _fold(special: SpecialPoint, loop: Loop) -> NormalForm:
     shift = form.parameter
     side, hz = shift.sign, _hz(special)
     if not side:
-        sentence = f"Fold at {hz}: on which side the two orbits exist cannot be told."
+        sentence = f"Fold at {hz}: on which side the two orbits exist cannot be told, {LOST}."
         return NormalForm("fold", sentence, form.nonlinear, shift)
     others = others_outside(special)
     if others:
@@ -186,7 +187,7 @@ def _flip(special: SpecialPoint, loop: Loop) -> NormalForm:
     hz, sign, side = _hz(special), form.nonlinear.sign, shift.sign
     title = f"Flip at {hz}"
     if not (sign and side):
-        sentence = f"{title}: super- or subcritical cannot be told, the coefficient is too small."
+        sentence = f"{title}: super- or subcritical cannot be told, {LOST}."
         return NormalForm("flip", sentence, form.nonlinear, shift)
     others = others_outside(special)
     stable = sign > 0 and not others
@@ -210,7 +211,9 @@ def _torus(special: SpecialPoint, loop: Loop) -> NormalForm:
     hz, sign, side = _hz(special), form.nonlinear.sign, shift.sign
     turn = resonance(mu)
     if not (sign and side):
-        sentence = f"Neimark-Sacker point at {hz}: super- or subcritical cannot be told; {turn}."
+        sentence = (
+            f"Neimark-Sacker point at {hz}: super- or subcritical cannot be told, {LOST}; {turn}."
+        )
         return NormalForm("torus", sentence, form.nonlinear, shift)
     others = others_outside(special)
     stable = sign < 0 and not others
@@ -268,7 +271,7 @@ def _pitchfork(special: SpecialPoint, found: Crossing) -> NormalForm:
     if symmetric:
         title += " (the symmetry x(t + T/2) = -x(t) breaks)"
     if not (sign and side):
-        sentence = f"{title}: super- or subcritical cannot be told."
+        sentence = f"{title}: super- or subcritical cannot be told, {LOST}."
         return NormalForm("pitchfork", sentence, form.nonlinear, shift)
     others = others_outside(special)
     stable = sign < 0 and not others
