@@ -394,7 +394,7 @@ def _grazing(special: SpecialPoint, others: Sequence[SpecialPoint]) -> NormalFor
     orbit, hz = special.orbit, _hz(special)
     touches = touching(orbit)
     if not touches:
-        return NormalForm("new contact", f"Grazing at {hz}: the stop is no longer to be told.")
+        return NormalForm("new contact", f"Grazing at {hz}: the system has no stop.")
     output, phase, is_maximum = touches[0]
     states = special.point.tangent[:-1].reshape(orbit.problem.segments, -1)
     try:
