@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from nldyn.branch import Branch, BranchPoint, SpecialPoint
+    from nldyn.cascades import Cascade, cascade, cascades_in
     from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
     from nldyn.curve_marks import LocatedPoint, refine_special
     from nldyn.curves import Curve, continue_constant, continue_in, continue_special
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from nldyn.flow import FlowMap, FlowOptions
     from nldyn.fourier import Spectrum, spectrum
     from nldyn.multipliers import Stability
+    from nldyn.normal_forms import NormalForm, describe, normal_form, switch_at_branch_point
     from nldyn.orbit import ConvergenceError, History, Orbit, solve_orbit
     from nldyn.orbit_plots import (
         plot_contact_force,
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "branch": "Branch BranchPoint SpecialPoint",
+    "cascades": "Cascade cascade cascades_in",
     "continuation": "ContinuationOptions Walk continue_branch switch_at_flip",
     "curve_marks": "LocatedPoint refine_special",
     "curves": "Curve continue_constant continue_in continue_special",
@@ -52,6 +55,7 @@ _HOMES = {
     "flow": "FlowMap FlowOptions",
     "multipliers": "Stability",
     "fourier": "Spectrum spectrum",
+    "normal_forms": "NormalForm describe normal_form switch_at_branch_point",
     "orbit": "ConvergenceError History Orbit solve_orbit",
     "orbit_plots": "plot_contact_force plot_history plot_phase_portrait plot_spectrum",
     "parameters": "Parameter",
@@ -65,6 +69,7 @@ _HOMES = {
 __all__ = [
     "Branch",
     "BranchPoint",
+    "Cascade",
     "ContinuationOptions",
     "ConvergenceError",
     "Coverage",
@@ -79,6 +84,7 @@ __all__ = [
     "History",
     "LocateError",
     "LocatedPoint",
+    "NormalForm",
     "Orbit",
     "Parameter",
     "SceneError",
@@ -92,10 +98,13 @@ __all__ = [
     "SystemModelError",
     "Unbalance",
     "Walk",
+    "cascade",
+    "cascades_in",
     "continue_branch",
     "continue_constant",
     "continue_in",
     "continue_special",
+    "describe",
     "diagram",
     "dissipation_for",
     "explore",
@@ -104,6 +113,7 @@ __all__ = [
     "load_branch",
     "load_branches",
     "load_diagram",
+    "normal_form",
     "plot_contact_force",
     "plot_diagram",
     "plot_history",
@@ -112,6 +122,7 @@ __all__ = [
     "refine_special",
     "solve_orbit",
     "spectrum",
+    "switch_at_branch_point",
     "switch_at_flip",
 ]
 

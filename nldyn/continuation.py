@@ -28,8 +28,17 @@ from nldyn.errors import SystemModelError, check_whole, is_finite, shown
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine
 from nldyn.shooting import ShootingProblem
-from nldyn.special import Chord, LocateError, differs, hidden_dips, special_points_between
+from nldyn.special import (
+    Chord,
+    LocateError,
+    differs,
+    hidden_dips,
+    special_points_between,
+    without_repeats,
+)
 from nldyn.system import numbers
+
+BORN = "born at the flip at"
 
 
 @dataclass(frozen=True)
@@ -550,6 +559,7 @@ class Trail:
                 self.special_points += found
                 self.notes += lost
         self._searched = max(self._searched, pairs)
+        self.special_points = without_repeats(self.special_points)
 
 
 def _insert_dips(nodes: list[BranchPoint]) -> None:
@@ -819,6 +829,11 @@ def _reversed(point: BranchPoint) -> BranchPoint:
 
 def _reversed_special(special: SpecialPoint) -> SpecialPoint:
     return SpecialPoint(special.kind, _reversed(special.point), special.frequency_error)
+
+
+def born_at(flip: SpecialPoint) -> str:
+    """Where a doubled branch begins, in place of why its continuation stopped there."""
+    return f"{BORN} {flip.frequency_hz:.6g} Hz"
 
 
 def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoint:

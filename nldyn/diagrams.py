@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from nldyn.branch import Branch, Course, SpecialPoint
+from nldyn.branch import Branch, BranchPoint, Course, SpecialPoint, stroboscopic
 from nldyn.checkpoint import Checkpoint, checkpoint_of_several
 from nldyn.continuation import (
     ContinuationOptions,
+    born_at,
     check_range,
     complete,
     continue_branch,
@@ -24,6 +25,7 @@ from nldyn.continuation import (
 from nldyn.errors import SystemModelError, check_frequency, check_whole
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
+from nldyn.normal_forms import switch_at_branch_point
 from nldyn.orbit import ConvergenceError, Orbit, check_observe
 from nldyn.search import SearchOptions, Strobe, orbits_from_strobe, reach, simulate_strobe
 from nldyn.special import LocateError
@@ -105,6 +107,7 @@ class Collector:
     branches: list[Branch] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     flip_ends: list[Orbit] = field(default_factory=list)
+    crossings: list[SpecialPoint] = field(default_factory=list)
 
     def known(self, orbit: Orbit) -> bool:
         return any(branch.contains(orbit) for branch in self.branches)
@@ -152,11 +155,29 @@ class Collector:
         except LocateError as error:
             self.notes.append(str(error))
             return
+        branch = self.from_start(start, born_at(special))
+        if branch is not None and branch.stop_reasons[1].startswith("joins"):
+            self.flip_ends.append(branch.nodes[-1].orbit)
+
+    def from_branch_point(self, special: SpecialPoint) -> None:
+        """Follow the other branch through a branch point both ways, unless it is known."""
+        if any(_is_same_crossing(special, other) for other in self.crossings):
+            return
+        self.crossings.append(special)
+        try:
+            starts = switch_at_branch_point(special)
+        except LocateError as error:
+            self.notes.append(str(error))
+            return
+        for start in starts:
+            self.from_start(start, f"from the branch point at {special.frequency_hz:.6g} Hz")
+
+    def from_start(self, start: BranchPoint, origin: str) -> Branch | None:
+        """Follow a branch from its first point one way, unless it is known or out of range."""
         low, high = self.range_hz
         if not low < start.orbit.frequency_hz < high or self.known(start.orbit):
-            return
+            return None
         progress = partial(self.progress, f"1/{start.orbit.period}")
-        origin = f"born at the flip at {special.frequency_hz:.6g} Hz"
         open_ends = tuple(self.open_ends(start.orbit.period))
         course = Course(self.range_hz, self.options, open_ends)
         branch = self.checkpoint.branch_from(start.orbit, course)
@@ -165,8 +186,7 @@ class Collector:
         else:
             branch = complete("", None, None, start, course, progress, self.checkpoint, origin)
         self.add(branch)
-        if branch.stop_reasons[1].startswith("joins"):
-            self.flip_ends.append(branch.nodes[-1].orbit)
+        return self.branches[-1]
 
 
 def _is_at(end: Orbit, special: SpecialPoint) -> bool:
@@ -175,7 +195,30 @@ def _is_at(end: Orbit, special: SpecialPoint) -> bool:
     return (
         end.period == 2 * flip.period
         and math.isclose(end.frequency_hz, flip.frequency_hz, rel_tol=2e-3)
-        and math.isclose(end.max_abs_displacement, flip.max_abs_displacement, rel_tol=2e-2)
+        and _alike(end, flip, 2e-2)
+    )
+
+
+def _is_same_crossing(a: SpecialPoint, b: SpecialPoint) -> bool:
+    """Whether two branch points, found on the two branches that cross there, are one."""
+    return (
+        a.orbit.period == b.orbit.period
+        and math.isclose(a.frequency_hz, b.frequency_hz, rel_tol=1e-6)
+        and _alike(a.orbit, b.orbit, 1e-3)
+    )
+
+
+def _alike(a: Orbit, b: Orbit, rtol: float) -> bool:
+    """Whether the states of two orbits agree once a period, up to a shift; mirror images do not.
+
+    The period of the first is a multiple of that of the second.
+    """
+    first, second = stroboscopic(a), stroboscopic(b)
+    second = np.tile(second, (len(first) // len(second), 1))
+    size = rtol * float(np.abs(second).max())
+    return any(
+        float(np.abs(first - np.roll(second, shift, axis=0)).max()) <= size
+        for shift in range(b.period)
     )
 
 
@@ -197,9 +240,10 @@ def diagram(
 
     Orbits of each period are looked for by simulation at `search_points` frequencies and at the
     seeds, continued in both directions, and at each flip the doubled branch is followed when its
-    period is wanted. If the stops are open at rest and no orbit found touches one, the search is
-    repeated once with four times as many initial states. What no simulation comes near (isolas of
-    unstable orbits, say) is missed.
+    period is wanted. At a branch point the other branch is followed both ways; where a symmetry
+    breaks, these are its two halves. If the stops are open at rest and no orbit found touches one,
+    the search is repeated once with four times as many initial states. What no simulation comes
+    near (isolas of unstable orbits, say) is missed.
 
     Parameters
     ----------
@@ -268,7 +312,9 @@ def diagram(
             _search(box, places, wanted, more)
         for seed in seeds:
             _follow_seed(box, seed, effort)
+        _follow_branch_points(box)
         _follow_flips_of_new(box, wanted, doublings)
+        _follow_branch_points(box)
     for period in wanted:
         if not any(branch.period == period for branch in box.branches):
             tried = f"{search_points} frequenc{'y' if search_points == 1 else 'ies'}"
@@ -332,6 +378,14 @@ def _follow_flips(box: Collector, branches: Sequence[Branch]) -> None:
         for special in branch.special_points:
             if special.kind == "PD":
                 box.from_flip(special)
+
+
+def _follow_branch_points(box: Collector) -> None:
+    """Branches that cross those found, and those that cross these."""
+    for branch in box.branches:  # which grow
+        for special in branch.special_points:
+            if special.kind == "BP":
+                box.from_branch_point(special)
 
 
 def _follow_flips_of_new(box: Collector, wanted: Sequence[int], doublings: int) -> None:

@@ -166,7 +166,7 @@ def explore(
     an orbit, and its branch continued in both directions unless it is known. Unstable orbits come
     from near returns of motions that wander, from Newton's method deflated by the known orbits
     [Farrell, Birkisson and Funke 2015], and from flips, at each of which the doubled branch is
-    followed as long as its period is within `max_period`.
+    followed as long as its period is within `max_period`, and from branch points.
 
     Isolas of unstable orbits that no motion passes, attractors with small basins that exist
     between two of the frequencies only, and orbits of longer periods can still be missing.
@@ -316,16 +316,17 @@ class _Survey:
                     self._follow(other)
 
     def _follow(self, orbit: Orbit) -> None:
-        """Follow an orbit's branch unless it is known, and those born at its flips."""
+        """Follow an orbit's branch unless it is known, and those that it leads to."""
         count = len(self.box.branches)
         self.box.from_orbits([orbit])
         while count < len(self.box.branches):
             branch = self.box.branches[count]
             count += 1
-            if 2 * branch.period <= self.max_period:
-                for special in branch.special_points:
-                    if special.kind == "PD":
-                        self.box.from_flip(special)
+            for special in branch.special_points:
+                if special.kind == "PD" and 2 * branch.period <= self.max_period:
+                    self.box.from_flip(special)
+                elif special.kind == "BP":
+                    self.box.from_branch_point(special)
 
 
 def settling_periods(system: System, frequency_hz: float) -> int:

@@ -19,6 +19,7 @@ from nldyn.version import software_version
 
 if TYPE_CHECKING:
     from nldyn.branch import Branch
+    from nldyn.cascades import Cascade
     from nldyn.diagrams import Diagram
     from nldyn.scene_schema import Scene
 
@@ -43,6 +44,11 @@ SPECIAL_COLUMNS = (
     "frequency_hz",
     "max_abs_displacement_m",
     "impacts",
+    "normal_form",
+    "coefficient",
+    "coefficient_error",
+    "relative_shift",
+    "meaning",
 )
 
 
@@ -119,10 +125,14 @@ def if_known(value: object) -> object:
 
 
 def special_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
-    """Give the rows of ``special_points.csv``, branch by branch."""
+    """Give the rows of ``special_points.csv``, branch by branch; the normal forms take time."""
+    from nldyn.normal_forms import normal_form
+
     for branch in diagram.branches:
         for point in branch.special_points:
             orbit = point.orbit
+            form = normal_form(point, branch.special_points)
+            coefficient, shift = form.coefficient, form.frequency_shift
             yield (
                 branch.name,
                 orbit.period,
@@ -130,6 +140,11 @@ def special_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
                 float(orbit.frequency_hz),
                 float(orbit.max_abs_displacement),
                 int(orbit.impacts),
+                form.name,
+                None if coefficient is None else if_known(coefficient.value),
+                None if coefficient is None else if_known(coefficient.error),
+                None if shift is None else if_known(shift.value),
+                form.sentence,
             )
 
 
@@ -143,6 +158,8 @@ def write_table(path: Path, columns: Iterable[str], rows: Iterable[Iterable[obje
 
 def summary(diagram: Diagram) -> Mapping[str, object]:
     """Say what was computed and how exactly, as plain numbers for ``summary.json``."""
+    from nldyn.cascades import cascades_in
+
     orbits = [orbit for branch in diagram.branches for orbit in branch.points]
     return {
         "software": f"nldyn {software_version()}",
@@ -152,6 +169,15 @@ def summary(diagram: Diagram) -> Mapping[str, object]:
         "stability_undecided": sum(orbit.stability.verdict == "undecided" for orbit in orbits),
         "notes": list(diagram.notes),
         "branches": [_branch_summary(branch, diagram.range_hz) for branch in diagram.branches],
+        "cascades": [_cascade_summary(cascade) for cascade in cascades_in(diagram.branches)],
+    }
+
+
+def _cascade_summary(cascade: Cascade) -> dict[str, object]:
+    return {
+        "periods": [flip.orbit.period for flip in cascade.flips],
+        "flips_hz": [float(flip.frequency_hz) for flip in cascade.flips],
+        "ratios": [float(ratio.value) for ratio in cascade.ratios],
     }
 
 

@@ -21,10 +21,14 @@ from nldyn._events import (
     travel,
 )
 from nldyn.branch import BranchPoint, SpecialPoint
+from nldyn.critical import correct_across, turns_at_crossing
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
 
 PRECISION = 1e-9  # in σ, to which a special point is located
+CROSSING_ERROR = 1e-8  # relative, of an orbit where branches cross
+NEIGHBOUR = 1e-3  # arclength between two branch points at one turn, and dP/ds there
+SAME = 1e-7  # arclength between two branch points that cannot be told apart
 STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
 
 
@@ -89,10 +93,15 @@ class Chord:
         row = self._row
         offset = float(row @ (a.orbit.point + sigma * self._secant))
         found = problem.correct(self.between(sigma), row, offset=offset)
-        if not found.converged:
-            raise LocateError(found.failure)
-        orbit = Orbit.of(problem, found, a.orbit.observe)
-        tangent = problem.tangent(found, self._secant)
+        if found.converged:
+            orbit = Orbit.of(problem, found, a.orbit.observe)
+            tangent = problem.tangent(found, self._secant)
+        else:
+            crossing = correct_across(problem, self.between(sigma), row, offset)
+            if crossing is None or crossing[2] > CROSSING_ERROR:
+                raise LocateError(found.failure)
+            orbit = Orbit(problem, *crossing, a.orbit.observe)
+            tangent = self._direction(sigma)
         length = a.arclength + sigma * (self.last.arclength - a.arclength)
         self.known[sigma] = BranchPoint(orbit, tangent, length)
         return self.known[sigma]
@@ -110,6 +119,13 @@ class Chord:
             + x * x * (3.0 - 2.0 * x) * b.orbit.point
             + x * x * (x - 1.0) * end
         )
+
+    def _direction(self, sigma: float) -> Real:
+        """Unit tangent from interpolated points: where branches cross the equations give none."""
+        step = 1e-3 * min(sigma, 1.0 - sigma)
+        secant = self.between(sigma + step) - self.between(sigma - step)
+        weights = self.first.orbit.problem.metric(self.first.orbit.point)
+        return np.asarray(secant / math.sqrt(float(secant @ (weights * secant))))
 
     def frequency_slope(self, point: BranchPoint) -> float:
         """Derivative of ln ω with respect to σ."""
@@ -215,6 +231,7 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
         )
     found = [locate(k, chord, lambda point, k=k: tests(point)[k]) for k in kinds]  # type: ignore[misc]
     found = [s for s in found if s.kind != "NS" or _on_unit_circle(s.orbit.multipliers)]
+    found = [_crossing_or_fold(s) for s in found]
     if contacts and touches:
         found.append(locate("GR", chord, touches[0].depth))
     found.sort(key=lambda s: s.point.arclength, reverse=bool(b.arclength < a.arclength))
@@ -224,6 +241,42 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
             middle, b, depth + 1
         )
     return found
+
+
+def without_repeats(found: list[SpecialPoint]) -> list[SpecialPoint]:
+    """Of neighbouring branch points where one branch turns, only the one nearest to the turn.
+
+    A branch that turns where it meets another one has a multiplier that touches 1 there without
+    passing it, so that rounding decides how often the branch point's test changes sign.
+    """
+    kept: list[SpecialPoint] = []
+    for special in found:
+        if kept and _turns_twice(kept[-1], special):
+            kept[-1] = min(kept[-1], special, key=_pace)
+        else:
+            kept.append(special)
+    return kept
+
+
+def _turns_twice(a: SpecialPoint, b: SpecialPoint) -> bool:
+    apart = abs(a.point.arclength - b.point.arclength)
+    turning = apart < NEIGHBOUR and max(_pace(a), _pace(b)) < NEIGHBOUR
+    return a.kind == b.kind == "BP" and (turning or apart < SAME)
+
+
+def _pace(special: SpecialPoint) -> float:
+    """How fast the frequency changes along the branch."""
+    return abs(float(special.point.tangent[-1]))
+
+
+def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
+    """What looks like a fold may be where this branch crosses another one.
+
+    So a branch of broken symmetry turns at the branch point that its two halves share.
+    """
+    if special.kind == "LP" and turns_at_crossing(special.orbit):
+        return SpecialPoint("BP", special.point, special.frequency_error)
+    return special
 
 
 def accounted(a: Orbit, found: list[SpecialPoint], b: Orbit) -> bool:

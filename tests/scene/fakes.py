@@ -4,7 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nldyn.critical import Estimate
 from nldyn.multipliers import Stability
+from nldyn.normal_forms import NormalForm
 
 SURE = Stability(0.5 + 0.2j, -0.62, 1e-7)
 
@@ -41,6 +43,13 @@ class FakeSpecialPoint:
     @property
     def frequency_hz(self):
         return self.point.orbit.frequency_hz
+
+    @property
+    def form(self):
+        if self.kind == "GR":
+            return NormalForm("new contact", "A touch, for example.")
+        numbers = Estimate(1.25, 1e-3), Estimate(-0.5, 1e-4)
+        return NormalForm("supercritical flip", "A flip, for example.", *numbers)
 
 
 @dataclass(frozen=True)

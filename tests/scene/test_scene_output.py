@@ -45,11 +45,15 @@ def test_files_and_columns(tmp_path):
         "stable,largest_multiplier,multiplier_angle_deg,relative_uncertainty,liouville_error"
     )
     assert ",".join(special[0]) == (
-        "branch,period,type,frequency_hz,max_abs_displacement_m,impacts"
+        "branch,period,type,frequency_hz,max_abs_displacement_m,impacts,"
+        "normal_form,coefficient,coefficient_error,relative_shift,meaning"
     )
     assert len(branches) == 1 + sum(len(b.points) for b in computed.branches)
     assert len(special) == 1 + sum(len(b.special_points) for b in computed.branches)
     assert {row[2] for row in special[1:]} == {"PD", "LP", "GR"}
+    assert special[1][6:] == ["supercritical flip", "1.25", "0.001", "-0.5", "A flip, for example."]
+    grazing = next(row for row in special if row[2] == "GR")
+    assert grazing[6:] == ["new contact", "", "", "", "A touch, for example."]
 
 
 def test_numbers_come_back_bit_for_bit(tmp_path):
@@ -82,6 +86,7 @@ def test_summary(tmp_path):
     assert summary["largest_relative_error"] == 1e-14
     assert summary["largest_liouville_error"] == 1e-12
     assert summary["stability_undecided"] == 0
+    assert summary["cascades"] == []
     assert [b["stop_reason"] for b in summary["branches"]] == ["end of range"] * 3
 
 
