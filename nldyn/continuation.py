@@ -550,6 +550,7 @@ class Trail:
 
     def _search(self, pairs: int) -> None:
         """Locate the special points of the first pairs of nodes, as far as that is not done."""
+        before = len(self.special_points)
         for index in range(self._searched, pairs):
             a, b = self.nodes[index : index + 2]
             try:
@@ -559,7 +560,8 @@ class Trail:
                 self.special_points += found
                 self.notes += lost
         self._searched = max(self._searched, pairs)
-        self.special_points = without_repeats(self.special_points)
+        if len(self.special_points) > before:
+            self.special_points = without_repeats(self.special_points)
 
 
 def _insert_dips(nodes: list[BranchPoint]) -> None:
