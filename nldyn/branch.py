@@ -144,7 +144,7 @@ class Course:
     ends: tuple[WalkEnd | None, WalkEnd | None] = (None, None)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Branch:
     """A curve of periodic orbits of one period multiple.
 
@@ -176,6 +176,14 @@ class Branch:
     notes: tuple[str, ...] = ()
     requested: tuple[BranchPoint, ...] = ()
     course: Course | None = None
+
+    def __repr__(self) -> str:
+        """One line, in place of all numbers of all orbits."""
+        hz = [node.orbit.frequency_hz for node in self.nodes]
+        return (
+            f"<Branch '{self.name}': period {self.period}, {len(hz)} points from {min(hz):.6g} to "
+            f"{max(hz):.6g} Hz, {len(self.special_points)} special points; {self.stop_reason}>"
+        )
 
     @property
     def points(self) -> list[Orbit]:

@@ -39,6 +39,7 @@ from nldyn.special import (
 from nldyn.system import numbers
 
 BORN = "born at the flip at"
+KINK = 1e-6  # step below which a branch may bend by any angle where the number of contacts changes
 
 
 @dataclass(frozen=True)
@@ -188,10 +189,12 @@ class Walk:
                 self.stop_reason = "meets another branch where that was broken off"
                 yield point
                 return
+            bent = step <= KINK and point.orbit.impacts != here.orbit.impacts
             growth = 0.7 * self.options.max_angle / max(angle, 1e-3)
             growth = min(growth, math.sqrt(0.5 * self.options.max_miss / max(miss, 1e-6)))
             step = min(step * min(max(growth, 0.5), 1.6), self.options.max_step)
-            behind = np.array([here.orbit.point, here.tangent])
+            behind = np.array([] if bent else [here.orbit.point, here.tangent])
+            behind = behind.reshape(-1, here.tangent.size)
             self.stride = Stride(point, step, behind, self.stride.count + 1)
             yield point
         self.stop_reason = f"{self.options.max_points}{POINTS}"
@@ -217,12 +220,17 @@ class Walk:
             predicted,
             row,
             offset=float(row @ straight),
-            longest=2.0 * self.options.max_miss * step,
+            longest=2.0 * (self.options.max_miss if step > KINK else 1.0) * step,
             max_iterations=8,
         )
         if not found.converged:
             return None
         miss = _length(weights, found.point - predicted) / step
+        if step <= KINK and miss < 1.0:  # a linear stop that is touched bends the branch
+            orbit = Orbit.of(problem, found, here.orbit.observe)
+            if orbit.impacts != here.orbit.impacts:
+                tangent = problem.tangent(found, direction)
+                return BranchPoint(orbit, tangent, here.arclength + step), 0.0, 0.0
         if miss > self.options.max_miss:
             return None
         # a curve that turns by max_angle leaves its tangent by half of that: a longer correction
@@ -264,15 +272,29 @@ class Walk:
         return BranchPoint(orbit, tangent, length)
 
     def _closed(self, a: BranchPoint, b: BranchPoint) -> bool:
-        """Whether the walk from a to b passes the start again, in the same direction."""
+        """Whether the walk from a to b passes the start again, in the same direction.
+
+        The orbit may have come back shifted by some of its excitation periods.
+        """
         start = self.start
         if b.arclength - start.arclength < 10.0 * (b.arclength - a.arclength):
             return False
-        weights = start.orbit.problem.metric(start.orbit.point)
-        step = b.orbit.point - a.orbit.point
-        if float(step @ (weights * start.tangent)) <= 0.0:
-            return False
-        return _passes(a, b, start.orbit.point)
+        problem = start.orbit.problem
+        weights = problem.metric(start.orbit.point)
+        step = weights * (b.orbit.point - a.orbit.point)
+        places = zip(
+            shifts(problem, start.orbit.point), shifts(problem, start.tangent), strict=True
+        )
+        return any(
+            float(step @ tangent) > 0.0 and _passes(a, b, place) for place, tangent in places
+        )
+
+
+def shifts(problem: ShootingProblem, point: Real) -> list[Real]:
+    """Shooting unknowns (N + 1,) of an orbit shifted by each of its excitation periods."""
+    nodes = problem.nodes(point)
+    moves = range(0, problem.segments, problem.segments // problem.period)
+    return [np.append(np.roll(nodes, move, axis=0).ravel(), point[-1]) for move in moves]
 
 
 def _passes(a: BranchPoint, b: BranchPoint, place: Real) -> bool:
@@ -295,10 +317,7 @@ def open_ends(branch: Branch) -> list[Real]:
     found = []
     for end, reason in ends:
         if reason.endswith(POINTS) or reason.startswith(SHORT_STEP):
-            problem, point = end.orbit.problem, end.orbit.point
-            for shift in range(0, problem.segments, problem.segments // problem.period):
-                states = np.roll(problem.nodes(point), shift, axis=0)
-                found.append(np.append(states.ravel(), point[-1]))
+            found += shifts(end.orbit.problem, end.orbit.point)
     return found
 
 
@@ -846,7 +865,8 @@ def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoin
     special : SpecialPoint
         A flip (PD).
     amplitude : float
-        Relative size of the first step off the branch; smaller ones are tried if it fails.
+        Relative size of the first step off the branch; smaller ones are tried until no contact has
+        changed and the multiplier that was (-1)² at the flip is still near 1.
 
     Returns
     -------
@@ -878,12 +898,17 @@ def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoin
     weights = problem.metric(doubled)
     direction /= _length(weights, direction)
     row = weights * direction
-    for size in (amplitude, 0.25 * amplitude, 0.05 * amplitude, 0.01 * amplitude):
+    first: BranchPoint | None = None
+    for share in (1.0, 0.25, 0.05, 0.01, 2e-3, 4e-4):
+        size = share * amplitude
         found = problem.correct(doubled + size * direction, row / np.linalg.norm(row))
         if found.converged:
-            tangent = problem.tangent(found, direction)
             twin = Orbit.of(problem, found, orbit.observe)
-            return BranchPoint(twin, tangent, 0.0)
+            first = BranchPoint(twin, problem.tangent(found, direction), 0.0)
+            if twin.impacts == 2 * orbit.impacts and np.abs(twin.multipliers - 1.0).min() < 0.3:
+                break
+    if first is not None:
+        return first
     raise LocateError(
         f"no orbit of period {problem.period} found beside the flip at "
         f"{orbit.frequency_hz:.6g} Hz: {found.failure}"

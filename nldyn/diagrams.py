@@ -11,7 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
-from nldyn.branch import Branch, BranchPoint, Course, SpecialPoint, stroboscopic
+from nldyn.branch import (
+    POINTS,
+    SHORT_STEP,
+    Branch,
+    BranchPoint,
+    Course,
+    SpecialPoint,
+    stroboscopic,
+)
 from nldyn.checkpoint import Checkpoint, checkpoint_of_several
 from nldyn.continuation import (
     ContinuationOptions,
@@ -126,6 +134,12 @@ class Collector:
         self.checkpoint.work = None
         self.branches.append(named)
         self.notes += [f"branch {named.name}: {note}" for note in named.notes]
+        for reason, node in zip(named.stop_reasons, (named.nodes[0], named.nodes[-1]), strict=True):
+            if reason.startswith("joins"):
+                self.flip_ends.append(node.orbit)
+            if reason.startswith(SHORT_STEP) or reason.endswith(POINTS):
+                hz = node.orbit.frequency_hz
+                self.notes.append(f"branch {named.name} was broken off at {hz:.6g} Hz: {reason}")
 
     def from_orbits(self, orbits: Iterable[Orbit]) -> None:
         """Follow each orbit both ways, unless its branch is known."""
@@ -155,9 +169,7 @@ class Collector:
         except LocateError as error:
             self.notes.append(str(error))
             return
-        branch = self.from_start(start, born_at(special))
-        if branch is not None and branch.stop_reasons[1].startswith("joins"):
-            self.flip_ends.append(branch.nodes[-1].orbit)
+        self.from_start(start, born_at(special))
 
     def from_branch_point(self, special: SpecialPoint) -> None:
         """Follow the other branch through a branch point both ways, unless it is known."""

@@ -133,7 +133,10 @@ class Exploration:
         ]
         open_ranges = ", ".join(f"{a:.4g}-{b:.4g}" for a, b in self.unsettled_ranges())
         if open_ranges:
-            lines.append(f"motions that did not settle (chaos or longer periods): {open_ranges} Hz")
+            lines.append(
+                f"motions that did not settle (chaos, longer periods or slow decay): "
+                f"{open_ranges} Hz"
+            )
         return "\n".join(lines + list(self.diagram.notes))
 
     def unsettled_ranges(self) -> list[tuple[float, float]]:
@@ -301,7 +304,7 @@ class _Survey:
 
     def _unstable(self, runs: Sequence[Real], stable: Sequence[Orbit], omega: float) -> None:
         """Look for unstable orbits of short periods near wandering motions and by deflation."""
-        for period in range(1, self.effort.unstable_period + 1):
+        for period in range(1, min(self.effort.unstable_period, self.max_period) + 1):
             for run in runs:
                 for start in near_returns(run, period, 2):
                     orbit = solve_from(self.box, run[start], period, omega)
@@ -386,7 +389,7 @@ def deflated_orbit(
         if not math.isfinite(length):
             return None
         away = min((float(np.linalg.norm(point[:-1] - x)) / size for x in repelled), default=1.0)
-        if length < min(1e-4, 0.1 * away):
+        if length == 0.0 or length < min(1e-4, 0.1 * away):
             break
         stretch = _stretch(point[:-1], step[:-1], repelled, size)
         point = point + step * math.copysign(min(abs(stretch), LONGEST / length), stretch)

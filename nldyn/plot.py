@@ -155,7 +155,7 @@ def period_name(period: int) -> str:
 
 
 def plot_diagram(
-    diagram: Diagram | Iterable[Branch],
+    diagram: Diagram | Branch | Iterable[Branch],
     ax: Axes | None = None,
     *,
     yscale: Literal["linear", "log"] = "linear",
@@ -168,7 +168,7 @@ def plot_diagram(
 
     Parameters
     ----------
-    diagram : Diagram or iterable of Branch
+    diagram : Diagram, Branch or iterable of Branch
         Branches to draw.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure, free of pyplot, unless given.
@@ -204,7 +204,8 @@ def plot_diagram(
     >>> ax.get_ylabel()
     'max |y| (µm)'
     """
-    branches = list(diagram if isinstance(diagram, Iterable) else diagram.branches)
+    several = getattr(diagram, "branches", diagram)
+    branches = list(several if isinstance(several, Iterable) else [several])
     ax = ax if ax is not None else new_axes()
     factor, unit = _unit_of(branches, unit)
     colours = period_colours(branch.period for branch in branches)
