@@ -503,6 +503,16 @@ def depends_on_speed(fl, stop):
 
 
 @inner
+def needs_speed(fl, stop):
+    """Whether a force depends on the speed, or is to be differentiated by what makes it do so."""
+    needed = depends_on_speed(fl, stop)
+    for c in range(fl.parameters.shape[0]):
+        wanted = fl.parameters[c, 0] == DISSIPATION and fl.parameters[c, 1] == stop
+        needed = needed or wanted
+    return needed
+
+
+@inner
 def law_by(fl, stop, column, delta, speed):
     """Derivative of a stop's force with respect to its own number in a column of `stops`."""
     if delta <= 0.0:
@@ -545,7 +555,7 @@ def new_panel(fl, m, n_states, active):
     na = active.size
     outputs = na
     for a in range(na):
-        if depends_on_speed(fl, active[a]):
+        if needs_speed(fl, active[a]):
             outputs = 2 * na
     return Panel(
         active,
@@ -755,6 +765,18 @@ def guess_rates(fl, panel, free, slope, force):
 
 
 @inner
+def consistent(panel, force, noise):
+    """Whether the forces (na m,) are those of the penetrations that they lead to."""
+    na, m = panel.F.shape
+    for a in range(na):
+        allowed = 1e-10 * largest(panel.F, a) + 10.0 * noise[a] * largest(panel.slope, a)
+        for i in range(m):
+            if abs(panel.F[a, i] - force[a * m + i]) > allowed:
+                return False
+    return True
+
+
+@inner
 def solve_panel(fl, tab, kind, phase, w, h, noise, panel):
     """Newton's method for the forces at the nodes; the penetrations in `output` are the guess.
 
@@ -818,7 +840,9 @@ def solve_panel(fl, tab, kind, phase, w, h, noise, panel):
         left = change * change if fresh else change * rate / max(1.0 - rate, 1e-3)
         if left <= 1e-13 and (fresh or before < np.inf or change == 0.0):
             panel_forces(fl, panel, slope)
-            return True
+            if consistent(panel, force, noise):  # that estimate trusts in the order of convergence
+                return True
+            rate = 1.0
         if rate > 0.1:
             panel.kept[0] = False
         before = change

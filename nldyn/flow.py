@@ -30,7 +30,7 @@ from nldyn._kernels import (
 )
 from nldyn._sample import local_extremes, sample_states
 from nldyn.contact_law import law_address
-from nldyn.errors import SystemModelError, check_whole
+from nldyn.errors import SystemModelError, check_whole, is_finite, shown
 from nldyn.gauss import GaussTables, gauss_tables
 from nldyn.linear import Complex, Real
 from nldyn.parameters import Parameter, parameter_tables
@@ -309,12 +309,30 @@ class FlowMap:
         Raises
         ------
         SystemModelError
-            For a parameter that the system does not have.
+            For a parameter that the system does not have, or arrays of the wrong shape or with
+            numbers that make no sense.
         """
+        self._check_segments(nodes, phases, omega, chained)
         status, *_, ends, jacobians, d_omegas, d_parameters, closings = self._fly(
             self._record(1), False, nodes, phases, omega, chained, sensitivities, parameters
         )
         return Segments(ends, jacobians, d_omegas, d_parameters, closings, _REASONS[status])
+
+    def _check_segments(self, nodes: Real, phases: Real, omega: float, chained: bool) -> None:
+        nodes, phases = np.asarray(nodes, dtype=float), np.asarray(phases, dtype=float)
+        if phases.ndim != 1 or phases.size < 2 or not np.all(np.diff(phases) > 0.0):
+            raise SystemModelError("phases must be two or more ascending numbers")
+        size = 2 * self.system.size
+        rows = 1 if chained else phases.size - 1
+        if nodes.ndim != 2 or nodes.shape[1] != size or len(nodes) < rows:
+            raise SystemModelError(
+                f"nodes must have shape ({rows}, {size}) for {phases.size - 1} segments of "
+                f"{self.system.size} modes, got {nodes.shape}"
+            )
+        if not (np.all(np.isfinite(nodes)) and np.all(np.isfinite(phases))):
+            raise SystemModelError("nodes and phases must be finite")
+        if not (is_finite(omega) and omega > 0.0):
+            raise SystemModelError(f"omega must be positive and finite, got {shown(omega)}")
 
     def trajectory(self, nodes: Real, phases: Real, omega: float) -> Trajectory:
         """Record the motion from phase to phase, restarted from each node state.

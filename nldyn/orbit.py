@@ -256,13 +256,15 @@ class Orbit:
 
     @cached_property
     def flow_error(self) -> FlowError:
-        """Error of the flow map on this orbit, by a finer one."""
+        """Error of the flow map on this orbit, by a finer one; infinite where either fails."""
         problem = self.problem
         nodes = problem.nodes(self.point)
         here, finer = (
             flow.shoot(nodes, problem.phases, self.omega)
             for flow in (problem.flow, problem.flow.finer)
         )
+        if here.failure or finer.failure:
+            return FlowError(math.inf, math.inf)
         return FlowError(
             *(
                 float(np.linalg.norm(a - b) / np.linalg.norm(b))

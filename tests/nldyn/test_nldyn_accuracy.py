@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nldyn import FlowMap, FlowOptions, Orbit
+from nldyn import (
+    FlowMap,
+    FlowOptions,
+    HarmonicForce,
+    Orbit,
+    Parameter,
+    Stop,
+    System,
+    SystemModelError,
+    Unbalance,
+)
 from nldyn.bench.models import load_case
 from nldyn.shooting import ShootingProblem
 
@@ -58,3 +68,56 @@ def test_error_estimates_are_true_within_a_factor_of_ten(name, rtol):
         strict=True,
     ):
         assert 0.1 * true - rounding < estimate < 10.0 * true + rounding
+
+
+def test_stiff_stops_of_mixed_exponents_agree_at_all_tolerances():
+    """Newton's method for a panel must not trust its first two steps to show how fast it is."""
+    stops = [
+        Stop("a", 5.89e7, 1.37, -9.28e-5, 1),
+        Stop("a", 3.82e13, 3.0, -3.12e-5, -1),
+        Stop("a", 2.49e6, 1.0, 4.39e-5, -1),
+    ]
+    system = System.from_modal(
+        [10.0], {"a": [1.0]}, modal_damping=0.02, stops=stops,
+        excitation=[HarmonicForce("a", 2.83)],
+    )  # fmt: skip
+    start, phases = np.array([[8.05e-6, -5.71e-4]]), np.array([0.0, 2.0 * np.pi])
+    ends = [
+        FlowMap(system, FlowOptions(rtol=rtol)).shoot(start, phases, 40.0 * np.pi).ends[0]
+        for rtol in (1e-9, 1e-10, 1e-11, 1e-12, 1e-13)
+    ]
+    for end in ends:
+        np.testing.assert_allclose(end, ends[-1], rtol=1e-8)
+
+
+def test_derivative_by_dissipation_where_there_is_none_against_differences():
+    flow = [FlowMap(one_dof(dissipation)) for dissipation in (0.0, 1e-3)]
+    start, phases = np.zeros((1, 2)), np.array([0.0, 2.0 * np.pi])
+    exact = flow[0].shoot(start, phases, 160.0, parameters=[Parameter("dissipation")])
+    ends = [one.shoot(start, phases, 160.0).ends[0] for one in flow]
+    difference = (ends[1] - ends[0]) / 1e-3
+    np.testing.assert_allclose(exact.d_parameters[0, :, 0], difference, rtol=1e-3)
+
+
+def one_dof(dissipation):
+    return System.from_matrices(
+        [[2.48]], [[16877.0]], {"middle": [1.0]}, modal_damping=0.0142,
+        stops=[Stop("middle", stiffness=5.17e9, dissipation=dissipation)],
+        excitation=[Unbalance("middle", 4.92e-6)],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("nodes", "phases", "omega", "says"),
+    [
+        (np.zeros((1, 3)), [0.0, 1.0], 10.0, "nodes must have shape"),
+        (np.zeros((1, 2)), [0.0, 1.0, 2.0], 10.0, "nodes must have shape"),
+        (np.full((1, 2), np.nan), [0.0, 1.0], 10.0, "must be finite"),
+        (np.zeros((1, 2)), [1.0, 0.0], 10.0, "ascending"),
+        (np.zeros((1, 2)), [0.0, 1.0], -1.0, "omega must be positive"),
+        (np.zeros((1, 2)), [0.0, 1.0], np.inf, "omega must be positive"),
+    ],
+)
+def test_senseless_segments_are_refused(nodes, phases, omega, says):
+    with pytest.raises(SystemModelError, match=says):
+        FlowMap(one_dof(0.0)).shoot(nodes, np.array(phases), omega)
