@@ -312,15 +312,16 @@ class FlowMap:
             For a parameter that the system does not have, or arrays of the wrong shape or with
             numbers that make no sense.
         """
+        nodes = np.ascontiguousarray(nodes, dtype=float)
+        phases = np.ascontiguousarray(phases, dtype=float)
         self._check_segments(nodes, phases, omega, chained)
         status, *_, ends, jacobians, d_omegas, d_parameters, closings = self._fly(
-            self._record(1), False, nodes, phases, omega, chained, sensitivities, parameters
+            self._no_record, False, nodes, phases, omega, chained, sensitivities, parameters
         )
         return Segments(ends, jacobians, d_omegas, d_parameters, closings, _REASONS[status])
 
     def _check_segments(self, nodes: Real, phases: Real, omega: float, chained: bool) -> None:
-        nodes, phases = np.asarray(nodes, dtype=float), np.asarray(phases, dtype=float)
-        if phases.ndim != 1 or phases.size < 2 or not np.all(np.diff(phases) > 0.0):
+        if phases.ndim != 1 or phases.size < 2 or not (phases[1:] > phases[:-1]).all():
             raise SystemModelError("phases must be two or more ascending numbers")
         size = 2 * self.system.size
         rows = 1 if chained else phases.size - 1
@@ -329,7 +330,7 @@ class FlowMap:
                 f"nodes must have shape ({rows}, {size}) for {phases.size - 1} segments of "
                 f"{self.system.size} modes, got {nodes.shape}"
             )
-        if not (np.all(np.isfinite(nodes)) and np.all(np.isfinite(phases))):
+        if not math.isfinite(nodes.sum() + phases[-1] - phases[0]):
             raise SystemModelError("nodes and phases must be finite")
         if not (is_finite(omega) and omega > 0.0):
             raise SystemModelError(f"omega must be positive and finite, got {shown(omega)}")
@@ -416,8 +417,8 @@ class FlowMap:
         parameters: Sequence[Parameter] = (),
     ) -> tuple[Any, ...]:
         """The flow map alone; see `_kernels.newton` for what comes back."""
-        point = np.append(np.asarray(nodes, dtype=float), 0.0)
-        phases = np.ascontiguousarray(phases, dtype=float)
+        point = np.empty(nodes.size + 1)
+        point[:-1], point[-1] = nodes.ravel(), 0.0
         corrector = Corrector(point, 0.0, 0.0, 0.0, 0.0, 0)
         return self._call(
             record, recording, float(omega), point, phases, chained, sensitivities, parameters,
@@ -436,12 +437,22 @@ class FlowMap:
         parameters: Sequence[Parameter],
         corrector: Corrector,
     ) -> tuple[Any, ...]:
-        table, drive_by = parameter_tables(self.system, parameters)
+        table, drive_by = (
+            parameter_tables(self.system, parameters) if parameters else self._no_parameters
+        )
         found = newton(
             self._data, self.tables, record, recording, omega, point, phases, chained,
             sensitivities, table, drive_by, corrector,
         )  # fmt: skip
-        return tuple(found)
+        return found  # type: ignore[no-any-return]
+
+    @cached_property
+    def _no_record(self) -> Record:
+        return self._record(0)
+
+    @cached_property
+    def _no_parameters(self) -> tuple[NDArray[np.int64], Complex]:
+        return parameter_tables(self.system, ())
 
     def _motion(
         self, omega: float, rec: Record, closings: NDArray[np.int64], failure: str
