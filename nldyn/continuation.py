@@ -589,18 +589,32 @@ def _insert_dips(nodes: list[BranchPoint]) -> None:
         if math.isnan(where):
             continue
         index = len(nodes) - 2 if where < nodes[-2].arclength else len(nodes) - 1
-        a, b = nodes[index - 1], nodes[index]
-        span = b.arclength - a.arclength
-        sigma = (where - a.arclength) / span
-        if span < 1e-6 or not 0.02 < sigma < 0.98:
-            continue
-        try:
-            extra = Chord(a, b).at(sigma)
-        except LocateError:
-            continue
-        if differs(a, extra):
+        extra = _turned_over(nodes[index - 1], nodes[index], where)
+        if extra is not None:
             nodes.insert(index, extra)
             return
+
+
+def _turned_over(a: BranchPoint, b: BranchPoint, where: float) -> BranchPoint | None:
+    """Point between a and b at which a test or an extreme has changed its sign, or None.
+
+    It is looked for at an arclength, then where the parabola through what is found dips.
+    """
+    chord, span = Chord(a, b), b.arclength - a.arclength
+    for _ in range(3):
+        sigma = (where - a.arclength) / span
+        if span < 1e-6 or not 0.02 < sigma < 0.98:
+            return None
+        try:
+            extra = chord.at(sigma)
+        except LocateError:
+            return None
+        if differs(a, extra):
+            return extra
+        where = next((x for x in hidden_dips(a, extra, b) if not math.isnan(x)), math.nan)
+        if math.isnan(where):
+            return None
+    return None
 
 
 def _by_halves(
