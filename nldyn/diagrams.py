@@ -184,11 +184,11 @@ class Collector:
         for start in starts:
             self.from_start(start, f"from the branch point at {special.frequency_hz:.6g} Hz")
 
-    def from_start(self, start: BranchPoint, origin: str) -> Branch | None:
+    def from_start(self, start: BranchPoint, origin: str) -> None:
         """Follow a branch from its first point one way, unless it is known or out of range."""
         low, high = self.range_hz
         if not low < start.orbit.frequency_hz < high or self.known(start.orbit):
-            return None
+            return
         progress = partial(self.progress, f"1/{start.orbit.period}")
         open_ends = tuple(self.open_ends(start.orbit.period))
         course = Course(self.range_hz, self.options, open_ends)
@@ -198,7 +198,6 @@ class Collector:
         else:
             branch = complete("", None, None, start, course, progress, self.checkpoint, origin)
         self.add(branch)
-        return self.branches[-1]
 
 
 def _is_at(end: Orbit, special: SpecialPoint) -> bool:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from nldyn.branch import Branch, minimal_period, same_orbit, stroboscopic
-from nldyn.continuation import ContinuationOptions, check_range
+from nldyn.continuation import ContinuationOptions, check_range, shifts
 from nldyn.diagrams import Collector, Diagram, Progress
 from nldyn.errors import SystemModelError, check_whole, is_finite, shown
 from nldyn.flow import FlowMap
@@ -24,7 +24,6 @@ from nldyn.orbit import (
     spread,
 )
 from nldyn.search import random_states, simulate
-from nldyn.shooting import ShootingProblem
 from nldyn.system import System
 
 RETURNS = 3.0  # recorded periods after settling, over the longest period looked for
@@ -381,7 +380,7 @@ def deflated_orbit(
         return None
     row = np.zeros(point.size)
     row[-1] = 1.0
-    repelled = [states for orbit in known for states in _shifts(problem, orbit)]
+    repelled = [x[:-1] for orbit in known for x in shifts(problem, orbit.point)]
     for _ in range(ITERATIONS):
         step = problem.correct(point, row, max_iterations=1).point - point
         size = problem.scale(point) * math.sqrt(problem.segments)
@@ -412,13 +411,6 @@ def _stretch(x: Real, step: Real, repelled: Sequence[Real], size: float) -> floa
         square = float(away @ away) or 1e-300
         slope += -2.0 * float(away @ step) / size / (square * (1.0 + square))
     return 1.0 / (1.0 - slope) if slope != 1.0 else 1.0
-
-
-def _shifts(problem: ShootingProblem, orbit: Orbit) -> Iterator[Real]:
-    """States of an orbit at the shooting phases, shifted by each of its excitation periods."""
-    nodes = orbit.problem.nodes(orbit.point)
-    for shift in range(0, problem.segments, problem.segments // problem.period):
-        yield np.roll(nodes, shift, axis=0).ravel()
 
 
 def _at(branch: Branch, omega: float) -> list[Orbit]:
