@@ -312,9 +312,6 @@ class FlowMap:
             For a parameter that the system does not have, or arrays of the wrong shape or with
             numbers that make no sense.
         """
-        nodes = np.ascontiguousarray(nodes, dtype=float)
-        phases = np.ascontiguousarray(phases, dtype=float)
-        self._check_segments(nodes, phases, omega, chained)
         status, *_, ends, jacobians, d_omegas, d_parameters, closings = self._fly(
             self._no_record, False, nodes, phases, omega, chained, sensitivities, parameters
         )
@@ -417,6 +414,9 @@ class FlowMap:
         parameters: Sequence[Parameter] = (),
     ) -> tuple[Any, ...]:
         """The flow map alone; see `_kernels.newton` for what comes back."""
+        nodes = np.asarray(nodes, dtype=float)
+        phases = np.ascontiguousarray(phases, dtype=float)
+        self._check_segments(nodes, phases, omega, chained)
         point = np.empty(nodes.size + 1)
         point[:-1], point[-1] = nodes.ravel(), 0.0
         corrector = Corrector(point, 0.0, 0.0, 0.0, 0.0, 0)
