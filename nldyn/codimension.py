@@ -17,6 +17,7 @@ from nldyn.orbit import ConvergenceError, Orbit
 # across a grazing, where the first jumps; nearer to one than this they are not computed.
 DIFFERENCE = 1e-3
 SHORTEST_DIFFERENCE = 1e-5
+DOUBLE = 1e-6  # product of unit null vectors from which a multiplier counts as double
 
 
 def codimension_tests(
@@ -129,10 +130,11 @@ def flip_coefficient(orbit: Orbit, left: Real, right: Real) -> float:
     """Normal form coefficient of a flip relative to the orbit's size; zero where it degenerates.
 
     pᵀ(C(q, q, q) + 3B(q, (1 - Φ)⁻¹B(q, q)))/6 with pᵀq = 1 (Kuznetsov 2004, eq. 5.44); positive
-    where the doubled orbits are stable in the plane of the flip. Close to a grazing it is nan.
+    where the doubled orbits are stable in the plane of the flip. Close to a grazing, and where two
+    multipliers are -1, it is nan.
     """
     h = _reach(orbit)
-    if h < 10.0 * SHORTEST_DIFFERENCE:
+    if h < 10.0 * SHORTEST_DIFFERENCE or abs(float(left @ right)) < DOUBLE:
         return math.nan
     before, after = _jacobians_beside(orbit, right, h)
     monodromy = orbit.monodromy
