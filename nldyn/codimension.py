@@ -8,7 +8,7 @@ import numpy as np
 
 from nldyn._events import branch_point_test, flip_test, torus_test
 from nldyn.bordered import Condition, Evaluation, nearest_depth
-from nldyn.conditions import Grazing, Singular
+from nldyn.conditions import BranchPoint, Grazing, Singular
 from nldyn.linear import Complex, Real
 from nldyn.orbit import ConvergenceError, Orbit
 
@@ -46,6 +46,8 @@ def codimension_tests(
             "PD": along_flips,
             "NS": along_tori,
         }[condition.kind](condition, at.orbit, mu)
+    if isinstance(condition, BranchPoint):
+        return along_branch_points(mu)
     tests = {"PD": flip_test(mu), "NS": torus_test(mu) if mu.size > 2 else 1.0}
     if parameter_tangent is None:
         tests["LP"] = branch_point_test(mu)
@@ -97,6 +99,15 @@ def along_tori(_: Singular | None, orbit: Orbit | None, mu: Complex) -> dict[str
     }
     if others.size > 2:
         tests["NSNS"] = torus_test(others)
+    return tests
+
+
+def along_branch_points(mu: Complex) -> dict[str, float]:
+    """Tests on a curve of branch points: what the other multipliers do."""
+    others = np.delete(mu, int(np.argmin(np.abs(mu - 1.0))))
+    tests = {"R1": branch_point_test(others), "BPPD": flip_test(others)}
+    if others.size > 2:
+        tests["BPNS"] = torus_test(others)
     return tests
 
 

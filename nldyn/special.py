@@ -220,7 +220,7 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
     chord = Chord(a, b)
     before, after = tests(a), tests(b)
     changed = [k for k in before if before[k] * after[k] < 0.0]
-    if "NS" in changed and not _leaves_circle(a.orbit.multipliers, b.orbit.multipliers):
+    if "NS" in changed and not leaves_circle(a.orbit.multipliers, b.orbit.multipliers):
         changed.remove("NS")
     kinds = [k for k in changed if not (k == "BP" and "LP" in changed)]
     lonely_fold = "LP" in changed and "BP" not in changed
@@ -345,7 +345,7 @@ def touching_extremes(a: Orbit, b: Orbit) -> list[Touch]:
     return touches
 
 
-def _leaves_circle(before: Complex, after: Complex) -> bool:
+def leaves_circle(before: Complex, after: Complex) -> bool:
     """Whether the pair nearest to the unit circle lies beside it at one of two orbits.
 
     The pair of a mode without damping stays on it, where the torus test is rounding noise.

@@ -138,6 +138,21 @@ def test_curve_of_flips_goes_round_the_first_tongue():
     assert (ends.min() - 2.0 * own) * (ends.max() - 2.0 * own) < 0.0
 
 
+def test_curve_of_branch_points_goes_round_the_second_tongue():
+    """There y leaves zero to either side; the branch points are multipliers 1 of Mathieu's."""
+    damping = 0.02
+    branch = continue_branch(orbit_at(2.0 * math.pi * 0.31, 2.0, damping), (0.31, 0.41))
+    curve = continue_special(
+        branch.special_points[0], ("frequency_hz", "amplitude"), ((0.3, 0.4), (0.3, 2.5))
+    )
+    assert curve.values[[0, -1], 1] == pytest.approx([2.5, 2.5])
+    assert curve.values[:, 1].min() < 1.5
+    assert curve.residuals.max() < 1e-8
+    for frequency_hz, force in curve.values[::3]:
+        mu = mathieu_multipliers(2.0 * math.pi * frequency_hz, force, damping)
+        assert np.abs(mu - 1.0).min() < 1e-8
+
+
 @pytest.mark.parametrize(
     ("kind", "characteristic", "order", "window"),
     [
