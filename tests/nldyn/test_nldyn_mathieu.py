@@ -56,8 +56,18 @@ def mathieu_numbers(omega, force, damping=0.0):
 
 
 def mathieu_multipliers(omega, force, damping):
-    """Multipliers of y by Hill's determinant (Whittaker and Watson, 19.42)."""
-    a, q = mathieu_numbers(omega, force, damping)
+    """Multipliers of y."""
+    spring = OWN_Y + 4.0 * STIFFNESS * PRELOAD
+    swing = 4.0 * STIFFNESS * abs(steady_response(omega, force))
+    return mathieu_multipliers_of(omega, spring, swing, damping)
+
+
+def mathieu_multipliers_of(omega, spring, swing, damping):
+    """Multipliers of y'' + c y' + (k + s cos ωt) y = 0 by Hill's determinant.
+
+    E. T. Whittaker and G. N. Watson, A Course of Modern Analysis, 19.42.
+    """
+    a, q = 4.0 * (spring - 0.25 * damping**2) / omega**2, 2.0 * swing / omega**2
     n = np.arange(-4000, 4001)
     xi = q / (4.0 * n**2 - a)
     determinant, before = 1.0, 1.0
