@@ -23,10 +23,12 @@ from nldyn import (
     System,
     SystemModelError,
     Unbalance,
+    codimension,
     continue_branch,
     continue_constant,
     continue_in,
     continue_special,
+    normal_form,
     refine_special,
     solve_orbit,
     switch_at_flip,
@@ -515,6 +517,53 @@ def test_coefficient_of_a_flip_tells_on_which_side_doubled_orbits_are(harmonic_b
         signs.add(b > 0.0)
     assert len(flips) == 8
     assert signs == {True, False}
+
+
+def test_generalised_flip_is_where_the_normal_form_changes_its_sign(harmonic_branch):
+    """The coefficient along the curve and that of `normal_form` are computed in different ways."""
+    special = of_kind(harmonic_branch, "PD", 12.7, 12.8)[0]
+    window = ((12.0, 14.0), (0.014, 0.065))
+    curve = continue_special(special, ("frequency_hz", "modal_damping"), window)
+    (mark,) = [m for m in curve.marks if m.kind == "GPD"]
+    signs = []
+    for share in (0.995, 1.005):
+        (orbit,) = curve.at("modal_damping", share * mark.values[1])
+        form = normal_form(SimpleNamespace(kind="PD", orbit=orbit, frequency_hz=orbit.frequency_hz))
+        signs.append(form.coefficient.sign)
+    assert sorted(signs) == [-1, 1]
+
+
+@pytest.mark.parametrize(
+    ("along", "held", "name", "target"),
+    [
+        ("along_folds", [1.0], "LPPD", -1.0),
+        ("along_folds", [1.0], "R1", 1.0),
+        ("along_folds", [1.0], "LPNS", None),
+        ("along_flips", [-1.0], "LPPD", 1.0),
+        ("along_flips", [-1.0], "R2", -1.0),
+        ("along_flips", [-1.0], "PDNS", None),
+        ("along_tori", [np.exp(1.2j), np.exp(-1.2j)], "LPNS", 1.0),
+        ("along_tori", [np.exp(1.2j), np.exp(-1.2j)], "PDNS", -1.0),
+        ("along_tori", [np.exp(1.2j), np.exp(-1.2j)], "NSNS", None),
+        ("along_branch_points", [1.0], "R1", 1.0),
+        ("along_branch_points", [1.0], "BPPD", -1.0),
+        ("along_branch_points", [1.0], "BPNS", None),
+    ],
+)
+def test_second_points_are_told_by_the_other_multipliers(monkeypatch, along, held, name, target):
+    """A real multiplier passes its target, or a pair the unit circle: only that test changes."""
+    for coefficient in ("fold_coefficient", "flip_coefficient"):
+        monkeypatch.setattr(codimension, coefficient, lambda *_: 1.0)
+    tests = []
+    for size in (0.99, 1.01):
+        pair = size * np.exp([0.7j, -0.7j])
+        moving = pair if target is None else np.array([size * target])
+        mu = np.concatenate([held, moving, [0.3 + 0.1j, 0.3 - 0.1j]])
+        condition = Singular("LP", np.ones(1), np.ones(1))
+        arguments = (mu,) if along == "along_branch_points" else (condition, None, mu)
+        tests.append(getattr(codimension, along)(*arguments))
+    changed = [key for key in tests[0] if tests[0][key] * tests[1][key] < 0.0]
+    assert changed == [name]
 
 
 @pytest.mark.parametrize(

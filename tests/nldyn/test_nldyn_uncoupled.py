@@ -118,3 +118,28 @@ def test_point_of_x_meets_the_flip_of_y_where_each_has_its_own(kind, name):
     assert mark.values == pytest.approx([of_x.frequency_hz, GAP], rel=1e-7)
     near = np.sort(np.abs(mark.orbit.multipliers + 1.0))
     assert near[0 if kind == "LP" else 1] < 1e-6
+
+
+def test_two_stops_are_grazed_at_once_where_each_amplitude_is_its_gap():
+    """The curve on which x touches its stop is its resonance curve; y touches at one frequency."""
+    stiff = 400.0  # of y: its resonance lies above those frequencies
+    wanted_hz = 1.0
+    system = System.from_matrices(
+        np.diag([MASS, MASS]), np.diag([STIFFNESS, stiff]),
+        {"x": [1.0, 0.0], "y": [0.0, 1.0]}, damping=np.diag([DAMPING, DAMPING]),
+        stops=[
+            Stop("x", 1e4, gap=amplitude(STIFFNESS, 0.8)),
+            Stop("y", 1e4, gap=amplitude(stiff, wanted_hz)),
+        ],
+        excitation=[HarmonicForce("x", 1.0), HarmonicForce("y", 1.0)],
+    )  # fmt: skip
+    branch = continue_branch(solve_orbit(system, 0.7), (0.7, 0.85))
+    touch = next(s for s in branch.special_points if s.kind == "GR")
+    curve = continue_special(touch, ("frequency_hz", "gap"), ((0.7, 1.2), (1e-3, 1e-1)))
+    (mark,) = [m for m in curve.marks if m.kind == "GRGR"]
+    assert mark.values == pytest.approx([wanted_hz, amplitude(STIFFNESS, wanted_hz)], rel=1e-9)
+
+
+def amplitude(stiffness, hz):
+    omega = 2.0 * np.pi * hz
+    return 1.0 / abs(stiffness - MASS * omega**2 + 1j * DAMPING * omega)
