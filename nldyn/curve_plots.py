@@ -68,7 +68,8 @@ def plot_curves(curves: Sequence[Curve], ax: Axes | None = None) -> Axes:
     kinds = list(dict.fromkeys(curve.kind for curve in curves))
     for curve in curves:
         colour = PERIOD_COLOURS[kinds.index(curve.kind) % len(PERIOD_COLOURS)]
-        name = MARKER_NAMES.get(curve.kind) or MONITOR_NAMES.get(curve.kind, curve.kind)
+        monitor, of, interface = curve.kind.partition(" of ")
+        name = MARKER_NAMES.get(curve.kind) or MONITOR_NAMES.get(monitor, monitor) + of + interface
         first = curve is next(c for c in curves if c.kind == curve.kind)
         x, y = (curve.values * scales).T
         ax.plot(x, y, color=colour, lw=1.4, label=name if first else None)

@@ -29,7 +29,7 @@ from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit
 from nldyn.parameter_values import Chart, checked_parameter, value_of
 from nldyn.parameters import Parameter
-from nldyn.special import root
+from nldyn.special import LocateError, root
 from nldyn.tables import orbit_columns
 
 CurvePart = Literal["points", "marks"]
@@ -389,7 +389,10 @@ def _with_value(orbit: Orbit, condition: Held, chart: Chart, options: Continuati
         for side, point in enumerate(pair):
             if point is None:
                 continue
-            found = _between(condition, ends[side], point)
+            try:
+                found = _between(condition, ends[side], point)
+            except LocateError as error:
+                raise ConvergenceError(f"{condition.name} was not reached: {error}") from None
             if found is not None:
                 return found
             ends[side] = point

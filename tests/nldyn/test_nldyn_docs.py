@@ -23,13 +23,15 @@ def test_example_runs(capsys):
     assert kinds == ["LP", "LP", "GR", "PD", "PD", "PD"]
 
 
-def test_example_of_the_curves_runs(capsys):
+def test_example_of_the_curves_runs(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "curves.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.S)
     exec(code, {})
     said = re.findall(r"^print.*?# (.*)$", code, flags=re.M)
     assert capsys.readouterr().out.splitlines() == said
-    assert len(said) == 4
+    assert len(said) == 5
+    assert (tmp_path / "curves.png").is_file()
 
 
 def test_every_kind_of_special_point_is_in_the_table():
