@@ -105,14 +105,18 @@ def check_special(caller: str, special: object, kind: str = "", *, of_branch: bo
 
 
 def check_branches(name: str, branches: object) -> None:
-    """Refuse anything but a list of branches, under its name.
+    """Refuse anything but a list of branches, or what has their columns, under its name.
 
     Raises
     ------
     SystemModelError
         As said.
     """
-    if not isinstance(branches, list | tuple) or not all(isinstance(b, Branch) for b in branches):
+    if not isinstance(branches, list | tuple) or not all(
+        hasattr(branch, column)
+        for branch in branches
+        for column in ("period", "points", "special_points", "stop_reasons")
+    ):
         raise SystemModelError(f"{name} must be a list of branches, got {shown(branches)}")
 
 
