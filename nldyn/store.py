@@ -507,8 +507,10 @@ class _Group:
 
 
 @contextmanager
-def _opened(path: str | Path) -> Iterator[_Group]:
-    """The root of a file that this version can read."""
+def _opened(
+    path: str | Path, format_: str = FORMAT, version: int = FORMAT_VERSION
+) -> Iterator[_Group]:
+    """The root of a file of a format that this version can read."""
     try:
         content = Path(path).read_bytes()
     except TypeError:
@@ -525,7 +527,7 @@ def _opened(path: str | Path) -> Iterator[_Group]:
     with file:
         root = _Group(path, file)
         try:
-            _check_format(root)
+            _check_format(root, format_, version)
             yield root
         except SystemModelError:
             raise
@@ -534,14 +536,16 @@ def _opened(path: str | Path) -> Iterator[_Group]:
             raise SystemModelError(f"{path}: is damaged: {error}") from error
 
 
-def _check_format(root: _Group) -> None:
-    if not root.has_attribute("format") or root.text("format") != FORMAT:
-        raise SystemModelError(f"{root.path}: is not a file of branches of nldyn")
+def _check_format(root: _Group, format_: str, newest: int) -> None:
+    if not root.has_attribute("format") or root.text("format") != format_:
+        raise SystemModelError(
+            f"{root.path}: is not a file of {format_.removeprefix('nldyn ')} of nldyn"
+        )
     version = root.whole("format_version")
-    if version > FORMAT_VERSION:
+    if version > newest:
         raise SystemModelError(
             f"{root.path}: has format version {version}, written by {root.text('software')}; this "
-            f"is nldyn {software_version()}, which reads versions up to {FORMAT_VERSION}"
+            f"is nldyn {software_version()}, which reads versions up to {newest}"
         )
 
 
