@@ -179,7 +179,7 @@ class Collector:
             else:
                 self.add(branch)
 
-    def from_flip(self, special: SpecialPoint) -> None:
+    def from_flip(self, special: SpecialPoint, options: ContinuationOptions | None = None) -> None:
         """Follow the branch that is born at a flip, unless it is known."""
         if any(_is_at(end, special) for end in self.flip_ends):
             return
@@ -188,9 +188,11 @@ class Collector:
         except LocateError as error:
             self.notes.append(str(error))
             return
-        self.from_start(start, born_at(special))
+        self.from_start(start, born_at(special), options)
 
-    def from_branch_point(self, special: SpecialPoint) -> None:
+    def from_branch_point(
+        self, special: SpecialPoint, options: ContinuationOptions | None = None
+    ) -> None:
         """Follow the other branch through a branch point both ways, unless it is known."""
         if not self._is_new_crossing(special):
             return
@@ -200,16 +202,19 @@ class Collector:
             self.notes.append(str(error))
             return
         for start in starts:
-            self.from_start(start, f"from the branch point at {special.frequency_hz:.6g} Hz")
+            origin = f"from the branch point at {special.frequency_hz:.6g} Hz"
+            self.from_start(start, origin, options)
 
-    def from_start(self, start: BranchPoint, origin: str) -> None:
+    def from_start(
+        self, start: BranchPoint, origin: str, options: ContinuationOptions | None = None
+    ) -> None:
         """Follow a branch from its first point one way, unless it is known or out of range."""
         low, high = self.range_hz
         if not low < start.orbit.frequency_hz < high or self.known(start.orbit):
             return
         progress = partial(self.progress, f"1/{start.orbit.period}")
         open_ends = tuple(self.open_ends(start.orbit.period))
-        course = Course(self.range_hz, self.options, open_ends)
+        course = Course(self.range_hz, options or self.options, open_ends)
         branch = self.checkpoint.branch_from(start.orbit, course)
         if branch is not None:
             branch = branch.extend(progress=progress, checkpoint=self.checkpoint)

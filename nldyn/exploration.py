@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +55,9 @@ class ExploreOptions:
         Largest period multiple of unstable orbits looked for by near returns and deflation.
     doubled_period : int
         Longest orbits followed from flips, if longer than those looked for.
+    doubled_points : int, optional
+        Most points in one direction of a branch that is longer in period than those looked for;
+        as on the others unless given. A note names each branch that is broken off.
     seed : int
         Seed of the random initial states: results are repeatable.
 
@@ -68,6 +72,7 @@ class ExploreOptions:
     settling: int = 20000
     unstable_period: int = 3
     doubled_period: int = 1
+    doubled_points: int | None = None
     seed: int = 20
 
     def __post_init__(self) -> None:
@@ -79,6 +84,8 @@ class ExploreOptions:
         check_whole("explore: settling", self.settling, 1)
         check_whole("explore: unstable_period", self.unstable_period, 0)
         check_whole("explore: doubled_period", self.doubled_period, 1)
+        if self.doubled_points is not None:
+            check_whole("explore: doubled_points", self.doubled_points, 2)
         check_whole("explore: seed", self.seed, 0)
 
 
@@ -233,21 +240,23 @@ class Exploration:
 
     def report(self) -> str:
         """What was found, tried and left unexplained, in a few lines."""
-        counts: dict[str, int] = {}
-        for branch in self.diagram.branches:
-            kind = "harmonic" if branch.period == 1 else f"1/{branch.period}"
-            counts[kind] = counts.get(kind, 0) + 1
+        counts = Counter(
+            "harmonic" if branch.period == 1 else f"1/{branch.period}"
+            for branch in self.diagram.branches
+        )
         low, high = self.diagram.range_hz
+        found = ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "none"
+        first = f"{low:g} to {high:g} Hz: {len(self.diagram.branches)} branches ({found})"
+        return "\n".join([first, *self.coverage_lines(), *self.diagram.notes])
+
+    def coverage_lines(self) -> list[str]:
+        """What was tried and left unexplained, line by line."""
         simulations = sum(c.settled + c.unsettled + c.failed for c in self.coverage)
-        lines = [
-            f"{low:g} to {high:g} Hz: {len(self.diagram.branches)} branches ("
-            + ", ".join(f"{n} {kind}" for kind, n in counts.items())
-            + ")",
-        ]
+        lines = []
         if simulations:
             lines.append(
                 f"{simulations} simulations at {len(self.coverage)} frequencies, "
-                f"{100.0 * self.settled_share:.1f} % ended on one of them"
+                f"{100.0 * self.settled_share:.1f} % ended on one of the branches"
             )
         if not self.finished:
             total = 2 * len(self.question.frequencies)
@@ -258,20 +267,19 @@ class Exploration:
                 f"motions that did not settle (chaos, longer periods or slow decay): "
                 f"{open_ranges} Hz"
             )
-        cut = self._cut()
-        return "\n".join([*lines, *([cut] if cut else []), *self.diagram.notes])
+        return lines + self._cut()
 
-    def _cut(self) -> str:
+    def _cut(self) -> list[str]:
         """Where the motions had less time to settle than the damping asks for."""
         system, limit = self.question.flow.system, self.question.effort.settling
         needed = [(settling_periods(system, c.frequency_hz), c.frequency_hz) for c in self.coverage]
         cut = [hz for periods, hz in needed if periods > limit]
         if not cut:
-            return ""
-        return (
-            f"settling was cut at {limit} periods from {cut[0]:.4g} to {cut[-1]:.4g} Hz, where the "
-            f"slowest motion takes up to {max(needed)[0]:.4g}: raise ExploreOptions.settling"
-        )
+            return []
+        return [
+            f"settling was cut at {limit} periods from {cut[0]:.4g} to {cut[-1]:.4g} Hz; the "
+            f"slowest motion takes up to {max(needed)[0]} there"
+        ]
 
     def unsettled_ranges(self) -> list[tuple[float, float]]:
         """Ranges of neighbouring frequencies in Hz at which some simulations did not settle."""
@@ -515,17 +523,24 @@ class _Survey:
 
     def _follow(self, orbit: Orbit) -> None:
         """Follow an orbit's branch unless it is known, and those that it leads to."""
+        box, count = self.box, len(self.box.branches)
         longest = max(self.max_period, self.effort.doubled_period)
-        count = len(self.box.branches)
-        self.box.from_orbits([orbit])
-        while count < len(self.box.branches):
-            branch = self.box.branches[count]
+        box.from_orbits([orbit])
+        while count < len(box.branches):
+            branch = box.branches[count]
             count += 1
             for special in branch.special_points:
                 if special.kind == "PD" and 2 * branch.period <= longest:
-                    self.box.from_flip(special)
+                    box.from_flip(special, self._options(2 * branch.period))
                 elif special.kind == "BP":
-                    self.box.from_branch_point(special)
+                    box.from_branch_point(special, self._options(branch.period))
+
+    def _options(self, period: int) -> ContinuationOptions:
+        """Step control of the branches of a period."""
+        options, most = self.question.options, self.effort.doubled_points
+        if period <= self.max_period or most is None:
+            return options
+        return replace(options, max_points=most)
 
 
 def settling_periods(system: System, frequency_hz: float) -> int:

@@ -322,7 +322,8 @@ def _write_exploration(group: Any, found: Exploration, flows: list[FlowMap]) -> 
     _set_attribute(group, "flow_map", _number_of(question.flow, flows))
     _set_attribute(group, "max_period", question.max_period)
     for name, value in asdict(question.effort).items():
-        _set_attribute(group, f"effort {name}", value)
+        if value is not None:
+            _set_attribute(group, f"effort {name}", value)
     _write_options(group, question.options)
     for name in ("steps", "branches", "notes"):
         _set_attribute(group, name, getattr(stage, name))
@@ -743,7 +744,7 @@ def _read_exploration(
     efforts = {
         item.name: group.whole(f"effort {item.name}")
         for item in fields(ExploreOptions)
-        if item.name != "spacing"
+        if item.name != "spacing" and group.has_attribute(f"effort {item.name}")
     }
     question = Question(
         _flow_of(group, flows),
