@@ -140,7 +140,7 @@ LONG = ContinuationOptions(max_points=20000)
 # All branches up to period 3; those that are born at flips are followed further where the time
 # allows, docs/paper.md says what that leaves out.
 SEARCH = ExploreOptions(spacing=0.01, starts=6)
-CASCADES = replace(SEARCH, doubled_period=8, doubled_points=300)
+CASCADES = replace(SEARCH, doubled_period=8, doubled_points=150)
 ALL = (1, 2, 3)
 
 JOBS = (
