@@ -69,7 +69,7 @@ class ExploreOptions:
 
     spacing: float = 0.005
     starts: int = 12
-    settling: int = 20000
+    settling: int = 50000
     unstable_period: int = 3
     doubled_period: int = 1
     doubled_points: int | None = None
