@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from nldyn.plot import plot_diagram
     from nldyn.search import SearchOptions, find_orbits
     from nldyn.special import LocateError
-    from nldyn.store import load_branch, load_branches, load_diagram
+    from nldyn.store import load_branch, load_branches, load_diagram, load_exploration
     from nldyn.system import System
 
 _HOMES = {
@@ -66,7 +66,7 @@ _HOMES = {
     "plot": "plot_diagram",
     "search": "SearchOptions find_orbits",
     "special": "LocateError",
-    "store": "load_branch load_branches load_diagram",
+    "store": "load_branch load_branches load_diagram load_exploration",
     "system": "System",
 }
 
@@ -119,6 +119,7 @@ __all__ = [
     "load_curve",
     "load_curves",
     "load_diagram",
+    "load_exploration",
     "normal_form",
     "plot_contact_force",
     "plot_curves",

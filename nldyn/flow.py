@@ -133,7 +133,7 @@ def _nodes_for_switch(power: float, nodes: int, tail: float) -> int:
 
     def coefficient(p: float, k: int) -> float:
         shares = rgamma(p - k + 1.0) * rgamma(p + k + 2.0)
-        return abs((2 * k + 1) * gamma(p + 1.0) ** 2 * shares)
+        return abs(float((2 * k + 1) * gamma(p + 1.0) ** 2 * shares))
 
     while any(
         coefficient(power, k) > tail or coefficient(power - 1.0, k) > 4.0 * tail

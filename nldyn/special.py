@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from nldyn._events import (
+    alone,
     branch_point_test,
     dip,
     extreme_dip,
@@ -227,6 +228,7 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
     contacts = abs(a.orbit.impacts - b.orbit.impacts)
     touches = touching_extremes(a.orbit, b.orbit)
     clear = len(touches) == contacts and len(kinds) + contacts <= 1 and not lonely_fold
+    clear = clear and not changes_hidden_by_birth(a.orbit, b.orbit)
     if not clear and depth < 10:
         middle = chord.at(0.5)
         return special_points_between(a, middle, depth + 1) + special_points_between(
@@ -359,6 +361,27 @@ def _pair_off_circle(multipliers: Complex) -> tuple[complex, float]:
     off = np.abs(multipliers[i] * multipliers[j] - 1.0)
     nearest_one = int(np.argmin(off))
     return complex(multipliers[i[nearest_one]]), float(off[nearest_one])
+
+
+def changes_hidden_by_birth(a: Orbit, b: Orbit) -> bool:
+    """Whether extremes that only one of two orbits has are across the stop in the other.
+
+    A maximum and a minimum of the penetration that are born together in flight may both reach the
+    stop before the next point: a new contact and its union with another one, after which there are
+    as many contacts as before.
+    """
+    full = 2.0 * math.pi * a.period
+    for output in range(len(a.system.stops)):
+        first, last = a.extremes(output), b.extremes(output)
+        if first.phases.size == last.phases.size:
+            continue
+        fewer = a
+        if first.phases.size > last.phases.size:
+            fewer, first, last = b, last, first
+        new = alone(first.phases, first.is_maximum, last.phases, last.is_maximum, full)
+        if np.any(last.values[new] * fewer.penetration(output, last.phases[new]) < 0.0):
+            return True
+    return False
 
 
 def _on_unit_circle(multipliers: Complex) -> bool:
