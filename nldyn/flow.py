@@ -120,7 +120,7 @@ class FlowOptions:
         """
         if exponent < 1.5:
             return 1e-13
-        return min((1e-2 * self.rtol) ** (1.0 / exponent), 1e-6)
+        return min(float((1e-2 * self.rtol) ** (1.0 / exponent)), 1e-6)
 
 
 def _nodes_for_switch(power: float, nodes: int, tail: float) -> int:
