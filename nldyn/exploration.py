@@ -23,7 +23,7 @@ from nldyn.orbit import (
     shooting_problem,
     spread,
 )
-from nldyn.search import random_states, simulate
+from nldyn.search import orbit_near, random_states, simulate
 from nldyn.system import System
 
 RETURNS = 3.0  # recorded periods after settling, over the longest period looked for
@@ -293,7 +293,7 @@ class _Survey:
             off = np.linalg.norm(tail[period:] - tail[:-period], axis=1)
             if float(np.median(off)) > NEAR * scale:
                 continue
-            found = solve_from(self.box, run[-1 - period], period, omega)
+            found = self._orbit_near(run[-1 - period], period, omega)
             if found is None or not found.stable:
                 continue
             nearest = np.linalg.norm(stroboscopic(found) - run[-1], axis=1).min()
@@ -301,12 +301,15 @@ class _Survey:
                 return next((other for other in known if same_orbit(found, other)), found)
         return None
 
+    def _orbit_near(self, start: Real, period: int, omega: float) -> Orbit | None:
+        return orbit_near(self.box.flow, start, period, omega, self.box.observe)
+
     def _unstable(self, runs: Sequence[Real], stable: Sequence[Orbit], omega: float) -> None:
         """Look for unstable orbits of short periods near wandering motions and by deflation."""
         for period in range(1, min(self.effort.unstable_period, self.max_period) + 1):
             for run in runs:
                 for start in near_returns(run, period, 2):
-                    orbit = solve_from(self.box, run[start], period, omega)
+                    orbit = self._orbit_near(run[start], period, omega)
                     if orbit is not None and orbit.period == period:
                         self._follow(orbit)
             known = [o for branch in self.box.of_period(period) for o in _at(branch, omega)]
@@ -346,22 +349,6 @@ def settling_periods(system: System, frequency_hz: float) -> int:
     if slowest <= 0.0:
         return most
     return int(min(max(math.ceil(DECAYS * frequency_hz / slowest), fewest), most))
-
-
-def solve_from(box: Collector, start: Real, period: int, omega: float) -> Orbit | None:
-    """Orbit that Newton's method finds from a state, by its minimal period; None if none."""
-    problem = shooting_problem(box.flow, period)
-    try:
-        nodes = spread(problem, start, omega)
-        orbit = refine(problem, nodes, omega, box.observe, max_iterations=10)
-        shorter = minimal_period(orbit)
-        if shorter < period:
-            problem = shooting_problem(box.flow, shorter)
-            nodes = spread(problem, stroboscopic(orbit)[0], omega)
-            orbit = refine(problem, nodes, omega, box.observe, max_iterations=10)
-    except ConvergenceError:
-        return None
-    return orbit
 
 
 def deflated_orbit(

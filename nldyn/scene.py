@@ -104,6 +104,18 @@ def parse_scene(text: str, file: str | Path = "scene.toml") -> Scene:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise SceneError(f"{file}: is not valid TOML: {_toml_fault(str(error))}") from None
+    return scene_from_tables(tables, file, text)
+
+
+def scene_from_tables(tables: dict[str, Any], file: str | Path, text: str = "") -> Scene:
+    """Check the tables of a scene that have been read from a text or changed since.
+
+    Raises
+    ------
+    SceneError
+        As for `load_scene`.
+    """
+    file = Path(file)
     try:
         scene = Scene.model_validate(tables)
     except ValidationError as error:
