@@ -311,7 +311,7 @@ def _orbit_target(orbit: Orbit) -> Target:
         shapes.append(shape / np.linalg.norm(shape, 2))
     rng = np.random.default_rng(1)
     tries = rng.standard_normal((40 * flow.system.size, states.shape[1]))
-    phases = 2.0 * np.pi * np.arange(period + 1)
+    phases = np.linspace(0.0, 2.0 * np.pi * period, period + 1)
     radius = scale
 
     def comes_nearer(k: int, radius: float) -> bool:

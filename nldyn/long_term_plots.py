@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap, to_rgb
+from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
@@ -83,7 +83,7 @@ def plot_brute_force(
         branches = diagram if isinstance(diagram, Diagram) else list(diagram)
         plot_diagram(branches, ax, special_points=(), unit=name)
     shade_ranges(ax, found.ranges())
-    handles = []
+    handles: list[Any] = []
     for kind, colour in KIND_COLOURS.items():
         chosen = [c for c in found.columns if c.attractor.kind == kind]
         if chosen:
@@ -95,7 +95,7 @@ def plot_brute_force(
     handles.append(Patch(color=SHADE, label="chaotic range"))
     before = ax.get_legend()
     if before is not None:
-        handles = [*before.legend_handles, *handles]  # type: ignore[list-item]
+        handles = [*before.legend_handles, *handles]
     ax.legend(handles=handles, fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
     ax.set_xlabel("excitation frequency (Hz)")
     ax.set_ylabel(f"largest displacement of {found.observe} ({name})")
@@ -208,11 +208,10 @@ def plot_basins(
 
 def _coloured(found: Basins) -> tuple[Real, list[Any]]:
     """Colours (ny, nx, 3) of the cells, and entries of the legend."""
-    colours = ListedColormap(PERIOD_COLOURS).colors
     image = np.ones((*found.labels.shape, 3))
     handles: list[Any] = []
     for index, basin in enumerate(found.basins):
-        base = np.array(to_rgb(colours[index % len(colours)]))  # type: ignore[index]
+        base = np.asarray(to_rgb(PERIOD_COLOURS[index % len(PERIOD_COLOURS)]), dtype=float)
         phases = max(basin.attractor.period, 1)
         for phase in range(phases):
             here = (found.labels == index) & (found.phases == phase)

@@ -100,7 +100,7 @@ class _Inverse:
 
     def __init__(self, flow: FlowMap, omega: float, periods: int, plane: Plane) -> None:
         self.flow, self.omega, self.plane = flow, omega, plane
-        self.phases = 2.0 * np.pi * np.arange(periods + 1)
+        self.phases = np.linspace(0.0, 2.0 * np.pi * periods, periods + 1)
         (x0, x1), (y0, y1) = plane.x_range, plane.y_range
         self.low = np.array([x0, y0])
         self.sides = np.array([x1 - x0, y1 - y0])
@@ -121,7 +121,7 @@ class _Inverse:
         if found.failure:
             return None
         jacobian = np.linalg.solve(self.to_z, found.monodromy @ self.to_z)
-        return self.to_plane(found.ends[-1]), jacobian
+        return self.to_plane(found.ends[-1]), np.asarray(jacobian, dtype=float)
 
     def jacobian(self, point: Real) -> Real:
         found = self.image(point)
@@ -220,18 +220,15 @@ def basin_edge(
     modal = found.plane.states((found.labels.shape[0], found.labels.shape[1]))
     observe = attractors[0].flow.system.interfaces[0]
     longest = int(found.periods.max()) + 16
-    points, saddles = [], []
+    points: list[Real] = []
+    saddles: list[Orbit] = []
     for (i, j), (k, m) in picked:
         ends = flow.to_state(np.array([modal[i, j], modal[k, m]]))
         low, high = _bisected(flow, omega, targets, longest, ends, int(found.labels[i, j]), width)
         middle = flow.to_modal(0.5 * (low + high))
         points.append(found.plane.coordinates(middle[None])[0][0])
         orbit = _lingering(flow, omega, low, observe)
-        if (
-            orbit is not None
-            and not orbit.stable
-            and not any(same_orbit(orbit, s) for s in saddles)
-        ):
+        if orbit is not None and not any(same_orbit(orbit, other) for other in saddles):
             saddles.append(orbit)
     return np.array(points), saddles
 
@@ -245,7 +242,7 @@ def _neighbours(found: Basins) -> np.ndarray:
         b = labels[di:, dj:]
         rows, columns = np.nonzero((a != b) & (a != UNDECIDED) & (b != UNDECIDED))
         first = np.column_stack([rows, columns])
-        pairs.append(np.stack([first, first + (di, dj)], axis=1))
+        pairs.append(np.stack([first, first + np.array([di, dj])], axis=1))
     return np.concatenate(pairs)
 
 

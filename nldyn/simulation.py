@@ -274,10 +274,11 @@ def simulate(
         failure = trajectory.failure
         if failure:
             break
-    lengths = [(end_phase(s) - float(s.record.phase[0])) / omega for s in stretches]
-    begins: Real = np.cumsum([transient / frequency_hz, *lengths])
-    if not failure:
-        begins = (transient + np.minimum(BLOCK * np.arange(len(begins)), periods)) / frequency_hz
+    turns = transient + np.minimum(BLOCK * np.arange(len(stretches) + 1.0), periods)
+    if failure:
+        lost = stretches[-1]
+        turns[-1] = turns[-2] + (end_phase(lost) - lost.record.phase[0]) / (2.0 * math.pi)
+    begins = np.asarray(turns / frequency_hz, dtype=float)
     return Motion(flow, tuple(stretches), begins, failure)
 
 
@@ -388,7 +389,7 @@ def sweep(
         if failure:
             break
         state = end_state(trajectory)
-    begins = times[: len(stretches) + 1].copy()
+    begins = np.array(times[: len(stretches) + 1])
     if failure:
         lost = stretches[-1]
         begins[-1] = begins[-2] + (end_phase(lost) - lost.record.phase[0]) / lost.omega
