@@ -208,7 +208,7 @@ def motion_of(orbit: Orbit, turns: int = 1) -> Motion:
     >>> round(motion_of(solve_orbit(system, frequency_hz=20.0), 3).duration, 12)
     0.15
     """
-    begins = orbit.duration * np.arange(turns + 1)
+    begins = np.asarray(orbit.duration * np.arange(turns + 1), dtype=float)
     return Motion(orbit.problem.flow, (orbit.trajectory,) * turns, begins)
 
 
