@@ -97,8 +97,8 @@ def impacts(motion: Motion | Orbit) -> Impacts:
     A contact that has begun before the motion, or is not over at its end, is left out. Of an orbit,
     a contact over the end of the period counts where it begins.
 
-    Times and impulses are as accurate as the flow map; peaks, and the energies, come from the
-    polynomials of the contact panels and are good to about 1e-5.
+    Times, impulses and losses are as accurate as the flow map; peaks come from the polynomials of
+    the contact panels and are good to about 1e-6, the work to about 1e-4.
 
     Parameters
     ----------
@@ -208,19 +208,41 @@ def panel_table(motion: Motion, stop: int) -> PanelTable:
 
 def _panel_table(flow: FlowMap, pieces: _Pieces, stop: int, panels: NDArray[np.intp]) -> PanelTable:
     weights = pieces.duration[panels, None] * flow.tables.weights[pieces.kind[panels]]
-    at_nodes = pieces.force[panels, stop]
-    fine = _fine_interpolation(flow.options.panel_nodes)
-    depth, force = pieces.depth[panels, stop] @ fine.T, at_nodes @ fine.T
+    nodal = pieces.force[panels, stop]
+    fine, rise = _panel_tables(flow.options.panel_nodes)
+    depth, force = pieces.depth[panels, stop] @ fine.T, nodal @ fine.T
     work = 0.5 * (force[:, 1:] + force[:, :-1]) * np.diff(depth, axis=1)
     return PanelTable(
         pieces.duration[panels],
-        np.einsum("pm,pm->p", weights, at_nodes),
-        np.einsum("pm,pm->p", weights, at_nodes**2),
+        np.einsum("pm,pm->p", weights, nodal),
+        np.einsum("pm,pm->p", weights, nodal**2),
         np.maximum(work, 0.0).sum(axis=1),
-        work.sum(axis=1),
-        depth.max(axis=1),
-        force.max(axis=1),
+        np.einsum("pm,pm->p", nodal, pieces.depth[panels, stop] @ rise.T),
+        _peaks(depth),
+        _peaks(force),
     )
+
+
+def _peaks(values: Real) -> Real:
+    """Largest value of each row (p,), by the parabola through three samples.
+
+    Examples
+    --------
+    >>> x = np.linspace(0.0, 1.0, 11)
+    >>> float(_peaks(1.0 - (x[None] - 0.33) ** 2)[0].round(12))
+    1.0
+    """
+    if not len(values):
+        return np.empty(0)
+    middle = np.clip(values.argmax(axis=1), 1, values.shape[1] - 2)
+    before, here, after = (
+        np.take_along_axis(values, (middle + k)[:, None], axis=1)[:, 0] for k in (-1, 0, 1)
+    )
+    bend = before - 2.0 * here + after
+    lean = 0.5 * (after - before)
+    inside = (bend < 0.0) & (np.abs(lean) <= -bend)
+    top = here - 0.5 * lean**2 / np.where(inside, bend, -1.0)
+    return np.where(inside, top, values.max(axis=1))
 
 
 def _of_stop(flow: FlowMap, pieces: _Pieces, stop: int) -> dict[str, NDArray[Any]]:
@@ -286,10 +308,15 @@ def _largest(group: NDArray[np.intp], values: Real, count: int) -> Real:
 
 
 @lru_cache(maxsize=8)
-def _fine_interpolation(nodes: int) -> Real:
-    """Matrix (FINE, nodes) from values at the Gauss nodes to equal steps of s from 0 to 1."""
+def _panel_tables(nodes: int) -> tuple[Real, Real]:
+    """Two matrices on values at the Gauss nodes of a panel, of the polynomial through them.
+
+    (FINE, nodes): values at equal steps of s from 0 to 1. (nodes, nodes): derivative by s at the
+    nodes, times the Gauss weights.
+    """
     x, w = legendre.leggauss(nodes)
     degrees = np.arange(nodes)
     to_legendre = (0.5 * (2 * degrees + 1))[:, None] * legendre.legvander(x, nodes - 1).T * w
     fine = legendre.legvander(np.linspace(-1.0, 1.0, FINE), nodes - 1)
-    return np.asarray(fine @ to_legendre)
+    slopes = np.array([legendre.legval(x, legendre.legder(unit)) for unit in np.eye(nodes)]).T
+    return np.asarray(fine @ to_legendre), np.asarray(w[:, None] * (slopes @ to_legendre))

@@ -17,6 +17,7 @@ from nldyn.search import orbit_near
 NEWTON_STEPS = 12
 FIRST = 1e-4  # how far the first, straight piece reaches, as a share of the plane
 HALVINGS = 30
+LINGER = 64  # periods for which a motion from the edge is followed
 MARGIN = 1.0  # how far beyond the plane a manifold is followed, in units of its sides
 
 
@@ -227,7 +228,7 @@ def basin_edge(
         low, high = _bisected(flow, omega, targets, longest, ends, int(found.labels[i, j]), width)
         middle = flow.to_modal(0.5 * (low + high))
         points.append(found.plane.coordinates(middle[None])[0][0])
-        orbit = _lingering(flow, omega, low, observe)
+        orbit = _lingering(flow, omega, targets, low, observe)
         if orbit is not None and not any(same_orbit(orbit, other) for other in saddles):
             saddles.append(orbit)
     return np.array(points), saddles
@@ -261,15 +262,19 @@ def _bisected(
     return low, high
 
 
-def _lingering(flow: FlowMap, omega: float, state: Real, observe: str) -> Orbit | None:
-    """Orbit near which a motion from a state on the edge lingers before it leaves."""
-    phases = np.linspace(0.0, 2.0 * np.pi * 64, 65)
+def _lingering(
+    flow: FlowMap, omega: float, targets: list[Target], state: Real, observe: str
+) -> Orbit | None:
+    """Unstable orbit near which a motion from the edge lingers before it reaches an attractor."""
+    phases = np.linspace(0.0, 2.0 * np.pi * LINGER, LINGER + 1)
     run = flow.shoot(state[None], phases, omega, sensitivities=False, chained=True)
     if run.failure:
         return None
+    reached = np.any([target.reached(run.ends) != UNDECIDED for target in targets], axis=0)
+    before = run.ends[: int(np.argmax(reached)) if reached.any() else LINGER]
     for period in (1, 2, 3, 4):
-        for start in near_returns(run.ends, period, 3):
-            orbit = orbit_near(flow, run.ends[start], period, omega, observe)
+        for start in near_returns(before, period, 3):
+            orbit = orbit_near(flow, before[start], period, omega, observe)
             if orbit is not None and not orbit.stable:
                 return orbit
     return None
