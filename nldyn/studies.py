@@ -248,11 +248,14 @@ def _entries(lines: Sequence[str], keep: str | Path) -> Iterator[dict[str, Any]]
 
 
 def _append(keep: str | Path, entry: Mapping[str, Any]) -> None:
-    path = Path(keep)
+    """Append a case; a last line that was cut off gives way to it."""
     text = json.dumps(entry) + "\n"
-    torn = path.exists() and path.stat().st_size > 0 and not path.read_bytes().endswith(b"\n")
-    with path.open("a", encoding="utf-8") as file:
-        file.write("\n" + text if torn else text)
+    with Path(keep).open("a+b") as file:
+        file.seek(0)
+        whole = file.read()
+        if not whole.endswith(b"\n"):
+            file.truncate(whole.rfind(b"\n") + 1)
+        file.write(text.encode())
 
 
 def _dataset(

@@ -216,7 +216,8 @@ def test_two_stable_orbits_share_the_plane_and_unstable_ones_sit_on_the_edge():
     flow = found.attractors[0].flow
     targets = [target_of(attractor) for attractor in found.attractors]
     for point in points:  # tiny steps to all sides reach both attractors
-        nearby = point + 1e-9 * np.array([[1, 0], [-1, 0], [0, 200], [0, -200], [1, 200], [-1, 200]])
+        sides = np.array([[1, 0], [-1, 0], [0, 200], [0, -200], [1, 200], [-1, 200]])
+        nearby = point + 1e-9 * sides
         starts = plane.origin + nearby[:, :1] * plane.x + nearby[:, 1:] * plane.y
         reached = settle(flow, 2.0 * np.pi * 22.8, targets, 500, flow.to_state(starts)).labels
         assert set(reached) == {0, 1}
