@@ -8,6 +8,7 @@ import signal
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -74,7 +75,7 @@ class Chaos:
         return Finding(
             holds=holds,
             text="frequencies with a chaotic motion, " + "; ".join(texts),
-            note=f"swept up and down in steps of {_step():g} Hz; chaotic means a largest Lyapunov "
+            note=f"swept up and down in steps of {_step(found):g} Hz; chaotic means a largest Lyapunov "
             "exponent above zero by three standard errors; the statement holds if it is so at more "
             f"than half of the frequencies of each range. Outside, {everywhere - inside} of the "
             f"other frequencies from {RANGE_HZ[0]:g} to {RANGE_HZ[1]:g} Hz have one, too",
@@ -103,8 +104,9 @@ class Chaos:
         )
 
 
-def _step() -> float:
-    return (RANGE_HZ[1] - RANGE_HZ[0]) / (POINTS - 1)
+def _step(found: BruteForce) -> float:
+    """Distance of neighbouring frequencies in Hz."""
+    return (RANGE_HZ[1] - RANGE_HZ[0]) / (found.share(*RANGE_HZ)[1] - 1)
 
 
 def _typical(found: BruteForce, low: float, high: float) -> str:
@@ -120,10 +122,10 @@ def _typical(found: BruteForce, low: float, high: float) -> str:
     return f" (median exponent {value:.3g} ± {error:.1g} 1/s)"
 
 
-def _task(task: tuple[str, Direction]) -> BruteForce:
+def _task(points: int, task: tuple[str, Direction]) -> BruteForce:
     model, direction = task
     return brute_force(
-        scene_system(model), RANGE_HZ, points=POINTS, directions=[direction], recorded=1,
+        scene_system(model), RANGE_HZ, points=points, directions=[direction], recorded=1,
         options=EFFORT,
     )  # fmt: skip
 
@@ -133,8 +135,8 @@ def _leave_ctrl_c() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def compute_chaos(workers: int) -> Chaos:
-    """Sweep all models up and down, on as many processes."""
+def compute_chaos(workers: int, points: int = POINTS) -> Chaos:
+    """Sweep all models up and down, on as many processes as workers."""
     tasks: list[tuple[str, Direction]] = [
         (model, direction) for model in MODELS for direction in ("up", "down")
     ]
@@ -145,7 +147,7 @@ def compute_chaos(workers: int) -> Chaos:
         ProcessPoolExecutor(workers, context, _leave_ctrl_c) as pool,
         _ended_at_failure(),
     ):
-        for outcome in as_finished(_task, tasks, pool):
+        for outcome in as_finished(partial(_task, points), tasks, pool):
             halves[tasks[outcome.index]] = outcome.value_or_raise()
             report(f"Lyapunov exponents, {len(halves)} of {len(tasks)} sweeps", 0.0)
     return Chaos(
@@ -186,6 +188,6 @@ def _draw(ax: Axes, found: BruteForce, label: str, colour: str) -> None:
     frequencies = sorted(largest)
     values = np.array([largest[hz] for hz in frequencies])
     ax.errorbar(
-        frequencies, values[:, 0], values[:, 1], color=colour, label=label, linewidth=0.8, marker=".",
-        markersize=4.0, elinewidth=0.8,
+        frequencies, *values.T, color=colour, label=label, linewidth=0.8, elinewidth=0.8,
+        marker=".", markersize=4.0,
     )  # fmt: skip

@@ -10,7 +10,7 @@ import nldyn.paper.figures
 from nldyn import FlowMap, System
 from nldyn.attractors import Attractor
 from nldyn.lyapunov import LyapunovSpectrum
-from nldyn.paper.chaos import MODELS, POINTS, RANGE_HZ, Chaos, write_chaos_figure
+from nldyn.paper.chaos import MODELS, POINTS, RANGE_HZ, Chaos, compute_chaos, write_chaos_figure
 from nldyn.paper.claims import evaluate
 from nldyn.paper.evidence import Finding
 from nldyn.paper.figures import SHOWN, write_figures
@@ -86,3 +86,11 @@ def test_the_figure_shows_both_models_at_both_dampings(chaos, tmp_path):
     text = (tmp_path / "chaos.svg").read_text(encoding="utf-8")
     assert (tmp_path / "chaos.png").stat().st_size > 10000
     assert "svg" in text
+
+
+def test_all_models_are_swept_both_ways_on_processes():
+    found = compute_chaos(workers=2, points=2)
+    assert set(found.diagrams) == set(MODELS)
+    for diagram in found.diagrams.values():
+        places = [(column.direction, column.frequency_hz) for column in diagram.columns]
+        assert places == [("up", 18.0), ("up", 90.0), ("down", 90.0), ("down", 18.0)]
