@@ -1,9 +1,10 @@
 """``python -m nldyn.bench.throughput``: forcing periods per second of plain simulation.
 
 The same motions by the flow map, by `scipy.integrate.solve_ivp` and by a compiled Runge-Kutta
-scheme of fourth order with fixed steps, each at the coarsest setting whose error over a period is below
-1e-8, or else at its finest. Times are processor times on one core. Two threads are measured by the
-wall clock and by the processor time that they get meanwhile, since other programs may take a core.
+scheme of fourth order with fixed steps, each at the coarsest setting whose error over a period is
+below 1e-8, or else at its finest. Times are processor times on one core. Two threads are measured
+by the wall clock and by the processor time that they get meanwhile, since other programs may take
+a core.
 """
 
 from __future__ import annotations
@@ -175,7 +176,7 @@ def measure(model: str) -> list[Row]:
     flow = FlowMap(system)
     phases = np.linspace(0.0, 2.0 * np.pi * STATES, STATES + 1)
     start = flow.to_state(case.start)[None]
-    states = flow.to_modal(flow.shoot(start, phases, omega, chained=True).ends)
+    states = list(flow.to_modal(flow.shoot(start, phases, omega, chained=True).ends))
     exact = by_flow_map(system, omega, 1e-13)
     ends = [exact(state) for state in states]
     rows = []

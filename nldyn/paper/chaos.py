@@ -75,10 +75,11 @@ class Chaos:
         return Finding(
             holds=holds,
             text="frequencies with a chaotic motion, " + "; ".join(texts),
-            note=f"swept up and down in steps of {_step(found):g} Hz; chaotic means a largest Lyapunov "
-            "exponent above zero by three standard errors; the statement holds if it is so at more "
-            f"than half of the frequencies of each range. Outside, {everywhere - inside} of the "
-            f"other frequencies from {RANGE_HZ[0]:g} to {RANGE_HZ[1]:g} Hz have one, too",
+            note=f"swept up and down in steps of {_step(found):g} Hz; chaotic means a largest "
+            "Lyapunov exponent above zero by three standard errors; the statement holds if more "
+            "than half of the frequencies of each range have such a motion. "
+            f"Outside, {everywhere - inside} of the other frequencies from {RANGE_HZ[0]:g} to "
+            f"{RANGE_HZ[1]:g} Hz have one, too",
         )
 
     def damping(self) -> tuple[bool, str]:
