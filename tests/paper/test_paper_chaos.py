@@ -58,7 +58,8 @@ def test_damping_counts_flips_and_chaotic_frequencies(chaos):
 
 
 def test_the_rows_on_chaotic_ranges_are_decided(chaos, monkeypatch):
-    monkeypatch.setattr("nldyn.paper.claims.CHECKS", {"damping": lambda _: Finding(holds=True, text="yes")})
+    flips = Finding(holds=True, text="fewer")
+    monkeypatch.setattr("nldyn.paper.claims.CHECKS", {"damping": lambda _: flips})
     verdicts = {row.id: row.verdict for row in evaluate({}, chaos)}
     assert verdicts["fig4.chaos"] == "differs"  # 59 to 66 Hz: 7 of 15
     assert verdicts["fig7.chaos"] == "agrees"
