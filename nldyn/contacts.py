@@ -23,6 +23,7 @@ FINE = 257  # points on a panel at which its polynomials are looked at
 UNITS = {
     "stop": "1",
     "time": "s",
+    "phase_deg": "deg",
     "duration": "s",
     "speed": "m/s",
     "rebound_speed": "m/s",
@@ -45,6 +46,8 @@ class Impacts:
         Index of the stop.
     time : (k,)
         When the contact begins, in s.
+    phase_deg : (k,)
+        Forcing phase at the begin in degrees, from 0 to 360.
     duration : (k,)
         Length of the contact in s.
     speed, rebound_speed : (k,)
@@ -65,6 +68,7 @@ class Impacts:
 
     stop: NDArray[np.int64]
     time: Real
+    phase_deg: Real
     duration: Real
     speed: Real
     rebound_speed: Real
@@ -131,6 +135,7 @@ class _Pieces:
     """All pieces of a motion, one after the other."""
 
     time: Real  # (P,) begin
+    phase: Real  # (P,) forcing phase at the begin
     duration: Real  # (P,)
     hz: Real  # (P,)
     event: NDArray[np.int64]  # (P,)
@@ -153,6 +158,7 @@ def _pieces(motion: Motion) -> _Pieces:
     last = end_state(motion.stretches[-1])[None]
     return _Pieces(
         np.concatenate(times),
+        np.concatenate([rec.phase for rec in records]),
         np.concatenate([rec.duration for rec in records]),
         np.concatenate(hz),
         np.concatenate([rec.event for rec in records]),
@@ -257,6 +263,7 @@ def _of_stop(flow: FlowMap, pieces: _Pieces, stop: int) -> dict[str, NDArray[Any
     return {
         "stop": np.full(count, stop, dtype=np.int64),
         "time": pieces.time[first],
+        "phase_deg": np.degrees(pieces.phase[first]) % 360.0,
         "duration": end - pieces.time[first],
         "speed": speed[first],
         "rebound_speed": -speed[last + 1],

@@ -11,6 +11,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from nldyn.attractors import Attractor
 from nldyn.basin_maps import UNDECIDED, Basins
 from nldyn.branch import Branch
 from nldyn.diagrams import Diagram
@@ -180,8 +181,9 @@ def plot_basins(
     plane = found.plane
     image, handles = _coloured(found)
     if times:
-        slow = np.log(np.maximum(found.periods, 1)) / np.log(max(int(found.periods.max()), 2))
-        image *= (1.0 - 0.7 * slow**2)[..., None]
+        slow = np.log(np.maximum(found.periods, 1))
+        slow -= slow.min()
+        image *= (1.0 - 0.8 * slow / max(float(slow.max()), 1e-9))[..., None]
     ends = (*plane.x_range, *plane.y_range)
     ax.imshow(image, origin="lower", extent=ends, aspect="auto", interpolation="nearest")
     for curve in manifolds:
@@ -206,6 +208,14 @@ def plot_basins(
     return ax
 
 
+def _title(attractor: Attractor) -> str:
+    """Name of an attractor, with its impacts if it is periodic."""
+    if attractor.orbit is None:
+        return attractor.name
+    count = attractor.orbit.impacts
+    return f"{attractor.name} ({count} impact{'' if count == 1 else 's'})"
+
+
 def _coloured(found: Basins) -> tuple[Real, list[Any]]:
     """Colours (ny, nx, 3) of the cells, and entries of the legend."""
     image = np.ones((*found.labels.shape, 3))
@@ -220,7 +230,7 @@ def _coloured(found: Basins) -> tuple[Real, list[Any]]:
             tint = base + (1.0 - base) * 0.75 * phase / phases
             image[here] = tint
             which = f", phase {phase}" if phases > 1 else ""
-            label = f"{basin.attractor.name}{which}: {100.0 * here.mean():.1f} %"
+            label = f"{_title(basin.attractor)}{which}: {100.0 * here.mean():.1f} %"
             handles.append(Patch(color=tuple(tint), label=label))
     if np.any(found.labels == UNDECIDED):
         handles.append(Patch(color="white", label=f"undecided: {100.0 * found.undecided:.1f} %"))

@@ -69,8 +69,7 @@ def impact_section(motion: Motion, stop: int = 0) -> tuple[Real, Real]:
     check_whole("stop", stop, 0, len(motion.system.stops) - 1)
     found = impacts(motion)
     hit = found.stop == stop
-    phase = 360.0 * np.asarray(found.time[hit] * found.frequency_hz[hit]) % 360.0
-    return phase, found.speed[hit]
+    return found.phase_deg[hit], found.speed[hit]
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,6 +270,5 @@ def column_of(direction: Direction, attractor: Attractor, observe: str, recorded
     _, peaks = motion.period_peaks(observe)
     strobe, _ = stroboscopic_section(motion, observe)
     found = impacts(motion)
-    phase = 360.0 * np.asarray(found.time * found.frequency_hz) % 360.0
     attractor._cache.clear()  # recorded motions are large beside what is shown of them
-    return Column(direction, attractor, peaks, strobe[1:], phase, found.speed)
+    return Column(direction, attractor, peaks, strobe[1:], found.phase_deg, found.speed)

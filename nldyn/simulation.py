@@ -12,7 +12,14 @@ import numpy as np
 from nldyn.errors import SystemModelError, check_frequency, check_whole, is_finite, shown
 from nldyn.flow import FlowMap, Trajectory
 from nldyn.linear import Real
-from nldyn.orbit import History, Orbit, check_bounded, check_observe, history_of
+from nldyn.orbit import (
+    ConvergenceError,
+    History,
+    Orbit,
+    check_bounded,
+    check_observe,
+    history_of,
+)
 from nldyn.system import System, numbers
 
 BLOCK = 64  # periods recorded in one call
@@ -247,6 +254,9 @@ def simulate(
     ------
     SystemModelError
         For input that makes no sense.
+    ConvergenceError
+        If the transient cannot be simulated. A recording that fails is kept up to there, with the
+        reason in `Motion.failure`.
 
     Examples
     --------
@@ -267,7 +277,7 @@ def simulate(
     state = starting_state(flow, start)
     before, failure = transient_end(flow, state, omega, transient)
     if before is None:
-        raise SystemModelError(f"the transient at {frequency_hz:g} Hz failed: {failure}")
+        raise ConvergenceError(f"the transient at {frequency_hz:g} Hz failed: {failure}")
     stretches = []
     for trajectory in _blocks(flow, before, omega, periods):
         stretches.append(trajectory)
