@@ -404,6 +404,8 @@ def find_attractors(
     ------
     SystemModelError
         For input that makes no sense.
+    TaskError
+        If a computation ends in an error; a simulation that fails is an attractor of that kind.
 
     Examples
     --------

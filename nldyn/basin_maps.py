@@ -460,6 +460,8 @@ def basins(
     ------
     SystemModelError
         For input that makes no sense.
+    TaskError
+        If a computation ends in an error.
 
     Examples
     --------

@@ -130,12 +130,8 @@ def contact_measures(
     listed = impacts(source)
     speeds = listed.speed[listed.stop == stop]
     time = motion.duration
-    turns = sum(
-        (end - begin) * stretch.omega / (2.0 * math.pi)
-        for begin, end, stretch in zip(
-            motion.begins[:-1], motion.begins[1:], motion.stretches, strict=True
-        )
-    )
+    lengths = zip(np.diff(motion.begins), motion.stretches, strict=True)
+    turns = float(sum(length * stretch.omega for length, stretch in lengths)) / (2.0 * math.pi)
     return ContactMeasures(
         turns / time,
         name,
