@@ -121,7 +121,7 @@ def impacts(motion: Motion | Orbit) -> Impacts:
     ...     excitation=[Unbalance("middle", 4.92e-6)])
     >>> found = impacts(solve_orbit(system, frequency_hz=25.3))
     >>> len(found), f"{found.speed[0]:.3f} m/s"
-    (1, '0.070 m/s')
+    (1, '0.018 m/s')
     """
     if isinstance(motion, Orbit):
         found = _complete(motion_of(motion, 2))
