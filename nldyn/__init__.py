@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from nldyn.contacts import Impacts, impacts
     from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
     from nldyn.curve_marks import LocatedPoint, refine_special
+    from nldyn.curve_plots import plot_curves
+    from nldyn.curve_store import load_curve, load_curves, save_curves
     from nldyn.curves import Curve, continue_constant, continue_in, continue_special
     from nldyn.diagrams import Diagram, Seed, diagram
     from nldyn.elements import (
@@ -48,7 +50,7 @@ if TYPE_CHECKING:
     from nldyn.sections import BruteForce, brute_force, impact_section, stroboscopic_section
     from nldyn.simulation import Motion, simulate, sweep
     from nldyn.special import LocateError
-    from nldyn.store import load_branch, load_branches, load_diagram
+    from nldyn.store import load_branch, load_branches, load_diagram, load_exploration
     from nldyn.studies import study
     from nldyn.system import System
     from nldyn.wear import ContactMeasures, contact_measures
@@ -60,6 +62,8 @@ _HOMES = {
     "cascades": "Cascade cascade cascades_in",
     "continuation": "ContinuationOptions Walk continue_branch switch_at_flip",
     "curve_marks": "LocatedPoint refine_special",
+    "curve_plots": "plot_curves",
+    "curve_store": "load_curve load_curves save_curves",
     "curves": "Curve continue_constant continue_in continue_special",
     "diagrams": "Diagram Seed diagram",
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
@@ -82,7 +86,7 @@ _HOMES = {
     "sections": "BruteForce brute_force impact_section stroboscopic_section",
     "simulation": "Motion simulate sweep",
     "special": "LocateError",
-    "store": "load_branch load_branches load_diagram",
+    "store": "load_branch load_branches load_diagram load_exploration",
     "studies": "study",
     "system": "System",
     "wear": "ContactMeasures contact_measures",
@@ -153,12 +157,16 @@ __all__ = [
     "impacts",
     "load_branch",
     "load_branches",
+    "load_curve",
+    "load_curves",
     "load_diagram",
+    "load_exploration",
     "lyapunov_exponents",
     "normal_form",
     "plot_basins",
     "plot_brute_force",
     "plot_contact_force",
+    "plot_curves",
     "plot_diagram",
     "plot_history",
     "plot_phase_portrait",
@@ -167,6 +175,7 @@ __all__ = [
     "plot_sweep",
     "refine_special",
     "run_all",
+    "save_curves",
     "simulate",
     "solve_orbit",
     "spectrum",

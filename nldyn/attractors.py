@@ -27,6 +27,7 @@ Kind = Literal["periodic", "quasi-periodic", "chaotic", "undecided", "failed"]
 
 NEAR = 0.1  # a return within this share of the motion is worth a Newton iteration
 ON_ORBIT = 1e-4  # distance from an orbit, relative to the motion, at which it is reached
+SETTLED = 600  # most periods of a transient that is not chosen
 CLOUD = 1000  # stroboscopic states kept of a motion that is not periodic
 LONGEST = 8  # a motion that has not decided itself is followed this much longer
 
@@ -216,7 +217,7 @@ def attractor_from(
     omega = 2.0 * math.pi * frequency_hz
     transient = options.transient
     if transient is None:
-        transient = settling_periods(flow.system, frequency_hz)
+        transient = min(settling_periods(flow.system, frequency_hz), SETTLED)
     moved, failure = transient_end(flow, state, omega, transient)
     if moved is None:
         return Attractor(flow, frequency_hz, "failed", state[None], failure=failure)

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import gamma, rgamma
 
 from nldyn._kernels import (
     CONTACT_FAILED,
@@ -30,17 +31,18 @@ from nldyn._kernels import (
 )
 from nldyn._sample import local_extremes, sample_states
 from nldyn.contact_law import law_address
-from nldyn.errors import SystemModelError, check_whole, is_finite, shown
+from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.gauss import GaussTables, gauss_tables
 from nldyn.linear import Complex, Real
 from nldyn.parameters import Parameter, parameter_tables
-from nldyn.system import System
+from nldyn.system import System, numbers
 
 __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
 
 _REASONS = {
     OK: "",
-    TOO_MANY_PIECES: "too many contacts, or too fast a mode, for one segment (more segments help)",
+    TOO_MANY_PIECES: "more than 20000 flights and contact panels in one segment: too many contacts "
+    "or too fast a mode (more segments help)",
     CONTACT_FAILED: "a contact phase could not be resolved",
     DIVERGED: "Newton's method diverged",
     SINGULAR: "singular Jacobian",
@@ -58,7 +60,8 @@ class FlowOptions:
         Relative error to aim at in the state after a period, 1e-13 to 1e-2; that of the Jacobian
         is about ten times as large. It sets the two others unless these are given.
     nodes : int, optional
-        Gauss nodes on a contact panel, 4 to 40; the end of a panel is accurate to order 2 nodes.
+        Gauss nodes on a contact panel, 4 to 40, and more where the exponent of a stop needs them;
+        the end of a panel is accurate to order 2 nodes.
     tail : float, optional
         A panel is halved until the last two Legendre coefficients of its force are below this
         fraction of the largest force. The error at its end goes with the square.
@@ -74,14 +77,16 @@ class FlowOptions:
     tail: float | None = None
 
     def __post_init__(self) -> None:
-        if not 1e-13 <= self.rtol <= 1e-2:
+        if not (is_finite(self.rtol) and 1e-13 <= self.rtol <= 1e-2):
             raise SystemModelError(
-                f"FlowOptions: rtol must lie between 1e-13 and 1e-2, got {self.rtol:g}"
+                f"FlowOptions: rtol must lie between 1e-13 and 1e-2, got {shown(self.rtol)}"
             )
         if self.nodes is not None:
             check_whole("FlowOptions: nodes", self.nodes, 4, 40)
-        if self.tail is not None and not 0.0 < self.tail < 1.0:
-            raise SystemModelError(f"FlowOptions: tail must lie between 0 and 1, got {self.tail:g}")
+        if self.tail is not None and not (is_finite(self.tail) and 0.0 < self.tail < 1.0):
+            raise SystemModelError(
+                f"FlowOptions: tail must lie between 0 and 1, got {shown(self.tail)}"
+            )
 
     @property
     def panel_nodes(self) -> int:
@@ -112,9 +117,32 @@ class FlowOptions:
         """Error allowed in the instant of an event, as a share of the panel before it.
 
         The slope of the force starts with the power ``exponent - 1`` of the time, so an error ε
-        of its start costs ε^exponent in the Jacobian.
+        of its start costs ε^exponent in the Jacobian. More than a millionth would make events of
+        two stops look simultaneous.
         """
-        return 1e-13 if exponent < 1.5 else (1e-2 * self.rtol) ** (1.0 / exponent)
+        if exponent < 1.5:
+            return 1e-13
+        return min(float((1e-2 * self.rtol) ** (1.0 / exponent)), 1e-6)
+
+
+def _nodes_for_switch(power: float, nodes: int, tail: float) -> int:
+    """Nodes, not fewer than asked for, with which the force after a switch can be resolved.
+
+    On a panel that is short enough the force goes as s^power and its slope, times dχ/ds, as
+    s^(power - 1); with too few nodes their Legendre tails stay above what is accepted, however
+    short it is. The coefficients of s^p are (2k+1) Γ(p+1)² / (Γ(p-k+1) Γ(p+k+2)).
+    """
+
+    def coefficient(p: float, k: int) -> float:
+        shares = rgamma(p - k + 1.0) * rgamma(p + k + 2.0)
+        return abs(float((2 * k + 1) * gamma(p + 1.0) ** 2 * shares))
+
+    while any(
+        coefficient(power, k) > tail or coefficient(power - 1.0, k) > 4.0 * tail
+        for k in (nodes - 2, nodes - 1)
+    ):
+        nodes += 1
+    return nodes
 
 
 @dataclass(frozen=True)
@@ -221,14 +249,20 @@ class FlowMap:
     """
 
     def __init__(self, system: System, options: FlowOptions | None = None) -> None:
+        check_types(system=(system, System), options=(options, FlowOptions, None))
         self.system = system
         self.options = options or FlowOptions()
 
     @cached_property
     def tables(self) -> GaussTables:
         """Collocation tables."""
-        smooth = all(float(2.0 * stop.exponent).is_integer() for stop in self.system.stops)
-        return gauss_tables(self.options.panel_nodes, 2 if smooth else 4)
+        exponents = [stop.exponent for stop in self.system.stops]
+        smooth = all(float(2.0 * exponent).is_integer() for exponent in exponents)
+        power = 2 if smooth else 4
+        nodes, tail = self.options.panel_nodes, self.options.panel_tail
+        for exponent in exponents:
+            nodes = _nodes_for_switch(power * exponent, nodes, tail)
+        return gauss_tables(nodes, power)
 
     @cached_property
     def rows(self) -> Real:
@@ -327,8 +361,6 @@ class FlowMap:
                 f"nodes must have shape ({rows}, {size}) for {phases.size - 1} segments of "
                 f"{self.system.size} modes, got {nodes.shape}"
             )
-        if not math.isfinite(nodes.sum() + phases[-1] - phases[0]):
-            raise SystemModelError("nodes and phases must be finite")
         if not (is_finite(omega) and omega > 0.0):
             raise SystemModelError(f"omega must be positive and finite, got {shown(omega)}")
 
@@ -352,7 +384,7 @@ class FlowMap:
         -------
         Trajectory
         """
-        capacity = 64 * len(nodes) if not chained else 16 * len(phases)
+        capacity = (16 if chained else 64) * np.size(phases)
         while True:
             record = self._record(capacity)
             status, *_, closings = self._fly(record, True, nodes, phases, omega, chained, False)
@@ -418,8 +450,7 @@ class FlowMap:
         parameters: Sequence[Parameter] = (),
     ) -> tuple[Any, ...]:
         """The flow map alone; see `_kernels.newton` for what comes back."""
-        nodes = np.asarray(nodes, dtype=float)
-        phases = np.ascontiguousarray(phases, dtype=float)
+        nodes, phases = numbers("nodes", nodes), numbers("phases", phases)
         self._check_segments(nodes, phases, omega, chained)
         point = np.empty(nodes.size + 1)
         point[:-1], point[-1] = nodes.ravel(), 0.0
@@ -486,8 +517,8 @@ class FlowMap:
             np.empty(capacity, dtype=np.int64),
             np.empty(capacity, dtype=np.int64),
             np.empty((capacity, 2 * self.system.size)),
-            np.empty((capacity, len(self.system.stops), self.options.panel_nodes)),
-            np.empty((capacity, len(self.system.stops), self.options.panel_nodes)),
+            np.empty((capacity, len(self.system.stops), self.tables.nodes.size)),
+            np.empty((capacity, len(self.system.stops), self.tables.nodes.size)),
             np.zeros(2, dtype=np.int64),
         )
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nldyn.errors import SystemModelError, check_whole
+from nldyn.errors import SystemModelError, check_types, check_whole
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit, check_observe
 from nldyn.system import System, numbers
@@ -72,7 +72,8 @@ def spectrum(orbit: Orbit, interface: str | Real | None = None, *, orders: int =
     >>> bool(abs(lines.amplitude[1] / orbit.max_abs_displacement - 1.0) < 1e-9)
     True
     """
-    check_whole("spectrum: orders", orders, 1)
+    check_types(orbit=(orbit, Orbit))
+    check_whole("spectrum: orders", orders, 1, 10**4)
     phi = modal_row(orbit.system, orbit.observe if interface is None else interface)
     lines = orders * orbit.period
     samples = 2 ** int(np.ceil(np.log2(8 * lines)))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from nldyn.elements import Stop
-from nldyn.errors import SystemModelError, check_frequency, check_whole
+from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
 from nldyn.flow import FlowMap, Solution, Trajectory, chain
 from nldyn.linear import Real
 from nldyn.multipliers import (
@@ -399,6 +399,11 @@ class Orbit:
         states[order] = self.trajectory.states(within[order])
         return self.problem.flow.to_modal(states)
 
+    def penetration(self, stop: int, phases: Real) -> Real:
+        """Penetration of a stop (m, negative when open) at any forcing phases."""
+        states = self.states(phases)
+        return _depth_and_speed(self.system, self.system.stops[stop], states)[0]
+
     def history(self, samples: int = 1000) -> History:
         """Sample one period of the orbit.
 
@@ -461,6 +466,7 @@ def _depth_and_speed(system: System, stop: Stop, states: Real) -> tuple[Real, Re
 
 def check_observe(system: System, observe: str | None) -> str:
     """Interface to observe: the given one, else the system's first."""
+    check_types(system=(system, System), observe=(observe, str, None))
     if not system.interfaces:
         raise SystemModelError("the system has no interface to observe")
     if observe is None:
