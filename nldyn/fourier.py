@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nldyn.errors import SystemModelError, check_types, check_whole
+from nldyn.errors import SystemModelError, check_types, check_whole, shown
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit, check_observe
 from nldyn.system import System, numbers
@@ -97,13 +97,12 @@ def modal_row(system: System, point: str | Real | None) -> Real:
     """
     if point is None or isinstance(point, str):
         return np.asarray(system.participation[check_observe(system, point)])
-    row = numbers("row", point)
-    if row.shape != (system.size,):
+    if np.shape(point) != (system.size,):
         raise SystemModelError(
-            f"the row of a point must have {system.size} entries, one for each mode, got shape "
-            f"{row.shape}"
+            f"interface must be a str or None, or the displacements of {system.size} modes, got "
+            f"{shown(point)}"
         )
-    return row
+    return numbers("interface", point)
 
 
 def _coefficients(orbit: Orbit, phi: Real, lines: int, samples: int) -> Complex:

@@ -302,7 +302,7 @@ def test_spectrum_at_any_point_is_that_of_its_modes():
     steady = system.steady(orbit.omega)
     displacement = (system.linear.right @ steady)[:2]
     assert spectrum(orbit, row).phasor[1] == pytest.approx(row @ displacement, rel=1e-9)
-    with pytest.raises(SystemModelError, match="must have 2 entries"):
+    with pytest.raises(SystemModelError, match="displacements of 2 modes"):
         spectrum(orbit, np.ones(3))
 
 
