@@ -16,18 +16,15 @@ from fem.files import draft_of, plain_write_errors
 from fem.mesh import FrameMesh
 from fem.model import (
     BeamPart,
-    CircularSection,
-    CrossSection,
     FrameModel,
     Hinge,
     Interface,
     Material,
     PointMass,
     PointSpring,
-    RectangularSection,
-    Section,
     Support,
 )
+from fem.sections import CircularSection, CrossSection, RectangularSection, Section
 
 FORMAT = "fem frame 1"
 SECTIONS = {kind.__name__: kind for kind in (RectangularSection, CircularSection, Section)}

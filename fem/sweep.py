@@ -11,7 +11,7 @@ import numpy.typing as npt
 from fem.errors import ModelError
 from fem.frame import Component
 from fem.mesh import FloatArray, IntArray
-from fem.model import CircularSection, CrossSection, RectangularSection
+from fem.sections import CircularSection, CrossSection, RectangularSection
 
 CIRCLE_POINTS = 32
 BoolArray = npt.NDArray[np.bool_]
