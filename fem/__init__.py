@@ -16,7 +16,7 @@ from fem.model import (
     PointSpring,
     Support,
 )
-from fem.read import from_meshio, read_mesh
+from fem.read import from_meshio, read_mesh, read_structure, structure_from_meshio
 from fem.sections import CircularSection, CrossSection, RectangularSection, Section
 from fem.structure import Coupling, Foundation, SolidPart, StructureModel, symmetry
 from fem.structure_assembly import LockingWarning, StructureComponent
@@ -55,6 +55,8 @@ __all__ = [
     "joined",
     "read_abaqus",
     "read_mesh",
+    "read_structure",
+    "structure_from_meshio",
     "structure_mesh",
     "symmetry",
     "write_mesh",

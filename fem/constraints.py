@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 from scipy import sparse
 
 from fem.beams import cross_matrix
@@ -14,6 +15,9 @@ from fem.errors import ModelError
 from fem.mesh import FloatArray, IntArray
 from fem.scatter import SparseArray
 from fem.structure import AXES, IN_PLANE, Coupling, StructureModel, axis_index
+
+
+BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +93,7 @@ class Constraints:
             rows = sparse.csr_array(matrix[self.dependent])
             mixed = C.T @ rows[:, self.free]
             own = C.T @ rows[:, self.dependent] @ C
-            part = sparse.csr_array(part + mixed + mixed.T + own)
+            part = sparse.csr_array(part + (mixed + mixed.T + own))
         part.eliminate_zeros()
         part.sort_indices()
         return part
@@ -152,7 +156,7 @@ def constrain(model: StructureModel, numbering: Numbering) -> Constraints:
 
 
 def _check_coupling(
-    model: StructureModel, index: int, slaves: IntArray, held: FloatArray, owner: IntArray
+    model: StructureModel, index: int, slaves: IntArray, held: BoolArray, owner: IntArray
 ) -> None:
     coupling = model.couplings[index]
     what = f"{model.mesh.source}: coupling of {coupling.face!r} to {coupling.point!r}"

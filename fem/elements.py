@@ -132,7 +132,8 @@ def _shear_strain(
         return np.zeros((len(lengths), 4))
     ratio = 12.0 * bending_stiffness / (shear_stiffness * lengths**2)
     half, one = np.full(len(lengths), -0.5), 1.0 / lengths
-    return (ratio / (1.0 + ratio))[:, None] * np.stack([-one, half, one, half], axis=1)
+    rows = np.stack([-one, half, one, half], axis=1)
+    return np.asarray((ratio / (1.0 + ratio))[:, None] * rows, dtype=np.float64)
 
 
 def congruent(matrices: FloatArray, T: FloatArray) -> FloatArray:

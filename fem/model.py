@@ -176,8 +176,10 @@ class PointMass:
     def __post_init__(self) -> None:
         owner = f"point mass at {self.point!r}"
         object.__setattr__(self, "offset", vector(f"{owner}: offset", self.offset, 3))
-        inertias = (self.rotary_inertia,)
-        if isinstance(self.rotary_inertia, Sequence):
+        inertias: Sequence[float]
+        if not isinstance(self.rotary_inertia, Sequence):
+            inertias = (self.rotary_inertia,)
+        else:
             inertias = vector(f"{owner}: rotary inertia", self.rotary_inertia, 3)
             object.__setattr__(self, "rotary_inertia", inertias)
         for name, value in (("mass", self.mass), *(("rotary inertia", i) for i in inertias)):

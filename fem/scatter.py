@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy import sparse
 
 from fem.mesh import FloatArray, IntArray
@@ -24,8 +26,8 @@ class BlockPattern:
         For every kind of cell in the order given, the places (e, b, b) of its pairs among the p.
     """
 
-    indptr: IntArray
-    indices: IntArray
+    indptr: npt.NDArray[Any]
+    indices: npt.NDArray[Any]
     places: tuple[IntArray, ...]
 
     @property
@@ -72,4 +74,5 @@ def dense_scatter(matrices: FloatArray, dofs: IntArray, count: int) -> SparseArr
     """Sum of matrices (e, m, m) at the degrees of freedom (e, m), shape (count, count)."""
     rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
     columns = np.tile(dofs, (1, dofs.shape[1])).ravel()
-    return sparse.coo_array((matrices.ravel(), (rows, columns)), shape=(count, count)).tocsr()
+    full = sparse.coo_array((matrices.ravel(), (rows, columns)), shape=(count, count))
+    return sparse.csr_array(full.tocsr())

@@ -204,4 +204,4 @@ def shear_areas(
     if any(value is None for value in given):
         names = ("shear_area", "shear_area_across")[:directions]
         raise ModelError(f"{what}: a Timoshenko beam needs the section's {' and '.join(names)}")
-    return [float(value) for value in given]
+    return [float(value) for value in given if value is not None]

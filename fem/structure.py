@@ -271,7 +271,7 @@ class StructureModel:
                 found.setdefault(KINDS[kind].facet_kind, []).append(
                     nodes[:, local].reshape(-1, local.shape[1])
                 )
-        return {kind: once(np.concatenate(blocks)) for kind, blocks in found.items()}
+        return {kind: once(np.concatenate(blocks), kind) for kind, blocks in found.items()}
 
     def facets_on(self, name: str) -> dict[str, IntArray]:
         """The outer facets all of whose nodes are in a point set or group."""
@@ -391,10 +391,14 @@ class StructureModel:
     def _check_names(self) -> None:
         for support in self.supports:
             self.mesh.nodes(support.point)
-        for item in (*self.point_masses, *self.springs, *self.hinges, *self.interfaces.values()):
-            self.mesh.node(item.point)
-        for face in (*self.couplings, *self.foundations):
-            self.mesh.nodes(face.face)
+        points = [item.point for item in self.point_masses]
+        points += [item.point for item in self.springs]
+        points += [item.point for item in self.hinges]
+        points += [item.point for item in self.interfaces.values()]
+        for name in points:
+            self.mesh.node(name)
+        for name in [item.face for item in self.couplings] + [f.face for f in self.foundations]:
+            self.mesh.nodes(name)
         for hinge in self.hinges:
             if hinge.part not in self.beams:
                 raise ModelError(
@@ -407,19 +411,19 @@ class StructureModel:
                 )
 
 
-def once(facets: IntArray) -> IntArray:
-    """The facets (f, k) that occur once, told apart by their three lowest nodes.
+def once(facets: IntArray, kind: str) -> IntArray:
+    """The facets (f, k) of a kind that occur once, told apart by their three lowest corners.
 
     Examples
     --------
-    >>> once(np.array([[0, 1], [2, 1], [1, 0]]))
+    >>> once(np.array([[0, 1], [2, 1], [1, 0]]), "line")
     array([[2, 1]])
     """
-    lowest = np.sort(facets, axis=1)[:, :3]
+    lowest = np.sort(facets[:, : len(KINDS[kind].corners)], axis=1)[:, :3]
     _, key = np.unique(lowest[:, 0] * (facets.max() + 1) + lowest[:, 1], return_inverse=True)
     key = key * (facets.max() + 1) + lowest[:, -1]
     _, index, count = np.unique(key, return_index=True, return_counts=True)
-    return facets[np.sort(index[count == 1])]
+    return np.asarray(facets[np.sort(index[count == 1])], dtype=np.int64)
 
 
 def symmetry(point: str, normal: str) -> Support:

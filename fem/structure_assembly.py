@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,7 @@ from fem.solids import (
     mass_matrices,
     stiffness_matrices,
 )
+from fem.store import load_structure, save_structure
 from fem.structure import SolidPart, StructureModel, axis_index
 
 BATCH_BYTES = 1e8
@@ -89,6 +91,15 @@ class StructureComponent:
         return np.asarray(
             self.all_values(u)[beam_dofs(self.model, self.numbering, part)].reshape(-1, 2, 6)
         )
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the structure to an .npz file; the matrices are assembled again by `load`."""
+        save_structure(self.model, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> StructureComponent:
+        """Read and assemble what `save` wrote; a `ModelError` says what is wrong."""
+        return assemble_structure(load_structure(path))
 
     def all_values(self, u: FloatArray) -> FloatArray:
         """All degrees of freedom, also held and coupled ones, from the free ones (N,)."""
@@ -206,13 +217,13 @@ def attached_matrices(
         spans = points[lines[:, 1]] - points[lines[:, 0]]
         K, M = element_matrices(part, spans, f"{model.mesh.source}: part {name!r}")
         dofs = beam_dofs(model, numbering, name)
-        stiffness += dense_scatter(K, dofs, size)
-        mass += dense_scatter(M, dofs, size)
+        stiffness = _sum(stiffness, dense_scatter(K, dofs, size))
+        mass = _sum(mass, dense_scatter(M, dofs, size))
     for matrices, dofs in (*_foundations(model, numbering), *_springs(model, numbering)):
-        stiffness += dense_scatter(matrices, dofs, size)
+        stiffness = _sum(stiffness, dense_scatter(matrices, dofs, size))
     for lump in model.point_masses:
         matrix, dofs = _lumped(model, numbering, lump)
-        mass += dense_scatter(matrix, dofs, size)
+        mass = _sum(mass, dense_scatter(matrix, dofs, size))
     return stiffness, mass
 
 
@@ -279,7 +290,7 @@ def _foundations(
 
 
 def _facet_foundation(
-    model: StructureModel, numbering: Numbering, face: str, stiffness: tuple[float, ...]
+    model: StructureModel, numbering: Numbering, face: str, stiffness: Sequence[float]
 ) -> Iterator[tuple[FloatArray, IntArray]]:
     for kind, cells in model.facets_on(face).items():
         products = facet_products(kind, model.mesh.points[cells])
@@ -289,7 +300,7 @@ def _facet_foundation(
 
 
 def _beam_foundation(
-    model: StructureModel, numbering: Numbering, face: str, stiffness: tuple[float, ...]
+    model: StructureModel, numbering: Numbering, face: str, stiffness: Sequence[float]
 ) -> Iterator[tuple[FloatArray, IntArray]]:
     inside = np.zeros(len(model.mesh.points), dtype=np.bool_)
     inside[model.mesh.nodes(face)] = True

@@ -312,6 +312,8 @@ def box_mesh(
         The corner with the lowest coordinates.
     kind
         Any kind of cell of the dimension; by default "quad8" or "hexahedron20".
+    source
+        Name of the mesh in error texts.
 
     Raises
     ------
