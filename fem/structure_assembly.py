@@ -31,7 +31,7 @@ from fem.solids import (
     stiffness_matrices,
 )
 from fem.store import load_structure, save_structure
-from fem.structure import SolidPart, StructureModel, axis_index
+from fem.structure import AXES, SolidPart, StructureModel, axis_index
 
 BATCH_BYTES = 1e8
 """Size of the element matrices that are made at a time."""
@@ -135,8 +135,30 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     K = constraints.reduced(_sum(stiffness, beam_stiffness))
     del stiffness
     M = constraints.reduced(_sum(mass, beam_mass))
+    _check_nothing_empty(K, M, model, numbering, constraints)
     interfaces = _interface_vectors(model, numbering, constraints)
     return StructureComponent(K, M, interfaces, model, numbering, constraints)
+
+
+def _check_nothing_empty(
+    K: SparseArray,
+    M: SparseArray,
+    model: StructureModel,
+    numbering: Numbering,
+    constraints: Constraints,
+) -> None:
+    """Refuse a direction with neither stiffness nor mass, which no solver could bear."""
+    empty = np.flatnonzero((K.diagonal() == 0.0) & (M.diagonal() == 0.0))
+    if not len(empty):
+        return
+    dofs = numbering.dofs(np.arange(len(model.mesh.points)))
+    node, axis = np.argwhere(dofs == constraints.free[empty[0]])[0]
+    name = next((n for n, at in model.mesh.point_sets.items() if list(at) == [node]), None)
+    what = f"node {node}" if name is None else f"point {name!r}"
+    raise ModelError(
+        f"{model.mesh.source}: nothing is joined to the direction {AXES[axis]!r} of {what};"
+        " support it or couple it in all directions"
+    )
 
 
 def _sum(first: SparseArray, second: SparseArray) -> SparseArray:

@@ -375,17 +375,18 @@ def test_a_block_on_a_foundation_sinks_by_its_load_over_its_area():
 
 @pytest.mark.parametrize("ratio", [5.0, 10.0])
 def test_the_warning_of_locking_says_how_much_too_stiff(ratio):
-    height = 0.01
-    mesh = fem.box_mesh("leaf", (1.0, height, 1.0), (int(0.1 * 10 / (ratio * height)), 1, 1),
-                        kind="hexahedron")  # fmt: skip
+    height, cells = 0.01, int(100 / ratio)
+    mesh = fem.box_mesh("leaf", (1.0, height, 1.0), (cells, 1, cells), kind="hexahedron")
     model = fem.StructureModel(
         mesh,
         {"leaf": fem.SolidPart(NO_CONTRACTION)},
-        supports=[fem.Support("x0", ("x", "y", "z")), fem.Support("z0", "z"),
-                  fem.Support("z1", "z")],
+        supports=[
+            fem.Support("x0", ("x", "y", "z")),
+            *(fem.Support(face, "z") for face in ("z0", "z1", "tip")),
+        ],
         couplings=[fem.Coupling("tip", "x1", directions=("x", "y"))],
         interfaces={"tip": fem.Interface("tip", "y")},
-    )  # fmt: skip
+    )
     with pytest.warns(fem.LockingWarning, match="times too stiff") as caught:
         component = fem.assemble(model)
     said = float(str(caught[0].message).split("about ")[1].split(" times")[0])
