@@ -16,7 +16,6 @@ from fem.mesh import FloatArray, IntArray
 from fem.scatter import SparseArray
 from fem.structure import AXES, IN_PLANE, Coupling, StructureModel, axis_index
 
-
 BoolArray = npt.NDArray[np.bool_]
 
 

@@ -295,6 +295,11 @@ class FrameModel:
         """Element indices of every part of the model."""
         return {name: self.mesh.part(name) for name in self.parts}
 
+    @property
+    def links(self) -> IntArray:
+        """Pairs of nodes that are joined, shape (m, 2)."""
+        return self.mesh.lines
+
     def _listed(self, name: str, kind: type[object]) -> tuple[object, ...]:
         given = getattr(self, name)
         if not (isinstance(given, Sequence) and all(isinstance(item, kind) for item in given)):

@@ -261,6 +261,19 @@ class StructureModel:
             if isinstance(part, SolidPart)
         }
 
+    @property
+    def links(self) -> IntArray:
+        """Pairs of nodes that are joined by cells of parts and by couplings, shape (m, 2)."""
+        pairs = [
+            np.stack([np.repeat(cells[:, 0], cells.shape[1]), cells.ravel()], axis=1)
+            for cells in self._part_cells()
+        ]
+        for coupling in self.couplings:
+            nodes = self.mesh.nodes(coupling.face)
+            point = np.full(len(nodes), self.mesh.node(coupling.point))
+            pairs.append(np.stack([point, nodes], axis=1))
+        return np.concatenate(pairs)
+
     @cached_property
     def facets(self) -> dict[str, IntArray]:
         """Faces (in the plane: edges) of solids that no second cell shares, (f, k) by kind."""
