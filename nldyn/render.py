@@ -184,16 +184,17 @@ def save_orbit(orbit: Orbit, folder: Path) -> None:
 
 
 def stop_sphere(scene: Scene, index: int) -> StopSphere | None:
-    """Give a stop as a sphere to be drawn, if it acts along an axis of the frame."""
+    """Give a stop as a sphere to be drawn, if it acts along an axis."""
     from fem.render import StopSphere
 
-    axes = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
+    axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
     stop = scene.stops[index]
     place = scene.interfaces[stop.at]
     if place.direction not in axes:
         return None
-    x, y = axes[place.direction]
-    way = (stop.direction * x, stop.direction * y)
+    way = tuple(stop.direction * along for along in axes[place.direction])
+    if scene.mesh is None or scene.mesh.model == "frame":
+        way = way[:2]
     return StopSphere(place.at, stop.radius or DRAWN_RADIUS, way, stop.gap)
 
 
@@ -210,7 +211,7 @@ class _Drawing:
     """The pictures that need a graphics library."""
 
     scene: Scene
-    component: fem.Component
+    component: fem.Component | fem.StructureComponent
     reduced: cms.ReducedModel
     folder: Path
     tell: Progress
@@ -267,10 +268,9 @@ class _Drawing:
         self, state: NDArray[np.float64], penetration: float, stop: StopSphere | None
     ) -> float:
         """Factor on the deflection at which the stop is not drowned in what it dents."""
-        from fem.render import automatic_scale, round_number
-        from fem.sweep import frame_surface
+        from fem.render import automatic_scale, round_number, surface_of
 
-        factor = automatic_scale(frame_surface(self.component, _mirror(self.scene)), state[None])
+        factor = automatic_scale(surface_of(self.component, _mirror(self.scene)), state[None])
         if stop is None or penetration == 0.0:
             return factor
         return min(factor, round_number(2.0 * stop.radius / penetration))
