@@ -151,7 +151,8 @@ def _beam_values(drawing: StructureSurface, u: FloatArray, colour: str) -> Itera
 def _bending_stress(part: BeamPart, about_z: FloatArray, about_y: FloatArray) -> FloatArray:
     height, width = outline(part.section).max(axis=0)
     across: float = part.section.second_moment_across  # type: ignore[attr-defined]
-    return about_z * height / part.section.second_moment + about_y * width / across
+    found = about_z * height / part.section.second_moment + about_y * width / across
+    return np.asarray(found, dtype=np.float64)
 
 
 def _along(first: FloatArray, last: FloatArray, s: FloatArray) -> FloatArray:

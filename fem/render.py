@@ -609,19 +609,28 @@ def add_surroundings(
     stop: StopSphere | None,
 ) -> list[Block | Cube]:
     """Draw supports, the stop and the masses; the masses are returned, because they move."""
-    frame = isinstance(drawing, FrameSurface)
-    for solid, plane in support_solids(drawing) if frame else support_marks(drawing):
+    marks, stops, blocks = surroundings(drawing, factor, stop)
+    for solid, plane in marks:
         if plane:
             plotter.add_mesh(solid, color=PLANE, opacity=0.25, lighting=False)
         else:
             add_solid(plotter, solid, STEEL)
-    if stop is not None:
-        for solid in (stop_solids if frame else stop_bodies)(drawing, stop, factor):
-            add_solid(plotter, solid, STOP, smooth=solid.n_cells > 100)
-    blocks = mass_blocks(drawing, stop) if frame else mass_cubes(drawing)
+    for solid in stops:
+        add_solid(plotter, solid, STOP, smooth=solid.n_cells > 100)
     for block in blocks:
         add_solid(plotter, block.solid, BLOCK)
     return blocks
+
+
+def surroundings(
+    drawing: Surface, factor: float, stop: StopSphere | None
+) -> tuple[list[tuple[Any, bool]], list[Any], list[Block | Cube]]:
+    """Marks of the supports, bodies of the stop, and the masses."""
+    if isinstance(drawing, StructureSurface):
+        stops = [] if stop is None else stop_bodies(drawing, stop, factor)
+        return list(support_marks(drawing)), stops, [*mass_cubes(drawing)]
+    stops = [] if stop is None else stop_solids(drawing, stop, factor)
+    return list(support_solids(drawing)), stops, [*mass_blocks(drawing, stop)]
 
 
 def add_solid(plotter: Plotter, solid: Any, colour: str, smooth: bool = False) -> None:

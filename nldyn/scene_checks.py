@@ -15,8 +15,11 @@ from nldyn.scene_schema import Matrix, Scene
 
 Report = Callable[[KeyPath, str], SceneError]
 STRUCTURE_ONLY = ("couplings", "foundations")
-MESH_ONLY = ("parts", "supports", "point_masses", "springs", "hinges", *STRUCTURE_ONLY)
-MESH_ONLY += ("interfaces", "reduction")
+MESH_ONLY = (
+    *("parts", "supports", "point_masses", "springs", "hinges"),
+    *STRUCTURE_ONLY,
+    *("interfaces", "reduction"),
+)
 
 
 class TaggedMesh(Protocol):
