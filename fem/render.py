@@ -628,7 +628,7 @@ def surroundings(
     """Marks of the supports, bodies of the stop, and the masses."""
     if isinstance(drawing, StructureSurface):
         stops = [] if stop is None else stop_bodies(drawing, stop, factor)
-        return list(support_marks(drawing)), stops, [*mass_cubes(drawing)]
+        return list(support_marks(drawing)), stops, [*mass_cubes(drawing, stop)]
     stops = [] if stop is None else stop_solids(drawing, stop, factor)
     return list(support_solids(drawing)), stops, [*mass_blocks(drawing, stop)]
 

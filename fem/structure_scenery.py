@@ -84,8 +84,11 @@ def _patches(drawing: StructureSurface, facets: dict[str, IntArray]) -> Iterator
         yield pyvista.PolyData(lifted.reshape(-1, 3), faces=faces)
 
 
-def mass_cubes(drawing: StructureSurface) -> list[Cube]:
-    """A cube of steel for each lumped mass, with its centre where the mass has it."""
+def mass_cubes(drawing: StructureSurface, stop: StopSphere | None) -> list[Cube]:
+    """A cube of steel for each lumped mass, with its centre where the mass has it.
+
+    One without an offset at the point that hits the stop stands on the side away from it.
+    """
     import pyvista
 
     model = drawing.component.model
@@ -95,6 +98,9 @@ def mass_cubes(drawing: StructureSurface) -> list[Cube]:
             node = model.mesh.node(lump.point)
             edge = (lump.mass / BLOCK_DENSITY) ** (1 / 3)
             centre = model.mesh.points[node] + np.asarray(lump.offset)
+            if stop is not None and model.mesh.node(stop.point) == node and not any(lump.offset):
+                away = -direction_of(stop)
+                centre = centre + (reach_along(drawing, centre, away) + edge / 2.0) * away
             solid = pyvista.Cube(center=centre, x_length=edge, y_length=edge, z_length=edge)
             at_rest = np.array(solid.points, dtype=np.float64)
             cubes.append(Cube(node, model.mesh.points[node], at_rest, solid))
@@ -107,7 +113,7 @@ def stop_bodies(drawing: StructureSurface, stop: StopSphere, scale: float) -> li
 
     mesh = drawing.component.model.mesh
     point = mesh.points[mesh.node(stop.point)]
-    towards = np.array([*stop.direction, 0.0][:3]) / math.hypot(*stop.direction)
+    towards = direction_of(stop)
     surface = reach_along(drawing, point, towards) + scale * stop.gap
     centre = point + (surface + stop.radius) * towards
     post = max(1.6 * MARK_FRACTION * size_of(drawing), 4.0 * stop.radius)
@@ -121,6 +127,12 @@ def stop_bodies(drawing: StructureSurface, stop: StopSphere, scale: float) -> li
             resolution=48,
         ),
     ]
+
+
+def direction_of(stop: StopSphere) -> FloatArray:
+    """Unit vector (3,) from the structure to the stop."""
+    way = np.array([*stop.direction, 0.0][:3], dtype=np.float64)
+    return way / float(np.linalg.norm(way))
 
 
 def reach_along(drawing: StructureSurface, point: FloatArray, towards: FloatArray) -> float:
