@@ -13,7 +13,7 @@ from fem.beams import cross_matrix
 from fem.cells import KINDS
 from fem.errors import ModelError
 from fem.mesh import FloatArray, IntArray
-from fem.scatter import SparseArray
+from fem.scatter import SparseArray, dense_scatter
 from fem.structure import AXES, IN_PLANE, Coupling, StructureModel, axis_index
 
 BoolArray = npt.NDArray[np.bool_]
@@ -246,9 +246,8 @@ def averaging(
     shape functions, so that the mean is over the area and not over the nodes; where the nodes
     carry no facet (as on beams) all count the same.
     """
-    weights = face_products(model, coupling.face, nodes)
     R = rigid[:, translations][:, :, axes]
-    WR = np.einsum("mn,nij->mij", weights, R)
+    WR = (face_products(model, coupling.face, nodes) @ R.reshape(len(nodes), -1)).reshape(R.shape)
     normal = np.einsum("mij,mik->jk", R, WR)
     scale = np.sqrt(np.diag(normal))
     if not (scale > 0.0).all() or np.linalg.cond(normal / np.outer(scale, scale)) > 1e10:
@@ -259,20 +258,19 @@ def averaging(
     return np.asarray(np.linalg.solve(normal, WR.reshape(-1, len(axes)).T), dtype=np.float64)
 
 
-def face_products(model: StructureModel, face: str, nodes: IntArray) -> FloatArray:
+def face_products(model: StructureModel, face: str, nodes: IntArray) -> SparseArray:
     """Integrals (m, m) of products of shape functions over a face; else the identity."""
     facets = model.facets_on(face)
     if not facets:
-        return np.eye(len(nodes))
+        return sparse.csr_array(sparse.eye_array(len(nodes)))
     position = np.full(len(model.mesh.points), -1)
     position[nodes] = np.arange(len(nodes))
-    found = np.zeros((len(nodes), len(nodes)))
+    found = sparse.csr_array((len(nodes), len(nodes)))
     for kind, cells in facets.items():
-        products = facet_products(kind, model.mesh.points[cells])
         at = position[cells]
         inside = (at >= 0).all(axis=1)
-        at, products = at[inside], products[inside]
-        np.add.at(found, (at[:, :, None], at[:, None, :]), products)
+        products = facet_products(kind, model.mesh.points[cells[inside]])
+        found = sparse.csr_array(found + dense_scatter(products, at[inside], len(nodes)))
     return found
 
 

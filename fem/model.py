@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -34,11 +34,10 @@ def vector(what: str, values: Sequence[float], length: int) -> tuple[float, ...]
     >>> vector("offset", [0, 1], 2)
     (0.0, 1.0)
     """
-    if isinstance(values, str) or not all(is_finite(value) for value in values):
+    given = list(values) if isinstance(values, Iterable) else []
+    if len(given) != length or not all(is_finite(value) for value in given):
         raise ModelError(f"{what} must be {length} finite numbers, not {values!r}")
-    if len(values) != length:
-        raise ModelError(f"{what} must be {length} finite numbers, not {values!r}")
-    return tuple(float(value) for value in values)
+    return tuple(float(value) for value in given)
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ SECTIONS = {kind.__name__: kind for kind in (RectangularSection, CircularSection
 def save_model(model: FrameModel, path: str | os.PathLike[str]) -> None:
     """Write a model, whole or not at all.
 
-    A cross-section of a class that is not from this package is kept as its area and second moment.
+    A cross-section of a class that is not from this package is kept by its numbers.
 
     Raises
     ------
@@ -182,7 +182,7 @@ def _items(attached: dict[str, Any], lists: Lists) -> dict[str, Any]:
 def _part(part: BeamPart | SolidPart) -> dict[str, Any]:
     plain = asdict(part)
     if isinstance(part, BeamPart):
-        plain.update(_section(part.section))
+        plain.update(_section(part))
     return plain
 
 
@@ -194,11 +194,25 @@ def _part_from(plain: dict[str, Any]) -> BeamPart | SolidPart:
     return BeamPart(section=section, **plain)
 
 
-def _section(section: CrossSection) -> dict[str, Any]:
-    kind = type(section).__name__
+def _section(part: BeamPart) -> dict[str, Any]:
+    section, kind = part.section, type(part.section).__name__
     if not isinstance(section, RectangularSection | CircularSection | Section):
-        section, kind = Section(section.area, section.second_moment), "Section"
+        section, kind = _plain_section(section, part.material.poissons_ratio), "Section"
     return {"kind": kind, "section": asdict(section)}
+
+
+def _plain_section(section: CrossSection, poissons_ratio: float | None) -> Section:
+    """A section of a class of the user's own by its numbers."""
+    areas: tuple[float | None, float | None] = (None, None)
+    if poissons_ratio is not None and hasattr(section, "shear_areas"):
+        areas = section.shear_areas(poissons_ratio)
+    return Section(
+        section.area,
+        section.second_moment,
+        getattr(section, "second_moment_across", None),
+        getattr(section, "torsion_constant", None),
+        *areas,
+    )
 
 
 def _named(arrays: dict[str, npt.NDArray[Any]], prefix: str) -> dict[str, npt.NDArray[Any]]:

@@ -23,7 +23,7 @@ from fem.errors import ModelError
 from fem.locking import locking_warnings
 from fem.mesh import FloatArray, IntArray
 from fem.model import PointMass
-from fem.scatter import BlockPattern, SparseArray, block_pattern, dense_scatter
+from fem.scatter import SparseArray, block_pattern, dense_scatter
 from fem.solids import (
     checked_volumes,
     gradients_and_volumes,
@@ -188,12 +188,6 @@ def solid_matrices(model: StructureModel, numbering: Numbering) -> tuple[SparseA
             for i, j in np.ndindex(kind.dimension, kind.dimension):
                 np.add.at(stiffness[i, j], at, K[:, :, i, :, j].ravel())
             np.add.at(mass, at, M.ravel())
-    return _matrices(pattern, stiffness, mass)
-
-
-def _matrices(
-    pattern: BlockPattern, stiffness: FloatArray, mass: FloatArray
-) -> tuple[SparseArray, SparseArray]:
     return pattern.matrix(stiffness), pattern.same_in_all_directions(mass)
 
 
