@@ -79,16 +79,15 @@ def _compiled(law: ContactLaw) -> Any:
     inner = law if hasattr(law, "py_func") else numba.njit(law)
 
     def call(delta: Any, speed: Any, out: Any) -> None:
-        values = inner(delta, speed)
-        for i in range(3):
-            out[i] = values[i]
+        out[0], out[1], out[2] = inner(delta, speed)  # whole numbers among them are converted
 
     double = numba.types.float64
     signature = numba.types.void(double, double, numba.types.CPointer(double))
     try:
         return numba.cfunc(signature)(call)
     except numba.core.errors.NumbaError as error:
-        first = str(error).strip().splitlines()
+        told = [line.strip() for line in str(error).splitlines()]
+        reasons = [line for line in told if line and not line.startswith(("Failed", "During"))]
         raise SystemModelError(
-            f"the contact law '{law.__name__}' cannot be compiled: {first[-1] if first else error}"
+            f"the contact law '{law.__name__}' cannot be compiled: {(reasons or told)[0]}"
         ) from None

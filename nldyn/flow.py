@@ -31,11 +31,11 @@ from nldyn._kernels import (
 )
 from nldyn._sample import local_extremes, sample_states
 from nldyn.contact_law import law_address
-from nldyn.errors import SystemModelError, check_whole, is_finite, shown
+from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.gauss import GaussTables, gauss_tables
 from nldyn.linear import Complex, Real
 from nldyn.parameters import Parameter, parameter_tables
-from nldyn.system import System
+from nldyn.system import System, numbers
 
 __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
 
@@ -77,14 +77,16 @@ class FlowOptions:
     tail: float | None = None
 
     def __post_init__(self) -> None:
-        if not 1e-13 <= self.rtol <= 1e-2:
+        if not (is_finite(self.rtol) and 1e-13 <= self.rtol <= 1e-2):
             raise SystemModelError(
-                f"FlowOptions: rtol must lie between 1e-13 and 1e-2, got {self.rtol:g}"
+                f"FlowOptions: rtol must lie between 1e-13 and 1e-2, got {shown(self.rtol)}"
             )
         if self.nodes is not None:
             check_whole("FlowOptions: nodes", self.nodes, 4, 40)
-        if self.tail is not None and not 0.0 < self.tail < 1.0:
-            raise SystemModelError(f"FlowOptions: tail must lie between 0 and 1, got {self.tail:g}")
+        if self.tail is not None and not (is_finite(self.tail) and 0.0 < self.tail < 1.0):
+            raise SystemModelError(
+                f"FlowOptions: tail must lie between 0 and 1, got {shown(self.tail)}"
+            )
 
     @property
     def panel_nodes(self) -> int:
@@ -247,6 +249,7 @@ class FlowMap:
     """
 
     def __init__(self, system: System, options: FlowOptions | None = None) -> None:
+        check_types(system=(system, System), options=(options, FlowOptions, None))
         self.system = system
         self.options = options or FlowOptions()
 
@@ -358,8 +361,6 @@ class FlowMap:
                 f"nodes must have shape ({rows}, {size}) for {phases.size - 1} segments of "
                 f"{self.system.size} modes, got {nodes.shape}"
             )
-        if not math.isfinite(nodes.sum() + phases[-1] - phases[0]):
-            raise SystemModelError("nodes and phases must be finite")
         if not (is_finite(omega) and omega > 0.0):
             raise SystemModelError(f"omega must be positive and finite, got {shown(omega)}")
 
@@ -379,7 +380,7 @@ class FlowMap:
         -------
         Trajectory
         """
-        capacity = 64 * len(nodes)
+        capacity = 64 * np.size(phases)
         while True:
             record = self._record(capacity)
             status, *_, closings = self._fly(record, True, nodes, phases, omega, False, False)
@@ -445,8 +446,7 @@ class FlowMap:
         parameters: Sequence[Parameter] = (),
     ) -> tuple[Any, ...]:
         """The flow map alone; see `_kernels.newton` for what comes back."""
-        nodes = np.asarray(nodes, dtype=float)
-        phases = np.ascontiguousarray(phases, dtype=float)
+        nodes, phases = numbers("nodes", nodes), numbers("phases", phases)
         self._check_segments(nodes, phases, omega, chained)
         point = np.empty(nodes.size + 1)
         point[:-1], point[-1] = nodes.ravel(), 0.0

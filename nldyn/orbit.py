@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from nldyn.elements import Stop
-from nldyn.errors import SystemModelError, check_frequency, check_whole
+from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
 from nldyn.flow import FlowMap, Solution, Trajectory, chain
 from nldyn.linear import Real
 from nldyn.multipliers import (
@@ -464,6 +464,7 @@ def _depth_and_speed(system: System, stop: Stop, states: Real) -> tuple[Real, Re
 
 def check_observe(system: System, observe: str | None) -> str:
     """Interface to observe: the given one, else the system's first."""
+    check_types(system=(system, System), observe=(observe, str, None))
     if not system.interfaces:
         raise SystemModelError("the system has no interface to observe")
     if observe is None:

@@ -75,6 +75,9 @@ def parameter_tables(
     SystemModelError
         For a parameter that the system does not have.
     """
+    check_types(parameters=(parameters, Sequence))
+    for parameter in parameters:
+        check_types(**{"parameters: entry": (parameter, Parameter)})
     table = np.zeros((len(parameters), 2), dtype=np.int64)
     drive_by = np.zeros((len(parameters), 2, 2 * system.size), dtype=complex)
     for row, parameter in enumerate(parameters):

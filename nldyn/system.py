@@ -387,6 +387,8 @@ def _by_interface(name: str, vectors: Mapping[str, ArrayLike]) -> Mapping[str, A
 def numbers(name: str, values: ArrayLike) -> Real:
     """An array of finite floats, or a SystemModelError under the name."""
     try:
+        if np.iscomplexobj(values):
+            raise TypeError
         array = np.array(values, dtype=float)  # a copy: the caller may change the original
     except (TypeError, ValueError, OverflowError):
         raise SystemModelError(f"{name} must hold numbers only") from None

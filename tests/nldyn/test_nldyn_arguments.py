@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from nldyn import (
+    FlowMap,
+    FlowOptions,
     Parameter,
     SystemModelError,
     cascade,
@@ -17,6 +20,8 @@ from nldyn import (
     continue_in,
     continue_special,
     describe,
+    explore,
+    find_orbits,
     normal_form,
     plot_contact_force,
     plot_curves,
@@ -206,3 +211,34 @@ def test_what_is_no_branch_or_curve_cannot_be_drawn(harmonic_branch, orbit):
         refused(lambda x: curve.at("frequency_hz", x), *junk[:-3]), "value must be a finite number"
     )
     check_named(refused(lambda x: curve.at(x, 26.0)), "the curve has no parameter")
+
+
+@pytest.mark.parametrize("name", ["rtol", "tail"])
+def test_flow_options_refuse_what_is_no_share(name):
+    junk = [value for value in JUNK if not (name == "tail" and value is None)]
+    check_named(refused(lambda value: FlowOptions(**{name: value}), *junk), name)
+
+
+def test_flow_map_names_what_it_cannot_use(one_dof):
+    phases = np.array([0.0, 1.0])
+    flow, state = FlowMap(one_dof), np.zeros((1, 2))
+    check_named(refused(FlowMap), "system")
+    check_named(refused(lambda value: FlowMap(one_dof, value), "tight", 1e-9, []), "options")
+    for run in (flow.shoot, flow.trajectory):
+        check_named(refused(lambda value, run=run: run(value, phases, 100.0), *JUNK, 1j), "nodes")
+        check_named(refused(lambda value, run=run: run(state, value, 100.0)), "phases")
+        check_named(refused(lambda value, run=run: run(state, phases, value)), "omega")
+    wrong = [value for value in JUNK if value not in (None, [])]
+    check_named(
+        refused(lambda value: flow.shoot(state, phases, 100.0, parameters=value), *wrong, ["gap"]),
+        "parameters",
+    )
+
+
+def test_searches_name_a_system_that_is_none(one_dof):
+    for search in (
+        lambda value: solve_orbit(value, 20.0),
+        lambda value: explore(value, (20.0, 21.0)),
+        lambda value: find_orbits(value, 20.0, period=1),
+    ):
+        check_named(refused(search), "system")
