@@ -1,25 +1,26 @@
-"""Plane frames of Euler-Bernoulli beams: from a mesh to stiffness, mass and interfaces."""
+"""Frames and structures of beams and solids: from a mesh to stiffness, mass and interfaces."""
 
 from fem.abaqus import read_abaqus
+from fem.assemble import assemble
 from fem.calibrate import Calibration, calibrate
 from fem.errors import ModelError
-from fem.frame import Component, assemble
+from fem.frame import Component
 from fem.mesh import FrameMesh, frame_mesh
 from fem.model import (
     BeamPart,
-    CircularSection,
-    CrossSection,
     FrameModel,
     Hinge,
     Interface,
     Material,
     PointMass,
     PointSpring,
-    RectangularSection,
-    Section,
     Support,
 )
-from fem.read import from_meshio, read_mesh
+from fem.read import from_meshio, read_mesh, read_structure, structure_from_meshio
+from fem.sections import CircularSection, CrossSection, RectangularSection, Section
+from fem.structure import Coupling, Foundation, SolidPart, StructureModel, symmetry
+from fem.structure_assembly import LockingWarning, StructureComponent
+from fem.structure_mesh import StructureMesh, box_mesh, joined, structure_mesh
 from fem.write import write_mesh
 
 __all__ = [
@@ -27,23 +28,36 @@ __all__ = [
     "Calibration",
     "CircularSection",
     "Component",
+    "Coupling",
     "CrossSection",
+    "Foundation",
     "FrameMesh",
     "FrameModel",
     "Hinge",
     "Interface",
+    "LockingWarning",
     "Material",
     "ModelError",
     "PointMass",
     "PointSpring",
     "RectangularSection",
     "Section",
+    "SolidPart",
+    "StructureComponent",
+    "StructureMesh",
+    "StructureModel",
     "Support",
     "assemble",
+    "box_mesh",
     "calibrate",
     "frame_mesh",
     "from_meshio",
+    "joined",
     "read_abaqus",
     "read_mesh",
+    "read_structure",
+    "structure_from_meshio",
+    "structure_mesh",
+    "symmetry",
     "write_mesh",
 ]

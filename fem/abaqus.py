@@ -1,4 +1,4 @@
-"""Read nodes, line elements and sets of Abaqus input files.
+"""Read nodes, elements and sets of Abaqus input files.
 
 meshio 5.3 has a reader of its own, but it loses or mixes up sets in ordinary frame files: a set
 that grows over several ``*ELEMENT`` keywords, a keyword in lower case, a second ``*NODE``, a set
@@ -8,6 +8,7 @@ same `meshio.Mesh`.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,12 +16,18 @@ from pathlib import Path
 import meshio
 import numpy as np
 
+from fem.cells import KINDS
 from fem.errors import ModelError
 from fem.mesh import IntArray
 
 TWO_NODE_LINES: tuple[str, ...] = ("B21", "B23", "B31", "B31OS", "B33", "FRAME2D", "FRAME3D")
 TWO_NODE_LINES += ("PIPE21", "PIPE31", "T2D2", "T3D2")
 THREE_NODE_LINES = ("B22", "B32", "B32OS", "PIPE22", "PIPE32", "T2D3", "T3D3")
+
+_PLANE_SOLIDS = {"3": "triangle", "4": "quad", "6": "triangle6", "8": "quad8"}
+SOLIDS = {f"{p}{count}": kind for p in ("CPS", "CPE") for count, kind in _PLANE_SOLIDS.items()}
+SOLIDS |= {"C3D4": "tetra", "C3D8": "hexahedron", "C3D10": "tetra10", "C3D20": "hexahedron20"}
+"""Solid elements by the kind of their cells; a suffix for another integration changes nothing."""
 
 LONGEST_RANGE = 10_000_000
 
@@ -36,7 +43,7 @@ class _Keyword:
 class _Deck:
     path: Path
     nodes: dict[int, list[float]] = field(default_factory=dict)
-    elements: dict[int, tuple[int, int]] = field(default_factory=dict)
+    elements: dict[int, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
     sets: dict[str, dict[str, tuple[str, list[int]]]] = field(
         default_factory=lambda: {"NSET": {}, "ELSET": {}}
     )
@@ -49,7 +56,7 @@ class _Deck:
 
 
 def read_abaqus(path: str | Path) -> meshio.Mesh:
-    """Read the frame of an Abaqus input file.
+    """Read the nodes, elements and sets of an Abaqus input file.
 
     Parameters
     ----------
@@ -61,7 +68,8 @@ def read_abaqus(path: str | Path) -> meshio.Mesh:
     Returns
     -------
     meshio.Mesh
-        Line cells of the beam, truss, pipe and frame elements, with cell sets and point sets.
+        Line cells of the beam, truss, pipe and frame elements and cells of the solid ones, with
+        cell sets and point sets.
 
     Raises
     ------
@@ -138,15 +146,27 @@ def _read_elements(deck: _Deck, keyword: _Keyword) -> None:
     kind = keyword.parameters.get("TYPE", "").upper().removesuffix("H")
     if kind in THREE_NODE_LINES:
         raise deck.fail(f"elements of type {kind!r} are not straight two-node lines")
-    if kind not in TWO_NODE_LINES:
+    solid = next((name for name in SOLIDS if re.fullmatch(f"{name}[RIMT]*", kind)), None)
+    if kind not in TWO_NODE_LINES and solid is None:
         return
-    for row in keyword.rows:
-        label, start, stop = (int(word) for word in row[:3])
+    cell = "line" if solid is None else SOLIDS[solid]
+    count = KINDS[cell].node_count
+    words = [word for row in keyword.rows for word in row if word]
+    rows = keyword.rows if solid is None else _cut(deck, words, count + 1)
+    for row in rows:
+        label, *nodes = (int(word) for word in row[: count + 1])
         if label in deck.elements:
             raise deck.fail(f"element {label} is defined twice (write one part to a file)")
-        deck.elements[label] = (start, stop)
+        deck.elements[label] = (cell, tuple(nodes))
         if "ELSET" in keyword.parameters:
             deck.grow("ELSET", keyword.parameters["ELSET"], [label])
+
+
+def _cut(deck: _Deck, words: list[str], length: int) -> list[list[str]]:
+    """The words of elements that may go on over several lines, one list for each element."""
+    if len(words) % length:
+        raise deck.fail(f"a list of elements does not hold {length - 1} nodes for each of them")
+    return [words[first : first + length] for first in range(0, len(words), length)]
 
 
 def _read_set(deck: _Deck, keyword: _Keyword) -> None:
@@ -192,22 +212,36 @@ _ACTIONS: dict[str, Callable[[_Deck, _Keyword], None]] = {
 
 def _to_meshio(deck: _Deck) -> meshio.Mesh:
     node = {label: i for i, label in enumerate(deck.nodes)}
-    element = {label: i for i, label in enumerate(deck.elements)}
-    for label, ends in deck.elements.items():
-        for end in ends:
+    for label, (_, nodes) in deck.elements.items():
+        for end in nodes:
             if end not in node:
                 raise deck.fail(f"element {label} ends at node {end}, which is not defined")
-    lines = [[node[start], node[stop]] for start, stop in deck.elements.values()]
     for name, labels in deck.sets["NSET"].values():
         missing = [label for label in labels if label not in node]
         if missing:
             raise deck.fail(f"set {name!r} holds node {missing[0]}, which is not defined")
+    kinds = list(dict.fromkeys(kind for kind, _ in deck.elements.values())) or ["line"]
+    labels_of = {
+        kind: [label for label, (own, _) in deck.elements.items() if own == kind] for kind in kinds
+    }
+    index = {kind: {label: i for i, label in enumerate(labels_of[kind])} for kind in kinds}
+    cells = [
+        (
+            kind,
+            np.array(
+                [[node[n] for n in deck.elements[label][1]] for label in labels_of[kind]],
+                dtype=np.int64,
+            ).reshape(-1, KINDS[kind].node_count),
+        )
+        for kind in kinds
+    ]
     return meshio.Mesh(
         np.array(list(deck.nodes.values()), dtype=np.float64).reshape(-1, 3),
-        [("line", np.array(lines, dtype=np.int64).reshape(-1, 2))],
+        cells,
         point_sets={name: _positions(labels, node) for name, labels in deck.sets["NSET"].values()},
         cell_sets={
-            name: [_positions(labels, element)] for name, labels in deck.sets["ELSET"].values()
+            name: [_positions(labels, index[kind]) for kind in kinds]
+            for name, labels in deck.sets["ELSET"].values()
         },
     )
 

@@ -38,3 +38,10 @@ def quoted(names: object) -> str:
     'none'
     """
     return ", ".join(repr(str(name)) for name in names) or "none"  # type: ignore[attr-defined]
+
+
+def check_positive(owner: object, **values: object) -> None:
+    """Raise ModelError for the first value that is not a positive finite number."""
+    for name, value in values.items():
+        if not (is_finite(value) and value > 0.0):
+            raise ModelError(f"{owner}: {name} must be positive and finite, not {value!r}")

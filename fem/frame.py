@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from fem.elements import local_matrices, turn
+from fem.beams import plane_matrices
+from fem.elements import turn
 from fem.errors import ModelError
 from fem.mesh import FloatArray, IntArray
 from fem.model import DIRECTIONS, FrameModel
@@ -73,7 +74,7 @@ class Component:
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Component:
         """Read and assemble a frame that `save` wrote; a `ModelError` says what is wrong."""
-        return assemble(load_model(path))
+        return assemble_frame(load_model(path))
 
     def _all(self, u: FloatArray) -> FloatArray:
         u = np.asarray(u, dtype=np.float64)
@@ -87,50 +88,8 @@ class Component:
         return values
 
 
-def assemble(model: FrameModel) -> Component:
-    """Assemble stiffness and consistent mass of a plane frame.
-
-    Parameters
-    ----------
-    model
-        The frame. It may float freely or be a mechanism.
-
-    Returns
-    -------
-    Component
-        Matrices of the free degrees of freedom and the interface vectors.
-
-    Raises
-    ------
-    ModelError
-        If the supports leave nothing free.
-
-    Notes
-    -----
-    Euler-Bernoulli beams: cubic Hermite bending, linear stretching, no shear, no rotary inertia
-    of the cross-section [1]_. The error of a frequency falls with the fourth power of the element
-    length as long as stretching does not matter, else with the second.
-
-    .. [1] M. Petyt, Introduction to Finite Element Vibration Analysis, 2nd ed., Cambridge
-       University Press, 2010, sections 3.2, 3.4 and 3.5.
-
-    Examples
-    --------
-    The tip of a cantilever under 1 N moves by L³/(3 E I):
-
-    >>> import fem
-    >>> from scipy.sparse.linalg import spsolve
-    >>> mesh = fem.frame_mesh({"root": (0, 0), "tip": (2, 0)}, [("arm", "root", "tip", 3)])
-    >>> component = fem.assemble(fem.FrameModel(
-    ...     mesh,
-    ...     parts={"arm": fem.BeamPart(fem.Material(2e11, 7800.0), fem.Section(1e-3, 1e-8))},
-    ...     supports=[fem.Support("root", ("x", "y", "rotation"))],
-    ...     interfaces={"tip": fem.Interface("tip", "y")},
-    ... ))
-    >>> tip = component.interfaces["tip"]
-    >>> bool(abs(tip @ spsolve(component.stiffness, tip) / (8 / (3 * 2e11 * 1e-8)) - 1) < 1e-12)
-    True
-    """
+def assemble_frame(model: FrameModel) -> Component:
+    """Assemble a plane frame; `fem.assemble` calls it."""
     element_dofs = number_dofs(model)
     free = _free_dofs(model)
     stiffness, mass = _element_matrices(model)
@@ -170,14 +129,13 @@ def _free_dofs(model: FrameModel) -> IntArray:
 
 def _element_matrices(model: FrameModel) -> tuple[FloatArray, FloatArray]:
     mesh = model.mesh
-    EA, EI, rhoA = (np.zeros(len(mesh.lines)) for _ in range(3))
-    for name, elements in model.element_parts().items():
-        material, section = model.parts[name].material, model.parts[name].section
-        EA[elements] = material.youngs_modulus * section.area
-        EI[elements] = material.youngs_modulus * section.second_moment
-        rhoA[elements] = material.density * section.area
     directions = mesh.spans[:, :2] / mesh.lengths[:, None]
-    stiffness, mass = local_matrices(mesh.lengths, EA, EI, rhoA)
+    count = len(mesh.lines)
+    stiffness, mass = np.zeros((count, 6, 6)), np.zeros((count, 6, 6))
+    for name, elements in model.element_parts().items():
+        what = f"{mesh.source}: part {name!r}"
+        pair = plane_matrices(model.parts[name], mesh.lengths[elements], what)
+        stiffness[elements], mass[elements] = pair
     return turn(stiffness, directions), turn(mass, directions)
 
 

@@ -56,12 +56,12 @@ class FrameMesh:
     source: str = "mesh"
 
     def __post_init__(self) -> None:
-        points = _numbers(f"{self.source}: points", self.points, np.float64)
-        lines = _numbers(f"{self.source}: lines", self.lines, np.int64)
+        points = numbers(f"{self.source}: points", self.points, np.float64)
+        lines = numbers(f"{self.source}: lines", self.lines, np.int64)
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "lines", lines)
-        object.__setattr__(self, "parts", _index_sets(f"{self.source}: part", self.parts))
-        sets = _index_sets(f"{self.source}: point", self.point_sets)
+        object.__setattr__(self, "parts", index_sets(f"{self.source}: part", self.parts))
+        sets = index_sets(f"{self.source}: point", self.point_sets)
         object.__setattr__(self, "point_sets", sets)
         self._check_arrays()
         self._check_elements()
@@ -217,10 +217,10 @@ def frame_mesh(
 def _coordinates(source: str, name: str, xyz: Sequence[float]) -> FloatArray:
     if len(xyz) not in (2, 3):
         raise ModelError(f"{source}: point {name!r} needs two or three coordinates, not {len(xyz)}")
-    return _numbers(f"{source}: coordinates of point {name!r}", [*xyz, 0.0][:3], np.float64)
+    return numbers(f"{source}: coordinates of point {name!r}", [*xyz, 0.0][:3], np.float64)
 
 
-def _numbers(what: str, values: npt.ArrayLike, dtype: type[Number]) -> npt.NDArray[Number]:
+def numbers(what: str, values: npt.ArrayLike, dtype: type[Number]) -> npt.NDArray[Number]:
     """A copy that cannot be written to, or a ModelError that says what holds no numbers."""
     try:
         array = np.array(values, dtype=dtype)
@@ -230,9 +230,9 @@ def _numbers(what: str, values: npt.ArrayLike, dtype: type[Number]) -> npt.NDArr
     return array
 
 
-def _index_sets(what: str, sets: Mapping[str, npt.ArrayLike]) -> dict[str, IntArray]:
+def index_sets(what: str, sets: Mapping[str, npt.ArrayLike]) -> dict[str, IntArray]:
     found = {}
     for name, indices in sets.items():
         owner = f"{what} {name!r}"
-        found[str(name)] = _numbers(owner, np.unique(_numbers(owner, indices, np.int64)), np.int64)
+        found[str(name)] = numbers(owner, np.unique(numbers(owner, indices, np.int64)), np.int64)
     return found

@@ -2,29 +2,42 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
-from fem.errors import ModelError, is_finite, quoted
+from fem.errors import ModelError, check_positive, is_finite, quoted
 from fem.mesh import FrameMesh, IntArray
+from fem.sections import CrossSection
 
 DIRECTIONS = ("x", "y", "rotation")
+"""Of a plane frame; "rotation" is about z."""
+SPATIAL_DIRECTIONS = (*DIRECTIONS, "z", "rotation_x", "rotation_y", "rotation_z")
+THEORIES = ("euler-bernoulli", "timoshenko")
 
 
-def _positive(owner: object, **values: float) -> None:
-    for name, value in values.items():
-        if not (is_finite(value) and value > 0.0):
-            raise ModelError(f"{owner}: {name} must be positive and finite, not {value!r}")
+def known_direction(owner: str, direction: str) -> None:
+    if direction not in SPATIAL_DIRECTIONS:
+        raise ModelError(
+            f"{owner}: there is no direction {direction!r}; use {quoted(DIRECTIONS)}, and in space"
+            f" {quoted(SPATIAL_DIRECTIONS[3:])}"
+        )
 
 
-def _known_direction(owner: str, direction: str) -> None:
-    if direction not in DIRECTIONS:
-        raise ModelError(f"{owner}: there is no direction {direction!r}; use {quoted(DIRECTIONS)}")
+def vector(what: str, values: Sequence[float], length: int) -> tuple[float, ...]:
+    """The values as a tuple of finite floats, or a ModelError.
+
+    Examples
+    --------
+    >>> vector("offset", [0, 1], 2)
+    (0.0, 1.0)
+    """
+    given = list(values) if isinstance(values, Iterable) else []
+    if len(given) != length or not all(is_finite(value) for value in given):
+        raise ModelError(f"{what} must be {length} finite numbers, not {values!r}")
+    return tuple(float(value) for value in given)
 
 
 @dataclass(frozen=True)
@@ -37,6 +50,8 @@ class Material:
         E in N/m².
     density
         rho in kg/m³.
+    poissons_ratio
+        nu; solids, Timoshenko beams and beams in space need it.
 
     Examples
     --------
@@ -46,106 +61,48 @@ class Material:
 
     youngs_modulus: float
     density: float
+    poissons_ratio: float | None = None
 
     def __post_init__(self) -> None:
-        _positive("material", youngs_modulus=self.youngs_modulus, density=self.density)
+        check_positive("material", youngs_modulus=self.youngs_modulus, density=self.density)
+        nu = self.poissons_ratio
+        if nu is not None and not (is_finite(nu) and -1.0 < nu < 0.5):
+            raise ModelError(f"material: poissons_ratio must be above -1 and below 0.5, not {nu!r}")
 
-
-class CrossSection(Protocol):
-    """Anything with an area in m² and a second moment of area in m⁴ for bending in the plane."""
-
-    @property
-    def area(self) -> float:
-        """Area in m²."""
-
-    @property
-    def second_moment(self) -> float:
-        """Second moment of area in m⁴ about the axis normal to the plane of the frame."""
-
-
-@dataclass(frozen=True)
-class Section:
-    """A cross-section given by its area in m² and its second moment of area in m⁴.
-
-    Examples
-    --------
-    >>> Section(area=2.85e-3, second_moment=1.94e-5).area   # IPE 200
-    0.00285
-    """
-
-    area: float
-    second_moment: float
-
-    def __post_init__(self) -> None:
-        _positive("section", area=self.area, second_moment=self.second_moment)
-
-
-@dataclass(frozen=True)
-class RectangularSection:
-    """A rectangle: `width` in m normal to the plane of the frame, `height` in m within it.
-
-    Examples
-    --------
-    >>> section = RectangularSection(width=0.09, height=0.01)
-    >>> round(section.area, 6), round(section.second_moment * 1e9, 6)
-    (0.0009, 7.5)
-    """
-
-    width: float
-    height: float
-
-    def __post_init__(self) -> None:
-        _positive("rectangular section", width=self.width, height=self.height)
-
-    @property
-    def area(self) -> float:
-        """Area in m²."""
-        return self.width * self.height
-
-    @property
-    def second_moment(self) -> float:
-        """Second moment of area in m⁴: width height³ / 12."""
-        return self.width * self.height**3 / 12.0
-
-
-@dataclass(frozen=True)
-class CircularSection:
-    """A round bar, or a tube if `bore` is not zero; both diameters in m.
-
-    Examples
-    --------
-    >>> round(CircularSection(0.02).area * 1e6, 3)
-    314.159
-    """
-
-    diameter: float
-    bore: float = 0.0
-
-    def __post_init__(self) -> None:
-        _positive("circular section", diameter=self.diameter)
-        if not (is_finite(self.bore) and 0.0 <= self.bore < self.diameter):
-            raise ModelError(
-                f"circular section: bore must be at least 0 and less than the diameter"
-                f" {self.diameter!r}, not {self.bore!r}"
-            )
-
-    @property
-    def area(self) -> float:
-        """Area in m²."""
-        return math.pi / 4.0 * (self.diameter**2 - self.bore**2)
-
-    @property
-    def second_moment(self) -> float:
-        """Second moment of area in m⁴: pi (diameter⁴ - bore⁴) / 64."""
-        return math.pi / 64.0 * (self.diameter**4 - self.bore**4)
+    def poissons_ratio_for(self, what: str) -> float:
+        """Poisson's ratio, or a ModelError that says what needs it."""
+        if self.poissons_ratio is None:
+            raise ModelError(f"{what}: its material needs a poissons_ratio")
+        return self.poissons_ratio
 
 
 @dataclass(frozen=True)
 class BeamPart:
-    """Material and cross-section of a part of the mesh."""
+    """Material and cross-section of a part of the mesh, and how it acts as a beam.
+
+    Parameters
+    ----------
+    material, section
+        What it is made of.
+    theory
+        "euler-bernoulli", or "timoshenko" with shear deformation and rotary inertia.
+    axial_force
+        In N, positive for tension: a preload, which adds its geometric stiffness.
+    orientation
+        In space: direction of the section's height, any vector not along the beam; only its part
+        across the beam counts. By default the height lies in planes z = constant as in a plane
+        frame, which beams along z cannot do.
+    offset
+        In space: place (along the height, along the width) in m of the beam's axis as seen from
+        the line between its nodes, for eccentric connections.
+    """
 
     material: Material
     section: CrossSection
+    theory: str = "euler-bernoulli"
+    axial_force: float = 0.0
+    orientation: Sequence[float] | None = None
+    offset: Sequence[float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         if not isinstance(self.material, Material):
@@ -154,14 +111,27 @@ class BeamPart:
             raise ModelError(
                 f"part: section must have an area and a second_moment, not be {self.section!r}"
             )
-        _positive("section", area=self.section.area, second_moment=self.section.second_moment)
+        check_positive("section", area=self.section.area, second_moment=self.section.second_moment)
+        if self.theory not in THEORIES:
+            raise ModelError(f"part: theory must be one of {quoted(THEORIES)}, not {self.theory!r}")
+        if not is_finite(self.axial_force):
+            raise ModelError(f"part: axial_force must be finite, not {self.axial_force!r}")
+        object.__setattr__(self, "offset", vector("part: offset", self.offset, 2))
+        if self.orientation is not None:
+            object.__setattr__(
+                self, "orientation", vector("part: orientation", self.orientation, 3)
+            )
+            if not any(self.orientation):
+                raise ModelError("part: orientation must not be the zero vector")
 
 
 @dataclass(frozen=True)
 class Support:
     """Directions of a point that are held: any of "x", "y", "rotation".
 
-    A clamp holds all three; a plane of symmetry normal to x holds ("x", "rotation").
+    A clamp holds all three; a plane of symmetry normal to x holds ("x", "rotation"). In a
+    structure there are also "z", "rotation_x", "rotation_y" and "rotation_z" (the same as
+    "rotation"), and the point may be a face; nodes of solids have no rotation to hold.
 
     Examples
     --------
@@ -183,28 +153,44 @@ class Support:
         if not given:
             raise ModelError(f"{owner}: no direction is held")
         for name in given:
-            _known_direction(owner, name)
+            known_direction(owner, name)
             if given.count(name) > 1:
                 raise ModelError(f"{owner}: direction {name!r} is given twice")
 
 
 @dataclass(frozen=True)
 class PointMass:
-    """A lumped mass in kg at a point, with an optional rotary inertia in kg m²."""
+    """A lumped mass in kg at a point, with an optional rotary inertia in kg m².
+
+    In space the inertia is about the centre of mass and the same about all axes, or given as
+    three principal values about x, y and z; `offset` (x, y, z) in m is the place of the centre of
+    mass as seen from the point, with which it is joined rigidly.
+    """
 
     point: str
     mass: float
-    rotary_inertia: float = 0.0
+    rotary_inertia: float | Sequence[float] = 0.0
+    offset: Sequence[float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        for name, value in (("mass", self.mass), ("rotary inertia", self.rotary_inertia)):
+        owner = f"point mass at {self.point!r}"
+        object.__setattr__(self, "offset", vector(f"{owner}: offset", self.offset, 3))
+        inertias: Sequence[float]
+        if not isinstance(self.rotary_inertia, Sequence):
+            inertias = (self.rotary_inertia,)
+        else:
+            inertias = vector(f"{owner}: rotary inertia", self.rotary_inertia, 3)
+            object.__setattr__(self, "rotary_inertia", inertias)
+        for name, value in (("mass", self.mass), *(("rotary inertia", i) for i in inertias)):
             if not (is_finite(value) and value >= 0.0):
                 raise ModelError(
                     f"point mass at {self.point!r}: {name} must be finite and not negative,"
                     f" not {value!r}"
                 )
-        if self.mass == 0.0 and self.rotary_inertia == 0.0:
+        if self.mass == 0.0 and not any(inertias):
             raise ModelError(f"point mass at {self.point!r}: mass and rotary inertia are both zero")
+        if self.mass == 0.0 and any(self.offset):
+            raise ModelError(f"{owner}: an offset needs a mass")
 
 
 @dataclass(frozen=True)
@@ -216,8 +202,8 @@ class PointSpring:
     stiffness: float
 
     def __post_init__(self) -> None:
-        _known_direction(f"spring at {self.point!r}", self.direction)
-        _positive(f"spring at {self.point!r}", stiffness=self.stiffness)
+        known_direction(f"spring at {self.point!r}", self.direction)
+        check_positive(f"spring at {self.point!r}", stiffness=self.stiffness)
 
 
 @dataclass(frozen=True)
@@ -234,13 +220,13 @@ class Hinge:
 
 @dataclass(frozen=True)
 class Interface:
-    """A point and direction ("x", "y" or "rotation") at which others may push and watch."""
+    """A point and direction ("x", "y", "rotation", ...) at which others may push and watch."""
 
     point: str
     direction: str
 
     def __post_init__(self) -> None:
-        _known_direction(f"interface at {self.point!r}", self.direction)
+        known_direction(f"interface at {self.point!r}", self.direction)
 
 
 LISTS = {"supports": Support, "point_masses": PointMass, "springs": PointSpring, "hinges": Hinge}
@@ -298,6 +284,7 @@ class FrameModel:
         for name, kind in TABLES.items():
             object.__setattr__(self, name, self._named(name, kind))
         self._check_plane()
+        self._check_spatial()
         self._check_points()
         self._check_parts()
         self._check_hinges()
@@ -306,6 +293,11 @@ class FrameModel:
     def element_parts(self) -> dict[str, IntArray]:
         """Element indices of every part of the model."""
         return {name: self.mesh.part(name) for name in self.parts}
+
+    @property
+    def links(self) -> IntArray:
+        """Pairs of nodes that are joined, shape (m, 2)."""
+        return self.mesh.lines
 
     def _listed(self, name: str, kind: type[object]) -> tuple[object, ...]:
         given = getattr(self, name)
@@ -332,6 +324,30 @@ class FrameModel:
                 f"{self.mesh.source}: a plane frame needs one z at all nodes,"
                 f" but z runs from {z.min():g} to {z.max():g}"
             )
+
+    def _check_spatial(self) -> None:
+        """Refuse what only a structure in space has."""
+        named = [(f"support at {s.point!r}", d) for s in self.supports for d in s.directions]
+        named += [(f"spring at {spring.point!r}", spring.direction) for spring in self.springs]
+        named += [(f"interface {name!r}", i.direction) for name, i in self.interfaces.items()]
+        for owner, direction in named:
+            if direction not in DIRECTIONS:
+                raise ModelError(
+                    f"{self.mesh.source}: {owner}: a plane frame has no direction {direction!r};"
+                    f" use {quoted(DIRECTIONS)}, or a StructureModel"
+                )
+        for name, part in self.parts.items():
+            if part.orientation is not None or any(part.offset):
+                raise ModelError(
+                    f"{self.mesh.source}: part {name!r} has an orientation or an offset, which a"
+                    " plane frame does not have; use a StructureModel"
+                )
+        for lump in self.point_masses:
+            if any(lump.offset) or isinstance(lump.rotary_inertia, tuple):
+                raise ModelError(
+                    f"{self.mesh.source}: the point mass at {lump.point!r} has an offset or three"
+                    " rotary inertias, which a plane frame does not have; use a StructureModel"
+                )
 
     def _check_points(self) -> None:
         names = [support.point for support in self.supports]

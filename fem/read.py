@@ -1,16 +1,21 @@
-"""Read frame meshes from Gmsh, VTK and Abaqus files."""
+"""Read meshes of frames and structures from Gmsh, VTK and Abaqus files."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TypeVar
 
 import meshio
 import numpy as np
 
 from fem.abaqus import read_abaqus
+from fem.cells import KINDS
 from fem.errors import ModelError, quoted
 from fem.mesh import FloatArray, FrameMesh, IntArray
+from fem.structure_mesh import StructureMesh
+
+Mesh = TypeVar("Mesh", FrameMesh, StructureMesh)
 
 SET_PREFIX = "set:"
 FARTHEST = 1e50
@@ -68,6 +73,39 @@ def read_mesh(path: str | Path) -> FrameMesh:
     >>> sorted(mesh.parts), sorted(mesh.point_sets)
     (['beam', 'leaf'], ['corner', 'foot', 'middle'])
     """
+    return _read(path, from_meshio)
+
+
+def read_structure(path: str | Path) -> StructureMesh:
+    """Read a mesh of lines, surfaces and volumes with its named groups and points.
+
+    Parameters
+    ----------
+    path
+        A file as for `read_mesh`. In ``.msh`` files all physical groups are groups of cells, and
+        physical points are point sets; in ``.vtu`` files the arrays ``set:NAME``; in ``.inp``
+        files ELSET are groups and NSET point sets.
+
+    Returns
+    -------
+    StructureMesh
+        All cells of all kinds that `fem` knows.
+
+    Raises
+    ------
+    ModelError
+        As for `read_mesh`, and for whatever `StructureMesh` refuses.
+
+    Examples
+    --------
+    >>> import fem
+    >>> sorted(fem.read_structure("meshes/half_beam.msh").groups)
+    ['beam', 'leaf']
+    """
+    return _read(path, structure_from_meshio)
+
+
+def _read(path: str | Path, build: Callable[[meshio.Mesh, str], Mesh]) -> Mesh:
     path = Path(path)
     if path.suffix.lower() not in READERS:
         raise ModelError(
@@ -79,7 +117,7 @@ def read_mesh(path: str | Path) -> FrameMesh:
         raise ModelError(f"{path}: the mesh file is empty")
     kind, read = READERS[path.suffix.lower()]
     try:
-        return from_meshio(read(path), str(path))
+        return build(read(path), str(path))
     except ModelError:
         raise
     except (Exception, SystemExit) as error:
@@ -106,12 +144,7 @@ def from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> FrameMesh:
     """
     points = _three_coordinates(content, source)
     lines, parts = _lines_and_parts(content, source)
-    bad = np.flatnonzero(~(np.abs(points) < FARTHEST).all(axis=1))
-    if len(bad):
-        raise ModelError(
-            f"{source}: the coordinates of node {bad[0]} (counted from 0) are not finite numbers"
-            f" below {FARTHEST:g} m"
-        )
+    _check_far(points, source)
     used = np.unique(lines)
     number = np.full(len(points), -1)
     number[used] = np.arange(len(used))
@@ -123,6 +156,59 @@ def from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> FrameMesh:
         {name: nodes[nodes >= 0] for name, nodes in sets.items()},
         source,
     )
+
+
+def structure_from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> StructureMesh:
+    """Take cells, groups and points of all kinds out of a `meshio.Mesh`.
+
+    Examples
+    --------
+    >>> import meshio
+    >>> content = meshio.Mesh(
+    ...     [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [("triangle", [[0, 1, 2]])],
+    ...     cell_data={"set:sheet": [[1]]},
+    ... )
+    >>> structure_from_meshio(content).part("sheet")
+    {'triangle': array([0])}
+    """
+    points = _three_coordinates(content, source)
+    cells: dict[str, list[IntArray]] = {}
+    groups: dict[str, dict[str, list[IntArray]]] = {}
+    for index, block in enumerate(content.cells):
+        if block.type not in KINDS or not len(block.data):
+            continue
+        blocks = cells.setdefault(block.type, [])
+        first = sum(len(data) for data in blocks)
+        for name, found in _groups(content, index, KINDS[block.type].dimension):
+            groups.setdefault(name, {}).setdefault(block.type, []).append(found + first)
+        blocks.append(np.asarray(block.data, dtype=np.int64))
+    if not cells:
+        found_kinds = sorted({block.type for block in content.cells if len(block.data)})
+        raise ModelError(
+            f"{source}: the mesh has no cells of a known kind (it has {quoted(found_kinds)};"
+            f" known are {quoted(KINDS)})"
+        )
+    _check_far(points, source)
+    return StructureMesh(
+        points,
+        {kind: np.concatenate(blocks) for kind, blocks in cells.items()},
+        {
+            name: {kind: np.concatenate(found) for kind, found in group.items()}
+            for name, group in groups.items()
+            if any(len(cells) for found in group.values() for cells in found)
+        },
+        {name: nodes for name, nodes in _point_sets(content).items() if len(nodes)},
+        source,
+    )
+
+
+def _check_far(points: FloatArray, source: str) -> None:
+    bad = np.flatnonzero(~(np.abs(points) < FARTHEST).all(axis=1))
+    if len(bad):
+        raise ModelError(
+            f"{source}: the coordinates of node {bad[0]} (counted from 0) are not finite numbers"
+            f" below {FARTHEST:g} m"
+        )
 
 
 def _three_coordinates(content: meshio.Mesh, source: str) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Pictures and animations of deflected frames with their true sections.
+"""Pictures and animations of deflected frames and structures with their true sections.
 
 Everything here renders off-screen with pyvista, which is imported when the first picture is made.
 """
@@ -17,12 +17,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fem.colouring import surface_values
 from fem.errors import ModelError
 from fem.files import draft_of
 from fem.frame import Component
 from fem.gl import RenderError, gl_available, require_gl
 from fem.mesh import FloatArray
 from fem.scenery import Block, StopSphere, mass_blocks, stop_solids, support_solids
+from fem.structure_assembly import StructureComponent
+from fem.structure_scenery import Cube, mass_cubes, stop_bodies, support_marks
+from fem.structure_surface import StructureSurface, structure_surface, without_mirror
 from fem.sweep import FrameSurface, frame_surface
 
 __all__ = [
@@ -30,10 +34,13 @@ __all__ = [
     "StopSphere",
     "animate",
     "gl_available",
+    "render_comparison",
     "render_modes",
     "render_shape",
 ]
 
+AnyComponent = Component | StructureComponent
+Surface = FrameSurface | StructureSurface
 Image = npt.NDArray[np.uint8]
 Plotter = Any  # pyvista.Plotter, which is imported late
 
@@ -55,7 +62,7 @@ SHEET_FIELD = (0.05, 0.84, 0.94)
 
 
 def render_shape(
-    component: Component,
+    component: AnyComponent,
     u: FloatArray,
     path: str | os.PathLike[str],
     *,
@@ -63,11 +70,12 @@ def render_shape(
     scale: float | None = None,
     stop: StopSphere | None = None,
     mirror: str | None = None,
+    colour: str = "displacement",
     size: tuple[int, int] = (1600, 900),
 ) -> float:
-    """Picture of a deflected frame, coloured by its displacement.
+    """Picture of a deflected frame or structure, coloured by its displacement or stress.
 
-    Drawn with it: the frame at rest in grey, supports, point masses as blocks of steel of that
+    Drawn with it: the same at rest in grey, supports, point masses as blocks of steel of that
     mass, and the stop at its true place (its gap scaled as the deflection is). The factor on the
     deflection is stated in the picture.
 
@@ -86,7 +94,10 @@ def render_shape(
     stop
         The stop to draw.
     mirror
-        A point on a plane of symmetry, to draw a half model whole.
+        A point on a plane of symmetry, to draw half a frame whole.
+    colour
+        "displacement"; "stress": von Mises' in solids, that of the outermost fibre in beams; or
+        "moment": the bending moment of beams.
     size
         Width and height in pixels.
 
@@ -115,12 +126,12 @@ def render_shape(
     ...     factor = render_shape(component, u, "arm.png", title="An arm")
     """
     target = named(path, (".png",))
-    drawing = frame_surface(component, mirror)
+    drawing = surface_of(component, mirror)
     states = checked_states(component, u, 1)
     factor = automatic_scale(drawing, states) if scale is None else checked_scale(scale)
     require_gl()
     with plotter_of(size) as plotter:
-        moving = add_deflected(plotter, drawing, states[0], factor)
+        moving = add_deflected(plotter, drawing, states[0], factor, colour)
         compose(plotter, moving, states, stop, title, size)
         add_note(plotter, scale_note(factor, stop), size)
         image = plotter.screenshot(None, return_img=True)
@@ -129,7 +140,7 @@ def render_shape(
 
 
 def render_modes(
-    component: Component,
+    component: AnyComponent,
     shapes: npt.ArrayLike,
     titles: Sequence[str],
     path: str | os.PathLike[str],
@@ -173,7 +184,7 @@ def render_modes(
     ...     render_modes(component, np.eye(len(component.free))[:, :2], ["one", "two"], "arm.png")
     """
     target = named(path, (".png",))
-    drawing = frame_surface(component, mirror)
+    drawing = surface_of(component, mirror)
     modes = checked_states(component, np.asarray(shapes, dtype=np.float64).T, 2)
     if len(titles) != len(modes):
         raise ModelError(f"there are {len(modes)} modes to draw, but {len(titles)} titles")
@@ -193,8 +204,68 @@ def render_modes(
     write_image(target, image)
 
 
+def render_comparison(
+    component: AnyComponent,
+    full: FloatArray,
+    reduced: FloatArray,
+    path: str | os.PathLike[str],
+    *,
+    title: str = "",
+    scale: float | None = None,
+    mirror: str | None = None,
+    size: tuple[int, int] = (1600, 900),
+) -> float:
+    """Picture of two deflections of one component: of the full and of a reduced model.
+
+    The surface is the full one, coloured by the distance between the two; red lines are the sharp
+    edges of the reduced one.
+
+    Parameters
+    ----------
+    component
+        The assembled component.
+    full, reduced
+        Displacements of the free degrees of freedom in m, each of shape (N,).
+    path, title, scale, mirror, size
+        As for `render_shape`.
+
+    Returns
+    -------
+    float
+        The largest distance over the largest displacement of the full model.
+
+    Raises
+    ------
+    RenderError, ModelError
+        As for `render_shape`.
+    """
+    target = named(path, (".png",))
+    drawing = surface_of(component, mirror)
+    states = checked_states(component, np.stack([full, reduced]), 2)
+    factor = automatic_scale(drawing, states) if scale is None else checked_scale(scale)
+    apart = drawing.place(states[0] - states[1])[1]
+    largest = float(drawing.place(states[0])[1].max())
+    share = float(apart.max()) / largest if largest > 0.0 else 0.0
+    require_gl()
+    with plotter_of(size) as plotter:
+        moving = add_deflected(plotter, drawing, states[0], factor)
+        other, _ = drawing.place(states[1], factor)
+        _, lines = polydata(drawing, other)
+        plotter.add_mesh(lines, color=STOP, line_width=3.0)
+        compose(plotter, moving, states, None, title, size)
+        unit, per_metre = length_unit(float(apart.max()))
+        moving.colour_by(per_metre, float(apart.max()))
+        moving.surface.point_data["colour"][:] = apart * per_metre
+        add_scalar_bar(plotter, moving, f"distance between the two in {unit}", *size)
+        note = f"deflection drawn × {factor:g};  red lines: reduced model, off by {share:.2g}"
+        add_note(plotter, note + " of the largest displacement", size)
+        image = plotter.screenshot(None, return_img=True)
+    write_image(target, image)
+    return share
+
+
 def animate(
-    component: Component,
+    component: AnyComponent,
     displacements: npt.ArrayLike,
     path: str | os.PathLike[str],
     *,
@@ -202,6 +273,7 @@ def animate(
     scale: float | None = None,
     stop: StopSphere | None = None,
     mirror: str | None = None,
+    colour: str = "displacement",
     title: str = "",
     fps: float = 25.0,
     size: tuple[int, int] = (1120, 540),
@@ -219,7 +291,7 @@ def animate(
         A .gif, or an .mp4 where imageio-ffmpeg is installed; written whole or not at all.
     times
         Instants in s, shape (m,), shown in the pictures.
-    scale, stop, mirror, title
+    scale, stop, mirror, colour, title
         As for `render_shape`; one scale and one range of colours for all pictures.
     fps
         Pictures per second.
@@ -252,7 +324,7 @@ def animate(
     ...     factor = animate(component, states, "arm.gif", times=times)
     """
     target = named(path, (".gif", ".mp4"))
-    drawing = frame_surface(component, mirror)
+    drawing = surface_of(component, mirror)
     states = checked_states(component, displacements, 2)
     instants = np.asarray(times, dtype=np.float64)
     if instants.shape != (len(states),):
@@ -265,7 +337,7 @@ def animate(
     check_video(target)
     require_gl()
     with plotter_of(size) as plotter:
-        moving = add_deflected(plotter, drawing, states[0], factor)
+        moving = add_deflected(plotter, drawing, states[0], factor, colour)
         compose(plotter, moving, states, stop, title, size)
         images = []
         for state, instant in zip(states, instants, strict=True):
@@ -290,7 +362,7 @@ def named(path: str | os.PathLike[str], endings: tuple[str, ...]) -> Path:
     return target
 
 
-def checked_states(component: Component, states: npt.ArrayLike, dimensions: int) -> FloatArray:
+def checked_states(component: AnyComponent, states: npt.ArrayLike, dimensions: int) -> FloatArray:
     """The states as (m, N) floats, or ModelError."""
     array = np.asarray(states, dtype=np.float64)
     count = len(component.free)
@@ -330,7 +402,7 @@ def extent(points: FloatArray) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def automatic_scale(drawing: FrameSurface, states: FloatArray) -> float:
+def automatic_scale(drawing: Surface, states: FloatArray) -> float:
     """A factor 1, 2 or 5 times a power of ten that makes the largest deflection visible."""
     at_rest, _ = drawing.place(np.zeros(states.shape[1]))
     largest = max(float(drawing.place(state)[1].max()) for state in states)
@@ -348,6 +420,27 @@ def round_number(value: float) -> float:
     power = math.floor(math.log10(value) + 1e-12)
     lead = max(step for step in (1, 2, 5) if step <= value / 10.0**power * (1 + 1e-9))
     return float(f"{lead}e{power}")
+
+
+def quantity_unit(colour: str, largest: float) -> tuple[str, float]:
+    """What the bar of colours says, and the factor on the quantity.
+
+    Examples
+    --------
+    >>> quantity_unit("stress", 2.3e8)
+    ('stress in MPa', 1e-06)
+    """
+    if colour == "displacement":
+        unit, factor = length_unit(largest)
+    elif colour == "stress":
+        unit, factor = next(
+            (u, f)
+            for u, f in (("MPa", 1e-6), ("kPa", 1e-3), ("Pa", 1.0))
+            if largest * f >= 0.1 or f == 1.0
+        )
+    else:
+        unit, factor = "N m", 1.0
+    return f"{'bending moment' if colour == 'moment' else colour} in {unit}", factor
 
 
 def length_unit(largest: float) -> tuple[str, float]:
@@ -370,32 +463,34 @@ def scale_note(factor: float, stop: StopSphere | None) -> str:
 class Moving:
     """The deflected frame in a plotter; the only thing that changes from picture to picture."""
 
-    drawing: FrameSurface
+    drawing: Surface
     factor: float
     surface: Any
     edges: Any
     actor: Any
-    blocks: Sequence[Block] = ()
-    per_metre: float = 1.0
+    blocks: Sequence[Block | Cube] = ()
+    colour: str = "displacement"
+    factor_on_colour: float = 1.0
     largest: float = 0.0
 
     def move(self, u: FloatArray) -> None:
         """Draw another state."""
-        points, size = self.drawing.place(u, self.factor)
+        points, _ = self.drawing.place(u, self.factor)
         self.surface.points[:] = points
         self.edges.points[:] = points
-        self.surface.point_data["displacement"][:] = size * self.per_metre
+        values = surface_values(self.drawing, u, self.colour)
+        self.surface.point_data["colour"][:] = values * self.factor_on_colour
         self.surface.Modified()
         self.edges.Modified()
         shape = self.drawing.component.shape(u)
         for block in self.blocks:
             block.move(shape, self.factor)
 
-    def colour_by(self, per_metre: float, largest: float) -> None:
-        """Set the unit of the colours and their range, 0 to ``largest`` m."""
-        self.surface.point_data["displacement"][:] *= per_metre / self.per_metre
-        self.per_metre = per_metre
-        self.actor.mapper.scalar_range = (0.0, largest * per_metre or 1.0)
+    def colour_by(self, factor: float, largest: float) -> None:
+        """Set the factor on the colours and their range, 0 to ``largest`` in SI units."""
+        self.surface.point_data["colour"][:] *= factor / self.factor_on_colour
+        self.factor_on_colour = factor
+        self.actor.mapper.scalar_range = (0.0, largest * factor or 1.0)
 
 
 @contextlib.contextmanager
@@ -428,7 +523,7 @@ def plotter_of(
         plotter.close()
 
 
-def polydata(drawing: FrameSurface, points: FloatArray) -> tuple[Any, Any]:
+def polydata(drawing: Surface, points: FloatArray) -> tuple[Any, Any]:
     """The surface and its sharp edges as pyvista meshes on the same points."""
     import pyvista
 
@@ -441,18 +536,33 @@ def polydata(drawing: FrameSurface, points: FloatArray) -> tuple[Any, Any]:
     return surface, edges
 
 
-def add_deflected(plotter: Plotter, drawing: FrameSurface, u: FloatArray, factor: float) -> Moving:
+def surface_of(component: AnyComponent, mirror: str | None = None) -> Surface:
+    """The surface of a frame or a structure; only a frame can be mirrored."""
+    if isinstance(component, StructureComponent):
+        without_mirror(component, mirror)
+        return structure_surface(component)
+    return frame_surface(component, mirror)
+
+
+def add_deflected(
+    plotter: Plotter,
+    drawing: Surface,
+    u: FloatArray,
+    factor: float,
+    colour: str = "displacement",
+) -> Moving:
     """Draw the deflected frame and, in grey, the frame at rest."""
     rest, _ = drawing.place(np.zeros_like(u), shrinkage=GHOST_SHRINKAGE)
     ghost, ghost_edges = polydata(drawing, rest)
     plotter.add_mesh(ghost, color=GHOST, opacity=0.16, lighting=False, show_scalar_bar=False)
     plotter.add_mesh(ghost_edges, color=GHOST, opacity=0.55, line_width=1.5)
-    points, size = drawing.place(u, factor)
+    points, _ = drawing.place(u, factor)
     surface, edges = polydata(drawing, points)
-    surface.point_data["displacement"] = size
+    values = surface_values(drawing, u, colour)
+    surface.point_data["colour"] = values
     actor = plotter.add_mesh(
         surface,
-        scalars="displacement",
+        scalars="colour",
         cmap=COLOURS,
         show_scalar_bar=False,
         ambient=0.35,
@@ -460,7 +570,9 @@ def add_deflected(plotter: Plotter, drawing: FrameSurface, u: FloatArray, factor
         specular=0.1,
     )
     plotter.add_mesh(edges, color=TEXT, opacity=0.6, line_width=1.5)
-    return Moving(drawing, factor, surface, edges, actor, largest=float(size.max()))
+    return Moving(
+        drawing, factor, surface, edges, actor, colour=colour, largest=float(values.max())
+    )
 
 
 def compose(
@@ -475,11 +587,11 @@ def compose(
     drawing = moving.drawing
     moving.blocks = add_surroundings(plotter, drawing, moving.factor, stop)
     keep_room(plotter, drawing, states, moving.factor)
-    largest = max(float(drawing.place(state)[1].max()) for state in states)
-    unit, per_metre = length_unit(largest)
-    moving.colour_by(per_metre, largest)
+    largest = max(float(surface_values(drawing, u, moving.colour).max()) for u in states)
+    label, on_colour = quantity_unit(moving.colour, largest)
+    moving.colour_by(on_colour, largest)
     moving.move(states[0])
-    add_scalar_bar(plotter, moving, f"displacement in {unit}", *size)
+    add_scalar_bar(plotter, moving, label, *size)
     add_text(plotter, title, "title", (0.5, 0.92), 1.4 * text_height(size[1]), size[0])
     fit_camera(plotter, size)
 
@@ -492,23 +604,33 @@ def add_note(plotter: Plotter, text: str, size: tuple[int, int]) -> None:
 
 def add_surroundings(
     plotter: Plotter,
-    drawing: FrameSurface,
+    drawing: Surface,
     factor: float,
     stop: StopSphere | None,
-) -> list[Block]:
+) -> list[Block | Cube]:
     """Draw supports, the stop and the masses; the masses are returned, because they move."""
-    for solid, plane in support_solids(drawing):
+    marks, stops, blocks = surroundings(drawing, factor, stop)
+    for solid, plane in marks:
         if plane:
             plotter.add_mesh(solid, color=PLANE, opacity=0.25, lighting=False)
         else:
             add_solid(plotter, solid, STEEL)
-    if stop is not None:
-        for solid in stop_solids(drawing, stop, factor):
-            add_solid(plotter, solid, STOP, smooth=solid.n_cells > 100)
-    blocks = mass_blocks(drawing, stop)
+    for solid in stops:
+        add_solid(plotter, solid, STOP, smooth=solid.n_cells > 100)
     for block in blocks:
         add_solid(plotter, block.solid, BLOCK)
     return blocks
+
+
+def surroundings(
+    drawing: Surface, factor: float, stop: StopSphere | None
+) -> tuple[list[tuple[Any, bool]], list[Any], list[Block | Cube]]:
+    """Marks of the supports, bodies of the stop, and the masses."""
+    if isinstance(drawing, StructureSurface):
+        stops = [] if stop is None else stop_bodies(drawing, stop, factor)
+        return list(support_marks(drawing)), stops, [*mass_cubes(drawing, stop)]
+    stops = [] if stop is None else stop_solids(drawing, stop, factor)
+    return list(support_solids(drawing)), stops, [*mass_blocks(drawing, stop)]
 
 
 def add_solid(plotter: Plotter, solid: Any, colour: str, smooth: bool = False) -> None:
@@ -523,7 +645,7 @@ def add_solid(plotter: Plotter, solid: Any, colour: str, smooth: bool = False) -
     )
 
 
-def keep_room(plotter: Plotter, drawing: FrameSurface, states: FloatArray, factor: float) -> None:
+def keep_room(plotter: Plotter, drawing: Surface, states: FloatArray, factor: float) -> None:
     """Make the picture large enough for all states."""
     import pyvista
 
@@ -603,7 +725,7 @@ def fit_camera(
 
 def add_mode(
     plotter: Plotter,
-    drawing: FrameSurface,
+    drawing: Surface,
     mode: FloatArray,
     title: str,
     size: tuple[int, int],

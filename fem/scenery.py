@@ -30,7 +30,8 @@ class StopSphere:
     radius
         In m.
     direction
-        From the beam to the stop, (x, y): the way the point moves to hit it.
+        From the beam to the stop, (x, y) or in a structure (x, y, z): the way the point moves to
+        hit it.
     gap
         In m, from the beam at rest to the stop; negative if they are pressed together.
 
@@ -47,7 +48,7 @@ class StopSphere:
 
     point: str
     radius: float
-    direction: tuple[float, float] = (0.0, 1.0)
+    direction: tuple[float, ...] = (0.0, 1.0)
     gap: float = 0.0
 
     def __post_init__(self) -> None:

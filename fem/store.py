@@ -1,12 +1,13 @@
-"""Keep a frame in an .npz file: the arrays of its mesh and a JSON text of what is attached."""
+"""Keep a model in an .npz file: the arrays of its mesh and a JSON text of what is attached."""
 
 from __future__ import annotations
 
 import json
 import os
-from dataclasses import asdict
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,29 +15,25 @@ import numpy.typing as npt
 from fem.errors import ModelError
 from fem.files import draft_of, plain_write_errors
 from fem.mesh import FrameMesh
-from fem.model import (
-    BeamPart,
-    CircularSection,
-    CrossSection,
-    FrameModel,
-    Hinge,
-    Interface,
-    Material,
-    PointMass,
-    PointSpring,
-    RectangularSection,
-    Section,
-    Support,
-)
+from fem.model import LISTS as FRAME_LISTS
+from fem.model import BeamPart, FrameModel, Interface, Material
+from fem.sections import CircularSection, CrossSection, RectangularSection, Section
+from fem.structure import LISTS as STRUCTURE_LISTS
+from fem.structure import SolidPart, StructureModel
+from fem.structure_mesh import StructureMesh
 
 FORMAT = "fem frame 1"
+STRUCTURE_FORMAT = "fem structure 1"
+Arrays = dict[str, npt.NDArray[Any]]
+Lists = Mapping[str, type]
+Model = TypeVar("Model")
 SECTIONS = {kind.__name__: kind for kind in (RectangularSection, CircularSection, Section)}
 
 
 def save_model(model: FrameModel, path: str | os.PathLike[str]) -> None:
     """Write a model, whole or not at all.
 
-    A cross-section of a class that is not from this package is kept as its area and second moment.
+    A cross-section of a class that is not from this package is kept by its numbers.
 
     Raises
     ------
@@ -54,17 +51,35 @@ def save_model(model: FrameModel, path: str | os.PathLike[str]) -> None:
     True
     """
     mesh = model.mesh
-    arrays: dict[str, npt.NDArray[Any]] = {
-        "format": np.array(FORMAT),
-        "points": mesh.points,
-        "lines": mesh.lines,
-        "attached": np.array(json.dumps(_attached(model))),
-    }
+    arrays: dict[str, npt.NDArray[Any]] = {"points": mesh.points, "lines": mesh.lines}
     arrays |= {f"part {name}": elements for name, elements in mesh.parts.items()}
     arrays |= {f"point {name}": nodes for name, nodes in mesh.point_sets.items()}
-    target = Path(path)
-    with plain_write_errors(target), draft_of(target) as draft, draft.open("wb") as file:
-        np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+    _write(path, FORMAT, _attached(model, FRAME_LISTS), arrays)
+
+
+def save_structure(model: StructureModel, path: str | os.PathLike[str]) -> None:
+    """Write a structure as `save_model` writes a frame.
+
+    Examples
+    --------
+    >>> import fem, pathlib, tempfile
+    >>> model = fem.StructureModel(
+    ...     fem.box_mesh("bar", (1.0, 0.1, 0.1), (2, 1, 1)),
+    ...     {"bar": fem.SolidPart(fem.Material(2.1e11, 7800.0, 0.3))},
+    ...     couplings=[fem.Coupling("tip", "x1")],
+    ... )
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "bar.npz"
+    >>> save_structure(model, path)
+    >>> load_structure(path).couplings == model.couplings
+    True
+    """
+    mesh = model.mesh
+    arrays: dict[str, npt.NDArray[Any]] = {"points": mesh.points}
+    arrays |= {f"cells {kind}": nodes for kind, nodes in mesh.cells.items()}
+    for name, group in mesh.groups.items():
+        arrays |= {f"group {kind} {name}": cells for kind, cells in group.items()}
+    arrays |= {f"point {name}": nodes for name, nodes in mesh.point_sets.items()}
+    _write(path, STRUCTURE_FORMAT, _attached(model, STRUCTURE_LISTS), arrays)
 
 
 def load_model(path: str | os.PathLike[str]) -> FrameModel:
@@ -75,14 +90,8 @@ def load_model(path: str | os.PathLike[str]) -> FrameModel:
     ModelError
         If the file is missing or is not such a file.
     """
-    if not Path(path).is_file():
-        raise ModelError(f"{path}: there is no such frame file")
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = dict(file)
-        if str(arrays["format"]) != FORMAT:
-            raise KeyError("format")
-        attached = json.loads(str(arrays["attached"]))
+
+    def build(arrays: Arrays, attached: dict[str, Any]) -> FrameModel:
         mesh = FrameMesh(
             arrays["points"],
             arrays["lines"],
@@ -90,45 +99,119 @@ def load_model(path: str | os.PathLike[str]) -> FrameModel:
             _named(arrays, "point "),
             attached["source"],
         )
-        return _model(mesh, attached)
+        return FrameModel(mesh, **_items(attached, FRAME_LISTS))
+
+    return _read(path, FORMAT, "frame", build)
+
+
+def load_structure(path: str | os.PathLike[str]) -> StructureModel:
+    """Read a model that `save_structure` wrote.
+
+    Raises
+    ------
+    ModelError
+        If the file is missing or is not such a file.
+    """
+
+    def build(arrays: Arrays, attached: dict[str, Any]) -> StructureModel:
+        groups: dict[str, dict[str, npt.NDArray[Any]]] = {}
+        for key, cells in _named(arrays, "group ").items():
+            kind, _, name = key.partition(" ")
+            groups.setdefault(name, {})[kind] = cells
+        mesh = StructureMesh(
+            arrays["points"],
+            _named(arrays, "cells "),
+            groups,
+            _named(arrays, "point "),
+            attached["source"],
+        )
+        items = _items(attached, STRUCTURE_LISTS)
+        # the mesh that was saved has the points of the couplings
+        items["couplings"] = [replace(coupling, at=None) for coupling in items["couplings"]]
+        return StructureModel(mesh, **items)
+
+    return _read(path, STRUCTURE_FORMAT, "structure", build)
+
+
+def _write(
+    path: str | os.PathLike[str], kind: str, attached: dict[str, Any], arrays: Arrays
+) -> None:
+    arrays = {"format": np.array(kind), "attached": np.array(json.dumps(attached)), **arrays}
+    target = Path(path)
+    with plain_write_errors(target), draft_of(target) as draft, draft.open("wb") as file:
+        np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+
+
+def _read(
+    path: str | os.PathLike[str],
+    kind: str,
+    what: str,
+    build: Callable[[Arrays, dict[str, Any]], Model],
+) -> Model:
+    if not Path(path).is_file():
+        raise ModelError(f"{path}: there is no such {what} file")
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = dict(file)
+        if str(arrays["format"]) != kind:
+            raise KeyError("format")
+        return build(arrays, json.loads(str(arrays["attached"])))
     except ModelError:
         raise
     except Exception as error:
-        raise ModelError(f"{path}: is not a file of a saved frame") from error
+        raise ModelError(f"{path}: is not a file of a saved {what}") from error
 
 
-def _attached(model: FrameModel) -> dict[str, Any]:
-    lists = ("supports", "point_masses", "springs", "hinges")
+def _attached(model: FrameModel | StructureModel, lists: Lists) -> dict[str, Any]:
     return {
         "source": model.mesh.source,
-        "parts": {
-            name: {"material": asdict(part.material), **_section(part.section)}
-            for name, part in model.parts.items()
-        },
+        "parts": {name: _part(part) for name, part in model.parts.items()},
         "interfaces": {name: asdict(item) for name, item in model.interfaces.items()},
         **{name: [asdict(item) for item in getattr(model, name)] for name in lists},
     }
 
 
-def _section(section: CrossSection) -> dict[str, Any]:
-    kind = type(section).__name__
+def _items(attached: dict[str, Any], lists: Lists) -> dict[str, Any]:
+    return {
+        "parts": {name: _part_from(part) for name, part in attached["parts"].items()},
+        "interfaces": {name: Interface(**item) for name, item in attached["interfaces"].items()},
+        **{name: [kind(**item) for item in attached[name]] for name, kind in lists.items()},
+    }
+
+
+def _part(part: BeamPart | SolidPart) -> dict[str, Any]:
+    plain = asdict(part)
+    if isinstance(part, BeamPart):
+        plain.update(_section(part))
+    return plain
+
+
+def _part_from(plain: dict[str, Any]) -> BeamPart | SolidPart:
+    plain = {**plain, "material": Material(**plain["material"])}
+    if "kind" not in plain:
+        return SolidPart(**plain)
+    section = SECTIONS[plain.pop("kind")](**plain.pop("section"))
+    return BeamPart(section=section, **plain)
+
+
+def _section(part: BeamPart) -> dict[str, Any]:
+    section, kind = part.section, type(part.section).__name__
     if not isinstance(section, RectangularSection | CircularSection | Section):
-        section, kind = Section(section.area, section.second_moment), "Section"
+        section, kind = _plain_section(section, part.material.poissons_ratio), "Section"
     return {"kind": kind, "section": asdict(section)}
 
 
-def _model(mesh: FrameMesh, attached: dict[str, Any]) -> FrameModel:
-    return FrameModel(
-        mesh,
-        parts={
-            name: BeamPart(Material(**part["material"]), SECTIONS[part["kind"]](**part["section"]))
-            for name, part in attached["parts"].items()
-        },
-        supports=[Support(**item) for item in attached["supports"]],
-        point_masses=[PointMass(**item) for item in attached["point_masses"]],
-        springs=[PointSpring(**item) for item in attached["springs"]],
-        hinges=[Hinge(**item) for item in attached["hinges"]],
-        interfaces={name: Interface(**item) for name, item in attached["interfaces"].items()},
+def _plain_section(section: CrossSection, poissons_ratio: float | None) -> Section:
+    """A section of a class of the user's own by its numbers."""
+    areas: tuple[float | None, float | None] = (None, None)
+    if poissons_ratio is not None and hasattr(section, "shear_areas"):
+        areas = section.shear_areas(poissons_ratio)
+    return Section(
+        section.area,
+        section.second_moment,
+        getattr(section, "second_moment_across", None),
+        getattr(section, "torsion_constant", None),
+        *areas,
     )
 
 

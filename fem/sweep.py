@@ -11,7 +11,7 @@ import numpy.typing as npt
 from fem.errors import ModelError
 from fem.frame import Component
 from fem.mesh import FloatArray, IntArray
-from fem.model import CircularSection, CrossSection, RectangularSection
+from fem.sections import CircularSection, CrossSection, RectangularSection
 
 CIRCLE_POINTS = 32
 BoolArray = npt.NDArray[np.bool_]
@@ -282,7 +282,7 @@ def frame_surface(
             elements,
             outline(model.parts[name].section),
             s,
-            open_ends(component, elements, joined),
+            open_ends(model.mesh.lines[elements], joined),
         )
         for name, elements in model.element_parts().items()
         if len(elements)
@@ -290,15 +290,12 @@ def frame_surface(
     return FrameSurface(component, parts, plane)
 
 
-def open_ends(
-    component: Component, elements: IntArray, joined: BoolArray
-) -> tuple[tuple[int, int], ...]:
-    """(position among `elements`, end 0 or 1) of the ends where the part stops.
+def open_ends(lines: IntArray, joined: BoolArray) -> tuple[tuple[int, int], ...]:
+    """(position among `lines` (e, 2), end 0 or 1) of the ends where the part stops.
 
-    These are the ends that no other of the elements meets and that are not among the nodes
+    These are the ends that no other of the lines meets and that are not among the nodes
     `joined` (n,) to the mirror image.
     """
-    lines = component.model.mesh.lines[elements]
     meeting = np.bincount(lines.ravel())
     stops = (meeting[lines] == 1) & ~joined[lines]
     return tuple((int(e), int(end)) for e, end in np.argwhere(stops))

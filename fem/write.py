@@ -1,4 +1,4 @@
-"""Write frame meshes as Gmsh, VTK and Abaqus files."""
+"""Write meshes as Gmsh, VTK and Abaqus files."""
 
 from __future__ import annotations
 
@@ -6,20 +6,22 @@ from pathlib import Path
 
 import meshio
 import numpy as np
+import numpy.typing as npt
 
 from fem.errors import ModelError, quoted
 from fem.files import plain_write_errors
 from fem.mesh import FrameMesh, IntArray
 from fem.read import SET_PREFIX
+from fem.structure_mesh import StructureMesh
 
 
-def write_mesh(mesh: FrameMesh, path: str | Path) -> None:
-    """Write a mesh so that `read_mesh` gives it back.
+def write_mesh(mesh: FrameMesh | StructureMesh, path: str | Path) -> None:
+    """Write a mesh so that `read_mesh`, or `read_structure`, gives it back.
 
     Parameters
     ----------
     mesh
-        The mesh.
+        The mesh. One of a structure is written as ``.vtu`` only.
     path
         File ending in ``.msh`` (Gmsh 2.2, ASCII), ``.vtu`` or ``.inp`` (Abaqus, B21 elements).
 
@@ -39,6 +41,12 @@ def write_mesh(mesh: FrameMesh, path: str | Path) -> None:
     {'a': array([0]), 'b': array([1])}
     """
     path = Path(path)
+    if isinstance(mesh, StructureMesh):
+        if path.suffix.lower() != ".vtu":
+            raise ModelError(f"{path}: the mesh of a structure is written as '.vtu' only")
+        with plain_write_errors(path):
+            _write_structure(mesh, path)
+        return
     writers = {".msh": _write_gmsh, ".vtu": _write_vtu, ".inp": _write_abaqus}
     if path.suffix.lower() not in writers:
         raise ModelError(
@@ -92,6 +100,30 @@ def _write_vtu(mesh: FrameMesh, path: Path) -> None:
         },
     )
     meshio.vtu.write(path, content)
+
+
+def _write_structure(mesh: StructureMesh, path: Path) -> None:
+    """Compressed; coordinates in double precision."""
+    content = meshio.Mesh(
+        mesh.points,
+        list(mesh.cells.items()),
+        cell_data={
+            SET_PREFIX + name: [
+                _flags(group.get(kind, np.zeros(0, dtype=np.int64)), len(cells))
+                for kind, cells in mesh.cells.items()
+            ]
+            for name, group in mesh.groups.items()
+        },
+        point_data={
+            SET_PREFIX + name: _flags(nodes, len(mesh.points))
+            for name, nodes in mesh.point_sets.items()
+        },
+    )
+    meshio.vtu.write(path, content)
+
+
+def _flags(indices: IntArray, count: int) -> npt.NDArray[np.int8]:
+    return _indicator(indices, count).astype(np.int8)
 
 
 def _indicator(indices: IntArray, count: int) -> IntArray:

@@ -8,8 +8,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from nldyn.attractors import Attractor, AttractorOptions, classify, find_attractors
+    from nldyn.basin_maps import Basins, Plane, basins
     from nldyn.branch import Branch, BranchPoint, SpecialPoint
     from nldyn.cascades import Cascade, cascade, cascades_in
+    from nldyn.contacts import Impacts, impacts
     from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
     from nldyn.curve_marks import LocatedPoint, refine_special
     from nldyn.curve_plots import plot_curves
@@ -25,9 +28,13 @@ if TYPE_CHECKING:
         hertz_stiffness,
     )
     from nldyn.errors import SceneError, SystemModelError
+    from nldyn.executors import Outcome, TaskError, run_all
     from nldyn.exploration import Coverage, Exploration, ExploreOptions, explore
     from nldyn.flow import FlowMap, FlowOptions
     from nldyn.fourier import Spectrum, spectrum
+    from nldyn.long_term_plots import plot_basins, plot_brute_force, plot_section, plot_sweep
+    from nldyn.lyapunov import LyapunovSpectrum, lyapunov_exponents
+    from nldyn.manifolds import basin_edge, stable_manifold
     from nldyn.multipliers import Stability
     from nldyn.normal_forms import NormalForm, describe, normal_form, switch_at_branch_point
     from nldyn.orbit import ConvergenceError, History, Orbit, solve_orbit
@@ -40,11 +47,17 @@ if TYPE_CHECKING:
     from nldyn.parameters import Parameter
     from nldyn.plot import plot_diagram
     from nldyn.search import SearchOptions, find_orbits
+    from nldyn.sections import BruteForce, brute_force, impact_section, stroboscopic_section
+    from nldyn.simulation import Motion, simulate, sweep
     from nldyn.special import LocateError
     from nldyn.store import load_branch, load_branches, load_diagram, load_exploration
+    from nldyn.studies import study
     from nldyn.system import System
+    from nldyn.wear import ContactMeasures, contact_measures
 
 _HOMES = {
+    "attractors": "Attractor AttractorOptions classify find_attractors",
+    "basin_maps": "Basins Plane basins",
     "branch": "Branch BranchPoint SpecialPoint",
     "cascades": "Cascade cascade cascades_in",
     "continuation": "ContinuationOptions Walk continue_branch switch_at_flip",
@@ -54,26 +67,40 @@ _HOMES = {
     "curves": "Curve continue_constant continue_in continue_special",
     "diagrams": "Diagram Seed diagram",
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
-    "exploration": "Coverage Exploration ExploreOptions explore",
     "errors": "SceneError SystemModelError",
+    "executors": "Outcome TaskError run_all",
+    "exploration": "Coverage Exploration ExploreOptions explore",
     "flow": "FlowMap FlowOptions",
-    "multipliers": "Stability",
     "fourier": "Spectrum spectrum",
+    "contacts": "Impacts impacts",
+    "long_term_plots": "plot_basins plot_brute_force plot_section plot_sweep",
+    "lyapunov": "LyapunovSpectrum lyapunov_exponents",
+    "manifolds": "basin_edge stable_manifold",
+    "multipliers": "Stability",
     "normal_forms": "NormalForm describe normal_form switch_at_branch_point",
     "orbit": "ConvergenceError History Orbit solve_orbit",
     "orbit_plots": "plot_contact_force plot_history plot_phase_portrait plot_spectrum",
     "parameters": "Parameter",
     "plot": "plot_diagram",
     "search": "SearchOptions find_orbits",
+    "sections": "BruteForce brute_force impact_section stroboscopic_section",
+    "simulation": "Motion simulate sweep",
     "special": "LocateError",
     "store": "load_branch load_branches load_diagram load_exploration",
+    "studies": "study",
     "system": "System",
+    "wear": "ContactMeasures contact_measures",
 }
 
 __all__ = [
+    "Attractor",
+    "AttractorOptions",
+    "Basins",
     "Branch",
     "BranchPoint",
+    "BruteForce",
     "Cascade",
+    "ContactMeasures",
     "ContinuationOptions",
     "ConvergenceError",
     "Coverage",
@@ -86,11 +113,16 @@ __all__ = [
     "FlowOptions",
     "HarmonicForce",
     "History",
+    "Impacts",
     "LocateError",
     "LocatedPoint",
+    "LyapunovSpectrum",
+    "Motion",
     "NormalForm",
     "Orbit",
+    "Outcome",
     "Parameter",
+    "Plane",
     "SceneError",
     "SearchOptions",
     "Seed",
@@ -100,10 +132,16 @@ __all__ = [
     "Stop",
     "System",
     "SystemModelError",
+    "TaskError",
     "Unbalance",
     "Walk",
+    "basin_edge",
+    "basins",
+    "brute_force",
     "cascade",
     "cascades_in",
+    "classify",
+    "contact_measures",
     "continue_branch",
     "continue_constant",
     "continue_in",
@@ -112,25 +150,39 @@ __all__ = [
     "diagram",
     "dissipation_for",
     "explore",
+    "find_attractors",
     "find_orbits",
     "hertz_stiffness",
+    "impact_section",
+    "impacts",
     "load_branch",
     "load_branches",
     "load_curve",
     "load_curves",
     "load_diagram",
     "load_exploration",
+    "lyapunov_exponents",
     "normal_form",
+    "plot_basins",
+    "plot_brute_force",
     "plot_contact_force",
     "plot_curves",
     "plot_diagram",
     "plot_history",
     "plot_phase_portrait",
+    "plot_section",
     "plot_spectrum",
+    "plot_sweep",
     "refine_special",
+    "run_all",
     "save_curves",
+    "simulate",
     "solve_orbit",
     "spectrum",
+    "stable_manifold",
+    "stroboscopic_section",
+    "study",
+    "sweep",
     "switch_at_branch_point",
     "switch_at_flip",
 ]

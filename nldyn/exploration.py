@@ -28,7 +28,7 @@ from nldyn.orbit import (
     shooting_problem,
     spread,
 )
-from nldyn.search import random_states
+from nldyn.search import orbit_near, random_states
 from nldyn.system import System
 
 RETURNS = 3.0  # recorded periods after settling, over the longest period looked for
@@ -608,13 +608,16 @@ class _Survey:
             off = np.linalg.norm(tail[period:] - tail[:-period], axis=1)
             if float(np.median(off)) > NEAR * scale:
                 continue
-            found = solve_from(self.box, run[-1 - period], period, omega)
+            found = self._orbit_near(run[-1 - period], period, omega)
             if found is None or not found.stable:
                 continue
             nearest = np.linalg.norm(stroboscopic(found) - run[-1], axis=1).min()
             if nearest < NEAR * scale:
                 return next((other for other in known if same_orbit(found, other)), found)
         return None
+
+    def _orbit_near(self, start: Real, period: int, omega: float) -> Orbit | None:
+        return orbit_near(self.box.flow, start, period, omega, self.box.observe)
 
     def _unstable(
         self,
@@ -628,7 +631,7 @@ class _Survey:
         for period in range(1, min(self.effort.unstable_period, self.max_period) + 1):
             for run in runs:
                 for start in near_returns(run[TRANSIENT:], period, CANDIDATES):
-                    orbit = solve_from(self.box, run[TRANSIENT + start], period, omega)
+                    orbit = self._orbit_near(run[TRANSIENT + start], period, omega)
                     if orbit is not None:
                         self._meet(orbit, known)
             starts = [run[-1] for run in wandering] + [stroboscopic(o)[0] for o in stable]
@@ -749,22 +752,6 @@ def settling_periods(system: System, frequency_hz: float) -> int:
     if slowest <= 0.0:
         return UNDAMPED
     return max(math.ceil(DECAYS * frequency_hz / slowest), FEWEST)
-
-
-def solve_from(box: Collector, start: Real, period: int, omega: float) -> Orbit | None:
-    """Orbit that Newton's method finds from a state, by its minimal period; None if none."""
-    problem = shooting_problem(box.flow, period)
-    try:
-        nodes = spread(problem, start, omega)
-        orbit = refine(problem, nodes, omega, box.observe, max_iterations=10)
-        shorter = minimal_period(orbit)
-        if shorter < period:
-            problem = shooting_problem(box.flow, shorter)
-            nodes = spread(problem, stroboscopic(orbit)[0], omega)
-            orbit = refine(problem, nodes, omega, box.observe, max_iterations=10)
-    except ConvergenceError:
-        return None
-    return orbit
 
 
 def deflated_orbit(

@@ -364,26 +364,30 @@ class FlowMap:
         if not (is_finite(omega) and omega > 0.0):
             raise SystemModelError(f"omega must be positive and finite, got {shown(omega)}")
 
-    def trajectory(self, nodes: Real, phases: Real, omega: float) -> Trajectory:
+    def trajectory(
+        self, nodes: Real, phases: Real, omega: float, *, chained: bool = False
+    ) -> Trajectory:
         """Record the motion from phase to phase, restarted from each node state.
 
         Parameters
         ----------
         nodes : (k, 2n) array
-            States at the first k phases.
+            States at the first k phases; only the first is used when `chained`.
         phases : (k + 1,) array
             Forcing phases in radians.
         omega : float
             Excitation frequency in rad/s.
+        chained : bool
+            Start each segment where the one before ended.
 
         Returns
         -------
         Trajectory
         """
-        capacity = 64 * np.size(phases)
+        capacity = (16 if chained else 64) * np.size(phases)
         while True:
             record = self._record(capacity)
-            status, *_, closings = self._fly(record, True, nodes, phases, omega, False, False)
+            status, *_, closings = self._fly(record, True, nodes, phases, omega, chained, False)
             if status != RECORD_FULL:
                 return self._motion(omega, record, closings, _REASONS[status])
             capacity *= 4

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nldyn.errors import check_types, check_whole
+from nldyn.errors import SystemModelError, check_types, check_whole, shown
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit, check_observe
+from nldyn.system import System, numbers
 
 MOST_SAMPLES = 2**18
 
@@ -35,8 +36,8 @@ class Spectrum:
         return np.asarray(np.abs(self.phasor))
 
 
-def spectrum(orbit: Orbit, interface: str | None = None, *, orders: int = 30) -> Spectrum:
-    """Fourier coefficients of the displacement of an interface over one period of an orbit.
+def spectrum(orbit: Orbit, interface: str | Real | None = None, *, orders: int = 30) -> Spectrum:
+    """Fourier coefficients of a displacement over one period of an orbit.
 
     The trapezoidal rule with more and more samples, until the coefficients stay within 1e-9 of
     the largest (or there are 2¹⁸ samples).
@@ -45,8 +46,9 @@ def spectrum(orbit: Orbit, interface: str | None = None, *, orders: int = 30) ->
     ----------
     orbit : Orbit
         A periodic orbit.
-    interface : str, optional
-        The observed one unless given.
+    interface : str or (n,) array, optional
+        An interface, or the displacement of each mode at any point: a row of
+        ``reduced.expand(numpy.eye(n))``. The observed interface unless given.
     orders : int
         Highest multiple of the excitation frequency.
 
@@ -57,7 +59,8 @@ def spectrum(orbit: Orbit, interface: str | None = None, *, orders: int = 30) ->
     Raises
     ------
     SystemModelError
-        For an unknown interface, or if `orders` is not a whole number of at least 1.
+        For an unknown interface, a row of the wrong length, or if `orders` is not a whole number
+        of at least 1.
 
     Examples
     --------
@@ -69,12 +72,9 @@ def spectrum(orbit: Orbit, interface: str | None = None, *, orders: int = 30) ->
     >>> bool(abs(lines.amplitude[1] / orbit.max_abs_displacement - 1.0) < 1e-9)
     True
     """
-    check_types(orbit=(orbit, Orbit), interface=(interface, str, None))
+    check_types(orbit=(orbit, Orbit))
     check_whole("spectrum: orders", orders, 1, 10**4)
-    system = orbit.system
-    phi = system.participation[
-        check_observe(system, orbit.observe if interface is None else interface)
-    ]
+    phi = modal_row(orbit.system, orbit.observe if interface is None else interface)
     lines = orders * orbit.period
     samples = 2 ** int(np.ceil(np.log2(8 * lines)))
     found = _coefficients(orbit, phi, lines, samples)
@@ -85,6 +85,24 @@ def spectrum(orbit: Orbit, interface: str | None = None, *, orders: int = 30) ->
             break
     multiples = np.arange(lines + 1, dtype=float)
     return Spectrum(multiples * (orbit.frequency_hz / orbit.period), found)
+
+
+def modal_row(system: System, point: str | Real | None) -> Real:
+    """Displacement of each mode (n,) at an interface, or at any point that is given so.
+
+    Raises
+    ------
+    SystemModelError
+        For an unknown interface or a row of the wrong length.
+    """
+    if point is None or isinstance(point, str):
+        return np.asarray(system.participation[check_observe(system, point)])
+    if np.shape(point) != (system.size,):
+        raise SystemModelError(
+            f"interface must be a str or None, or the displacements of {system.size} modes, got "
+            f"{shown(point)}"
+        )
+    return numbers("interface", point)
 
 
 def _coefficients(orbit: Orbit, phi: Real, lines: int, samples: int) -> Complex:

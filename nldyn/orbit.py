@@ -53,7 +53,7 @@ class Extremes:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """An orbit sampled in time.
+    """A motion sampled in time.
 
     Parameters
     ----------
@@ -287,23 +287,8 @@ class Orbit:
         if rounding > 1e-6:
             return math.nan
         exact = -float(np.trace(self.system.total_damping)) * self.duration
-        exact -= self._contact_damping()
+        exact -= contact_damping(self.problem.flow, self.trajectory)
         return math.inf if math.isnan(value) else abs(math.expm1(min(value - exact, 700.0)))
-
-    def _contact_damping(self) -> float:
-        """∫ Σ v² ∂F/∂δ' dt over the contacts, by the quadrature of their panels."""
-        system = self.system
-        if not any(stop.depends_on_speed for stop in system.stops):
-            return 0.0
-        phases, weights = self.trajectory.contact_quadrature()
-        states = self.problem.flow.to_modal(self.trajectory.states(phases))
-        total = 0.0
-        for stop in system.stops:
-            v = system.stop_vector(stop)
-            total += float(
-                v @ v * weights @ stop.viscosity(*_depth_and_speed(system, stop, states))
-            )
-        return total
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -438,22 +423,39 @@ class Orbit:
         """
         check_whole("history: samples", samples, 1)
         phases = np.linspace(0.0, 2.0 * np.pi * self.period, samples + 1)
-        states = self.states(phases)
-        system = self.system
-        q = states[:, : system.size]
-        stops = system.stops
-        depth, force = np.empty((len(stops), phases.size)), np.empty((len(stops), phases.size))
-        for row, stop in enumerate(stops):
-            depth[row], speed = _depth_and_speed(system, stop, states)
-            force[row] = stop.force(depth[row], speed)
-        return History(
-            phases / self.omega,
-            q,
-            states[:, system.size :],
-            {name: q @ phi for name, phi in system.participation.items()},
-            depth.T,
-            force.T,
-        )
+        return history_of(self.system, phases / self.omega, self.states(phases))
+
+
+def history_of(system: System, time: Real, states: Real) -> History:
+    """Displacements and forces at modal states (k, 2n), with their times (k,) in s."""
+    q = states[:, : system.size]
+    depth = np.empty((len(system.stops), time.size))
+    force = np.empty_like(depth)
+    for row, stop in enumerate(system.stops):
+        depth[row], speed = _depth_and_speed(system, stop, states)
+        force[row] = stop.force(depth[row], speed)
+    return History(
+        time,
+        q,
+        states[:, system.size :],
+        {name: q @ phi for name, phi in system.participation.items()},
+        depth.T,
+        force.T,
+    )
+
+
+def contact_damping(flow: FlowMap, motion: Trajectory) -> float:
+    """∫ Σ v² ∂F/∂δ' dt over the contacts of a motion, by the quadrature of their panels."""
+    system = flow.system
+    if not any(stop.depends_on_speed for stop in system.stops):
+        return 0.0
+    phases, weights = motion.contact_quadrature()
+    states = flow.to_modal(motion.states(phases))
+    total = 0.0
+    for stop in system.stops:
+        v = system.stop_vector(stop)
+        total += float(v @ v * weights @ stop.viscosity(*_depth_and_speed(system, stop, states)))
+    return total
 
 
 def _depth_and_speed(system: System, stop: Stop, states: Real) -> tuple[Real, Real]:

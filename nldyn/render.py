@@ -65,8 +65,9 @@ def render_scene(
         A scene with a ``[mesh]``. Without a ``[continuation]`` only its modes are drawn.
     directory : str or Path
         Gets ``modes.csv`` and ``mode_shapes.png``, and for the orbit ``orbit.png``,
-        ``orbit.svg``, ``deepest_contact.png`` and ``motion.gif`` or ``.mp4``; all of them or
-        nothing.
+        ``orbit.svg``, ``deepest_contact.png``, ``deepest_contact_stress.png`` and ``motion.gif``
+        or ``.mp4``; also ``mode_shapes.html`` and ``deepest_contact.html``, to be turned in a
+        browser. All of them or nothing.
     frequency_hz : float, optional
         Excitation frequency of the orbit in Hz; unless given, where the harmonic branch has its
         largest displacement.
@@ -120,6 +121,7 @@ def render_scene(
         if orbit is not None:
             save_orbit(orbit, folder)
         drawing = _Drawing(scene, component, reduced, folder, tell)
+        drawing.pages(orbit)
         missing = drawing.draw(orbit, video)
     return Rendering(Path(directory), orbit, missing)
 
@@ -184,16 +186,17 @@ def save_orbit(orbit: Orbit, folder: Path) -> None:
 
 
 def stop_sphere(scene: Scene, index: int) -> StopSphere | None:
-    """Give a stop as a sphere to be drawn, if it acts along an axis of the frame."""
+    """Give a stop as a sphere to be drawn, if it acts along an axis."""
     from fem.render import StopSphere
 
-    axes = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
+    axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
     stop = scene.stops[index]
     place = scene.interfaces[stop.at]
     if place.direction not in axes:
         return None
-    x, y = axes[place.direction]
-    way = (stop.direction * x, stop.direction * y)
+    way = tuple(stop.direction * along for along in axes[place.direction])
+    if scene.mesh is None or scene.mesh.model == "frame":
+        way = way[:2]
     return StopSphere(place.at, stop.radius or DRAWN_RADIUS, way, stop.gap)
 
 
@@ -207,10 +210,10 @@ def stop_to_draw(scene: Scene, impact: Impact | None) -> StopSphere | None:
 
 @dataclass(frozen=True)
 class _Drawing:
-    """The pictures that need a graphics library."""
+    """The pages for a browser, and the pictures, which need a graphics library."""
 
     scene: Scene
-    component: fem.Component
+    component: fem.Component | fem.StructureComponent
     reduced: cms.ReducedModel
     folder: Path
     tell: Progress
@@ -231,21 +234,53 @@ class _Drawing:
             return str(error)
         return ""
 
+    @property
+    def mode_titles(self) -> list[str]:
+        """What each mode of the reduced model is called."""
+        kept = self.reduced.modes
+        return [
+            f"{'mode' if number < kept else 'residual mode'} {number + 1}: {hz:.1f} Hz"
+            for number, hz in enumerate(self.reduced.frequencies_hz)
+        ]
+
+    def pages(self, orbit: Orbit | None) -> None:
+        """Write the modes, and the stress at the deepest contact, as pages for a browser."""
+        from fem.page import write_page
+
+        write_page(
+            self.component,
+            self.reduced.basis,
+            self.mode_titles,
+            self.folder / "mode_shapes.html",
+            heading=self.scene.title or "Mode shapes",
+            mirror=_mirror(self.scene),
+        )
+        if orbit is None:
+            return
+        impact = deepest_impact(self.scene, orbit)
+        what = "largest deflection" if impact is None else "deepest contact"
+        write_page(
+            self.component,
+            self.reduced.expand(deepest_state(orbit, impact))[:, None],
+            [f"{what} at {orbit.frequency_hz:.4g} Hz"],
+            self.folder / "deepest_contact.html",
+            heading=self.scene.title or "Deepest contact",
+            mirror=_mirror(self.scene),
+            colour="stress",
+            relative=False,
+        )
+
     def modes(self) -> None:
         """Draw a sheet with all modes of the reduced model."""
         from fem.render import render_modes
 
         self.tell("mode shapes", 0.0)
-        kept = self.reduced.modes
-        titles = [
-            f"{'mode' if number < kept else 'residual mode'} {number + 1}: {hz:.1f} Hz"
-            for number, hz in enumerate(self.reduced.frequencies_hz)
-        ]
         path = self.folder / "mode_shapes.png"
-        render_modes(self.component, self.reduced.basis, titles, path, mirror=_mirror(self.scene))
+        mirror = _mirror(self.scene)
+        render_modes(self.component, self.reduced.basis, self.mode_titles, path, mirror=mirror)
 
     def deepest_contact(self, orbit: Orbit) -> None:
-        """Draw the structure at the instant of deepest contact."""
+        """Draw the structure at the instant of deepest contact: displacement, then stress."""
         from fem.render import render_shape
 
         self.tell("deepest contact", 0.0)
@@ -253,24 +288,25 @@ class _Drawing:
         what = "largest deflection" if impact is None else "deepest contact"
         state = self.reduced.expand(deepest_state(orbit, impact))
         stop = stop_to_draw(self.scene, impact)
-        render_shape(
-            self.component,
-            state,
-            self.folder / "deepest_contact.png",
-            title=f"{what} at {orbit.frequency_hz:.4g} Hz",
-            scale=self.visible_scale(state, impact.penetration if impact else 0.0, stop),
-            stop=stop,
-            mirror=_mirror(self.scene),
-        )
+        for name, colour in (("contact", "displacement"), ("contact_stress", "stress")):
+            render_shape(
+                self.component,
+                state,
+                self.folder / f"deepest_{name}.png",
+                title=f"{what} at {orbit.frequency_hz:.4g} Hz",
+                scale=self.visible_scale(state, impact.penetration if impact else 0.0, stop),
+                stop=stop,
+                mirror=_mirror(self.scene),
+                colour=colour,
+            )
 
     def visible_scale(
         self, state: NDArray[np.float64], penetration: float, stop: StopSphere | None
     ) -> float:
         """Factor on the deflection at which the stop is not drowned in what it dents."""
-        from fem.render import automatic_scale, round_number
-        from fem.sweep import frame_surface
+        from fem.render import automatic_scale, round_number, surface_of
 
-        factor = automatic_scale(frame_surface(self.component, _mirror(self.scene)), state[None])
+        factor = automatic_scale(surface_of(self.component, _mirror(self.scene)), state[None])
         if stop is None or penetration == 0.0:
             return factor
         return min(factor, round_number(2.0 * stop.radius / penetration))

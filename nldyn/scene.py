@@ -12,10 +12,18 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from nldyn.errors import SceneError, SystemModelError
-from nldyn.scene_checks import check_computable, check_mesh_names, check_ratio_count, check_scene
+from nldyn.scene_checks import (
+    check_computable,
+    check_mesh_names,
+    check_ratio_count,
+    check_scene,
+    check_structure_names,
+)
 from nldyn.scene_messages import KeyPath, from_validation, scene_error, table_at
 from nldyn.scene_schema import ContinuationTable, ExcitationTable, PartTable, Scene, StopTable
 
@@ -107,6 +115,18 @@ def parse_scene(text: str, file: str | Path = "scene.toml") -> Scene:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise SceneError(f"{file}: is not valid TOML: {_toml_fault(str(error))}") from None
+    return scene_from_tables(tables, file, text)
+
+
+def scene_from_tables(tables: dict[str, Any], file: str | Path, text: str = "") -> Scene:
+    """Check the tables of a scene that have been read from a text or changed since.
+
+    Raises
+    ------
+    SceneError
+        As for `load_scene`.
+    """
+    file = Path(file)
     try:
         scene = Scene.model_validate(tables)
     except ValidationError as error:
@@ -116,7 +136,7 @@ def parse_scene(text: str, file: str | Path = "scene.toml") -> Scene:
     return scene
 
 
-def build_component(scene: Scene) -> fem.Component:
+def build_component(scene: Scene) -> fem.Component | fem.StructureComponent:
     """Assemble the mesh of a scene.
 
     Parameters
@@ -126,7 +146,7 @@ def build_component(scene: Scene) -> fem.Component:
 
     Returns
     -------
-    fem.Component
+    fem.Component or fem.StructureComponent
         Sparse stiffness (N/m) and mass (kg), and the interfaces.
 
     Raises
@@ -152,6 +172,12 @@ def build_component(scene: Scene) -> fem.Component:
     except (OSError, ValueError) as error:
         fault = f"names {path}, which {_unreadable(error)}"
         raise scene_error(scene.file, ("mesh", "file"), fault) from None
+    if scene.mesh.model == "structure":
+        with _told_as(scene, ("mesh", "file"), fem.ModelError):
+            structure = fem.read_structure(path)
+        check_structure_names(scene, structure, scene.file)
+        with _told_as(scene, (), fem.ModelError):
+            return fem.assemble(_structure_model(scene, structure))
     with _told_as(scene, ("mesh", "file"), fem.ModelError):
         mesh = fem.read_mesh(path)
     check_mesh_names(scene, mesh, scene.file)
@@ -159,14 +185,16 @@ def build_component(scene: Scene) -> fem.Component:
         return fem.assemble(_frame_model(scene, mesh))
 
 
-def build_reduced(scene: Scene, component: fem.Component | None = None) -> cms.ReducedModel:
+def build_reduced(
+    scene: Scene, component: fem.Component | fem.StructureComponent | None = None
+) -> cms.ReducedModel:
     """Reduce the mesh of a scene to the modes that it asks for.
 
     Parameters
     ----------
     scene : Scene
         A scene with a ``[mesh]`` and a ``[reduction]``.
-    component : fem.Component, optional
+    component : fem.Component or fem.StructureComponent, optional
         What `build_component` gave for this scene, if it is at hand.
 
     Returns
@@ -191,7 +219,7 @@ def build_reduced(scene: Scene, component: fem.Component | None = None) -> cms.R
     component = component or build_component(scene)
     table = scene.reduction
     assert table is not None
-    pieces = _count_pieces(component.model.mesh)
+    pieces = _count_pieces(len(component.model.mesh.points), component.model.links)
     hint = f"; the mesh is in {pieces} pieces that share no node" if pieces > 1 else ""
     with _told_as(scene, ("reduction",), cms.ReductionError, hint=hint):
         return cms.reduce(
@@ -396,32 +424,68 @@ def _to_follow(scene: Scene) -> tuple[FlowMap, ContinuationTable]:
 def _frame_model(scene: Scene, mesh: fem.FrameMesh) -> fem.FrameModel:
     import fem
 
-    return fem.FrameModel(
+    parts = {name: _beam(table) for name, table in scene.parts.items()}
+    return fem.FrameModel(mesh, parts, **_attached(scene))
+
+
+def _structure_model(scene: Scene, mesh: fem.StructureMesh) -> fem.StructureModel:
+    import fem
+
+    return fem.StructureModel(
         mesh,
-        parts={name: _part(table) for name, table in scene.parts.items()},
-        supports=[fem.Support(s.at, tuple(s.fixed)) for s in scene.supports],
-        point_masses=[fem.PointMass(m.at, m.mass, m.rotary_inertia) for m in scene.point_masses],
-        springs=[fem.PointSpring(s.at, s.direction, s.stiffness) for s in scene.springs],
-        hinges=[fem.Hinge(h.at, h.part) for h in scene.hinges],
-        interfaces={name: fem.Interface(i.at, i.direction) for name, i in scene.interfaces.items()},
+        parts={
+            name: _beam(table) if table.kind == "beam" else _solid(table)
+            for name, table in scene.parts.items()
+        },
+        couplings=[
+            fem.Coupling(c.at, c.face, c.kind, c.place, tuple(c.directions))
+            for c in scene.couplings
+        ],
+        foundations=[fem.Foundation(f.at, f.stiffness) for f in scene.foundations],
+        **_attached(scene),
     )
 
 
-def _count_pieces(mesh: fem.FrameMesh) -> int:
-    """Count the pieces of a mesh that share no node."""
+def _attached(scene: Scene) -> dict[str, Any]:
+    """What holds, loads and joins the points of a frame or a structure."""
+    import fem
+
+    return {
+        "supports": [fem.Support(s.at, tuple(s.fixed)) for s in scene.supports],
+        "point_masses": [
+            fem.PointMass(m.at, m.mass, m.rotary_inertia, m.offset or (0.0, 0.0, 0.0))
+            for m in scene.point_masses
+        ],
+        "springs": [fem.PointSpring(s.at, s.direction, s.stiffness) for s in scene.springs],
+        "hinges": [fem.Hinge(h.at, h.part) for h in scene.hinges],
+        "interfaces": {
+            name: fem.Interface(i.at, i.direction) for name, i in scene.interfaces.items()
+        },
+    }
+
+
+def _count_pieces(count: int, links: NDArray[np.int64]) -> int:
+    """Count the pieces of a mesh of ``count`` nodes that share no node; links are pairs (m, 2)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    count = len(mesh.points)
-    links = coo_array((mesh.lengths, (mesh.lines[:, 0], mesh.lines[:, 1])), shape=(count, count))
-    pieces, _ = connected_components(links, directed=False)
-    return int(pieces)
+    ends = (links[:, 0], links[:, 1])
+    graph = coo_array((np.ones(len(links)), ends), shape=(count, count))
+    _, piece = connected_components(graph, directed=False)
+    return len(np.unique(piece[links]))
 
 
-def _part(table: PartTable) -> fem.BeamPart:
+def _solid(table: PartTable) -> fem.SolidPart:
     import fem
 
-    material = fem.Material(table.youngs_modulus, table.density)
+    material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
+    return fem.SolidPart(material, table.plane, table.thickness)
+
+
+def _beam(table: PartTable) -> fem.BeamPart:
+    import fem
+
+    material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
     section: fem.CrossSection
     if table.width is not None and table.height is not None:
         section = fem.RectangularSection(table.width, table.height)
@@ -429,8 +493,22 @@ def _part(table: PartTable) -> fem.BeamPart:
         section = fem.CircularSection(table.diameter, table.bore or 0.0)
     else:
         assert table.area is not None and table.second_moment is not None
-        section = fem.Section(table.area, table.second_moment)
-    return fem.BeamPart(material, section)
+        section = fem.Section(
+            table.area,
+            table.second_moment,
+            table.second_moment_across,
+            table.torsion_constant,
+            table.shear_area,
+            table.shear_area_across,
+        )
+    return fem.BeamPart(
+        material,
+        section,
+        table.theory or "euler-bernoulli",
+        table.axial_force or 0.0,
+        table.orientation,
+        table.offset or (0.0, 0.0),
+    )
 
 
 def _stop(table: StopTable) -> Stop:

@@ -14,7 +14,12 @@ from nldyn.scene_messages import KeyPath, scene_error, show, unknown_name
 from nldyn.scene_schema import Matrix, Scene
 
 Report = Callable[[KeyPath, str], SceneError]
-MESH_ONLY = ("parts", "supports", "point_masses", "springs", "hinges", "interfaces", "reduction")
+STRUCTURE_ONLY = ("couplings", "foundations")
+MESH_ONLY = (
+    *("parts", "supports", "point_masses", "springs", "hinges"),
+    *STRUCTURE_ONLY,
+    *("interfaces", "reduction"),
+)
 
 
 class TaggedMesh(Protocol):
@@ -27,6 +32,18 @@ class TaggedMesh(Protocol):
     @property
     def point_sets(self) -> Mapping[str, NDArray[np.int64]]:
         """Nodes of the point sets by name."""
+
+
+class TaggedStructure(Protocol):
+    """What the checks need of the mesh of a structure: its groups of cells, and all its names."""
+
+    @property
+    def groups(self) -> Mapping[str, object]:
+        """Cells by name."""
+
+    @property
+    def names(self) -> list[str]:
+        """All names that stand for nodes."""
 
 
 def check_scene(scene: Scene, file: Path) -> None:
@@ -64,6 +81,21 @@ def check_mesh_names(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
     for number, hinge in enumerate(scene.hinges):
         key = ("hinges", number, "part")
         _require(hinge.part, mesh.parts, f"a part of the mesh {source}", file, key)
+
+
+def check_structure_names(scene: Scene, mesh: TaggedStructure, file: Path) -> None:
+    """Check that the scene of a structure and its mesh agree on the names of parts and places."""
+    assert scene.mesh is not None
+    source = scene.mesh.file
+    for name in scene.parts:
+        if name not in mesh.groups:
+            fault = unknown_name(name, mesh.groups, f"a part of the mesh {source}")
+            raise scene_error(file, ("parts", name), fault.removeprefix(f"'{name}' "))
+    known = dict.fromkeys([*mesh.names, *(coupling.at for coupling in scene.couplings)])
+    for key, name in (*_points_used(scene), *_faces_used(scene)):
+        _require(
+            name, known, f"a point or face of the mesh {source} or of [[couplings]]", file, key
+        )
 
 
 def check_computable(scene: Scene, file: Path) -> None:
@@ -126,6 +158,16 @@ def _check_structure(scene: Scene, report: Report) -> None:
     for key in ("parts", "interfaces", "reduction"):
         if not getattr(scene, key):
             raise report((key,), "is missing: a mesh needs it")
+    if scene.mesh.model == "structure":
+        if scene.mesh.mirror is not None:
+            raise report(("mesh", "mirror"), "is for frames; a structure is drawn as it is")
+        return
+    for key in STRUCTURE_ONLY:
+        if getattr(scene, key):
+            raise report((key,), "needs [mesh] with model = 'structure'")
+    for name, part in scene.parts.items():
+        if part.kind == "solid":
+            raise report(("parts", name, "kind"), "'solid' needs [mesh] with model = 'structure'")
 
 
 def _check_modal(scene: Scene, report: Report) -> None:
@@ -224,6 +266,13 @@ def _points_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
         yield ("interfaces", name, "at"), interface.at
     if scene.mesh is not None and scene.mesh.mirror is not None:
         yield ("mesh", "mirror"), scene.mesh.mirror
+
+
+def _faces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
+    for number, coupling in enumerate(scene.couplings):
+        yield ("couplings", number, "face"), coupling.face
+    for number, foundation in enumerate(scene.foundations):
+        yield ("foundations", number, "at"), foundation.at
 
 
 def _require(name: str, known: Mapping[str, object], what: str, file: Path, key: KeyPath) -> None:

@@ -40,6 +40,8 @@ Frequency = Annotated[float, Field(ge=1e-6, le=LARGEST_FREQUENCY)]
 ModeFrequency = Annotated[NotNegative, Field(le=1e12)]
 Period = Annotated[int, Field(ge=1, le=100)]
 Matrix = list[list[Number]]
+Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Direction = Literal["x", "y", "rotation", "z", "rotation_x", "rotation_y", "rotation_z"]
 
 
 class Table(BaseModel):
@@ -52,22 +54,47 @@ class MeshTable(Table):
     """``[mesh]``: the file of the finite element mesh."""
 
     file: str
+    model: Literal["frame", "structure"] = "frame"
     mirror: str | None = None
 
 
 class PartTable(Table):
-    """``[parts.NAME]``: material of one part of the mesh, and a section of one of three kinds."""
+    """``[parts.NAME]``: material of one part of the mesh, and what it is: a beam or a solid."""
 
+    kind: Literal["beam", "solid"] = "beam"
     youngs_modulus: Positive
     density: Positive
+    poissons_ratio: Annotated[float, Field(gt=-1, lt=0.5)] | None = None
+    plane: Literal["stress", "strain"] | None = None
+    thickness: Positive | None = None
     width: Positive | None = None
     height: Positive | None = None
     diameter: Positive | None = None
     bore: Positive | None = None
     area: Positive | None = None
     second_moment: Positive | None = None
+    second_moment_across: Positive | None = None
+    torsion_constant: Positive | None = None
+    shear_area: Positive | None = None
+    shear_area_across: Positive | None = None
+    theory: Literal["euler-bernoulli", "timoshenko"] | None = None
+    axial_force: Number | None = None
+    orientation: Triple | None = None
+    offset: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
 
     @model_validator(mode="after")
+    def _what_it_is(self) -> PartTable:
+        if self.kind == "beam":
+            _refuse(self, ("plane", "thickness"), "a beam; a part of kind 'solid' has it")
+            return self._one_section()
+        own = ("kind", "youngs_modulus", "density", "poissons_ratio", "plane", "thickness")
+        _refuse(self, tuple(set(type(self).model_fields) - set(own)), "a part of kind 'solid'")
+        if self.poissons_ratio is None:
+            raise ValueError("needs 'poissons_ratio', as it is of kind 'solid'")
+        if (self.plane is None) != (self.thickness is None):
+            raise ValueError("needs both 'plane' and 'thickness' (in the plane), or neither")
+        return self
+
     def _one_section(self) -> PartTable:
         keys = ("width", "height", "diameter", "bore", "area", "second_moment")
         given = {key for key in keys if getattr(self, key) is not None}
@@ -77,6 +104,9 @@ class PartTable(Table):
                 "needs one section: 'width' and 'height', or 'diameter' (and 'bore'), or 'area' "
                 f"and 'second_moment'; given: {quoted(key for key in keys if key in given)}"
             )
+        if self.area is None:
+            numbers = ("second_moment_across", "torsion_constant", "shear_area")
+            _refuse(self, (*numbers, "shear_area_across"), "a section given by its dimensions")
         if self.bore and self.diameter and self.bore >= self.diameter:
             raise ValueError(f"has a 'bore' of {self.bore:g}, not less than its 'diameter'")
         return self
@@ -86,7 +116,7 @@ class SupportTable(Table):
     """``[[supports]]``: directions in which the nodes of a point set cannot move."""
 
     at: str
-    fixed: Annotated[list[Literal["x", "y", "rotation"]], Field(min_length=1)]
+    fixed: Annotated[list[Direction], Field(min_length=1)]
 
 
 class PointMassTable(Table):
@@ -94,11 +124,14 @@ class PointMassTable(Table):
 
     at: str
     mass: NotNegative
-    rotary_inertia: NotNegative = 0.0
+    rotary_inertia: (
+        NotNegative | Annotated[list[NotNegative], Field(min_length=3, max_length=3)]
+    ) = 0.0
+    offset: Triple | None = None
 
     @model_validator(mode="after")
     def _some(self) -> PointMassTable:
-        if self.mass == 0.0 and self.rotary_inertia == 0.0:
+        if self.mass == 0.0 and self.rotary_inertia in (0.0, [0.0] * 3):
             raise ValueError("needs a 'mass' or a 'rotary_inertia' above 0")
         return self
 
@@ -107,7 +140,7 @@ class SpringTable(Table):
     """``[[springs]]``: a linear spring between a point set and the ground."""
 
     at: str
-    direction: Literal["x", "y", "rotation"]
+    direction: Direction
     stiffness: Positive
 
 
@@ -118,11 +151,28 @@ class HingeTable(Table):
     part: str
 
 
+class CouplingTable(Table):
+    """``[[couplings]]``: joins the nodes of a face to a point."""
+
+    at: str
+    face: str
+    kind: Literal["rigid", "averaging"] = "rigid"
+    place: Triple | None = None
+    directions: Annotated[list[Literal["x", "y", "z"]], Field(min_length=1)] = ["x", "y", "z"]
+
+
+class FoundationTable(Table):
+    """``[[foundations]]``: an elastic foundation under a face, an edge or a beam."""
+
+    at: str
+    stiffness: Annotated[list[NotNegative], Field(min_length=3, max_length=3)]
+
+
 class InterfaceTable(Table):
     """``[interfaces.NAME]``: a point and direction where something acts or is observed."""
 
     at: str
-    direction: Literal["x", "y", "rotation"]
+    direction: Direction
 
 
 class ReductionTable(Table):
@@ -315,6 +365,8 @@ class Scene(Table):
     point_masses: list[PointMassTable] = []
     springs: list[SpringTable] = []
     hinges: list[HingeTable] = []
+    couplings: list[CouplingTable] = []
+    foundations: list[FoundationTable] = []
     interfaces: dict[str, InterfaceTable] = {}
     reduction: ReductionTable | None = None
     modal: ModalTable | None = None

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nldyn.branch import minimal_period, same_orbit
+from nldyn.branch import minimal_period, same_orbit, stroboscopic
 from nldyn.errors import check_frequency, check_whole
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
@@ -166,6 +166,21 @@ def orbits_from_strobe(
             if not any(same_orbit(orbit, other) for other in found):
                 found.append(orbit)
     return found
+
+
+def orbit_near(flow: FlowMap, start: Real, period: int, omega: float, observe: str) -> Orbit | None:
+    """Orbit that Newton's method finds from a state z, by its minimal period; None if none."""
+    problem = shooting_problem(flow, period)
+    try:
+        orbit = refine(problem, spread(problem, start, omega), omega, observe, max_iterations=10)
+        shorter = minimal_period(orbit)
+        if shorter < period:
+            problem = shooting_problem(flow, shorter)
+            nodes = spread(problem, stroboscopic(orbit)[0], omega)
+            orbit = refine(problem, nodes, omega, observe, max_iterations=10)
+    except ConvergenceError:
+        return None
+    return orbit
 
 
 def _refined(problem: ShootingProblem, start: Real, omega: float, observe: str) -> Orbit | None:

@@ -28,6 +28,7 @@ def main(out: str | Path, workers: int = 2) -> None:
     --------
     >>> main("results/paper")        # doctest: +SKIP
     """
+    from nldyn.paper.chaos import compute_chaos, write_chaos_figure
     from nldyn.paper.claims import evaluate, verdict_counts, write_claims
     from nldyn.paper.figures import write_figures
     from nldyn.paper.jobs import run_jobs
@@ -37,10 +38,12 @@ def main(out: str | Path, workers: int = 2) -> None:
     check_directory(out)
     start = time.perf_counter()
     results = run_jobs(workers)
+    chaos = compute_chaos(workers)
     with result_directory(out, "paper") as folder:
-        rows = evaluate(results)
+        rows = evaluate(results, chaos)
         write_claims(rows, folder / "claims.csv")
-        write_figures(results, folder)
+        write_figures(results, folder, chaos)
+        write_chaos_figure(chaos, folder)
         write_page(rows, results, time.perf_counter() - start, folder)
     seconds = time.perf_counter() - start
     counts = verdict_counts(rows)

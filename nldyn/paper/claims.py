@@ -9,6 +9,7 @@ from pathlib import Path
 
 from nldyn.diagrams import Diagram
 from nldyn.output import write_table
+from nldyn.paper.chaos import CLAIMS, Chaos
 from nldyn.paper.checks import CHECKS
 from nldyn.paper.evidence import READING_TOLERANCE, Finding
 
@@ -58,9 +59,24 @@ def published_claims() -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def evaluate(results: Results) -> list[Claim]:
-    """Every published claim with our value and a verdict."""
-    return [judged(row, CHECKS.get(row["id"]), results) for row in published_claims()]
+def evaluate(results: Results, chaos: Chaos | None = None) -> list[Claim]:
+    """Every published claim with our value and a verdict.
+
+    Without Lyapunov exponents the chaotic ranges are not decided.
+    """
+    return [judged(row, _check(row, chaos), results) for row in published_claims()]
+
+
+def _check(row: Mapping[str, str], chaos: Chaos | None) -> Callable[[Results], Finding] | None:
+    """The check of a claim; with the exponents where it needs them."""
+    check = CHECKS.get(row["id"])
+    if chaos is None:
+        return check
+    if row["id"] in CLAIMS:
+        return lambda results: chaos.finding(CLAIMS[row["id"]], row["published"])
+    if row["id"] == "damping" and check is not None:
+        return lambda results: chaos.with_damping(check(results))
+    return check
 
 
 def write_claims(rows: Sequence[Claim], path: Path) -> None:

@@ -10,7 +10,9 @@ from matplotlib.ticker import MaxNLocator
 
 from nldyn.branch import Branch
 from nldyn.diagrams import Diagram
+from nldyn.long_term_plots import shade_ranges
 from nldyn.orbit import Orbit
+from nldyn.paper.chaos import CAPTION, FIGURE, SHADED, Chaos
 from nldyn.paper.evidence import orbits_at
 from nldyn.plot import new_axes_pair, plot_diagram, plot_orbit, save_figure
 
@@ -28,6 +30,7 @@ CAPTIONS = {
     "figure_7": "Figure 7: 4-DOF model, ξ = 0.01",
     "figure_8": "Figure 8: 4-DOF model, ξ = 0.001",
     "figure_9": "Figure 9: orbits of the 4-DOF model at 22.5 Hz, ξ = 0.001",
+    FIGURE: CAPTION,
 }
 
 # The computations that a diagram shows; the first one's range is that of its harmonic branches.
@@ -51,19 +54,22 @@ def title(name: str, results: Results) -> str:
 
 def legend_text(name: str) -> str:
     """What the page says below a figure beside its title."""
+    shaded = " Shaded: frequencies at which a motion is chaotic." if name in SHADED else ""
     if name not in DASHED:
-        return ""
-    return (
+        return shaded
+    return shaded + (
         f" Dashed lines: f₂/2 to f₂/5 with f₂ = {SECOND_MODE_HZ:g} Hz, the frequency of the second "
         "mode; its superharmonic peaks lie near them."
     )
 
 
-def write_figures(results: Results, folder: Path) -> None:
-    """Write all figures to a folder."""
+def write_figures(results: Results, folder: Path, chaos: Chaos | None = None) -> None:
+    """Write all figures to a folder; those of the larger models with their chaotic ranges."""
     for name, jobs in SHOWN.items():
         branches = [branch for job in jobs for branch in results[job].branches]
         ax = _diagram(branches, title(name, results))
+        if chaos is not None:
+            shade_ranges(ax, chaos.ranges(name))
         if name in DASHED:
             _dashed(ax, (2, 3, 4, 5))
         if name == "figure_7":

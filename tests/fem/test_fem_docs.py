@@ -27,19 +27,37 @@ def test_examples_run_in_order(monkeypatch, capsys):
     assert "| length |" in capsys.readouterr().out
 
 
+def test_examples_of_structures_run_in_order(monkeypatch, tmp_path):
+    monkeypatch.chdir(ROOT)
+    text = (ROOT / "docs" / "structures.md").read_text(encoding="utf-8")
+    names = {}
+    for block in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL):
+        exec(block.replace("bracket.html", str(tmp_path / "bracket.html")), names)
+    assert len(names["component"].interfaces["hub"]) == len(names["component"].free)
+    assert (tmp_path / "bracket.html").stat().st_size > 10_000
+
+
 @pytest.mark.parametrize(
     "name",
     [
         "abaqus",
+        "assemble",
+        "colouring",
         "calibrate",
         "elements",
         "errors",
         "files",
-        "frame",
         "mesh",
         "model",
+        "page",
         "read",
+        "scatter",
+        "sections",
         "store",
+        "structure",
+        "structure_assembly",
+        "structure_mesh",
+        "structure_surface",
         "write",
     ],
 )

@@ -29,7 +29,8 @@ def test_without_graphics_the_rest_is_written(tmp_path, monkeypatch):
     result, out = render(tmp_path, BEAM, "--frequency-hz", "23.0")
     assert result.exit_code == 3
     assert result.stderr == "nldyn: install libegl1\n"
-    assert names(out) == {"modes.csv", "orbit.png", "orbit.svg"}
+    pages = {"mode_shapes.html", "deepest_contact.html"}
+    assert names(out) == {"modes.csv", "orbit.png", "orbit.svg"} | pages
     with (out / "modes.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [row["mode"] for row in rows] == ["1", "2"]
@@ -115,4 +116,5 @@ def test_all_pictures(tmp_path, monkeypatch):
     monkeypatch.setattr("nldyn.render.FRAMES", 3)
     result, out = render(tmp_path, BEAM, "--frequency-hz", "23.0")
     assert result.exit_code == 0, result.output
-    assert {"mode_shapes.png", "deepest_contact.png", "motion.gif"} < names(out)
+    stress = "deepest_contact_stress.png"
+    assert {"mode_shapes.png", "deepest_contact.png", stress, "motion.gif"} < names(out)

@@ -176,3 +176,121 @@ def test_tolerance_of_a_scene_is_that_of_its_flow_map(monkeypatch):
     monkeypatch.setattr(nldyn.diagrams, "diagram", lambda flow, *_, **__: taken.append(flow))
     compute(parse_scene(text, scene.file))
     assert taken[0].options.rtol == 1e-6
+
+
+def test_the_beam_of_solids_moves_as_the_frame():
+    """Same scene, other mesh: orbits with contact agree as the reduced models do."""
+    from nldyn import solve_orbit
+
+    heights = []
+    for name in ("four_dof_xi_0.01.toml", "solid_beam.toml"):
+        orbit = solve_orbit(build_system(load_scene(example(name))), frequency_hz=25.0)
+        heights.append((orbit.max_abs_displacement, orbit.max_penetration))
+    np.testing.assert_allclose(heights[1], heights[0], rtol=1e-2)
+
+
+SOLID = (
+    example("solid_beam.toml")
+    .read_text()
+    .replace("../../meshes/half_beam_solid.vtu", mesh("half_beam_solid.vtu").as_posix())
+)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ('model = "structure"', "", r"couplings needs \[mesh\] with model = 'structure'"),
+        ("[parts.leaf]", "[parts.leave]", r"parts\.leave.*is not a part of the mesh.*'leaf'"),
+        (
+            'face = "leaf_top"',
+            'face = "leaf_tip"',
+            r"couplings\[1\]\.face.*'leaf_tip' is not a poi",
+        ),
+        ('at = "foot"', 'at = "feet"', r"supports\[1\]\.at.*'feet' is not a point or face"),
+        ("poissons_ratio = 0.3", "", r"parts\.beam needs 'poissons_ratio', as it is of kind 'so"),
+        ('kind = "solid"', 'kind = "solid"\nwidth = 0.1', r"'width', which is not a key of a part"),
+        ('kind = "solid"', 'kind = "solid"\nthickness = 0.1', "needs both 'plane' and 'thickness'"),
+        ('model = "structure"', 'model = "structure"\nmirror = "middle"', "mirror is for frames"),
+        (
+            'at = "corner"\nfixed = ["z"]',
+            'at = "beam_end"\nfixed = ["y"]',
+            "a support holds a direction of its face",
+        ),
+    ],
+)
+def test_a_fault_in_a_scene_of_solids_is_told(old, new, sentence):
+    text = SOLID.replace(old, new, 1)
+    assert text != SOLID
+    with pytest.raises(SceneError, match=sentence) as caught:
+        build_component(parse_scene(text))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_scene_of_beams_in_space(tmp_path):
+    import fem
+
+    frame = fem.frame_mesh(
+        {"a": (0, 0, 0), "b": (0, 0, 1), "c": (0.5, 0, 1)},
+        [("mast", "a", "b", 6), ("arm", "b", "c", 4)],
+    )
+    fem.write_mesh(fem.structure_mesh(frame), tmp_path / "mast.vtu")
+    text = """
+    [mesh]
+    file = "mast.vtu"
+    model = "structure"
+    [parts.mast]
+    youngs_modulus = 2.1e11
+    density = 7800.0
+    poissons_ratio = 0.3
+    diameter = 0.05
+    orientation = [1.0, 0.0, 0.0]
+    theory = "timoshenko"
+    axial_force = -1000.0
+    [parts.arm]
+    youngs_modulus = 2.1e11
+    density = 7800.0
+    poissons_ratio = 0.3
+    area = 1e-3
+    second_moment = 1e-7
+    second_moment_across = 2e-7
+    torsion_constant = 1.5e-7
+    offset = [0.01, 0.0]
+    [[supports]]
+    at = "a"
+    fixed = ["x", "y", "z", "rotation_x", "rotation_y", "rotation_z"]
+    [[point_masses]]
+    at = "c"
+    mass = 1.0
+    rotary_inertia = [0.01, 0.02, 0.03]
+    offset = [0.0, 0.1, 0.0]
+    [[foundations]]
+    at = "arm"
+    stiffness = [0.0, 0.0, 1e4]
+    [interfaces.tip]
+    at = "c"
+    direction = "z"
+    [reduction]
+    modes = 4
+    """
+    scene = parse_scene(text, tmp_path / "mast.toml")
+    section = fem.Section(1e-3, 1e-7, 2e-7, 1.5e-7)
+    steel = fem.Material(2.1e11, 7800.0, 0.3)
+    direct = fem.assemble(
+        fem.StructureModel(
+            frame,
+            {
+                "mast": fem.BeamPart(
+                    steel, fem.CircularSection(0.05), "timoshenko", -1000.0, (1.0, 0.0, 0.0)
+                ),
+                "arm": fem.BeamPart(steel, section, offset=(0.01, 0.0)),
+            },
+            [fem.Support("a", ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z"))],
+            [fem.PointMass("c", 1.0, (0.01, 0.02, 0.03), (0.0, 0.1, 0.0))],
+            foundations=[fem.Foundation("arm", (0.0, 0.0, 1e4))],
+            interfaces={"tip": fem.Interface("c", "z")},
+        )
+    )
+    component = build_component(scene)
+    assert abs(component.stiffness - direct.stiffness).max() == 0.0
+    assert abs(component.mass - direct.mass).max() == 0.0
+    assert len(build_reduced(scene, component).frequencies_hz) == 5

@@ -1,0 +1,185 @@
+"""Beams: from material and section to the matrices of elements in the plane and in space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem.elements import bending_matrices, congruent, stretching_matrices
+from fem.errors import ModelError
+from fem.mesh import FloatArray
+from fem.model import BeamPart
+from fem.sections import section_number, shear_areas
+
+UPRIGHT = np.array([0, 0, 1.0])
+IN_PLANE = np.array([1, 5, 7, 11])
+OUT_OF_PLANE = np.array([2, 4, 8, 10])
+TURNED_SIGNS = np.array([1.0, -1.0, 1.0, -1.0])
+"""A positive rotation about the local y lowers w along x."""
+
+
+@dataclass(frozen=True)
+class Bending:
+    """Numbers of bending in one plane: EI in N m², kGA in N or None, rho I in kg m or None."""
+
+    stiffness: float
+    shear_stiffness: float | None
+    inertia_per_length: float | None
+
+    def matrices(
+        self, lengths: FloatArray, mass_per_length: float, axial_force: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Stiffness and mass (e, 4, 4) of elements of these lengths (e,)."""
+
+        def each(value: float | None) -> FloatArray | None:
+            return None if value is None else np.full(len(lengths), value)
+
+        return bending_matrices(
+            lengths,
+            np.full(len(lengths), self.stiffness),
+            np.full(len(lengths), mass_per_length),
+            each(self.shear_stiffness),
+            each(self.inertia_per_length),
+            each(axial_force or None),
+        )
+
+
+def plane_bending(part: BeamPart, what: str) -> Bending:
+    """Bending along the height of the section."""
+    stiffness = part.material.youngs_modulus * part.section.second_moment
+    if part.theory == "euler-bernoulli":
+        return Bending(stiffness, None, None)
+    areas = shear_areas(part.section, part.material.poissons_ratio_for(what), what, 1)
+    inertia = part.material.density * part.section.second_moment
+    return Bending(stiffness, shear_modulus(part, what) * areas[0], inertia)
+
+
+def across_bending(part: BeamPart, what: str) -> Bending:
+    """Bending along the width of the section."""
+    second_moment = section_number(part.section, "second_moment_across", what)
+    stiffness = part.material.youngs_modulus * second_moment
+    if part.theory == "euler-bernoulli":
+        return Bending(stiffness, None, None)
+    areas = shear_areas(part.section, part.material.poissons_ratio_for(what), what)
+    inertia = part.material.density * second_moment
+    return Bending(stiffness, shear_modulus(part, what) * areas[1], inertia)
+
+
+def shear_modulus(part: BeamPart, what: str) -> float:
+    """G = E / (2 (1 + nu)) in N/m²."""
+    return part.material.youngs_modulus / (2.0 * (1.0 + part.material.poissons_ratio_for(what)))
+
+
+def plane_matrices(part: BeamPart, lengths: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
+    """Stiffness and mass (e, 6, 6) along the axis, for (u, w, rotation) at both ends."""
+    pairs = _stretching(part, lengths), _bending(part, lengths, plane_bending(part, what))
+    return _composed(6, [(np.array([0, 3]), pairs[0]), (np.array([1, 2, 4, 5]), pairs[1])])
+
+
+def spatial_matrices(
+    part: BeamPart, lengths: FloatArray, what: str
+) -> tuple[FloatArray, FloatArray]:
+    """Stiffness and mass (e, 12, 12) in local axes.
+
+    The degrees of freedom are (u, v, w) and the rotations about x, y and z at the first end, then
+    at the second; x runs along the beam, y along the height of the section and z along its width.
+    Torsion is Saint-Venant's: GJ, and rho (Iy + Iz) as inertia; warping is free.
+    """
+    across = _bending(part, lengths, across_bending(part, what))
+    signs = TURNED_SIGNS[:, None] * TURNED_SIGNS
+    material, section = part.material, part.section
+    torsion = shear_modulus(part, what) * section_number(section, "torsion_constant", what)
+    polar = section.second_moment + section_number(section, "second_moment_across", what)
+    ones = np.ones(len(lengths))
+    return _composed(
+        12,
+        [
+            (np.array([0, 6]), _stretching(part, lengths)),
+            (IN_PLANE, _bending(part, lengths, plane_bending(part, what))),
+            (OUT_OF_PLANE, (across[0] * signs, across[1] * signs)),
+            (
+                np.array([3, 9]),
+                stretching_matrices(lengths, torsion * ones, material.density * polar * ones),
+            ),
+        ],
+    )
+
+
+def _stretching(part: BeamPart, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    ones, area = np.ones(len(lengths)), part.section.area
+    material = part.material
+    return stretching_matrices(
+        lengths, material.youngs_modulus * area * ones, material.density * area * ones
+    )
+
+
+def _bending(
+    part: BeamPart, lengths: FloatArray, numbers: Bending
+) -> tuple[FloatArray, FloatArray]:
+    return numbers.matrices(lengths, part.material.density * part.section.area, part.axial_force)
+
+
+def _composed(
+    size: int, pieces: list[tuple[FloatArray, tuple[FloatArray, FloatArray]]]
+) -> tuple[FloatArray, FloatArray]:
+    count = len(pieces[0][1][0])
+    stiffness, mass = np.zeros((count, size, size)), np.zeros((count, size, size))
+    for dofs, pair in pieces:
+        at = np.ix_(np.arange(count), dofs, dofs)
+        stiffness[at], mass[at] = pair
+    return stiffness, mass
+
+
+def local_axes(part: BeamPart, spans: FloatArray, what: str) -> FloatArray:
+    """Unit vectors x, y, z of the elements as rows, shape (e, 3, 3), from their spans (e, 3).
+
+    Raises
+    ------
+    ModelError
+        If the orientation lies along an element, or is missing for one along z.
+    """
+    x = spans / np.linalg.norm(spans, axis=1)[:, None]
+    if part.orientation is None:
+        z = UPRIGHT - x * x[:, 2:]
+        fault = "runs along z, so it needs an orientation (the direction of the section's height)"
+    else:
+        z = np.cross(x, np.asarray(part.orientation) / np.linalg.norm(part.orientation))
+        fault = f"runs along its orientation {part.orientation}"
+    size = np.linalg.norm(z, axis=1)
+    along = np.flatnonzero(size < 1e-6)
+    if len(along):
+        raise ModelError(f"{what}: line {along[0]} {fault}")
+    z = z / size[:, None]
+    return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def to_nodes(part: BeamPart, axes: FloatArray) -> FloatArray:
+    """The matrices (e, 12, 12) from the nodes' displacements to those of the axis, in local axes.
+
+    The nodes have (ux, uy, uz) and the rotations about x, y and z at the first end, then at the
+    second; the axis lies off the line between them by the part's offset.
+    """
+    offset = np.einsum("i,eij->ej", np.array([0.0, *part.offset]), axes)
+    T = np.zeros((len(axes), 12, 12))
+    for first in (0, 6):
+        T[:, first : first + 3, first : first + 3] = axes
+        T[:, first + 3 : first + 6, first + 3 : first + 6] = axes
+        T[:, first : first + 3, first + 3 : first + 6] = axes @ -cross_matrix(offset)
+    return T
+
+
+def cross_matrix(vectors: FloatArray) -> FloatArray:
+    """The matrices [a]x of vectors a (..., 3), so that [a]x b is the cross product of a and b."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    zero = np.zeros_like(x)
+    return np.stack(
+        [np.stack(row, axis=-1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))], axis=-2
+    )
+
+
+def element_matrices(part: BeamPart, spans: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
+    """Stiffness and mass (e, 12, 12) of beams in space for their nodes' displacements."""
+    T = to_nodes(part, local_axes(part, spans, what))
+    stiffness, mass = spatial_matrices(part, np.linalg.norm(spans, axis=1), what)
+    return congruent(stiffness, T), congruent(mass, T)

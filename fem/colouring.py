@@ -1,0 +1,160 @@
+"""What the colours of a picture mean: displacement, stress, bending moment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fem.beams import local_axes, plane_matrices, spatial_matrices, to_nodes
+from fem.cells import KINDS
+from fem.elements import rotations
+from fem.errors import ModelError, quoted
+from fem.mesh import FloatArray
+from fem.model import BeamPart
+from fem.solids import gradients_and_volumes, strains
+from fem.structure import SolidPart
+from fem.structure_assembly import StructureComponent
+from fem.structure_surface import StructureSurface
+from fem.sweep import FrameSurface, outline
+
+COLOURS = {"displacement": "m", "stress": "Pa", "moment": "N m"}
+"""Quantities by which a picture can be coloured, with their units."""
+
+
+def surface_values(
+    drawing: FrameSurface | StructureSurface, u: FloatArray, colour: str
+) -> FloatArray:
+    """The quantity at every point of the surface, shape (P,), not negative.
+
+    Parameters
+    ----------
+    drawing
+        The surface.
+    u
+        Displacements of the free degrees of freedom, shape (N,).
+    colour
+        "displacement" in m; "stress" in Pa: von Mises' in solids, averaged over the cells that
+        meet at a node, and in beams |N|/A + |M| y/I of the outermost fibre; "moment": the bending
+        moment of beams in N m.
+
+    Raises
+    ------
+    ModelError
+        If there is no such quantity.
+    """
+    if colour not in COLOURS:
+        raise ModelError(f"there is no colouring {colour!r}; there are {quoted(COLOURS)}")
+    if colour == "displacement":
+        return drawing.place(u)[1]
+    if isinstance(drawing, FrameSurface):
+        found = np.concatenate(list(_frame_values(drawing, u, colour)))
+        return found if drawing.mirror is None else np.tile(found, 2)
+    nodal = np.zeros(len(drawing.nodes))
+    if colour == "stress" and len(drawing.nodes):
+        nodal = von_mises(drawing.component, u)[drawing.nodes]
+    nodal = np.maximum(drawing.with_middles(nodal), 0.0)
+    return np.concatenate([nodal, *_beam_values(drawing, u, colour)])
+
+
+def von_mises(component: StructureComponent, u: FloatArray) -> FloatArray:
+    """Von Mises' stress in Pa at every node, the mean over the cells that meet there, (n,).
+
+    Zero at nodes on no solid. The stress tensor is averaged, not its norm.
+
+    Examples
+    --------
+    A bar pulled by 1 N over 0.02 m² is under 50 Pa everywhere:
+
+    >>> import fem
+    >>> from scipy.sparse.linalg import spsolve
+    >>> component = fem.assemble(fem.StructureModel(
+    ...     fem.box_mesh("bar", (1.0, 0.1, 0.2), (3, 1, 1)),
+    ...     {"bar": fem.SolidPart(fem.Material(2e11, 7800.0, 0.0))},
+    ...     [fem.Support("x0", ("x", "y", "z"))],
+    ...     couplings=[fem.Coupling("end", "x1", "averaging")],
+    ...     interfaces={"end": fem.Interface("end", "x")},
+    ... ))
+    >>> u = spsolve(component.stiffness.tocsc(), component.interfaces["end"])
+    >>> np.round(von_mises(component, u)[:-1].min(), 6), np.round(von_mises(component, u).max(), 6)
+    (np.float64(50.0), np.float64(50.0))
+    """
+    mesh = component.model.mesh
+    moved = component.shape(u)[:, :3]
+    total, count = np.zeros((len(mesh.points), 3, 3)), np.zeros(len(mesh.points))
+    for part, kinds in component.model.solids.values():
+        for kind, cells in kinds.items():
+            stress = cell_stresses(part, kind, mesh.points[cells], moved[cells])
+            np.add.at(total, cells.ravel(), stress.reshape(-1, 3, 3))
+            np.add.at(count, cells.ravel(), 1.0)
+    mean = total / np.maximum(count, 1.0)[:, None, None]
+    deviator = mean - np.trace(mean, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
+    return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=(1, 2))), dtype=np.float64)
+
+
+def cell_stresses(
+    part: SolidPart, kind: str, coordinates: FloatArray, displacements: FloatArray
+) -> FloatArray:
+    """Stress tensors (e, b, 3, 3) in Pa at the nodes of cells, from (e, b, 3) displacements."""
+    cell = KINDS[kind]
+    d = cell.dimension
+    gradients, _ = gradients_and_volumes(cell, coordinates[..., :d], cell.nodes)
+    strain = strains(gradients, displacements[..., :d])
+    first, mu = part.lame
+    trace = np.trace(strain, axis1=-2, axis2=-1)
+    stress = np.zeros((*strain.shape[:2], 3, 3))
+    stress[..., :d, :d] = 2.0 * mu * strain + (first * trace)[..., None, None] * np.eye(d)
+    if part.plane == "strain":
+        stress[..., 2, 2] = first * trace
+    return stress
+
+
+def _frame_values(drawing: FrameSurface, u: FloatArray, colour: str) -> Iterator[FloatArray]:
+    model = drawing.component.model
+    ends = drawing.component.element_shape(u).reshape(-1, 6)
+    directions = model.mesh.spans[:, :2] / model.mesh.lengths[:, None]
+    local = np.einsum("eij,ej->ei", rotations(directions), ends)
+    for swept in drawing.parts:
+        name = next(n for n, e in model.element_parts().items() if e is swept.elements)
+        part, elements = model.parts[name], swept.elements
+        K, _ = plane_matrices(part, model.mesh.lengths[elements], f"part {name!r}")
+        forces = np.einsum("eij,ej->ei", K, local[elements])
+        moment = _along(-forces[:, 2], forces[:, 5], swept.places)
+        values = np.abs(moment)
+        if colour == "stress":
+            corners = outline(part.section)
+            axial = np.abs(forces[:, 3:4]) / part.section.area
+            values = axial + values * corners[:, 0].max() / part.section.second_moment
+        yield np.repeat(values[..., None], len(swept.outline), axis=-1).ravel()
+
+
+def _beam_values(drawing: StructureSurface, u: FloatArray, colour: str) -> Iterator[FloatArray]:
+    model = drawing.component.model
+    for name, swept in drawing.beams:
+        part, lines = model.beams[name]
+        spans = model.mesh.points[lines[:, 1]] - model.mesh.points[lines[:, 0]]
+        what = f"{model.mesh.source}: part {name!r}"
+        T = to_nodes(part, local_axes(part, spans, what))
+        ends = drawing.component.element_shape(u, name).reshape(-1, 12)
+        K, _ = spatial_matrices(part, np.linalg.norm(spans, axis=1), what)
+        forces = np.einsum("eij,ejk,ek->ei", K, T, ends)
+        about_z = np.abs(_along(-forces[:, 5], forces[:, 11], swept.places))
+        about_y = np.abs(_along(-forces[:, 4], forces[:, 10], swept.places))
+        values = np.hypot(about_y, about_z)
+        if colour == "stress":
+            values = np.abs(forces[:, 6:7]) / part.section.area + _bending_stress(
+                part, about_z, about_y
+            )
+        yield np.repeat(values[..., None], len(swept.outline), axis=-1).ravel()
+
+
+def _bending_stress(part: BeamPart, about_z: FloatArray, about_y: FloatArray) -> FloatArray:
+    height, width = outline(part.section).max(axis=0)
+    across: float = part.section.second_moment_across  # type: ignore[attr-defined]
+    found = about_z * height / part.section.second_moment + about_y * width / across
+    return np.asarray(found, dtype=np.float64)
+
+
+def _along(first: FloatArray, last: FloatArray, s: FloatArray) -> FloatArray:
+    """Linear between the ends, shape (e, m)."""
+    return np.asarray(first[:, None] * (1 - s) + last[:, None] * s, dtype=np.float64)

@@ -1,0 +1,55 @@
+"""First-order solids that are too stiff in bending, found before they give wrong numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fem.cells import KINDS
+from fem.constraints import facet_products
+from fem.mesh import FloatArray, IntArray
+from fem.structure import SolidPart, StructureModel, once
+
+TOLERABLE = 0.05
+"""Parasitic stiffness in bending, relative, above which a part is warned of."""
+
+
+def locking_warnings(model: StructureModel) -> Iterator[str]:
+    """One sentence for every part of first-order cells that is thin against its cells.
+
+    Notes
+    -----
+    A linear cell of length h cannot bend; it shears by the curvature times the distance from its
+    middle. In a beam of thickness t this adds (G/E)(h/t)² = (h/t)²/(2 (1 + nu)) to the bending
+    stiffness of 1, however many cells lie through the thickness. The thickness of a part is
+    estimated as twice its volume over its surface, which is that of a plate or a thin beam.
+    """
+    for name, (part, kinds) in model.solids.items():
+        for kind, nodes in kinds.items():
+            if KINDS[kind].order == 1:
+                ratio = thickness_ratio(model.mesh.points, kind, nodes)
+                excess = stiffening(part, ratio)
+                if excess > TOLERABLE:
+                    yield (
+                        f"{model.mesh.source}: part {name!r} is of first-order cells ({kind}) and"
+                        f" its thickness is {ratio:.2g} of their length; where it bends along them"
+                        f" it is about {1.0 + excess:.3g} times too stiff; use second-order cells"
+                    )
+
+
+def stiffening(part: SolidPart, ratio: float) -> float:
+    """Parasitic share of the bending stiffness at a ratio of thickness to cell length."""
+    return 1.0 / (2.0 * (1.0 + part.material.poissons_ratio_for("solid part")) * ratio**2)
+
+
+def thickness_ratio(points: FloatArray, kind: str, nodes: IntArray) -> float:
+    """Thickness of a part over the longest edge of its cells (the median of them)."""
+    cell = KINDS[kind]
+    ends = points[nodes[:, np.array(cell.edges)]]
+    longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
+    local = np.array(cell.facets)
+    facets = once(nodes[:, local].reshape(-1, local.shape[1]), cell.facet_kind)
+    surface = float(facet_products(cell.facet_kind, points[facets]).sum())
+    volume = float(facet_products(kind, points[nodes]).sum())
+    return 2.0 * volume / surface / float(np.median(longest))

@@ -1,0 +1,454 @@
+"""What a structure is made of: solids and beams in space or in the plane, and what joins them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from fem.cells import KINDS
+from fem.errors import ModelError, check_positive, quoted
+from fem.mesh import FloatArray, FrameMesh, IntArray
+from fem.model import (
+    BeamPart,
+    Hinge,
+    Interface,
+    Material,
+    PointMass,
+    PointSpring,
+    Support,
+    vector,
+)
+from fem.structure_mesh import StructureMesh, structure_mesh
+
+AXES = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")
+"""The six directions of a node, in the order of `StructureComponent.shape`."""
+PLANES = ("stress", "strain")
+IN_PLANE = ("x", "y", "rotation_z")
+
+
+def axis_index(direction: str) -> int:
+    """Position of a direction among the six of a node; "rotation" is about z.
+
+    Examples
+    --------
+    >>> axis_index("y"), axis_index("rotation")
+    (1, 5)
+    """
+    return AXES.index("rotation_z" if direction == "rotation" else direction)
+
+
+@dataclass(frozen=True)
+class SolidPart:
+    """A part of the mesh that is a solid body.
+
+    Parameters
+    ----------
+    material
+        With a Poisson's ratio.
+    plane
+        None for tetrahedra and hexahedra; for triangles and quadrilaterals in the x-y plane,
+        "stress" (a sheet) or "strain" (a slice of a long body).
+    thickness
+        In m, of a plane part.
+
+    Examples
+    --------
+    >>> steel = Material(2.1e11, 7800.0, poissons_ratio=0.3)
+    >>> SolidPart(steel).plane is None, SolidPart(steel, "stress", 0.05).thickness
+    (True, 0.05)
+    """
+
+    material: Material
+    plane: str | None = None
+    thickness: float | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.material, Material):
+            raise ModelError(f"part: material must be a Material, not {self.material!r}")
+        self.material.poissons_ratio_for("solid part")
+        if self.plane is None and self.thickness is None:
+            return
+        if self.plane not in PLANES:
+            raise ModelError(
+                f"solid part: a thickness goes with plane {quoted(PLANES)}, not {self.plane!r}"
+            )
+        check_positive("solid part in the plane", thickness=self.thickness)
+
+    @property
+    def lame(self) -> tuple[float, float]:
+        """Lamé's constants in N/m², the first one as plane stress needs it where it applies."""
+        E, nu = self.material.youngs_modulus, self.material.poissons_ratio_for("solid part")
+        mu = E / (2.0 * (1.0 + nu))
+        first = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+        if self.plane == "stress":
+            first = 2.0 * first * mu / (first + 2.0 * mu)
+        return first, mu
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """Joins the nodes of a face to a point that has rotations.
+
+    Parameters
+    ----------
+    point
+        Name of the point: one of the mesh, or a new one.
+    face
+        Point set or group whose nodes are joined to it.
+    kind
+        "rigid": the nodes move with the point as one rigid body (RBE2). "averaging": the point
+        moves with the face in the mean and does not stiffen it (RBE3): its motion is the rigid
+        one nearest to the face's, in the sense of least squares over the area.
+    at
+        Place (x, y, z) in m of a new point; by default the centre of the face.
+    directions
+        Of a rigid coupling: the translations of the face that follow, by default all.
+
+    Examples
+    --------
+    >>> Coupling("hub", "bore").kind
+    'rigid'
+    """
+
+    point: str
+    face: str
+    kind: str = "rigid"
+    at: Sequence[float] | None = None
+    directions: Sequence[str] = ("x", "y", "z")
+
+    def __post_init__(self) -> None:
+        owner = f"coupling of {self.face!r} to {self.point!r}"
+        if self.kind not in ("rigid", "averaging"):
+            raise ModelError(f"{owner}: kind must be 'rigid' or 'averaging', not {self.kind!r}")
+        if self.at is not None:
+            object.__setattr__(self, "at", vector(f"{owner}: at", self.at, 3))
+        given = (self.directions,) if isinstance(self.directions, str) else tuple(self.directions)
+        if not given or not set(given) <= {"x", "y", "z"} or len(set(given)) < len(given):
+            raise ModelError(f"{owner}: directions must be out of 'x', 'y', 'z', not {given!r}")
+        if self.kind == "averaging" and len(given) < 3:
+            raise ModelError(f"{owner}: an averaging coupling has all directions")
+        object.__setattr__(self, "directions", given)
+
+
+@dataclass(frozen=True)
+class Foundation:
+    """An elastic foundation under a face, an edge or a beam.
+
+    Parameters
+    ----------
+    face
+        Point set or group: a face of solids, an edge of plane solids, or lines of beams.
+    stiffness
+        (x, y, z): N/m³ under a face (force per area and displacement), N/m² along an edge or a
+        beam (force per length and displacement).
+
+    Examples
+    --------
+    >>> Foundation("bottom", (0.0, 0.0, 1e8)).stiffness
+    (0.0, 0.0, 100000000.0)
+    """
+
+    face: str
+    stiffness: Sequence[float]
+
+    def __post_init__(self) -> None:
+        owner = f"foundation of {self.face!r}"
+        object.__setattr__(self, "stiffness", vector(f"{owner}: stiffness", self.stiffness, 3))
+        if min(self.stiffness) < 0.0 or not any(self.stiffness):
+            raise ModelError(f"{owner}: stiffness must not be negative and not all zero")
+
+
+Part = BeamPart | SolidPart
+
+LISTS = {
+    "supports": Support,
+    "point_masses": PointMass,
+    "springs": PointSpring,
+    "hinges": Hinge,
+    "couplings": Coupling,
+    "foundations": Foundation,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class StructureModel:
+    """A structure of solids and beams: a mesh and everything attached to it.
+
+    Parameters
+    ----------
+    mesh
+        A mesh with all kinds of cells; of a `FrameMesh` the lines are taken.
+    parts
+        By the name of the group of cells: `SolidPart` for bodies, `BeamPart` for lines. With
+        plane solids everything lies and moves in the plane: x, y and the rotation about z.
+    supports, point_masses, springs, hinges
+        As in a `FrameModel`, in up to six directions. The point of a support may be a face.
+    couplings
+        Faces joined to points, for beams, masses, springs, supports and interfaces on solids.
+    foundations
+        Elastic foundations.
+    interfaces
+        The named directions that a reduction keeps and a load may act on.
+
+    Raises
+    ------
+    ModelError
+        If something is not of its kind, a name is not in the mesh, a cell of the highest
+        dimension belongs to no part or one to two, or anything holds, loads or joins what is not
+        there or is held or joined already.
+
+    Examples
+    --------
+    >>> import fem
+    >>> model = fem.StructureModel(
+    ...     fem.box_mesh("bar", (1.0, 0.1, 0.1), (4, 1, 1)),
+    ...     parts={"bar": fem.SolidPart(fem.Material(2.1e11, 7800.0, 0.3))},
+    ...     supports=[fem.Support("x0", ("x", "y", "z"))],
+    ...     couplings=[fem.Coupling("tip", "x1", "averaging")],
+    ...     interfaces={"tip": fem.Interface("tip", "y")},
+    ... )
+    >>> fem.assemble(model).stiffness.shape
+    (144, 144)
+    """
+
+    mesh: StructureMesh
+    parts: Mapping[str, Part]
+    supports: Sequence[Support] = ()
+    point_masses: Sequence[PointMass] = ()
+    springs: Sequence[PointSpring] = ()
+    hinges: Sequence[Hinge] = ()
+    couplings: Sequence[Coupling] = ()
+    foundations: Sequence[Foundation] = ()
+    interfaces: Mapping[str, Interface] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if isinstance(self.mesh, FrameMesh):
+            object.__setattr__(self, "mesh", structure_mesh(self.mesh))
+        if not isinstance(self.mesh, StructureMesh):
+            raise ModelError(f"model: mesh must be a StructureMesh, not {self.mesh!r}")
+        for name, kind in LISTS.items():
+            object.__setattr__(self, name, self._listed(name, kind))
+        object.__setattr__(self, "parts", self._named("parts", Part))
+        object.__setattr__(self, "interfaces", self._named("interfaces", Interface))
+        self._check_parts()
+        object.__setattr__(self, "mesh", self._with_coupled_points())
+        self._check_plane()
+        self._check_names()
+
+    @property
+    def is_plane(self) -> bool:
+        """Whether the structure lies and moves in the x-y plane, because a part does."""
+        return any(isinstance(part, SolidPart) and part.plane for part in self.parts.values())
+
+    @property
+    def beams(self) -> dict[str, tuple[BeamPart, IntArray]]:
+        """Beam parts with the node pairs (e, 2) of their lines."""
+        return {
+            name: (part, self.mesh.cells["line"][self.mesh.part(name)["line"]])
+            for name, part in self.parts.items()
+            if isinstance(part, BeamPart)
+        }
+
+    @property
+    def solids(self) -> dict[str, tuple[SolidPart, dict[str, IntArray]]]:
+        """Solid parts with the nodes (e, b) of their cells by kind."""
+        return {
+            name: (part, {k: self.mesh.cells[k][at] for k, at in self.mesh.part(name).items()})
+            for name, part in self.parts.items()
+            if isinstance(part, SolidPart)
+        }
+
+    @property
+    def links(self) -> IntArray:
+        """Pairs of nodes that are joined by cells of parts and by couplings, shape (m, 2)."""
+        pairs = [
+            np.stack([np.repeat(cells[:, 0], cells.shape[1]), cells.ravel()], axis=1)
+            for cells in self._part_cells()
+        ]
+        for coupling in self.couplings:
+            nodes = self.mesh.nodes(coupling.face)
+            point = np.full(len(nodes), self.mesh.node(coupling.point))
+            pairs.append(np.stack([point, nodes], axis=1))
+        return np.concatenate(pairs)
+
+    @cached_property
+    def facets(self) -> dict[str, IntArray]:
+        """Faces (in the plane: edges) of solids that no second cell shares, (f, k) by kind."""
+        found: dict[str, list[IntArray]] = {}
+        for _, cells in self.solids.values():
+            for kind, nodes in cells.items():
+                local = np.array(KINDS[kind].facets)
+                found.setdefault(KINDS[kind].facet_kind, []).append(
+                    nodes[:, local].reshape(-1, local.shape[1])
+                )
+        return {kind: once(np.concatenate(blocks), kind) for kind, blocks in found.items()}
+
+    def facets_on(self, name: str) -> dict[str, IntArray]:
+        """The outer facets all of whose nodes are in a point set or group."""
+        inside = np.zeros(len(self.mesh.points), dtype=np.bool_)
+        inside[self.mesh.nodes(name)] = True
+        on = {kind: facets[inside[facets].all(axis=1)] for kind, facets in self.facets.items()}
+        return {kind: facets for kind, facets in on.items() if len(facets)}
+
+    def _listed(self, name: str, kind: type[object]) -> tuple[object, ...]:
+        given = getattr(self, name)
+        if not (isinstance(given, Sequence) and all(isinstance(item, kind) for item in given)):
+            raise ModelError(
+                f"{self.mesh.source}: {name} must be a list of {kind.__name__}, not {given!r}"
+            )
+        return tuple(given)
+
+    def _named(self, name: str, kind: object) -> dict[str, object]:
+        given = getattr(self, name)
+        items = given.values() if isinstance(given, Mapping) else [None]
+        if not all(isinstance(item, kind) for item in items):  # type: ignore[arg-type]
+            raise ModelError(
+                f"{self.mesh.source}: {name} must be a dictionary by name, of"
+                f" {getattr(kind, '__name__', 'BeamPart and SolidPart')}, not {given!r}"
+            )
+        return dict(given)
+
+    def _check_parts(self) -> None:
+        mesh = self.mesh
+        owners = {kind: np.zeros(len(cells), dtype=np.int64) for kind, cells in mesh.cells.items()}
+        for name, part in self.parts.items():
+            group = mesh.part(name)
+            wanted = self._kinds_for(part)
+            wrong = sorted(set(group) - wanted)
+            if wrong or not group:
+                raise ModelError(
+                    f"{mesh.source}: part {name!r} is a {type(part).__name__} and needs cells out"
+                    f" of {quoted(sorted(wanted))}, but has {quoted(wrong)}"
+                )
+            for kind, cells in group.items():
+                owners[kind][cells] += 1
+        highest = max(KINDS[kind].dimension for kind in mesh.cells if kind in KINDS)
+        for kind, count in owners.items():
+            bare = np.flatnonzero(count == 0)
+            if len(bare) and (kind not in KINDS or KINDS[kind].dimension == highest > 0):
+                if kind == "vertex":
+                    continue
+                raise ModelError(
+                    f"{mesh.source}: {kind} {bare[0]} is in no part of the model, whose parts are"
+                    f" {quoted(self.parts)} (the mesh has {quoted(mesh.groups)})"
+                )
+            if count.max() > 1:
+                raise ModelError(
+                    f"{mesh.source}: {kind} {np.argmax(count > 1)} is in more than one part"
+                )
+        for name, (_, lines) in self.beams.items():
+            spans = mesh.points[lines[:, 1]] - mesh.points[lines[:, 0]]
+            short = np.flatnonzero(np.linalg.norm(spans, axis=1) <= 1e-12 * mesh.size)
+            if len(short):
+                raise ModelError(f"{mesh.source}: line {short[0]} of {name!r} has zero length")
+
+    @staticmethod
+    def _kinds_for(part: Part) -> set[str]:
+        if isinstance(part, BeamPart):
+            return {"line"}
+        dimension = 2 if part.plane else 3
+        return {name for name, kind in KINDS.items() if kind.dimension == dimension}
+
+    def _with_coupled_points(self) -> StructureMesh:
+        """The mesh with a node for every coupled point that is not in it."""
+        mesh = self.mesh
+        for coupling in self.couplings:
+            owner = f"{mesh.source}: coupling of {coupling.face!r} to {coupling.point!r}"
+            if coupling.point in mesh.names:
+                if coupling.at is not None:
+                    raise ModelError(f"{owner}: the mesh has a point of this name; leave out 'at'")
+                mesh.node(coupling.point)
+                continue
+            place = coupling.at or self._centre(mesh, coupling.face)
+            points = np.vstack([mesh.points, np.asarray(place)])
+            sets = {**mesh.point_sets, coupling.point: np.array([len(points) - 1])}
+            mesh = replace(mesh, points=points, point_sets=sets)
+        return mesh
+
+    @staticmethod
+    def _centre(mesh: StructureMesh, face: str) -> FloatArray:
+        """Middle of the box around a face."""
+        points = mesh.points[mesh.nodes(face)]
+        return np.asarray((points.min(axis=0) + points.max(axis=0)) / 2.0, dtype=np.float64)
+
+    def _check_plane(self) -> None:
+        if not self.is_plane:
+            return
+        solid = [part for part in self.parts.values() if isinstance(part, SolidPart)]
+        if not all(part.plane for part in solid):
+            raise ModelError(f"{self.mesh.source}: plane and three-dimensional parts do not mix")
+        used = np.unique(np.concatenate([n.ravel() for n in self._part_cells()]))
+        z = self.mesh.points[used, 2]
+        if np.ptp(z) > 1e-9 * self.mesh.size:
+            raise ModelError(
+                f"{self.mesh.source}: a plane structure needs one z at all nodes, but z runs from"
+                f" {z.min():g} to {z.max():g}"
+            )
+        named = [(f"support at {s.point!r}", d) for s in self.supports for d in s.directions]
+        named += [(f"spring at {spring.point!r}", spring.direction) for spring in self.springs]
+        named += [(f"interface {name!r}", i.direction) for name, i in self.interfaces.items()]
+        for owner, direction in named:
+            if AXES[axis_index(direction)] not in IN_PLANE:
+                raise ModelError(
+                    f"{self.mesh.source}: {owner}: a plane structure has no direction"
+                    f" {direction!r}; it moves along x and y and turns about z"
+                )
+
+    def _part_cells(self) -> list[IntArray]:
+        cells = [lines for _, lines in self.beams.values()]
+        return cells + [nodes for _, kinds in self.solids.values() for nodes in kinds.values()]
+
+    def _check_names(self) -> None:
+        for support in self.supports:
+            self.mesh.nodes(support.point)
+        points = [item.point for item in self.point_masses]
+        points += [item.point for item in self.springs]
+        points += [item.point for item in self.hinges]
+        points += [item.point for item in self.interfaces.values()]
+        for name in points:
+            self.mesh.node(name)
+        for name in [item.face for item in self.couplings] + [f.face for f in self.foundations]:
+            self.mesh.nodes(name)
+        for hinge in self.hinges:
+            if hinge.part not in self.beams:
+                raise ModelError(
+                    f"{self.mesh.source}: hinge at {hinge.point!r}: {hinge.part!r} is no beam part"
+                )
+            if self.mesh.node(hinge.point) not in self.beams[hinge.part][1]:
+                raise ModelError(
+                    f"{self.mesh.source}: no line of part {hinge.part!r} meets the hinge at"
+                    f" {hinge.point!r}"
+                )
+
+
+def once(facets: IntArray, kind: str) -> IntArray:
+    """The facets (f, k) of a kind that occur once, told apart by their three lowest corners.
+
+    Examples
+    --------
+    >>> once(np.array([[0, 1], [2, 1], [1, 0]]), "line")
+    array([[2, 1]])
+    """
+    lowest = np.sort(facets[:, : len(KINDS[kind].corners)], axis=1)[:, :3]
+    _, key = np.unique(lowest[:, 0] * (facets.max() + 1) + lowest[:, 1], return_inverse=True)
+    key = key * (facets.max() + 1) + lowest[:, -1]
+    _, index, count = np.unique(key, return_index=True, return_counts=True)
+    return np.asarray(facets[np.sort(index[count == 1])], dtype=np.int64)
+
+
+def symmetry(point: str, normal: str) -> Support:
+    """The support of the nodes on a plane of symmetry with its normal along "x", "y" or "z".
+
+    It holds the translation along the normal and the rotations about the other two axes.
+
+    Examples
+    --------
+    >>> symmetry("middle", "x").directions
+    ('x', 'rotation_y', 'rotation_z')
+    """
+    if normal not in ("x", "y", "z"):
+        raise ModelError(f"symmetry at {point!r}: normal must be 'x', 'y' or 'z', not {normal!r}")
+    return Support(point, (normal, *(f"rotation_{axis}" for axis in "xyz" if axis != normal)))

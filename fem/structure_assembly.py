@@ -1,0 +1,374 @@
+"""Assembly of structures of solids and beams."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from fem.beams import cross_matrix, element_matrices, local_axes, to_nodes
+from fem.cells import KINDS, CellKind
+from fem.constraints import (
+    Constraints,
+    Numbering,
+    constrain,
+    facet_products,
+    number_blocks,
+)
+from fem.errors import ModelError
+from fem.locking import locking_warnings
+from fem.mesh import FloatArray, IntArray
+from fem.model import PointMass
+from fem.scatter import SparseArray, block_pattern, dense_scatter
+from fem.solids import (
+    checked_volumes,
+    gradients_and_volumes,
+    mass_matrices,
+    stiffness_matrices,
+)
+from fem.store import load_structure, save_structure
+from fem.structure import AXES, SolidPart, StructureModel, axis_index
+
+BATCH_BYTES = 1e8
+"""Size of the element matrices that are made at a time."""
+
+
+class LockingWarning(UserWarning):
+    """First-order solids on a part that is thin: they are too stiff in bending."""
+
+
+@dataclass(frozen=True, eq=False)
+class StructureComponent:
+    """An assembled structure: N free degrees of freedom, two matrices and named interfaces.
+
+    Parameters
+    ----------
+    stiffness, mass
+        K in N/m (N m/rad, ...) and M in kg (kg m², ...), sparse and symmetric, shape (N, N).
+    interfaces
+        A vector of shape (N,) by name: a load f at the interface is `vector * f` and its
+        displacement is `vector @ u`.
+    model
+        The structure that was assembled.
+    numbering, constraints
+        Which degrees of freedom there are, and how they follow from the free ones.
+    """
+
+    stiffness: SparseArray
+    mass: SparseArray
+    interfaces: Mapping[str, FloatArray]
+    model: StructureModel
+    numbering: Numbering
+    constraints: Constraints
+
+    @property
+    def free(self) -> IntArray:
+        """Indices of the free degrees of freedom among all, shape (N,)."""
+        return self.constraints.free
+
+    def shape(self, u: FloatArray) -> FloatArray:
+        """Translations and rotations (x, y, z) of every node of the mesh, shape (n, 6).
+
+        Parameters
+        ----------
+        u
+            Displacements of the free degrees of freedom, shape (N,).
+
+        Returns
+        -------
+        ndarray
+            Zero where supported, and for rotations of nodes that have none.
+        """
+        values = np.append(self.all_values(u), 0.0)
+        return np.asarray(values[self.numbering.dofs(np.arange(len(self.model.mesh.points)))])
+
+    def element_shape(self, u: FloatArray, part: str) -> FloatArray:
+        """Six displacements at both ends of every line of a beam part, hinges apart, (e, 2, 6)."""
+        return np.asarray(
+            self.all_values(u)[beam_dofs(self.model, self.numbering, part)].reshape(-1, 2, 6)
+        )
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the structure to an .npz file; the matrices are assembled again by `load`."""
+        save_structure(self.model, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> StructureComponent:
+        """Read and assemble what `save` wrote; a `ModelError` says what is wrong."""
+        return assemble_structure(load_structure(path))
+
+    def all_values(self, u: FloatArray) -> FloatArray:
+        """All degrees of freedom, also held and coupled ones, from the free ones (N,)."""
+        u = np.asarray(u, dtype=np.float64)
+        if u.shape != self.free.shape:
+            raise ModelError(
+                f"{self.model.mesh.source}: a displacement of the component has shape"
+                f" {self.free.shape}, not {u.shape}"
+            )
+        return np.asarray(self.constraints.transformation @ u, dtype=np.float64)
+
+
+def assemble_structure(model: StructureModel) -> StructureComponent:
+    """Assemble stiffness and consistent mass of a structure; `fem.assemble` calls it.
+
+    Raises
+    ------
+    ModelError
+        If the supports leave nothing free, a cell is flat or folded, or a support, mass, spring
+        or interface is where there is nothing to hold, load or move.
+
+    Warns
+    -----
+    LockingWarning
+        If a part of first-order cells is so thin that it is much too stiff in bending.
+    """
+    for text in locking_warnings(model):
+        warnings.warn(text, LockingWarning, stacklevel=3)
+    numbering = number_blocks(model)
+    constraints = constrain(model, numbering)
+    stiffness, mass = solid_matrices(model, numbering)
+    beam_stiffness, beam_mass = attached_matrices(model, numbering)
+    K = constraints.reduced(_sum(stiffness, beam_stiffness))
+    del stiffness
+    M = constraints.reduced(_sum(mass, beam_mass))
+    _check_nothing_empty(K, M, model, numbering, constraints)
+    interfaces = _interface_vectors(model, numbering, constraints)
+    return StructureComponent(K, M, interfaces, model, numbering, constraints)
+
+
+def _check_nothing_empty(
+    K: SparseArray,
+    M: SparseArray,
+    model: StructureModel,
+    numbering: Numbering,
+    constraints: Constraints,
+) -> None:
+    """Refuse a direction with neither stiffness nor mass, which no solver could bear."""
+    empty = np.flatnonzero((K.diagonal() == 0.0) & (M.diagonal() == 0.0))
+    if not len(empty):
+        return
+    dofs = numbering.dofs(np.arange(len(model.mesh.points)))
+    node, axis = np.argwhere(dofs == constraints.free[empty[0]])[0]
+    name = next((n for n, at in model.mesh.point_sets.items() if list(at) == [node]), None)
+    what = f"node {node}" if name is None else f"point {name!r}"
+    raise ModelError(
+        f"{model.mesh.source}: nothing is joined to the direction {AXES[axis]!r} of {what};"
+        " support it or couple it in all directions"
+    )
+
+
+def _sum(first: SparseArray, second: SparseArray) -> SparseArray:
+    if second.nnz == 0:
+        return first
+    return sparse.csr_array(first + second) if first.nnz else second
+
+
+def solid_matrices(model: StructureModel, numbering: Numbering) -> tuple[SparseArray, SparseArray]:
+    """Stiffness and mass of all solids, for all degrees of freedom."""
+    size = 3 * numbering.count
+    pieces = [
+        (name, part, KINDS[kind], nodes)
+        for name, (part, kinds) in model.solids.items()
+        for kind, nodes in kinds.items()
+    ]
+    if not pieces:
+        return sparse.csr_array((size, size)), sparse.csr_array((size, size))
+    pattern = block_pattern([numbering.translation[p[3]] for p in pieces], numbering.count)
+    stiffness = np.zeros((3, 3, len(pattern.indices)))
+    mass = np.zeros(len(pattern.indices))
+    for (name, part, kind, nodes), places in zip(pieces, pattern.places, strict=True):
+        what = f"{model.mesh.source}: part {name!r}: {kind.name}"
+        for batch in _batches(len(nodes), kind):
+            K, M = cell_matrices(part, kind, model.mesh.points[nodes[batch]], what, batch.start)
+            at = places[batch].ravel()
+            for i, j in np.ndindex(kind.dimension, kind.dimension):
+                np.add.at(stiffness[i, j], at, K[:, :, i, :, j].ravel())
+            np.add.at(mass, at, M.ravel())
+    return pattern.matrix(stiffness), pattern.same_in_all_directions(mass)
+
+
+def _batches(count: int, kind: CellKind) -> Iterator[slice]:
+    values = (kind.node_count * kind.dimension) ** 2 + 9 * len(kind.quadrature[1]) * kind.node_count
+    step = max(int(BATCH_BYTES / (8 * values)), 1)
+    for first in range(0, count, step):
+        yield slice(first, min(first + step, count))
+
+
+def cell_matrices(
+    part: SolidPart, kind: CellKind, coordinates: FloatArray, what: str, first: int = 0
+) -> tuple[FloatArray, FloatArray]:
+    """Stiffness (e, b, d, b, d) and mass for one direction (e, b, b) of cells of one kind.
+
+    Examples
+    --------
+    >>> from fem.model import Material
+    >>> part = SolidPart(Material(1.0, 1.0, 0.0))
+    >>> K, M = cell_matrices(part, KINDS["hexahedron"], KINDS["hexahedron"].nodes[None], "cube")
+    >>> K.shape, round(float(M.sum()), 12)
+    ((1, 8, 3, 8, 3), 1.0)
+    """
+    places, weights = kind.quadrature
+    gradients, volumes = gradients_and_volumes(kind, coordinates[..., : kind.dimension], places)
+    weighted = checked_volumes(volumes, what, first) * weights
+    if part.thickness is not None:
+        weighted = weighted * part.thickness
+    return (
+        stiffness_matrices(gradients, weighted, part.lame),
+        mass_matrices(kind, weighted, part.material.density),
+    )
+
+
+def attached_matrices(
+    model: StructureModel, numbering: Numbering
+) -> tuple[SparseArray, SparseArray]:
+    """Stiffness and mass of beams, springs, foundations and lumped masses."""
+    size = 3 * numbering.count
+    stiffness, mass = sparse.csr_array((size, size)), sparse.csr_array((size, size))
+    for name, (part, lines) in model.beams.items():
+        points = model.mesh.points
+        spans = points[lines[:, 1]] - points[lines[:, 0]]
+        K, M = element_matrices(part, spans, f"{model.mesh.source}: part {name!r}")
+        dofs = beam_dofs(model, numbering, name)
+        stiffness = _sum(stiffness, dense_scatter(K, dofs, size))
+        mass = _sum(mass, dense_scatter(M, dofs, size))
+    for matrices, dofs in (*_foundations(model, numbering), *_springs(model, numbering)):
+        stiffness = _sum(stiffness, dense_scatter(matrices, dofs, size))
+    for lump in model.point_masses:
+        matrix, dofs = _lumped(model, numbering, lump)
+        mass = _sum(mass, dense_scatter(matrix, dofs, size))
+    return stiffness, mass
+
+
+def beam_dofs(model: StructureModel, numbering: Numbering, name: str) -> IntArray:
+    """Degrees of freedom (e, 12) of the lines of a beam part; hinges have their own rotations."""
+    lines = model.beams[name][1]
+    dofs = numbering.dofs(lines)
+    for hinge, block in zip(model.hinges, numbering.hinged, strict=True):
+        if hinge.part == name:
+            dofs[lines == model.mesh.node(hinge.point), 3:] = 3 * block + np.arange(3)
+    return np.asarray(dofs.reshape(-1, 12), dtype=np.int64)
+
+
+def point_dof(model: StructureModel, numbering: Numbering, point: str, direction: str) -> int:
+    """The degree of freedom of a named point, or a ModelError where it has none."""
+    dof = int(numbering.dofs(np.array([model.mesh.node(point)]))[0, axis_index(direction)])
+    if dof < 0:
+        moved = "does not turn" if axis_index(direction) > 2 else "is on no part of the model"
+        raise ModelError(
+            f"{model.mesh.source}: {point!r} has no direction {direction!r}: it {moved}; couple a"
+            " face to it"
+        )
+    return dof
+
+
+def _springs(model: StructureModel, numbering: Numbering) -> Iterator[tuple[FloatArray, IntArray]]:
+    for spring in model.springs:
+        dof = point_dof(model, numbering, spring.point, spring.direction)
+        yield np.array([[[spring.stiffness]]]), np.array([[dof]])
+
+
+def _lumped(
+    model: StructureModel, numbering: Numbering, lump: PointMass
+) -> tuple[FloatArray, IntArray]:
+    """Mass matrix of a rigid body at a point, with its centre at the offset, (1, k, k)."""
+    node = model.mesh.node(lump.point)
+    inertia = np.broadcast_to(np.asarray(lump.rotary_inertia, dtype=np.float64), (3,))
+    if not inertia.any() and not any(lump.offset):
+        directions = ("x", "y") if model.is_plane else ("x", "y", "z")
+        dofs = [point_dof(model, numbering, lump.point, name) for name in directions]
+        return lump.mass * np.eye(len(dofs))[None], np.array([dofs])
+    point_dof(model, numbering, lump.point, "rotation_z")
+    # the centre moves by u + r x c = u - [c]x r
+    to_centre = np.hstack([np.eye(3), -cross_matrix(np.asarray(lump.offset))])
+    M = lump.mass * to_centre.T @ to_centre
+    M[3:, 3:] += np.diag(inertia)
+    return M[None], numbering.dofs(np.array([node]))
+
+
+def _foundations(
+    model: StructureModel, numbering: Numbering
+) -> Iterator[tuple[FloatArray, IntArray]]:
+    for foundation in model.foundations:
+        found = [
+            *_facet_foundation(model, numbering, foundation.face, foundation.stiffness),
+            *_beam_foundation(model, numbering, foundation.face, foundation.stiffness),
+        ]
+        if not found:
+            raise ModelError(
+                f"{model.mesh.source}: foundation of {foundation.face!r}: there is no outer face,"
+                " edge or beam whose nodes are all in it"
+            )
+        yield from found
+
+
+def _facet_foundation(
+    model: StructureModel, numbering: Numbering, face: str, stiffness: Sequence[float]
+) -> Iterator[tuple[FloatArray, IntArray]]:
+    for kind, cells in model.facets_on(face).items():
+        products = facet_products(kind, model.mesh.points[cells])
+        for axis in range(2 if model.is_plane else 3):
+            if stiffness[axis]:
+                yield stiffness[axis] * products, 3 * numbering.translation[cells] + axis
+
+
+def _beam_foundation(
+    model: StructureModel, numbering: Numbering, face: str, stiffness: Sequence[float]
+) -> Iterator[tuple[FloatArray, IntArray]]:
+    inside = np.zeros(len(model.mesh.points), dtype=np.bool_)
+    inside[model.mesh.nodes(face)] = True
+    for name, (part, lines) in model.beams.items():
+        on = inside[lines].all(axis=1)
+        if on.any():
+            ends = model.mesh.points[lines[on]]
+            spans = ends[:, 1] - ends[:, 0]
+            what = f"{model.mesh.source}: part {name!r}"
+            axes = local_axes(part, spans, what)
+            shapes = beam_shapes(np.linalg.norm(spans, axis=1))
+            # displacement of the axis in x, y, z: (e, q, 3, 12)
+            N = np.einsum("eji,eqjk,ekl->eqil", axes, shapes, to_nodes(part, axes), optimize=True)
+            weights = BEAM_WEIGHTS[None, :] * np.linalg.norm(spans, axis=1)[:, None]
+            K = np.einsum("eq,eqia,i,eqib->eab", weights, N, stiffness, N, optimize=True)
+            yield K, beam_dofs(model, numbering, name)[on]
+
+
+BEAM_PLACES, BEAM_WEIGHTS = (
+    (np.polynomial.legendre.leggauss(4)[0] + 1.0) / 2.0,
+    np.polynomial.legendre.leggauss(4)[1] / 2.0,
+)
+
+
+def beam_shapes(lengths: FloatArray) -> FloatArray:
+    """Displacement (u, v, w) at Gauss's four places from the twelve local numbers, (e, 4, 3, 12).
+
+    Hermite's cubics, also for Timoshenko beams, whose own differ by their shear strain.
+    """
+    s = BEAM_PLACES
+    N = np.zeros((len(lengths), len(s), 3, 12))
+    N[:, :, 0, 0], N[:, :, 0, 6] = 1 - s, s
+    cubic = (1 - 3 * s**2 + 2 * s**3, s - 2 * s**2 + s**3, 3 * s**2 - 2 * s**3, s**3 - s**2)
+    L = lengths[:, None]
+    for row, dofs, sign in ((1, (1, 5, 7, 11), 1.0), (2, (2, 4, 8, 10), -1.0)):
+        N[:, :, row, dofs[0]], N[:, :, row, dofs[2]] = cubic[0], cubic[2]
+        N[:, :, row, dofs[1]], N[:, :, row, dofs[3]] = sign * L * cubic[1], sign * L * cubic[3]
+    return N
+
+
+def _interface_vectors(
+    model: StructureModel, numbering: Numbering, constraints: Constraints
+) -> dict[str, FloatArray]:
+    vectors = {}
+    for name, interface in model.interfaces.items():
+        dof = point_dof(model, numbering, interface.point, interface.direction)
+        vector = constraints.transformation[[dof]].toarray().ravel()
+        if not vector.any():
+            raise ModelError(
+                f"{model.mesh.source}: interface {name!r} is on direction {interface.direction!r}"
+                f" of point {interface.point!r}, which a support holds"
+            )
+        vector.setflags(write=False)
+        vectors[name] = vector
+    return vectors

@@ -1,0 +1,280 @@
+"""Stable manifolds of saddles, which separate basins, and the saddles on the edge between two."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from nldyn.basin_maps import UNDECIDED, Basins, Plane, Target, settle, target_of
+from nldyn.branch import same_orbit, stroboscopic
+from nldyn.errors import SystemModelError, check_whole, is_finite, shown
+from nldyn.flow import FlowMap
+from nldyn.linear import Real
+from nldyn.orbit import Orbit, near_returns
+from nldyn.search import orbit_near
+
+NEWTON_STEPS = 12
+FIRST = 1e-4  # how far the first, straight piece reaches, as a share of the plane
+HALVINGS = 30
+LINGER = 64  # periods for which a motion from the edge is followed
+MARGIN = 1.0  # how far beyond the plane a manifold is followed, in units of its sides
+
+
+def stable_manifold(
+    orbit: Orbit, plane: Plane, *, resolution: float = 0.005, max_points: int = 20000
+) -> list[Real]:
+    """Stable manifold of a saddle of a system with one mode, in a plane of initial states.
+
+    A short piece along the stable eigenvector is taken back in time, again and again: its inverse
+    image under the map over the orbit's period is longer by the inverse of the stable multiplier,
+    and errors across the manifold shrink. Inverse images come from Newton's method with the exact
+    Jacobian, each from the one before; where they lie too far apart, points are put between.
+
+    Parameters
+    ----------
+    orbit : Orbit
+        With one multiplier outside the unit circle and one inside.
+    plane : Plane
+        Displacement and velocity, such as `Plane.at_interface` gives.
+    resolution : float
+        Largest distance of neighbouring points, in units of the sides of the plane.
+    max_points : int
+        Where to stop.
+
+    Returns
+    -------
+    list of (k, 2) arrays
+        Coordinates in the plane of the connected pieces, on both sides of each stroboscopic state
+        of the orbit. A piece ends where it leaves the plane by more than a side.
+
+    Raises
+    ------
+    SystemModelError
+        If the system has more than one mode, or the orbit is no saddle.
+
+    Examples
+    --------
+    >>> from nldyn import Plane, Stop, System, Unbalance, solve_orbit, stable_manifold
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> saddle = solve_orbit(system, frequency_hz=50.0)
+    >>> plane = Plane.at_interface(system, (-2e-4, 0.0), (-0.05, 0.05))
+    >>> len(stable_manifold(saddle, plane, max_points=100))
+    2
+    """
+    flow = orbit.problem.flow
+    if flow.system.size != 1:
+        raise SystemModelError(
+            f"stable_manifold needs one mode, whose saddles have a curve as stable manifold; the "
+            f"system has {flow.system.size} (basin_edge finds where it cuts a plane)"
+        )
+    if not (is_finite(resolution) and 0.0 < resolution < 1.0):
+        raise SystemModelError(f"resolution must lie between 0 and 1, got {shown(resolution)}")
+    check_whole("max_points", max_points, 2)
+    outside = int(np.sum(np.abs(orbit.multipliers) > 1.0))
+    if outside != 1:
+        raise SystemModelError(
+            f"the orbit at {orbit.frequency_hz:g} Hz is no saddle: {outside} of its two "
+            "multipliers lie outside the unit circle"
+        )
+    count = orbit.period if min(orbit.multipliers.real) > 0.0 else 2 * orbit.period
+    pieces = []
+    for state in stroboscopic(orbit):
+        inverse = _Inverse(flow, orbit.omega, count, plane)
+        middle = inverse.to_plane(state)
+        values, vectors = np.linalg.eig(inverse.jacobian(middle))
+        stable = int(np.argmin(np.abs(values)))
+        along = np.real(vectors[:, stable])
+        along *= FIRST / float(np.linalg.norm(along))
+        shrink = abs(float(np.real(values[stable])))
+        for side in (1.0, -1.0):
+            piece = [middle + side * along * shrink**x for x in np.linspace(1.0, 0.0, 9)]
+            budget = max_points // (2 * orbit.period)
+            pieces.append(_grown(inverse, np.vstack([middle, *piece]), resolution, budget))
+    return [inverse.to_user(piece) for piece in pieces]
+
+
+class _Inverse:
+    """The map over some periods and its inverse, in coordinates from 0 to 1 within a plane."""
+
+    def __init__(self, flow: FlowMap, omega: float, periods: int, plane: Plane) -> None:
+        self.flow, self.omega, self.plane = flow, omega, plane
+        self.phases = np.linspace(0.0, 2.0 * np.pi * periods, periods + 1)
+        (x0, x1), (y0, y1) = plane.x_range, plane.y_range
+        self.low = np.array([x0, y0])
+        self.sides = np.array([x1 - x0, y1 - y0])
+        modal = np.column_stack([plane.x * self.sides[0], plane.y * self.sides[1]])
+        self.to_z = flow.to_state(modal.T).T
+        self.offset = flow.to_state(plane.origin + plane.x * x0 + plane.y * y0)
+
+    def to_plane(self, state: Real) -> Real:
+        return np.asarray(np.linalg.solve(self.to_z, state - self.offset))
+
+    def to_user(self, points: Real) -> Real:
+        return np.asarray(self.low + points * self.sides)
+
+    def image(self, point: Real) -> tuple[Real, Real] | None:
+        """Image of a point and the Jacobian there; None where the flow map fails."""
+        state = self.offset + self.to_z @ point
+        found = self.flow.shoot(state[None], self.phases, self.omega, chained=True)
+        if found.failure:
+            return None
+        jacobian = np.linalg.solve(self.to_z, found.monodromy @ self.to_z)
+        return self.to_plane(found.ends[-1]), np.asarray(jacobian, dtype=float)
+
+    def jacobian(self, point: Real) -> Real:
+        found = self.image(point)
+        assert found is not None
+        return found[1]
+
+    def __call__(self, point: Real, guess: Real) -> Real | None:
+        """The point that is mapped to a given one, by Newton's method; None if none is found."""
+        here = guess
+        for _ in range(NEWTON_STEPS):
+            found = self.image(here)
+            if found is None:
+                return None
+            step = np.linalg.solve(found[1], point - found[0])
+            size = float(np.linalg.norm(step))
+            if not math.isfinite(size):
+                return None
+            here = here + step * min(1.0, 0.2 / size if size > 0.0 else 1.0)
+            if size < 1e-10:
+                return here
+        return None
+
+
+def _grown(inverse: _Inverse, curve: Real, resolution: float, budget: int) -> Real:
+    """Take the last part of a curve back in time, and append it, until the points are used up.
+
+    `curve` begins at the saddle's state; its points after that cover one fundamental piece.
+    """
+    points = list(curve)
+    parent = 1  # index of the point whose inverse image comes next
+    guess = points[-1]
+    while len(points) < budget and parent + 1 < len(points):
+        before, after = points[parent], points[parent + 1]
+        start, share = points[-1], 0.0
+        while share < 1.0 and len(points) < budget:
+            step = 1.0 - share
+            for _ in range(HALVINGS):
+                target = before + (share + step) * (after - before)
+                found = inverse(target, guess)
+                if found is not None and np.linalg.norm(found - start) <= resolution:
+                    break
+                step *= 0.5
+            else:
+                return np.array(points)
+            share += step
+            start = guess = found
+            points.append(found)
+            if np.any(found < -MARGIN) or np.any(found > 1.0 + MARGIN):
+                return np.array(points)
+        parent += 1
+    return np.array(points)
+
+
+def basin_edge(
+    found: Basins, count: int = 200, *, seed: int = 20, width: float = 1e-12
+) -> tuple[Real, list[Orbit]]:
+    """Points on the boundary between basins, by bisection, and the saddles to which they lead.
+
+    Between two neighbouring cells with different attractors lies a state that goes to neither: a
+    point of the stable manifold of a saddle. Bisection finds it, and a motion from there lingers
+    near the saddle, where Newton's method solves for it.
+
+    Parameters
+    ----------
+    found : Basins
+        What `nldyn.basins` gave, of a system with any number of modes.
+    count : int
+        Number of points, picked at random from the pairs of neighbouring cells.
+    seed : int
+        Of the choice.
+    width : float
+        Where bisection ends, in units of the distance of two cells.
+
+    Returns
+    -------
+    points : (k, 2)
+        Coordinates in the plane.
+    saddles : list of Orbit
+        Different unstable orbits met, if the motion lingered long enough to solve for one.
+
+    Raises
+    ------
+    SystemModelError
+        If there are no two basins.
+    """
+    check_whole("basin_edge: count", count, 1)
+    attractors = found.attractors
+    pairs = _neighbours(found)
+    if not len(pairs):
+        raise SystemModelError("basin_edge: the plane shows no two basins")
+    flow = attractors[0].flow
+    omega = 2.0 * math.pi * found.frequency_hz
+    targets = [target_of(attractor) for attractor in attractors]
+    rng = np.random.default_rng(seed)
+    picked = pairs[rng.choice(len(pairs), min(count, len(pairs)), replace=False)]
+    modal = found.plane.states((found.labels.shape[0], found.labels.shape[1]))
+    observe = attractors[0].flow.system.interfaces[0]
+    longest = int(found.periods.max()) + 16
+    points: list[Real] = []
+    saddles: list[Orbit] = []
+    for (i, j), (k, m) in picked:
+        ends = flow.to_state(np.array([modal[i, j], modal[k, m]]))
+        low, high = _bisected(flow, omega, targets, longest, ends, int(found.labels[i, j]), width)
+        middle = flow.to_modal(0.5 * (low + high))
+        points.append(found.plane.coordinates(middle[None])[0][0])
+        orbit = _lingering(flow, omega, targets, low, observe)
+        if orbit is not None and not any(same_orbit(orbit, other) for other in saddles):
+            saddles.append(orbit)
+    return np.array(points), saddles
+
+
+def _neighbours(found: Basins) -> np.ndarray:
+    """Pairs (k, 2, 2) of neighbouring cells that lead to different attractors."""
+    labels = found.labels
+    pairs = []
+    for di, dj in ((0, 1), (1, 0)):
+        a = labels[: labels.shape[0] - di, : labels.shape[1] - dj]
+        b = labels[di:, dj:]
+        rows, columns = np.nonzero((a != b) & (a != UNDECIDED) & (b != UNDECIDED))
+        first = np.column_stack([rows, columns])
+        pairs.append(np.stack([first, first + np.array([di, dj])], axis=1))
+    return np.concatenate(pairs)
+
+
+def _bisected(
+    flow: FlowMap, omega: float, targets: list[Target], longest: int, ends: Real, label: int,
+    width: float,
+) -> tuple[Real, Real]:  # fmt: skip
+    """Two states z as near to each other as wanted of which the first only leads to a target."""
+    low, high = ends
+    for _ in range(math.ceil(-math.log2(width))):
+        middle = 0.5 * (low + high)
+        if np.array_equal(middle, low) or np.array_equal(middle, high):
+            break
+        reached = settle(flow, omega, targets, longest, middle[None]).labels[0]
+        low, high = (middle, high) if reached == label else (low, middle)
+    return low, high
+
+
+def _lingering(
+    flow: FlowMap, omega: float, targets: list[Target], state: Real, observe: str
+) -> Orbit | None:
+    """Unstable orbit near which a motion from the edge lingers before it reaches an attractor."""
+    phases = np.linspace(0.0, 2.0 * np.pi * LINGER, LINGER + 1)
+    run = flow.shoot(state[None], phases, omega, sensitivities=False, chained=True)
+    if run.failure:
+        return None
+    reached = np.any([target.reached(run.ends) != UNDECIDED for target in targets], axis=0)
+    before = run.ends[: int(np.argmax(reached)) if reached.any() else LINGER]
+    for period in (1, 2, 3, 4):
+        for start in near_returns(before, period, 3):
+            orbit = orbit_near(flow, before[start], period, omega, observe)
+            if orbit is not None and not orbit.stable:
+                return orbit
+    return None

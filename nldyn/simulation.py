@@ -1,0 +1,442 @@
+"""Time simulation with exact events: transients, and sweeps of the excitation frequency."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from nldyn.errors import SystemModelError, check_frequency, check_whole, is_finite, shown
+from nldyn.flow import FlowMap, Trajectory
+from nldyn.linear import Real
+from nldyn.orbit import (
+    ConvergenceError,
+    History,
+    Orbit,
+    check_bounded,
+    check_observe,
+    history_of,
+)
+from nldyn.system import System, numbers
+
+BLOCK = 64  # periods recorded in one call
+MOST_STEPS = 10**7  # of a sweep
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A simulated motion: exact at any instant, not a table of samples.
+
+    It consists of stretches, in each of which the frequency is constant.
+
+    Parameters
+    ----------
+    flow : FlowMap
+        What made it.
+    stretches : tuple of Trajectory
+        One after the other.
+    begins : (k + 1,)
+        Times in s at which the k stretches begin, and at which the last one ends.
+    failure : str
+        Empty, or why the simulation ended early.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance, simulate
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> motion = simulate(system, frequency_hz=20.0, periods=200)
+    >>> motion.end_time
+    10.0
+    """
+
+    flow: FlowMap
+    stretches: tuple[Trajectory, ...]
+    begins: Real
+    failure: str = ""
+
+    @property
+    def system(self) -> System:
+        """The system."""
+        return self.flow.system
+
+    @property
+    def start_time(self) -> float:
+        """Time in s at which the recorded motion begins."""
+        return float(self.begins[0])
+
+    @property
+    def end_time(self) -> float:
+        """Time in s at which it ends."""
+        return float(self.begins[-1])
+
+    @property
+    def duration(self) -> float:
+        """Length of the recorded motion in s."""
+        return self.end_time - self.start_time
+
+    def frequency_hz(self, time: Real | float) -> Real:
+        """Excitation frequency in Hz at times in s, that of the stretch."""
+        hz = np.array([stretch.omega for stretch in self.stretches]) / (2.0 * np.pi)
+        return np.asarray(hz[self._stretch_at(np.asarray(time, dtype=float))])
+
+    def states(self, time: Real) -> Real:
+        """Modal displacements and velocities (k, 2n) at times (k,) in s within the motion.
+
+        Raises
+        ------
+        SystemModelError
+            For a time before the beginning or after the end.
+        """
+        time = np.asarray(time, dtype=float)
+        slack = 1e-9 * max(abs(self.end_time), 1e-300)
+        if time.size and (
+            time.min() < self.start_time - slack or time.max() > self.end_time + slack
+        ):
+            raise SystemModelError(
+                f"time must lie between {self.start_time:g} and {self.end_time:g} s, "
+                f"got {time.min():g} to {time.max():g}"
+            )
+        order = np.argsort(time, kind="stable")
+        where = self._stretch_at(time[order])
+        states = np.empty((time.size, 2 * self.system.size))
+        for k in np.unique(where):
+            within = order[where == k]
+            stretch = self.stretches[k]
+            phases = stretch.record.phase[0] + stretch.omega * (time[within] - self.begins[k])
+            states[within] = stretch.states(phases)
+        return self.flow.to_modal(states)
+
+    def _stretch_at(self, time: Real) -> np.ndarray:
+        last = len(self.stretches) - 1
+        return np.clip(np.searchsorted(self.begins, time, side="right") - 1, 0, last)
+
+    @property
+    def end(self) -> Real:
+        """Modal displacements and velocities (2n,) at the end: where to go on."""
+        return np.asarray(self.flow.to_modal(end_state(self.stretches[-1])))
+
+    @property
+    def end_phase_deg(self) -> float:
+        """Forcing phase at the end in degrees, from 0 to 360."""
+        return math.degrees(end_phase(self.stretches[-1])) % 360.0
+
+    def history(self, samples: int = 1000) -> History:
+        """Sample the motion: displacements, penetrations and contact forces.
+
+        Parameters
+        ----------
+        samples : int
+            Number of equal time steps; the result has one sample more. A contact shorter than a
+            step may fall between two samples; `nldyn.impacts` misses none.
+
+        Raises
+        ------
+        SystemModelError
+            If `samples` is not a whole number of at least 1.
+        """
+        check_whole("history: samples", samples, 1)
+        time = np.linspace(self.start_time, self.end_time, samples + 1)
+        return history_of(self.system, time, self.states(time))
+
+    def extremes(self, interface: str | None = None) -> tuple[Real, Real]:
+        """Times (k,) in s and values (k,) in m of the local extremes of a displacement.
+
+        Parameters
+        ----------
+        interface : str, optional
+            The first unless given.
+        """
+        system = self.system
+        name = check_observe(system, interface)
+        output = len(system.stops) + system.interfaces.index(name)
+        times, values = [np.empty(0)], [np.empty(0)]
+        for begin, stretch in zip(self.begins, self.stretches, strict=False):
+            found = stretch.extremes(output)
+            first = stretch.record.phase[0]
+            found = found[found[:, 0] > first]  # without the one that closes a periodic motion
+            times.append(begin + (found[:, 0] - first) / stretch.omega)
+            values.append(found[:, 1])
+        return np.concatenate(times), np.concatenate(values)
+
+    def period_peaks(self, interface: str | None = None) -> tuple[Real, Real]:
+        """Frequencies (k,) in Hz and largest absolute displacements (k,) in m of each period.
+
+        Only whole excitation periods count, from the beginning on.
+        """
+        times, values = self.extremes(interface)
+        ends, hz = self._periods
+        index = np.searchsorted(ends, times, side="right") - 1
+        peaks = np.zeros(hz.size)
+        inside = (index >= 0) & (index < hz.size)
+        np.maximum.at(peaks, index[inside], np.abs(values[inside]))
+        return hz, peaks
+
+    @cached_property
+    def _periods(self) -> tuple[Real, Real]:
+        """Times (k + 1,) at which whole excitation periods end, and their frequencies (k,)."""
+        turns = [0.0]
+        for stretch in self.stretches:
+            turns.append(turns[-1] + end_phase(stretch) - float(stretch.record.phase[0]))
+        total = math.floor(turns[-1] / (2.0 * math.pi) + 1e-6)
+        ends = np.interp(2.0 * np.pi * np.arange(total + 1), turns, self.begins)
+        return ends, 1.0 / np.diff(ends)
+
+    @property
+    def strobe(self) -> Real:
+        """Modal displacements and velocities (k + 1, 2n) after each whole excitation period."""
+        ends, _ = self._periods
+        return self.states(np.clip(ends, self.start_time, self.end_time))
+
+
+def end_phase(stretch: Trajectory) -> float:
+    """Forcing phase at which a recorded motion ends."""
+    record = stretch.record
+    return float(record.phase[-1] + stretch.omega * record.duration[-1])
+
+
+def end_state(stretch: Trajectory) -> Real:
+    """State z (2n,) at which a recorded motion ends."""
+    return np.asarray(stretch.states(np.array([end_phase(stretch)]))[0])
+
+
+def motion_of(orbit: Orbit, turns: int = 1) -> Motion:
+    """A periodic orbit as a motion, run through several times.
+
+    Examples
+    --------
+    >>> from nldyn import System, Unbalance, solve_orbit
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> round(motion_of(solve_orbit(system, frequency_hz=20.0), 3).duration, 12)
+    0.15
+    """
+    begins = np.asarray(orbit.duration * np.arange(turns + 1), dtype=float)
+    return Motion(orbit.problem.flow, (orbit.trajectory,) * turns, begins)
+
+
+def simulate(
+    system: System | FlowMap,
+    frequency_hz: float,
+    periods: int,
+    *,
+    start: Real | None = None,
+    transient: int = 0,
+) -> Motion:
+    """Simulate a motion at constant excitation frequency.
+
+    Flights are exact, contact phases resolved to the tolerance of the flow map; no contact is
+    passed over.
+
+    Parameters
+    ----------
+    system : System or FlowMap
+        What to simulate.
+    frequency_hz : float
+        Excitation frequency in Hz.
+    periods : int
+        Excitation periods to record.
+    start : (2n,) array, optional
+        Modal displacements and velocities at forcing phase zero; at rest unless given.
+    transient : int
+        Excitation periods before the recording.
+
+    Returns
+    -------
+    Motion
+        Its time counts from the start, transient included.
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense.
+    ConvergenceError
+        If the transient cannot be simulated. A recording that fails is kept up to there, with the
+        reason in `Motion.failure`.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> motion = simulate(system, frequency_hz=50.0, periods=10, transient=500)
+    >>> len(motion.strobe)
+    11
+    """
+    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    check_frequency("frequency_hz", frequency_hz)
+    check_whole("periods", periods, 1)
+    check_whole("transient", transient, 0)
+    omega = 2.0 * math.pi * frequency_hz
+    check_bounded(flow.system, omega)
+    state = starting_state(flow, start)
+    before, failure = transient_end(flow, state, omega, transient)
+    if before is None:
+        raise ConvergenceError(f"the transient at {frequency_hz:g} Hz failed: {failure}")
+    stretches = []
+    for trajectory in _blocks(flow, before, omega, periods):
+        stretches.append(trajectory)
+        failure = trajectory.failure
+        if failure:
+            break
+    turns = transient + np.minimum(BLOCK * np.arange(len(stretches) + 1.0), periods)
+    if failure:
+        lost = stretches[-1]
+        turns[-1] = turns[-2] + (end_phase(lost) - lost.record.phase[0]) / (2.0 * math.pi)
+    begins = np.asarray(turns / frequency_hz, dtype=float)
+    return Motion(flow, tuple(stretches), begins, failure)
+
+
+def starting_state(flow: FlowMap, start: Real | None) -> Real:
+    """State z (2n,) of a modal one that a user gave; rest for none."""
+    size = 2 * flow.system.size
+    if start is None:
+        return np.zeros(size)
+    modal = numbers("start", start)
+    if modal.shape != (size,):
+        raise SystemModelError(
+            f"start must have {size} entries, displacements and velocities of "
+            f"{flow.system.size} modes, got shape {modal.shape}"
+        )
+    return flow.to_state(modal)
+
+
+def transient_end(
+    flow: FlowMap, state: Real, omega: float, periods: int
+) -> tuple[Real | None, str]:
+    """State z after some periods from phase zero on, or None and why there is none."""
+    if periods == 0:
+        return state, ""
+    phases = np.linspace(0.0, 2.0 * np.pi * periods, periods + 1)
+    found = flow.shoot(state[None], phases, omega, sensitivities=False, chained=True)
+    return (None, found.failure) if found.failure else (found.ends[-1], "")
+
+
+def _blocks(flow: FlowMap, state: Real, omega: float, periods: int) -> Iterator[Trajectory]:
+    """Recorded motions of up to `BLOCK` periods, one after the other."""
+    while periods > 0:
+        count = min(periods, BLOCK)
+        phases = np.linspace(0.0, 2.0 * np.pi * count, count + 1)
+        trajectory = flow.trajectory(state[None], phases, omega, chained=True)
+        yield trajectory
+        state = end_state(trajectory)
+        periods -= count
+
+
+def sweep(
+    system: System | FlowMap,
+    range_hz: tuple[float, float],
+    rate_hz_per_s: float,
+    *,
+    start: Real | None = None,
+    steps_per_period: int = 4,
+) -> Motion:
+    """Simulate the run-up or run-down of a machine: the frequency changes at a constant rate.
+
+    The forcing phase goes as ``2π (f₀ t ± rate t²/2)``, and the excitation has the phasor of the
+    momentary frequency. Flights have a closed form at constant frequency only, so that the
+    frequency is constant over each step of the phase, at the value that gives the step its exact
+    duration: the phases at the ends of the steps are exact. The error against the true sweep goes
+    with the square of the step. What a rotor's angular acceleration itself adds to an unbalance
+    (``rate / (2π f²)`` of it) is not modelled.
+
+    Parameters
+    ----------
+    system : System or FlowMap
+        What to simulate.
+    range_hz : (float, float)
+        First and last frequency in Hz; a descending pair runs down.
+    rate_hz_per_s : float
+        Size of the rate of change in Hz/s.
+    start : (2n,) array, optional
+        Modal displacements and velocities at forcing phase zero; at rest unless given.
+    steps_per_period : int
+        Steps of constant frequency in an excitation period.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense, or a sweep of more than ten million steps.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> run_up = sweep(system, (22.0, 24.0), rate_hz_per_s=1.0)
+    >>> hz, peaks = run_up.period_peaks()
+    >>> len(hz)
+    46
+    """
+    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    first, last = _sweep_range(range_hz)
+    if not (is_finite(rate_hz_per_s) and rate_hz_per_s > 0.0):
+        raise SystemModelError(
+            f"rate_hz_per_s must be positive and finite, got {shown(rate_hz_per_s)}"
+        )
+    check_whole("steps_per_period", steps_per_period, 1)
+    state = starting_state(flow, start)
+    phases, times = chirp_steps(first, last, rate_hz_per_s, steps_per_period)
+    stretches = []
+    failure = ""
+    for k in range(len(times) - 1):
+        omega = (phases[k + 1] - phases[k]) / (times[k + 1] - times[k])
+        turn = 2.0 * math.pi * math.floor(phases[k] / (2.0 * math.pi))
+        step = np.array([phases[k] - turn, phases[k + 1] - turn])
+        trajectory = flow.trajectory(state[None], step, float(omega))
+        stretches.append(trajectory)
+        failure = trajectory.failure
+        if failure:
+            break
+        state = end_state(trajectory)
+    begins = np.array(times[: len(stretches) + 1])
+    if failure:
+        lost = stretches[-1]
+        begins[-1] = begins[-2] + (end_phase(lost) - lost.record.phase[0]) / lost.omega
+    return Motion(flow, tuple(stretches), begins, failure)
+
+
+def chirp_steps(first: float, last: float, rate: float, steps: int) -> tuple[Real, Real]:
+    """Phases and times (k + 1,) of a sweep from one frequency (Hz) to another, in equal phases.
+
+    Examples
+    --------
+    >>> phases, times = chirp_steps(10.0, 12.0, 1.0, 1)
+    >>> float(times[-1]), float(round(phases[-1] / (2.0 * np.pi), 9))
+    (2.0, 22.0)
+    """
+    slope = math.copysign(rate, last - first)
+    total = math.pi * (last**2 - first**2) / slope
+    count = math.ceil(total * steps / (2.0 * math.pi) - 1e-9)
+    if count > MOST_STEPS:
+        raise SystemModelError(
+            f"the sweep takes {count} steps of constant frequency, at most {MOST_STEPS} are "
+            "allowed: choose a higher rate or fewer steps_per_period"
+        )
+    phases = np.minimum(2.0 * np.pi / steps * np.arange(count + 1), total)
+    frequency = np.sqrt(first**2 + slope * phases / np.pi)
+    # f - f0 without cancellation
+    times = phases / (np.pi * (frequency + first))
+    return phases, times
+
+
+def _sweep_range(range_hz: tuple[float, float]) -> tuple[float, float]:
+    try:
+        first, last = range_hz
+    except (TypeError, ValueError):
+        raise SystemModelError(f"range_hz must be two frequencies, got {shown(range_hz)}") from None
+    check_frequency("range_hz: first", first)
+    check_frequency("range_hz: last", last)
+    if first == last:
+        raise SystemModelError(f"range_hz: the sweep begins and ends at {first:g} Hz")
+    return float(first), float(last)

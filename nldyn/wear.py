@@ -1,0 +1,237 @@
+"""Noise and wear: contact forces, impulses, impact power and power spectra of a motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+from nldyn.attractors import Attractor
+from nldyn.contacts import impacts, panel_table
+from nldyn.errors import SystemModelError, check_whole
+from nldyn.fourier import modal_row
+from nldyn.linear import Real
+from nldyn.orbit import Orbit
+from nldyn.simulation import Motion, motion_of
+
+UNITS = {
+    "frequency_hz": "Hz",
+    "attractor": "",
+    "stable": "1",
+    "periods": "1",
+    "peak_force": "N",
+    "rms_force": "N",
+    "impulse_rate": "N",
+    "impact_rate": "1/s",
+    "impact_power": "W",
+    "loss_power": "W",
+    "contact_share": "1",
+    "fastest_impact": "m/s",
+}
+
+
+@dataclass(frozen=True)
+class ContactMeasures:
+    """What a motion does to one stop.
+
+    Parameters
+    ----------
+    frequency_hz : float
+        Excitation frequency in Hz, the mean one of a sweep.
+    attractor : str
+        Such as ``period 2`` or ``chaotic``.
+    stable : bool
+        False for an unstable orbit, which a machine does not stay on.
+    periods : float
+        Excitation periods over which is averaged.
+    peak_force, rms_force : float
+        Largest force, and root of the mean of its square over all time, in N.
+    impulse_rate : float
+        Impulse per second: the mean force, in N.
+    impact_rate : float
+        Impacts that begin per second.
+    impact_power : float
+        Work done against the stop while the penetration grows, per second, in W: the energy that
+        impacts bring to the contact.
+    loss_power : float
+        Power that stays in the contact, in W; zero but for rounding without dissipation.
+    contact_share : float
+        Share of the time in contact.
+    fastest_impact : float
+        Largest speed of an impact in m/s.
+    """
+
+    frequency_hz: float
+    attractor: str
+    stable: bool
+    periods: float
+    peak_force: float
+    rms_force: float
+    impulse_rate: float
+    impact_rate: float
+    impact_power: float
+    loss_power: float
+    contact_share: float
+    fastest_impact: float
+
+
+def contact_measures(
+    source: Orbit | Motion | Attractor, *, stop: int = 0, periods: int = 256
+) -> ContactMeasures:
+    """Peak and r.m.s. contact force, impulse and impacts per second, and impact power.
+
+    Parameters
+    ----------
+    source : Orbit, Motion or Attractor
+        A periodic orbit counts over its period, a motion over all of its time.
+    stop : int
+        Index of the stop.
+    periods : int
+        Excitation periods simulated on an attractor that is not periodic.
+
+    Returns
+    -------
+    ContactMeasures
+
+    Raises
+    ------
+    SystemModelError
+        For a stop that the system does not have, or an attractor whose simulation failed.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance, contact_measures, solve_orbit
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> found = contact_measures(solve_orbit(system, frequency_hz=25.3))
+    >>> f"{found.peak_force:.1f} N, {found.impact_rate:.1f} impacts per second"
+    '119.4 N, 25.3 impacts per second'
+    """
+    if isinstance(source, Attractor):
+        if source.kind == "failed":
+            raise SystemModelError(f"the attractor's simulation failed: {source.failure}")
+        check_whole("contact_measures: periods", periods, 1)
+        name = source.name
+        source = source.orbit if source.orbit is not None else source.motion(periods)
+    elif isinstance(source, Orbit):
+        name = f"period {source.period}"
+    else:
+        name = "motion"
+    stable = not isinstance(source, Orbit) or source.stable
+    motion = motion_of(source) if isinstance(source, Orbit) else source
+    check_whole("stop", stop, 0, len(motion.system.stops) - 1)
+    table = panel_table(motion, stop)
+    listed = impacts(source)
+    speeds = listed.speed[listed.stop == stop]
+    time = motion.duration
+    lengths = zip(np.diff(motion.begins), motion.stretches, strict=True)
+    turns = float(sum(length * stretch.omega for length, stretch in lengths)) / (2.0 * math.pi)
+    return ContactMeasures(
+        turns / time,
+        name,
+        stable,
+        turns,
+        float(table.peak_force.max(initial=0.0)),
+        math.sqrt(max(float(table.square.sum()), 0.0) / time),
+        float(table.impulse.sum()) / time,
+        speeds.size / time,
+        float(table.work.sum()) / time,
+        float(table.loss.sum()) / time,
+        float(table.duration.sum()) / time,
+        float(speeds.max(initial=0.0)),
+    )
+
+
+def measures_table(
+    sources: Iterable[Orbit | Motion | Attractor], *, stop: int = 0, periods: int = 256
+) -> dict[str, NDArray[Any]]:
+    """Columns of `contact_measures`, one row for each source, ascending in frequency.
+
+    Parameters
+    ----------
+    sources : iterable
+        The orbits of a branch (``branch.points``), the attractors of a diagram by brute force
+        (``column.attractor for column in found.columns``), motions, or all of them.
+    stop, periods
+        As for `contact_measures`.
+
+    Returns
+    -------
+    dict of str to (k,) array
+        Units are in `nldyn.wear.UNITS`; ``pandas.DataFrame`` takes it as it is.
+    """
+    rows = [
+        asdict(contact_measures(source, stop=stop, periods=periods))
+        for source in sources
+        if not (isinstance(source, Attractor) and source.kind == "failed")
+    ]
+    rows.sort(key=lambda row: float(row["frequency_hz"]))
+    return {name: np.array([row[name] for row in rows]) for name in UNITS}
+
+
+def power_spectrum(
+    motion: Motion,
+    point: str | Real | None = None,
+    *,
+    samples_per_period: int = 64,
+    quantity: str = "displacement",
+) -> tuple[Real, Real]:
+    """Power spectral density of a motion that is not periodic, at an interface or any point.
+
+    By Welch's method with Hann windows of an eighth of the motion [Welch 1967]. Contact makes
+    content at high frequencies: what lies above half of the sampling frequency is folded down.
+
+    Parameters
+    ----------
+    motion : Motion
+        What `nldyn.simulate` gave, with a transient left out; at constant frequency.
+    point : str or (n,) array, optional
+        An interface, or the displacement of each mode at any point of the mesh: a row of
+        ``reduced.expand(numpy.eye(n))``. The first interface unless given.
+    samples_per_period : int
+        Samples in an excitation period.
+    quantity : {"displacement", "velocity"}
+        What of the point; the velocity of a surface is what it sounds by.
+
+    Returns
+    -------
+    frequency_hz : (k,)
+    density : (k,)
+        In m²/Hz or (m/s)²/Hz.
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense.
+
+    Examples
+    --------
+    >>> from nldyn import System, Unbalance, simulate
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> hz, density = power_spectrum(simulate(system, 20.0, periods=64, transient=1000))
+    >>> float(hz[np.argmax(density)])
+    20.0
+    """
+    check_whole("samples_per_period", samples_per_period, 4)
+    if quantity not in ("displacement", "velocity"):
+        raise SystemModelError(f"quantity must be 'displacement' or 'velocity', got '{quantity}'")
+    omegas = {stretch.omega for stretch in motion.stretches}
+    if len(omegas) > 1:
+        raise SystemModelError("a power spectrum needs a motion at constant frequency")
+    row = modal_row(motion.system, point)
+    hz = omegas.pop() / (2.0 * math.pi)
+    rate = samples_per_period * hz
+    count = int(motion.duration * rate + 1e-6)
+    if count < 16:
+        raise SystemModelError(f"a power spectrum needs 16 samples, the motion gives {count}")
+    states = motion.states(motion.start_time + np.arange(count) / rate)
+    half = states[:, : row.size] if quantity == "displacement" else states[:, row.size :]
+    frequency, density = welch(half @ row, rate, nperseg=max(count // 8, 16))
+    return np.asarray(frequency), np.asarray(density)

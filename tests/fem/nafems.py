@@ -1,0 +1,151 @@
+"""Free vibration benchmarks of NAFEMS: what is built, and what is published.
+
+Dimensions and reference values are those of "Selected Benchmarks for Natural Frequency Analysis"
+(NAFEMS R0015, 1987) as quoted in the verification manual of OptiStruct (OS-V 0400 to 0455,
+help.altair.com), and for FV5 the issue of 1989 on caesarsystems.co.uk/NAFEMS_benchmarks. For the
+seventh mode of FV52 the manual prints 265.81 Hz beside a ratio that belongs to 167.89 Hz.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from structures import CLAMP, STEEL, lowest_hz
+
+import fem
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """One benchmark: its model, how many of its lowest frequencies are rigid, what is published."""
+
+    name: str
+    build: object
+    rigid: int
+    published: tuple[float, ...]
+    note: str
+    tolerance: float
+
+    def computed(self):
+        """Natural frequencies in Hz without the rigid ones, as many as are published."""
+        component = fem.assemble(self.build())
+        return lowest_hz(component, self.rigid + len(self.published))[self.rigid :]
+
+
+def double_cross():
+    """FV2: eight arms of 5 m, 0.125 m square, pinned at their ends, in the plane."""
+    angles = np.arange(8) * np.pi / 4
+    ends = {f"end{i}": (5 * np.cos(a), 5 * np.sin(a)) for i, a in enumerate(angles)}
+    mesh = fem.frame_mesh(
+        {"middle": (0.0, 0.0), **ends}, [("arms", "middle", end, 8) for end in ends]
+    )
+    return fem.FrameModel(
+        mesh,
+        {"arms": fem.BeamPart(STEEL, fem.RectangularSection(0.125, 0.125))},
+        supports=[fem.Support(end, ("x", "y")) for end in ends],
+    )
+
+
+def off_centre_masses():
+    """FV4: a clamped bar of 10 m, 0.5 m thick, with 10 t and 1 t at 2 m from its tip."""
+    mesh = fem.frame_mesh({"a": (0, 0, 0), "b": (10, 0, 0)}, [("bar", "a", "b", 5)])
+    return fem.StructureModel(
+        mesh,
+        {"bar": fem.BeamPart(STEEL, fem.CircularSection(0.5))},
+        supports=[fem.Support("a", CLAMP)],
+        point_masses=[
+            fem.PointMass("b", 10000.0, offset=(0.0, -2.0, 0.0)),
+            fem.PointMass("b", 1000.0, offset=(0.0, 2.0, 0.0)),
+        ],
+    )
+
+
+def deep_beam():
+    """FV5: a simply supported beam of 10 m, 2 m square."""
+    mesh = fem.frame_mesh({"a": (0, 0, 0), "b": (10, 0, 0)}, [("beam", "a", "b", 20)])
+    return fem.StructureModel(
+        mesh,
+        {"beam": fem.BeamPart(STEEL, fem.RectangularSection(2.0, 2.0), theory="timoshenko")},
+        supports=[fem.Support("a", ("x", "y", "z", "rotation_x")), fem.Support("b", ("y", "z"))],
+    )
+
+
+def plate():
+    return fem.box_mesh("plate", (10.0, 10.0, 0.05), (16, 16, 1))
+
+
+def middle_plane(mesh):
+    """Nodes in the middle of the thickness."""
+    return np.flatnonzero(np.abs(mesh.points[:, 2] - 0.025) < 1e-9)
+
+
+def free_plate():
+    """FV12: a free plate, 10 m square and 0.05 m thick, that moves out of its plane only."""
+    mesh = plate()
+    mesh = mesh.with_point_sets({"middle": middle_plane(mesh)})
+    return fem.StructureModel(
+        mesh, {"plate": fem.SolidPart(STEEL)}, supports=[fem.Support("middle", ("x", "y"))]
+    )
+
+
+def cantilevered_plate():
+    """FV16: the same plate, clamped at one edge."""
+    return fem.StructureModel(
+        plate(), {"plate": fem.SolidPart(STEEL)}, supports=[fem.Support("x0", ("x", "y", "z"))]
+    )
+
+
+def tapered_membrane():
+    """FV32: a sheet of 10 m, 5 m wide at the clamp and 1 m at the tip, 0.05 m thick."""
+    mesh = fem.box_mesh("sheet", (10.0, 1.0), (16, 8))
+    points = mesh.points.copy()
+    points[:, 1] = (points[:, 1] - 0.5) * (5.0 - 0.4 * points[:, 0])
+    return fem.StructureModel(
+        mesh.with_points(points),
+        {"sheet": fem.SolidPart(STEEL, "stress", 0.05)},
+        supports=[fem.Support("x0", ("x", "y"))],
+    )
+
+
+def solid_plate():
+    """FV52: a block 10 m square and 1 m thick, its lower edges held in z."""
+    mesh = fem.box_mesh("plate", (10.0, 10.0, 1.0), (4, 4, 1))
+    x, y, z = mesh.points.T
+    edge = (z < 1e-9) & (np.isclose(x % 10.0, 0.0) | np.isclose(y % 10.0, 0.0))
+    mesh = mesh.with_point_sets({"edges": np.flatnonzero(edge)})
+    return fem.StructureModel(
+        mesh, {"plate": fem.SolidPart(STEEL)}, supports=[fem.Support("edges", "z")]
+    )
+
+
+BENCHMARKS = [
+    Benchmark(
+        "FV2 pin-ended double cross", double_cross, 0,
+        (11.336, *[17.709] * 7, 45.345, *[57.390] * 7), "plane frame, 8 elements per arm", 0.006,
+    ),
+    Benchmark(
+        "FV4 cantilever, masses off centre", off_centre_masses, 0,
+        (1.723, 1.727, 7.413, 9.972, 18.155, 26.957), "5 beams in space, masses with offset", 0.002,
+    ),
+    Benchmark(
+        "FV5 deep simply supported beam", deep_beam, 0,
+        (42.650, 42.650, 71.20, 125.00, 148.15, 148.15, 213.61, 283.47, 283.47),
+        "20 Timoshenko beams", 0.004,
+    ),
+    Benchmark(
+        "FV12 free thin square plate", free_plate, 3,
+        (1.622, 2.360, 2.922, 4.233, 4.233, 7.416), "16 x 16 x 1 hexahedron20", 0.009,
+    ),
+    Benchmark(
+        "FV16 cantilevered thin square plate", cantilevered_plate, 0,
+        (0.421, 1.029, 2.582, 3.306, 3.753, 6.555), "16 x 16 x 1 hexahedron20", 0.006,
+    ),
+    Benchmark(
+        "FV32 cantilevered tapered membrane", tapered_membrane, 0,
+        (44.623, 130.03, 162.70, 246.05, 379.90, 391.44), "16 x 8 quad8, plane stress", 0.0002,
+    ),
+    Benchmark(
+        "FV52 simply supported solid square plate", solid_plate, 3,
+        (45.897, 109.44, 109.44, 167.89, 193.59, 206.19, 206.19), "4 x 4 x 1 hexahedron20",
+        0.025,
+    ),
+]  # fmt: skip

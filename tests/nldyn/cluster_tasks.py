@@ -1,0 +1,31 @@
+"""What the tests send to processes and clusters: functions that can be pickled by name."""
+
+from __future__ import annotations
+
+import os
+import time
+
+from nldyn import System
+
+
+def square(value: float) -> float:
+    if value == 3:
+        raise ValueError("three is refused")
+    return value**2
+
+
+def die(value: int) -> int:
+    if value == 1:
+        os._exit(1)
+    return value
+
+
+def worker(value: int) -> tuple[int, int]:
+    time.sleep(0.2)
+    return value, os.getpid()
+
+
+def frequencies(system: System) -> dict[str, float]:
+    if system.stops[0].gap > 0.9e-3:
+        raise ValueError("the gap is too large")
+    return {"f1_hz": system.frequencies_hz[0], "gap": system.stops[0].gap}

@@ -1,0 +1,109 @@
+"""The same results here, on threads, on processes, and on a cluster that loses a worker."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+
+import cluster_tasks
+import numpy as np
+import pytest
+from one_dof import make_one_dof
+
+from nldyn import Plane, TaskError, basins, brute_force, run_all
+from nldyn.executors import as_finished
+
+
+def processes(workers: int) -> ProcessPoolExecutor:
+    return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
+
+
+@pytest.fixture(scope="module")
+def plane():
+    return Plane.at_interface(make_one_dof(), (-3e-4, 0.4e-4), (-0.05, 0.05))
+
+
+@pytest.fixture(scope="module")
+def here(plane):
+    return basins(make_one_dof(), 25.3, plane, shape=(30, 40), starts=3, checks=3)
+
+
+def test_failures_are_kept_beside_results():
+    counts = []
+    with ThreadPoolExecutor(2) as pool:
+        for executor in (None, pool):
+            found = run_all(
+                cluster_tasks.square, [1, 2, 3, 4], executor, lambda *done: counts.append(done)
+            )
+            assert [outcome.value for outcome in found] == [1, 4, None, 16]
+            assert found[2].failure == "ValueError: three is refused"
+            assert counts[-1] == (4, 4)
+            with pytest.raises(TaskError, match="computation 2 failed: ValueError: three"):
+                found[2].value_or_raise()
+
+
+def test_a_broken_pool_is_a_failure_of_each_case_left():
+    with processes(1) as pool:
+        found = run_all(cluster_tasks.die, [0, 1, 2, 3], pool)
+    assert len(found) == 4
+    assert "BrokenProcessPool" in found[1].failure
+    assert "BrokenProcessPool" in found[3].failure
+
+
+def test_a_caller_may_stop_early():
+    with ThreadPoolExecutor(1) as pool:
+        results = as_finished(cluster_tasks.worker, range(50), pool)
+        next(results)
+        results.close()
+
+
+def test_threads_give_the_same_basins(plane, here):
+    with ThreadPoolExecutor(2) as pool:
+        found = basins(
+            make_one_dof(), 25.3, plane, shape=(30, 40), starts=3, checks=3, executor=pool
+        )
+    np.testing.assert_array_equal(found.labels, here.labels)
+    np.testing.assert_array_equal(found.periods, here.periods)
+
+
+def test_processes_give_the_same_diagram():
+    alone = brute_force(make_one_dof(), (35.0, 38.0), points=4)
+    with processes(2) as pool:
+        found = brute_force(make_one_dof(), (35.0, 38.0), points=4, executor=pool)
+    for a, b in zip(alone.columns, found.columns, strict=True):
+        assert a.attractor.name == b.attractor.name
+        np.testing.assert_array_equal(a.peaks, b.peaks)
+
+
+def test_a_cluster_that_loses_a_worker_gives_the_same_basins(plane, here, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    import dask
+
+    settings = {"distributed.worker.daemon": False, "distributed.comm.timeouts.connect": "20s"}
+    with (
+        dask.config.set(settings),
+        distributed.LocalCluster(
+            n_workers=3, threads_per_worker=1, processes=True, dashboard_address=None,
+            local_directory=str(tmp_path),
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):  # fmt: skip
+        pids = list(client.run(os.getpid).values())
+        assert len(set(pids)) == 3
+        killed = []
+
+        def kill_one(done: int, total: int) -> None:
+            if done == 1 and total > 4 and not killed:
+                os.kill(pids[0], signal.SIGKILL)
+                killed.append(pids[0])
+
+        found = basins(
+            make_one_dof(), 25.3, plane, shape=(30, 40), starts=3, checks=3,
+            executor=client.get_executor(), progress=kill_one,
+        )  # fmt: skip
+        assert killed
+    np.testing.assert_array_equal(found.labels, here.labels)
+    np.testing.assert_array_equal(found.periods, here.periods)
+    assert found.wrong == here.wrong == 0

@@ -1,0 +1,341 @@
+"""Attractors, diagrams by brute force, basins, manifolds, contact measures and spectra."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from one_dof import make_one_dof
+from scipy.spatial import cKDTree
+
+from nldyn import (
+    FlowMap,
+    HarmonicForce,
+    Plane,
+    Stop,
+    System,
+    SystemModelError,
+    basin_edge,
+    basins,
+    brute_force,
+    classify,
+    contact_measures,
+    find_attractors,
+    impact_section,
+    plot_basins,
+    plot_brute_force,
+    plot_section,
+    plot_sweep,
+    simulate,
+    solve_orbit,
+    spectrum,
+    stable_manifold,
+    stroboscopic_section,
+    sweep,
+)
+from nldyn.attractors import Attractor, zero_one_test
+from nldyn.basin_maps import settle, target_of
+from nldyn.orbit import ConvergenceError
+from nldyn.sections import BruteForce, Column
+from nldyn.wear import measures_table, power_spectrum
+
+
+@pytest.fixture(scope="module")
+def one_dof() -> System:
+    return make_one_dof()
+
+
+@pytest.fixture(scope="module")
+def plane(one_dof) -> Plane:
+    return Plane.at_interface(one_dof, (-3e-4, 0.4e-4), (-0.05, 0.05))
+
+
+@pytest.fixture(scope="module")
+def at_50_hz(one_dof, plane):
+    return basins(one_dof, 50.0, plane, shape=(16, 16), starts=6, checks=24)
+
+
+# attractors
+
+
+@pytest.mark.parametrize(("hz", "name"), [(25.3, "period 1"), (50.0, "period 2")])
+def test_periodic_attractors_are_the_stable_orbits(one_dof, hz, name):
+    found = classify(one_dof, hz)
+    assert found.name == name
+    assert found.orbit is not None and found.orbit.stable
+    value, error = found.largest_exponent
+    multiplier = abs(found.orbit.largest_multiplier)
+    assert value == pytest.approx(math.log(multiplier) * hz / found.period, abs=error + 1e-9)
+    assert "stable orbit" in found.evidence
+
+
+def test_chaos_is_found_by_two_independent_tests(one_dof):
+    found = classify(one_dof, 36.0)
+    assert found.kind == "chaotic"
+    assert found.exponents is not None and found.exponents.chaotic
+    assert found.zero_one > 0.8
+    assert "Lyapunov" in found.evidence
+
+
+def test_free_vibration_under_forcing_is_quasi_periodic():
+    system = System.from_modal([10.0], {"tip": [1.0]}, excitation=[HarmonicForce("tip", 1.0)])
+    found = classify(system, 10.0 * (1.0 + math.sqrt(5.0)), start=[1e-3, 0.0])
+    assert found.kind == "quasi-periodic"
+    assert found.zero_one < 0.2
+
+
+def test_zero_one_test_tells_a_torus_from_the_logistic_map():
+    steps = np.arange(1000)
+    assert zero_one_test(np.cos(0.3 * steps) + np.cos(math.sqrt(2.0) * steps)) < 0.1
+    x = [0.3]
+    for _ in steps:
+        x.append(3.97 * x[-1] * (1.0 - x[-1]))
+    assert zero_one_test(np.array(x)) > 0.9
+    assert zero_one_test(np.ones(200)) == 0.0
+
+
+def test_many_starts_lead_to_distinct_attractors(one_dof):
+    found = find_attractors(one_dof, 18.4, starts=16)
+    assert sum(share.count for share in found) == 16
+    names = [share.attractor.name for share in found]
+    assert "period 3" in names and "period 1" in names  # section 3 lists the 1/3 at 18.4 Hz
+
+
+# sections
+
+
+@pytest.fixture(scope="module")
+def from_35_to_40(one_dof):
+    return brute_force(one_dof, (35.0, 40.0), points=11, starts=1, recorded=48)
+
+
+def test_peaks_of_periodic_columns_lie_on_their_orbits(from_35_to_40):
+    periodic = [c for c in from_35_to_40.columns if c.attractor.orbit is not None]
+    assert len(periodic) > 5
+    for column in periodic:
+        orbit = column.attractor.orbit
+        assert column.peaks.max() == pytest.approx(orbit.max_abs_displacement, rel=1e-6)
+        assert len(np.unique(np.round(column.strobe, 10))) == orbit.period
+
+
+def test_chaotic_ranges_hold_their_frequencies(from_35_to_40):
+    chaotic = {c.frequency_hz for c in from_35_to_40.columns if c.attractor.kind == "chaotic"}
+    assert 36.0 in chaotic
+    ranges = from_35_to_40.ranges()
+    for hz in np.linspace(35.0, 40.0, 11):
+        assert any(a <= hz <= b for a, b in ranges) == (hz in chaotic)
+    count, total = from_35_to_40.share(35.0, 40.0)
+    assert (count, total) == (len(chaotic), 11)
+
+
+def test_ranges_join_neighbours_only(one_dof):
+    flow = FlowMap(one_dof)
+    empty = np.empty(0)
+
+    def column(hz: float, kind: str) -> Column:
+        attractor = Attractor(flow, hz, kind, np.zeros((1, 2)))
+        return Column("up", attractor, empty, empty, empty, empty)
+
+    kinds = ["chaotic", "periodic", "chaotic", "chaotic", "periodic", "chaotic"]
+    found = BruteForce("middle", tuple(column(float(k), kind) for k, kind in enumerate(kinds)))
+    assert found.ranges() == [(0.0, 0.5), (1.5, 3.5), (4.5, 5.0)]
+
+
+def test_sections_of_a_subharmonic_have_its_points(one_dof):
+    motion = simulate(one_dof, 50.0, periods=40, transient=1500)
+    y, v = stroboscopic_section(motion)
+    assert len(set(zip(np.round(y, 9), np.round(v, 6), strict=True))) == 2
+    phase, speed = impact_section(motion)
+    assert len(phase) == 20  # one impact in two periods
+    np.testing.assert_allclose(phase, phase[0], atol=1e-3)
+    np.testing.assert_allclose(speed, speed[0], rtol=1e-5)
+
+
+# basins and manifolds
+
+
+def test_cells_agree_with_their_classification(at_50_hz):
+    assert at_50_hz.undecided == 0.0
+    assert (at_50_hz.checked, at_50_hz.wrong) == (24, 0)
+    (basin,) = at_50_hz.basins
+    assert basin.attractor.name == "period 2"
+    assert basin.share == 1.0 and basin.integrity == pytest.approx(0.5, abs=0.04)
+
+
+def test_phases_are_those_that_a_simulation_has(one_dof, plane, at_50_hz):
+    attractor = at_50_hz.attractors[0]
+    flow = attractor.flow
+    states = plane.states((16, 16))
+    phases = np.linspace(0.0, 2000.0 * np.pi, 1001)
+    for row, column in [(0, 0), (3, 9), (8, 8), (12, 2), (15, 15), (6, 4)]:
+        start = flow.to_state(states[row, column])
+        end = flow.shoot(start[None], phases, 100.0 * np.pi, chained=True).ends[-1]
+        away = np.linalg.norm(attractor.states - end, axis=1)
+        assert int(np.argmin(away)) == at_50_hz.phases[row, column]
+        assert away.min() < 1e-6 * away.max()
+
+
+def test_stable_manifold_separates_the_phases(one_dof, plane):
+    saddle = solve_orbit(one_dof, 50.0)
+    assert not saddle.stable
+    pieces = stable_manifold(saddle, plane, max_points=1200)
+    flow = saddle.problem.flow
+    width = np.array([np.ptp(plane.x_range), np.ptp(plane.y_range)])
+    for piece in pieces:  # the map takes the curve to itself
+        tree = cKDTree(piece / width)
+        for point in piece[20::100]:
+            start = plane.origin + point[0] * plane.x + point[1] * plane.y
+            image = simulate(flow, 50.0, periods=2, start=start).end
+            place = plane.coordinates(image[None])[0][0]
+            assert tree.query(place / width)[0] < 0.004
+    sides = []
+    middle = pieces[0][300]
+    along = (pieces[0][301] - pieces[0][299]) / width
+    across = np.array([-along[1], along[0]]) * width
+    for side in (1.0, -1.0):
+        x, y = middle + side * across
+        start = plane.origin + x * plane.x + y * plane.y
+        ends = simulate(flow, 50.0, periods=2, start=start, transient=2000).strobe
+        sides.append(ends[0, 0] > ends[1, 0])
+    assert sides[0] != sides[1]
+
+
+def test_two_stable_orbits_share_the_plane_and_unstable_ones_sit_on_the_edge():
+    from nldyn.resources import example
+    from nldyn.scene import build_system, load_scene
+
+    system = build_system(load_scene(example("two_dof_xi_0.01.toml")))
+    plane = Plane.at_interface(system, (-3e-5, 1e-5), (-0.006, 0.006))
+    found = basins(system, 22.8, plane, shape=(10, 10), starts=12, checks=10)
+    assert found.wrong == 0 and found.undecided == 0.0
+    impacts_of = sorted(a.orbit.impacts for a in found.attractors)
+    assert impacts_of == [1, 2]  # branches (c) and (a) of Figure 4
+    points, saddles = basin_edge(found, 5)
+    assert saddles and not any(saddle.stable for saddle in saddles)
+    flow = found.attractors[0].flow
+    targets = [target_of(attractor) for attractor in found.attractors]
+    for point in points:  # tiny steps to all sides reach both attractors
+        sides = np.array([[1, 0], [-1, 0], [0, 200], [0, -200], [1, 200], [-1, 200]])
+        nearby = point + 1e-9 * sides
+        starts = plane.origin + nearby[:, :1] * plane.x + nearby[:, 1:] * plane.y
+        reached = settle(flow, 2.0 * np.pi * 22.8, targets, 500, flow.to_state(starts)).labels
+        assert set(reached) == {0, 1}
+
+
+def test_neighbourhood_of_an_orbit_leads_to_it(one_dof):
+    attractor = classify(one_dof, 25.3)
+    target = target_of(attractor)
+    assert target.shapes is not None
+    flow = attractor.flow
+    rng = np.random.default_rng(7)
+    lower = np.linalg.cholesky(target.shapes[0])
+    phases = np.linspace(0.0, 1600.0 * np.pi, 801)
+    for direction in rng.standard_normal((20, 2)):
+        start = target.states[0] + 0.99 * np.linalg.solve(
+            lower.T, direction / np.linalg.norm(direction)
+        )
+        assert target.reached(start[None])[0] == 0
+        end = flow.shoot(start[None], phases, 2.0 * np.pi * 25.3, chained=True).ends[-1]
+        assert np.linalg.norm(end - target.states[0]) < 1e-6 * np.linalg.norm(target.states[0])
+
+
+# noise and wear
+
+
+def test_mean_contact_force_balances_the_spring(one_dof):
+    for hz, period in ((25.3, 1), (50.0, 2)):
+        orbit = solve_orbit(one_dof, hz, period)
+        mean = float(spectrum(orbit).phasor[0].real)
+        found = contact_measures(orbit)
+        assert found.impulse_rate == pytest.approx(-16877.0 * mean, rel=1e-6)
+        assert found.impact_rate == pytest.approx(orbit.impacts * hz / period)
+        depth = orbit.max_penetration
+        power = 5.17e9 * depth**2.5 / 2.5 * found.impact_rate  # all impacts of one depth
+        assert found.impact_power == pytest.approx(power, rel=1e-3)
+        assert found.peak_force == pytest.approx(5.17e9 * depth**1.5, rel=1e-5)
+
+
+def test_rms_force_agrees_with_a_fine_history(one_dof):
+    orbit = solve_orbit(one_dof, 25.3)
+    force = orbit.history(200000).force[:-1, 0]
+    found = contact_measures(orbit)
+    assert found.rms_force == pytest.approx(math.sqrt(np.mean(force**2)), rel=1e-4)
+    assert found.contact_share == pytest.approx(np.mean(force > 0.0), rel=1e-3)
+
+
+def test_power_of_excitation_is_lost_in_damping_and_contact():
+    system = make_one_dof(stops=[Stop("middle", 5.17e9, dissipation=5.0)])
+    orbit = solve_orbit(system, 25.3)
+    h = orbit.history(100000)
+    omega = orbit.omega
+    y1 = h.modal_velocity[:-1, 0] / math.sqrt(2.48)
+    push = 4.92e-6 * omega**2 * np.cos(omega * h.time[:-1])
+    damping = 2.0 * 0.0142 * math.sqrt(16877.0 * 2.48)
+    lost = contact_measures(orbit).loss_power
+    assert lost > 0.0
+    assert np.mean(push * y1) == pytest.approx(np.mean(damping * y1**2) + lost, rel=1e-5)
+
+
+def test_measures_of_chaos_and_of_branches_fit_one_table(one_dof, from_35_to_40):
+    attractors = [column.attractor for column in from_35_to_40.columns]
+    table = measures_table([solve_orbit(one_dof, 37.2), *attractors], periods=64)
+    assert np.all(np.diff(table["frequency_hz"]) >= -1e-9)
+    assert "chaotic" in table["attractor"]
+    assert np.all(table["peak_force"] > table["rms_force"])
+
+
+def test_power_spectrum_holds_the_variance(one_dof):
+    motion = simulate(one_dof, 36.0, periods=512, transient=300)
+    hz, density = power_spectrum(motion)
+    y = motion.history(64 * 512).displacement["middle"]
+    assert np.sum(density) * hz[1] == pytest.approx(float(np.var(y)), rel=0.15)
+
+
+def test_spectrum_at_any_point_is_that_of_its_modes():
+    system = System.from_modal(
+        [13.1, 40.0], {"middle": [0.6, 0.3]}, modal_damping=0.02,
+        excitation=[HarmonicForce("middle", 1.0)],
+    )  # fmt: skip
+    orbit = solve_orbit(system, 20.0)
+    row = np.array([0.1, -0.7])
+    steady = system.steady(orbit.omega)
+    displacement = (system.linear.right @ steady)[:2]
+    assert spectrum(orbit, row).phasor[1] == pytest.approx(row @ displacement, rel=1e-9)
+    with pytest.raises(SystemModelError, match="displacements of 2 modes"):
+        spectrum(orbit, np.ones(3))
+
+
+# pictures and bad input
+
+
+def test_pictures_show_what_was_found(one_dof, from_35_to_40, at_50_hz, tmp_path):
+    ax = plot_brute_force(from_35_to_40)
+    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert "chaotic range" in labels and "periodic motion" in labels
+    ax = plot_basins(at_50_hz, times=True)
+    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert labels[0].startswith("period 2 (1 impact), phase 0: ")
+    motion = simulate(one_dof, 36.0, periods=20)
+    assert plot_section(motion).get_xlabel() == "displacement of middle (µm)"
+    assert len(plot_sweep(sweep(one_dof, (20.0, 21.0), 5.0)).lines) == 1
+    ax.figure.savefig(tmp_path / "basins.png")
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda s: brute_force(s, (40.0, 30.0)), "range"),
+        (lambda s: brute_force(s, (30.0, 40.0), directions=["left"]), "'up' or 'down', got 'left'"),
+        (lambda s: brute_force(s, (30.0, 40.0), directions=[]), "needs a direction or random"),
+        (lambda s: Plane.at_interface(s, (1.0, 0.0), (0.0, 1.0)), "x_range must be two ascending"),
+        (lambda s: Plane.at_interface(s, (0, 1), (0, 1), interface="top"), "unknown interface"),
+        (lambda s: Plane(np.zeros(2), np.ones(2), np.ones(2), (0, 1), (0, 1)), "parallel"),
+        (lambda s: stable_manifold(solve_orbit(s, 25.3), None), "is no saddle: 0 of its two"),
+        (lambda s: impact_section(simulate(s, 20.0, 1), 3), "stop must be a whole number"),
+        (lambda s: contact_measures(solve_orbit(s, 25.3), stop=1), "stop must be a whole number"),
+    ],
+)
+def test_bad_input_is_one_sentence(one_dof, call, said):
+    with pytest.raises((SystemModelError, ConvergenceError), match=said):
+        call(one_dof)
