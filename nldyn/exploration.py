@@ -519,9 +519,8 @@ class _Survey:
         """Simulate at the next frequency, from what came before and, going up, random states."""
         box, flow, stage = self.box, self.box.flow, self.stage
         turn, place, length = self.question.place(stage.steps)
-        up = place < length // 2
-        frequencies = self.question.frequencies(turn)
-        frequency = frequencies[place if up else length - 1 - place]
+        up, last = place < length // 2, place == length - 1
+        frequency = self.question.frequencies(turn)[place if up else length - 1 - place]
         box.progress("explore", frequency)
         omega = 2.0 * math.pi * frequency
         starts = stage.carried
@@ -529,36 +528,12 @@ class _Survey:
             seed = (self.effort.seed, turn, place)
             starts = np.vstack([starts, random_states(flow, omega, self.effort.starts, seed)])
         known = _Known(box, frequency)
-        attractors: list[Orbit] = []
-        runs, wandering = [], []
-        for start in starts:
-            run, orbit = self._motion(start, known)
-            if run is None:
-                continue
-            runs.append(run)
-            if orbit is None:
-                orbit = self._settled_on(run, omega, attractors)
-            if orbit is None:
-                wandering.append(run)
-            elif not any(same_orbit(orbit, other) for other in attractors):
-                attractors.append(orbit)
-                self._meet(orbit, known)
-        if up:
-            self._unstable(runs, wandering, attractors, known)
-        here = Coverage(
-            frequency,
-            tuple(sorted({orbit.period for orbit in attractors})),
-            len(runs) - len(wandering),
-            len(wandering),
-            len(starts) - len(runs),
-        )
+        here, carried = self._search(starts, known, also_unstable=up)
         both = {c.frequency_hz: c for c in stage.coverage}
         both[frequency] = both[frequency].with_more(here) if frequency in both else here
         met = np.zeros((turn + 1, len(box.branches)), dtype=bool)
         met[: len(stage.met), : stage.branches] = stage.met
         met[turn, known.met] = True
-        carried = [stroboscopic(orbit)[0] for orbit in attractors]
-        carried += [run[-1] for run in wandering[:1]]
         self.stage = Stage(
             stage.steps + 1,
             len(box.branches),
@@ -566,27 +541,55 @@ class _Survey:
             np.array(carried).reshape(-1, 2 * flow.system.size),
             tuple(both[hz] for hz in sorted(both)),
             met,
-            (*stage.ends, len(box.branches)) if place == length - 1 else stage.ends,
+            (*stage.ends, len(box.branches)) if last else stage.ends,
         )
         if box.checkpoint.work is None:
             box.checkpoint.work = lambda: None  # the coverage is worth keeping without a branch too
         box.checkpoint.offer()
+
+    def _search(
+        self, starts: Real, known: _Known, *, also_unstable: bool
+    ) -> tuple[Coverage, list[Real]]:
+        """Follow what motions come to; the states from which the next frequency starts."""
+        attractors: list[Orbit] = []
+        runs, wandering = [], []
+        for start in starts:
+            run, orbit = self._motion(start, known)
+            if run is None:
+                continue
+            runs.append(run)
+            orbit = orbit or self._settled_on(run, known.omega, attractors)
+            if orbit is None:
+                wandering.append(run)
+            elif not any(same_orbit(orbit, other) for other in attractors):
+                attractors.append(orbit)
+                self._meet(orbit, known)
+        if also_unstable:
+            self._unstable(runs, wandering, attractors, known)
+        coverage = Coverage(
+            known.frequency_hz,
+            tuple(sorted({orbit.period for orbit in attractors})),
+            len(runs) - len(wandering),
+            len(wandering),
+            len(starts) - len(runs),
+        )
+        ends = [stroboscopic(orbit)[0] for orbit in attractors]
+        return coverage, ends + [run[-1] for run in wandering[:1]]
 
     def _motion(self, start: Real, known: _Known) -> tuple[Real | None, Orbit | None]:
         """States after each period, and the known stable orbit on which the motion has settled.
 
         It ends as soon as it comes near to one; no states if it cannot be computed.
         """
-        flow, hz = self.box.flow, known.frequency_hz
-        settling = min(settling_periods(flow.system, hz), self.effort.settling)
+        flow = self.box.flow
+        settling = settling_periods(flow.system, known.frequency_hz)
+        settling = min(settling, self.effort.settling)
         left = settling + math.ceil(RETURNS * self.max_period) + 1
         states = np.array([start])
         while left > 0:
             count = min(left, max(PIECE, len(states) // 4))
             phases = np.linspace(0.0, 2.0 * np.pi * count, count + 1)
-            found = flow.shoot(
-                states[-1:], phases, 2.0 * math.pi * hz, sensitivities=False, chained=True
-            )
+            found = flow.shoot(states[-1:], phases, known.omega, sensitivities=False, chained=True)
             if found.failure:
                 return None, None
             states = np.vstack([states, found.ends])
@@ -627,7 +630,7 @@ class _Survey:
         known: _Known,
     ) -> None:
         """Look for unstable orbits of short periods beside all motions, and by deflation."""
-        omega = 2.0 * math.pi * known.frequency_hz
+        omega = known.omega
         for period in range(1, min(self.effort.unstable_period, self.max_period) + 1):
             for run in runs:
                 for start in near_returns(run[TRANSIENT:], period, CANDIDATES):
@@ -678,6 +681,7 @@ class _Known:
 
     def __init__(self, box: Collector, frequency_hz: float) -> None:
         self.box, self.frequency_hz = box, frequency_hz
+        self.omega = 2.0 * math.pi * frequency_hz
         self.met: list[int] = []
         self._orbits: list[tuple[int, Orbit]] = []
         self._stable: list[tuple[Orbit, Real]] = []

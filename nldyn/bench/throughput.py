@@ -242,9 +242,9 @@ def threads(model: str, workers: int, periods: int = 6400) -> tuple[float, float
         flow = FlowMap(case.system)
         state = np.zeros((1, size))
         for _ in range(0, periods, 64):
-            state = flow.shoot(state, phases, case.omega, sensitivities=False, chained=True).ends[
-                -1:
-            ]
+            state = flow.shoot(
+                state, phases, case.omega, sensitivities=False, chained=True
+            ).ends[-1:]
 
     simulate(0)
     with ThreadPoolExecutor(workers) as pool:
