@@ -24,6 +24,7 @@ from nldyn import (
     load_diagram,
     load_exploration,
     solve_orbit,
+    switch_at_flip,
 )
 from nldyn.branch import stroboscopic
 from nldyn.diagrams import Collector
@@ -408,3 +409,17 @@ def test_bad_efforts_are_refused_by_name(given, says):
 def test_bad_questions_are_refused_before_any_simulation(range_hz, period, says):
     with pytest.raises(SystemModelError, match=says):
         explore(system_of("one_dof"), range_hz, period)
+
+
+def test_an_orbit_between_a_flip_and_the_first_point_beside_it_is_known():
+    """A doubled branch begins at some distance from its flip; what lies between belongs to it."""
+    flow = FlowMap(system_of("one_dof"))
+    box = Collector(flow, (28.0, 60.0), "middle", ContinuationOptions(), lambda what, hz: None)
+    box.from_orbits([solve_orbit(flow, 50.0)])
+    flip = next(s for s in box.branches[0].special_points if s.kind == "PD")
+    box.from_flip(flip)
+    assert [branch.period for branch in box.branches] == [1, 2]
+    near = switch_at_flip(flip, amplitude=1e-3).orbit
+    assert not box.known(near)
+    box.from_orbits([near])
+    assert len(box.branches) == 2
