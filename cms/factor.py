@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +14,26 @@ from scipy.sparse.linalg import splu
 from cms.component import FloatArray, SparseMatrix
 
 DENSE_LIMIT = 1500
+
+Progress = Callable[[str], None]
+listener: ContextVar[Progress | None] = ContextVar("listener", default=None)
+
+
+@contextmanager
+def announced(progress: Progress | None) -> Iterator[None]:
+    """Tell every factorisation within to ``progress`` before it begins."""
+    token = listener.set(progress)
+    try:
+        yield
+    finally:
+        listener.reset(token)
+
+
+def announce(text: str) -> None:
+    """Say what is done, to whom it may concern."""
+    progress = listener.get()
+    if progress is not None:
+        progress(text)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ import re
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -192,7 +193,11 @@ def build_reduced(scene: Scene, component: fem.Component | None = None) -> cms.R
     hint = f"; the mesh is in {pieces} pieces that share no node" if pieces > 1 else ""
     with _told_as(scene, ("reduction",), cms.ReductionError, hint=hint):
         return cms.reduce(
-            component, modes=table.modes, cutoff_hz=table.cutoff_hz, residual=table.residual
+            component,
+            modes=table.modes,
+            cutoff_hz=table.cutoff_hz,
+            method=table.method,
+            residual=table.residual,
         )
 
 
@@ -247,9 +252,7 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
                 )
         reduced = reduced or build_reduced(scene)
         check_ratio_count(scene, len(reduced.frequencies_hz), scene.file)
-        return System.from_modal(
-            reduced.frequencies_hz, _observed_first(scene, reduced.participation), **acting
-        )
+        return System.from_reduced(with_first(reduced, scene.observed), **acting)
 
 
 def compute(
@@ -387,6 +390,18 @@ def _observed_first(scene: Scene, interfaces: Any) -> dict[str, Any]:
     """Put the observed interface first: orbits report the displacement of the first one."""
     names = sorted(interfaces, key=lambda name: name != scene.observed)
     return {name: interfaces[name] for name in names}
+
+
+def with_first(reduced: cms.ReducedModel, observed: str) -> cms.ReducedModel:
+    """The model with an interface before the others."""
+    order = sorted(reduced.interfaces, key=lambda name: name != observed)
+    places = [reduced.interfaces.index(name) for name in order]
+    changed: dict[str, Any] = {"participation": {n: reduced.participation[n] for n in order}}
+    if reduced.residual_flexibility is not None:
+        changed["residual_flexibility"] = reduced.residual_flexibility[places][:, places]
+    if reduced.residual_shapes is not None:
+        changed["residual_shapes"] = reduced.residual_shapes[:, places]
+    return replace(reduced, **changed)
 
 
 @contextmanager
