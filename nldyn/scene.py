@@ -9,7 +9,6 @@ import re
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     import cms
     import fem
     from nldyn.diagrams import Diagram, Progress
-    from nldyn.elements import Excitation, Stop
+    from nldyn.elements import Damper, Excitation, Stop
     from nldyn.system import System
 
 __all__ = [
@@ -192,13 +191,18 @@ def build_reduced(scene: Scene, component: fem.Component | None = None) -> cms.R
     pieces = _count_pieces(component.model.mesh)
     hint = f"; the mesh is in {pieces} pieces that share no node" if pieces > 1 else ""
     with _told_as(scene, ("reduction",), cms.ReductionError, hint=hint):
-        return cms.reduce(
+        reduced = cms.reduce(
             component,
             modes=table.modes,
             cutoff_hz=table.cutoff_hz,
             method=table.method,
             residual=table.residual,
         )
+        if pieces > 1 and reduced.rigid_body_modes:
+            count = reduced.rigid_body_modes
+            modes = f"{count} rigid-body mode{'s' if count > 1 else ''}"
+            raise cms.ReductionError(f"the component floats ({modes})")
+        return reduced
 
 
 def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> System:
@@ -227,15 +231,16 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
     >>> f"{build_system(load_scene(example('one_dof.toml'))).frequencies_hz[0]:.4f}"
     '13.1293'
     """
-    from nldyn.elements import Damper
+    from nldyn.setting import with_first
     from nldyn.system import System
 
     with _told_as(scene, (), SystemModelError):
+        stops, dampers, excitation = acting_elements(scene)
         acting: dict[str, Any] = {
             "modal_damping": scene.damping.modal_ratio,
-            "stops": [_stop(stop) for stop in scene.stops],
-            "dampers": [Damper(damper.at, damper.coefficient) for damper in scene.dampers],
-            "excitation": [_excitation(table) for table in scene.excitation],
+            "stops": stops,
+            "dampers": dampers,
+            "excitation": excitation,
         }
         if scene.modal is not None:
             hz = scene.modal.frequencies_hz
@@ -322,6 +327,20 @@ def compute(
         )
 
 
+def acting_elements(
+    scene: Scene,
+) -> tuple[tuple[Stop, ...], tuple[Damper, ...], tuple[Excitation, ...]]:
+    """The stops, dampers and excitation of a scene; a `SceneError` says what is wrong with one."""
+    from nldyn.elements import Damper
+
+    with _told_as(scene, (), SystemModelError):
+        return (
+            tuple(_stop(stop) for stop in scene.stops),
+            tuple(Damper(damper.at, damper.coefficient) for damper in scene.dampers),
+            tuple(_excitation(table) for table in scene.excitation),
+        )
+
+
 def _frame_model(scene: Scene, mesh: fem.FrameMesh) -> fem.FrameModel:
     import fem
 
@@ -390,18 +409,6 @@ def _observed_first(scene: Scene, interfaces: Any) -> dict[str, Any]:
     """Put the observed interface first: orbits report the displacement of the first one."""
     names = sorted(interfaces, key=lambda name: name != scene.observed)
     return {name: interfaces[name] for name in names}
-
-
-def with_first(reduced: cms.ReducedModel, observed: str) -> cms.ReducedModel:
-    """The model with an interface before the others."""
-    order = sorted(reduced.interfaces, key=lambda name: name != observed)
-    places = [reduced.interfaces.index(name) for name in order]
-    changed: dict[str, Any] = {"participation": {n: reduced.participation[n] for n in order}}
-    if reduced.residual_flexibility is not None:
-        changed["residual_flexibility"] = reduced.residual_flexibility[places][:, places]
-    if reduced.residual_shapes is not None:
-        changed["residual_shapes"] = reduced.residual_shapes[:, places]
-    return replace(reduced, **changed)
 
 
 @contextmanager
