@@ -6,7 +6,7 @@ from cms.component import ComponentLike
 from cms.coupling import Joint, couple
 from cms.errors import ReductionError
 from cms.model import ReducedModel
-from cms.reduction import METHODS, Matrices, reduce
+from cms.reduction import METHODS, Matrices, keep_modes, reduce
 
 __all__ = [
     "METHODS",
@@ -20,6 +20,7 @@ __all__ = [
     "accuracy",
     "check",
     "couple",
+    "keep_modes",
     "mac",
     "reduce",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -249,6 +249,64 @@ def reduced_fixed(
     errors = fixed_interface_errors(fixed, squares, vectors)
     whole = assembled(pencil, Modes(squares, vectors, errors), fixed.dropped, method)
     return replace(whole, modes=int(kept.squares.size))
+
+
+def keep_modes(reduced: ReducedModel, numbers: Sequence[int]) -> ReducedModel:
+    """The model with fewer modes, as if the component had been reduced to these.
+
+    Parameters
+    ----------
+    reduced : ReducedModel
+        A model by "rubin", "craig-chang" or "dual-craig-bampton".
+    numbers : sequence of int
+        Numbers of the component modes to keep, from 1; rigid-body modes must be among them.
+
+    Returns
+    -------
+    ReducedModel
+        With its residual modes; nothing is computed on the component, because the static
+        solutions are combinations of the larger model's modes.
+
+    Raises
+    ------
+    ReductionError
+        For a number that there is not, or a model by another method.
+
+    Examples
+    --------
+    >>> import numpy as np, cms
+    >>> n = 30
+    >>> K = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    >>> chain = cms.Matrices(K, np.eye(n), {"first": np.eye(n)[0]})
+    >>> fewer = cms.keep_modes(cms.reduce(chain, modes=8), [1, 2])
+    >>> bool(np.allclose(fewer.frequencies_hz, cms.reduce(chain, modes=2).frequencies_hz))
+    True
+    """
+    if reduced.method not in ("rubin", "craig-chang", "dual-craig-bampton") or reduced.components:
+        raise ReductionError(
+            f"modes of a model by '{reduced.method}' cannot be left out afterwards"
+        )
+    wanted = sorted(set(numbers))
+    if any(not 1 <= number <= reduced.modes for number in wanted):
+        raise ReductionError(f"modes {wanted} are not all between 1 and {reduced.modes}")
+    chosen = np.array(wanted, dtype=np.intp) - 1
+    squares = (2.0 * np.pi * reduced.frequencies_hz) ** 2
+    rigid = np.flatnonzero(squares[: reduced.modes] == 0.0)
+    if not set(rigid) <= set(chosen):
+        raise ReductionError(f"the {counted(rigid.size)} must be kept")
+    pencil = checked_pencil(Matrices(np.diag(squares), np.eye(reduced.size), reduced.participation))
+    kept = Modes(squares[chosen], np.eye(reduced.size)[:, chosen], reduced.residuals[chosen])
+    extra = residual_modes(pencil, shifted_factor(pencil), kept.vectors)
+    if kept.squares.size + extra.squares.size == 0:
+        raise ReductionError("nothing is left of the model")
+    added = Modes(extra.squares, extra.vectors, np.full(extra.squares.size, np.inf))
+    small = assembled(pencil, kept, extra.dropped, reduced.method, added)
+    damping = reduced.damping
+    return replace(
+        small,
+        basis=reduced.basis @ small.basis,
+        damping=None if damping is None else small.basis.T @ damping @ small.basis,
+    )
 
 
 def with_component_damping(reduced: ReducedModel, component: ComponentLike) -> ReducedModel:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from nldyn.branch import Branch, BranchPoint, SpecialPoint
     from nldyn.cascades import Cascade, cascade, cascades_in
     from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
+    from nldyn.convergence import Study, converge
     from nldyn.curve_marks import LocatedPoint, refine_special
     from nldyn.curves import Curve, continue_constant, continue_in, continue_special
     from nldyn.diagrams import Diagram, Seed, diagram
@@ -38,6 +39,8 @@ if TYPE_CHECKING:
     from nldyn.parameters import Parameter
     from nldyn.plot import plot_diagram
     from nldyn.search import SearchOptions, find_orbits
+    from nldyn.selection import Selection, reduce_for
+    from nldyn.setting import Setting
     from nldyn.special import LocateError
     from nldyn.store import load_branch, load_branches, load_diagram
     from nldyn.system import System
@@ -46,6 +49,7 @@ _HOMES = {
     "branch": "Branch BranchPoint SpecialPoint",
     "cascades": "Cascade cascade cascades_in",
     "continuation": "ContinuationOptions Walk continue_branch switch_at_flip",
+    "convergence": "Study converge",
     "curve_marks": "LocatedPoint refine_special",
     "curves": "Curve continue_constant continue_in continue_special",
     "diagrams": "Diagram Seed diagram",
@@ -61,6 +65,8 @@ _HOMES = {
     "parameters": "Parameter",
     "plot": "plot_diagram",
     "search": "SearchOptions find_orbits",
+    "selection": "Selection reduce_for",
+    "setting": "Setting",
     "special": "LocateError",
     "store": "load_branch load_branches load_diagram",
     "system": "System",
@@ -90,10 +96,13 @@ __all__ = [
     "SceneError",
     "SearchOptions",
     "Seed",
+    "Selection",
+    "Setting",
     "SpecialPoint",
     "Spectrum",
     "Stability",
     "Stop",
+    "Study",
     "System",
     "SystemModelError",
     "Unbalance",
@@ -104,6 +113,7 @@ __all__ = [
     "continue_constant",
     "continue_in",
     "continue_special",
+    "converge",
     "describe",
     "diagram",
     "dissipation_for",
@@ -119,6 +129,7 @@ __all__ = [
     "plot_history",
     "plot_phase_portrait",
     "plot_spectrum",
+    "reduce_for",
     "refine_special",
     "solve_orbit",
     "spectrum",

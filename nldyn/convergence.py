@@ -23,6 +23,7 @@ from nldyn.system import System
 if TYPE_CHECKING:
     import cms
     from nldyn.diagrams import Progress
+    from nldyn.scene_schema import Scene
 
 COUNTS = (*range(1, 11), 12, 16, 20, 30, 40)
 GRID = 400
@@ -31,6 +32,7 @@ SPECIAL_KINDS = ("LP", "PD")
 MATCH = 0.02  # special points of one kind farther apart are not the same
 INVISIBLE = 1e-9
 FULL = "full"
+SCENE_METHODS = ("rubin", "craig-bampton", "guyan", "truncation")
 QUANTITIES = {
     "eigenfrequency": "eigenfrequencies",
     "receptance": "receptance",
@@ -285,6 +287,64 @@ def converge(
     )
 
 
+def study_of_scene(
+    scene: Scene,
+    *,
+    modes: Sequence[int] = COUNTS,
+    methods: Sequence[str] = ("rubin",),
+    refinements: Sequence[int] = (1,),
+    at_hz: float | None = None,
+    full: bool = False,
+    progress: Progress | None = None,
+) -> Study:
+    """The convergence study of a scene with a mesh, see `converge`.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its ``[reduction]`` is not used.
+    modes, methods, at_hz, full, progress
+        As for `converge`.
+    refinements : sequence of int
+        Meshes: every element is cut into so many.
+
+    Raises
+    ------
+    SceneError
+        As `build_component`, and if a model cannot be made or no branch is found.
+    """
+    import cms
+    from nldyn.scene import build_component
+    from nldyn.scene_messages import scene_error
+    from nldyn.setting import setting_of
+
+    setting = setting_of(scene)
+    if min(refinements) < 1:
+        raise SystemModelError("converge: a refinement must be 1 or more")
+    for method in methods:
+        if method not in SCENE_METHODS:
+            raise SystemModelError(
+                f"converge: there is no method '{method}' for a scene "
+                f"(there are: {', '.join(SCENE_METHODS)})"
+            )
+    components = {
+        "" if len(refinements) == 1 else f"x{times}": build_component(scene, times)
+        for times in sorted(refinements)
+    }
+    try:
+        return converge(
+            components,
+            setting,
+            modes=modes,
+            methods=methods,
+            at_hz=at_hz,
+            full=full,
+            progress=progress,
+        )
+    except (cms.ReductionError, ConvergenceError) as error:
+        raise scene_error(scene.file, ("reduction",), str(error), sep=": ") from None
+
+
 def best_of(models: Sequence[Measured], mesh: str) -> Measured:
     """The largest model of the last mesh whose branch was followed."""
     followed = [m for m in models if m.special_hz is not None and m.label.startswith(mesh)]
@@ -314,10 +374,7 @@ def measured(
     peak = max(peaks, key=lambda p: p.height).orbit if peaks else None
     orbits = branch.at(at_hz)
     orbit = orbits[0] if orbits else None
-    special = {
-        kind: tuple(sorted(p.frequency_hz for p in branch.special_points if str(p.kind) == kind))
-        for kind in SPECIAL_KINDS
-    }
+    special = special_points_of(branch)
     per_orbit = seconds_per_orbit(orbit) if orbit else np.nan
     return Measured(*linear, peak, special, orbit, per_orbit, seconds, "; ".join(branch.notes))
 
@@ -498,6 +555,14 @@ def relative(a: Orbit | None, b: Orbit | None, number: Callable[[Orbit], float])
         return np.nan
     exact = number(b)
     return abs(number(a) - exact) / abs(exact) if exact else abs(number(a))
+
+
+def special_points_of(branch: Branch) -> dict[str, tuple[float, ...]]:
+    """Frequencies of the folds and flips of a branch, by kind."""
+    return {
+        kind: tuple(sorted(p.frequency_hz for p in branch.special_points if str(p.kind) == kind))
+        for kind in SPECIAL_KINDS
+    }
 
 
 def matched(

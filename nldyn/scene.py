@@ -113,13 +113,15 @@ def parse_scene(text: str, file: str | Path = "scene.toml") -> Scene:
     return scene
 
 
-def build_component(scene: Scene) -> fem.Component:
+def build_component(scene: Scene, refinement: int = 1) -> fem.Component:
     """Assemble the mesh of a scene.
 
     Parameters
     ----------
     scene : Scene
         A scene with a ``[mesh]``.
+    refinement : int
+        Cut every element into this many.
 
     Returns
     -------
@@ -153,6 +155,8 @@ def build_component(scene: Scene) -> fem.Component:
         mesh = fem.read_mesh(path)
     check_mesh_names(scene, mesh, scene.file)
     with _told_as(scene, (), fem.ModelError):
+        if refinement > 1:
+            mesh = refined_mesh(mesh, refinement)
         return fem.assemble(_frame_model(scene, mesh))
 
 
@@ -352,6 +356,37 @@ def _frame_model(scene: Scene, mesh: fem.FrameMesh) -> fem.FrameModel:
         springs=[fem.PointSpring(s.at, s.direction, s.stiffness) for s in scene.springs],
         hinges=[fem.Hinge(h.at, h.part) for h in scene.hinges],
         interfaces={name: fem.Interface(i.at, i.direction) for name, i in scene.interfaces.items()},
+    )
+
+
+def refined_mesh(mesh: fem.FrameMesh, times: int) -> fem.FrameMesh:
+    """The mesh with every line cut into equal pieces; names of parts and points stay.
+
+    Examples
+    --------
+    >>> import fem
+    >>> mesh = fem.frame_mesh({"a": (0, 0), "b": (1, 0)}, [("arm", "a", "b", 2)])
+    >>> len(refined_mesh(mesh, 3).lines)
+    6
+    """
+    import numpy as np
+
+    import fem
+
+    n, count = len(mesh.points), len(mesh.lines)
+    first, last = (mesh.points[mesh.lines[:, end]] for end in (0, 1))
+    share = np.arange(1, times)[None, :, None] / times
+    inner = first[:, None] + share * (last - first)[:, None]
+    numbers = n + np.arange(count * (times - 1)).reshape(count, times - 1)
+    chain = np.hstack([mesh.lines[:, :1], numbers, mesh.lines[:, 1:]])
+    lines = np.stack([chain[:, :-1], chain[:, 1:]], axis=-1).reshape(-1, 2)
+    pieces = np.arange(count * times).reshape(count, times)
+    return fem.FrameMesh(
+        np.vstack([mesh.points, inner.reshape(-1, 3)]),
+        lines,
+        {name: pieces[elements].ravel() for name, elements in mesh.parts.items()},
+        mesh.point_sets,
+        mesh.source,
     )
 
 
