@@ -98,31 +98,42 @@ def plot_cost(study: Study, title: str = "") -> Axes:
     """Draw the errors of the resonance peak and of the folds and flips against time per orbit."""
     ax = new_axes(8.0, 5.0)
     times = [1e3 * model.seconds_per_orbit for model in study.models]
-    draw_series(ax, study, "peak_m", times, "o")
-    draw_series(ax, study, "fold_flip", times, "s")
+    draw_series(ax, study, "peak_m", times, "o", "")
+    draw_series(ax, study, "fold_flip", times, "s", "")
     for label, colour in colours(study).items():
-        ax.plot([], [], "-", color=colour, label=label)
+        ax.plot([], [], "-", color=colour, label=f"{label} (numbers: kept modes)")
     ax.plot([], [], "ko", label="peak height")
     ax.plot([], [], "ks", label="folds and flips")
     ax.set_xscale("log")
     ax.set_xlabel("time per orbit (ms)")
-    ax.set_ylabel("relative error")
+    ax.set_ylabel("relative error of the harmonic branch")
     ax.legend(frameon=False)
     ax.set_title(title)
     return ax
 
 
 def draw_series(
-    ax: Axes, study: Study, quantity: str, abscissa: list[float], marker: str = "o"
+    ax: Axes, study: Study, quantity: str, abscissa: list[float], marker: str = "o", line: str = "-"
 ) -> None:
-    """Draw one error of every series; what is missing or infinite leaves a gap."""
+    """Draw one error of every series; what is missing, infinite or zero leaves a gap.
+
+    Zero is the error of the model that the others are compared with. Without a line the points
+    get their numbers of modes.
+    """
     palette = colours(study)
+    drawn = False
     for label, indices in study.series().items():
         x = [abscissa[i] for i in indices]
-        y = [max(getattr(study.errors[i], quantity), SMALLEST) for i in indices]
-        y = [value if math.isfinite(value) else math.nan for value in y]
-        ax.plot(x, y, marker + "-", color=palette[label], markersize=4, linewidth=1.0)
-    ax.set_yscale("log")
+        errors = [getattr(study.errors[i], quantity) for i in indices]
+        y = [max(e, SMALLEST) if 0.0 < e < math.inf else math.nan for e in errors]
+        drawn = drawn or any(value > 0.0 for value in y)
+        ax.plot(x, y, marker + line, color=palette[label], markersize=4, linewidth=1.0)
+        if not line:
+            for place, value, index in zip(x, y, indices, strict=True):
+                count = str(study.models[index].modes)
+                ax.annotate(count, (place, value), (4, 2), textcoords="offset points", fontsize=7)
+    if drawn:
+        ax.set_yscale("log")
     ax.grid(True, which="major", linewidth=0.3)
 
 

@@ -337,3 +337,82 @@ def test_faults_in_damping_are_told(cantilever, damping, words):
 def test_massless_flexibility_refuses_damping_it_cannot_carry(cantilever, damping):
     with pytest.raises(cms.ReductionError, match="reduce by 'rubin' or 'craig-bampton'"):
         cms.reduce(cantilever, modes=3, method="macneal").with_damping(**damping)
+
+
+class FakePardiso:
+    """Stands in for pypardiso: solves with SuperLU, and spoils what it is told to."""
+
+    spoil = 0.0
+
+    def __init__(self, mtype):
+        self.mtype, self.iparm, self.phase = mtype, np.zeros(64, dtype=np.int32), 0
+
+    def set_phase(self, phase):
+        self.phase = phase
+
+    def _call_pardiso(self, upper, right):
+        if self.phase == 12:
+            assert self.mtype == 2 and self.iparm[0] == 1
+            whole = upper + sparse.triu(upper, k=1).T
+            self.inverse = sparse.linalg.splu(sparse.csc_matrix(whole))
+        if self.phase == 33:
+            return self.inverse.solve(np.ascontiguousarray(right)) * (1.0 + self.spoil)
+        return right
+
+
+@pytest.fixture
+def pardiso(monkeypatch):
+    import sys
+    import types
+
+    import cms.factor
+
+    module = types.ModuleType("pypardiso")
+    module.PyPardisoSolver = FakePardiso
+    module.pardiso_wrapper = types.SimpleNamespace(PyPardisoError=RuntimeError)
+    monkeypatch.setitem(sys.modules, "pypardiso", module)
+    monkeypatch.delenv("CMS_SOLVER", raising=False)
+    cms.factor.pardiso_is_there.cache_clear()
+    yield FakePardiso
+    cms.factor.pardiso_is_there.cache_clear()
+
+
+def test_pardiso_is_chosen_where_it_is_installed(pardiso):
+    told = []
+    reduced = cms.reduce(chain(2500), modes=3, progress=told.append)
+    assert "by PARDISO" in told[0] and "GB" in told[0]
+    np.testing.assert_allclose(reduced.frequencies_hz[:3], fixed_free_hz(2500)[:3], rtol=1e-8)
+    floating = cms.reduce(chain(2500, left=0.0), modes=3)
+    assert floating.rigid_body_modes == 1
+
+
+@pytest.mark.parametrize("spoil", [1e-3, np.nan])
+def test_a_solver_that_returns_garbage_is_found_out(pardiso, monkeypatch, spoil):
+    monkeypatch.setattr(pardiso, "spoil", spoil)
+    with pytest.raises(cms.ReductionError):
+        cms.reduce(chain(2500), modes=3)
+
+
+def test_superlu_can_be_asked_for(pardiso, monkeypatch):
+    monkeypatch.setenv("CMS_SOLVER", "superlu")
+    told = []
+    cms.reduce(chain(2500), modes=3, progress=told.append)
+    assert "by SuperLU" in told[0]
+
+
+def test_fewer_modes_of_a_model_are_the_model_of_fewer_modes(cantilever):
+    large = cms.reduce(cantilever, modes=9)
+    for numbers in ([1, 2, 3], [1, 3, 4]):
+        small = cms.keep_modes(large, numbers)
+        static = [small.static_flexibility(n, "tip") for n in ("tip", "middle")]
+        np.testing.assert_allclose(static, [30 / 7, 15 / 7], rtol=1e-10)
+        np.testing.assert_allclose(
+            small.frequencies_hz[:3], large.frequencies_hz[np.array(numbers) - 1], rtol=1e-12
+        )
+    same = cms.reduce(cantilever, modes=3)
+    found = cms.keep_modes(large, [1, 2, 3])
+    np.testing.assert_allclose(found.frequencies_hz, same.frequencies_hz, rtol=1e-10)
+    with pytest.raises(cms.ReductionError, match="not all between 1 and 9"):
+        cms.keep_modes(large, [0, 1])
+    with pytest.raises(cms.ReductionError, match="by 'craig-bampton' cannot be left out"):
+        cms.keep_modes(cms.reduce(cantilever, modes=3, method="craig-bampton"), [1])
