@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
     from nldyn.convergence import Study, converge
     from nldyn.curve_marks import LocatedPoint, refine_special
+    from nldyn.curve_plots import plot_curves
+    from nldyn.curve_store import load_curve, load_curves, save_curves
     from nldyn.curves import Curve, continue_constant, continue_in, continue_special
     from nldyn.diagrams import Diagram, Seed, diagram
     from nldyn.elements import (
@@ -42,7 +44,7 @@ if TYPE_CHECKING:
     from nldyn.selection import Selection, reduce_for
     from nldyn.setting import Setting
     from nldyn.special import LocateError
-    from nldyn.store import load_branch, load_branches, load_diagram
+    from nldyn.store import load_branch, load_branches, load_diagram, load_exploration
     from nldyn.system import System
 
 _HOMES = {
@@ -51,6 +53,8 @@ _HOMES = {
     "continuation": "ContinuationOptions Walk continue_branch switch_at_flip",
     "convergence": "Study converge",
     "curve_marks": "LocatedPoint refine_special",
+    "curve_plots": "plot_curves",
+    "curve_store": "load_curve load_curves save_curves",
     "curves": "Curve continue_constant continue_in continue_special",
     "diagrams": "Diagram Seed diagram",
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
@@ -68,7 +72,7 @@ _HOMES = {
     "selection": "Selection reduce_for",
     "setting": "Setting",
     "special": "LocateError",
-    "store": "load_branch load_branches load_diagram",
+    "store": "load_branch load_branches load_diagram load_exploration",
     "system": "System",
 }
 
@@ -122,15 +126,20 @@ __all__ = [
     "hertz_stiffness",
     "load_branch",
     "load_branches",
+    "load_curve",
+    "load_curves",
     "load_diagram",
+    "load_exploration",
     "normal_form",
     "plot_contact_force",
+    "plot_curves",
     "plot_diagram",
     "plot_history",
     "plot_phase_portrait",
     "plot_spectrum",
     "reduce_for",
     "refine_special",
+    "save_curves",
     "solve_orbit",
     "spectrum",
     "switch_at_branch_point",

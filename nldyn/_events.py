@@ -103,6 +103,16 @@ def sign_changes(phases_a, values_a, kinds_a, phases_b, values_b, kinds_b, full)
 
 
 @njit(cache=True, error_model="numpy")
+def alone(phases_a, kinds_a, phases_b, kinds_b, full):
+    """Which extremes of b none of a belongs to: those born or lost between them."""
+    found = np.empty(phases_b.size, dtype=np.bool_)
+    for j in range(phases_b.size):
+        i = nearest(phases_a, kinds_a, kinds_b[j], phases_b[j], full)
+        found[j] = i < 0 or nearest(phases_b, kinds_b, kinds_b[j], phases_a[i], full) != j
+    return found
+
+
+@njit(cache=True, error_model="numpy")
 def dip(left, right, before, here, after):
     """Where a function may touch zero unseen between `left` and `right` of here, or nan.
 

@@ -1080,8 +1080,8 @@ def interpolate(tab, values, s):
 
 
 @inner
-def first_root(tab, values, noise):
-    """First s at which the polynomial through `values` falls below -noise, or 2.
+def first_root(tab, values, noise, edge):
+    """First s at which the polynomial through `values` falls below -noise, at its end edge, or 2.
 
     It is looked at on a grid four times as fine as the nodes, and at the minima between.
     """
@@ -1095,7 +1095,7 @@ def first_root(tab, values, noise):
         fine[i] = total
     for i in range(1, n):
         below = -1.0
-        if fine[i] < (-noise if i < n - 1 else 0.0):
+        if fine[i] < (-noise if i < n - 1 else edge):
             below = grid[i]
         elif i < n - 1 and fine[i - 1] >= fine[i] <= fine[i + 1]:
             left, right = grid[i - 1] - grid[i], grid[i + 1] - grid[i]
@@ -1140,7 +1140,7 @@ def first_event(fl, tab, kind, phase, w, h, closed, panel, w_end):
     values = np.empty(m + 2)
     for s in range(closed.size):
         noise = output_noise(fl, s, w)
-        start, _, _, _ = output_derivatives(fl, s, w, phase, 0.0)
+        start, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
         end, _, _, _ = output_derivatives(fl, s, w_end, phase + fl.omega * h, 0.0)
         sign = 1.0 if closed[s] else -1.0  # the values are positive as long as nothing happens
         if closed[s]:
@@ -1157,7 +1157,12 @@ def first_event(fl, tab, kind, phase, w, h, closed, panel, w_end):
         )
         for i in range(m):
             values[i + 1] = inner[0, i]
-        root = first_root(tab, values, noise + 4.0 * legendre_tail(tab, inner, 0))
+        noise += 4.0 * legendre_tail(tab, inner, 0)
+        edge = 0.0
+        if sign * speed > 0.0:  # the panel may begin a little before the event that it begins with
+            noise += 2.0 * max(-values[0], 0.0)
+            edge = min(2.0 * values[0], 0.0)
+        root = first_root(tab, values, noise, edge)
         if root <= 1.0:
             fraction = map_fraction(tab, kind, root)
             if fraction < where:
@@ -1276,6 +1281,29 @@ def time_to_event(fl, stop, closed, w, phase):
 
 
 @inner
+def coarsest_instant(fl):
+    """Largest error allowed in the instant of an event, as a share of a panel."""
+    found = 0.0
+    for s in range(fl.stops.shape[0]):
+        found = max(found, fl.stops[s, INSTANT])
+    return found
+
+
+@inner
+def stop_at_switch(fl, w, phase, h, closed):
+    """Stop that is to open or close now, to within a share of a length h of time, or -1."""
+    stop, nearest = -1, np.inf
+    allowed = 10.0 * coarsest_instant(fl) * h
+    for s in range(closed.size):
+        late = abs(time_to_event(fl, s, closed[s], w, phase))
+        gap = abs(distance(fl, s, w, phase))
+        here = late <= allowed or gap <= 10.0 * output_noise(fl, s, w)
+        if late < nearest and here:
+            stop, nearest = s, late
+    return stop
+
+
+@inner
 def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec):
     """Solve one panel and choose its length, at most h_max, and h_mapped to aim at an event.
 
@@ -1294,9 +1322,11 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
     if kind < 0:
         kind, h = guess_panel(fl, tab, phase, w, limit, h_mapped, start_switch, panel)
     tried = h
-    for _ in range(100):
+    for attempt in range(100):
         if h <= 0.0 or phase + fl.omega * h == phase:
-            return OK, kind, 0.0, active[0] if aim < 0 else aim
+            if aim < 0:
+                aim = stop_at_switch(fl, w, phase, tried, closed)
+            return OK if aim >= 0 else CONTACT_FAILED, kind, 0.0, aim
         if not solve_panel(fl, tab, kind, phase, w, h, noise, panel):
             limit = 0.4 * min(h, tried)
             aim = -1
@@ -1308,7 +1338,8 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
         fine = resolved(fl, tab, kind, noise, panel)
         event, where = first_event(fl, tab, kind, phase, w, h, closed, panel, w_end)
         at_end = where > (0.999 if event == aim else 1.0 - 1e-7)
-        if event >= 0 and (aim < 0 or not at_end):
+        lost = attempt % 12 == 11  # the instant that is aimed at goes to and fro
+        if event >= 0 and (aim < 0 or not at_end) and not lost:
             goal = switch
             aim = event
             if h * where > h_mapped:  # half the way first
@@ -1324,7 +1355,7 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
                     and time_to_event(fl, active[a], closed[active[a]], w_end, end_phase) < h
                 ):
                     aim = active[a]
-        if aim >= 0:
+        if aim >= 0 and not lost:
             dh = time_to_event(fl, aim, closed[aim], w_end, end_phase)
             if abs(dh) <= fl.stops[aim, INSTANT] * h or (
                 dh < np.inf and abs(distance(fl, aim, w_end, end_phase)) <= output_noise(fl, aim, w)
@@ -1336,9 +1367,9 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
                 continue
             elif dh > 0.0 and fine:  # the contact goes on
                 return OK, kind, h, -1
-            aim = -1
-        elif fine:
+        elif fine and not lost:
             return OK, kind, h, -1
+        aim = -1
         keep_profile(tab, kind, smooth, 0.5, panel, guess)
         kind = smooth
         h *= 0.5
@@ -1438,9 +1469,10 @@ def switch_with(fl, w, phase, h, closed, closings):
 
     The instant is known to a small share of the length h of the panel before it.
     """
+    allowed = 10.0 * coarsest_instant(fl) * h
     for s in range(closed.size):
         value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
-        reach = 10.0 * fl.stops[s, INSTANT] * h * abs(speed) + 10.0 * output_noise(fl, s, w)
+        reach = allowed * abs(speed) + 10.0 * output_noise(fl, s, w)
         if abs(value - fl.stops[s, GAP]) <= reach and closed[s] != (speed > 0.0):
             closed[s] = speed > 0.0
             if closed[s]:
@@ -1468,7 +1500,7 @@ def run_pieces(
     skip = 0.0
     flight, none = (FLIGHT, -1) if duration >= 0.0 else (0, 0)  # as above
     w_end = np.empty(w.size)
-    for _ in range(5000):
+    for _ in range(20000):
         remain = duration - t
         if remain <= 0.0:
             return OK

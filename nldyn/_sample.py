@@ -180,8 +180,9 @@ def local_extremes(
     """Phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output.
 
     The rate is sampled sixteen times per period of the fastest mode (rad/s), its sign changes are
-    refined by the secant that weighs down an end kept twice (Anderson and Björck 1973). The motion
-    is taken as periodic: an extreme at its start counts once.
+    refined. In flight, where a parabola through three samples of one sign comes near zero, it is
+    looked for a change of sign there: two extremes closer than the samples. The motion is taken as
+    periodic: an extreme at its start counts once.
     """
     spacing = 2.0 * np.pi / (16.0 * fastest)
     found = np.empty((64, 3))
@@ -195,6 +196,7 @@ def local_extremes(
     steps = np.empty((blocks.shape[0], 4))
     weights = np.empty((0, tab.nodes.size))
     first_value, first_sign, sign, t_old, rate_old = 0.0, 0, 0, 0.0, 0.0
+    t_older, rate_older = 0.0, 0.0
     for piece in range(count):
         h = rec_duration[piece]
         kind = rec_kind[piece]
@@ -232,33 +234,96 @@ def local_extremes(
             if first_sign == 0:
                 first_sign = sign = new_sign
             if new_sign != sign:
-                lo, hi, rate_lo, rate_hi = t_old, t, rate_old, rate
                 middle = t
-                for step in range(100 if i > 0 else 0):
-                    last = middle
-                    middle = lo - rate_lo * (hi - lo) / (rate_hi - rate_lo)
-                    if step > 10 and step % 2 == 0:
-                        middle = 0.5 * (lo + hi)
-                    state_at(blocks, tab, kind, h, start, shares, middle, v)
-                    value, rate_middle = output_rate(
-                        row, row1, near, forced, omega, rec_phase[piece] + omega * middle, middle, v
-                    )
-                    if rate_middle * sign > 0.0:
-                        if step > 0 and last < middle:
-                            rate_hi *= shrink(rate_middle, rate_lo)
-                        lo, rate_lo = middle, rate_middle
-                    else:
-                        if step > 0 and last > middle:
-                            rate_lo *= shrink(rate_middle, rate_hi)
-                        hi, rate_hi = middle, rate_middle
-                    if abs(middle - last) <= 1e-9 * spacing or rate_middle == 0.0:
-                        break
+                if i > 0:
+                    middle, value = turning_point(
+                        blocks, tab, kind, h, start, shares, row, row1, near, forced, omega,
+                        rec_phase[piece], spacing, sign, t_old, t, rate_old, rate, v,
+                    )  # fmt: skip
                 found, n = append_extreme(found, n, rec_phase[piece] + omega * middle, value, sign)
                 sign = new_sign
+            elif kind == FLIGHT and i > 1 and rate_older * rate_old > 0.0 and rate_old * rate > 0.0:
+                # two extremes between samples of one sign: where their parabola comes to zero
+                lo, hi, rate_lo, rate_hi = t_older, t, rate_older, rate
+                middle, rate_middle = t_old, rate_old
+                for _ in range(3):
+                    where = near_zero(lo, middle, hi, rate_lo, rate_middle, rate_hi)
+                    if not lo < where < hi or where == middle:
+                        break
+                    state_at(blocks, tab, kind, h, start, shares, where, v)
+                    value, rate_where = output_rate(
+                        row, row1, near, forced, omega, rec_phase[piece] + omega * where, where, v
+                    )
+                    if where < middle:
+                        hi, rate_hi = middle, rate_middle
+                    else:
+                        lo, rate_lo = middle, rate_middle
+                    if rate_where * sign < 0.0:
+                        phase = rec_phase[piece]
+                        first, value = turning_point(
+                            blocks, tab, kind, h, start, shares, row, row1, near, forced, omega,
+                            phase, spacing, sign, lo, where, rate_lo, rate_where, v,
+                        )  # fmt: skip
+                        found, n = append_extreme(found, n, phase + omega * first, value, sign)
+                        last, value = turning_point(
+                            blocks, tab, kind, h, start, shares, row, row1, near, forced, omega,
+                            phase, spacing, -sign, where, hi, rate_where, rate_hi, v,
+                        )  # fmt: skip
+                        found, n = append_extreme(found, n, phase + omega * last, value, -sign)
+                        rate_old = 0.0  # the next three samples would show the same pair
+                        break
+                    middle, rate_middle = where, rate_where
+            t_older, rate_older = t_old, rate_old
             t_old, rate_old = t, rate
     if sign != first_sign:
         found, n = append_extreme(found, n, rec_phase[0], first_value, sign)
     return found[:n]
+
+
+@inner
+def turning_point(
+    blocks, tab, kind, h, start, shares, row, row1, near, forced, omega,
+    phase, spacing, sign, lo, hi, rate_lo, rate_hi, v,
+):  # fmt: skip
+    """Time and value at which the rate of an output changes its sign between two times of a piece.
+
+    By the secant that weighs down an end kept twice (Anderson and Björck 1973).
+    """
+    middle, value = hi, 0.0
+    for step in range(100):
+        last = middle
+        middle = lo - rate_lo * (hi - lo) / (rate_hi - rate_lo)
+        if step > 10 and step % 2 == 0:
+            middle = 0.5 * (lo + hi)
+        state_at(blocks, tab, kind, h, start, shares, middle, v)
+        value, rate_middle = output_rate(
+            row, row1, near, forced, omega, phase + omega * middle, middle, v
+        )
+        if rate_middle * sign > 0.0:
+            if step > 0 and last < middle:
+                rate_hi *= shrink(rate_middle, rate_lo)
+            lo, rate_lo = middle, rate_middle
+        else:
+            if step > 0 and last > middle:
+                rate_lo *= shrink(rate_middle, rate_hi)
+            hi, rate_hi = middle, rate_middle
+        if abs(middle - last) <= 1e-9 * spacing or rate_middle == 0.0:
+            break
+    return middle, value
+
+
+@inner
+def near_zero(a, b, c, rate_a, rate_b, rate_c):
+    """Where the parabola through three rates of one sign comes within a quarter of zero, or nan."""
+    first, last = (rate_b - rate_a) / (b - a), (rate_c - rate_b) / (c - b)
+    curvature = (last - first) / (c - a)
+    if curvature * rate_b <= 0.0:
+        return np.nan
+    slope = first + curvature * (b - a)
+    where = b - 0.5 * slope / curvature
+    value = rate_b - 0.25 * slope * slope / curvature
+    least = min(abs(rate_a), abs(rate_b), abs(rate_c))
+    return where if value * rate_b < 0.25 * least * abs(rate_b) else np.nan
 
 
 @inner

@@ -105,9 +105,13 @@ class OrbitFamily:
         return len(self.charts) + (self.unfolding is not None)
 
     def unknowns(self, orbit: Orbit) -> Real:
-        """Unknowns (N + m,) of an orbit of the start's system."""
+        """Unknowns (N + m,) of an orbit of the family."""
+        nodes = orbit.problem.nodes(orbit.point)
+        here, start = orbit.system.linear, self.system.linear
+        if here is not start:  # an orbit of the family has coordinates of its own
+            nodes = nodes @ (start.left @ here.right).T
         point = np.zeros(self.n_states + self.n_free)
-        point[: self.n_states] = orbit.point[:-1]
+        point[: self.n_states] = nodes.ravel()
         for place, chart in enumerate(self.charts, self.n_states):
             value = value_of(orbit.system, orbit.frequency_hz, chart.parameter)
             point[place] = chart.coordinate(value)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from nldyn.errors import SystemModelError, shown
 from nldyn.linear import Real
 from nldyn.orbit import Orbit
 
@@ -81,6 +82,42 @@ class SpecialPoint:
     def frequency_hz(self) -> float:
         """Excitation frequency in Hz."""
         return self.point.orbit.frequency_hz
+
+
+def check_special(caller: str, special: object, kind: str = "", *, of_branch: bool = True) -> None:
+    """Refuse anything but a special point, of a branch and of a kind where these are wanted.
+
+    Raises
+    ------
+    SystemModelError
+        As said.
+    """
+    found, orbit = getattr(special, "kind", None), getattr(special, "orbit", None)
+    if not (isinstance(found, str) and isinstance(orbit, Orbit)):
+        raise SystemModelError(f"{caller} needs a special point, got {shown(special)}")
+    if kind and found != kind:
+        raise SystemModelError(f"{caller} needs a {kind} point, got {found}")
+    if of_branch and not isinstance(getattr(special, "point", None), BranchPoint):
+        raise SystemModelError(
+            f"{caller} needs a special point of a branch, which knows the branch's direction; "
+            f"the {found} point at {orbit.frequency_hz:g} Hz was found otherwise"
+        )
+
+
+def check_branches(name: str, branches: object) -> None:
+    """Refuse anything but a list of branches, or what has their columns, under its name.
+
+    Raises
+    ------
+    SystemModelError
+        As said.
+    """
+    if not isinstance(branches, list | tuple) or not all(
+        hasattr(branch, column)
+        for branch in branches
+        for column in ("period", "points", "special_points", "stop_reasons")
+    ):
+        raise SystemModelError(f"{name} must be a list of branches, got {shown(branches)}")
 
 
 @dataclass(frozen=True, eq=False)

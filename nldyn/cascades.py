@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nldyn.branch import Branch, BranchPoint, SpecialPoint
+from nldyn.branch import Branch, BranchPoint, SpecialPoint, check_branches, check_special
 from nldyn.continuation import (
     BORN,
     ContinuationOptions,
@@ -19,7 +19,7 @@ from nldyn.continuation import (
     switch_at_flip,
 )
 from nldyn.critical import CoefficientError, Estimate, doubled_parameter, flip, loop_of
-from nldyn.errors import SystemModelError, check_whole
+from nldyn.errors import check_types, check_whole
 from nldyn.special import LocateError, special_points_between
 
 FEIGENBAUM = 4.669201609102991  # limit of the ratios, Feigenbaum (1978)
@@ -130,9 +130,9 @@ def cascade(
     >>> [flip.orbit.period for flip in cascade(branch.special_points[0], 2).flips]
     [1, 2, 4]
     """
-    if first.kind != "PD":
-        raise SystemModelError(f"cascade needs a PD point, got {first.kind}")
-    check_whole("cascade: depth", depth, 1)
+    check_special("cascade", first, "PD", of_branch=False)
+    check_types(options=(options, ContinuationOptions, None))
+    check_whole("cascade: depth", depth, 1, 30)
     hz = first.frequency_hz
     window = check_range((0.5 * hz, 2.0 * hz) if range_hz is None else range_hz)
     flips, branches, reason = [first], list[Branch](), f"depth {depth} reached"
@@ -163,6 +163,7 @@ def cascades_in(branches: Sequence[Branch]) -> list[Cascade]:
     list of Cascade
         Each from the flip of an orbit that is not itself born at a flip.
     """
+    check_branches("branches", branches)
     origins = {branch.stop_reasons[0]: branch for branch in branches}
     found = []
     for branch in branches:

@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -94,17 +94,21 @@ def run(scene: Path, out: Path, log: bool, quiet: bool) -> None:
     with plain_errors():
         from nldyn.progress import progress_line
         from nldyn.result_directory import check_directory
-        from nldyn.scene import compute, load_scene
+        from nldyn.scene import compute, explore_scene, load_scene
 
         start = time.perf_counter()
         loaded = load_scene(scene)
         check_directory(out)
         with kept_at_interrupt(out) as unfinished:
             with progress_line(quiet) as report:
-                diagram = compute(loaded, report, unfinished)
+                found = explore_scene(loaded, report, unfinished) if loaded.explore else None
+                diagram = found.diagram if found else compute(loaded, report, unfinished)
             from nldyn.output import write_results
 
-            write_results(diagram, out, loaded, yscale="log" if log else "linear")
+            yscale: Literal["linear", "log"] = "log" if log else "linear"
+            write_results(found or diagram, out, loaded, yscale=yscale)
+        if found:
+            click.echo("\n".join(found.coverage_lines()))
         click.echo(describe(diagram, time.perf_counter() - start, out))
         if not diagram.branches:
             click.echo("nldyn: no periodic orbit was found; the tables are empty", err=True)

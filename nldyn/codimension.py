@@ -8,7 +8,7 @@ import numpy as np
 
 from nldyn._events import branch_point_test, flip_test, torus_test
 from nldyn.bordered import Condition, Evaluation, nearest_depth
-from nldyn.conditions import Grazing, Singular
+from nldyn.conditions import BranchPoint, Grazing, Singular
 from nldyn.linear import Complex, Real
 from nldyn.orbit import ConvergenceError, Orbit
 
@@ -17,6 +17,7 @@ from nldyn.orbit import ConvergenceError, Orbit
 # across a grazing, where the first jumps; nearer to one than this they are not computed.
 DIFFERENCE = 1e-3
 SHORTEST_DIFFERENCE = 1e-5
+DOUBLE = 1e-6  # product of unit null vectors from which a multiplier counts as double
 
 
 def codimension_tests(
@@ -45,6 +46,8 @@ def codimension_tests(
             "PD": along_flips,
             "NS": along_tori,
         }[condition.kind](condition, at.orbit, mu)
+    if isinstance(condition, BranchPoint):
+        return along_branch_points(mu)
     tests = {"PD": flip_test(mu), "NS": torus_test(mu) if mu.size > 2 else 1.0}
     if parameter_tangent is None:
         tests["LP"] = branch_point_test(mu)
@@ -99,6 +102,15 @@ def along_tori(_: Singular | None, orbit: Orbit | None, mu: Complex) -> dict[str
     return tests
 
 
+def along_branch_points(mu: Complex) -> dict[str, float]:
+    """Tests on a curve of branch points: what the other multipliers do."""
+    others = np.delete(mu, int(np.argmin(np.abs(mu - 1.0))))
+    tests = {"R1": branch_point_test(others), "BPPD": flip_test(others)}
+    if others.size > 2:
+        tests["BPNS"] = torus_test(others)
+    return tests
+
+
 def torus_pair(mu: Complex) -> list[int]:
     """Indices of the two multipliers whose product is nearest to 1."""
     i, j = np.triu_indices(mu.size, 1)
@@ -129,10 +141,11 @@ def flip_coefficient(orbit: Orbit, left: Real, right: Real) -> float:
     """Normal form coefficient of a flip relative to the orbit's size; zero where it degenerates.
 
     pᵀ(C(q, q, q) + 3B(q, (1 - Φ)⁻¹B(q, q)))/6 with pᵀq = 1 (Kuznetsov 2004, eq. 5.44); positive
-    where the doubled orbits are stable in the plane of the flip. Close to a grazing it is nan.
+    where the doubled orbits are stable in the plane of the flip. Close to a grazing, and where two
+    multipliers are -1, it is nan.
     """
     h = _reach(orbit)
-    if h < 10.0 * SHORTEST_DIFFERENCE:
+    if h < 10.0 * SHORTEST_DIFFERENCE or abs(float(left @ right)) < DOUBLE:
         return math.nan
     before, after = _jacobians_beside(orbit, right, h)
     monodromy = orbit.monodromy

@@ -9,12 +9,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nldyn._events import nearest
-from nldyn.bordered import DIFFERENCE, Condition, Evaluation, length_unit, reach_of_grazing
+from nldyn.bordered import (
+    DIFFERENCE,
+    Condition,
+    Evaluation,
+    OrbitFamily,
+    length_unit,
+    reach_of_grazing,
+)
 from nldyn.errors import SystemModelError, is_finite, shown
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit
 
-KINDS = ("LP", "PD", "NS", "GR")
+KINDS = ("LP", "PD", "NS", "BP", "GR")
 
 SMALLEST_OVERLAP = 1e-3  # of null vectors: it vanishes where a multiplier is double
 
@@ -133,9 +140,10 @@ class BranchPoint:
 
     @classmethod
     def of(cls, at: Evaluation) -> BranchPoint:
-        """The condition with the borders of a point in one parameter, not yet unfolded."""
-        unit = 1.0 / np.sqrt(at.family.metric(at.point))
-        u, _, vh = np.linalg.svd(at.jacobian * unit)
+        """The condition with the borders of a point, by the states and the first parameter."""
+        n = at.family.n_states
+        unit = 1.0 / np.sqrt(at.family.metric(at.point)[: n + 1])
+        u, _, vh = np.linalg.svd(at.jacobian[:, : n + 1] * unit)
         return cls(u[:, -1], vh[-2:], unit)
 
     def value(self, at: Evaluation) -> Real:
@@ -152,8 +160,8 @@ class BranchPoint:
         return reach_of_grazing(at)
 
     def renewed(self, at: Evaluation) -> BranchPoint:
-        """The same: a branch point is not followed."""
-        return self
+        """The same with the borders of another point."""
+        return BranchPoint.of(at)
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,12 +335,15 @@ class Held:
 
     Parameters
     ----------
+    name : str
+        What is held.
     monitor : callable
         A number of an orbit.
     target : float
         Its value.
     """
 
+    name: str
     monitor: Callable[[Orbit], float]
     target: float
 
@@ -359,18 +370,20 @@ class Held:
             raise SystemModelError(
                 f"monitor must be a name or a function of an orbit, got {shown(monitor)}"
             )
-        name = monitor_name(monitor)
+        name = getattr(monitor, "__name__", "monitor") if callable(monitor) else monitor
+        if name == "max_abs_displacement":
+            name = f"{name} of {orbit.observe}"
         present = function(orbit)
-        if not (is_finite(present) and present != 0.0):
+        if not is_finite(present) or (present == 0.0 and target is None):
             raise SystemModelError(f"the start has {name} = {shown(present)}, which cannot be held")
         if target is None:
             target = present
-        if not (is_finite(target) and target * present > 0.0):
+        if not (is_finite(target) and target != 0.0 and target * present >= 0.0):
             raise SystemModelError(
                 f"{name} to be held must be finite and of the sign of the start's "
                 f"({present:g}), got {shown(target)}"
             )
-        return cls(function, float(target))
+        return cls(name, function, float(target))
 
     def value(self, at: Evaluation) -> Real:
         """Relative difference from the target, shape (1,)."""
@@ -385,23 +398,24 @@ class Held:
         return self
 
 
-def monitor_name(monitor: Monitor) -> str:
-    """Name of a monitor in tables and errors."""
-    return monitor if isinstance(monitor, str) else getattr(monitor, "__name__", "monitor")
-
-
-def condition_of(kind: str, orbit: Orbit) -> Condition:
-    """Defining condition of a special point.
+def defined_by(kind: str, family: OrbitFamily, orbit: Orbit) -> tuple[OrbitFamily, Condition]:
+    """Defining condition of a special point near an orbit, and the family in which it is solved.
 
     Raises
     ------
     SystemModelError
         For a kind that has none here, or an orbit that has no such point.
     """
+    if kind == "BP":
+        guess = family.unknowns(orbit)
+        condition = BranchPoint.of(family.at(guess))
+        return family.unfolded(condition.left * family.scale(guess)), condition
     if kind == "GR":
-        return Grazing.of(orbit)
+        return family, Grazing.of(orbit)
     if kind in KINDS:
         if kind == "NS" and orbit.system.size < 2:
             raise SystemModelError("a Neimark-Sacker point needs at least two modes")
-        return Singular.of(kind, orbit)
-    raise SystemModelError(f"unknown kind of special point {shown(kind)}; there are: {KINDS}")
+        return family, Singular.of(kind, orbit)
+    raise SystemModelError(
+        f"unknown kind of special point {shown(kind)}; there are: {', '.join(KINDS)}"
+    )

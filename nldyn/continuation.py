@@ -21,10 +21,18 @@ from nldyn.branch import (
     Course,
     SpecialPoint,
     WalkEnd,
+    check_special,
 )
 from nldyn.checkpoint import Checkpoint, checkpoint_at
 from nldyn.crossings import check_requested, requested
-from nldyn.errors import SystemModelError, check_whole, is_finite, shown
+from nldyn.errors import (
+    SystemModelError,
+    check_positive,
+    check_types,
+    check_whole,
+    is_finite,
+    shown,
+)
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine
 from nldyn.shooting import ShootingProblem
@@ -698,6 +706,12 @@ def continue_branch(
     ----------
     H. B. Keller (1977), pseudo-arclength continuation; E. Doedel et al., AUTO-07p manual.
     """
+    check_types(
+        orbit=(orbit, Orbit),
+        name=(name, str),
+        options=(options, ContinuationOptions, None),
+        progress=(progress, Callable, None),
+    )
     low, high = check_range(range_hz)
     if not low * (1.0 - 1e-9) <= orbit.frequency_hz <= high * (1.0 + 1e-9):
         raise SystemModelError(
@@ -890,12 +904,12 @@ def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoin
     Raises
     ------
     SystemModelError
-        If the special point is not a flip.
+        If the special point is not a flip, or the amplitude not positive.
     LocateError
         If no orbit of twice the period is found.
     """
-    if special.kind != "PD":
-        raise SystemModelError(f"switch_at_flip needs a PD point, got {special.kind}")
+    check_special("switch_at_flip", special, "PD", of_branch=False)
+    check_positive("amplitude", amplitude)
     orbit = special.orbit
     base = orbit.problem
     problem = ShootingProblem(base.flow, 2 * base.period, 2 * base.segments)

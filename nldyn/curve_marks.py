@@ -9,14 +9,16 @@ from typing import Protocol
 import numpy as np
 
 from nldyn.bordered import Condition, Free, OrbitFamily, correct
+from nldyn.branch import check_special
 from nldyn.codimension import is_torus, torus_pair
-from nldyn.conditions import BranchPoint, Grazing, Singular, condition_of
-from nldyn.curve_walk import CurvePoint, curve_point, is_torus_curve
+from nldyn.conditions import BranchPoint, Grazing, Singular, defined_by
+from nldyn.curve_walk import CurvePoint, between, curve_point, is_torus_curve
+from nldyn.errors import check_whole
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit
 from nldyn.parameter_values import FREQUENCY, Chart, checked_parameter, value_of
 from nldyn.parameters import Parameter
-from nldyn.special import LocateError, root, touching_extremes
+from nldyn.special import LocateError, leaves_circle, root, touching_extremes
 
 
 class Located(Protocol):
@@ -94,6 +96,8 @@ def refine_special(
     G. Moore (1980), *Numer. Funct. Anal. Optim.* 2, 441-472 (branch points);
     W. J. F. Govaerts (2000); Yu. A. Kuznetsov (2004), section 10.3.
     """
+    check_special("refine_special", special, of_branch=False)
+    check_whole("max_iterations", max_iterations, 1, 1000)
     orbit = special.orbit
     chosen = checked_parameter(orbit.system, parameter)
     value = value_of(orbit.system, orbit.frequency_hz, chosen)
@@ -102,14 +106,8 @@ def refine_special(
         size = orbit.max_abs_displacement
         span = (value - size, value + size)
     family = OrbitFamily.around(orbit, (Chart(chosen, *span),))
+    family, condition = defined_by(special.kind, family, orbit)
     guess = family.unknowns(orbit)
-    condition: Condition
-    if special.kind == "BP":
-        condition = BranchPoint.of(family.at(guess))
-        family = family.unfolded(condition.left * family.scale(guess))
-        guess = np.append(guess, 0.0)
-    else:
-        condition = condition_of(special.kind, orbit)
     found = correct(family, guess, condition, max_iterations=max_iterations)
     if not found.converged:
         raise LocateError(
@@ -159,14 +157,8 @@ class CurveChord:
         """Cubic interpolation of the unknowns between the nearest known points."""
         below = max(s for s in self._known if s < sigma)
         above = min(s for s in self._known if s > sigma)
-        a, b = self._known[below], self._known[above]
-        x, span = (sigma - below) / (above - below), b.arclength - a.arclength
-        return np.asarray(
-            (1.0 + 2.0 * x) * (1.0 - x) ** 2 * a.point
-            + x * (1.0 - x) ** 2 * span * a.tangent
-            + x * x * (3.0 - 2.0 * x) * b.point
-            + x * x * (x - 1.0) * span * b.tangent
-        )
+        x = (sigma - below) / (above - below)
+        return between(self._known[below], self._known[above], x)
 
 
 def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], list[str]]:
@@ -193,6 +185,8 @@ def _changes_of_sign(
 ) -> list[tuple[str, Callable[[CurvePoint], float]]]:
     """Tests that change sign between two points, with the names of what they tell of."""
     names = [name for name in a.tests if a.tests[name] * b.tests[name] < 0.0]
+    if not leaves_circle(a.orbit.multipliers, b.orbit.multipliers):
+        names = [name for name in names if name not in ("NS", "GRNS")]
     if "LP" in names and "BP" in names:  # at a fold both change sign
         names.remove("BP")
     found: list[tuple[str, Callable[[CurvePoint], float]]] = [
@@ -214,6 +208,8 @@ def _changes_of_sign(
 def _touch_name(condition: Condition) -> str:
     if isinstance(condition, Grazing):
         return "GRGR"
+    if isinstance(condition, BranchPoint):
+        return "GRBP"
     return f"GR{condition.kind}" if isinstance(condition, Singular) else "GR"
 
 
@@ -222,6 +218,8 @@ def _is_true(name: str, point: CurvePoint) -> bool:
     mu = point.orbit.multipliers
     if name in ("NS", "GRNS"):
         return is_torus(mu)
+    if name == "BPNS":
+        return is_torus(np.delete(mu, int(np.argmin(np.abs(mu - 1.0)))))
     if name in ("LPNS", "PDNS") and not is_torus_curve(point.condition):
         target = 1.0 if name == "LPNS" else -1.0
         return is_torus(np.delete(mu, int(np.argmin(np.abs(mu - target)))))

@@ -20,15 +20,18 @@ from nldyn.bordered import (
     tangent_surface,
 )
 from nldyn.codimension import codimension_tests, is_torus
-from nldyn.conditions import Both, Grazing, Singular
+from nldyn.conditions import Both, BranchPoint, Grazing, Singular
 from nldyn.continuation import ContinuationOptions, passed_flip
 from nldyn.errors import SystemModelError
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit
+from nldyn.parameter_values import Chart
 
 RANGE_END = "end of the range of "
 RESONANCE_END = "becomes a curve of neutral saddles at a resonance"
 CLOSED_CURVE = "closed curve"
+DISSOLVED = "the branch point dissolves, as the symmetry does that brings it about"
+UNFOLDED = 1e-6  # unfolding number from which a branch point has dissolved
 CORNER_STEP = 1e-3  # a step shorter than this may have met a corner
 
 
@@ -85,6 +88,20 @@ class CurvePoint:
             self.condition, self.found.at, float(self.tangent[-1]) if one else None
         )
 
+    def on_charts(self, charts: tuple[Chart, ...]) -> CurvePoint:
+        """The same point with its parameters on the scales of other ranges."""
+        at = self.found.at
+        n, point, tangent = at.family.n_states, self.point.copy(), self.tangent.copy()
+        for place, (old, new) in enumerate(zip(at.family.charts, charts, strict=True), n):
+            value = old.value(float(point[place]))
+            tangent[place] *= old.slope(float(point[place]))
+            point[place] = new.coordinate(value)
+            tangent[place] /= new.slope(float(point[place]))
+        family = replace(at.family, charts=charts)
+        tangent /= _length(family.metric(point), tangent)
+        found = replace(self.found, at=Evaluation(family, point), along=tangent)
+        return replace(self, found=found, tangent=tangent)
+
     def reversed(self) -> CurvePoint:
         """The same point of the curve run through the other way."""
         return replace(self, tangent=-self.tangent, arclength=-self.arclength)
@@ -109,15 +126,29 @@ def on_chart_plane(a: CurvePoint, b: CurvePoint, which: int, value: float) -> Cu
         return None
     target = family.charts[which].coordinate(value)
     share = (target - float(a.point[place])) / float(b.point[place] - a.point[place])
-    return _on_plane(a, share * (b.point - a.point), share * (b.arclength - a.arclength), which)
+    way = between(a, b, share) - a.point
+    return _on_plane(a, way, share * (b.arclength - a.arclength), which, target)
 
 
-def _on_plane(a: CurvePoint, way: Real, length: float, which: int) -> CurvePoint | None:
-    """Point of the curve near the end of a way from a, where a parameter is as it is there."""
+def between(a: CurvePoint, b: CurvePoint, x: float) -> Real:
+    """Unknowns at a share of the way from a to b, by cubic interpolation with the tangents."""
+    span = b.arclength - a.arclength
+    return np.asarray(
+        (1.0 + 2.0 * x) * (1.0 - x) ** 2 * a.point
+        + x * (1.0 - x) ** 2 * span * a.tangent
+        + x * x * (3.0 - 2.0 * x) * b.point
+        + x * x * (x - 1.0) * span * b.tangent
+    )
+
+
+def _on_plane(
+    a: CurvePoint, way: Real, length: float, which: int, coordinate: float
+) -> CurvePoint | None:
+    """Point of the curve near the end of a way from a, where a parameter has a coordinate."""
     guess = a.point + way
     row = np.zeros(guess.size)
     row[a.found.at.family.n_states + which] = 1.0
-    found = correct(a.found.at.family, guess, a.condition, row, float(row @ guess))
+    found = correct(a.found.at.family, guess, a.condition, row, coordinate)
     return curve_point(found, a.condition, way, a.arclength + length) if found.converged else None
 
 
@@ -271,7 +302,7 @@ class CurveWalk:
             ahead = (chart.coordinate(limit) - float(here.point[place])) / (slope or 1e-300)
             if not 0.0 < ahead <= step:
                 continue
-            end = _on_plane(here, ahead * here.tangent, ahead, which)
+            end = _on_plane(here, ahead * here.tangent, ahead, which, chart.coordinate(limit))
             if end is not None:
                 weights = here.found.at.family.metric(here.point)
                 off = _length(weights, end.point - here.point - ahead * here.tangent)
@@ -293,8 +324,16 @@ class CurveWalk:
         if ends:
             share, which, limit = min(ends)
             self.stop_reason = f"{RANGE_END}{charts[which].parameter.name}"
-            end = on_chart_plane(here, there, which, limit) if share > 1e-9 else None
-            return [] if end is None else [end]
+            if share <= 1e-9:
+                return []
+            end = on_chart_plane(here, there, which, limit)
+            if end is None:
+                self.stop_reason += ", where no orbit was found"
+                return []
+            return [end]
+        if isinstance(here.condition, BranchPoint) and abs(there.point[-1]) > UNFOLDED:
+            self.stop_reason = DISSOLVED
+            return []
         if passed_flip(here.orbit, there.orbit):
             self.stop_reason = f"meets orbits of period {here.orbit.period // 2}"
             return []

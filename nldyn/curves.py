@@ -3,26 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
+from itertools import pairwise, zip_longest
+from pathlib import Path
+from typing import Any, Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nldyn.bordered import Condition, Free, OrbitFamily, correct, gradient, tangent_surface
-from nldyn.conditions import Held, Monitor, condition_of, monitor_name
+from nldyn.branch import check_special
+from nldyn.conditions import Held, Monitor, defined_by
 from nldyn.continuation import ContinuationOptions
-from nldyn.curve_marks import Located, LocatedPoint, marks_between
-from nldyn.curve_walk import CLOSED_CURVE, CurvePoint, CurveWalk, curve_point, on_chart_plane
-from nldyn.errors import SystemModelError, shown
+from nldyn.curve_marks import CurveChord, Located, LocatedPoint, marks_between
+from nldyn.curve_walk import (
+    CLOSED_CURVE,
+    DISSOLVED,
+    CurvePoint,
+    CurveWalk,
+    curve_point,
+    on_chart_plane,
+)
+from nldyn.errors import SystemModelError, check_types, is_finite, shown
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit
 from nldyn.parameter_values import Chart, checked_parameter, value_of
 from nldyn.parameters import Parameter
+from nldyn.special import LocateError, root
+from nldyn.tables import orbit_columns
 
+CurvePart = Literal["points", "marks"]
 CLOSE = 1e-3  # how far the defining condition of a start may be off
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Curve:
     """A curve of periodic orbits in one or two parameters.
 
@@ -64,6 +78,121 @@ class Curve:
         """Largest residual at each point, shape (k,)."""
         return np.array([point.residual for point in self.points])
 
+    def __repr__(self) -> str:
+        """One line, in place of all numbers of all orbits."""
+        names = " and ".join(parameter.name for parameter in self.parameters)
+        marks = ", ".join(mark.kind for mark in self.marks) or "none"
+        return (
+            f"<Curve of {self.kind} in {names}: {len(self.points)} points, marks: {marks}; "
+            f"{' / '.join(self.stop_reasons)}>"
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write the curve to an HDF5 file that `load_curve` reads, whole or not at all.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        """
+        from nldyn.curve_store import save_curves
+
+        save_curves(path, [self])
+
+    def table(self, part: CurvePart = "points") -> dict[str, NDArray[Any]]:
+        """Columns of numbers, one row per orbit; ``pandas.DataFrame`` takes them as they are.
+
+        Parameters
+        ----------
+        part : {"points", "marks"}
+            Which orbits: row i belongs to ``curve.points[i]`` or ``curve.marks[i]``.
+
+        Returns
+        -------
+        dict of str to (n,) array
+            The parameters under their names, with the index where it is not 0, in SI units, then
+            the columns of `Branch.table`, and the residual.
+
+        Raises
+        ------
+        SystemModelError
+            For an unknown part.
+        """
+        if part not in get_args(CurvePart):
+            names = ", ".join(get_args(CurvePart))
+            raise SystemModelError(f"table: part must be one of {names}; got {shown(part)}")
+        rows = self.points if part == "points" else self.marks
+        columns: dict[str, NDArray[Any]] = {}
+        if part == "marks":
+            columns["type"] = np.array([mark.kind for mark in self.marks], dtype=str)
+        values = np.array([row.values for row in rows], dtype=float)
+        for parameter, column in zip(
+            self.parameters, values.reshape(-1, len(self.parameters)).T, strict=True
+        ):
+            name, index = parameter.name, parameter.index
+            columns[f"{name}_{index}" if index else name] = column
+        for name, column in orbit_columns([row.orbit for row in rows]).items():
+            columns.setdefault(name, column)
+        columns["residual"] = np.array([row.residual for row in rows], dtype=float)
+        if part == "points":
+            columns["arclength"] = np.array([point.arclength for point in self.points])
+        return columns
+
+    def extend(
+        self,
+        ranges: Sequence[tuple[float, float]],
+        *,
+        options: ContinuationOptions | None = None,
+        progress: Callable[[Real], None] | None = None,
+    ) -> Curve:
+        """Follow the curve beyond its ends; the points that it has are kept.
+
+        Parameters
+        ----------
+        ranges : one of (float, float) for each parameter
+            Values between which to stay, which contain those of the curve.
+        options, progress
+            As for `continue_special`.
+
+        Returns
+        -------
+        Curve
+
+        Raises
+        ------
+        SystemModelError
+            For ranges that do not contain the curve.
+        """
+        charts = _charts(
+            self.orbits[0], self.parameters, ranges, options, progress, len(self.parameters)
+        )
+        for chart, column in zip(charts, self.values.T, strict=True):
+            chart.check_start(float(column.min()))
+            chart.check_start(float(column.max()))
+        points = [point.on_charts(charts) for point in self.points]
+        marks, notes, reasons = list(self.marks), list(self.notes), list(self.stop_reasons)
+        if CLOSED_CURVE in reasons:
+            return self
+        for side in (1, 0):
+            end = points[-1] if side else points[0].reversed()
+            walk = CurveWalk(end, options or ContinuationOptions())
+            more = _collected(walk, progress)
+            reasons[side] = walk.stop_reason
+            found, lost = _marked(more)
+            notes += lost
+            if side:
+                points, marks = points + more[1:], marks + found
+            else:
+                points = [point.reversed() for point in more[:0:-1]] + points
+                marks = found[::-1] + marks
+        return replace(
+            self,
+            points=tuple(points),
+            marks=tuple(marks),
+            stop_reasons=(reasons[0], reasons[1]),
+            notes=tuple(notes),
+        )
+
     def at(self, name: str, value: float) -> list[Orbit]:
         """All orbits of the curve at which a parameter has a value, corrected there.
 
@@ -79,6 +208,8 @@ class Curve:
         SystemModelError
             If the curve does not change the parameter.
         """
+        if not is_finite(value):
+            raise SystemModelError(f"value must be a finite number, got {shown(value)}")
         names = [parameter.name for parameter in self.parameters]
         if name not in names:
             raise SystemModelError(
@@ -139,8 +270,9 @@ def continue_in(
     >>> [f"{value:.6g}" for value in curve.values[[0, -1], 0]]
     ['1e-06', '1e-05']
     """
-    charts = _charts(orbit, [parameter], [limits])
-    return _curve("orbit", orbit, charts, Free(), options, progress)
+    charts = _charts(orbit, [parameter], [limits], options, progress)
+    start = _start(OrbitFamily.around(orbit, charts), orbit, Free())
+    return _curve("orbit", start, options, progress)
 
 
 def continue_special(
@@ -151,12 +283,15 @@ def continue_special(
     options: ContinuationOptions | None = None,
     progress: Callable[[Real], None] | None = None,
 ) -> Curve:
-    """Continue a fold, flip, Neimark-Sacker or grazing point in two parameters.
+    """Continue a fold, flip, Neimark-Sacker, branch or grazing point in two parameters.
+
+    A branch point is followed where both parameters leave the symmetry as it is that brings it
+    about; otherwise it is a single point of their plane.
 
     Parameters
     ----------
     special : SpecialPoint or LocatedPoint
-        LP, PD, NS or GR.
+        LP, PD, NS, BP or GR.
     parameters : two of str or Parameter
         See `nldyn.parameter_values.checked_parameter`.
     ranges : two of (float, float)
@@ -174,8 +309,8 @@ def continue_special(
     Raises
     ------
     SystemModelError
-        For a kind that cannot be followed, a parameter that there is not, or a range that does
-        not hold the start.
+        For a kind that cannot be followed, a parameter that there is not, a range that does
+        not hold the start, or a branch point that dissolves when the parameters change.
     ConvergenceError
         If Newton's method does not meet the point again.
 
@@ -183,10 +318,19 @@ def continue_special(
     ----------
     Yu. A. Kuznetsov (2004), *Elements of Applied Bifurcation Theory*, section 10.3.
     """
+    check_special("continue_special", special, of_branch=False)
     orbit = special.orbit
-    charts = _charts(orbit, parameters, ranges)
-    _check_special(special, charts)
-    return _curve(special.kind, orbit, charts, condition_of(special.kind, orbit), options, progress)
+    charts = _charts(orbit, parameters, ranges, options, progress, 2)
+    family, condition = defined_by(special.kind, OrbitFamily.around(orbit, charts), orbit)
+    _check_special(special.kind, family, orbit, condition)
+    curve = _curve(special.kind, _start(family, orbit, condition), options, progress)
+    if len(curve.points) == 1 and DISSOLVED in curve.stop_reasons:
+        names = " or ".join(chart.parameter.name for chart in charts)
+        raise SystemModelError(
+            f"the BP at {orbit.frequency_hz:g} Hz is a single point: it dissolves when {names} "
+            "changes, as the symmetry does that brings it about"
+        )
+    return curve
 
 
 def continue_constant(
@@ -210,8 +354,8 @@ def continue_constant(
     parameters, ranges
         As for `continue_special`.
     value : float, optional
-        Value to hold; the orbit's own unless given. The orbit is first changed until it has the
-        value, in the first parameter alone.
+        Value to hold; the orbit's own unless given. The orbit is first followed in the first
+        parameter alone, both ways within its range, up to where it has the value.
     options, progress
         As for `continue_special`.
 
@@ -225,22 +369,60 @@ def continue_constant(
     SystemModelError
         For bad input, also a monitor that is zero on the orbit.
     ConvergenceError
-        If no orbit with the value is found near the start.
+        If no orbit with the value is found on the way; the text says which values are.
     """
-    charts = _charts(orbit, parameters, ranges)
+    charts = _charts(orbit, parameters, ranges, options, progress, 2)
     condition = Held.of(monitor, value, orbit)
-    return _curve(monitor_name(monitor), orbit, charts, condition, options, progress)
+    orbit = _with_value(orbit, condition, charts[0], options or ContinuationOptions())
+    start = _start(OrbitFamily.around(orbit, charts), orbit, condition)
+    return _curve(condition.name, start, options, progress)
 
 
-def _check_special(special: Located, charts: tuple[Chart, ...]) -> None:
+def _with_value(orbit: Orbit, condition: Held, chart: Chart, options: ContinuationOptions) -> Orbit:
+    """The orbit that has the value to be held, on the curve of orbits in one parameter."""
+    present = condition.monitor(orbit)
+    if abs(present / condition.target - 1.0) < CLOSE:
+        return orbit
+    start = _start(OrbitFamily.around(orbit, (chart,)), orbit, Free())
+    ends, met = [start, start.reversed()], [present]
+    for pair in zip_longest(*(CurveWalk(end, options) for end in ends)):
+        for side, point in enumerate(pair):
+            if point is None:
+                continue
+            try:
+                found = _between(condition, ends[side], point)
+            except LocateError as error:
+                raise ConvergenceError(f"{condition.name} was not reached: {error}") from None
+            if found is not None:
+                return found
+            ends[side] = point
+            met.append(condition.monitor(point.orbit))
+    name, places = chart.parameter.name, sorted(float(end.values[0]) for end in ends)
+    raise ConvergenceError(
+        f"no orbit with {condition.name} = {condition.target:g} was found: it is {present:g} at "
+        f"the start and from {min(met):g} to {max(met):g} where {name} goes from {places[0]:g} to "
+        f"{places[1]:g}; start at another orbit, or widen the range of {name}"
+    )
+
+
+def _between(condition: Held, a: CurvePoint, b: CurvePoint) -> Orbit | None:
+    """The orbit with the value to be held between two points of a curve, if they lie about it."""
+
+    def off(point: CurvePoint) -> float:
+        return float(condition.monitor(point.orbit)) / condition.target - 1.0
+
+    if not off(a) * off(b) <= 0.0:
+        return None
+    chord = CurveChord(a, b)
+    return chord.at(root(lambda sigma: off(chord.at(sigma)))[0]).orbit
+
+
+def _check_special(kind: str, family: OrbitFamily, orbit: Orbit, condition: Condition) -> None:
     """Refuse a start that is not nearly a special point of its kind."""
-    orbit = special.orbit
-    family = OrbitFamily.around(orbit, charts)
-    condition = condition_of(special.kind, orbit)
     off = float(np.abs(condition.value(family.at(family.unknowns(orbit)))).max())
     if off > CLOSE:
         raise SystemModelError(
-            f"the orbit at {orbit.frequency_hz:g} Hz is no {special.kind}: its defining condition "
+            f"the orbit at {orbit.frequency_hz:g} Hz is no {kind}: its defining condition "
             f"is off by {off:.1e}; locate it first, see refine_special"
         )
 
@@ -249,9 +431,21 @@ def _charts(
     orbit: Orbit,
     parameters: Sequence[str | Parameter],
     ranges: Sequence[tuple[float, float]],
+    options: ContinuationOptions | None,
+    progress: Callable[[Real], None] | None,
+    count: int = 1,
 ) -> tuple[Chart, ...]:
-    """Charts of the parameters, checked against the start."""
-    if isinstance(parameters, str) or len(parameters) != len(ranges):
+    """Charts of the parameters, checked against the start; other arguments are checked as well."""
+    check_types(
+        orbit=(orbit, Orbit),
+        parameters=(parameters, list, tuple),
+        ranges=(ranges, list, tuple),
+        options=(options, ContinuationOptions, None),
+        progress=(progress, Callable, None),
+    )
+    if len(parameters) != count:
+        raise SystemModelError(f"a curve of this kind needs two parameters, got {len(parameters)}")
+    if len(ranges) != count:
         raise SystemModelError("give as many ranges as parameters, one pair of numbers each")
     chosen = [checked_parameter(orbit.system, parameter) for parameter in parameters]
     if len(set(chosen)) < len(chosen):
@@ -264,16 +458,11 @@ def _charts(
 
 def _curve(
     kind: str,
-    orbit: Orbit,
-    charts: tuple[Chart, ...],
-    condition: Condition,
+    start: CurvePoint,
     options: ContinuationOptions | None,
     progress: Callable[[Real], None] | None,
 ) -> Curve:
     """Walk both ways from the start and mark what is met."""
-    if len(charts) != 1 + (not isinstance(condition, Free)):
-        raise SystemModelError(f"a curve of this kind needs two parameters, got {len(charts)}")
-    start = _start(OrbitFamily.around(orbit, charts), orbit, condition)
     options = options or ContinuationOptions()
     up = CurveWalk(start, options)
     points = _collected(up, progress)
@@ -283,20 +472,26 @@ def _curve(
         before = _collected(down, progress)
         points = [point.reversed() for point in before[:0:-1]] + points
         reasons = (down.stop_reason, up.stop_reason)
+    marks, notes = _marked(points)
+    return Curve(
+        kind,
+        tuple(chart.parameter for chart in start.found.at.family.charts),
+        tuple(points),
+        tuple(marks),
+        reasons,
+        tuple(notes),
+    )
+
+
+def _marked(points: Sequence[CurvePoint]) -> tuple[list[LocatedPoint], list[str]]:
+    """What is met between the points, in order, and what may be missing."""
     marks: list[LocatedPoint] = []
     notes: list[str] = []
     for a, b in pairwise(points):
         more, lost = marks_between(a, b)
         marks += more
         notes += lost
-    return Curve(
-        kind,
-        tuple(chart.parameter for chart in charts),
-        tuple(points),
-        tuple(marks),
-        reasons,
-        tuple(notes),
-    )
+    return marks, notes
 
 
 def _collected(walk: CurveWalk, progress: Callable[[Real], None] | None) -> list[CurvePoint]:
@@ -312,18 +507,13 @@ def _start(family: OrbitFamily, orbit: Orbit, condition: Condition) -> CurvePoin
     """First point of a curve, heading up in its first parameter."""
     guess = family.unknowns(orbit)
     first = family.n_states
-    if isinstance(condition, Held):
-        towards = np.zeros(guess.size)
-        towards[-1] = 1.0
-        found = correct(family, guess, condition, towards, float(guess[-1]), max_iterations=25)
-    else:
-        at = family.at(guess)
-        _, surface = tangent_surface(at)
-        by_surface = gradient(at, surface, condition)
-        along = surface @ np.linalg.svd(by_surface)[2][-1] if by_surface.size else surface[:, 0]
-        row = family.metric(guess) * along
-        row /= np.linalg.norm(row)
-        found = correct(family, guess, condition, row, float(row @ guess))
+    at = family.at(guess)
+    _, surface = tangent_surface(at)
+    by_surface = gradient(at, surface, condition)
+    along = surface @ np.linalg.svd(by_surface)[2][-1] if by_surface.size else surface[:, 0]
+    row = family.metric(guess) * along
+    row /= np.linalg.norm(row)
+    found = correct(family, guess, condition, row, float(row @ guess))
     if not found.converged:
         raise ConvergenceError(
             f"the start of the curve at {orbit.frequency_hz:g} Hz was not found: {found.failure}"

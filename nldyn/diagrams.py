@@ -132,14 +132,33 @@ class Collector:
         label = "harmonic" if branch.period == 1 else f"1/{branch.period}"
         named = replace(branch, name=f"{count:02d} {label}")
         self.checkpoint.work = None
-        self.branches.append(named)
+        self._keep(named)
         self.notes += [f"branch {named.name}: {note}" for note in named.notes]
         for reason, node in zip(named.stop_reasons, (named.nodes[0], named.nodes[-1]), strict=True):
-            if reason.startswith("joins"):
-                self.flip_ends.append(node.orbit)
             if reason.startswith(SHORT_STEP) or reason.endswith(POINTS):
                 hz = node.orbit.frequency_hz
                 self.notes.append(f"branch {named.name} was broken off at {hz:.6g} Hz: {reason}")
+
+    def _keep(self, branch: Branch) -> None:
+        self.branches.append(branch)
+        ends = zip(branch.stop_reasons, (branch.nodes[0], branch.nodes[-1]), strict=True)
+        self.flip_ends += [node.orbit for reason, node in ends if reason.startswith("joins")]
+
+    def take_back(self, branches: Iterable[Branch], notes: Iterable[str]) -> None:
+        """Take branches that an earlier run had found, named and followed up, in its order."""
+        self.notes += notes
+        for branch in branches:
+            self._keep(branch)
+            for special in branch.special_points:
+                if special.kind == "BP":
+                    self._is_new_crossing(special)
+
+    def _is_new_crossing(self, special: SpecialPoint) -> bool:
+        """Whether a branch point was not met before; from now on it was."""
+        if any(_is_same_crossing(special, other) for other in self.crossings):
+            return False
+        self.crossings.append(special)
+        return True
 
     def from_orbits(self, orbits: Iterable[Orbit]) -> None:
         """Follow each orbit both ways, unless its branch is known."""
@@ -160,7 +179,7 @@ class Collector:
             else:
                 self.add(branch)
 
-    def from_flip(self, special: SpecialPoint) -> None:
+    def from_flip(self, special: SpecialPoint, options: ContinuationOptions | None = None) -> None:
         """Follow the branch that is born at a flip, unless it is known."""
         if any(_is_at(end, special) for end in self.flip_ends):
             return
@@ -169,29 +188,33 @@ class Collector:
         except LocateError as error:
             self.notes.append(str(error))
             return
-        self.from_start(start, born_at(special))
+        self.from_start(start, born_at(special), options)
 
-    def from_branch_point(self, special: SpecialPoint) -> None:
+    def from_branch_point(
+        self, special: SpecialPoint, options: ContinuationOptions | None = None
+    ) -> None:
         """Follow the other branch through a branch point both ways, unless it is known."""
-        if any(_is_same_crossing(special, other) for other in self.crossings):
+        if not self._is_new_crossing(special):
             return
-        self.crossings.append(special)
         try:
             starts = switch_at_branch_point(special)
         except LocateError as error:
             self.notes.append(str(error))
             return
         for start in starts:
-            self.from_start(start, f"from the branch point at {special.frequency_hz:.6g} Hz")
+            origin = f"from the branch point at {special.frequency_hz:.6g} Hz"
+            self.from_start(start, origin, options)
 
-    def from_start(self, start: BranchPoint, origin: str) -> None:
+    def from_start(
+        self, start: BranchPoint, origin: str, options: ContinuationOptions | None = None
+    ) -> None:
         """Follow a branch from its first point one way, unless it is known or out of range."""
         low, high = self.range_hz
         if not low < start.orbit.frequency_hz < high or self.known(start.orbit):
             return
         progress = partial(self.progress, f"1/{start.orbit.period}")
         open_ends = tuple(self.open_ends(start.orbit.period))
-        course = Course(self.range_hz, self.options, open_ends)
+        course = Course(self.range_hz, options or self.options, open_ends)
         branch = self.checkpoint.branch_from(start.orbit, course)
         if branch is not None:
             branch = branch.extend(progress=progress, checkpoint=self.checkpoint)

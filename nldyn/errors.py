@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from numbers import Integral, Real
 from reprlib import repr as shortened
-from typing import TypeGuard
+from typing import Any, TypeGuard
 
 LARGEST_FREQUENCY = 1e12  # Hz, of an excitation
 
@@ -39,6 +40,35 @@ def check_frequency(name: str, value: object) -> None:
         raise SystemModelError(
             f"{name} must be positive and at most {LARGEST_FREQUENCY:g}, got {shown(value)}"
         )
+
+
+def check_types(**arguments: tuple[Any, ...]) -> None:
+    """Refuse arguments of a wrong type: each a value with its classes, None if optional.
+
+    Examples
+    --------
+    >>> check_types(name=(3, str))
+    Traceback (most recent call last):
+        ...
+    nldyn.errors.SystemModelError: name must be a str, got 3
+    """
+    for name, (value, *classes) in arguments.items():
+        if not any(value is None if c is None else isinstance(value, c) for c in classes):
+            words = " or ".join(_article(c) for c in classes)
+            raise SystemModelError(f"{name} must be {words}, got {shown(value)}")
+
+
+def _article(kind: Any) -> str:
+    if kind is None or kind is Callable:
+        return "None" if kind is None else "a function"
+    name: str = kind.__name__
+    return f"an {name}" if name[0] in "AEIOU" else f"a {name}"
+
+
+def check_positive(name: str, value: object) -> None:
+    """Refuse anything but a positive, finite number, under its name."""
+    if not (is_finite(value) and value > 0.0):
+        raise SystemModelError(f"{name} must be a positive number, got {shown(value)}")
 
 
 def check_whole(name: str, value: object, least: int, most: int | None = None) -> None:

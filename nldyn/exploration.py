@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from nldyn.branch import Branch, minimal_period, same_orbit, stroboscopic
+from nldyn.checkpoint import Checkpoint
 from nldyn.continuation import ContinuationOptions, check_range, shifts
 from nldyn.diagrams import Collector, Diagram, Progress
 from nldyn.errors import SystemModelError, check_whole, is_finite, shown
@@ -28,7 +31,7 @@ from nldyn.system import System
 
 RETURNS = 3.0  # recorded periods after settling, over the longest period looked for
 DECAYS = 4.0  # time allowed for settling, over the slowest decay time of the linear part
-SETTLING = (30, 600)  # fewest and most periods of it
+FEWEST, UNDAMPED = 30, 600  # periods of it: at least, and where nothing decays
 NEAR = 0.1  # a return within this share of the motion is worth a Newton iteration
 LONGEST = 0.5  # step of a deflated iteration, relative to the orbit
 ITERATIONS = 40  # of a deflated iteration
@@ -45,8 +48,16 @@ class ExploreOptions:
         is stable only in a narrower window may be missed.
     starts : int
         Random initial states at each of them, beside the motions of the frequency before.
+    settling : int
+        Most excitation periods after which a motion may have settled. The limit itself follows the
+        damping; where this one cuts it, the report says so.
     unstable_period : int
         Largest period multiple of unstable orbits looked for by near returns and deflation.
+    doubled_period : int
+        Longest orbits followed from flips, if longer than those looked for.
+    doubled_points : int, optional
+        Most points in one direction of a branch that is longer in period than those looked for;
+        as on the others unless given. A note names each branch that is broken off.
     seed : int
         Seed of the random initial states: results are repeatable.
 
@@ -58,7 +69,10 @@ class ExploreOptions:
 
     spacing: float = 0.005
     starts: int = 12
+    settling: int = 50000
     unstable_period: int = 3
+    doubled_period: int = 1
+    doubled_points: int | None = None
     seed: int = 20
 
     def __post_init__(self) -> None:
@@ -67,7 +81,11 @@ class ExploreOptions:
                 f"explore: spacing must lie between 0 and 1, got {shown(self.spacing)}"
             )
         check_whole("explore: starts", self.starts, 1)
+        check_whole("explore: settling", self.settling, 1)
         check_whole("explore: unstable_period", self.unstable_period, 0)
+        check_whole("explore: doubled_period", self.doubled_period, 1)
+        if self.doubled_points is not None:
+            check_whole("explore: doubled_points", self.doubled_points, 2)
         check_whole("explore: seed", self.seed, 0)
 
 
@@ -92,6 +110,84 @@ class Coverage:
     unsettled: int
     failed: int
 
+    def with_more(self, other: Coverage) -> Coverage:
+        """Both together."""
+        return Coverage(
+            self.frequency_hz,
+            tuple(sorted({*self.periods, *other.periods})),
+            self.settled + other.settled,
+            self.unsettled + other.unsettled,
+            self.failed + other.failed,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What is explored, and how.
+
+    Parameters
+    ----------
+    flow : FlowMap
+        Of the system.
+    range_hz : (float, float)
+        Frequencies in Hz.
+    max_period : int
+        Longest orbits looked for.
+    observe : str
+        Interface whose displacement is reported.
+    effort : ExploreOptions
+        How much is simulated.
+    options : ContinuationOptions
+        Step control.
+    """
+
+    flow: FlowMap
+    range_hz: tuple[float, float]
+    max_period: int
+    observe: str
+    effort: ExploreOptions
+    options: ContinuationOptions
+
+    @property
+    def frequencies(self) -> list[float]:
+        """Frequencies in Hz at which motions are simulated, ascending."""
+        low, high = self.range_hz
+        count = math.ceil(math.log(high / low) / self.effort.spacing) + 1
+        found: list[float] = np.geomspace(low, high, count).tolist()
+        return found
+
+    def same(self, other: Question) -> bool:
+        """Whether another question is this one."""
+        from nldyn.store import same_flow
+
+        mine, its = (
+            (q.range_hz, q.max_period, q.observe, q.effort, q.options) for q in (self, other)
+        )
+        return mine == its and same_flow(self.flow, other.flow)
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """How far an exploration has come: all that its further steps depend on, beside the branches.
+
+    Parameters
+    ----------
+    steps : int
+        Frequencies done, on the way up and then down.
+    branches, notes : int
+        How many of those in the diagram these steps have found and followed up.
+    carried : (k, 2n)
+        States from which the next frequency starts, beside the random ones.
+    coverage : tuple of Coverage
+        One for each frequency reached, ascending, with what both ways found there.
+    """
+
+    steps: int
+    branches: int
+    notes: int
+    carried: Real
+    coverage: tuple[Coverage, ...]
+
 
 @dataclass(frozen=True, eq=False)
 class Exploration:
@@ -101,42 +197,89 @@ class Exploration:
     ----------
     diagram : Diagram
         All branches, with notes.
-    coverage : tuple of Coverage
-        One for each frequency, ascending.
+    question : Question
+        What was explored, and how.
+    stage : Stage
+        How far it has come.
     """
 
     diagram: Diagram
-    coverage: tuple[Coverage, ...]
+    question: Question
+    stage: Stage
+
+    @property
+    def coverage(self) -> tuple[Coverage, ...]:
+        """What the simulations came to, one for each frequency, ascending."""
+        return self.stage.coverage
+
+    @property
+    def finished(self) -> bool:
+        """Whether all frequencies were done, on the way up and down."""
+        return self.stage.steps == 2 * len(self.question.frequencies)
 
     @property
     def settled_share(self) -> float:
         """Share of all simulations that ended on an orbit of one of the branches."""
         settled = sum(c.settled for c in self.coverage)
         total = sum(c.settled + c.unsettled + c.failed for c in self.coverage)
-        return settled / total
+        return settled / total if total else math.nan
+
+    def save(self, path: str | Path) -> None:
+        """Write branches and coverage to one HDF5 file that `load_exploration` reads.
+
+        Also `load_diagram` and `load_branches` read it.
+
+        Raises
+        ------
+        OutputError, SystemModelError
+            As `Branch.save`.
+        """
+        from nldyn.store import save_exploration
+
+        save_exploration(path, self)
 
     def report(self) -> str:
         """What was found, tried and left unexplained, in a few lines."""
-        counts: dict[str, int] = {}
-        for branch in self.diagram.branches:
-            kind = "harmonic" if branch.period == 1 else f"1/{branch.period}"
-            counts[kind] = counts.get(kind, 0) + 1
+        counts = Counter(
+            "harmonic" if branch.period == 1 else f"1/{branch.period}"
+            for branch in self.diagram.branches
+        )
         low, high = self.diagram.range_hz
+        found = ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "none"
+        first = f"{low:g} to {high:g} Hz: {len(self.diagram.branches)} branches ({found})"
+        return "\n".join([first, *self.coverage_lines(), *self.diagram.notes])
+
+    def coverage_lines(self) -> list[str]:
+        """What was tried and left unexplained, line by line."""
         simulations = sum(c.settled + c.unsettled + c.failed for c in self.coverage)
-        lines = [
-            f"{low:g} to {high:g} Hz: {len(self.diagram.branches)} branches ("
-            + ", ".join(f"{n} {kind}" for kind, n in counts.items())
-            + ")",
-            f"{simulations} simulations at {len(self.coverage)} frequencies, "
-            f"{100.0 * self.settled_share:.1f} % ended on one of them",
-        ]
+        lines = []
+        if simulations:
+            lines.append(
+                f"{simulations} simulations at {len(self.coverage)} frequencies, "
+                f"{100.0 * self.settled_share:.1f} % ended on one of the branches"
+            )
+        if not self.finished:
+            total = 2 * len(self.question.frequencies)
+            lines.append(f"not finished: {self.stage.steps} of {total} steps up and down are done")
         open_ranges = ", ".join(f"{a:.4g}-{b:.4g}" for a, b in self.unsettled_ranges())
         if open_ranges:
             lines.append(
                 f"motions that did not settle (chaos, longer periods or slow decay): "
                 f"{open_ranges} Hz"
             )
-        return "\n".join(lines + list(self.diagram.notes))
+        return lines + self._cut()
+
+    def _cut(self) -> list[str]:
+        """Where the motions had less time to settle than the damping asks for."""
+        system, limit = self.question.flow.system, self.question.effort.settling
+        needed = [(settling_periods(system, c.frequency_hz), c.frequency_hz) for c in self.coverage]
+        cut = [hz for periods, hz in needed if periods > limit]
+        if not cut:
+            return []
+        return [
+            f"settling was cut at {limit} periods from {cut[0]:.4g} to {cut[-1]:.4g} Hz; the "
+            f"slowest motion takes up to {max(needed)[0]} there"
+        ]
 
     def unsettled_ranges(self) -> list[tuple[float, float]]:
         """Ranges of neighbouring frequencies in Hz at which some simulations did not settle."""
@@ -160,6 +303,7 @@ def explore(
     effort: ExploreOptions | None = None,
     options: ContinuationOptions | None = None,
     progress: Progress | None = None,
+    checkpoint: str | Path | None = None,
 ) -> Exploration:
     """Find the branches of periodic orbits in a range of frequencies, without initial guesses.
 
@@ -189,6 +333,10 @@ def explore(
         Step control.
     progress : callable, optional
         Called as ``progress(what, frequency_hz)``.
+    checkpoint : str or Path, optional
+        File that keeps what is found, written now and then, at the end, and when an exception such
+        as Ctrl-C ends the exploration; `load_exploration` reads it at any time. If it holds this
+        very exploration, that one goes on and gives what an uninterrupted one gives.
 
     Returns
     -------
@@ -197,7 +345,9 @@ def explore(
     Raises
     ------
     SystemModelError
-        For input that makes no sense.
+        For input that makes no sense, or if `checkpoint` holds something else.
+    OutputError
+        If `checkpoint` cannot be written.
 
     Examples
     --------
@@ -212,58 +362,112 @@ def explore(
     flow = system if isinstance(system, FlowMap) else FlowMap(system)
     low, high = check_range(range_hz)
     check_whole("max_period", max_period, 1)
-    effort = effort or ExploreOptions()
-    box = Collector(
+    question = Question(
         flow,
         (low, high),
+        max_period,
         check_observe(flow.system, observe),
+        effort or ExploreOptions(),
         options or ContinuationOptions(),
+    )
+    box = Collector(
+        flow,
+        question.range_hz,
+        question.observe,
+        question.options,
         progress or (lambda what, frequency_hz: None),
     )
-    survey = _Survey(box, max_period, effort)
-    count = math.ceil(math.log(high / low) / effort.spacing) + 1
-    frequencies = np.geomspace(low, high, count).tolist()
-    coverage = survey.sweep(frequencies, effort.starts)
-    survey.sweep(frequencies[::-1], 0)
-    diagram = Diagram(tuple(box.branches), (low, high), box.observe, tuple(box.notes))
-    return Exploration(diagram, tuple(coverage))
+    survey = _Survey(box, question)
+    if checkpoint is not None:
+        survey.keep_in(checkpoint)
+    with box.checkpoint:
+        frequencies = question.frequencies
+        way = [*((hz, question.effort.starts) for hz in frequencies)]
+        way += [(hz, 0) for hz in frequencies[::-1]]
+        for frequency, starts in way[survey.stage.steps :]:
+            survey.step(frequency, starts)
+    return survey.so_far(box.branches)
 
 
-@dataclass
 class _Survey:
     """Simulations over frequencies that fill a box of branches."""
 
-    box: Collector
-    max_period: int
-    effort: ExploreOptions
+    def __init__(self, box: Collector, question: Question) -> None:
+        self.box, self.question = box, question
+        self.max_period, self.effort = question.max_period, question.effort
+        nothing = np.empty((0, 2 * question.flow.system.size))
+        self.stage = Stage(0, 0, 0, nothing, ())
 
-    def sweep(self, frequencies: Sequence[float], starts: int) -> list[Coverage]:
-        """Simulate at one frequency after the other, from random states and what came before."""
-        size = 2 * self.box.flow.system.size
-        carried = np.empty((0, size))
-        found = []
-        for frequency in frequencies:
-            self.box.progress("explore", frequency)
-            flow, omega = self.box.flow, 2.0 * math.pi * frequency
-            fresh = random_states(flow, omega, starts, self.effort.seed)
-            settling = settling_periods(flow.system, frequency)
-            recorded = math.ceil(RETURNS * self.max_period) + 1
-            strobe = simulate(flow, omega, np.concatenate([carried, fresh]), 5, settling + recorded)
-            orbits, settled, wandering = self._attractors(strobe.runs, omega)
-            if starts:
-                self._unstable(wandering, orbits, omega)
-            ends = [stroboscopic(orbit)[0] for orbit in orbits]
-            carried = np.array(ends + [run[-1] for run in wandering[:1]]).reshape(-1, size)
-            found.append(
-                Coverage(
-                    frequency,
-                    tuple(sorted({orbit.period for orbit in orbits})),
-                    settled,
-                    len(wandering),
-                    len(strobe.failures),
+    def keep_in(self, path: str | Path) -> None:
+        """Keep everything in a file, and begin where the exploration in it ended, if there is one.
+
+        Raises
+        ------
+        SystemModelError, OutputError
+            As `explore`.
+        """
+        from nldyn.store import check_writable, load_exploration, save_exploration
+
+        place = check_writable(path)
+        earlier: Sequence[Branch] = ()
+        if place.exists():
+            laws = {i: s.law for i, s in enumerate(self.question.flow.system.stops) if s.law}
+            known = load_exploration(place, laws=laws)
+            if not self.question.same(known.question):
+                raise SystemModelError(
+                    f"{path}: holds another exploration (other system, range, periods, effort or "
+                    "options); choose another file, or delete it"
                 )
+            self.stage = known.stage
+            self.box.take_back(
+                known.diagram.branches[: known.stage.branches],
+                known.diagram.notes[: known.stage.notes],
             )
-        return found
+            earlier = known.diagram.branches[known.stage.branches :]
+        self.box.checkpoint = Checkpoint(
+            lambda branches: save_exploration(place, self.so_far(branches)),
+            self.box.branches,
+            earlier,
+        )
+
+    def so_far(self, branches: Sequence[Branch]) -> Exploration:
+        """What the steps that are done have come to, with branches found since then too."""
+        box = self.box
+        diagram = Diagram(tuple(branches), box.range_hz, box.observe, tuple(box.notes))
+        return Exploration(diagram, self.question, self.stage)
+
+    def step(self, frequency: float, starts: int) -> None:
+        """Simulate at one frequency, from random states and what came before."""
+        box, size = self.box, 2 * self.box.flow.system.size
+        box.progress("explore", frequency)
+        flow, omega = box.flow, 2.0 * math.pi * frequency
+        fresh = random_states(flow, omega, starts, self.effort.seed)
+        settling = min(settling_periods(flow.system, frequency), self.effort.settling)
+        recorded = math.ceil(RETURNS * self.max_period) + 1
+        begun = np.concatenate([self.stage.carried, fresh])
+        strobe = simulate(flow, omega, begun, 5, settling + recorded)
+        orbits, settled, wandering = self._attractors(strobe.runs, omega)
+        if starts:
+            self._unstable(wandering, orbits, omega)
+        ends = [stroboscopic(orbit)[0] for orbit in orbits]
+        carried = np.array(ends + [run[-1] for run in wandering[:1]]).reshape(-1, size)
+        here = Coverage(
+            frequency,
+            tuple(sorted({orbit.period for orbit in orbits})),
+            settled,
+            len(wandering),
+            len(strobe.failures),
+        )
+        before, steps = self.stage.coverage, self.stage.steps
+        if steps < len(self.question.frequencies):
+            coverage = (*before, here)
+        else:
+            place = 2 * len(before) - 1 - steps
+            coverage = (*before[:place], before[place].with_more(here), *before[place + 1 :])
+        self.stage = Stage(steps + 1, len(box.branches), len(box.notes), carried, coverage)
+        if box.checkpoint.work is None:
+            box.checkpoint.work = lambda: None  # the coverage is worth keeping without a branch too
+        box.checkpoint.offer()
 
     def _attractors(
         self, runs: Sequence[Real], omega: float
@@ -319,20 +523,30 @@ class _Survey:
 
     def _follow(self, orbit: Orbit) -> None:
         """Follow an orbit's branch unless it is known, and those that it leads to."""
-        count = len(self.box.branches)
-        self.box.from_orbits([orbit])
-        while count < len(self.box.branches):
-            branch = self.box.branches[count]
+        box, count = self.box, len(self.box.branches)
+        longest = max(self.max_period, self.effort.doubled_period)
+        box.from_orbits([orbit])
+        while count < len(box.branches):
+            branch = box.branches[count]
             count += 1
             for special in branch.special_points:
-                if special.kind == "PD" and 2 * branch.period <= self.max_period:
-                    self.box.from_flip(special)
+                if special.kind == "PD" and 2 * branch.period <= longest:
+                    box.from_flip(special, self._options(2 * branch.period))
                 elif special.kind == "BP":
-                    self.box.from_branch_point(special)
+                    box.from_branch_point(special, self._options(branch.period))
+
+    def _options(self, period: int) -> ContinuationOptions:
+        """Step control of the branches of a period."""
+        options, most = self.question.options, self.effort.doubled_points
+        if period <= self.max_period or most is None:
+            return options
+        return replace(options, max_points=most)
 
 
 def settling_periods(system: System, frequency_hz: float) -> int:
-    """Excitation periods after which the slowest linear motion has decayed to e^-4, within bounds.
+    """Excitation periods after which the slowest linear motion has decayed to e^-4, at least 30.
+
+    A motion without damping does not settle; 600 periods show where it goes.
 
     Examples
     --------
@@ -342,10 +556,9 @@ def settling_periods(system: System, frequency_hz: float) -> int:
     64
     """
     slowest = min(-float(np.linalg.eigvals(block).real.max()) for block in system.linear.blocks)
-    fewest, most = SETTLING
     if slowest <= 0.0:
-        return most
-    return int(min(max(math.ceil(DECAYS * frequency_hz / slowest), fewest), most))
+        return UNDAMPED
+    return max(math.ceil(DECAYS * frequency_hz / slowest), FEWEST)
 
 
 def solve_from(box: Collector, start: Real, period: int, omega: float) -> Orbit | None:

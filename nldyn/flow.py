@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import gamma, rgamma
 
 from nldyn._kernels import (
     CONTACT_FAILED,
@@ -40,7 +41,8 @@ __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
 
 _REASONS = {
     OK: "",
-    TOO_MANY_PIECES: "too many contacts, or too fast a mode, for one segment (more segments help)",
+    TOO_MANY_PIECES: "more than 20000 flights and contact panels in one segment: too many contacts "
+    "or too fast a mode (more segments help)",
     CONTACT_FAILED: "a contact phase could not be resolved",
     DIVERGED: "Newton's method diverged",
     SINGULAR: "singular Jacobian",
@@ -58,7 +60,8 @@ class FlowOptions:
         Relative error to aim at in the state after a period, 1e-13 to 1e-2; that of the Jacobian
         is about ten times as large. It sets the two others unless these are given.
     nodes : int, optional
-        Gauss nodes on a contact panel, 4 to 40; the end of a panel is accurate to order 2 nodes.
+        Gauss nodes on a contact panel, 4 to 40, and more where the exponent of a stop needs them;
+        the end of a panel is accurate to order 2 nodes.
     tail : float, optional
         A panel is halved until the last two Legendre coefficients of its force are below this
         fraction of the largest force. The error at its end goes with the square.
@@ -112,9 +115,32 @@ class FlowOptions:
         """Error allowed in the instant of an event, as a share of the panel before it.
 
         The slope of the force starts with the power ``exponent - 1`` of the time, so an error ε
-        of its start costs ε^exponent in the Jacobian.
+        of its start costs ε^exponent in the Jacobian. More than a millionth would make events of
+        two stops look simultaneous.
         """
-        return 1e-13 if exponent < 1.5 else (1e-2 * self.rtol) ** (1.0 / exponent)
+        if exponent < 1.5:
+            return 1e-13
+        return min(float((1e-2 * self.rtol) ** (1.0 / exponent)), 1e-6)
+
+
+def _nodes_for_switch(power: float, nodes: int, tail: float) -> int:
+    """Nodes, not fewer than asked for, with which the force after a switch can be resolved.
+
+    On a panel that is short enough the force goes as s^power and its slope, times dχ/ds, as
+    s^(power - 1); with too few nodes their Legendre tails stay above what is accepted, however
+    short it is. The coefficients of s^p are (2k+1) Γ(p+1)² / (Γ(p-k+1) Γ(p+k+2)).
+    """
+
+    def coefficient(p: float, k: int) -> float:
+        shares = rgamma(p - k + 1.0) * rgamma(p + k + 2.0)
+        return abs(float((2 * k + 1) * gamma(p + 1.0) ** 2 * shares))
+
+    while any(
+        coefficient(power, k) > tail or coefficient(power - 1.0, k) > 4.0 * tail
+        for k in (nodes - 2, nodes - 1)
+    ):
+        nodes += 1
+    return nodes
 
 
 @dataclass(frozen=True)
@@ -227,8 +253,13 @@ class FlowMap:
     @cached_property
     def tables(self) -> GaussTables:
         """Collocation tables."""
-        smooth = all(float(2.0 * stop.exponent).is_integer() for stop in self.system.stops)
-        return gauss_tables(self.options.panel_nodes, 2 if smooth else 4)
+        exponents = [stop.exponent for stop in self.system.stops]
+        smooth = all(float(2.0 * exponent).is_integer() for exponent in exponents)
+        power = 2 if smooth else 4
+        nodes, tail = self.options.panel_nodes, self.options.panel_tail
+        for exponent in exponents:
+            nodes = _nodes_for_switch(power * exponent, nodes, tail)
+        return gauss_tables(nodes, power)
 
     @cached_property
     def rows(self) -> Real:
@@ -482,8 +513,8 @@ class FlowMap:
             np.empty(capacity, dtype=np.int64),
             np.empty(capacity, dtype=np.int64),
             np.empty((capacity, 2 * self.system.size)),
-            np.empty((capacity, len(self.system.stops), self.options.panel_nodes)),
-            np.empty((capacity, len(self.system.stops), self.options.panel_nodes)),
+            np.empty((capacity, len(self.system.stops), self.tables.nodes.size)),
+            np.empty((capacity, len(self.system.stops), self.tables.nodes.size)),
             np.zeros(2, dtype=np.int64),
         )
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nldyn.errors import check_whole
+from nldyn.errors import check_types, check_whole
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit, check_observe
 
@@ -69,9 +69,12 @@ def spectrum(orbit: Orbit, interface: str | None = None, *, orders: int = 30) ->
     >>> bool(abs(lines.amplitude[1] / orbit.max_abs_displacement - 1.0) < 1e-9)
     True
     """
-    check_whole("spectrum: orders", orders, 1)
+    check_types(orbit=(orbit, Orbit), interface=(interface, str, None))
+    check_whole("spectrum: orders", orders, 1, 10**4)
     system = orbit.system
-    phi = system.participation[check_observe(system, interface or orbit.observe)]
+    phi = system.participation[
+        check_observe(system, orbit.observe if interface is None else interface)
+    ]
     lines = orders * orbit.period
     samples = 2 ** int(np.ceil(np.log2(8 * lines)))
     found = _coefficients(orbit, phi, lines, samples)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nldyn.branch import BranchPoint, SpecialPoint
+from nldyn.branch import BranchPoint, SpecialPoint, check_special
 from nldyn.critical import (
     CoefficientError,
     Coefficients,
@@ -25,7 +25,7 @@ from nldyn.critical import (
     loop_of,
     torus,
 )
-from nldyn.errors import SystemModelError
+from nldyn.errors import SystemModelError, check_positive, check_types
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
 from nldyn.special import LocateError
@@ -114,6 +114,10 @@ def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> N
     ----------
     Yu. A. Kuznetsov (2004), *Elements of Applied Bifurcation Theory*, 3rd ed., section 5.4.
     """
+    check_special("describe", special, of_branch=getattr(special, "kind", "") in ("GR", "BP"))
+    check_types(others=(others, Sequence))
+    for other in others:
+        check_special("describe: others", other, of_branch=False)
     if special.kind == "GR":
         return _grazing(special, others)
     kinds = {"LP": _fold, "PD": _flip, "NS": _torus, "BP": _branch_point}
@@ -343,8 +347,8 @@ def switch_at_branch_point(
     LocateError
         If the other branch is not found.
     """
-    if special.kind != "BP":
-        raise SystemModelError(f"switch_at_branch_point needs a BP point, got {special.kind}")
+    check_special("switch_at_branch_point", special, "BP")
+    check_positive("amplitude", amplitude)
     try:
         direction = other_tangent(special)
     except CoefficientError as error:

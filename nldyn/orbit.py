@@ -414,6 +414,11 @@ class Orbit:
         states[order] = self.trajectory.states(within[order])
         return self.problem.flow.to_modal(states)
 
+    def penetration(self, stop: int, phases: Real) -> Real:
+        """Penetration of a stop (m, negative when open) at any forcing phases."""
+        states = self.states(phases)
+        return _depth_and_speed(self.system, self.system.stops[stop], states)[0]
+
     def history(self, samples: int = 1000) -> History:
         """Sample one period of the orbit.
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from nldyn.errors import check_types, check_whole
 from nldyn.fourier import spectrum
 from nldyn.linear import Real
 from nldyn.orbit import Orbit, check_observe
@@ -51,7 +52,7 @@ def plot_history(
     >>> ax.get_xlabel(), ax.get_ylabel()
     ('time (s)', 'displacement of middle (µm)')
     """
-    name = check_observe(orbit.system, interface or orbit.observe)
+    name = _checked(orbit, ax, interface, samples)
     phases = _phases(orbit, samples)
     y, _ = _motion(orbit, name, phases)
     factor, unit = length_unit(float(np.abs(y).max()))
@@ -90,7 +91,7 @@ def plot_phase_portrait(
     SystemModelError
         For an unknown interface.
     """
-    name = check_observe(orbit.system, interface or orbit.observe)
+    name = _checked(orbit, ax, interface, samples)
     y, speed = _motion(orbit, name, _phases(orbit, samples))
     factor, unit = length_unit(float(np.abs(y).max()))
     pace, pace_unit = length_unit(float(np.abs(speed).max()))
@@ -136,7 +137,7 @@ def plot_spectrum(
     SystemModelError
         For an unknown interface, or if `orders` is not a whole number of at least 1.
     """
-    name = check_observe(orbit.system, interface or orbit.observe)
+    name = _checked(orbit, ax, interface)
     lines = spectrum(orbit, name, orders=orders)
     factor, unit = length_unit(float(lines.amplitude.max()))
     height = lines.amplitude / factor
@@ -174,6 +175,7 @@ def plot_contact_force(orbit: Orbit, ax: Axes | None = None, *, samples: int = 4
     -------
     matplotlib.axes.Axes
     """
+    _checked(orbit, ax, None, samples)
     phases = _phases(orbit, samples)
     states = orbit.states(phases)
     system = orbit.system
@@ -203,6 +205,13 @@ def plot_contact_force(orbit: Orbit, ax: Axes | None = None, *, samples: int = 4
     ax.set_xlabel("time (s)")
     ax.set_ylabel(f"contact force ({unit})")
     return ax
+
+
+def _checked(orbit: Orbit, ax: Axes | None, interface: str | None, samples: int = 1) -> str:
+    """The interface to draw, after a look at the arguments that all these functions have."""
+    check_types(orbit=(orbit, Orbit), ax=(ax, Axes, None), interface=(interface, str, None))
+    check_whole("samples", samples, 1, 10**7)
+    return check_observe(orbit.system, orbit.observe if interface is None else interface)
 
 
 def _phases(orbit: Orbit, samples: int) -> Real:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from nldyn.branch import Branch
     from nldyn.cascades import Cascade
     from nldyn.diagrams import Diagram
+    from nldyn.exploration import Exploration
     from nldyn.scene_schema import Scene
 
 BRANCH_COLUMNS = (
@@ -52,8 +53,11 @@ SPECIAL_COLUMNS = (
 )
 
 
+COVERAGE_COLUMNS = ("frequency_hz", "periods", "settled", "unsettled", "failed")
+
+
 def write_results(
-    diagram: Diagram,
+    found: Diagram | Exploration,
     directory: str | Path,
     scene: Scene | None = None,
     *,
@@ -63,12 +67,13 @@ def write_results(
 
     Parameters
     ----------
-    diagram : Diagram
-        What `nldyn.scene.compute` gave.
+    found : Diagram or Exploration
+        What `nldyn.scene.compute` or `nldyn.scene.explore_scene` gave.
     directory : str or Path
         New, empty, or written by an earlier run, whose files are replaced; other files in it
         are kept. Gets ``branches.csv``, ``special_points.csv``, ``branches.h5``,
-        ``diagram.png``, ``diagram.svg``, ``summary.json`` and, with a scene, ``scene.toml``.
+        ``diagram.png``, ``diagram.svg``, ``summary.json``, with an exploration ``coverage.csv``
+        and, with a scene, ``scene.toml``.
     scene : Scene, optional
         The scene it was computed from; its text is copied.
     yscale : {"linear", "log"}
@@ -95,12 +100,17 @@ def write_results(
     >>> (folder / "branches.csv").read_text()[:20]
     'branch,point,period,'
     """
+    from nldyn.exploration import Exploration
     from nldyn.plot import save_diagram
 
+    exploration = found if isinstance(found, Exploration) else None
+    diagram = found.diagram if isinstance(found, Exploration) else found
     with result_directory(directory, "run") as folder:
         write_table(folder / "branches.csv", BRANCH_COLUMNS, branch_rows(diagram))
         write_table(folder / "special_points.csv", SPECIAL_COLUMNS, special_rows(diagram))
-        diagram.save(folder / "branches.h5")
+        found.save(folder / "branches.h5")
+        if exploration is not None:
+            write_table(folder / "coverage.csv", COVERAGE_COLUMNS, coverage_rows(exploration))
         save_diagram(diagram, folder, title=scene.title if scene else "", yscale=yscale)
         text = json.dumps(summary(diagram), indent=1, allow_nan=False)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
@@ -117,6 +127,13 @@ def branch_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
         rows = zip(*(columns[name].tolist() for name in BRANCH_COLUMNS[2:]), strict=True)
         for number, row in enumerate(rows):
             yield (branch.name, number, *map(if_known, row))
+
+
+def coverage_rows(found: Exploration) -> Iterable[tuple[object, ...]]:
+    """Give the rows of ``coverage.csv``, one for each frequency."""
+    for c in found.coverage:
+        periods = " ".join(map(str, c.periods))
+        yield (c.frequency_hz, periods, c.settled, c.unsettled, c.failed)
 
 
 def if_known(value: object) -> object:

@@ -20,6 +20,18 @@ _OF_STOPS = ("gap", "stiffness", "exponent", "dissipation")
 _OF_EXCITATION = ("amplitude", "mass_times_radius")
 _OF_DAMPERS = ("coefficient",)
 _OF_MODES = ("modal_damping", "natural_frequency_hz")
+UNITS = {
+    "frequency_hz": "Hz",
+    "gap": "m",
+    "stiffness": "N/m^exponent",
+    "exponent": "1",
+    "dissipation": "s/m",
+    "amplitude": "N",
+    "mass_times_radius": "kg m",
+    "coefficient": "N s/m",
+    "modal_damping": "1",
+    "natural_frequency_hz": "Hz",
+}
 NAMES = (FREQUENCY, *_OF_STOPS, *_OF_EXCITATION, *_OF_DAMPERS, *_OF_MODES)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from nldyn._kernels import DISSIPATION, EXPONENT, GAP, STIFFNESS
 from nldyn.elements import turn
-from nldyn.errors import SystemModelError
+from nldyn.errors import SystemModelError, check_types, check_whole
 from nldyn.linear import Complex
 from nldyn.system import System
 
@@ -38,6 +38,11 @@ class Parameter:
     index : int
         Which of the stops or excitations of the system.
 
+    Raises
+    ------
+    SystemModelError
+        If the name is no text, or the index no whole number of at least -1.
+
     Examples
     --------
     >>> import numpy as np
@@ -54,6 +59,10 @@ class Parameter:
 
     name: str
     index: int = 0
+
+    def __post_init__(self) -> None:
+        check_types(**{"Parameter: name": (self.name, str)})
+        check_whole("Parameter: index", self.index, -1)
 
 
 def parameter_tables(

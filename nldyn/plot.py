@@ -17,6 +17,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
+from nldyn.branch import check_branches
+from nldyn.errors import SystemModelError, check_types, shown
 from nldyn.hover import show_labels
 
 if TYPE_CHECKING:
@@ -191,8 +193,8 @@ def plot_diagram(
 
     Raises
     ------
-    ValueError
-        For a unit that is not one of the four.
+    SystemModelError
+        For what is no branch or no axes, or a scale, kind or unit that there is not.
 
     Examples
     --------
@@ -206,6 +208,11 @@ def plot_diagram(
     """
     several = getattr(diagram, "branches", diagram)
     branches = list(several if isinstance(several, Iterable) else [several])
+    check_branches("diagram", branches)
+    check_types(ax=(ax, Axes, None), special_points=(special_points, Sequence))
+    _check_choice("yscale", yscale, ("linear", "log"))
+    for kind in special_points:
+        _check_choice("special_points", kind, tuple(MARKERS))
     ax = ax if ax is not None else new_axes()
     factor, unit = _unit_of(branches, unit)
     colours = period_colours(branch.period for branch in branches)
@@ -423,7 +430,10 @@ def _unit_of(branches: Sequence[Branch], unit: str | None) -> tuple[float, str]:
     if unit is None:
         largest = [float(np.max(b.max_abs_displacement)) for b in branches if len(b.points)]
         return length_unit(max(largest, default=1.0))
-    for factor, name in PREFIXES:
-        if name == unit:
-            return factor, name
-    raise ValueError(f"'{unit}' is not a unit of the displacement axis; use m, mm, µm or nm")
+    _check_choice("unit", unit, tuple(name for _, name in PREFIXES))
+    return next(prefix for prefix in PREFIXES if prefix[1] == unit)
+
+
+def _check_choice(name: str, value: object, choices: Sequence[str]) -> None:
+    if value not in choices:
+        raise SystemModelError(f"{name} must be one of {', '.join(choices)}, got {shown(value)}")

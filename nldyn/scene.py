@@ -17,13 +17,15 @@ from pydantic import ValidationError
 from nldyn.errors import SceneError, SystemModelError
 from nldyn.scene_checks import check_computable, check_mesh_names, check_ratio_count, check_scene
 from nldyn.scene_messages import KeyPath, from_validation, scene_error, table_at
-from nldyn.scene_schema import ExcitationTable, PartTable, Scene, StopTable
+from nldyn.scene_schema import ContinuationTable, ExcitationTable, PartTable, Scene, StopTable
 
 if TYPE_CHECKING:
     import cms
     import fem
     from nldyn.diagrams import Diagram, Progress
     from nldyn.elements import Damper, Excitation, Stop
+    from nldyn.exploration import Exploration
+    from nldyn.flow import FlowMap
     from nldyn.system import System
 
 __all__ = [
@@ -33,6 +35,7 @@ __all__ = [
     "build_reduced",
     "build_system",
     "compute",
+    "explore_scene",
     "load_scene",
     "parse_scene",
 ]
@@ -309,17 +312,15 @@ def compute(
     >>> len(compute(scene).branches)     # without a stop there is only the resonance curve
     1
     """
-    check_computable(scene, scene.file)
-    system = build_system(scene)
+    if scene.explore is not None:
+        return explore_scene(scene, progress, checkpoint).diagram
+    flow, table = _to_follow(scene)
     from nldyn.continuation import ContinuationOptions
     from nldyn.diagrams import Seed, diagram
-    from nldyn.flow import FlowMap, FlowOptions
 
-    table = scene.continuation
-    assert table is not None
     with _told_as(scene, ("continuation",), SystemModelError):
         return diagram(
-            FlowMap(system, FlowOptions(table.rtol)),
+            flow,
             (table.range_hz[0], table.range_hz[1]),
             table.periods,
             seeds=[Seed(seed.period, seed.near_hz) for seed in scene.subharmonics],
@@ -329,6 +330,79 @@ def compute(
             progress=progress,
             checkpoint=checkpoint,
         )
+
+
+def explore_scene(
+    scene: Scene, progress: Progress | None = None, checkpoint: str | Path | None = None
+) -> Exploration:
+    """Find the branches of a scene with an ``[explore]`` table, and tell how well it was searched.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with an ``[[excitation]]``, a ``[continuation]`` and an ``[explore]``.
+    progress, checkpoint
+        As for `nldyn.explore`.
+
+    Returns
+    -------
+    Exploration
+
+    Raises
+    ------
+    SceneError
+        As for `compute`.
+
+    Examples
+    --------
+    >>> scene = parse_scene('''
+    ... [modal]
+    ... frequencies_hz = [13.1]
+    ... participation.tip = [0.6]
+    ... [damping]
+    ... modal_ratio = 0.02
+    ... [[excitation]]
+    ... at = "tip"
+    ... kind = "harmonic"
+    ... amplitude = 1.0
+    ... [continuation]
+    ... range_hz = [10.0, 16.0]
+    ... [explore]
+    ... max_period = 2
+    ... spacing = 0.1
+    ... ''')
+    >>> explore_scene(scene).settled_share
+    1.0
+    """
+    flow, table = _to_follow(scene)
+    from nldyn.continuation import ContinuationOptions
+    from nldyn.exploration import ExploreOptions, explore
+
+    if scene.explore is None:
+        raise scene_error(scene.file, ("explore",), "is missing")
+    efforts = scene.explore.model_dump()
+    with _told_as(scene, ("explore",), SystemModelError):
+        return explore(
+            flow,
+            (table.range_hz[0], table.range_hz[1]),
+            efforts.pop("max_period"),
+            effort=ExploreOptions(**efforts),
+            options=ContinuationOptions(max_step=table.max_step),
+            progress=progress,
+            checkpoint=checkpoint,
+        )
+
+
+def _to_follow(scene: Scene) -> tuple[FlowMap, ContinuationTable]:
+    """Flow map of a scene that says what to compute."""
+    check_computable(scene, scene.file)
+    system = build_system(scene)
+    from nldyn.flow import FlowMap, FlowOptions
+
+    table = scene.continuation
+    assert table is not None
+    with _told_as(scene, ("continuation",), SystemModelError):
+        return FlowMap(system, FlowOptions(table.rtol)), table
 
 
 def acting_elements(

@@ -40,6 +40,7 @@ def check_scene(scene: Scene, file: Path) -> None:
     _check_matrices(scene, report)
     _check_interface_names(scene, report)
     _check_seeds(scene, report)
+    _check_explore(scene, report)
 
 
 def check_mesh_names(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
@@ -190,6 +191,18 @@ def _check_seeds(scene: Scene, report: Report) -> None:
         if not low <= seed.near_hz <= high:
             fault = f"must lie within continuation.range_hz, not at {seed.near_hz:g}"
             raise report(("subharmonics", number, "near_hz"), fault)
+
+
+def _check_explore(scene: Scene, report: Report) -> None:
+    """Refuse beside [explore] what says where to look."""
+    if scene.explore is None:
+        return
+    if scene.subharmonics:
+        raise report(("subharmonics",), "is of no use beside [explore]; keep one of them")
+    if scene.continuation is not None:
+        for key in ("periods", "follow_doublings", "search_points"):
+            if key in scene.continuation.model_fields_set:
+                raise report(("continuation", key), "is of no use beside [explore]; keep one")
 
 
 def _interfaces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:

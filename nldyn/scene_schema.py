@@ -286,6 +286,19 @@ class SeedTable(Table):
     near_hz: Frequency
 
 
+class ExploreTable(Table):
+    """``[explore]``: find all branches without naming places to look at."""
+
+    max_period: Period = 8
+    spacing: Annotated[float, Field(ge=1e-6, le=0.5)] = 0.005
+    starts: Annotated[int, Field(ge=1, le=1000)] = 12
+    settling: Annotated[int, Field(ge=1, le=10_000_000)] = 50000
+    unstable_period: Annotated[int, Field(ge=0, le=100)] = 3
+    doubled_period: Period = 1
+    doubled_points: Annotated[int, Field(ge=2, le=1_000_000)] | None = None
+    seed: Annotated[int, Field(ge=0, le=2**32)] = 20
+
+
 class Scene(Table):
     """A whole scene: a structure, what acts on it, and what to compute.
 
@@ -318,6 +331,7 @@ class Scene(Table):
     observe: ObserveTable | None = None
     continuation: ContinuationTable | None = None
     subharmonics: list[SeedTable] = []
+    explore: ExploreTable | None = None
 
     _file: Path = PrivateAttr(default=Path("scene.toml"))
     _text: str = PrivateAttr(default="")

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from nldyn._events import (
+    alone,
     branch_point_test,
     dip,
     extreme_dip,
@@ -29,6 +30,7 @@ PRECISION = 1e-9  # in σ, to which a special point is located
 CROSSING_ERROR = 1e-8  # relative, of an orbit where branches cross
 NEIGHBOUR = 1e-3  # arclength between two branch points at one turn, and dP/ds there
 SAME = 1e-7  # arclength between two branch points that cannot be told apart
+ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
 
 
@@ -219,11 +221,14 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
     chord = Chord(a, b)
     before, after = tests(a), tests(b)
     changed = [k for k in before if before[k] * after[k] < 0.0]
+    if "NS" in changed and not leaves_circle(a.orbit.multipliers, b.orbit.multipliers):
+        changed.remove("NS")
     kinds = [k for k in changed if not (k == "BP" and "LP" in changed)]
     lonely_fold = "LP" in changed and "BP" not in changed
     contacts = abs(a.orbit.impacts - b.orbit.impacts)
     touches = touching_extremes(a.orbit, b.orbit)
     clear = len(touches) == contacts and len(kinds) + contacts <= 1 and not lonely_fold
+    clear = clear and not changes_hidden_by_birth(a.orbit, b.orbit)
     if not clear and depth < 10:
         middle = chord.at(0.5)
         return special_points_between(a, middle, depth + 1) + special_points_between(
@@ -342,11 +347,46 @@ def touching_extremes(a: Orbit, b: Orbit) -> list[Touch]:
     return touches
 
 
+def leaves_circle(before: Complex, after: Complex) -> bool:
+    """Whether the pair nearest to the unit circle lies beside it at one of two orbits.
+
+    The pair of a mode without damping stays on it, where the torus test is rounding noise.
+    """
+    return any(_pair_off_circle(mu)[1] > ON_CIRCLE for mu in (before, after))
+
+
+def _pair_off_circle(multipliers: Complex) -> tuple[complex, float]:
+    """One of the two multipliers whose product is nearest to 1, and how far that is from 1."""
+    i, j = np.triu_indices(multipliers.size, 1)
+    off = np.abs(multipliers[i] * multipliers[j] - 1.0)
+    nearest_one = int(np.argmin(off))
+    return complex(multipliers[i[nearest_one]]), float(off[nearest_one])
+
+
+def changes_hidden_by_birth(a: Orbit, b: Orbit) -> bool:
+    """Whether extremes that only one of two orbits has are across the stop in the other.
+
+    A maximum and a minimum of the penetration that are born together in flight may both reach the
+    stop before the next point: a new contact and its union with another one, after which there are
+    as many contacts as before.
+    """
+    full = 2.0 * math.pi * a.period
+    for output in range(len(a.system.stops)):
+        first, last = a.extremes(output), b.extremes(output)
+        if first.phases.size == last.phases.size:
+            continue
+        fewer = a
+        if first.phases.size > last.phases.size:
+            fewer, first, last = b, last, first
+        new = alone(first.phases, first.is_maximum, last.phases, last.is_maximum, full)
+        if np.any(last.values[new] * fewer.penetration(output, last.phases[new]) < 0.0):
+            return True
+    return False
+
+
 def _on_unit_circle(multipliers: Complex) -> bool:
     """Whether a complex pair (not a real pair μ, 1/μ) is what makes the torus test vanish."""
-    i, j = np.triu_indices(multipliers.size, 1)
-    nearest_one = int(np.argmin(np.abs(multipliers[i] * multipliers[j] - 1.0)))
-    mu = multipliers[i[nearest_one]]
+    mu = _pair_off_circle(multipliers)[0]
     return bool(abs(mu.imag) > 1e-6 * abs(mu))
 
 

@@ -30,6 +30,7 @@ from nldyn.continuation import ContinuationOptions
 from nldyn.diagrams import Diagram
 from nldyn.elements import Damper, Excitation, HarmonicForce, Stop, Unbalance
 from nldyn.errors import SystemModelError, shown
+from nldyn.exploration import Coverage, Exploration, ExploreOptions, Question, Stage
 from nldyn.flow import FlowMap, FlowOptions, Trajectory
 from nldyn.linear import LinearPart, Real
 from nldyn.orbit import Orbit
@@ -63,8 +64,17 @@ def save_branches(path: str | Path, branches: Sequence[Branch]) -> None:
 
 def save_diagram(path: str | Path, diagram: Diagram) -> None:
     """Write a diagram with its branches to one file, whole or not at all; see `Diagram.save`."""
-    attributes = {"range_hz": diagram.range_hz, "observe": diagram.observe, "notes": diagram.notes}
-    write_whole(path, _content(diagram.branches, attributes))
+    write_whole(path, _content(diagram.branches, _of_diagram(diagram)))
+
+
+def save_exploration(path: str | Path, found: Exploration) -> None:
+    """Write an exploration to one file, whole or not at all; see `Exploration.save`."""
+    diagram = found.diagram
+    write_whole(path, _content(diagram.branches, _of_diagram(diagram), found))
+
+
+def _of_diagram(diagram: Diagram) -> dict[str, Any]:
+    return {"range_hz": diagram.range_hz, "observe": diagram.observe, "notes": diagram.notes}
 
 
 def load_branch(path: str | Path, name: str | None = None, *, laws: Laws | None = None) -> Branch:
@@ -111,7 +121,7 @@ def load_branch(path: str | Path, name: str | None = None, *, laws: Laws | None 
 def load_branches(path: str | Path, *, laws: Laws | None = None) -> list[Branch]:
     """Read all branches of a file; see `load_branch`."""
     with _opened(path) as root:
-        return _read_branches(root, laws or {})
+        return _read_branches(root, _read_flows(root, laws or {}))
 
 
 def load_diagram(path: str | Path, *, laws: Laws | None = None) -> Diagram:
@@ -136,10 +146,35 @@ def load_diagram(path: str | Path, *, laws: Laws | None = None) -> Diagram:
     with _opened(path) as root:
         if not root.has_attribute("range_hz"):
             raise SystemModelError(f"{path}: holds branches without a diagram; use load_branches")
-        range_hz = root.pair("range_hz")
-        notes = tuple(root.texts("notes"))
-        observe = root.text("observe")
-        return Diagram(tuple(_read_branches(root, laws or {})), range_hz, observe, notes)
+        return _read_diagram(root, _read_flows(root, laws or {}))
+
+
+def load_exploration(path: str | Path, *, laws: Laws | None = None) -> Exploration:
+    """Read an exploration that `Exploration.save` wrote, or what `explore` keeps while it works.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    laws : mapping of int to callable, optional
+        See `load_branch`.
+
+    Returns
+    -------
+    Exploration
+
+    Raises
+    ------
+    SystemModelError
+        As `load_branch`, and if the file holds no exploration.
+    """
+    with _opened(path) as root:
+        if "exploration" not in root:
+            raise SystemModelError(f"{path}: holds no exploration; use load_branches")
+        flows = _read_flows(root, laws or {})
+        diagram = _read_diagram(root, flows)
+        question, stage = _read_exploration(root.group("exploration"), flows, diagram)
+        return Exploration(diagram, question, stage)
 
 
 def same_flow(a: FlowMap, b: FlowMap) -> bool:
@@ -212,7 +247,11 @@ def write_whole(path: str | Path, content: bytes) -> None:
         draft.unlink(missing_ok=True)
 
 
-def _content(branches: Sequence[Branch], attributes: Mapping[str, Any]) -> bytes:
+def _content(
+    branches: Sequence[Branch],
+    attributes: Mapping[str, Any],
+    exploration: Exploration | None = None,
+) -> bytes:
     """The bytes of a file of branches."""
     memory = io.BytesIO()
     flows: list[FlowMap] = []
@@ -225,6 +264,8 @@ def _content(branches: Sequence[Branch], attributes: Mapping[str, Any]) -> bytes
         groups = file.create_group("branches")
         for number, branch in enumerate(branches):
             _write_branch(groups.create_group(f"{number:04d}"), branch, flows)
+        if exploration is not None:
+            _write_exploration(file.create_group("exploration"), exploration, flows)
         maps = file.create_group("flow_maps")
         for number, flow in enumerate(flows):
             _write_flow(maps.create_group(f"{number:04d}"), flow)
@@ -245,9 +286,7 @@ def _write_branch(group: Any, branch: Branch, flows: list[FlowMap]) -> None:
                 f"branch '{branch.name}' cannot be saved: its points are of different systems, "
                 "flow maps or shooting problems"
             )
-    if not any(same_flow(problem.flow, flow) for flow in flows):
-        flows.append(problem.flow)
-    number = next(i for i, flow in enumerate(flows) if same_flow(flow, problem.flow))
+    number = _number_of(problem.flow, flows)
     for key, value in {
         "name": branch.name,
         "period": branch.period,
@@ -269,6 +308,40 @@ def _write_branch(group: Any, branch: Branch, flows: list[FlowMap]) -> None:
         _put(table, name, column, UNITS[name])
     if branch.course is not None:
         _write_course(group.create_group("course"), branch.course)
+
+
+def _number_of(flow: FlowMap, flows: list[FlowMap]) -> int:
+    """Number of a flow map among those of the file, to which it is added if it is new."""
+    if not any(same_flow(flow, other) for other in flows):
+        flows.append(flow)
+    return next(i for i, other in enumerate(flows) if same_flow(other, flow))
+
+
+def _write_exploration(group: Any, found: Exploration, flows: list[FlowMap]) -> None:
+    question, stage = found.question, found.stage
+    _set_attribute(group, "flow_map", _number_of(question.flow, flows))
+    _set_attribute(group, "max_period", question.max_period)
+    for name, value in asdict(question.effort).items():
+        if value is not None:
+            _set_attribute(group, f"effort {name}", value)
+    _write_options(group, question.options)
+    for name in ("steps", "branches", "notes"):
+        _set_attribute(group, name, getattr(stage, name))
+    _put(group, "carried", stage.carried, STATE_UNIT)
+    table = group.create_group("coverage")
+    coverage = stage.coverage
+    _put(table, "frequency_hz", np.array([c.frequency_hz for c in coverage], dtype=float), "Hz")
+    for name in ("settled", "unsettled", "failed"):
+        _put(table, name, np.array([getattr(c, name) for c in coverage], dtype=np.int64), "1")
+    attractors = np.array([len(c.periods) for c in coverage], dtype=np.int64)
+    periods = np.array([n for c in coverage for n in c.periods], dtype=np.int64)
+    _put(table, "different_periods", attractors, "1")
+    _put(table, "periods", periods, "1; those of one frequency after the other")
+
+
+def _write_options(group: Any, options: ContinuationOptions) -> None:
+    for name, value in asdict(options).items():
+        _set_attribute(group, f"option {name}", value)
 
 
 def _write_points(group: Any, points: Sequence[BranchPoint], problem: ShootingProblem) -> None:
@@ -314,8 +387,7 @@ def _write_course(group: Any, course: Course) -> None:
     _set_attribute(group, "start", course.start)
     _set_attribute(group, "special_points_before", course.special_points_before)
     _set_attribute(group, "notes_before", course.notes_before)
-    for name, value in asdict(course.options).items():
-        _set_attribute(group, f"option {name}", value)
+    _write_options(group, course.options)
     _put(group, "at", np.array(course.at, dtype=float), "Hz")
     ends = group.create_group("open_ends")
     for number, end in enumerate(course.open_ends):
@@ -507,8 +579,10 @@ class _Group:
 
 
 @contextmanager
-def _opened(path: str | Path) -> Iterator[_Group]:
-    """The root of a file that this version can read."""
+def _opened(
+    path: str | Path, format_: str = FORMAT, version: int = FORMAT_VERSION
+) -> Iterator[_Group]:
+    """The root of a file of a format that this version can read."""
     try:
         content = Path(path).read_bytes()
     except TypeError:
@@ -525,7 +599,7 @@ def _opened(path: str | Path) -> Iterator[_Group]:
     with file:
         root = _Group(path, file)
         try:
-            _check_format(root)
+            _check_format(root, format_, version)
             yield root
         except SystemModelError:
             raise
@@ -534,27 +608,44 @@ def _opened(path: str | Path) -> Iterator[_Group]:
             raise SystemModelError(f"{path}: is damaged: {error}") from error
 
 
-def _check_format(root: _Group) -> None:
-    if not root.has_attribute("format") or root.text("format") != FORMAT:
-        raise SystemModelError(f"{root.path}: is not a file of branches of nldyn")
+def _check_format(root: _Group, format_: str, newest: int) -> None:
+    if not root.has_attribute("format") or root.text("format") != format_:
+        raise SystemModelError(
+            f"{root.path}: is not a file of {format_.removeprefix('nldyn ')} of nldyn"
+        )
     version = root.whole("format_version")
-    if version > FORMAT_VERSION:
+    if version > newest:
         raise SystemModelError(
             f"{root.path}: has format version {version}, written by {root.text('software')}; this "
-            f"is nldyn {software_version()}, which reads versions up to {FORMAT_VERSION}"
+            f"is nldyn {software_version()}, which reads versions up to {newest}"
         )
 
 
-def _read_branches(root: _Group, laws: Laws) -> list[Branch]:
-    flows = [_read_flow(group, laws) for group in root.group("flow_maps").groups()]
+def _read_flows(root: _Group, laws: Laws) -> list[FlowMap]:
+    return [_read_flow(group, laws) for group in root.group("flow_maps").groups()]
+
+
+def _read_branches(root: _Group, flows: Sequence[FlowMap]) -> list[Branch]:
     return [_read_branch(group, flows) for group in root.group("branches").groups()]
 
 
-def _read_branch(group: _Group, flows: Sequence[FlowMap]) -> Branch:
+def _read_diagram(root: _Group, flows: Sequence[FlowMap]) -> Diagram:
+    range_hz, observe = root.pair("range_hz"), root.text("observe")
+    branches = tuple(_read_branches(root, flows))
+    return Diagram(branches, range_hz, observe, tuple(root.texts("notes")))
+
+
+def _flow_of(group: _Group, flows: Sequence[FlowMap]) -> FlowMap:
     number = group.whole("flow_map")
     if not 0 <= number < len(flows):
         raise group.fault("attribute", "flow_map", f"is {number}, but there are {len(flows)}")
-    problem = ShootingProblem(flows[number], group.whole("period"), group.whole("segments"))
+    return flows[number]
+
+
+def _read_branch(group: _Group, flows: Sequence[FlowMap]) -> Branch:
+    problem = ShootingProblem(
+        _flow_of(group, flows), group.whole("period"), group.whole("segments")
+    )
     observe = group.text("observe")
     if observe not in problem.flow.system.interfaces:
         raise group.fault("attribute", "observe", f"names an unknown interface '{observe}'")
@@ -623,12 +714,6 @@ def _read_motions(group: _Group, count: int, flow: FlowMap) -> list[Trajectory |
 
 def _read_course(group: _Group, nodes: int) -> Course:
     low, high = group.pair("range_hz")
-    lengths = {
-        item.name: group.number(f"option {item.name}")
-        for item in fields(ContinuationOptions)
-        if item.name != "max_points"
-    }
-    options = ContinuationOptions(**lengths, max_points=group.whole("option max_points"))
     start = group.whole("start")
     if not 0 <= start < nodes:
         raise group.fault("attribute", "start", f"is {start}, but there are {nodes} points")
@@ -638,7 +723,7 @@ def _read_course(group: _Group, nodes: int) -> Course:
     )
     return Course(
         (low, high),
-        options,
+        _read_options(group),
         tuple(group.group("open_ends").arrays()),
         tuple(group.array("at", -1).tolist()),
         start,
@@ -646,6 +731,59 @@ def _read_course(group: _Group, nodes: int) -> Course:
         group.whole("notes_before"),
         (backward, forward),
     )
+
+
+def _read_options(group: _Group) -> ContinuationOptions:
+    lengths = {
+        item.name: group.number(f"option {item.name}")
+        for item in fields(ContinuationOptions)
+        if item.name != "max_points"
+    }
+    return ContinuationOptions(**lengths, max_points=group.whole("option max_points"))
+
+
+def _read_exploration(
+    group: _Group, flows: Sequence[FlowMap], diagram: Diagram
+) -> tuple[Question, Stage]:
+    efforts = {
+        item.name: group.whole(f"effort {item.name}")
+        for item in fields(ExploreOptions)
+        if item.name != "spacing" and group.has_attribute(f"effort {item.name}")
+    }
+    question = Question(
+        _flow_of(group, flows),
+        diagram.range_hz,
+        group.whole("max_period"),
+        diagram.observe,
+        ExploreOptions(spacing=group.number("effort spacing"), **efforts),
+        _read_options(group),
+    )
+    steps, branches, notes = (group.whole(name) for name in ("steps", "branches", "notes"))
+    carried = group.array("carried", -1, 2 * question.flow.system.size)
+    coverage = _read_coverage(group.group("coverage"))
+    count = len(question.frequencies)
+    if not 0 <= steps <= 2 * count or len(coverage) != min(steps, count):
+        raise group.fault("attribute", "steps", f"is {steps} with {len(coverage)} frequencies")
+    for name, value, most in (
+        ("branches", branches, len(diagram.branches)),
+        ("notes", notes, len(diagram.notes)),
+    ):
+        if not 0 <= value <= most:
+            raise group.fault("attribute", name, f"is {value}, but there are {most}")
+    return question, Stage(steps, branches, notes, carried, coverage)
+
+
+def _read_coverage(group: _Group) -> tuple[Coverage, ...]:
+    hz = group.array("frequency_hz", -1)
+    counts = [
+        group.array(name, hz.size, kind=np.int64).tolist()
+        for name in ("settled", "unsettled", "failed")
+    ]
+    different = group.array("different_periods", hz.size, kind=np.int64)
+    periods = group.array("periods", int(different.sum()), kind=np.int64)
+    parts = np.split(periods, np.cumsum(different)[:-1]) if hz.size else []
+    rows = zip(hz.tolist(), (tuple(part.tolist()) for part in parts), *counts, strict=True)
+    return tuple(Coverage(*row) for row in rows)
 
 
 def _read_end(group: _Group, nodes: int) -> WalkEnd:

@@ -405,7 +405,7 @@ def numbers(name: str, values: ArrayLike) -> Real:
     """An array of finite floats, or a SystemModelError under the name."""
     try:
         array = np.array(values, dtype=float)  # a copy: the caller may change the original
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise SystemModelError(f"{name} must hold numbers only") from None
     if not np.all(np.isfinite(array)):
         raise SystemModelError(f"{name} has an entry that is not finite")

@@ -348,7 +348,8 @@ def _higher(results: Results) -> Finding:
             f"1/{period}: {1e6 * a[1].height:.3g} to {1e6 * b[1].height:.3g} µm, "
             f"{describe(b[1].orbit)}"
         )
-    shares = [unstable_share(d.branches, 20.0, 90.0) for d in (strong, weak)]
+    alike = [[b for b in d.branches if b.period <= 3] for d in (strong, weak)]
+    shares = [unstable_share(branches, 20.0, 90.0) for branches in alike]
     return Finding(
         holds=grown and shares[1] > shares[0],
         text="; ".join(texts) + f"; unstable share {shares[0]:.2f} to {shares[1]:.2f}",

@@ -23,10 +23,12 @@ from nldyn import (
     System,
     SystemModelError,
     Unbalance,
+    codimension,
     continue_branch,
     continue_constant,
     continue_in,
     continue_special,
+    normal_form,
     refine_special,
     solve_orbit,
     switch_at_flip,
@@ -395,6 +397,29 @@ def four_modes() -> System:
     return build_system(load_scene(example("four_dof_xi_0.01.toml")))
 
 
+def test_symmetry_breaks_on_a_curve_where_both_parameters_keep_it():
+    """Branches at other forces have their branch points on it, and λ stays zero."""
+    branch = continue_branch(solve_orbit(between_two_stops(), 1.0), (0.5, 1.0))
+    special = of_kind(branch, "BP")[0]
+    window = ((0.3, 2.0), (0.9, 1.1))
+    curve = continue_special(special, ("frequency_hz", "amplitude"), window)
+    assert curve.residuals.max() < 1e-7
+    found = curve.at("amplitude", 0.95)
+    assert found
+    changed = with_value(between_two_stops(), Parameter("amplitude"), 0.95)
+    other = continue_branch(solve_orbit(changed, 1.0), (0.5, 1.0))
+    places = np.array([s.frequency_hz for s in of_kind(other, "BP")])
+    for orbit in found:
+        assert np.abs(places / orbit.frequency_hz - 1.0).min() < 1e-8
+
+
+def test_a_branch_point_whose_symmetry_goes_is_a_single_point():
+    branch = continue_branch(solve_orbit(between_two_stops(), 1.0), (0.5, 1.0))
+    special = of_kind(branch, "BP")[0]
+    with pytest.raises(SystemModelError, match="dissolves when frequency_hz or gap changes"):
+        continue_special(special, ("frequency_hz", "gap"), ((0.3, 2.0), (0.005, 0.02)))
+
+
 # --- points of codimension two -------------------------------------------------------------------
 
 
@@ -494,6 +519,53 @@ def test_coefficient_of_a_flip_tells_on_which_side_doubled_orbits_are(harmonic_b
     assert signs == {True, False}
 
 
+def test_generalised_flip_is_where_the_normal_form_changes_its_sign(harmonic_branch):
+    """The coefficient along the curve and that of `normal_form` are computed in different ways."""
+    special = of_kind(harmonic_branch, "PD", 12.7, 12.8)[0]
+    window = ((12.0, 14.0), (0.014, 0.065))
+    curve = continue_special(special, ("frequency_hz", "modal_damping"), window)
+    (mark,) = [m for m in curve.marks if m.kind == "GPD"]
+    signs = []
+    for share in (0.995, 1.005):
+        (orbit,) = curve.at("modal_damping", share * mark.values[1])
+        form = normal_form(SimpleNamespace(kind="PD", orbit=orbit, frequency_hz=orbit.frequency_hz))
+        signs.append(form.coefficient.sign)
+    assert sorted(signs) == [-1, 1]
+
+
+@pytest.mark.parametrize(
+    ("along", "held", "name", "target"),
+    [
+        ("along_folds", [1.0], "LPPD", -1.0),
+        ("along_folds", [1.0], "R1", 1.0),
+        ("along_folds", [1.0], "LPNS", None),
+        ("along_flips", [-1.0], "LPPD", 1.0),
+        ("along_flips", [-1.0], "R2", -1.0),
+        ("along_flips", [-1.0], "PDNS", None),
+        ("along_tori", [np.exp(1.2j), np.exp(-1.2j)], "LPNS", 1.0),
+        ("along_tori", [np.exp(1.2j), np.exp(-1.2j)], "PDNS", -1.0),
+        ("along_tori", [np.exp(1.2j), np.exp(-1.2j)], "NSNS", None),
+        ("along_branch_points", [1.0], "R1", 1.0),
+        ("along_branch_points", [1.0], "BPPD", -1.0),
+        ("along_branch_points", [1.0], "BPNS", None),
+    ],
+)
+def test_second_points_are_told_by_the_other_multipliers(monkeypatch, along, held, name, target):
+    """A real multiplier passes its target, or a pair the unit circle: only that test changes."""
+    for coefficient in ("fold_coefficient", "flip_coefficient"):
+        monkeypatch.setattr(codimension, coefficient, lambda *_: 1.0)
+    tests = []
+    for size in (0.99, 1.01):
+        pair = size * np.exp([0.7j, -0.7j])
+        moving = pair if target is None else np.array([size * target])
+        mu = np.concatenate([held, moving, [0.3 + 0.1j, 0.3 - 0.1j]])
+        condition = Singular("LP", np.ones(1), np.ones(1))
+        arguments = (mu,) if along == "along_branch_points" else (condition, None, mu)
+        tests.append(getattr(codimension, along)(*arguments))
+    changed = [key for key in tests[0] if tests[0][key] * tests[1][key] < 0.0]
+    assert changed == [name]
+
+
 @pytest.mark.parametrize(
     ("name", "kind", "angle"),
     [("R3", "NS", 2.0 * math.pi / 3.0), ("R4", "NS", 0.5 * math.pi), ("R1", "NS", 0.0)],
@@ -545,6 +617,28 @@ def test_peak_force_is_held_in_frequency_and_gap(one_dof):
         assert recorded == pytest.approx(target, rel=1e-7)
 
 
+@pytest.mark.parametrize(("times", "first"), [(0.2, "frequency_hz"), (4.0, "mass_times_radius")])
+def test_a_value_far_from_the_starts_is_walked_to(one_dof, times, first):
+    """Also over a fold: the force falls to a fifth on another part of the branch only."""
+    start = solve_orbit(one_dof, 26.0)
+    target = times * peak_force(start)
+    window = {"frequency_hz": (11.0, 36.0), "mass_times_radius": (1e-6, 1e-4)}[first]
+    curve = continue_constant(
+        start, "peak_force", (first, "gap"), (window, (-1e-7, 1e-7)), value=target
+    )
+    assert curve.residuals.max() < 1e-9
+    assert [peak_force(o) for o in curve.orbits] == pytest.approx([target] * len(curve.orbits))
+
+
+def test_a_force_can_be_asked_for_where_nothing_is_touched_yet():
+    start = solve_orbit(linear_stop(gap=5e-3), 8.0)
+    assert start.impacts == 0
+    parameters = ("mass_times_radius", "gap")
+    window = ((1e-4, 1e-2), (1e-3, 1e-2))
+    curve = continue_constant(start, "peak_force", parameters, window, value=20.0)
+    assert [peak_force(o) for o in curve.orbits] == pytest.approx([20.0] * len(curve.orbits))
+
+
 def test_a_function_of_ones_own_is_held_as_the_monitor_of_that_name_is(one_dof):
     def largest(orbit):
         return max_abs_displacement(orbit)
@@ -555,6 +649,7 @@ def test_a_function_of_ones_own_is_held_as_the_monitor_of_that_name_is(one_dof):
     own = continue_constant(start, largest, parameters, window)
     named = continue_constant(start, "max_abs_displacement", parameters, window)
     assert own.kind == "largest"
+    assert named.kind == "max_abs_displacement of middle"
     assert own.values == pytest.approx(named.values, rel=1e-10)
     heights = [orbit.max_abs_displacement for orbit in named.orbits]
     assert heights == pytest.approx([start.max_abs_displacement] * len(heights), rel=1e-7)
@@ -626,7 +721,13 @@ WINDOW = ((20.0, 30.0), (-1e-6, 1e-6))
             lambda o: continue_special(
                 SimpleNamespace(kind="BP", orbit=o), ("frequency_hz", "gap"), WINDOW
             ),
-            "unknown kind of special point 'BP'",
+            "the orbit at 26 Hz is no BP",
+        ),
+        (
+            lambda o: continue_special(
+                SimpleNamespace(kind="CP", orbit=o), ("frequency_hz", "gap"), WINDOW
+            ),
+            "unknown kind of special point 'CP'; there are: LP, PD, NS, BP, GR",
         ),
         (
             lambda o: refine_special(SimpleNamespace(kind="NS", orbit=o)),
@@ -650,10 +751,17 @@ def test_a_start_that_is_no_special_point_is_refused(one_dof):
         refine_special(beside, max_iterations=1)
 
 
-def test_a_value_that_no_orbit_has_is_not_found(one_dof):
+def test_a_value_that_no_orbit_has_is_told_with_those_that_there_are(one_dof):
     start = solve_orbit(one_dof, 26.0)
-    with pytest.raises(ConvergenceError, match="start of the curve at 26 Hz was not found"):
+    with pytest.raises(ConvergenceError) as told:
         continue_constant(start, "peak_force", ("frequency_hz", "gap"), WINDOW, value=1e9)
+    branch = continue_branch(start, WINDOW[0])
+    forces = [peak_force(orbit) for orbit in branch.points]
+    assert str(told.value) == (
+        f"no orbit with peak_force = 1e+09 was found: it is {peak_force(start):g} at the start and "
+        f"from {min(forces):g} to {max(forces):g} where frequency_hz goes from 20 to 30; start at "
+        "another orbit, or widen the range of frequency_hz"
+    )
 
 
 def test_a_curve_has_no_other_parameters_than_its_own(one_dof):

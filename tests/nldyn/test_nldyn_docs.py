@@ -23,13 +23,15 @@ def test_example_runs(capsys):
     assert kinds == ["LP", "LP", "GR", "PD", "PD", "PD"]
 
 
-def test_example_of_the_curves_runs(capsys):
+def test_example_of_the_curves_runs(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "curves.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.S)
     exec(code, {})
     said = re.findall(r"^print.*?# (.*)$", code, flags=re.M)
     assert capsys.readouterr().out.splitlines() == said
-    assert len(said) == 4
+    assert len(said) == 5
+    assert (tmp_path / "curves.png").is_file()
 
 
 def test_every_kind_of_special_point_is_in_the_table():
@@ -71,3 +73,26 @@ def test_example_of_exploring_runs(tmp_path, monkeypatch, capsys):
     exec(code, {})
     assert "1/3" in capsys.readouterr().out
     assert (tmp_path / "explored.png").is_file()
+
+
+def test_tests_named_in_the_table_of_special_points_exist():
+    text = (ROOT / "docs" / "special_points.md").read_text(encoding="utf-8")
+    tests = "\n".join(p.read_text(encoding="utf-8") for p in (ROOT / "tests").rglob("test_*.py"))
+    defined = set(re.findall(r"^def (test_\w+)\(", tests, flags=re.M))
+    named = set(re.findall(r"`(test_\w+)`", text))
+    assert len(named) > 20
+    assert named - defined == set()
+
+
+def test_every_cell_of_the_table_of_special_points_says_no_or_names_a_test():
+    text = (ROOT / "docs" / "special_points.md").read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if line.startswith("|")]
+    rows = [row for row in rows if not row.startswith(("| kind", "|---"))]
+    kinds = ",".join(row.split("|")[1] for row in rows)
+    for kind in ("LP", "PD", "NS", "BP", "GR", "CP", "GPD", "LPPD", "R1", "R4", "GRGR"):
+        assert re.search(rf"\b{kind}\b", kinds)
+    for row in rows:
+        cells = [cell.strip() for cell in row.strip("|").split("|")]
+        assert len(cells) == 7
+        for cell in cells[3:]:
+            assert cell.startswith("no") or "`test_" in cell, cell

@@ -1,18 +1,27 @@
 """What `explore` finds without guesses: coexisting branches, isolas, and what it admits to miss."""
 
+from dataclasses import replace
 from itertools import combinations
 
+import h5py
 import numpy as np
 import pytest
+from branches_alike import assert_same_branches
 
 from nldyn import (
+    ContinuationOptions,
     ExploreOptions,
     FlowMap,
+    HarmonicForce,
     Stop,
     System,
     SystemModelError,
     Unbalance,
+    checkpoint,
     explore,
+    load_branches,
+    load_diagram,
+    load_exploration,
     solve_orbit,
 )
 from nldyn.branch import stroboscopic
@@ -130,6 +139,179 @@ def test_settling_time_follows_the_slowest_decay():
     assert settling_periods(free, 20.0) == 600
 
 
+def lightly_damped(ratio=1e-4):
+    return System.from_modal(
+        [10.0], {"tip": [1.0]}, modal_damping=ratio, excitation=[HarmonicForce("tip", 1.0)]
+    )
+
+
+def test_lightly_damped_motions_have_time_to_settle():
+    """ζω = 1e-4 · 2π · 10 /s: e^-4 takes 12 732 periods at 20 Hz, 600 leave 83 % of the motion."""
+    effort = ExploreOptions(spacing=0.1, starts=3)
+    found = explore(lightly_damped(), (19.0, 21.0), 2, effort=effort)
+    assert settling_periods(lightly_damped(), 20.0) == 12733
+    assert found.settled_share == 1.0
+    assert "settling was cut" not in found.report()
+
+
+def test_report_says_where_settling_is_cut():
+    effort = ExploreOptions(spacing=0.1, starts=3, settling=600)
+    found = explore(lightly_damped(), (19.0, 21.0), 2, effort=effort)
+    longest = settling_periods(lightly_damped(), 21.0)
+    assert found.settled_share < 1.0
+    assert (
+        f"settling was cut at 600 periods from 19 to 21 Hz; the slowest motion takes up to "
+        f"{longest} there" in found.report()
+    )
+
+
+# --- the way up and down, interruption and files -------------------------------------------------
+
+QUESTION = {"range_hz": (36.0, 38.0), "max_period": 3}
+EFFORT = ExploreOptions(spacing=0.01, starts=4, doubled_period=4)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return explore(system_of("one_dof"), **QUESTION, effort=EFFORT)
+
+
+def stopped_at(step, orbits=0):
+    """Progress that stops as Ctrl-C does, some orbits after a step has begun."""
+    steps, seen = 0, 0
+
+    def report(what, hz):
+        nonlocal steps, seen
+        steps += what == "explore"
+        seen += steps >= step
+        if seen > orbits:
+            raise KeyboardInterrupt
+
+    return report
+
+
+def interrupt(path, *place):
+    with pytest.raises(KeyboardInterrupt):
+        explore(
+            system_of("one_dof"),
+            **QUESTION,
+            effort=EFFORT,
+            progress=stopped_at(*place),
+            checkpoint=path,
+        )
+
+
+def assert_same_exploration(some, other):
+    assert (some.coverage, some.finished) == (other.coverage, other.finished)
+    assert some.diagram.notes == other.diagram.notes
+    assert [b.name for b in some.diagram.branches] == [b.name for b in other.diagram.branches]
+    for a, b in zip(some.diagram.branches, other.diagram.branches, strict=True):
+        assert_same_branches(a, b)
+
+
+def test_motions_are_carried_up_and_down(whole):
+    """At each frequency four random states, and what came before on the way up and down."""
+    counts = [c.settled + c.unsettled + c.failed for c in whole.coverage]
+    assert min(counts) >= 5 and min(counts[1:-1]) >= 6
+
+
+@pytest.mark.parametrize("places", [[(1,)], [(1, 40)], [(10,)], [(1, 60), (1, 90), (4, 2), (3,)]])
+def test_an_interrupted_exploration_goes_on_to_the_last_digit(whole, tmp_path, places):
+    """Stopped before anything is found, on a branch, on the way down, and several times."""
+    path = tmp_path / "found.h5"
+    for place in places:
+        interrupt(path, *place)
+        if path.exists():
+            part = load_exploration(path)
+            assert not part.finished and "not finished" in part.report()
+            assert len(part.diagram.branches) == len(load_branches(path)) > 0
+            assert part.stage.steps >= place[0] - 1
+            assert len(part.coverage) == min(part.stage.steps, len(whole.coverage))
+    again = explore(system_of("one_dof"), **QUESTION, effort=EFFORT, checkpoint=path)
+    assert_same_exploration(again, whole)
+    assert_same_exploration(load_exploration(path), whole)
+
+
+def test_frequencies_that_are_done_are_not_simulated_again(whole, tmp_path):
+    path = tmp_path / "found.h5"
+    interrupt(path, 6)
+    steps = []
+
+    def report(what, hz):
+        steps.extend([hz] if what == "explore" else [])
+
+    explore(system_of("one_dof"), **QUESTION, effort=EFFORT, progress=report, checkpoint=path)
+    assert len(steps) == 2 * len(whole.coverage) - 5
+
+
+def test_coverage_is_kept_where_no_branch_is_found(tmp_path, monkeypatch):
+    """Undamped free flight between impacts settles on nothing."""
+    monkeypatch.setattr(checkpoint, "PAUSE", 0.0)
+    system = System.from_modal(
+        [10.0], {"tip": [1.0]}, stops=[Stop("tip", 1e9, gap=1e-3)],
+        excitation=[HarmonicForce("tip", 1.0)],
+    )  # fmt: skip
+    path = tmp_path / "found.h5"
+    effort = ExploreOptions(spacing=0.02, starts=2, settling=30, unstable_period=0)
+    found = explore(system, (20.0, 21.0), 1, effort=effort, checkpoint=path)
+    kept = load_exploration(path)
+    assert kept.coverage == found.coverage and not kept.diagram.branches
+    assert sum(c.unsettled + c.failed for c in kept.coverage) > 0
+
+
+def test_a_saved_exploration_is_read_with_its_coverage(whole, tmp_path):
+    path = tmp_path / "found.h5"
+    whole.save(path)
+    loaded = load_exploration(path)
+    assert_same_exploration(loaded, whole)
+    assert loaded.report() == whole.report()
+    assert loaded.question.same(whole.question)
+    assert len(load_diagram(path).branches) == len(whole.diagram.branches)
+
+
+def test_another_exploration_in_the_file_is_refused_and_kept(whole, tmp_path):
+    path = tmp_path / "found.h5"
+    whole.save(path)
+    before = path.read_bytes()
+    other = replace(EFFORT, seed=21)
+    asked = [
+        {**QUESTION, "effort": other},
+        {**QUESTION, "effort": EFFORT, "range_hz": (36.0, 39.0)},
+        {**QUESTION, "effort": EFFORT, "max_period": 4},
+        {**QUESTION, "effort": EFFORT, "options": ContinuationOptions(max_step=0.04)},
+    ]
+    for question in asked:
+        with pytest.raises(SystemModelError, match="holds another exploration"):
+            explore(system_of("one_dof"), **question, checkpoint=path)
+    with pytest.raises(SystemModelError, match="holds another exploration"):
+        explore(system_of("two_dof_xi_0.01"), **QUESTION, effort=EFFORT, checkpoint=path)
+    assert path.read_bytes() == before
+
+
+def test_a_file_without_exploration_or_with_a_damaged_one_is_refused(whole, tmp_path):
+    path = tmp_path / "found.h5"
+    whole.diagram.save(path)
+    with pytest.raises(SystemModelError, match="holds no exploration"):
+        load_exploration(path)
+    whole.save(path)
+    with h5py.File(path, "r+") as file:
+        file["exploration"].attrs["steps"] = 3
+    with pytest.raises(SystemModelError, match="'/exploration/steps' is 3 with 7 frequencies"):
+        load_exploration(path)
+
+
+def test_long_doubled_branches_are_broken_off_where_told(whole):
+    """Branches of periods looked for are followed to their ends, those beyond not."""
+    short = explore(system_of("one_dof"), **QUESTION, effort=replace(EFFORT, doubled_points=10))
+    for branch, full in zip(short.diagram.branches, whole.diagram.branches, strict=True):
+        assert branch.period == full.period
+        if branch.period <= 3:
+            assert_same_branches(branch, full)
+        else:
+            assert len(branch.nodes) < len(full.nodes)
+            assert any(branch.name in note and "10 points" in note for note in short.diagram.notes)
+
+
 @pytest.mark.parametrize(
     ("given", "says"),
     [
@@ -138,6 +320,9 @@ def test_settling_time_follows_the_slowest_decay():
         ({"starts": 0}, "explore: starts"),
         ({"unstable_period": -1}, "explore: unstable_period"),
         ({"seed": 0.5}, "explore: seed"),
+        ({"settling": 0}, "explore: settling"),
+        ({"doubled_period": 0}, "explore: doubled_period"),
+        ({"doubled_points": 1}, "explore: doubled_points"),
     ],
 )
 def test_bad_efforts_are_refused_by_name(given, says):

@@ -282,3 +282,24 @@ def test_states_are_periodic_in_the_phase():
 def test_an_unstable_orbit_is_found_beside_the_attractor_of_twice_its_period(frequency_hz):
     orbit = solve_orbit(make_one_dof(), frequency_hz)
     assert orbit.period == 1 and not orbit.stable and orbit.error < 1e-10
+
+
+@pytest.mark.parametrize("short", [0.1, 1e-2, 1e-3, 1e-4])
+def test_extremes_closer_than_the_samples_are_found(short):
+    """y = a sin τ + b sin 2τ has y' = 0 where 4b c² + a c = 2b for c = cos τ; with a a little less
+    than 2b two of these lie close beside τ = π, nearer to each other than a sample."""
+    system = System.from_modal([10.0, 20.0], {"tip": [1.0, 1.0]})
+    flow = FlowMap(system)
+    natural, b = 20.0 * np.pi, 1e-3
+    a = 2.0 * b * (1.0 - short)
+    start = flow.to_state(np.array([0.0, 0.0, a * natural, 2.0 * b * natural]))
+    motion = flow.trajectory(start[None], np.array([0.0, 2.0 * np.pi]), natural)
+    c = (-a + np.array([1.0, -1.0]) * np.sqrt(a * a + 32.0 * b * b)) / (8.0 * b)
+    exact = np.sort(np.concatenate([np.arccos(c), 2.0 * np.pi - np.arccos(c)]))
+    found = motion.extremes(0)
+    assert found[:, 2].tolist() == [1.0, -1.0, 1.0, -1.0]
+    phases = found[:, 0]
+    np.testing.assert_allclose(phases, exact, atol=1e-7 / np.sqrt(short))
+    np.testing.assert_allclose(
+        found[:, 1], a * np.sin(exact) + b * np.sin(2.0 * exact), atol=1e-12 * b + 1e-16
+    )

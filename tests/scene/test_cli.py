@@ -13,7 +13,7 @@ from fakes import diagram
 
 import nldyn.progress
 import nldyn.scene
-from nldyn import continuation, load_branches, load_diagram
+from nldyn import continuation, exploration, load_branches, load_diagram, load_exploration
 from nldyn.cli import main
 from nldyn.resources import example, mesh
 
@@ -141,6 +141,76 @@ def test_a_run_goes_on_after_ctrl_c(tmp_path, monkeypatch):
         assert (out / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
     (branch,) = load_diagram(out / "branches.h5").branches
     assert known > 20 and len(steps) < 1.5 * (len(branch.nodes) - known)
+
+
+EXPLORE = "[explore]\nmax_period = 2\nspacing = 0.03\nstarts = 2\n"
+
+
+def explored_scene(folder, more=EXPLORE):
+    """A scene of the harmonic branch between 26 and 30 Hz, to be found without guesses."""
+    text = example("one_dof.toml").read_text().partition("[[subharmonics]]")[0]
+    text = text.replace("[5.0, 90.0]", "[26.0, 30.0]").replace("periods = [1, 2, 3]\n", "")
+    scene = folder / "explored.toml"
+    scene.write_text(f"{text}\n{more}")
+    return scene
+
+
+def test_a_scene_is_explored(tmp_path):
+    out = tmp_path / "out"
+    result = invoke("run", explored_scene(tmp_path), "--out", out, "--quiet")
+    assert result.exit_code == 0, result.output
+    assert "simulations at 6 frequencies, 100.0 % ended on one of the branches" in result.stdout
+    with (out / "coverage.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [rows[i]["frequency_hz"] for i in (0, -1)] == ["26.0", "30.0"]
+    assert all(row["periods"] == "1" and int(row["settled"]) >= 3 for row in rows)
+    found = load_exploration(out / "branches.h5")
+    assert [branch.period for branch in found.diagram.branches] == [1]
+    assert found.finished and len(found.coverage) == len(rows)
+
+
+def test_an_exploration_goes_on_after_ctrl_c(tmp_path, monkeypatch):
+    scene, out = explored_scene(tmp_path), tmp_path / "out"
+    assert invoke("run", scene, "--out", tmp_path / "whole", "--quiet").exit_code == 0
+    step = exploration._Survey.step
+    steps = []
+
+    def counted(*arguments):
+        steps.append(None)
+        if len(steps) == 5:
+            raise KeyboardInterrupt
+        step(*arguments)
+
+    monkeypatch.setattr(exploration._Survey, "step", counted)
+    stopped = invoke("run", scene, "--out", out, "--quiet")
+    assert stopped.exit_code == 130 and "goes on from there" in stopped.stderr
+    assert load_exploration(tmp_path / "out.unfinished.h5").stage.steps == 4
+    assert invoke("run", scene, "--out", out, "--quiet").exit_code == 0
+    assert len(steps) == 5 + 12 - 4
+    for name in ("branches.csv", "coverage.csv", "branches.h5", "summary.json"):
+        assert (out / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ("[explore]\nspacing = 0.0\n", "explore.spacing must"),
+        ("[explore]\nperiods = [1]\n", "explore.periods is not a known key"),
+        (EXPLORE + "[[subharmonics]]\nperiod = 2\nnear_hz = 28.0\n", "subharmonics is of no use"),
+    ],
+)
+def test_faults_of_an_explored_scene(tmp_path, more, says):
+    result = invoke("run", explored_scene(tmp_path, more), "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1 and says in result.stderr
+
+
+def test_places_to_look_at_are_refused_beside_explore(tmp_path):
+    scene = explored_scene(tmp_path)
+    scene.write_text(scene.read_text().replace("[26.0, 30.0]", "[26.0, 30.0]\nsearch_points = 3"))
+    result = invoke("check", scene)
+    assert result.exit_code == 2
+    assert "continuation.search_points is of no use beside [explore]" in result.stderr
 
 
 def test_another_scene_does_not_go_on_from_an_unfinished_one(tmp_path, monkeypatch):

@@ -78,7 +78,7 @@ def test_axes_of_the_caller_are_used():
     assert plot_diagram([resonance()], ax, unit="µm", special_points=()) is ax
     assert len(ax.lines) == 6
     assert ax.get_ylabel() == "max |y| (µm)"
-    with pytest.raises(ValueError, match="not a unit"):
+    with pytest.raises(ValueError, match="unit must be one of m, mm, µm, nm"):
         plot_diagram([resonance()], unit="inch")
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from nldyn.curves import Curve
-from nldyn.errors import SystemModelError
+from nldyn.errors import SystemModelError, check_types, shown
 from nldyn.parameters import Parameter
 from nldyn.plot import MARKER_NAMES, PERIOD_COLOURS, length_unit, new_axes
 
@@ -49,10 +49,15 @@ def plot_curves(curves: Sequence[Curve], ax: Axes | None = None) -> Axes:
     SystemModelError
         If there are no curves, or not all in the same two parameters.
     """
-    if not curves or any(
-        len(c.parameters) != 2 or c.parameters != curves[0].parameters for c in curves
+    several = isinstance(curves, list | tuple) and len(curves) > 0
+    if not several or not all(
+        isinstance(c, Curve) and len(c.parameters) == 2 and c.parameters == curves[0].parameters
+        for c in curves
     ):
-        raise SystemModelError("plot_curves needs curves in the same two parameters")
+        raise SystemModelError(
+            f"plot_curves needs a list of curves in the same two parameters, got {shown(curves)}"
+        )
+    check_types(ax=(ax, Axes, None))
     ax = ax or new_axes(7.5, 5.0)
     everything = np.vstack([curve.values for curve in curves])
     scales, labels = [], []
@@ -63,7 +68,8 @@ def plot_curves(curves: Sequence[Curve], ax: Axes | None = None) -> Axes:
     kinds = list(dict.fromkeys(curve.kind for curve in curves))
     for curve in curves:
         colour = PERIOD_COLOURS[kinds.index(curve.kind) % len(PERIOD_COLOURS)]
-        name = MARKER_NAMES.get(curve.kind) or MONITOR_NAMES.get(curve.kind, curve.kind)
+        monitor, of, interface = curve.kind.partition(" of ")
+        name = MARKER_NAMES.get(curve.kind) or MONITOR_NAMES.get(monitor, monitor) + of + interface
         first = curve is next(c for c in curves if c.kind == curve.kind)
         x, y = (curve.values * scales).T
         ax.plot(x, y, color=colour, lw=1.4, label=name if first else None)

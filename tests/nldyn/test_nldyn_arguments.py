@@ -1,0 +1,208 @@
+"""Arguments of a wrong kind are refused in one sentence that names them, before any work."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import pytest
+
+from nldyn import (
+    Parameter,
+    SystemModelError,
+    cascade,
+    cascades_in,
+    continue_branch,
+    continue_constant,
+    continue_in,
+    continue_special,
+    describe,
+    normal_form,
+    plot_contact_force,
+    plot_curves,
+    plot_diagram,
+    plot_history,
+    plot_phase_portrait,
+    plot_spectrum,
+    refine_special,
+    solve_orbit,
+    spectrum,
+    switch_at_branch_point,
+    switch_at_flip,
+)
+
+JUNK = (None, "nonsense", [], {"a": 1}, math.nan, -1.0, 10**400, object())
+PAIR, WINDOW = ("frequency_hz", "gap"), ((20.0, 30.0), (-1e-6, 1e-6))
+
+
+def refused(call, *junk) -> list[str]:
+    """What is said to each piece of junk; anything but a SystemModelError comes through."""
+    said = []
+    for value in junk or JUNK:
+        with pytest.raises(SystemModelError) as told:
+            call(value)
+        said.append(str(told.value))
+    return said
+
+
+def check_named(said, *names):
+    for sentence in said:
+        assert "\n" not in sentence
+        assert any(name in sentence for name in names), sentence
+
+
+@pytest.fixture(scope="module")
+def orbit(one_dof):
+    return solve_orbit(one_dof, 26.0)
+
+
+@pytest.fixture(scope="module")
+def flip(harmonic_branch):
+    return next(s for s in harmonic_branch.special_points if s.kind == "PD")
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments"),
+    [
+        (switch_at_flip, ()),
+        (switch_at_branch_point, ()),
+        (describe, ()),
+        (normal_form, ()),
+        (cascade, ()),
+        (refine_special, ()),
+        (continue_special, (PAIR, WINDOW)),
+    ],
+    ids=lambda x: getattr(x, "__name__", ""),
+)
+def test_what_is_no_special_point_is_refused(function, arguments):
+    halves = (SimpleNamespace(kind="PD"), SimpleNamespace(kind="PD", orbit=3))
+    said = refused(lambda junk: function(junk, *arguments), *JUNK, *halves)
+    name = "describe" if function is normal_form else function.__name__
+    check_named(said, f"{name} needs a special point, got")
+
+
+@pytest.mark.parametrize(
+    "plot", [plot_history, plot_phase_portrait, plot_spectrum, plot_contact_force, spectrum]
+)
+def test_what_is_no_orbit_cannot_be_drawn(plot, orbit):
+    check_named(refused(plot), "orbit must be an Orbit, got")
+    if plot is not spectrum:
+        axes = [junk for junk in JUNK if junk is not None]
+        check_named(refused(lambda junk: plot(orbit, junk), *axes), "ax must be an Axes or None")
+    if plot is not plot_contact_force:
+        said = refused(lambda junk: plot(orbit, interface=junk), [], 3, math.nan)
+        check_named(said, "interface must be a str or None")
+    word = "orders" if plot in (plot_spectrum, spectrum) else "samples"
+    said = refused(lambda junk: plot(orbit, **{word: junk}))
+    check_named(said, f"{word} must be a whole number")
+
+
+@pytest.mark.parametrize("name", ["orbit", "parameters", "ranges", "options", "progress"])
+@pytest.mark.parametrize("call", ["in", "special", "constant"])
+def test_arguments_of_curves_are_named(name, call, orbit, flip):
+    if call == "in":
+        good = {"orbit": orbit, "parameter": "gap", "limits": (-1e-6, 1e-6)}
+        function, name = (
+            continue_in,
+            {"parameters": "parameter", "ranges": "limits"}.get(name, name),
+        )
+    else:
+        good = {"orbit": orbit, "parameters": PAIR, "ranges": WINDOW, "monitor": "peak_force"}
+        function = continue_constant
+    if call == "special":
+        good = {"special": flip, "parameters": PAIR, "ranges": WINDOW}
+        function = continue_special
+        name = {"orbit": "special"}.get(name, name)
+    junk = [x for x in JUNK if not (x is None and name in ("options", "progress"))]
+    said = refused(lambda junk: function(**{**good, name: junk}), *junk)
+    words = {
+        "parameter": ("unknown parameter",),
+        "limits": ("the range of gap must be",),
+        "special": ("special point",),
+        "parameters": ("parameters must be", "needs two parameters"),
+        "ranges": ("ranges must be", "as many ranges"),
+    }
+    check_named(said, *words.get(name, (f"{name} must be",)))
+
+
+@pytest.mark.parametrize("name", ["monitor", "value"])
+def test_what_cannot_be_held_is_named(name, orbit):
+    good = {"monitor": "peak_force", "value": None}
+    junk = [x for x in JUNK if not (x is None and name == "value")]
+    said = refused(
+        lambda junk: continue_constant(
+            orbit, parameters=PAIR, ranges=WINDOW, **{**good, name: junk}
+        ),
+        *junk,
+    )
+    check_named(said, "monitor", "peak_force to be held must be")
+
+
+@pytest.mark.parametrize("entry", [None, [], math.nan, object(), "mass", Parameter("mass")])
+def test_entries_of_lists_of_parameters_are_named(entry, orbit):
+    said = refused(lambda junk: continue_special_or_constant(orbit, (junk, "gap")), entry)
+    check_named(said, "unknown parameter")
+
+
+def continue_special_or_constant(orbit, parameters):
+    return continue_constant(orbit, "peak_force", parameters, WINDOW)
+
+
+def test_numbers_of_a_parameter_are_checked():
+    check_named(refused(Parameter, None, [], 3, math.nan), "Parameter: name must be a str")
+    said = refused(lambda junk: Parameter("gap", junk), None, "0", [], math.nan, -2, 1.5, True)
+    check_named(said, "Parameter: index must be a whole number")
+
+
+@pytest.mark.parametrize("name", ["orbit", "range_hz", "at", "options", "progress", "name"])
+def test_arguments_of_a_continuation_are_named(name, orbit):
+    good = {"orbit": orbit, "range_hz": (25.0, 27.0)}
+    junk = {
+        "options": [x for x in JUNK if x is not None],
+        "progress": [x for x in JUNK if x is not None],
+        "name": [x for x in JUNK if x != "nonsense"],
+        "at": [None, "nonsense", math.nan, -1.0, [None], [math.nan], [-26.0], ["26"], [99.0], 26.0],
+    }.get(name, JUNK)
+    said = refused(lambda value: continue_branch(**{**good, name: value}), *junk)
+    check_named(said, name)
+
+
+def test_sizes_of_steps_off_a_branch_are_checked(flip):
+    check_named(refused(lambda junk: switch_at_flip(flip, junk)), "amplitude must be a positive")
+    check_named(refused(lambda junk: cascade(flip, junk)), "cascade: depth must be a whole number")
+    check_named(refused(lambda junk: refine_special(flip, junk)), "unknown parameter")
+    said = refused(lambda junk: refine_special(flip, max_iterations=junk))
+    check_named(said, "max_iterations must be a whole number")
+    said = refused(lambda junk: describe(flip, junk), None, 3, math.nan, object(), [3], ["LP"])
+    check_named(said, "others")
+
+
+def test_a_point_of_a_curve_does_not_know_the_branch(flip):
+    """Its orbit is enough for a flip, but not for what needs the branch's direction."""
+    mark = refine_special(flip)
+    assert switch_at_flip(mark).orbit.period == 2
+    with pytest.raises(SystemModelError, match="a special point of a branch, which knows"):
+        describe(SimpleNamespace(kind="GR", orbit=mark.orbit, frequency_hz=1.0))
+
+
+def test_what_is_no_branch_or_curve_cannot_be_drawn(harmonic_branch, orbit):
+    junk = [x for x in JUNK if x != []]
+    check_named(refused(plot_diagram, *junk), "diagram must be a list of branches")
+    check_named(refused(cascades_in, *junk), "branches must be a list of branches")
+    check_named(refused(plot_curves), "plot_curves needs")
+    curve = continue_in(orbit, "frequency_hz", (25.5, 26.5))
+    check_named(refused(lambda x: plot_curves([curve, x])), "plot_curves needs")
+    axes = [x for x in JUNK if x is not None]
+    said = refused(lambda x: plot_diagram([harmonic_branch], x), *axes)
+    check_named(said, "ax must be an Axes or None")
+    for name in ("yscale", "unit"):
+        said = refused(lambda x, name=name: plot_diagram([harmonic_branch], **{name: x}), *axes)
+        check_named(said, f"{name} must be one of")
+    said = refused(
+        lambda x: plot_diagram([harmonic_branch], special_points=x), None, 3, ["XX"], [3]
+    )
+    check_named(said, "special_points must be")
+    check_named(
+        refused(lambda x: curve.at("frequency_hz", x), *junk[:-3]), "value must be a finite number"
+    )
+    check_named(refused(lambda x: curve.at(x, 26.0)), "the curve has no parameter")

@@ -1,0 +1,170 @@
+"""Curves are saved, loaded, tabulated and extended."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pytest
+from one_dof import make_one_dof
+
+from nldyn import (
+    ContinuationOptions,
+    Damper,
+    HarmonicForce,
+    Parameter,
+    Stop,
+    System,
+    SystemModelError,
+    continue_branch,
+    continue_constant,
+    continue_in,
+    continue_special,
+    load_branch,
+    load_curve,
+    load_curves,
+    save_curves,
+    solve_orbit,
+)
+from nldyn.conditions import peak_force
+
+
+def symmetric() -> System:
+    stops = [Stop.linear("m", 3000.0, gap=0.01, direction=side) for side in (1, -1)]
+    return System.from_matrices(
+        [[1.0]], [[100.0]], {"m": [1.0]}, modal_damping=0.02, stops=stops,
+        dampers=[Damper("m", 0.01)], excitation=[HarmonicForce("m", 1.0)],
+    )  # fmt: skip
+
+
+def special(system, kind, window, start=None):
+    branch = continue_branch(solve_orbit(system, start or window[0]), window)
+    return next(s for s in branch.special_points if s.kind == kind)
+
+
+def force(orbit):
+    return peak_force(orbit)
+
+
+def make(kind):
+    one_dof = make_one_dof()
+    few = ContinuationOptions(max_points=4)
+    if kind == "BP":
+        found = special(symmetric(), "BP", (0.5, 1.0), 1.0)
+        return continue_special(
+            found, ("frequency_hz", "coefficient"), ((0.3, 2.0), (0.005, 0.02)), options=few
+        )
+    if kind in ("LP", "PD", "GR"):
+        window, start = {
+            "LP": ((12.0, 26.0), 26.0), "PD": ((33.0, 34.0), 33.0), "GR": ((5.7, 6.5), 6.5)
+        }[kind]  # fmt: skip
+        found = special(one_dof, kind, window, start)
+        pair = ("frequency_hz", "modal_damping" if kind == "PD" else "gap")
+        ranges = ((5.0, 60.0), (0.01, 0.02) if kind == "PD" else (-1e-7, 1e-7))
+        return continue_special(found, pair, ranges, options=few)
+    start = solve_orbit(one_dof, 26.0)
+    if kind == "orbit":
+        return continue_in(start, "frequency_hz", (15.0, 30.0))
+    monitor = {"own": force, "max_abs_displacement": "max_abs_displacement"}[kind]
+    window = ((25.0, 27.0), (-1e-7, 1e-7))
+    return continue_constant(start, monitor, ("frequency_hz", "gap"), window, options=few)
+
+
+@pytest.fixture(
+    scope="module", params=["LP", "PD", "GR", "BP", "orbit", "own", "max_abs_displacement"]
+)
+def curve(request):
+    return make(request.param)
+
+
+@pytest.fixture(scope="module")
+def loaded(curve, tmp_path_factory):
+    path = tmp_path_factory.mktemp("curves") / "curve.h5"
+    curve.save(path)
+    return load_curve(path, monitor=force if curve.kind == "force" else None)
+
+
+def test_loaded_curve_has_the_unknowns_of_the_saved_one(curve, loaded):
+    assert (loaded.kind, loaded.parameters) == (curve.kind, curve.parameters)
+    assert (loaded.stop_reasons, loaded.notes) == (curve.stop_reasons, curve.notes)
+    assert np.array_equal(loaded.values, curve.values)
+    for a, b in zip(curve.points, loaded.points, strict=True):
+        for name in ("point", "tangent", "arclength", "corner"):
+            assert np.array_equal(getattr(a, name), getattr(b, name))
+    assert [m.kind for m in loaded.marks] == [m.kind for m in curve.marks]
+    for one, other in zip(curve.marks, loaded.marks, strict=True):
+        assert other.values == pytest.approx(one.values, rel=1e-14)
+        assert other.orbit.frequency_hz == pytest.approx(one.orbit.frequency_hz, rel=1e-14)
+        assert other.orbit.multipliers == pytest.approx(one.orbit.multipliers, rel=1e-9, abs=1e-12)
+
+
+def test_loaded_curve_has_its_orbits_and_conditions(curve, loaded):
+    assert loaded.residuals == pytest.approx(curve.residuals, abs=1e-12)
+    for a, b in zip(curve.orbits, loaded.orbits, strict=True):
+        assert b.multipliers == pytest.approx(a.multipliers, rel=1e-12)
+        assert b.max_abs_displacement == pytest.approx(a.max_abs_displacement, rel=1e-12)
+        assert (b.period, b.observe, b.impacts) == (a.period, a.observe, a.impacts)
+
+
+def test_table_has_the_parameters_and_the_orbits(curve, loaded):
+    for part, rows in (("points", curve.points), ("marks", curve.marks)):
+        table = curve.table(part)
+        for number, parameter in enumerate(curve.parameters):
+            assert table[parameter.name].tolist() == [row.values[number] for row in rows]
+        assert table["impacts"].tolist() == [row.orbit.impacts for row in rows]
+        assert {len(column) for column in table.values()} == {len(rows)}
+        again = loaded.table(part)
+        assert list(again) == list(table)
+    with pytest.raises(SystemModelError, match="part must be one of points, marks; got 'nodes'"):
+        curve.table("nodes")
+
+
+def test_an_extended_curve_is_the_curve_through_the_longer_range():
+    found = special(make_one_dof(), "LP", (12.0, 26.0), 26.0)
+    pair = ("frequency_hz", "gap")
+    short = continue_special(found, pair, ((5.0, 60.0), (-1e-7, 1e-7)))
+    longer = short.extend(((5.0, 60.0), (-2e-7, 2e-7)))
+    whole = continue_special(found, pair, ((5.0, 60.0), (-2e-7, 2e-7)))
+    assert longer.values[[0, -1]] == pytest.approx(whole.values[[0, -1]], rel=1e-9)
+    assert longer.residuals.max() < 1e-7
+    assert [m.kind for m in longer.marks] == [m.kind for m in whole.marks]
+    for value in (-1.2e-7, 0.5e-7, 1.5e-7):
+        one, other = (c.at("gap", value)[0].frequency_hz for c in (longer, whole))
+        assert one == pytest.approx(other, rel=1e-9)
+    with pytest.raises(SystemModelError, match="outside its range"):
+        short.extend(((5.0, 60.0), (-1e-8, 1e-8)))
+
+
+def test_a_loaded_curve_goes_on(tmp_path):
+    few = ContinuationOptions(max_points=3)
+    start = solve_orbit(make_one_dof(), 26.0)
+    short = continue_in(start, Parameter("stiffness"), (1e9, 2e10), options=few)
+    assert "3 points" in short.stop_reasons
+    short.save(tmp_path / "short.h5")
+    longer = load_curve(tmp_path / "short.h5").extend([(1e9, 2e10)])
+    assert longer.values[[0, -1], 0] == pytest.approx([1e9, 2e10], rel=1e-14)
+    assert longer.stop_reasons == ("end of the range of stiffness",) * 2
+
+
+def test_several_curves_in_one_file_and_what_is_refused(tmp_path):
+    path, curve = tmp_path / "curves.h5", make("own")
+    few = continue_in(solve_orbit(make_one_dof(), 26.0), "frequency_hz", (25.9, 26.1))
+    save_curves(path, [few, few])
+    assert [c.kind for c in load_curves(path)] == ["orbit", "orbit"]
+    with pytest.raises(SystemModelError, match="holds 2 curves; use load_curves"):
+        load_curve(path)
+    with pytest.raises(SystemModelError, match="is not a file of branches"):
+        load_branch(path)
+    with pytest.raises(SystemModelError, match="curves must be a list of curves, got 3"):
+        save_curves(path, 3)
+    curve.save(path)
+    with pytest.raises(SystemModelError, match="a file cannot hold: pass monitor="):
+        load_curve(path)
+    with pytest.raises(SystemModelError, match="the monitor passed is not 'force'"):
+        load_curve(path, monitor=lambda orbit: 2.0 * force(orbit))
+    with h5py.File(path, "a") as file:
+        file.attrs["format_version"] = 99
+    with pytest.raises(SystemModelError, match="has format version 99, written by nldyn"):
+        load_curve(path, monitor=force)
+    path.write_bytes(path.read_bytes()[:3000])
+    with pytest.raises(SystemModelError, match="cut off or damaged"):
+        load_curve(path)
