@@ -230,7 +230,7 @@ def reduce_for(
     tell = told(progress, "selection")
     candidates = [n for n in seen if whole.frequencies_hz[n - 1] <= cutoff]
     rigid = [n for n in candidates if whole.frequencies_hz[n - 1] == 0.0]
-    kept, error = list(rigid), math.inf
+    kept, error = list(rigid), math.inf if len(seen) > len(rigid) else 0.0
     for number in [n for n in seen if n not in rigid]:
         kept.append(number)
         tell(whole.frequencies_hz[number - 1])
