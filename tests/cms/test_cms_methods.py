@@ -339,6 +339,10 @@ def test_massless_flexibility_refuses_damping_it_cannot_carry(cantilever, dampin
         cms.reduce(cantilever, modes=3, method="macneal").with_damping(**damping)
 
 
+class FakePardisoError(Exception):
+    value = -4  # not positive definite
+
+
 class FakePardiso:
     """Stands in for pypardiso: solves with SuperLU, and spoils what it is told to."""
 
@@ -354,7 +358,10 @@ class FakePardiso:
         if self.phase == 12:
             assert self.mtype == 2 and self.iparm[0] == 1
             whole = upper + sparse.triu(upper, k=1).T
-            self.inverse = sparse.linalg.splu(sparse.csc_matrix(whole))
+            try:
+                self.inverse = sparse.linalg.splu(sparse.csc_matrix(whole))
+            except RuntimeError:  # exactly singular
+                raise FakePardisoError from None
         if self.phase == 33:
             return self.inverse.solve(np.ascontiguousarray(right)) * (1.0 + self.spoil)
         return right
@@ -369,7 +376,7 @@ def pardiso(monkeypatch):
 
     module = types.ModuleType("pypardiso")
     module.PyPardisoSolver = FakePardiso
-    module.pardiso_wrapper = types.SimpleNamespace(PyPardisoError=RuntimeError)
+    module.pardiso_wrapper = types.SimpleNamespace(PyPardisoError=FakePardisoError)
     monkeypatch.setitem(sys.modules, "pypardiso", module)
     monkeypatch.delenv("CMS_SOLVER", raising=False)
     cms.factor.pardiso_is_there.cache_clear()
