@@ -1,8 +1,26 @@
 """Component mode synthesis: reduce a linear component to a few modal coordinates."""
 
+from cms.accuracy import Accuracy, accuracy
+from cms.checks import Checks, check, mac
 from cms.component import ComponentLike
+from cms.coupling import Joint, couple
 from cms.errors import ReductionError
 from cms.model import ReducedModel
-from cms.reduction import Matrices, reduce
+from cms.reduction import METHODS, Matrices, keep_modes, reduce
 
-__all__ = ["ComponentLike", "Matrices", "ReducedModel", "ReductionError", "reduce"]
+__all__ = [
+    "METHODS",
+    "Accuracy",
+    "Checks",
+    "ComponentLike",
+    "Joint",
+    "Matrices",
+    "ReducedModel",
+    "ReductionError",
+    "accuracy",
+    "check",
+    "couple",
+    "keep_modes",
+    "mac",
+    "reduce",
+]

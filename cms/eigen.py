@@ -33,14 +33,19 @@ class Shifted:
         In rad^2/s^2; zero unless the component floats.
     fastest : float
         Lower bound of the largest w^2, the scale of rounding.
-    rigid : int
-        Number of rigid-body modes, counted up to six; more are told as six.
+    rigid_modes : (N, n) array
+        The mass-normalised rigid-body modes; none if the component is held.
     """
 
     factor: Factor
     shift: float
     fastest: float
-    rigid: int = 0
+    rigid_modes: FloatArray
+
+    @property
+    def rigid(self) -> int:
+        """Number of rigid-body modes."""
+        return int(self.rigid_modes.shape[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +79,9 @@ def shifted_factor(pencil: Pencil) -> Shifted:
     """
     fastest = fastest_square(pencil)
     factor = factorise(pencil.stiffness)
+    none = np.zeros((pencil.size, 0))
     if factor is not None and factor.smallest_pivot > SUSPECT_PIVOT:
-        return Shifted(factor, 0.0, fastest)
+        return Shifted(factor, 0.0, fastest, none)
     shift = np.sqrt(EPS) * (fastest if fastest > 0.0 else 1.0)
     moved = factorise(pencil.stiffness + shift * pencil.mass)
     if moved is None:
@@ -83,12 +89,11 @@ def shifted_factor(pencil: Pencil) -> Shifted:
             "the stiffness or the mass matrix is indefinite, or a dof has neither: "
             f"K + {shift:.3g} M is not positive definite"
         )
-    shifted = Shifted(moved, shift, fastest)
-    few = lowest_modes(pencil, shifted, min(6, pencil.size))
-    rigid = int(np.count_nonzero(few.squares == 0.0))
-    if rigid == 0 and factor is not None:
-        return Shifted(factor, 0.0, fastest)
-    return replace(shifted, rigid=max(rigid, 1))
+    shifted = Shifted(moved, shift, fastest, none)
+    few = modes_up_to(pencil, shifted, 0.0)
+    if few.squares.size == 0 and factor is not None:
+        return Shifted(factor, 0.0, fastest, none)
+    return replace(shifted, rigid_modes=few.vectors)
 
 
 def lowest_modes(pencil: Pencil, shifted: Shifted, count: int) -> Modes:
@@ -128,7 +133,8 @@ def lowest_modes(pencil: Pencil, shifted: Shifted, count: int) -> Modes:
         squares, vectors = lanczos_modes(pencil, shifted, count)
     vectors = mass_orthonormal(vectors, pencil.mass)
     if shifted.shift > 0.0:
-        squares = np.where(np.abs(squares) <= RIGID_TOLERANCE * shifted.fastest, 0.0, squares)
+        rounding = RIGID_TOLERANCE * shifted.shift / np.sqrt(EPS)
+        squares = np.where(np.abs(squares) <= rounding, 0.0, squares)
     if squares[0] < 0.0:
         raise ReductionError(
             f"the stiffness matrix is not positive: its lowest w^2 is {squares[0]:.3g} rad^2/s^2"

@@ -1,21 +1,48 @@
-"""Reduce a component to free-interface modes and residual flexibility."""
+"""Reduce a component: free-interface and fixed-interface methods."""
 
 from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from cms.component import ComponentLike, FloatArray, Pencil, checked_pencil
-from cms.eigen import Modes, Shifted, lowest_modes, mode_errors, modes_up_to, shifted_factor
+from cms.component import (
+    ComponentLike,
+    FloatArray,
+    Pencil,
+    checked_pencil,
+    symmetric_matrix,
+    times,
+)
+from cms.constraint import fixed_interface, fixed_interface_errors, ritz
+from cms.eigen import (
+    Modes,
+    Shifted,
+    fastest_square,
+    lowest_modes,
+    mode_errors,
+    modes_up_to,
+    shifted_factor,
+)
 from cms.errors import ReductionError
+from cms.factor import Progress, announced
 from cms.model import ReducedModel
-from cms.residual import residual_modes
+from cms.residual import residual_flexibility, residual_modes
 
+METHODS = (
+    "rubin",
+    "craig-chang",
+    "macneal",
+    "dual-craig-bampton",
+    "craig-bampton",
+    "guyan",
+    "truncation",
+)
+FIXED = ("craig-bampton", "guyan")
 NEGLIGIBLE_PARTICIPATION = 1e-9
 
 
@@ -29,6 +56,8 @@ class Matrices:
         Symmetric, in N/m and kg for translations.
     interfaces : mapping of str to (N,) array_like
         Load and displacement vector of each interface.
+    damping : (N, N) sparse or dense matrix, optional
+        Symmetric, in N s/m for translations.
 
     Examples
     --------
@@ -41,6 +70,7 @@ class Matrices:
     stiffness: Any
     mass: Any
     interfaces: Mapping[str, Any]
+    damping: Any = None
 
 
 def reduce(
@@ -48,28 +78,47 @@ def reduce(
     *,
     modes: int | None = None,
     cutoff_hz: float | None = None,
+    method: str = "rubin",
     residual: bool = True,
+    progress: Progress | None = None,
 ) -> ReducedModel:
-    r"""Reduce a component to free-interface modes plus residual flexibility modes.
+    r"""Reduce a component by component mode synthesis.
 
     Parameters
     ----------
     component : ComponentLike
-        Any object with ``stiffness``, ``mass`` (N, N) and ``interfaces`` {name: (N,)}.
+        Any object with ``stiffness``, ``mass`` (N, N) and ``interfaces`` {name: (N,)}; where it has
+        a ``damping`` (N, N), too, its projection is the model's ``damping``.
     modes : int, optional
-        Number of free-interface modes to keep, 0 to N.
+        Number of component modes to keep, 0 to N; of a floating component the rigid-body modes
+        count. Not for "guyan", which keeps none.
     cutoff_hz : float, optional
         Keep the modes up to this frequency in Hz, instead of ``modes``. Below the first
-        frequency no mode is kept, which leaves the residual modes alone: a static model.
+        frequency no mode is kept, which leaves the interfaces' modes alone: a static model.
+    method : str
+        ======================  ============================================================
+        "rubin"                 free-interface modes, and one residual flexibility mode per
+                                interface with its mass [1]_ [2]_
+        "craig-chang"           the same; where the component floats, its attachment modes are
+                                those of inertia relief [3]_ (of "rubin", too)
+        "macneal"               the same without the mass of the residual modes [1]_
+        "dual-craig-bampton"    as "rubin"; `cms.couple` joins such models by interface forces
+                                [5]_
+        "craig-bampton"         fixed-interface modes and constraint modes [4]_
+        "guyan"                 constraint modes alone [6]_
+        "truncation"            free-interface modes alone
+        ======================  ============================================================
     residual : bool
-        Add one residual flexibility mode per interface, which makes the static flexibility
-        between the interfaces exact. Needs a component that is held (no rigid-body modes).
+        False is short for ``method="truncation"``.
+    progress : callable, optional
+        Called as ``progress(text)`` with what is to be done, how much memory it needs, and which
+        solver does it.
 
     Returns
     -------
     ReducedModel
-        Of r = kept modes + independent residual modes. A mode's sign is such that its
-        participation at the first interface that it moves is positive.
+        A mode's sign is such that its participation at the first interface that it moves is
+        positive.
 
     Raises
     ------
@@ -91,6 +140,11 @@ def reduce(
        analysis. AIAA Journal 13(8), 995-1006.
     .. [3] Craig, R.R. and Chang, C.-J. (1977) On the use of attachment modes in substructure
        coupling for dynamic analysis. AIAA paper 77-405.
+    .. [4] Craig, R.R. and Bampton, M.C.C. (1968) Coupling of substructures for dynamic analyses.
+       AIAA Journal 6(7), 1313-1319.
+    .. [5] Rixen, D.J. (2004) A dual Craig-Bampton method for dynamic substructuring. Journal of
+       Computational and Applied Mathematics 168, 383-391.
+    .. [6] Guyan, R.J. (1965) Reduction of stiffness and mass matrices. AIAA Journal 3(2), 380.
 
     Examples
     --------
@@ -103,23 +157,175 @@ def reduce(
     4
     >>> bool(np.isclose(reduced.static_flexibility("first"), n / (n + 1), rtol=1e-12))
     True
+    >>> static = cms.reduce(chain, method="guyan")
+    >>> static.size, bool(np.isclose(static.static_flexibility("first"), n / (n + 1), rtol=1e-12))
+    (1, True)
     """
+    method = chosen_method(method, residual)
+    if method == "guyan":
+        if cutoff_hz is not None or modes not in (None, 0):
+            raise ReductionError("method 'guyan' keeps no modes; give neither modes nor cutoff_hz")
+        modes = 0
     check_request(modes, cutoff_hz)
     pencil = checked_pencil(component)
-    check_count(modes, residual, pencil)
-    shifted = shifted_factor(pencil)
+    check_count(modes, method, pencil)
+    if method in FIXED and not pencil.names:
+        raise ReductionError(f"method '{method}' needs an interface, and the component has none")
+    with announced(progress):
+        if method in FIXED:
+            reduced = reduced_fixed(pencil, modes, cutoff_hz, method)
+        else:
+            reduced = reduced_free(pencil, modes, cutoff_hz, method)
+    return with_component_damping(reduced, component)
+
+
+def chosen_method(method: str, residual: bool) -> str:
+    """The name of the method, or ReductionError where there is none of that name."""
+    if method not in METHODS:
+        raise ReductionError(f"there is no method '{method}' (there are: {', '.join(METHODS)})")
     if residual:
-        check_held(shifted)
+        return method
+    if method not in ("rubin", "truncation"):
+        raise ReductionError(f"residual=False is method 'truncation', not '{method}'")
+    return "truncation"
+
+
+def reduced_free(
+    pencil: Pencil, modes: int | None, cutoff_hz: float | None, method: str
+) -> ReducedModel:
+    """Free-interface modes, with what the method adds to them."""
+    shifted = shifted_factor(pencil)
+    if method != "truncation":
+        check_rigid_kept(modes, shifted)
     kept = kept_modes(pencil, shifted, modes, cutoff_hz)
-    if not residual:
+    if method == "truncation":
         if kept.squares.size == 0:
             raise ReductionError(nothing_kept(cutoff_hz))
-        return assembled(pencil, kept, 0)
-    extra = residual_modes(pencil, shifted.factor, kept.vectors)
+        return assembled(pencil, kept, 0, method)
+    if method == "macneal":
+        if kept.squares.size == 0:
+            raise ReductionError(
+                "method 'macneal' needs at least one mode: what it adds is massless"
+            )
+        shapes = residual_flexibility(pencil, shifted, kept.vectors)
+        flexibility = pencil.loads.T @ shapes
+        return replace(
+            assembled(pencil, kept, 0, method),
+            residual_flexibility=(flexibility + flexibility.T) / 2,
+            residual_shapes=shapes,
+        )
+    extra = residual_modes(pencil, shifted, kept.vectors)
     if kept.squares.size + extra.squares.size == 0:
         raise ReductionError(nothing_kept(cutoff_hz))
     errors = mode_errors(pencil, shifted, extra.squares, extra.vectors)
-    return assembled(pencil, kept, extra.dropped, Modes(extra.squares, extra.vectors, errors))
+    added = Modes(extra.squares, extra.vectors, errors)
+    return assembled(pencil, kept, extra.dropped, method, added)
+
+
+def reduced_fixed(
+    pencil: Pencil, modes: int | None, cutoff_hz: float | None, method: str
+) -> ReducedModel:
+    """Constraint modes and fixed-interface modes, projected and diagonalised."""
+    fixed = fixed_interface(pencil)
+    inner = fixed.interior
+    if modes is not None and modes > inner.size:
+        raise ReductionError(
+            f"modes = {modes}, but with its interfaces held the component has only {inner.size} "
+            "degrees of freedom"
+        )
+    if modes is not None and modes < fixed.shifted.rigid and method != "guyan":
+        raise ReductionError(
+            f"modes = {modes}, but with its interfaces held the component still floats: its "
+            f"{counted(fixed.shifted.rigid)} must be kept"
+        )
+    if method == "guyan" and fixed.shifted.rigid:
+        raise ReductionError(
+            "method 'guyan' needs interfaces that hold the component: with them held "
+            f"{counted(fixed.shifted.rigid)} are left; use 'craig-bampton'"
+        )
+    kept = kept_modes(inner, fixed.shifted, modes, cutoff_hz)
+    basis = np.hstack([fixed.expanded(kept.vectors), fixed.constraint_modes])
+    squares, vectors = ritz(basis, pencil, fastest_square(pencil))
+    errors = fixed_interface_errors(fixed, squares, vectors)
+    whole = assembled(pencil, Modes(squares, vectors, errors), fixed.dropped, method)
+    return replace(whole, modes=int(kept.squares.size))
+
+
+def keep_modes(reduced: ReducedModel, numbers: Sequence[int]) -> ReducedModel:
+    """The model with fewer modes, as if the component had been reduced to these.
+
+    Parameters
+    ----------
+    reduced : ReducedModel
+        A model by "rubin", "craig-chang" or "dual-craig-bampton".
+    numbers : sequence of int
+        Numbers of the component modes to keep, from 1; rigid-body modes must be among them.
+
+    Returns
+    -------
+    ReducedModel
+        With its residual modes; nothing is computed on the component, because the static
+        solutions are combinations of the larger model's modes.
+
+    Raises
+    ------
+    ReductionError
+        For a number that there is not, or a model by another method.
+
+    Examples
+    --------
+    >>> import numpy as np, cms
+    >>> n = 30
+    >>> K = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    >>> chain = cms.Matrices(K, np.eye(n), {"first": np.eye(n)[0]})
+    >>> fewer = cms.keep_modes(cms.reduce(chain, modes=8), [1, 2])
+    >>> bool(np.allclose(fewer.frequencies_hz, cms.reduce(chain, modes=2).frequencies_hz))
+    True
+    """
+    if reduced.method not in ("rubin", "craig-chang", "dual-craig-bampton") or reduced.components:
+        raise ReductionError(
+            f"modes of a model by '{reduced.method}' cannot be left out afterwards"
+        )
+    wanted = sorted(set(numbers))
+    if any(not 1 <= number <= reduced.modes for number in wanted):
+        raise ReductionError(f"modes {wanted} are not all between 1 and {reduced.modes}")
+    chosen = np.array(wanted, dtype=np.intp) - 1
+    squares = (2.0 * np.pi * reduced.frequencies_hz) ** 2
+    rigid = np.flatnonzero(squares[: reduced.modes] == 0.0)
+    if not set(rigid) <= set(chosen):
+        raise ReductionError(f"the {counted(rigid.size)} must be kept")
+    pencil = checked_pencil(Matrices(np.diag(squares), np.eye(reduced.size), reduced.participation))
+    kept = Modes(squares[chosen], np.eye(reduced.size)[:, chosen], reduced.residuals[chosen])
+    extra = residual_modes(pencil, shifted_factor(pencil), kept.vectors)
+    if kept.squares.size + extra.squares.size == 0:
+        raise ReductionError("nothing is left of the model")
+    added = Modes(extra.squares, extra.vectors, np.full(extra.squares.size, np.inf))
+    small = assembled(pencil, kept, extra.dropped, reduced.method, added)
+    damping = reduced.damping
+    return replace(
+        small,
+        basis=reduced.basis @ small.basis,
+        damping=None if damping is None else small.basis.T @ damping @ small.basis,
+    )
+
+
+def with_component_damping(reduced: ReducedModel, component: ComponentLike) -> ReducedModel:
+    """The model with the component's damping matrix projected on its basis, if there is one."""
+    given = getattr(component, "damping", None)
+    if given is None:
+        return reduced
+    damping = symmetric_matrix(given, "damping")
+    if damping.shape[0] != reduced.basis.shape[0]:
+        raise ReductionError(
+            f"the damping matrix has shape {damping.shape}, but the component has "
+            f"{reduced.basis.shape[0]} degrees of freedom"
+        )
+    if reduced.has_massless_part:
+        raise ReductionError(
+            "method 'macneal' has no exact form of a damping matrix: use 'rubin', or "
+            "'with_damping' for modal damping"
+        )
+    return replace(reduced, damping=reduced.basis.T @ times(damping, reduced.basis))
 
 
 def check_request(modes: int | None, cutoff_hz: float | None) -> None:
@@ -138,13 +344,13 @@ def check_request(modes: int | None, cutoff_hz: float | None) -> None:
         raise ReductionError(f"cutoff_hz = {cutoff_hz!r} must be a positive frequency in Hz")
 
 
-def check_count(modes: int | None, residual: bool, pencil: Pencil) -> None:
+def check_count(modes: int | None, method: str, pencil: Pencil) -> None:
     """Raise ReductionError where the component cannot give what is asked for."""
     if modes is not None and modes > pencil.size:
         raise ReductionError(
             f"modes = {modes}, but the component has only {pencil.size} degrees of freedom"
         )
-    if modes == 0 and not residual:
+    if modes == 0 and method == "truncation":
         raise ReductionError("modes = 0 without residual modes leaves nothing of the component")
     if modes == 0 and not pencil.names:
         raise ReductionError("modes = 0, and the component has no interface for a residual mode")
@@ -165,18 +371,21 @@ def kept_modes(
     return modes_up_to(pencil, shifted, (2.0 * np.pi * float(cutoff_hz)) ** 2)
 
 
-def check_held(shifted: Shifted) -> None:
-    """Raise ReductionError where the component floats, so that K has no inverse."""
-    if shifted.rigid:
+def check_rigid_kept(modes: int | None, shifted: Shifted) -> None:
+    """Raise ReductionError where fewer modes are asked for than there are rigid-body modes."""
+    if modes is not None and modes < shifted.rigid:
         raise ReductionError(
-            f"the component floats ({shifted.rigid} rigid-body "
-            f"mode{'s' if shifted.rigid > 1 else ''}): residual flexibility needs supports "
-            "that hold it, or use residual=False"
+            f"modes = {modes}, but the component floats: its {counted(shifted.rigid)} must be kept"
         )
 
 
+def counted(rigid: int) -> str:
+    """How many rigid-body modes there are, in words."""
+    return f"{rigid} rigid-body mode{'s' if rigid > 1 else ''}"
+
+
 def assembled(
-    pencil: Pencil, kept: Modes, dropped: int, extra: Modes | None = None
+    pencil: Pencil, kept: Modes, dropped: int, method: str, extra: Modes | None = None
 ) -> ReducedModel:
     """Put kept and residual modes together as a ReducedModel."""
     parts = [kept] if extra is None else [kept, extra]
@@ -191,6 +400,7 @@ def assembled(
         residuals=errors,
         modes=int(kept.squares.size),
         dropped_residual_modes=dropped,
+        method=method,
     )
 
 

@@ -8,8 +8,9 @@ import numpy as np
 from scipy import linalg
 
 from cms.component import FloatArray, Pencil, times
+from cms.eigen import Shifted
 from cms.errors import ReductionError
-from cms.factor import Factor
+from cms.inertia import elastic_solutions, quotient
 
 DEPENDENCE_TOLERANCE = 1e-12
 
@@ -33,9 +34,9 @@ class ResidualModes:
     dropped: int
 
 
-def static_solutions(pencil: Pencil, factor: Factor) -> FloatArray:
-    """``K^-1 B`` (N, m), one column per interface, with one step of iterative refinement."""
-    return factor.solve(pencil.loads, refinements=1)
+def residual_flexibility(pencil: Pencil, shifted: Shifted, modes: FloatArray) -> FloatArray:
+    """``K^-1 B`` less the modes' share, (N, m); with inertia relief where the component floats."""
+    return without_modes(elastic_solutions(pencil, shifted, pencil.loads), modes, pencil)
 
 
 def without_modes(vectors: FloatArray, modes: FloatArray, pencil: Pencil) -> FloatArray:
@@ -49,17 +50,17 @@ def without_modes(vectors: FloatArray, modes: FloatArray, pencil: Pencil) -> Flo
     return vectors
 
 
-def residual_modes(pencil: Pencil, factor: Factor, modes: FloatArray) -> ResidualModes:
+def residual_modes(pencil: Pencil, shifted: Shifted, modes: FloatArray) -> ResidualModes:
     """Residual flexibility modes of all interfaces, projected on K and M and diagonalised.
 
     Parameters
     ----------
     pencil : Pencil
         K and M (N, N) and the interface vectors.
-    factor : Factor
-        The factorised K.
+    shifted : Shifted
+        The factorised K, or K + s M where the component floats.
     modes : (N, k) array
-        The kept, mass-normalised modes.
+        The kept, mass-normalised modes, with all rigid-body modes among them.
 
     Returns
     -------
@@ -77,8 +78,9 @@ def residual_modes(pencil: Pencil, factor: Factor, modes: FloatArray) -> Residua
     energy matrix reveal the rank; those below 1e-12 (a change of at most 1e-12 in the static
     flexibility) are dropped.
     """
-    static = static_solutions(pencil, factor)
-    static = static / np.sqrt(np.sum(pencil.loads * static, axis=0))
+    static = elastic_solutions(pencil, shifted, pencil.loads)
+    size = np.sqrt(np.maximum(np.sum(pencil.loads * static, axis=0), 0.0))
+    static = static * quotient(np.ones_like(size), size)
     residual = without_modes(static, modes, pencil)
     basis = independent_part(residual, pencil, pencil.size - modes.shape[1])
     basis = without_modes(basis, modes, pencil)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from nldyn.cascades import Cascade, cascade, cascades_in
     from nldyn.contacts import Impacts, impacts
     from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
+    from nldyn.convergence import Study, converge
     from nldyn.curve_marks import LocatedPoint, refine_special
     from nldyn.curve_plots import plot_curves
     from nldyn.curve_store import load_curve, load_curves, save_curves
@@ -48,6 +49,8 @@ if TYPE_CHECKING:
     from nldyn.plot import plot_diagram
     from nldyn.search import SearchOptions, find_orbits
     from nldyn.sections import BruteForce, brute_force, impact_section, stroboscopic_section
+    from nldyn.selection import Selection, reduce_for
+    from nldyn.setting import Setting
     from nldyn.simulation import Motion, simulate, sweep
     from nldyn.special import LocateError
     from nldyn.store import load_branch, load_branches, load_diagram, load_exploration
@@ -61,6 +64,7 @@ _HOMES = {
     "branch": "Branch BranchPoint SpecialPoint",
     "cascades": "Cascade cascade cascades_in",
     "continuation": "ContinuationOptions Walk continue_branch switch_at_flip",
+    "convergence": "Study converge",
     "curve_marks": "LocatedPoint refine_special",
     "curve_plots": "plot_curves",
     "curve_store": "load_curve load_curves save_curves",
@@ -85,6 +89,8 @@ _HOMES = {
     "search": "SearchOptions find_orbits",
     "sections": "BruteForce brute_force impact_section stroboscopic_section",
     "simulation": "Motion simulate sweep",
+    "selection": "Selection reduce_for",
+    "setting": "Setting",
     "special": "LocateError",
     "store": "load_branch load_branches load_diagram load_exploration",
     "studies": "study",
@@ -126,10 +132,13 @@ __all__ = [
     "SceneError",
     "SearchOptions",
     "Seed",
+    "Selection",
+    "Setting",
     "SpecialPoint",
     "Spectrum",
     "Stability",
     "Stop",
+    "Study",
     "System",
     "SystemModelError",
     "TaskError",
@@ -146,6 +155,7 @@ __all__ = [
     "continue_constant",
     "continue_in",
     "continue_special",
+    "converge",
     "describe",
     "diagram",
     "dissipation_for",
@@ -173,6 +183,7 @@ __all__ = [
     "plot_section",
     "plot_spectrum",
     "plot_sweep",
+    "reduce_for",
     "refine_special",
     "run_all",
     "save_curves",

@@ -497,6 +497,20 @@ def law(fl, stop, delta, speed):
 
 
 @inner
+def closed_law(fl, stop, delta, speed):
+    """The same within a panel on which the stop is closed.
+
+    A linear law goes on beyond the switch there: rounding may put the outermost node on its other
+    side, and would drop the whole stiffness from the slopes.
+    """
+    if fl.laws[stop] == 0 and fl.stops[stop, EXPONENT] == 1.0:
+        stiffness, loss = fl.stops[stop, STIFFNESS], fl.stops[stop, DISSIPATION]
+        factor = 1.0 + loss * speed
+        return stiffness * delta * factor, stiffness * factor, loss * stiffness * delta
+    return law(fl, stop, delta, speed)
+
+
+@inner
 def depends_on_speed(fl, stop):
     """Whether a force depends on the speed of penetration, as far as one knows."""
     return fl.laws[stop] != 0 or fl.stops[stop, DISSIPATION] != 0.0
@@ -515,15 +529,13 @@ def needs_speed(fl, stop):
 @inner
 def law_by(fl, stop, column, delta, speed):
     """Derivative of a stop's force with respect to its own number in a column of `stops`."""
-    if delta <= 0.0:
-        return 0.0
-    force, slope, _ = law(fl, stop, delta, speed)
+    force, slope, _ = closed_law(fl, stop, delta, speed)
     if column == GAP:
         return -slope
     if column == STIFFNESS:
         return force / fl.stops[stop, STIFFNESS]
     if column == EXPONENT:
-        return force * math.log(delta)
+        return force * math.log(delta) if delta > 0.0 else 0.0
     factor = 1.0 + fl.stops[stop, DISSIPATION] * speed  # column == DISSIPATION
     return speed * force / factor
 
@@ -715,7 +727,9 @@ def panel_forces(fl, panel, slope):
     for a in range(na):
         for i in range(m):
             speed = panel.output[na + a, i] if slope.shape[0] > na else 0.0
-            force, stiffness, viscosity = law(fl, panel.active[a], panel.output[a, i], speed)
+            force, stiffness, viscosity = closed_law(
+                fl, panel.active[a], panel.output[a, i], speed
+            )
             panel.F[a, i] = force
             slope[a, i] = stiffness
             if slope.shape[0] > na:
@@ -1304,6 +1318,32 @@ def stop_at_switch(fl, w, phase, h, closed):
 
 
 @inner
+def graded_length(fl, active, w, phase, h, sign, switched, event):
+    """Longest panel on which the slopes of stops that closed a little before (sign 1) are smooth.
+
+    With sign -1 the same at the end of a panel, of stops that open a little after it, `event` left
+    out. A law with a power that is not whole is singular at its switch; at a distance τ from it,
+    4 τ is a length on which Legendre coefficients fall by 2.6 from one to the next (Bernstein's
+    ellipse). Where a map has its nodes crowded there (switched), a switch within the error allowed
+    in its instant does not count.
+    """
+    longest = np.inf
+    for a in range(active.size):
+        s = active[a]
+        exponent = fl.stops[s, EXPONENT]
+        if s == event or (fl.laws[s] == 0 and exponent == math.floor(exponent)):
+            continue
+        value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
+        delta = value - fl.stops[s, GAP]
+        if sign * speed <= 0.0 or delta <= 10.0 * output_noise(fl, s, w):
+            continue
+        away = delta / abs(speed)
+        if not switched or away > 10.0 * fl.stops[s, INSTANT] * h:
+            longest = min(longest, 4.0 * away)
+    return longest
+
+
+@inner
 def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec):
     """Solve one panel and choose its length, at most h_max, and h_mapped to aim at an event.
 
@@ -1321,6 +1361,10 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
     kind, h, aim = remembered_panel(rec, start_switch, h_max, panel)
     if kind < 0:
         kind, h = guess_panel(fl, tab, phase, w, limit, h_mapped, start_switch, panel)
+    graded = graded_length(fl, active, w, phase, h, 1.0, start_switch == 1, -1)
+    if h > 1.5 * graded:
+        aim = -1
+        kind, h = guess_panel(fl, tab, phase, w, graded, h_mapped, start_switch, panel)
     tried = h
     for attempt in range(100):
         if h <= 0.0 or phase + fl.omega * h == phase:
@@ -1336,6 +1380,11 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
         panel_end(fl, tab, kind, w, h, panel, w_end)
         end_phase = phase + fl.omega * h
         fine = resolved(fl, tab, kind, noise, panel)
+        if fine:
+            event = aim if kind % 2 == 1 else -1
+            fine = h <= 1.5 * graded_length(
+                fl, active, w_end, end_phase, h, -1.0, kind % 2 == 1, event
+            )
         event, where = first_event(fl, tab, kind, phase, w, h, closed, panel, w_end)
         at_end = where > (0.999 if event == aim else 1.0 - 1e-7)
         lost = attempt % 12 == 11  # the instant that is aimed at goes to and fro

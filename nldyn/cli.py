@@ -1,4 +1,4 @@
-"""The command line: ``nldyn run``, ``check``, ``render`` and ``paper``.
+"""The command line: ``nldyn run``, ``check``, ``render``, ``converge`` and ``paper``.
 
 Exit codes: 0 done, 2 something in the scene or on the command line is wrong, 3 a picture or an
 animation needs something that is not installed, 130 stopped with Ctrl-C.
@@ -185,6 +185,83 @@ def render(
     if made.missing:
         click.echo(f"nldyn: {made.missing}", err=True)
         sys.exit(NO_GRAPHICS)
+
+
+def number_list(
+    _context: click.Context, _parameter: click.Parameter, value: str | None
+) -> list[int] | None:
+    """Read whole numbers with commas between them, or ranges like 1-10."""
+    if value is None:
+        return None
+    found: set[int] = set()
+    for piece in value.split(","):
+        first, _dash, last = piece.strip().partition("-")
+        if not first.isdecimal() or (last and not last.isdecimal()):
+            raise click.BadParameter(f"'{value}' is not a list of whole numbers such as 1-10,20")
+        if int(last or first) - int(first) > 1000:
+            raise click.BadParameter(f"'{value}' names more than 1000 numbers")
+        found |= set(range(int(first), int(last or first) + 1))
+    return sorted(found)
+
+
+@main.command()
+@scene_argument
+@out_option
+@click.option(
+    "--modes",
+    callback=number_list,
+    metavar="LIST",
+    help="Numbers of kept modes, such as 1-10,20; by default 1 to 10, 12, 16, 20, 30 and 40.",
+)
+@click.option(
+    "--methods",
+    default="rubin",
+    show_default=True,
+    metavar="LIST",
+    help="Methods to compare: rubin, craig-bampton, guyan, truncation.",
+)
+@click.option(
+    "--refinements",
+    callback=number_list,
+    metavar="LIST",
+    help="Meshes to compare: cut every element into so many; by default 1.",
+)
+@click.option("--at-hz", type=click.FloatRange(1e-6, 1e12), metavar="HZ", help="Orbit to compare.")
+@click.option("--full", is_flag=True, help="Find this orbit in the full model, too (minutes).")
+@quiet_option
+def converge(
+    scene: Path,
+    out: Path,
+    modes: list[int] | None,
+    methods: str,
+    refinements: list[int] | None,
+    at_hz: float | None,
+    full: bool,
+    quiet: bool,
+) -> None:
+    """Compute the harmonic branch with more and more modes, and compare."""
+    with plain_errors():
+        from nldyn.convergence import COUNTS, study_of_scene
+        from nldyn.convergence_output import write_study
+        from nldyn.progress import progress_line
+        from nldyn.result_directory import check_directory
+        from nldyn.scene import load_scene
+
+        loaded = load_scene(scene)
+        check_directory(out)
+        with progress_line(quiet) as report:
+            study = study_of_scene(
+                loaded,
+                modes=modes or COUNTS,
+                methods=[name.strip() for name in methods.split(",")],
+                refinements=refinements or [1],
+                at_hz=at_hz,
+                full=full,
+                progress=report,
+            )
+        write_study(study, out, loaded.title)
+        click.echo(study.report())
+        click.echo(f"written to {out}")
 
 
 @main.command()

@@ -14,7 +14,7 @@ ContactLaw = Callable[[float, float], tuple[float, float, float]]
 
 
 def check_law(owner: str, law: ContactLaw, stiffness: float, exponent: float) -> None:
-    """Refuse a law that is not finite, does not vanish with the penetration, or has wrong slopes.
+    """Refuse a law that is not finite, not smooth, not zero at its start, or has wrong slopes.
 
     Penetrations and speeds are tried around those at which the power law gives 1 N.
 
@@ -47,6 +47,49 @@ def check_law(owner: str, law: ContactLaw, stiffness: float, exponent: float) ->
     tiny = abs(_values(owner, law, 1e-9 * unit, 0.1)[0])
     if tiny > 1e-4 * max(abs(_values(owner, law, unit, 0.1)[0]), 1.0):
         raise SystemModelError(f"{owner}: law must vanish with the penetration")
+    _check_smooth(owner, law, unit)
+
+
+def _check_smooth(owner: str, law: ContactLaw, unit: float) -> None:
+    """Refuse a law whose force or slope jumps: panels resolve analytic laws only.
+
+    Sought on a grid of penetrations with eight points to an octave, from 1e-4 to 1e4 of the unit;
+    where neighbours differ by a twentieth, the larger half of the change is followed down to 1e-10
+    of the penetration, and one that is left there is a jump.
+    """
+
+    def values(exponent: float) -> tuple[float, float]:
+        force, stiff, _ = _values(owner, law, unit * 2.0**exponent, 0.1)
+        return force, stiff
+
+    points = [-13.25 + k / 8.0 for k in range(213)]
+    for which, name in enumerate(("force", "derivative by the penetration")):
+        known = []
+        for point in points:
+            try:
+                known.append(values(point)[which])
+            except SystemModelError:  # beyond what can be computed, as of an exponential law
+                break
+        for k in range(len(known) - 1):
+            if _differ(known[k], known[k + 1], 0.05):
+                low, high, below, above = points[k], points[k + 1], known[k], known[k + 1]
+                while high - low > 1e-10:
+                    middle = 0.5 * (low + high)
+                    between = values(middle)[which]
+                    if abs(between - below) > abs(above - between):
+                        high, above = middle, between
+                    else:
+                        low, below = middle, between
+                if _differ(below, above, 0.01):
+                    raise SystemModelError(
+                        f"{owner}: law is not smooth: its {name} jumps from {below:g} to {above:g} "
+                        f"at penetration {unit * 2.0**low:g} m; use several stops with gaps of "
+                        "their own instead"
+                    )
+
+
+def _differ(a: float, b: float, share: float) -> bool:
+    return abs(a - b) > share * max(abs(a), abs(b))
 
 
 def _values(owner: str, law: ContactLaw, delta: float, speed: float) -> tuple[float, float, float]:

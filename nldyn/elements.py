@@ -157,7 +157,8 @@ class Stop:
     law : callable, optional
         Another law: ``law(penetration, speed)`` gives the force and its derivatives with respect
         to both, for a positive penetration. numba must be able to compile it. It vanishes with
-        the penetration, where `stiffness` and `exponent` say how: as k δ^p.
+        the penetration, where `stiffness` and `exponent` say how: as k δ^p. Beyond that it must be
+        smooth: one with a kink is several stops with gaps of their own.
 
     Raises
     ------

@@ -31,7 +31,14 @@ from nldyn._kernels import (
 )
 from nldyn._sample import local_extremes, sample_states
 from nldyn.contact_law import law_address
-from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
+from nldyn.errors import (
+    LARGEST_FREQUENCY,
+    SystemModelError,
+    check_types,
+    check_whole,
+    is_finite,
+    shown,
+)
 from nldyn.gauss import GaussTables, gauss_tables
 from nldyn.linear import Complex, Real
 from nldyn.parameters import Parameter, parameter_tables
@@ -361,8 +368,11 @@ class FlowMap:
                 f"nodes must have shape ({rows}, {size}) for {phases.size - 1} segments of "
                 f"{self.system.size} modes, got {nodes.shape}"
             )
-        if not (is_finite(omega) and omega > 0.0):
-            raise SystemModelError(f"omega must be positive and finite, got {shown(omega)}")
+        if not (is_finite(omega) and 0.0 < omega <= 2.0 * math.pi * LARGEST_FREQUENCY):
+            raise SystemModelError(
+                "omega must be positive, finite and at most that of "
+                f"{LARGEST_FREQUENCY:g} Hz, got {shown(omega)}"
+            )
 
     def trajectory(
         self, nodes: Real, phases: Real, omega: float, *, chained: bool = False
@@ -476,8 +486,8 @@ class FlowMap:
             parameter_tables(self.system, parameters) if parameters else self._no_parameters
         )
         found = newton(
-            self._data, self.tables, record, recording, omega, point, phases, chained,
-            sensitivities, table, drive_by, corrector,
+            self._data, self.tables, record, recording, omega, point, phases, bool(chained),
+            bool(sensitivities), table, drive_by, corrector,
         )  # fmt: skip
         return found  # type: ignore[no-any-return]
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import cms
     import fem
     from nldyn.diagrams import Diagram, Progress
-    from nldyn.elements import Excitation, Stop
+    from nldyn.elements import Damper, Excitation, Stop
     from nldyn.exploration import Exploration
     from nldyn.flow import FlowMap
     from nldyn.system import System
@@ -136,13 +136,17 @@ def scene_from_tables(tables: dict[str, Any], file: str | Path, text: str = "") 
     return scene
 
 
-def build_component(scene: Scene) -> fem.Component | fem.StructureComponent:
+def build_component(
+    scene: Scene, refinement: int = 1
+) -> fem.Component | fem.StructureComponent:
     """Assemble the mesh of a scene.
 
     Parameters
     ----------
     scene : Scene
         A scene with a ``[mesh]``.
+    refinement : int
+        Cut every element of a frame into this many.
 
     Returns
     -------
@@ -152,7 +156,8 @@ def build_component(scene: Scene) -> fem.Component | fem.StructureComponent:
     Raises
     ------
     SceneError
-        If the scene has no mesh, or the mesh is unreadable, empty or lacks a name used.
+        If the scene has no mesh, or the mesh is unreadable, empty or lacks a name used, or is of a
+        structure and to be refined.
 
     Examples
     --------
@@ -173,6 +178,9 @@ def build_component(scene: Scene) -> fem.Component | fem.StructureComponent:
         fault = f"names {path}, which {_unreadable(error)}"
         raise scene_error(scene.file, ("mesh", "file"), fault) from None
     if scene.mesh.model == "structure":
+        if refinement > 1:
+            fault = 'is "structure", whose cells are refined in the mesher'
+            raise scene_error(scene.file, ("mesh", "model"), fault)
         with _told_as(scene, ("mesh", "file"), fem.ModelError):
             structure = fem.read_structure(path)
         check_structure_names(scene, structure, scene.file)
@@ -182,6 +190,8 @@ def build_component(scene: Scene) -> fem.Component | fem.StructureComponent:
         mesh = fem.read_mesh(path)
     check_mesh_names(scene, mesh, scene.file)
     with _told_as(scene, (), fem.ModelError):
+        if refinement > 1:
+            mesh = refined_mesh(mesh, refinement)
         return fem.assemble(_frame_model(scene, mesh))
 
 
@@ -222,9 +232,18 @@ def build_reduced(
     pieces = _count_pieces(len(component.model.mesh.points), component.model.links)
     hint = f"; the mesh is in {pieces} pieces that share no node" if pieces > 1 else ""
     with _told_as(scene, ("reduction",), cms.ReductionError, hint=hint):
-        return cms.reduce(
-            component, modes=table.modes, cutoff_hz=table.cutoff_hz, residual=table.residual
+        reduced = cms.reduce(
+            component,
+            modes=table.modes,
+            cutoff_hz=table.cutoff_hz,
+            method=table.method,
+            residual=table.residual,
         )
+        if pieces > 1 and reduced.rigid_body_modes:
+            count = reduced.rigid_body_modes
+            modes = f"{count} rigid-body mode{'s' if count > 1 else ''}"
+            raise cms.ReductionError(f"the component floats ({modes})")
+        return reduced
 
 
 def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> System:
@@ -253,15 +272,16 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
     >>> f"{build_system(load_scene(example('one_dof.toml'))).frequencies_hz[0]:.4f}"
     '13.1293'
     """
-    from nldyn.elements import Damper
+    from nldyn.setting import with_first
     from nldyn.system import System
 
     with _told_as(scene, (), SystemModelError):
+        stops, dampers, excitation = acting_elements(scene)
         acting: dict[str, Any] = {
             "modal_damping": scene.damping.modal_ratio,
-            "stops": [_stop(stop) for stop in scene.stops],
-            "dampers": [Damper(damper.at, damper.coefficient) for damper in scene.dampers],
-            "excitation": [_excitation(table) for table in scene.excitation],
+            "stops": stops,
+            "dampers": dampers,
+            "excitation": excitation,
         }
         if scene.modal is not None:
             hz = scene.modal.frequencies_hz
@@ -278,9 +298,7 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
                 )
         reduced = reduced or build_reduced(scene)
         check_ratio_count(scene, len(reduced.frequencies_hz), scene.file)
-        return System.from_modal(
-            reduced.frequencies_hz, _observed_first(scene, reduced.participation), **acting
-        )
+        return System.from_reduced(with_first(reduced, scene.observed), **acting)
 
 
 def compute(
@@ -421,6 +439,20 @@ def _to_follow(scene: Scene) -> tuple[FlowMap, ContinuationTable]:
         return FlowMap(system, FlowOptions(table.rtol)), table
 
 
+def acting_elements(
+    scene: Scene,
+) -> tuple[tuple[Stop, ...], tuple[Damper, ...], tuple[Excitation, ...]]:
+    """The stops, dampers and excitation of a scene; a `SceneError` says what is wrong with one."""
+    from nldyn.elements import Damper
+
+    with _told_as(scene, (), SystemModelError):
+        return (
+            tuple(_stop(stop) for stop in scene.stops),
+            tuple(Damper(damper.at, damper.coefficient) for damper in scene.dampers),
+            tuple(_excitation(table) for table in scene.excitation),
+        )
+
+
 def _frame_model(scene: Scene, mesh: fem.FrameMesh) -> fem.FrameModel:
     import fem
 
@@ -462,6 +494,37 @@ def _attached(scene: Scene) -> dict[str, Any]:
             name: fem.Interface(i.at, i.direction) for name, i in scene.interfaces.items()
         },
     }
+
+
+def refined_mesh(mesh: fem.FrameMesh, times: int) -> fem.FrameMesh:
+    """The mesh with every line cut into equal pieces; names of parts and points stay.
+
+    Examples
+    --------
+    >>> import fem
+    >>> mesh = fem.frame_mesh({"a": (0, 0), "b": (1, 0)}, [("arm", "a", "b", 2)])
+    >>> len(refined_mesh(mesh, 3).lines)
+    6
+    """
+    import numpy as np
+
+    import fem
+
+    n, count = len(mesh.points), len(mesh.lines)
+    first, last = (mesh.points[mesh.lines[:, end]] for end in (0, 1))
+    share = np.arange(1, times)[None, :, None] / times
+    inner = first[:, None] + share * (last - first)[:, None]
+    numbers = n + np.arange(count * (times - 1)).reshape(count, times - 1)
+    chain = np.hstack([mesh.lines[:, :1], numbers, mesh.lines[:, 1:]])
+    lines = np.stack([chain[:, :-1], chain[:, 1:]], axis=-1).reshape(-1, 2)
+    pieces = np.arange(count * times).reshape(count, times)
+    return fem.FrameMesh(
+        np.vstack([mesh.points, inner.reshape(-1, 3)]),
+        lines,
+        {name: pieces[elements].ravel() for name, elements in mesh.parts.items()},
+        mesh.point_sets,
+        mesh.source,
+    )
 
 
 def _count_pieces(count: int, links: NDArray[np.int64]) -> int:

@@ -181,9 +181,15 @@ class ReductionTable(Table):
     modes: Annotated[int, Field(ge=0)] | None = None
     cutoff_hz: Frequency | None = None
     residual: bool = True
+    method: Literal["rubin", "craig-bampton", "guyan", "truncation"] = "rubin"
 
     @model_validator(mode="after")
     def _one_choice(self) -> ReductionTable:
+        if not self.residual and self.method not in ("rubin", "truncation"):
+            raise ValueError("has 'residual = false', which is method 'truncation'; keep one")
+        if self.method == "guyan":
+            _refuse(self, ("modes", "cutoff_hz"), "method 'guyan', which keeps no modes")
+            return self
         _exactly_one(self, "modes", "cutoff_hz")
         return self
 

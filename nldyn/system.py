@@ -213,22 +213,39 @@ class System:
         Parameters
         ----------
         reduced : object
-            With `frequencies_hz` (n,) and `participation` {name: (n,)}.
+            With `frequencies_hz` (n,) and `participation` {name: (n,)}; its `damping` (n, n) in 1/s
+            is added to the modal damping, if it has one.
         modal_damping, stops, dampers, excitation
             As for `from_modal`.
 
         Raises
         ------
         SystemModelError
-            See `System`.
+            If part of its flexibility has no mass (`residual_flexibility`), as by MacNeal's
+            method: its interfaces would move at once under a force. See also `System`.
         """
-        return cls.from_modal(
-            reduced.frequencies_hz,
-            reduced.participation,
-            modal_damping=modal_damping,
-            stops=stops,
-            dampers=dampers,
-            excitation=excitation,
+        massless = getattr(reduced, "residual_flexibility", None)
+        if massless is not None and np.any(massless):
+            raise SystemModelError(
+                "part of the reduced model's flexibility has no mass "
+                f"(method '{getattr(reduced, 'method', 'unknown')}'), so that its interfaces have "
+                "no equation of motion; reduce by 'rubin' or 'craig-bampton' instead"
+            )
+        system = cls.from_modal(
+            reduced.frequencies_hz, reduced.participation, modal_damping=modal_damping
+        )
+        damping = getattr(reduced, "damping", None)
+        if damping is not None:
+            damping = _symmetric("damping", damping)
+            if damping.shape != system.damping.shape:
+                raise SystemModelError(f"damping is {damping.shape} for {system.size} modes")
+        return cls(
+            system.natural_frequencies,
+            system.damping if damping is None else system.damping + damping,
+            system.participation,
+            _listed("stops", stops),
+            _listed("dampers", dampers),
+            _listed("excitation", excitation),
         )
 
     @property

@@ -504,3 +504,64 @@ def test_small_motion_on_a_preloaded_stop_has_the_tangent_stiffness():
     assert abs(found.real[0] - exact.real[0]) < 1e-9
     assert abs(abs(found[0]) - abs(exact[0])) < 1e-9
     assert closings.tolist() == [0]
+
+
+# --- stops that close or open shortly after one another ----------------------------------------
+
+
+def jacobian_by_differences(flow, start, phases, omega):
+    """Central differences of order eight of the end state, (2, 2)."""
+    shares = ((1, 4 / 5), (2, -1 / 5), (3, 4 / 105), (4, -1 / 280))
+    step = 1e-3 * np.abs(start).max()
+
+    def end(offset):
+        return flow.shoot((start + offset)[None], phases, omega, sensitivities=False).ends[0]
+
+    columns = [
+        sum(c * (end(k * step * e) - end(-k * step * e)) for k, c in shares) / step
+        for e in np.eye(2)
+    ]
+    return np.transpose(columns)
+
+
+@pytest.mark.parametrize("exponent", [1.5, 2.5, 1.2])
+@pytest.mark.parametrize("apart", [1e-7, 1e-5, 1e-4, 1e-3, 1e-2])
+def test_stops_that_close_shortly_after_one_another_keep_the_jacobian(exponent, apart):
+    """The slope of the first one is singular a little before the panel of both begins."""
+    stiffness = 3e8 * 1e-4 ** (1.5 - exponent)
+    stops = [
+        Stop("a", stiffness, exponent, gap=1e-4),
+        Stop("a", 2.0 * stiffness, exponent, gap=1e-4 * (1.0 + apart)),
+    ]
+    system = System.from_modal(
+        [60.0], {"a": [1.0]}, modal_damping=0.02, stops=stops, excitation=[HarmonicForce("a", 20.0)]
+    )
+    flow, fine = FlowMap(system), FlowMap(system, FlowOptions(rtol=1e-13))
+    start, phases, omega = flow.to_state([0.0, 0.1]), np.array([0.0, 1.0]), 50.0 * math.pi
+    wanted = jacobian_by_differences(fine, start, phases, omega)
+    found = flow.shoot(start[None], phases, omega).jacobians[0]
+    assert np.abs(found - wanted).max() < 1e-9 * np.abs(wanted).max()
+
+
+@pytest.mark.parametrize("depth", [1e-13, 1e-10, 1e-7])
+def test_segment_that_starts_just_after_a_closing_keeps_the_jacobian(depth):
+    system = System.from_modal(
+        [60.0], {"a": [1.0]}, modal_damping=0.02, excitation=[HarmonicForce("a", 20.0)],
+        stops=[Stop("a", 10.0**13.5, 2.5, gap=1e-4)],
+    )  # fmt: skip
+    coarse, fine = FlowMap(system), FlowMap(system, FlowOptions(rtol=1e-13))
+    start, phases = coarse.to_state([1e-4 + depth, 0.1])[None], np.array([0.3, 1.3])
+    found, wanted = (f.shoot(start, phases, 50.0 * math.pi).jacobians[0] for f in (coarse, fine))
+    assert np.abs(found - wanted).max() < 2e-9 * np.abs(wanted).max()
+
+
+def test_linear_stop_is_as_exact_beside_one_of_another_law():
+    """The map for powers that are not whole has a node within rounding of the switch."""
+    linear, other = Stop("a", 1e6, 1.0, gap=1e-4), Stop("a", 1e6, 1.2, gap=1.0)
+    jacobians = []
+    for stops in ([linear], [linear, other]):
+        system = System.from_modal([60.0], {"a": [1.0]}, modal_damping=0.02, stops=stops)
+        flow = FlowMap(system)
+        found = flow.shoot(flow.to_state([[0.0, 0.1]]), np.array([0.0, 1.0]), 50.0 * math.pi)
+        jacobians.append(found.jacobians[0])
+    assert np.abs(jacobians[1] - jacobians[0]).max() < 1e-10 * np.abs(jacobians[0]).max()

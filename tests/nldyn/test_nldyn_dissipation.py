@@ -235,3 +235,36 @@ def test_a_law_that_cannot_be_compiled_says_so():
     system = make_one_dof(stops=[Stop("middle", 5e9, law=from_a_table)])
     with pytest.raises(SystemModelError, match="'from_a_table' cannot be compiled"):
         solve_orbit(system, 26.0)
+
+
+def test_law_may_give_whole_numbers():
+    def whole(delta, speed):
+        return 10**6 * delta, 10**6, 0
+
+    own = Stop("m", 1e6, exponent=1.0, gap=-1e-5, law=whole)
+    linear = Stop("m", 1e6, exponent=1.0, gap=-1e-5)
+    ends = []
+    for stop in (own, linear):
+        system = System.from_modal([13.1], {"m": [0.6]}, modal_damping=0.01, stops=[stop])
+        ends.append(FlowMap(system).shoot(np.zeros((1, 2)), np.array([0.0, 6.0]), 80.0).ends)
+    assert np.abs(ends[0] - ends[1]).max() <= 1e-12 * np.abs(ends[1]).max()
+
+
+def bilinear(delta, speed):
+    if delta < 2e-5:
+        return 1e6 * delta, 1e6, 0.0
+    return 20.0 + 5e6 * (delta - 2e-5), 5e6, 0.0
+
+
+def test_law_with_a_kink_is_refused():
+    with pytest.raises(SystemModelError, match="not smooth: its derivative by the penetration"):
+        Stop("m", 1e6, exponent=1.0, law=bilinear)
+
+
+@pytest.mark.parametrize("steepness", [1e4, 3e6])
+def test_smooth_law_is_not_taken_for_one_with_a_kink(steepness):
+    def stiffening(delta, speed):
+        rise = math.expm1(min(steepness * delta, 200.0))
+        return 1e6 / steepness * rise, 1e6 * (rise + 1.0), 0.0
+
+    assert Stop("m", 1e6, exponent=1.0, law=stiffening).law is stiffening

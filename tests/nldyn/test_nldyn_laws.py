@@ -320,16 +320,3 @@ def test_a_mode_that_no_interface_sees_changes_nothing():
     nu = 2 * np.pi * 77.0
     unseen = np.exp(nu * (-0.05 + 1j * math.sqrt(1 - 0.05**2)) / 31.0)
     assert np.abs(two.multipliers - unseen).min() < 1e-10
-
-
-def test_law_may_give_whole_numbers():
-    def whole(delta, speed):
-        return 10**6 * delta, 10**6, 0
-
-    own = Stop("m", 1e6, exponent=1.0, gap=-1e-5, law=whole)
-    linear = Stop("m", 1e6, exponent=1.0, gap=-1e-5)
-    ends = []
-    for stop in (own, linear):
-        system = System.from_modal([13.1], {"m": [0.6]}, modal_damping=0.01, stops=[stop])
-        ends.append(FlowMap(system).shoot(np.zeros((1, 2)), np.array([0.0, 6.0]), 80.0).ends)
-    assert np.abs(ends[0] - ends[1]).max() <= 1e-12 * np.abs(ends[1]).max()

@@ -1,0 +1,225 @@
+"""How wrong a reduced model is: bands for its frequencies and for the receptance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import linalg
+
+from cms.checks import check_belongs
+from cms.component import ComponentLike, FloatArray, Pencil, checked_pencil, times
+from cms.constraint import FixedInterface, fixed_interface
+from cms.eigen import Modes, lowest_modes, shifted_factor
+from cms.errors import ReductionError
+from cms.inertia import elastic_solutions
+from cms.model import ReducedModel
+from cms.residual import residual_flexibility, without_modes
+
+
+@dataclass(frozen=True, eq=False)
+class Accuracy:
+    """What is known of a reduced model's error without solving the full one, by `accuracy`.
+
+    Attributes
+    ----------
+    reduced : ReducedModel
+        The model.
+    next_hz : float
+        Frequency of the first mode left out: of the component, or of the component with held
+        interfaces for Craig-Bampton's and Guyan's methods. Infinite if none is left out.
+    gram : (m, m) array
+        Positive semidefinite matrix from which the receptance's error grows, see the notes of
+        `receptance_error`.
+    """
+
+    reduced: ReducedModel
+    next_hz: float
+    gram: FloatArray
+
+    @cached_property
+    def frequency_bands_hz(self) -> FloatArray:
+        """Band (r, 2) in Hz around each frequency that holds one of the component, for certain.
+
+        From the residuals: an exact w' lies within ``|w'^2 - w^2| <= residual w w'`` (Li 1998).
+        Kept free-interface modes have bands at rounding level; a residual mode's band says how
+        little it is a mode.
+        """
+        half = np.minimum(self.reduced.residuals, 1e8) / 2.0
+        factor = np.sqrt(1.0 + half**2) + half
+        hz = self.reduced.frequencies_hz
+        return np.column_stack([hz / factor, hz * factor])
+
+    def receptance_error(self, frequency_hz: ArrayLike, at: str, excited: str) -> FloatArray:
+        r"""Band of the error of the receptance, without damping.
+
+        Parameters
+        ----------
+        frequency_hz : float or (k,) array_like
+            Frequencies in Hz.
+        at, excited : str
+            Interfaces of the displacement and of the force.
+
+        Returns
+        -------
+        (k, 2) array
+            Between these the component's receptance minus the model's lies, in m/N; infinite at
+            and above ``next_hz``, where a mode left out may resonate.
+
+        Raises
+        ------
+        ReductionError
+            If there is no such interface.
+
+        Notes
+        -----
+        What free-interface methods leave out is a sum over the modes above the kept ones, in which
+        each term lies between its static value and :math:`a = \omega^2/(\omega^2 - \Omega^2)`
+        times that, with the first frequency left out ω. The static values need no modes:
+        for truncation they sum to the residual flexibility :math:`\Psi^T K\Psi`, for MacNeal's
+        method to :math:`\Omega^2 \Psi^T M \Psi`, and for Rubin's to
+
+        .. math:: \Omega^4 x^T (V^T M K_r^{-1} M V - \Lambda^{-1}) x, \qquad
+                  x = (\Lambda - \Omega^2)^{-1} V^T b
+
+        with the residual modes V, their squared frequencies Λ, and the inverse :math:`K_r^{-1}`
+        on what is left out. For Craig-Bampton's method the same holds for the dynamic
+        stiffness between the interfaces, where it is
+        :math:`\Omega^4 \Psi_c^T M K_r^{-1} M \Psi_c` with the constraint modes. So the bands are
+        bounds, not estimates. For displacement and force at different interfaces the spread
+        follows from those of both by Schwarz's inequality.
+
+        Examples
+        --------
+        >>> import numpy as np, cms
+        >>> n = 50
+        >>> K = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+        >>> chain = cms.Matrices(K, np.eye(n), {"first": np.eye(n)[0]})
+        >>> known = cms.accuracy(chain, cms.reduce(chain, modes=3))
+        >>> low, high = known.receptance_error(0.015, "first", "first")[0]
+        >>> exact = np.linalg.inv(K - (2 * np.pi * 0.015) ** 2 * np.eye(n))[0, 0]
+        >>> model = known.reduced.receptance(0.015, "first", "first").real
+        >>> bool(low < exact - model < high < 1.2 * low)
+        True
+        """
+        names = self.reduced.interfaces
+        for name in (at, excited):
+            self.reduced.static_flexibility(name)  # says if there is no such interface
+        i, j = names.index(at), names.index(excited)
+        bands = []
+        for hz in np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64)):
+            if hz >= self.next_hz:
+                bands.append((-np.inf, np.inf))
+                continue
+            square = (2.0 * np.pi * hz) ** 2
+            growth = 1.0 / (1.0 - (hz / self.next_hz) ** 2)
+            low, high = self._error(square, 1.0), self._error(square, growth)
+            spread = high - low
+            if np.min(np.linalg.eigvalsh(spread)) < -1e-9 * np.abs(high).max():
+                bands.append((-np.inf, np.inf))  # a resonance of the model lies in between
+            elif i == j:
+                bands.append((low[i, i], high[i, i]))
+            else:
+                middle = (low + high)[i, j] / 2.0
+                reach = np.sqrt(max(spread[i, i] * spread[j, j], 0.0)) / 2.0
+                bands.append((middle - reach, middle + reach))
+        return np.array(bands)
+
+    def _error(self, square: float, growth: float) -> FloatArray:
+        """Error (m, m) of the receptance at w^2 if every mode left out answers ``growth`` times."""
+        model = self.reduced
+        if model.method == "truncation":
+            return growth * self.gram
+        if model.method == "macneal":
+            return growth * square * self.gram
+        rows = np.array([model.participation[name] for name in model.interfaces])
+        dynamic = (2.0 * np.pi * model.frequencies_hz) ** 2 - square
+        if model.method in ("craig-bampton", "guyan"):
+            stiffness = linalg.inv((rows / dynamic) @ rows.T)
+            return np.asarray(
+                linalg.inv(stiffness - growth * square**2 * self.gram) - linalg.inv(stiffness)
+            )
+        x = rows[:, model.modes :] / dynamic[model.modes :]
+        return np.asarray(growth * square**2 * x @ self.gram @ x.T)
+
+
+def accuracy(component: ComponentLike, reduced: ReducedModel) -> Accuracy:
+    """What is known of the error of a reduced model.
+
+    Parameters
+    ----------
+    component : ComponentLike
+        The component that it was made of.
+    reduced : ReducedModel
+        Its reduced model.
+
+    Returns
+    -------
+    Accuracy
+
+    Raises
+    ------
+    ReductionError
+        If the model does not belong to the component, or is one whose error is not known.
+
+    Notes
+    -----
+    It costs a factorisation, the kept modes and one more, and a solution per interface.
+    """
+    pencil = checked_pencil(component)
+    check_belongs(pencil, reduced)
+    if reduced.method in ("craig-bampton", "guyan"):
+        return accuracy_fixed(pencil, reduced)
+    shifted = shifted_factor(pencil)
+    modes = lowest_modes(pencil, shifted, min(reduced.modes + 1, pencil.size))
+    kept = modes.vectors[:, : reduced.modes]
+    if reduced.method in ("truncation", "macneal"):
+        shapes = residual_flexibility(pencil, shifted, kept)
+        weight = pencil.stiffness if reduced.method == "truncation" else pencil.mass
+        gram = shapes.T @ times(weight, shapes)
+    else:
+        V = reduced.basis[:, reduced.modes :]
+        inertia = times(pencil.mass, V)
+        inverse = without_modes(elastic_solutions(pencil, shifted, inertia), kept, pencil)
+        squares = (2.0 * np.pi * reduced.frequencies_hz[reduced.modes :]) ** 2
+        gram = inertia.T @ inverse - np.diag(1.0 / squares)
+    return Accuracy(reduced, next_frequency(modes, reduced.modes), semidefinite(gram))
+
+
+def accuracy_fixed(pencil: Pencil, reduced: ReducedModel) -> Accuracy:
+    """Accuracy of a model by Craig-Bampton's or Guyan's method."""
+    if reduced.dropped_residual_modes:
+        raise ReductionError("the error is known only where no interface depends on the others")
+    fixed = fixed_interface(pencil)
+    if fixed.shifted.rigid:
+        raise ReductionError("the error is known only where the interfaces hold the component")
+    inner = fixed.interior
+    modes = lowest_modes(inner, fixed.shifted, min(reduced.modes + 1, inner.size))
+    kept = modes.vectors[:, : reduced.modes]
+    load = inertia_of_constraint_modes(fixed)
+    load = load - times(inner.mass, kept) @ (kept.T @ load)
+    gram = load.T @ without_modes(elastic_solutions(inner, fixed.shifted, load), kept, inner)
+    return Accuracy(reduced, next_frequency(modes, reduced.modes), semidefinite(gram))
+
+
+def inertia_of_constraint_modes(fixed: FixedInterface) -> FloatArray:
+    """``M Psi_c`` at the interior dofs, (n, m)."""
+    inertia = times(fixed.whole.mass, fixed.constraint_modes)
+    return np.asarray(fixed.turn.T @ inertia)[: fixed.interior.size]
+
+
+def next_frequency(modes: Modes, kept: int) -> float:
+    """Frequency in Hz of the mode after the kept ones; infinite if there is none."""
+    if modes.squares.size <= kept:
+        return np.inf
+    return float(np.sqrt(modes.squares[kept])) / (2.0 * np.pi)
+
+
+def semidefinite(matrix: FloatArray) -> FloatArray:
+    """The matrix without its negative part, which is rounding."""
+    if not matrix.size:
+        return matrix
+    values, vectors = linalg.eigh((matrix + matrix.T) / 2)
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)

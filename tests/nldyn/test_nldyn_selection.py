@@ -1,0 +1,109 @@
+"""Modes chosen for a setting, and the stated error against the full model."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from strings import MASSES, SETTING, string
+
+import cms
+from nldyn import Stop, SystemModelError, reduce_for, solve_orbit
+from nldyn.convergence import largest_force
+from nldyn.selection import contact_duration
+
+
+@pytest.fixture(scope="module")
+def selection():
+    return reduce_for(string(), SETTING, tolerance=0.02)
+
+
+def test_modes_that_the_middle_cannot_see_are_dropped(selection):
+    assert all(number % 2 for number in selection.kept)
+    unseen = {m.number for m in selection.left_out if m.reason == "no interface in use sees it"}
+    assert unseen == {n for n in range(1, max(unseen) + 1) if n % 2 == 0}
+    np.testing.assert_allclose(
+        selection.reduced.frequencies_hz[: len(selection.kept)],
+        cms.reduce(string(), modes=max(selection.kept)).frequencies_hz[
+            np.array(selection.kept) - 1
+        ],
+        rtol=1e-9,
+    )
+
+
+def test_an_interface_that_is_not_in_use_does_not_count():
+    """The quarter point would see every second mode, but nothing acts there."""
+    quarter = {"quarter": np.eye(MASSES)[MASSES // 4]}
+    found = reduce_for(string(quarter), SETTING, tolerance=0.02)
+    assert all(number % 2 for number in found.kept)
+
+
+def test_true_error_lies_within_the_stated_band(selection):
+    """All 41 modes, solved on their own at five frequencies and at the reference's peak."""
+    full = SETTING.system(cms.reduce(string(), modes=MASSES))
+    small = SETTING.system(selection.reduced)
+    _, high = selection.error
+    assert high < 0.1
+    worst = 0.0
+    strongest = 0.0
+    changes = []
+    for hz in np.geomspace(*SETTING.range_hz, 7)[1:-1]:
+        exact, found = solve_orbit(full, hz), solve_orbit(small, hz)
+        strongest = max(strongest, largest_force(exact))
+        changes.append(abs(largest_force(exact) - largest_force(found)))
+        size = exact.max_abs_displacement
+        worst = max(worst, abs(found.max_abs_displacement - size) / size)
+    worst = max(worst, max(changes) / strongest)
+    assert worst <= high * 1.05
+
+
+def test_a_smaller_tolerance_keeps_more(selection):
+    finer = reduce_for(string(), SETTING, tolerance=0.001)
+    assert len(finer.kept) > len(selection.kept)
+    assert finer.error[1] < selection.error[1]
+
+
+def test_the_report_says_what_was_kept_and_left_out(selection):
+    said = selection.report()
+    assert said.startswith("modes kept: 1 (")
+    assert "left out, no interface in use sees it: 2 (" in said
+    assert "estimated error of the harmonic response" in said
+
+
+def test_contact_of_a_linear_spring_lasts_half_a_period():
+    stop = Stop.linear("middle", 4e6)
+    assert contact_duration(stop, 2.0, 0.3) == pytest.approx(np.pi * np.sqrt(2.0 / 4e6))
+
+
+def test_contact_of_a_sphere_is_hertz_formula():
+    """Johnson (1985), eq. 11.24: 2.94 times depth over speed."""
+    depth = (1.25 * 2.0 * 0.1**2 / 1e9) ** 0.4
+    found = contact_duration(Stop("middle", 1e9), 2.0, 0.1)
+    assert found == pytest.approx(2.94 * depth / 0.1, rel=1e-2)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 1.0, np.nan, "small"])
+def test_a_tolerance_out_of_range_is_told(tolerance):
+    with pytest.raises(SystemModelError, match="tolerance must lie in"):
+        reduce_for(string(), SETTING, tolerance=tolerance)
+
+
+@pytest.mark.slow
+def test_the_example_of_the_docs(capsys):
+    """The mode at 430 Hz is left out, the one at 639 Hz is not; 20 modes confirm the band."""
+    page = Path(__file__).parents[2] / "docs" / "reduction_studies.md"
+    names: dict = {}
+    exec(re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.S)[0], names)
+    assert "modes kept: 1 (13.12 Hz), 2 (117.4 Hz), 3 (326.1 Hz), 5 (639.4 Hz)" in (
+        capsys.readouterr().out
+    )
+    selection, setting = names["selection"], names["setting_of"](names["scene"])
+    component = names["build_component"](names["scene"])
+    full = setting.system(cms.reduce(component, modes=20))
+    for hz in (20.0, 60.0, 85.0):
+        exact = solve_orbit(full, hz)
+        found = solve_orbit(setting.system(selection.reduced), hz)
+        error = abs(largest_force(found) / largest_force(exact) - 1)
+        assert error < selection.error[1]
