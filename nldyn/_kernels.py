@@ -953,6 +953,34 @@ def largest(values, a):
 
 
 @inner
+def nearly_opens(tab, kind, values, a, noise):
+    """Whether row a of penetrations has a minimum so low that its slope is nearly singular there.
+
+    The parabola through it vanishes at a complex pair nearer than a quarter of the panel.
+    """
+    for i in range(1, values.shape[1] - 1):
+        if values[a, i - 1] >= values[a, i] <= values[a, i + 1]:
+            left = tab.chi[kind, i - 1] - tab.chi[kind, i]
+            right = tab.chi[kind, i + 1] - tab.chi[kind, i]
+            up = (values[a, i - 1] - values[a, i]) / left
+            on = (values[a, i + 1] - values[a, i]) / right
+            curvature = (on - up) / (right - left)
+            slope = up - curvature * left
+            if curvature > 0.0:
+                lowest = values[a, i] - 0.25 * slope * slope / curvature
+                if noise < lowest < curvature / 16.0:
+                    return True
+    return False
+
+
+@inner
+def singular_slope(fl, stop):
+    """Whether the slope of a stop's force is singular at its switch."""
+    exponent = fl.stops[stop, EXPONENT]
+    return fl.laws[stop] != 0 or exponent != math.floor(exponent)
+
+
+@inner
 def resolved(fl, tab, kind, noise, panel):
     """Whether the Legendre tails of each force and of its slopes are small beside their largest.
 
@@ -968,6 +996,9 @@ def resolved(fl, tab, kind, noise, panel):
         deepest = largest(panel.output, a)
         if deepest <= 10.0 * noise[a]:
             continue
+        if o < na and singular_slope(fl, panel.active[a]):
+            if nearly_opens(tab, kind, panel.output, a, 10.0 * noise[a]):
+                return False
         tail = max(fl.tail, 20.0 * noise[a] / deepest)
         if o < na and legendre_tail(tab, panel.F, a) > tail * largest(panel.F, a):
             return False
@@ -1330,14 +1361,18 @@ def graded_length(fl, active, w, phase, h, sign, switched, event):
     longest = np.inf
     for a in range(active.size):
         s = active[a]
-        exponent = fl.stops[s, EXPONENT]
-        if s == event or (fl.laws[s] == 0 and exponent == math.floor(exponent)):
+        if s == event or not singular_slope(fl, s):
             continue
-        value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
+        value, speed, accel, _ = output_derivatives(fl, s, w, phase, 0.0)
         delta = value - fl.stops[s, GAP]
-        if sign * speed <= 0.0 or delta <= 10.0 * output_noise(fl, s, w):
+        if delta <= 10.0 * output_noise(fl, s, w):
             continue
-        away = delta / abs(speed)
+        if accel > 0.0 and speed * speed < 2.0 * accel * delta:  # it nearly opens: a complex pair
+            away = math.sqrt(2.0 * delta / accel)
+        elif sign * speed > 0.0:
+            away = delta / abs(speed)
+        else:
+            continue
         if not switched or away > 10.0 * fl.stops[s, INSTANT] * h:
             longest = min(longest, 4.0 * away)
     return longest
