@@ -99,11 +99,12 @@ class LyapunovSpectrum:
 
     @property
     def vanishing(self) -> bool:
-        """Whether the largest exponent is zero within errors that leave no room for chaos.
+        """Whether the largest exponent is zero as far as it is resolved.
 
-        Neighbours on a torus part with a power of the time: growth up to that is none.
+        Neighbours on a torus part with a power of the time: growth up to that is none, and its
+        standard error must not be larger.
         """
-        error = CLEAR * self.largest_error * self.periods / self.frequency_hz
+        error = self.largest_error * self.periods / self.frequency_hz
         unclear = self.chaotic or self.decaying
         return not unclear and max(abs(self.growth), error) < self._slow_growth
 

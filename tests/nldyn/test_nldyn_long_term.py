@@ -85,6 +85,17 @@ def test_free_vibration_under_forcing_is_quasi_periodic():
     assert found.zero_one < 0.2
 
 
+def test_a_torus_of_a_damped_structure_is_quasi_periodic():
+    from nldyn.resources import example
+    from nldyn.scene import build_system, load_scene
+
+    found = classify(build_system(load_scene(example("four_dof_xi_0.01.toml"))), 62.0)
+    assert found.kind == "quasi-periodic"
+    value, error = found.largest_exponent
+    assert abs(value) < 3.0 * error
+    assert abs(found.zero_one) < 0.2
+
+
 def lightly_damped(ratio: float, **changes) -> System:
     elements = {"excitation": [HarmonicForce("tip", 1.0)], **changes}
     return System.from_modal([10.0], {"tip": [1.0]}, modal_damping=ratio, **elements)
