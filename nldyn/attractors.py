@@ -29,6 +29,8 @@ NEAR = 0.1  # a return within this share of the motion is worth a Newton iterati
 ON_ORBIT = 1e-4  # distance from an orbit, relative to the motion, at which it is reached
 SETTLED = 600  # most periods of a transient that is not chosen
 CLOUD = 1000  # stroboscopic states kept of a motion that is not periodic
+BLOCK = 64  # periods of an unforced transient between two looks whether it is at rest
+LONG_RUN = 20000  # most periods that a motion is followed to an orbit
 LONGEST = 8  # a motion that has not decided itself is followed this much longer
 
 
@@ -45,6 +47,8 @@ class AttractorOptions:
     periods : int
         Excitation periods over which Lyapunov exponents are averaged at first; up to eight times
         as many where they do not decide.
+    confirmations : int
+        How many more runs of as many periods chaos must last to be the verdict.
 
     Raises
     ------
@@ -55,8 +59,10 @@ class AttractorOptions:
     max_period: int = 16
     transient: int | None = None
     periods: int = 1000
+    confirmations: int = 1
 
     def __post_init__(self) -> None:
+        check_whole("classify: confirmations", self.confirmations, 0)
         check_whole("classify: max_period", self.max_period, 1)
         check_whole("classify: periods", self.periods, 32)
         if self.transient is not None:
@@ -88,6 +94,13 @@ class Attractor:
         How far from the orbit the motion was last, relative to its size; nan if there is none.
     failure : str
         Why it failed, if it did.
+    chaotic_runs : tuple of LyapunovSpectrum
+        Exponents of the runs before, in which the motion was chaotic.
+    settling : Orbit, optional
+        Stable orbit that an undecided motion comes nearer to, too slowly to reach it.
+    returns_after : int
+        Periods after which an undecided motion repeats itself without being attracted; 0 if it
+        does not.
     """
 
     flow: FlowMap
@@ -99,6 +112,9 @@ class Attractor:
     zero_one: float = math.nan
     distance: float = math.nan
     failure: str = ""
+    chaotic_runs: tuple[LyapunovSpectrum, ...] = ()
+    settling: Orbit | None = None
+    returns_after: int = 0
     _cache: dict[int, Motion] = field(default_factory=dict, repr=False)
 
     @property
@@ -130,18 +146,41 @@ class Attractor:
         """What the verdict rests on, in a sentence."""
         if self.kind == "failed":
             return f"the simulation failed: {self.failure}"
-        value, error = self.largest_exponent
         if self.orbit is not None:
-            return (
+            said = (
                 f"a stable orbit of period {self.period} was solved for, largest multiplier "
                 f"{abs(self.orbit.largest_multiplier):.4g}, and the motion came as near to it as "
                 f"{self.distance:.1e} of its size"
             )
-        assert self.exponents is not None
-        return (
-            f"the largest Lyapunov exponent is {value:.4g} ± {error:.2g} 1/s over "
-            f"{self.exponents.periods} periods, and the 0-1 test gives {self.zero_one:.2f}"
-        )
+        else:
+            assert self.exponents is not None
+            said = (
+                f"the largest Lyapunov exponent is {_exponent_text(self.exponents)}, and the 0-1 "
+                f"test gives {self.zero_one:.2f}"
+            )
+        return said + self._slowness + self._before
+
+    @property
+    def _slowness(self) -> str:
+        """Why an undecided motion is not decided, as far as it is known."""
+        if self.kind != "undecided":
+            return ""
+        if self.returns_after:
+            many = "period" if self.returns_after == 1 else "periods"
+            return f"; the motion repeats after {self.returns_after} {many}, but attracts nothing"
+        if self.settling is not None:
+            return f"; a slow transient to the stable orbit of period {self.settling.period}"
+        if self.exponents is not None and self.exponents.decaying:
+            return "; a slow transient, or a period above `max_period`"
+        return "; its error is too large to decide"
+
+    @property
+    def _before(self) -> str:
+        if not self.chaotic_runs:
+            return ""
+        values = ", ".join(_exponent_text(run) for run in self.chaotic_runs)
+        lasting = "chaotic before, too" if self.kind == "chaotic" else "a chaotic transient before"
+        return f"; {lasting}: {values}"
 
     def motion(self, periods: int = 64) -> Motion:
         """The motion on the attractor, recorded over some excitation periods."""
@@ -149,6 +188,10 @@ class Attractor:
             start = self.flow.to_modal(self.states[-1])
             self._cache[periods] = simulate(self.flow, self.frequency_hz, periods, start=start)
         return self._cache[periods]
+
+
+def _exponent_text(found: LyapunovSpectrum) -> str:
+    return f"{found.largest:.4g} ± {found.largest_error:.2g} 1/s over {found.periods} periods"
 
 
 def classify(
@@ -163,13 +206,17 @@ def classify(
 
     - *periodic*: the motion nearly repeats, Newton's method finds a stable orbit there, and the
       motion comes within 1e-4 of it.
-    - *chaotic*: the largest Lyapunov exponent is positive by more than three standard errors.
-    - *quasi-periodic*: it is zero: small disturbances grow or shrink over the whole motion by no
-      more than a power of the time.
-    - *undecided*: it is negative but no orbit was found (a period above `max_period`, a slow
-      transient), or its error is too large after eight times the periods asked for.
+    - *chaotic*: the largest Lyapunov exponent is positive by more than three standard errors, and
+      so it is again over as many periods more (`AttractorOptions.confirmations`).
+    - *quasi-periodic*: it is zero within three standard errors, and small disturbances grow over
+      the whole motion by no more than a power of the time.
+    - *undecided*: it is negative but no orbit was reached (a period above `max_period`, a slow
+      transient), the motion repeats itself without being attracted, or the error is too large
+      after eight times the periods asked for.
 
-    Transient chaos that lasts longer than the simulation looks like chaos.
+    Without forcing the size of the motion is that of the largest on the way, so that what has
+    come to rest has period 1. Transient chaos that lasts longer than all runs together looks like
+    chaos; where it ended in time, `Attractor.evidence` tells of it.
 
     Parameters
     ----------
@@ -218,86 +265,175 @@ def attractor_from(
     transient = options.transient
     if transient is None:
         transient = min(settling_periods(flow.system, frequency_hz), SETTLED)
-    moved, failure = transient_end(flow, state, omega, transient)
-    if moved is None:
-        return Attractor(flow, frequency_hz, "failed", state[None], failure=failure)
+    try:
+        state, floor = _settled(flow, state, omega, transient)
+    except ConvergenceError as error:
+        return Attractor(flow, frequency_hz, "failed", state[None], failure=str(error))
     window = 3 * options.max_period + 1
     periods = options.periods
+    settling: Orbit | None = None
+    chaos: list[LyapunovSpectrum] = []
     try:
         while True:
-            phases = np.linspace(0.0, 2.0 * np.pi * window, window + 1)
-            strobe = flow.shoot(moved[None], phases, omega, sensitivities=False, chained=True)
-            if strobe.failure:
-                raise ConvergenceError(strobe.failure)
-            found = _reached_orbit(flow, strobe.ends, omega, observe, options.max_period)
+            run = _strobe(flow, state, omega, window)
+            found = _reached_orbit(flow, run, omega, observe, options.max_period, floor)
             if found is not None:
-                orbit, distance = found
-                states = stroboscopic(orbit)
-                return Attractor(flow, frequency_hz, "periodic", states, orbit, distance=distance)
-            exponents = spectrum_from(flow, strobe.ends[-1], omega, periods)
-            moved = exponents.end
-            if exponents.chaotic or periods >= LONGEST * options.periods:
+                return _periodic(flow, frequency_hz, *found, chaos)
+            exponents = spectrum_from(flow, run[-1], omega, periods)
+            state = exponents.end
+            if exponents.chaotic:
+                chaos.append(exponents)
+                if len(chaos) > options.confirmations:
+                    break
+                continue
+            if exponents.vanishing and periods > options.periods:
                 break
-            if not exponents.decaying and periods > options.periods:
+            if exponents.decaying:
+                run = _strobe(flow, state, omega, CLOUD)
+                found, settling = _slow_orbit(flow, run, omega, observe, floor)
+                if found is not None:
+                    return _periodic(flow, frequency_hz, *found, chaos)
+                if settling is not None:
+                    break
+            if periods >= LONGEST * options.periods:
                 break
             periods *= 2
+        cloud = _strobe(flow, state, omega, max(CLOUD, window))
+        end = cloud[-1 - window :]
+        found = _reached_orbit(flow, end, omega, observe, options.max_period, floor)
     except ConvergenceError as error:
-        return Attractor(flow, frequency_hz, "failed", moved[None], failure=str(error))
-    phases = np.linspace(0.0, 2.0 * np.pi * CLOUD, CLOUD + 1)
-    strobe = flow.shoot(moved[None], phases, omega, sensitivities=False, chained=True)
-    if strobe.failure:
-        return Attractor(flow, frequency_hz, "failed", moved[None], failure=strobe.failure)
-    cloud = strobe.ends
-    kind: Kind = "chaotic" if exponents.chaotic else "undecided"
-    if not exponents.chaotic and not exponents.decaying:
-        kind = "quasi-periodic" if abs(exponents.growth) < 5.0 + math.log(periods) else "undecided"
+        return Attractor(flow, frequency_hz, "failed", state[None], failure=str(error))
+    if found is not None:
+        return _periodic(flow, frequency_hz, *found, chaos)
+    kind: Kind = "undecided"
+    again = 0
+    if exponents.chaotic:
+        kind, chaos = "chaotic", chaos[:-1]
+    elif exponents.vanishing:
+        again = _repeats(end, options.max_period)
+        kind = "undecided" if again else "quasi-periodic"
     return Attractor(
-        flow, frequency_hz, kind, cloud, exponents=exponents, zero_one=zero_one_test(cloud[:, 0])
+        flow, frequency_hz, kind, cloud, exponents=exponents, zero_one=zero_one_test(cloud[:, 0]),
+        chaotic_runs=tuple(chaos), settling=settling, returns_after=again,
+    )  # fmt: skip
+
+
+def _periodic(
+    flow: FlowMap, hz: float, orbit: Orbit, distance: float, chaos: Sequence[LyapunovSpectrum]
+) -> Attractor:
+    states = stroboscopic(orbit)
+    return Attractor(
+        flow, hz, "periodic", states, orbit, distance=distance, chaotic_runs=tuple(chaos)
     )
 
 
+def _strobe(flow: FlowMap, state: Real, omega: float, periods: int) -> Real:
+    """States z (periods, 2n) after each of some periods from phase zero on."""
+    phases = np.linspace(0.0, 2.0 * np.pi * periods, periods + 1)
+    found = flow.shoot(state[None], phases, omega, sensitivities=False, chained=True)
+    if found.failure:
+        raise ConvergenceError(found.failure)
+    return np.asarray(found.ends)
+
+
+def _settled(flow: FlowMap, state: Real, omega: float, periods: int) -> tuple[Real, float]:
+    """State z after a transient, and the least size by which its motion is to be measured.
+
+    Forcing sets the size of a motion. Without it a motion has only that which it had on the way,
+    and is at rest once it has lost all but `ON_ORBIT` of that.
+    """
+    if np.any(flow.system.response(omega)[1]):
+        moved, failure = transient_end(flow, state, omega, periods)
+        if moved is None:
+            raise ConvergenceError(failure)
+        return moved, 0.0
+    largest = float(np.linalg.norm(state))
+    while periods > 0:
+        run = _strobe(flow, state, omega, min(periods, BLOCK))
+        sizes = np.linalg.norm(run, axis=1)
+        largest = max(largest, float(sizes.max()))
+        state, periods = run[-1], periods - len(run)
+        if float(np.linalg.norm(run - state, axis=1).max()) <= 0.1 * ON_ORBIT * largest:
+            break
+    return state, largest
+
+
 def _reached_orbit(
-    flow: FlowMap, run: Real, omega: float, observe: str, max_period: int
+    flow: FlowMap, run: Real, omega: float, observe: str, max_period: int, floor: float
 ) -> tuple[Orbit, float] | None:
     """Stable orbit that the end of a run (k, 2n) has reached, and how far it is from it still."""
-    scale = float(np.linalg.norm(run, axis=1).max()) or 1.0
+    scale = _size(run, floor)
     for period in range(1, max_period + 1):
         off = np.linalg.norm(run[period:] - run[:-period], axis=1)[-2 * max_period :]
         if float(np.median(off)) > NEAR * scale:
             continue
-        orbit = orbit_near(flow, run[-1 - period], period, omega, observe)
+        start = run[-1 - period]
+        if float(np.linalg.norm(start)) <= NEAR * floor:
+            start = np.zeros_like(start)  # rest itself, not one of many tiny orbits
+        orbit = orbit_near(flow, start, period, omega, observe)
         if orbit is None or not orbit.stable:
             continue
         distance = _distance(orbit, run[-1]) / scale
         if distance > 2.0 * NEAR:
             continue
-        reached = _approached(flow, run[-1], orbit, omega, scale, distance)
-        if reached is not None:
-            return orbit, reached
+        left = _distance_later(flow, run[-1], orbit, omega, scale, distance)
+        if left <= ON_ORBIT:
+            return orbit, left
     return None
+
+
+def _slow_orbit(
+    flow: FlowMap, run: Real, omega: float, observe: str, floor: float
+) -> tuple[tuple[Orbit, float] | None, Orbit | None]:
+    """Stable harmonic orbit that a slow transient (k, 2n) reaches, or else comes nearer to.
+
+    A lightly damped motion goes round it for long, and the mean of its states lies near it.
+    """
+    scale = _size(run, floor)
+    for start in (run.mean(axis=0), run[-1]):
+        orbit = orbit_near(flow, start, 1, omega, observe)
+        if orbit is None or not orbit.stable:
+            continue
+        first, last = _distance(orbit, run[0]) / scale, _distance(orbit, run[-1]) / scale
+        left = _distance_later(flow, run[-1], orbit, omega, scale, last)
+        if left <= ON_ORBIT:
+            return (orbit, left), None
+        if left < 0.9 * first:
+            return None, orbit
+    return None, None
+
+
+def _repeats(run: Real, max_period: int) -> int:
+    """Periods after which a run (k, 2n) repeats to 1e-6 of its size; 0 if it does not."""
+    scale = float(np.linalg.norm(run, axis=1).max())
+    for period in range(1, max_period + 1):
+        if np.all(np.linalg.norm(run[period:] - run[:-period], axis=1) <= 1e-6 * scale):
+            return period
+    return 0
+
+
+def _size(run: Real, floor: float) -> float:
+    return max(float(np.linalg.norm(run, axis=1).max()), floor) or 1.0
 
 
 def _distance(orbit: Orbit, state: Real) -> float:
     return float(np.linalg.norm(stroboscopic(orbit) - state, axis=1).min())
 
 
-def _approached(
+def _distance_later(
     flow: FlowMap, state: Real, orbit: Orbit, omega: float, scale: float, distance: float
-) -> float | None:
-    """Distance from the orbit once it is below `ON_ORBIT`; None if the motion stays away.
+) -> float:
+    """Relative distance from the orbit after as long as its multipliers say is needed.
 
-    The multipliers tell how long that takes.
+    That is until it is below `ON_ORBIT`, but no longer than `LONG_RUN`.
     """
     if distance <= ON_ORBIT:
         return distance
     decay = -orbit.stability.log_modulus / orbit.period
     needed = 2.0 * math.log(max(distance, 10.0 * ON_ORBIT) / ON_ORBIT) / max(decay, 1e-12)
-    count = int(min(needed, 20000.0)) + orbit.period
+    count = int(min(needed, LONG_RUN)) + orbit.period
     moved, _ = transient_end(flow, state, omega, count)
-    if moved is None:
-        return None
-    left = _distance(orbit, moved) / scale
-    return left if left <= ON_ORBIT else None
+    return math.inf if moved is None else _distance(orbit, moved) / scale
 
 
 def zero_one_test(values: Real) -> float:
@@ -339,8 +475,10 @@ def zero_one_test(values: Real) -> float:
     n = values.size
     lags = np.arange(1, n // 10 + 1)
     values = values - values.mean()
-    if not np.any(values):
+    size = float(np.abs(values).max())
+    if size == 0.0:
         return 0.0
+    values = values / size  # squares of tiny values would underflow
     results = []
     for c in np.random.default_rng(1).uniform(np.pi / 5.0, 4.0 * np.pi / 5.0, 40):
         turn = np.exp(1j * c * np.arange(1, n + 1))
@@ -461,6 +599,8 @@ def same_attractor(a: Attractor, b: Attractor) -> bool:
         return False
     if a.orbit is not None and b.orbit is not None:
         return same_orbit(a.orbit, b.orbit)
+    if a.settling is not None and b.settling is not None:
+        return same_orbit(a.settling, b.settling)
     return (a.orbit is None) == (b.orbit is None) and overlap(a.states, b.states)
 
 

@@ -166,12 +166,15 @@ class Motion:
     def period_peaks(self, interface: str | None = None) -> tuple[Real, Real]:
         """Frequencies (k,) in Hz and largest absolute displacements (k,) in m of each period.
 
-        Only whole excitation periods count, from the beginning on.
+        Only whole excitation periods count, from the beginning on. The largest displacement may
+        be a local extreme within the period or lie at either end of it.
         """
         times, values = self.extremes(interface)
         ends, hz = self._periods
         index = np.searchsorted(ends, times, side="right") - 1
-        peaks = np.zeros(hz.size)
+        phi = self.system.participation[check_observe(self.system, interface)]
+        at_ends = np.abs(self.strobe[:, : phi.size] @ phi)
+        peaks = np.maximum(at_ends[:-1], at_ends[1:])
         inside = (index >= 0) & (index < hz.size)
         np.maximum.at(peaks, index[inside], np.abs(values[inside]))
         return hz, peaks

@@ -34,7 +34,7 @@ from nldyn import (
     stroboscopic_section,
     sweep,
 )
-from nldyn.attractors import Attractor, zero_one_test
+from nldyn.attractors import Attractor, AttractorOptions, zero_one_test
 from nldyn.basin_maps import settle, target_of
 from nldyn.orbit import ConvergenceError
 from nldyn.sections import BruteForce, Column
@@ -83,6 +83,83 @@ def test_free_vibration_under_forcing_is_quasi_periodic():
     found = classify(system, 10.0 * (1.0 + math.sqrt(5.0)), start=[1e-3, 0.0])
     assert found.kind == "quasi-periodic"
     assert found.zero_one < 0.2
+
+
+def test_a_torus_of_a_damped_structure_is_quasi_periodic():
+    from nldyn.resources import example
+    from nldyn.scene import build_system, load_scene
+
+    found = classify(build_system(load_scene(example("four_dof_xi_0.01.toml"))), 62.0)
+    assert found.kind == "quasi-periodic"
+    value, error = found.largest_exponent
+    assert abs(value) < 3.0 * error
+    assert abs(found.zero_one) < 0.2
+
+
+def lightly_damped(ratio: float, **changes) -> System:
+    elements = {"excitation": [HarmonicForce("tip", 1.0)], **changes}
+    return System.from_modal([10.0], {"tip": [1.0]}, modal_damping=ratio, **elements)
+
+
+@pytest.mark.parametrize(("ratio", "name"), [(1e-2, "period 1"), (1e-4, "period 1")])
+def test_a_slow_transient_is_followed_to_the_orbit_that_newton_finds(ratio, name):
+    system = lightly_damped(ratio)
+    hz = 7.0 * math.sqrt(2.0)
+    found = classify(system, hz)
+    assert found.name == name
+    value, _ = found.largest_exponent
+    assert value == pytest.approx(-ratio * 20.0 * math.pi, rel=1e-4)
+    shares = find_attractors(system, hz, starts=4)
+    assert [(share.attractor.name, share.count) for share in shares] == [(name, 4)]
+
+
+@pytest.mark.parametrize("ratio", [1e-5, 1e-6])
+def test_a_transient_too_slow_to_end_is_undecided_and_told(ratio):
+    system = lightly_damped(ratio)
+    hz = 7.0 * math.sqrt(2.0)
+    found = classify(system, hz)
+    assert found.kind == "undecided"
+    assert found.largest_exponent[0] == pytest.approx(-ratio * 20.0 * math.pi, rel=1e-2)
+    assert "slow transient to the stable orbit of period 1" in found.evidence
+    assert [share.count for share in find_attractors(system, hz, starts=3)] == [3]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("gap", [0.0, 1e-5, 1e-3])
+def test_rest_is_the_attractor_of_a_damped_motion_without_forcing(gap):
+    system = lightly_damped(0.01, excitation=[], stops=[Stop("tip", 1e6, gap=gap)])
+    starts = np.array([[1e-3, 0.0], [2e-3, 0.0]])
+    (share,) = find_attractors(system, 20.0, starts=starts)
+    assert share.attractor.name == "period 1" and share.count == 2
+    assert np.abs(share.attractor.states).max() < 1e-9
+    multiplier = abs(share.attractor.orbit.largest_multiplier)
+    assert multiplier == pytest.approx(math.exp(-0.01 * math.pi), rel=1e-6)  # free decay
+
+
+@pytest.mark.parametrize(("start", "after"), [([0.0, 0.0], 1), ([1e-2, 0.0], 2)])
+def test_a_motion_that_repeats_but_attracts_nothing_is_not_quasi_periodic(start, after):
+    system = System.from_modal([15.0], {"tip": [1.0]})
+    found = classify(system, 10.0, start=start)
+    assert found.kind == "undecided"
+    assert f"repeats after {after} period" in found.evidence
+
+
+def test_chaos_that_ends_is_told_as_a_transient_of_the_orbit_after_it(one_dof):
+    found = classify(one_dof, 35.38)
+    assert found.orbit is not None and found.orbit.stable
+    assert found.chaotic_runs and found.chaotic_runs[0].chaotic
+    assert "a chaotic transient before" in found.evidence
+    at_once = classify(one_dof, 35.38, options=AttractorOptions(confirmations=0, periods=300))
+    assert at_once.kind == "chaotic"  # the verdict that a short simulation would give
+
+
+def test_chaos_that_lasts_is_confirmed_by_a_second_run(one_dof):
+    found = classify(one_dof, 36.0)
+    assert found.exponents is not None
+    (first,) = found.chaotic_runs
+    apart = abs(first.largest - found.exponents.largest)
+    assert apart < 4.0 * math.hypot(first.largest_error, found.exponents.largest_error)
+    assert "chaotic before, too" in found.evidence
 
 
 def test_zero_one_test_tells_a_torus_from_the_logistic_map():

@@ -171,6 +171,23 @@ def test_history_and_states_are_those_of_one_motion_in_blocks():
     assert peaks.max() >= np.abs(history.displacement["middle"]).max() * (1.0 - 1e-12)
 
 
+def test_largest_displacement_of_a_period_without_an_extreme_lies_at_its_ends():
+    system = System.from_modal([1.0], {"mass": [1.0]})
+    _, peaks = simulate(system, 20.0, periods=40, start=[1.0, 0.0]).period_peaks()
+    cosine = np.abs(np.cos(2.0 * np.pi * np.arange(41) / 20.0))
+    np.testing.assert_allclose(peaks, np.maximum(cosine[:-1], cosine[1:]), rtol=1e-9)
+
+
+@pytest.mark.parametrize("hz", [50.0, 76.0])
+def test_largest_displacements_of_subharmonic_motion_are_those_of_a_dense_sampling(hz):
+    system = make_one_dof()
+    motion = simulate(system, hz, periods=12, transient=800)
+    _, peaks = motion.period_peaks()
+    size = np.abs(motion.history(12 * 2000).displacement["middle"])
+    sampled = [size[2000 * k : 2000 * (k + 1) + 1].max() for k in range(12)]
+    np.testing.assert_allclose(peaks, sampled, rtol=1e-5)
+
+
 @pytest.mark.parametrize(
     ("call", "said"),
     [
