@@ -7,6 +7,8 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
+from nldyn.interruption import interrupted
+
 Item = TypeVar("Item")
 Value = TypeVar("Value")
 
@@ -97,9 +99,10 @@ def as_finished(
     if executor is None:
         for index, item in enumerate(items):
             try:
-                yield Outcome(index, function(item))
+                outcome = Outcome(index, function(item))
             except Exception as error:
-                yield Outcome(index, None, _said(error))
+                outcome = Outcome(index, None, _said(error))
+            yield outcome
         return
     futures: dict[Any, int] = {}
     try:
@@ -133,4 +136,7 @@ def _outcome(index: int, future: Future[Value]) -> Outcome[Value]:
 
 
 def _said(error: Exception) -> str:
+    """Text of a failure; Ctrl-C, in whatever wrapping, is none and goes on to the caller."""
+    if interrupted(error):
+        raise KeyboardInterrupt from error
     return f"{type(error).__name__}: {error}"

@@ -23,6 +23,7 @@ from nldyn.orbit import (
 from nldyn.system import System, numbers
 
 BLOCK = 64  # periods recorded in one call
+PIECE = 2000  # periods of a transient in one call: between two, Ctrl-C is answered
 MOST_STEPS = 10**7  # of a sweep
 
 
@@ -310,11 +311,15 @@ def transient_end(
     flow: FlowMap, state: Real, omega: float, periods: int
 ) -> tuple[Real | None, str]:
     """State z after some periods from phase zero on, or None and why there is none."""
-    if periods == 0:
-        return state, ""
-    phases = np.linspace(0.0, 2.0 * np.pi * periods, periods + 1)
-    found = flow.shoot(state[None], phases, omega, sensitivities=False, chained=True)
-    return (None, found.failure) if found.failure else (found.ends[-1], "")
+    while periods > 0:
+        count = min(periods, PIECE)
+        phases = np.linspace(0.0, 2.0 * np.pi * count, count + 1)
+        found = flow.shoot(state[None], phases, omega, sensitivities=False, chained=True)
+        if found.failure:
+            return None, found.failure
+        state = found.ends[-1]
+        periods -= count
+    return state, ""
 
 
 def _blocks(flow: FlowMap, state: Real, omega: float, periods: int) -> Iterator[Trajectory]:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from one_dof import make_one_dof
 
-from nldyn import Plane, TaskError, basins, brute_force, run_all
+from nldyn import FlowMap, Plane, TaskError, basins, brute_force, run_all, simulate
 from nldyn.executors import as_finished
 
 
@@ -50,6 +50,44 @@ def test_a_broken_pool_is_a_failure_of_each_case_left():
     assert len(found) == 4
     assert "BrokenProcessPool" in found[1].failure
     assert "BrokenProcessPool" in found[3].failure
+
+
+def wrapped_interrupt(value):
+    try:
+        raise KeyboardInterrupt
+    except KeyboardInterrupt as error:
+        raise SystemError("a kernel returned a result with an exception set") from error
+
+
+def test_ctrl_c_is_no_failure_of_a_case():
+    with pytest.raises(KeyboardInterrupt):
+        run_all(wrapped_interrupt, [1, 2])
+    with ThreadPoolExecutor(1) as pool, pytest.raises(KeyboardInterrupt):
+        run_all(wrapped_interrupt, [1, 2], pool)
+
+
+def test_ctrl_c_in_a_compiled_kernel_ends_all_cases():
+    flow = FlowMap(make_one_dof())
+    simulate(flow, 36.0, 1)  # compiled before the signal comes
+    begun = []
+
+    def case(index):
+        begun.append(index)
+        if index == 0:
+            signal.setitimer(signal.ITIMER_REAL, 0.05)
+        simulate(flow, 36.0, 1, transient=10**7)
+
+    def stop(number, frame):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, stop)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            run_all(case, range(3))
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    assert begun == [0]
 
 
 def test_a_caller_may_stop_early():
