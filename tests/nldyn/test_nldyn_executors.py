@@ -12,7 +12,17 @@ import numpy as np
 import pytest
 from one_dof import make_one_dof
 
-from nldyn import FlowMap, Plane, TaskError, basins, brute_force, run_all, simulate
+from nldyn import (
+    FlowMap,
+    Plane,
+    SystemModelError,
+    TaskError,
+    basins,
+    brute_force,
+    executors,
+    run_all,
+    simulate,
+)
 from nldyn.executors import as_finished
 
 
@@ -44,12 +54,27 @@ def test_failures_are_kept_beside_results():
                 found[2].value_or_raise()
 
 
-def test_a_broken_pool_is_a_failure_of_each_case_left():
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_case_that_kills_its_process_fails_alone(workers):
+    with processes(workers) as pool:
+        for items in ([0, 1, 2, 3], [4, 5]):  # the pool stays broken
+            found = run_all(cluster_tasks.die, items, pool)
+            assert [outcome.value for outcome in found] == [i if i != 1 else None for i in items]
+            assert all(("BrokenProcessPool" in o.failure) == (i == 1)
+                       for i, o in zip(items, found, strict=True))  # fmt: skip
+
+
+def test_processes_that_always_end_are_given_up(monkeypatch):
+    monkeypatch.setattr(executors, "HOPELESS", 2)
     with processes(1) as pool:
-        found = run_all(cluster_tasks.die, [0, 1, 2, 3], pool)
-    assert len(found) == 4
-    assert "BrokenProcessPool" in found[1].failure
-    assert "BrokenProcessPool" in found[3].failure
+        found = run_all(cluster_tasks.die, [1, 1, 1, 1], pool)
+    assert all("BrokenProcessPool" in outcome.failure for outcome in found)
+    assert "2 processes ended one after the other" in found[3].failure
+
+
+def test_an_executor_of_a_wrong_kind_is_named():
+    with pytest.raises(SystemModelError, match="executor must be an Executor or None, got 2"):
+        run_all(cluster_tasks.square, [1], 2)
 
 
 def wrapped_interrupt(value):
