@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -251,6 +252,17 @@ class Branch:
     def stable(self) -> NDArray[np.bool_]:
         """Stability of the points."""
         return np.array([orbit.stable for orbit in self.points])
+
+    @cached_property
+    def places(self) -> tuple[BranchPoint, ...]:
+        """Points and special points together, in order along the branch."""
+        points = [*self.nodes, *(special.point for special in self.special_points)]
+        return tuple(sorted(points, key=lambda point: point.arclength))
+
+    @cached_property
+    def log_frequencies(self) -> Real:
+        """Logarithms of ω (rad/s) at the `places`, in the order along the branch."""
+        return np.array([point.orbit.point[-1] for point in self.places])
 
     def at(self, frequency_hz: float) -> list[Orbit]:
         """All orbits of the branch at one frequency, in order along it.

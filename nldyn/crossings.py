@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import brentq
@@ -69,21 +68,19 @@ def _arclength(point: BranchPoint) -> float:
 def _crossings(branch: Branch, frequency_hz: float) -> tuple[list[BranchPoint], list[str]]:
     check_frequency("frequency_hz", frequency_hz)
     p = math.log(2.0 * math.pi * frequency_hz)
-    places = [*branch.nodes, *(special.point for special in branch.special_points)]
-    places.sort(key=_arclength)
+    places, level = branch.places, branch.log_frequencies - p
     found: list[BranchPoint] = []
     lost: list[str] = []
-    for a, b in pairwise(places):
-        before, after = _log_frequency(a) - p, _log_frequency(b) - p
-        if abs(before) <= SAME:
-            found.append(a)
-        elif before * after < 0.0 and abs(after) > SAME:
-            try:
-                found.append(_crossing(a, b, p))
-            except LocateError as error:
-                lost.append(f"the orbit of the branch at {frequency_hz:.8g} Hz is missing: {error}")
-    if places and abs(_log_frequency(places[-1]) - p) <= SAME:
-        found.append(places[-1])
+    on = np.abs(level) <= SAME
+    passed = (level[:-1] * level[1:] < 0.0) & ~on[:-1] & ~on[1:]
+    for i in np.flatnonzero(on | np.append(passed, False)):
+        if on[i]:
+            found.append(places[i])
+            continue
+        try:
+            found.append(_crossing(places[i], places[i + 1], p))
+        except LocateError as error:
+            lost.append(f"the orbit of the branch at {frequency_hz:.8g} Hz is missing: {error}")
     return found, lost
 
 

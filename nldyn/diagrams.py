@@ -22,6 +22,7 @@ from nldyn.branch import (
 )
 from nldyn.checkpoint import Checkpoint, checkpoint_of_several
 from nldyn.continuation import (
+    BORN,
     ContinuationOptions,
     born_at,
     check_range,
@@ -177,7 +178,16 @@ class Collector:
             except ConvergenceError as error:
                 self.notes.append(f"orbit of period {orbit.period} found but not followed: {error}")
             else:
-                self.add(branch)
+                if not self._begins_at_known_flip(branch):
+                    self.add(branch)
+
+    def _begins_at_known_flip(self, branch: Branch) -> bool:
+        """Whether a branch is one that was followed from a flip, found between flip and start."""
+        return any(
+            other.stop_reasons[0].startswith(BORN)
+            and branch.contains(other.nodes[len(other.nodes) // 2].orbit)
+            for other in self.of_period(branch.period)
+        )
 
     def from_flip(self, special: SpecialPoint, options: ContinuationOptions | None = None) -> None:
         """Follow the branch that is born at a flip, unless it is known."""

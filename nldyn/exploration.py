@@ -6,9 +6,11 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nldyn.branch import Branch, minimal_period, same_orbit, stroboscopic
 from nldyn.checkpoint import Checkpoint
@@ -26,15 +28,19 @@ from nldyn.orbit import (
     shooting_problem,
     spread,
 )
-from nldyn.search import orbit_near, random_states, simulate
+from nldyn.search import orbit_near, random_states
 from nldyn.system import System
 
 RETURNS = 3.0  # recorded periods after settling, over the longest period looked for
 DECAYS = 4.0  # time allowed for settling, over the slowest decay time of the linear part
 FEWEST, UNDAMPED = 30, 600  # periods of it: at least, and where nothing decays
 NEAR = 0.1  # a return within this share of the motion is worth a Newton iteration
+ARRIVED = 0.01  # a motion this near to a known stable orbit, relative, has settled on it
+CANDIDATES = 5  # near returns of each motion and period from which Newton's method starts
+TRANSIENT = 5  # periods of a motion beside which no orbits are looked for
+PIECE = 16  # periods simulated between two looks at the known orbits; later a quarter of all
 LONGEST = 0.5  # step of a deflated iteration, relative to the orbit
-ITERATIONS = 40  # of a deflated iteration
+ITERATIONS = 20  # of a deflated iteration
 
 
 @dataclass(frozen=True)
@@ -48,6 +54,10 @@ class ExploreOptions:
         is stable only in a narrower window may be missed.
     starts : int
         Random initial states at each of them, beside the motions of the frequency before.
+    rounds : int
+        Most searches through the range. Each begins from random states of its own at frequencies
+        between those of the ones before; one that finds no new branch up to the longest period
+        looked for is the last.
     settling : int
         Most excitation periods after which a motion may have settled. The limit itself follows the
         damping; where this one cuts it, the report says so.
@@ -69,6 +79,7 @@ class ExploreOptions:
 
     spacing: float = 0.005
     starts: int = 12
+    rounds: int = 1
     settling: int = 50000
     unstable_period: int = 3
     doubled_period: int = 1
@@ -81,6 +92,7 @@ class ExploreOptions:
                 f"explore: spacing must lie between 0 and 1, got {shown(self.spacing)}"
             )
         check_whole("explore: starts", self.starts, 1)
+        check_whole("explore: rounds", self.rounds, 1)
         check_whole("explore: settling", self.settling, 1)
         check_whole("explore: unstable_period", self.unstable_period, 0)
         check_whole("explore: doubled_period", self.doubled_period, 1)
@@ -148,20 +160,36 @@ class Question:
     effort: ExploreOptions
     options: ContinuationOptions
 
-    @property
-    def frequencies(self) -> list[float]:
-        """Frequencies in Hz at which motions are simulated, ascending."""
+    def frequencies(self, turn: int) -> list[float]:
+        """Frequencies in Hz at which a round simulates motions, ascending.
+
+        Between two neighbours of the first round, the shares of the way at which the further ones
+        lie are van der Corput's sequence 1/2, 1/4, 3/4, 1/8, ...: each fills the largest gaps.
+        """
         low, high = self.range_hz
-        count = math.ceil(math.log(high / low) / self.effort.spacing) + 1
-        found: list[float] = np.geomspace(low, high, count).tolist()
-        return found
+        steps = math.ceil(math.log(high / low) / self.effort.spacing)
+        found: list[float] = np.geomspace(low, high, steps + 1).tolist()
+        if turn == 0:
+            return found
+        share, weight = 0.0, 0.5
+        while turn:
+            share, weight, turn = share + weight * (turn % 2), 0.5 * weight, turn // 2
+        return [a * (b / a) ** share for a, b in pairwise(found)]
+
+    def place(self, steps: int) -> tuple[int, int, int]:
+        """Round in which some steps have ended, how many of them belong to it, and its length."""
+        turn = 0
+        while steps >= (length := 2 * len(self.frequencies(turn))):
+            turn, steps = turn + 1, steps - length
+        return turn, steps, length
 
     def same(self, other: Question) -> bool:
-        """Whether another question is this one."""
+        """Whether another question is this one, but for the number of rounds."""
         from nldyn.store import same_flow
 
         mine, its = (
-            (q.range_hz, q.max_period, q.observe, q.effort, q.options) for q in (self, other)
+            (q.range_hz, q.max_period, q.observe, replace(q.effort, rounds=1), q.options)
+            for q in (self, other)
         )
         return mine == its and same_flow(self.flow, other.flow)
 
@@ -173,13 +201,18 @@ class Stage:
     Parameters
     ----------
     steps : int
-        Frequencies done, on the way up and then down.
+        Frequencies done, on the way up and then down, round by round.
     branches, notes : int
         How many of those in the diagram these steps have found and followed up.
     carried : (k, 2n)
         States from which the next frequency starts, beside the random ones.
     coverage : tuple of Coverage
         One for each frequency reached, ascending, with what both ways found there.
+    met : (rounds, branches) array of bool
+        Which of the branches simulated motions came to in each round begun: settled on, or
+        nearly returned beside.
+    ends : tuple of int
+        Number of branches at the end of each round that is done.
     """
 
     steps: int
@@ -187,6 +220,8 @@ class Stage:
     notes: int
     carried: Real
     coverage: tuple[Coverage, ...]
+    met: NDArray[np.bool_]
+    ends: tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,8 +249,38 @@ class Exploration:
 
     @property
     def finished(self) -> bool:
-        """Whether all frequencies were done, on the way up and down."""
-        return self.stage.steps == 2 * len(self.question.frequencies)
+        """Whether all rounds were done, or one that found nothing new."""
+        done = len(self.stage.ends)
+        return done > 0 and (
+            done >= self.question.effort.rounds or self.new_branches[done - 1] == 0
+        )
+
+    @property
+    def new_branches(self) -> tuple[int, ...]:
+        """How many branches of the periods looked for each round found, the one at work too."""
+        ends = [0, *self.stage.ends]
+        if len(ends) <= len(self.stage.met):
+            ends.append(self.stage.branches)
+        periods = [branch.period for branch in self.diagram.branches]
+        longest = self.question.max_period
+        return tuple(sum(n <= longest for n in periods[a:b]) for a, b in pairwise(ends))
+
+    @property
+    def meetings(self) -> tuple[int, ...]:
+        """In how many rounds motions came to each branch of the periods looked for."""
+        counts = np.asarray(self.stage.met).sum(axis=0).tolist()
+        branches = self.diagram.branches[: self.stage.branches]
+        longest = self.question.max_period
+        return tuple(n for n, b in zip(counts, branches, strict=True) if b.period <= longest)
+
+    @property
+    def unmet_branches(self) -> float:
+        """Estimate of how many branches motions would come to, but did not in the rounds done.
+
+        See `chao_lower_bound`; NaN after one round. Some of them may be known, reached from
+        flips, branch points or by deflation. It says nothing of branches that no motion comes near.
+        """
+        return chao_lower_bound(self.meetings, len(self.stage.ends))
 
     @property
     def settled_share(self) -> float:
@@ -259,8 +324,11 @@ class Exploration:
                 f"{100.0 * self.settled_share:.1f} % ended on one of the branches"
             )
         if not self.finished:
-            total = 2 * len(self.question.frequencies)
-            lines.append(f"not finished: {self.stage.steps} of {total} steps up and down are done")
+            turn, steps, length = self.question.place(self.stage.steps)
+            lines.append(
+                f"not finished: {steps} of {length} steps up and down of round {turn + 1} are done"
+            )
+        lines += self._rounds()
         open_ranges = ", ".join(f"{a:.4g}-{b:.4g}" for a, b in self.unsettled_ranges())
         if open_ranges:
             lines.append(
@@ -268,6 +336,20 @@ class Exploration:
                 f"{open_ranges} Hz"
             )
         return lines + self._cut()
+
+    def _rounds(self) -> list[str]:
+        """What each round found, and how many branches are still to be expected."""
+        if math.isnan(self.unmet_branches):
+            return []
+        found = ", ".join(str(n) for n in self.new_branches)
+        never, once, twice = (self.meetings.count(n) for n in (0, 1, 2))
+        longest = self.question.max_period
+        return [
+            f"branches up to period {longest} that the rounds added: {found}",
+            f"of them motions came to {len(self.meetings) - never}, {once} in one round only and "
+            f"{twice} in two: at least about {self.unmet_branches:.0f} more are to be expected "
+            f"that motions would come to (Chao 1987); {never} were reached otherwise",
+        ]
 
     def _cut(self) -> list[str]:
         """Where the motions had less time to settle than the damping asks for."""
@@ -381,11 +463,8 @@ def explore(
     if checkpoint is not None:
         survey.keep_in(checkpoint)
     with box.checkpoint:
-        frequencies = question.frequencies
-        way = [*((hz, question.effort.starts) for hz in frequencies)]
-        way += [(hz, 0) for hz in frequencies[::-1]]
-        for frequency, starts in way[survey.stage.steps :]:
-            survey.step(frequency, starts)
+        while not survey.so_far(box.branches).finished:
+            survey.step()
     return survey.so_far(box.branches)
 
 
@@ -396,7 +475,7 @@ class _Survey:
         self.box, self.question = box, question
         self.max_period, self.effort = question.max_period, question.effort
         nothing = np.empty((0, 2 * question.flow.system.size))
-        self.stage = Stage(0, 0, 0, nothing, ())
+        self.stage = Stage(0, 0, 0, nothing, (), np.zeros((0, 0), dtype=bool), ())
 
     def keep_in(self, path: str | Path) -> None:
         """Keep everything in a file, and begin where the exploration in it ended, if there is one.
@@ -436,54 +515,89 @@ class _Survey:
         diagram = Diagram(tuple(branches), box.range_hz, box.observe, tuple(box.notes))
         return Exploration(diagram, self.question, self.stage)
 
-    def step(self, frequency: float, starts: int) -> None:
-        """Simulate at one frequency, from random states and what came before."""
-        box, size = self.box, 2 * self.box.flow.system.size
+    def step(self) -> None:
+        """Simulate at the next frequency, from what came before and, going up, random states."""
+        box, flow, stage = self.box, self.box.flow, self.stage
+        turn, place, length = self.question.place(stage.steps)
+        up, last = place < length // 2, place == length - 1
+        frequency = self.question.frequencies(turn)[place if up else length - 1 - place]
         box.progress("explore", frequency)
-        flow, omega = box.flow, 2.0 * math.pi * frequency
-        fresh = random_states(flow, omega, starts, self.effort.seed)
-        settling = min(settling_periods(flow.system, frequency), self.effort.settling)
-        recorded = math.ceil(RETURNS * self.max_period) + 1
-        begun = np.concatenate([self.stage.carried, fresh])
-        strobe = simulate(flow, omega, begun, 5, settling + recorded)
-        orbits, settled, wandering = self._attractors(strobe.runs, omega)
-        if starts:
-            self._unstable(wandering, orbits, omega)
-        ends = [stroboscopic(orbit)[0] for orbit in orbits]
-        carried = np.array(ends + [run[-1] for run in wandering[:1]]).reshape(-1, size)
-        here = Coverage(
-            frequency,
-            tuple(sorted({orbit.period for orbit in orbits})),
-            settled,
-            len(wandering),
-            len(strobe.failures),
+        omega = 2.0 * math.pi * frequency
+        starts = stage.carried
+        if up:
+            seed = (self.effort.seed, turn, place)
+            starts = np.vstack([starts, random_states(flow, omega, self.effort.starts, seed)])
+        known = _Known(box, frequency)
+        here, carried = self._search(starts, known, also_unstable=up)
+        both = {c.frequency_hz: c for c in stage.coverage}
+        both[frequency] = both[frequency].with_more(here) if frequency in both else here
+        met = np.zeros((turn + 1, len(box.branches)), dtype=bool)
+        met[: len(stage.met), : stage.branches] = stage.met
+        met[turn, known.met] = True
+        self.stage = Stage(
+            stage.steps + 1,
+            len(box.branches),
+            len(box.notes),
+            np.array(carried).reshape(-1, 2 * flow.system.size),
+            tuple(both[hz] for hz in sorted(both)),
+            met,
+            (*stage.ends, len(box.branches)) if last else stage.ends,
         )
-        before, steps = self.stage.coverage, self.stage.steps
-        if steps < len(self.question.frequencies):
-            coverage = (*before, here)
-        else:
-            place = 2 * len(before) - 1 - steps
-            coverage = (*before[:place], before[place].with_more(here), *before[place + 1 :])
-        self.stage = Stage(steps + 1, len(box.branches), len(box.notes), carried, coverage)
         if box.checkpoint.work is None:
             box.checkpoint.work = lambda: None  # the coverage is worth keeping without a branch too
         box.checkpoint.offer()
 
-    def _attractors(
-        self, runs: Sequence[Real], omega: float
-    ) -> tuple[list[Orbit], int, list[Real]]:
-        """Different orbits on which runs have settled, how many runs did, and the other runs."""
-        orbits: list[Orbit] = []
-        wandering = []
-        for run in runs:
-            orbit = self._settled_on(run, omega, orbits)
+    def _search(
+        self, starts: Real, known: _Known, *, also_unstable: bool
+    ) -> tuple[Coverage, list[Real]]:
+        """Follow what motions come to; the states from which the next frequency starts."""
+        attractors: list[Orbit] = []
+        runs, wandering = [], []
+        for start in starts:
+            run, orbit = self._motion(start, known)
+            if run is None:
+                continue
+            runs.append(run)
+            orbit = orbit or self._settled_on(run, known.omega, attractors)
             if orbit is None:
                 wandering.append(run)
-            elif not any(orbit is other for other in orbits):
-                orbits.append(orbit)
-        for orbit in orbits:
-            self._follow(orbit)
-        return orbits, len(runs) - len(wandering), wandering
+            elif not any(same_orbit(orbit, other) for other in attractors):
+                attractors.append(orbit)
+                self._meet(orbit, known)
+        if also_unstable:
+            self._unstable(runs, wandering, attractors, known)
+        coverage = Coverage(
+            known.frequency_hz,
+            tuple(sorted({orbit.period for orbit in attractors})),
+            len(runs) - len(wandering),
+            len(wandering),
+            len(starts) - len(runs),
+        )
+        ends = [stroboscopic(orbit)[0] for orbit in attractors]
+        return coverage, ends + [run[-1] for run in wandering[:1]]
+
+    def _motion(self, start: Real, known: _Known) -> tuple[Real | None, Orbit | None]:
+        """States after each period, and the known stable orbit on which the motion has settled.
+
+        It ends as soon as it comes near to one; no states if it cannot be computed.
+        """
+        flow = self.box.flow
+        settling = settling_periods(flow.system, known.frequency_hz)
+        settling = min(settling, self.effort.settling)
+        left = settling + math.ceil(RETURNS * self.max_period) + 1
+        states = np.array([start])
+        while left > 0:
+            count = min(left, max(PIECE, len(states) // 4))
+            phases = np.linspace(0.0, 2.0 * np.pi * count, count + 1)
+            found = flow.shoot(states[-1:], phases, known.omega, sensitivities=False, chained=True)
+            if found.failure:
+                return None, None
+            states = np.vstack([states, found.ends])
+            orbit = known.stable_near(states[-PIECE:])
+            if orbit is not None:
+                return states, orbit
+            left -= count
+        return states, None
 
     def _settled_on(self, run: Real, omega: float, known: Sequence[Orbit]) -> Orbit | None:
         """Stable orbit to which a run comes near at its end, one of the known ones if it can be."""
@@ -508,21 +622,37 @@ class _Survey:
     def _orbit_near(self, start: Real, period: int, omega: float) -> Orbit | None:
         return orbit_near(self.box.flow, start, period, omega, self.box.observe)
 
-    def _unstable(self, runs: Sequence[Real], stable: Sequence[Orbit], omega: float) -> None:
-        """Look for unstable orbits of short periods near wandering motions and by deflation."""
+    def _unstable(
+        self,
+        runs: Sequence[Real],
+        wandering: Sequence[Real],
+        stable: Sequence[Orbit],
+        known: _Known,
+    ) -> None:
+        """Look for unstable orbits of short periods beside all motions, and by deflation."""
+        omega = known.omega
         for period in range(1, min(self.effort.unstable_period, self.max_period) + 1):
             for run in runs:
-                for start in near_returns(run, period, 2):
-                    orbit = self._orbit_near(run[start], period, omega)
-                    if orbit is not None and orbit.period == period:
-                        self._follow(orbit)
-            known = [o for branch in self.box.of_period(period) for o in _at(branch, omega)]
-            starts = [run[-1] for run in runs] + [stroboscopic(o)[0] for o in stable]
+                for start in near_returns(run[TRANSIENT:], period, CANDIDATES):
+                    orbit = self._orbit_near(run[TRANSIENT + start], period, omega)
+                    if orbit is not None:
+                        self._meet(orbit, known)
+            starts = [run[-1] for run in wandering] + [stroboscopic(o)[0] for o in stable]
             for start in starts:
-                other = deflated_orbit(self.box, start, period, omega, known)
+                others = known.of_period(period)
+                other = deflated_orbit(self.box, start, period, omega, others)
                 if other is not None:
-                    known.append(other)
                     self._follow(other)
+                    known.take()
+
+    def _meet(self, orbit: Orbit, known: _Known) -> None:
+        """Follow the branch of an orbit that a motion came to, unless it is known."""
+        if known.number(orbit) is None:
+            self._follow(orbit)
+            known.take()
+        number = known.number(orbit)
+        if number is not None:
+            known.met.append(number)
 
     def _follow(self, orbit: Orbit) -> None:
         """Follow an orbit's branch unless it is known, and those that it leads to."""
@@ -544,6 +674,70 @@ class _Survey:
         if period <= self.max_period or most is None:
             return options
         return replace(options, max_points=most)
+
+
+class _Known:
+    """Orbits of all branches at one frequency, and which of the branches motions came to."""
+
+    def __init__(self, box: Collector, frequency_hz: float) -> None:
+        self.box, self.frequency_hz = box, frequency_hz
+        self.omega = 2.0 * math.pi * frequency_hz
+        self.met: list[int] = []
+        self._orbits: list[tuple[int, Orbit]] = []
+        self._stable: list[tuple[Orbit, Real]] = []
+        self._seen = 0
+        self.take()
+
+    def take(self) -> None:
+        """Take the orbits of branches that were found since."""
+        for number in range(self._seen, len(self.box.branches)):
+            orbits = self.box.branches[number].at(self.frequency_hz)
+            self._orbits += [(number, orbit) for orbit in orbits]
+            self._stable += [(orbit, stroboscopic(orbit)) for orbit in orbits if orbit.stable]
+        self._seen = len(self.box.branches)
+
+    def of_period(self, period: int) -> list[Orbit]:
+        """Orbits of one period multiple."""
+        return [orbit for _, orbit in self._orbits if orbit.period == period]
+
+    def number(self, orbit: Orbit) -> int | None:
+        """Number of the branch that an orbit lies on."""
+        return next((i for i, other in self._orbits if same_orbit(orbit, other)), None)
+
+    def stable_near(self, states: Real) -> Orbit | None:
+        """Stable orbit near which the last of some states lie, one period after the other."""
+        size = ARRIVED * (float(np.linalg.norm(states, axis=1).max()) or 1.0)
+        for orbit, places in self._stable:
+            tail = states[-orbit.period :]
+            off = np.linalg.norm(places[:, None] - tail[None], axis=2).min(axis=0)
+            if float(off.max()) < size:
+                return orbit
+        return None
+
+
+def chao_lower_bound(counts: Sequence[int], rounds: int) -> float:
+    """Estimated number of kinds that none of several rounds met, NaN for less than two rounds.
+
+    From the numbers Q₁ and Q₂ of kinds met in one and in two of r rounds it is
+    (r - 1)/r Q₁(Q₁ - 1)/(2(Q₂ + 1)) [Chao 1987, bias-corrected]. Where some kinds are harder to
+    meet than others, it is a lower bound.
+
+    Parameters
+    ----------
+    counts : sequence of int
+        In how many rounds each kind was met.
+    rounds : int
+        Number r of rounds.
+
+    Examples
+    --------
+    >>> chao_lower_bound([1, 1, 1, 2, 2, 4], 4)
+    0.75
+    """
+    if rounds < 2:
+        return math.nan
+    once, twice = counts.count(1), counts.count(2)
+    return (rounds - 1) / rounds * once * (once - 1) / (2.0 * (twice + 1))
 
 
 def settling_periods(system: System, frequency_hz: float) -> int:
@@ -611,7 +805,3 @@ def _stretch(x: Real, step: Real, repelled: Sequence[Real], size: float) -> floa
         square = float(away @ away) or 1e-300
         slope += -2.0 * float(away @ step) / size / (square * (1.0 + square))
     return 1.0 / (1.0 - slope) if slope != 1.0 else 1.0
-
-
-def _at(branch: Branch, omega: float) -> list[Orbit]:
-    return branch.at(omega / (2.0 * math.pi))

@@ -133,6 +133,12 @@ class FlowOptions:
         return min(float((1e-2 * self.rtol) ** (1.0 / exponent)), 1e-6)
 
 
+def _floats(name: str, values: Real) -> Real:
+    """The values, without a look at those that are an array of floats already."""
+    known = isinstance(values, np.ndarray) and values.dtype == np.float64
+    return values if known else numbers(name, values)
+
+
 def _nodes_for_switch(power: float, nodes: int, tail: float) -> int:
     """Nodes, not fewer than asked for, with which the force after a switch can be resolved.
 
@@ -369,6 +375,8 @@ class FlowMap:
                 f"nodes must have shape ({rows}, {size}) for {phases.size - 1} segments of "
                 f"{self.system.size} modes, got {nodes.shape}"
             )
+        if not math.isfinite(nodes.sum() + phases[-1] - phases[0]):
+            raise SystemModelError("nodes and phases must be finite")
         if not (is_finite(omega) and 0.0 < omega <= 2.0 * math.pi * LARGEST_FREQUENCY):
             raise SystemModelError(
                 "omega must be positive, finite and at most that of "
@@ -461,7 +469,7 @@ class FlowMap:
         parameters: Sequence[Parameter] = (),
     ) -> tuple[Any, ...]:
         """The flow map alone; see `_kernels.newton` for what comes back."""
-        nodes, phases = numbers("nodes", nodes), numbers("phases", phases)
+        nodes, phases = _floats("nodes", nodes), np.ascontiguousarray(_floats("phases", phases))
         self._check_segments(nodes, phases, omega, chained)
         point = np.empty(nodes.size + 1)
         point[:-1], point[-1] = nodes.ravel(), 0.0

@@ -342,6 +342,7 @@ class ExploreTable(Table):
     max_period: Period = 8
     spacing: Annotated[float, Field(ge=1e-6, le=0.5)] = 0.005
     starts: Annotated[int, Field(ge=1, le=1000)] = 12
+    rounds: Annotated[int, Field(ge=1, le=1000)] = 1
     settling: Annotated[int, Field(ge=1, le=10_000_000)] = 50000
     unstable_period: Annotated[int, Field(ge=0, le=100)] = 3
     doubled_period: Period = 1

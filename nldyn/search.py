@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,7 +85,7 @@ def simulate_strobe(flow: FlowMap, frequency_hz: float, options: SearchOptions) 
     return simulate(flow, omega, starts, options.transient, options.recorded)
 
 
-def random_states(flow: FlowMap, omega: float, count: int, seed: int) -> Real:
+def random_states(flow: FlowMap, omega: float, count: int, seed: int | Sequence[int]) -> Real:
     """Initial states (count, 2n): rest, then random ones, see `simulate_strobe`."""
     n = 2 * flow.system.size
     rng = np.random.default_rng(seed)

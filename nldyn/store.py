@@ -328,6 +328,8 @@ def _write_exploration(group: Any, found: Exploration, flows: list[FlowMap]) -> 
     for name in ("steps", "branches", "notes"):
         _set_attribute(group, name, getattr(stage, name))
     _put(group, "carried", stage.carried, STATE_UNIT)
+    _put(group, "met", np.asarray(stage.met, dtype=np.int64), "1 where motions came to a branch")
+    _put(group, "ends", np.array(stage.ends, dtype=np.int64), "branches at each round's end")
     table = group.create_group("coverage")
     coverage = stage.coverage
     _put(table, "frequency_hz", np.array([c.frequency_hz for c in coverage], dtype=float), "Hz")
@@ -761,8 +763,11 @@ def _read_exploration(
     steps, branches, notes = (group.whole(name) for name in ("steps", "branches", "notes"))
     carried = group.array("carried", -1, 2 * question.flow.system.size)
     coverage = _read_coverage(group.group("coverage"))
-    count = len(question.frequencies)
-    if not 0 <= steps <= 2 * count or len(coverage) != min(steps, count):
+    ends = tuple(group.array("ends", -1, kind=np.int64).tolist())
+    met = group.array("met", -1, branches, kind=np.int64) > 0
+    done, here, length = question.place(max(steps, 0))
+    reached = sum(len(question.frequencies(turn)) for turn in range(done)) + min(here, length // 2)
+    if steps < 0 or len(coverage) != reached or len(ends) != done or not 0 <= len(met) - done <= 1:
         raise group.fault("attribute", "steps", f"is {steps} with {len(coverage)} frequencies")
     for name, value, most in (
         ("branches", branches, len(diagram.branches)),
@@ -770,7 +775,7 @@ def _read_exploration(
     ):
         if not 0 <= value <= most:
             raise group.fault("attribute", name, f"is {value}, but there are {most}")
-    return question, Stage(steps, branches, notes, carried, coverage)
+    return question, Stage(steps, branches, notes, carried, coverage, met, ends)
 
 
 def _read_coverage(group: _Group) -> tuple[Coverage, ...]:

@@ -112,7 +112,7 @@ def one_dof(dissipation):
     [
         (np.zeros((1, 3)), [0.0, 1.0], 10.0, "nodes must have shape"),
         (np.zeros((1, 2)), [0.0, 1.0, 2.0], 10.0, "nodes must have shape"),
-        (np.full((1, 2), np.nan), [0.0, 1.0], 10.0, "not finite"),
+        (np.full((1, 2), np.nan), [0.0, 1.0], 10.0, "must be finite"),
         (np.zeros((1, 2)), [1.0, 0.0], 10.0, "ascending"),
         (np.zeros((1, 2)), [0.0, 1.0], -1.0, "omega must be positive"),
         (np.zeros((1, 2)), [0.0, 1.0], np.inf, "omega must be positive"),
