@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from nldyn.branch import same_orbit, stroboscopic
-from nldyn.errors import SystemModelError, check_frequency, check_whole
+from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
 from nldyn.executors import run_all
 from nldyn.exploration import settling_periods
 from nldyn.flow import FlowMap
@@ -250,6 +250,7 @@ def classify(
     'period 2'
     """
     flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    check_types(options=(options, AttractorOptions, None))
     check_frequency("frequency_hz", frequency_hz)
     check_bounded(flow.system, 2.0 * math.pi * frequency_hz)
     name = check_observe(flow.system, observe)
@@ -556,6 +557,7 @@ def find_attractors(
     ['period 1']
     """
     flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    check_types(options=(options, AttractorOptions, None), executor=(executor, Executor, None))
     check_frequency("frequency_hz", frequency_hz)
     omega = 2.0 * math.pi * frequency_hz
     check_bounded(flow.system, omega)

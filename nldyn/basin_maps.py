@@ -22,7 +22,14 @@ from nldyn.attractors import (
     same_attractor,
 )
 from nldyn.branch import stroboscopic
-from nldyn.errors import SystemModelError, check_frequency, check_whole, is_finite, shown
+from nldyn.errors import (
+    SystemModelError,
+    check_frequency,
+    check_types,
+    check_whole,
+    is_finite,
+    shown,
+)
 from nldyn.executors import run_all
 from nldyn.flow import FlowMap, chain
 from nldyn.linear import Real
@@ -72,6 +79,7 @@ class Plane:
             raise SystemModelError("plane: origin, x and y must be vectors of one length")
         for name in ("x_range", "y_range"):
             ends = getattr(self, name)
+            check_types(**{f"plane: {name}": (ends, Sequence, np.ndarray)})
             ascending = len(ends) == 2 and all(is_finite(e) for e in ends) and ends[0] < ends[1]
             if not ascending:
                 raise SystemModelError(
@@ -118,6 +126,8 @@ class Plane:
         >>> plane.states((3, 3)).shape
         (3, 3, 2)
         """
+        for label, ends in (("displacement", displacement), ("velocity", velocity)):
+            check_types(**{f"plane: {label}": (ends, Sequence, np.ndarray)})
         name = check_observe(system, interface)
         phi = system.participation[name]
         if not np.any(phi):
@@ -135,7 +145,7 @@ class Plane:
 
     def axes(self, shape: tuple[int, int]) -> tuple[Real, Real]:
         """Coordinates of the middles of the cells, (nx,) and (ny,), for a shape (ny, nx)."""
-        ny, nx = shape
+        ny, nx = check_shape("plane: shape", shape)
         (x0, x1), (y0, y1) = self.x_range, self.y_range
         return (
             x0 + (x1 - x0) * (np.arange(nx) + 0.5) / nx,
@@ -436,7 +446,7 @@ def basins(
     shape : (int, int)
         Numbers of cells (ny, nx).
     attractors : sequence of Attractor
-        Those that are known.
+        Those that are known, of the same system and frequency.
     starts : int
         Cells from which attractors are looked for first.
     longest : int
@@ -480,6 +490,11 @@ def basins(
     in non-linear mechanical oscillators, *Nonlinear Anal.* 63.
     """
     flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    check_types(
+        plane=(plane, Plane), options=(options, AttractorOptions, None),
+        executor=(executor, Executor, None), progress=(progress, Callable, None),
+        attractors=(attractors, Sequence),
+    )  # fmt: skip
     check_frequency("frequency_hz", frequency_hz)
     omega = 2.0 * math.pi * frequency_hz
     check_bounded(flow.system, omega)
@@ -489,15 +504,13 @@ def basins(
         ("starts", starts, 1), ("longest", longest, CHUNK), ("checks", checks, 0), ("seed", seed, 0)
     ):  # fmt: skip
         check_whole(f"basins: {label}", value, least)
-    if len(shape) != 2:
-        raise SystemModelError(f"basins: shape must be two numbers, got {shown(shape)}")
-    for count in shape:
-        check_whole("basins: shape", count, 1)
+    check_shape("basins: shape", shape)
     if plane.origin.size != 2 * flow.system.size:
         raise SystemModelError(
             f"plane: states have {plane.origin.size} entries but the system needs "
             f"{2 * flow.system.size}"
         )
+    _check_known(attractors, flow.system, frequency_hz)
     modal = plane.states(shape).reshape(-1, plane.origin.size)
     rng = np.random.default_rng(seed)
     picked = rng.choice(len(modal), min(starts, len(modal)), replace=False)
@@ -541,6 +554,41 @@ def basins(
         periods.reshape(shape),
         len(checked),
         int(wrong),
+    )
+
+
+def check_shape(name: str, shape: tuple[int, int]) -> tuple[int, int]:
+    """Two whole numbers of at least 1, or a SystemModelError under the name."""
+    check_types(**{name: (shape, Sequence)})
+    if len(shape) != 2:
+        raise SystemModelError(f"{name} must be two numbers, got {shown(shape)}")
+    for count in shape:
+        check_whole(name, count, 1)
+    return shape
+
+
+def _check_known(attractors: Sequence[Attractor], system: System, frequency_hz: float) -> None:
+    """Refuse attractors of another system or frequency than those of the basins."""
+    for k, attractor in enumerate(attractors):
+        check_types(**{f"attractors: entry {k}": (attractor, Attractor)})
+        if not math.isclose(attractor.frequency_hz, frequency_hz, rel_tol=1e-9):
+            raise SystemModelError(
+                f"attractors: entry {k} is one at {attractor.frequency_hz:g} Hz, but the basins "
+                f"are asked for at {frequency_hz:g} Hz"
+            )
+        if not _same_system(attractor.flow.system, system):
+            raise SystemModelError(f"attractors: entry {k} is one of another system")
+
+
+def _same_system(a: System, b: System) -> bool:
+    return a is b or (
+        np.array_equal(a.natural_frequencies, b.natural_frequencies)
+        and np.array_equal(a.damping, b.damping)
+        and list(a.participation) == list(b.participation)
+        and all(
+            np.array_equal(a.participation[name], b.participation[name]) for name in a.interfaces
+        )
+        and (a.stops, a.dampers, a.excitation) == (b.stops, b.dampers, b.excitation)
     )
 
 

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from nldyn.command import INTERRUPTED, STOPPED, interrupted
+from nldyn.command import INTERRUPTED, STOPPED
+from nldyn.interruption import interrupted
 
 if TYPE_CHECKING:
     from nldyn.diagrams import Diagram

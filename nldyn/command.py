@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import sys
 
+from nldyn.interruption import interrupted
+
 INTERRUPTED = 130
 STOPPED = "nldyn: stopped by Ctrl-C, nothing is written"
 
@@ -24,10 +26,3 @@ def main() -> None:
             raise
         print(STOPPED, file=sys.stderr)
         sys.exit(INTERRUPTED)
-
-
-def interrupted(error: BaseException | None) -> bool:
-    """Whether Ctrl-C is behind an error: compiled code and imports wrap it in others."""
-    if error is None or isinstance(error, KeyboardInterrupt):
-        return error is not None
-    return interrupted(error.__cause__ or error.__context__)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from nldyn.errors import check_types
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
 from nldyn.orbit import Orbit
@@ -123,6 +124,7 @@ def impacts(motion: Motion | Orbit) -> Impacts:
     >>> len(found), f"{found.speed[0]:.3f} m/s"
     (1, '0.018 m/s')
     """
+    check_types(motion=(motion, Motion, Orbit))
     if isinstance(motion, Orbit):
         found = _complete(motion_of(motion, 2))
         within = found.time < motion.duration

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
+from nldyn.errors import check_types
+from nldyn.interruption import interrupted
+
 Item = TypeVar("Item")
 Value = TypeVar("Value")
+
+HOPELESS = 8  # processes ended in a row after which a broken pool is given up
 
 
 class TaskError(RuntimeError):
@@ -63,7 +70,8 @@ def run_all(
         What to apply it to.
     executor : concurrent.futures.Executor, optional
         ``ThreadPoolExecutor``, ``ProcessPoolExecutor``, ``client.get_executor()`` of
-        dask.distributed, or any other; one after the other, here, unless given.
+        dask.distributed, or any other; one after the other, here, unless given. Where a
+        computation kills its process of a ``ProcessPoolExecutor``, only that one fails.
     progress : callable, optional
         Called as ``progress(done, total)`` after each one.
 
@@ -79,6 +87,7 @@ def run_all(
     >>> run_all(len, [1])[0].failure
     "TypeError: object of type 'int' has no len()"
     """
+    check_types(executor=(executor, Executor, None), progress=(progress, Callable, None))
     outcomes: dict[int, Outcome[Value]] = {}
     for outcome in as_finished(function, items, executor):
         outcomes[outcome.index] = outcome
@@ -92,16 +101,20 @@ def as_finished(
 ) -> Iterator[Outcome[Value]]:
     """Give the outcomes of `run_all` one by one, as they are finished.
 
-    When the caller stops early, computations that have not begun are cancelled.
+    When the caller stops early, computations that have not begun are cancelled. Where a
+    ``ProcessPoolExecutor`` breaks because a computation kills its process, those left are done on
+    processes of their own, and only the one that kills is a failure.
     """
     if executor is None:
         for index, item in enumerate(items):
             try:
-                yield Outcome(index, function(item))
+                outcome = Outcome(index, function(item))
             except Exception as error:
-                yield Outcome(index, None, _said(error))
+                outcome = Outcome(index, None, _said(error))
+            yield outcome
         return
     futures: dict[Any, int] = {}
+    lost: list[int] = []
     try:
         for index, item in enumerate(items):
             futures[_submitted(executor, function, item)] = index
@@ -109,10 +122,77 @@ def as_finished(
         while waiting:
             ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
             for future in sorted(ended, key=futures.__getitem__):
-                yield _outcome(futures[future], future)
+                if isinstance(executor, ProcessPoolExecutor) and _broken(future):
+                    lost.append(futures[future])
+                else:
+                    yield _outcome(futures[future], future)
     finally:
         for future in futures:
             future.cancel()
+    if lost:
+        assert isinstance(executor, ProcessPoolExecutor)
+        yield from _on_own_processes(executor, function, items, sorted(lost))
+
+
+def _on_own_processes(
+    pool: ProcessPoolExecutor,
+    function: Callable[[Item], Value],
+    items: Sequence[Item],
+    indices: Sequence[int],
+) -> Iterator[Outcome[Value]]:
+    """Outcomes of some items after their pool broke.
+
+    Each process has a pool of its own and one item at a time, so that its end tells which item
+    killed it. After `HOPELESS` ends in a row the items left are given up: then it is not they, as
+    where the main module cannot be imported.
+    """
+    waiting = iter(indices)
+    pools: list[ProcessPoolExecutor] = []
+    running: dict[Future[Value], tuple[int, ProcessPoolExecutor]] = {}
+
+    def begin(own: ProcessPoolExecutor) -> None:
+        index = next(waiting, None)
+        if index is not None:
+            running[own.submit(function, items[index])] = index, own
+
+    ends = 0
+    try:
+        for _ in range(min(_processes(pool), len(indices))):
+            pools.append(_pool_of_one(pool))
+            begin(pools[-1])
+        while running:
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                index, own = running.pop(future)
+                ends = ends + 1 if _broken(future) else 0
+                yield _outcome(index, future)
+                if ends >= HOPELESS:
+                    reason = f"BrokenProcessPool: {HOPELESS} processes ended one after the other"
+                    yield from (Outcome(index, None, reason) for index in waiting)
+                if _broken(future):
+                    own = _pool_of_one(pool)
+                    pools.append(own)
+                begin(own)
+    finally:
+        for own in pools:
+            own.shutdown(wait=False, cancel_futures=True)
+
+
+def _broken(future: Future[Value]) -> bool:
+    return not future.cancelled() and isinstance(future.exception(), BrokenProcessPool)
+
+
+def _processes(pool: ProcessPoolExecutor) -> int:
+    return getattr(pool, "_max_workers", None) or os.cpu_count() or 1
+
+
+def _pool_of_one(pool: ProcessPoolExecutor) -> ProcessPoolExecutor:
+    """A pool of one process that starts as those of another pool."""
+    return ProcessPoolExecutor(
+        1,
+        mp_context=getattr(pool, "_mp_context", None),
+        initializer=getattr(pool, "_initializer", None),
+        initargs=getattr(pool, "_initargs", ()),
+    )
 
 
 def _submitted(executor: Executor, function: Callable[[Item], Value], item: Item) -> Future[Value]:
@@ -133,4 +213,7 @@ def _outcome(index: int, future: Future[Value]) -> Outcome[Value]:
 
 
 def _said(error: Exception) -> str:
+    """Text of a failure; Ctrl-C, in whatever wrapping, is none and goes on to the caller."""
+    if interrupted(error):
+        raise KeyboardInterrupt from error
     return f"{type(error).__name__}: {error}"

@@ -40,6 +40,7 @@ from nldyn.errors import (
     shown,
 )
 from nldyn.gauss import GaussTables, gauss_tables
+from nldyn.interruption import interrupted
 from nldyn.linear import Complex, Real
 from nldyn.parameters import Parameter, parameter_tables
 from nldyn.system import System, numbers
@@ -493,10 +494,15 @@ class FlowMap:
         table, drive_by = (
             parameter_tables(self.system, parameters) if parameters else self._no_parameters
         )
-        found = newton(
-            self._data, self.tables, record, recording, omega, point, phases, bool(chained),
-            bool(sensitivities), table, drive_by, corrector,
-        )  # fmt: skip
+        try:
+            found = newton(
+                self._data, self.tables, record, recording, omega, point, phases, bool(chained),
+                bool(sensitivities), table, drive_by, corrector,
+            )  # fmt: skip
+        except SystemError as error:
+            if interrupted(error):
+                raise KeyboardInterrupt from error
+            raise
         return found  # type: ignore[no-any-return]
 
     @cached_property

@@ -14,7 +14,7 @@ import numpy as np
 from nldyn.attractors import Attractor, AttractorOptions, Kind, attractor_from
 from nldyn.contacts import impacts
 from nldyn.continuation import check_range
-from nldyn.errors import SystemModelError, check_whole, shown
+from nldyn.errors import SystemModelError, check_types, check_whole, shown
 from nldyn.executors import run_all
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
@@ -211,6 +211,10 @@ def brute_force(
     'chaotic'
     """
     flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    check_types(
+        directions=(directions, Sequence), options=(options, AttractorOptions, None),
+        executor=(executor, Executor, None), progress=(progress, Callable, None),
+    )  # fmt: skip
     low, high = check_range(range_hz)
     check_whole("points", points, 1)
     check_whole("starts", starts, 0)

@@ -23,6 +23,7 @@ from nldyn.orbit import (
 from nldyn.system import System, numbers
 
 BLOCK = 64  # periods recorded in one call
+PIECE = 2000  # periods of a transient in one call: between two, Ctrl-C is answered
 MOST_STEPS = 10**7  # of a sweep
 
 
@@ -80,9 +81,15 @@ class Motion:
         return self.end_time - self.start_time
 
     def frequency_hz(self, time: Real | float) -> Real:
-        """Excitation frequency in Hz at times in s, that of the stretch."""
+        """Excitation frequency in Hz at times in s within the motion, that of the stretch.
+
+        Raises
+        ------
+        SystemModelError
+            For a time before the beginning or after the end.
+        """
         hz = np.array([stretch.omega for stretch in self.stretches]) / (2.0 * np.pi)
-        return np.asarray(hz[self._stretch_at(np.asarray(time, dtype=float))])
+        return np.asarray(hz[self._stretch_at(self._checked(time))])
 
     def states(self, time: Real) -> Real:
         """Modal displacements and velocities (k, 2n) at times (k,) in s within the motion.
@@ -92,15 +99,9 @@ class Motion:
         SystemModelError
             For a time before the beginning or after the end.
         """
-        time = np.asarray(time, dtype=float)
-        slack = 1e-9 * max(abs(self.end_time), 1e-300)
-        if time.size and (
-            time.min() < self.start_time - slack or time.max() > self.end_time + slack
-        ):
-            raise SystemModelError(
-                f"time must lie between {self.start_time:g} and {self.end_time:g} s, "
-                f"got {time.min():g} to {time.max():g}"
-            )
+        time = self._checked(time)
+        if time.ndim != 1:
+            raise SystemModelError(f"time must be a list of times, got shape {time.shape}")
         order = np.argsort(time, kind="stable")
         where = self._stretch_at(time[order])
         states = np.empty((time.size, 2 * self.system.size))
@@ -110,6 +111,19 @@ class Motion:
             phases = stretch.record.phase[0] + stretch.omega * (time[within] - self.begins[k])
             states[within] = stretch.states(phases)
         return self.flow.to_modal(states)
+
+    def _checked(self, time: Real | float) -> Real:
+        """Times within the motion as an array."""
+        time = numbers("time", time)
+        slack = 1e-9 * max(abs(self.end_time), 1e-300)
+        if time.size and (
+            time.min() < self.start_time - slack or time.max() > self.end_time + slack
+        ):
+            raise SystemModelError(
+                f"time must lie between {self.start_time:g} and {self.end_time:g} s, "
+                f"got {time.min():g} to {time.max():g}"
+            )
+        return time
 
     def _stretch_at(self, time: Real) -> np.ndarray:
         last = len(self.stretches) - 1
@@ -258,8 +272,8 @@ def simulate(
     SystemModelError
         For input that makes no sense.
     ConvergenceError
-        If the transient cannot be simulated. A recording that fails is kept up to there, with the
-        reason in `Motion.failure`.
+        If the transient cannot be simulated, or nothing of the recording. One that fails later is
+        kept up to there, with the reason in `Motion.failure`.
 
     Examples
     --------
@@ -283,13 +297,16 @@ def simulate(
         raise ConvergenceError(f"the transient at {frequency_hz:g} Hz failed: {failure}")
     stretches = []
     for trajectory in _blocks(flow, before, omega, periods):
-        stretches.append(trajectory)
         failure = trajectory.failure
+        if trajectory.record.phase.size:
+            stretches.append(trajectory)
         if failure:
             break
+    if not stretches:
+        raise ConvergenceError(f"the motion at {frequency_hz:g} Hz failed at once: {failure}")
     turns = transient + np.minimum(BLOCK * np.arange(len(stretches) + 1.0), periods)
-    if failure:
-        lost = stretches[-1]
+    lost = stretches[-1]
+    if lost.failure:
         turns[-1] = turns[-2] + (end_phase(lost) - lost.record.phase[0]) / (2.0 * math.pi)
     begins = np.asarray(turns / frequency_hz, dtype=float)
     return Motion(flow, tuple(stretches), begins, failure)
@@ -313,11 +330,15 @@ def transient_end(
     flow: FlowMap, state: Real, omega: float, periods: int
 ) -> tuple[Real | None, str]:
     """State z after some periods from phase zero on, or None and why there is none."""
-    if periods == 0:
-        return state, ""
-    phases = np.linspace(0.0, 2.0 * np.pi * periods, periods + 1)
-    found = flow.shoot(state[None], phases, omega, sensitivities=False, chained=True)
-    return (None, found.failure) if found.failure else (found.ends[-1], "")
+    while periods > 0:
+        count = min(periods, PIECE)
+        phases = np.linspace(0.0, 2.0 * np.pi * count, count + 1)
+        found = flow.shoot(state[None], phases, omega, sensitivities=False, chained=True)
+        if found.failure:
+            return None, found.failure
+        state = found.ends[-1]
+        periods -= count
+    return state, ""
 
 
 def _blocks(flow: FlowMap, state: Real, omega: float, periods: int) -> Iterator[Trajectory]:
@@ -369,6 +390,8 @@ def sweep(
     ------
     SystemModelError
         For input that makes no sense, or a sweep of more than ten million steps.
+    ConvergenceError
+        If the motion fails at once.
 
     Examples
     --------
@@ -397,14 +420,17 @@ def sweep(
         turn = 2.0 * math.pi * math.floor(phases[k] / (2.0 * math.pi))
         step = np.array([phases[k] - turn, phases[k + 1] - turn])
         trajectory = flow.trajectory(state[None], step, float(omega))
-        stretches.append(trajectory)
         failure = trajectory.failure
+        if trajectory.record.phase.size:
+            stretches.append(trajectory)
         if failure:
             break
         state = end_state(trajectory)
+    if not stretches:
+        raise ConvergenceError(f"the sweep from {first:g} Hz failed at once: {failure}")
     begins = np.array(times[: len(stretches) + 1])
-    if failure:
-        lost = stretches[-1]
+    lost = stretches[-1]
+    if lost.failure:
         begins[-1] = begins[-2] + (end_phase(lost) - lost.record.phase[0]) / lost.omega
     return Motion(flow, tuple(stretches), begins, failure)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import hashlib
 import itertools
 import json
 import math
@@ -17,9 +16,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from scipy.stats import qmc
 
-from nldyn.errors import SceneError, SystemModelError, check_whole, is_finite, shown
+from nldyn.errors import SceneError, SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.executors import as_finished
 from nldyn.scene import Scene, build_system, load_scene, scene_from_tables
+from nldyn.study_keys import case_keys
 from nldyn.system import System
 from nldyn.version import software_version
 
@@ -42,6 +42,7 @@ def study(
     samples: int | None = None,
     seed: int = 20,
     keep: str | Path | None = None,
+    keep_name: str | None = None,
     executor: Executor | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xarray.Dataset:
@@ -66,7 +67,13 @@ def study(
         Of the samples.
     keep : str or Path, optional
         A file to which each case is appended as soon as it is done. The same study goes on with
-        it where it was; cases that failed are tried again.
+        it where it was; cases that failed are tried again. A case counts as the same if its tables,
+        the content of its mesh file and the measure are: the code of the measure and of functions
+        of its own module that it calls, with the values that they use. Functions of other modules
+        count by their names.
+    keep_name : str, optional
+        A name that stands for the measure in `keep`, in place of its code. Needed where a measure
+        uses objects whose content cannot be compared; choose another one when it changes.
     executor : concurrent.futures.Executor, optional
         Where to compute; here unless given.
     progress : callable, optional
@@ -100,12 +107,21 @@ def study(
     ----------
     M. D. McKay, R. J. Beckman, W. J. Conover (1979), *Technometrics* 21, 239-245.
     """
+    check_types(**{
+        "study: scene": (scene, Scene, str, Path),
+        "study: parameters": (parameters, Mapping),
+        "study: measure": (measure, Callable),
+        "study: keep": (keep, str, Path, None),
+        "study: keep_name": (keep_name, str, None),
+        "study: executor": (executor, Executor, None),
+        "study: progress": (progress, Callable, None),
+    })  # fmt: skip
     scene = scene if isinstance(scene, Scene) else load_scene(scene)
     names = list(parameters)
+    for name in names:
+        check_types(**{"study: a key of parameters": (name, str)})
     if not names:
         raise SystemModelError("study: name at least one parameter")
-    if not callable(measure):
-        raise SystemModelError(f"study: measure must be a function, got {shown(measure)}")
     check_whole("study: seed", seed, 0)
     values = _design(parameters, design, samples, seed)
     base = tomllib.loads(scene.text)
@@ -113,8 +129,11 @@ def study(
     for tables in cases:
         scene_from_tables(tables, scene.file)
     label = f"{getattr(measure, '__module__', '')}.{getattr(measure, '__qualname__', measure)}"
-    keys = [_fingerprint(tables, label) for tables in cases]
-    done = _read(keep) if keep is not None else {}
+    keys, done = [str(k) for k in range(len(cases))], {}
+    if keep is not None:
+        keys = case_keys(cases, scene.file.parent, measure, keep_name)
+        done = _read(keep)
+        _check_writable(keep)
     waiting = [k for k, key in enumerate(keys) if key not in done]
     task = partial(_measured, str(scene.file), measure)
     finished = len(cases) - len(waiting)
@@ -122,6 +141,9 @@ def study(
         progress(finished, len(cases))
     for outcome in as_finished(task, [cases[k] for k in waiting], executor):
         entry = {"values": outcome.value or {}, "failure": outcome.failure}
+        for name in ("failure", "case", *names):
+            if name in entry["values"]:
+                raise SystemModelError(f"study: a measured number must not be named '{name}'")
         key = keys[waiting[outcome.index]]
         done[key] = entry
         if keep is not None:
@@ -213,9 +235,11 @@ def _index(scene: Scene, place: list[Any], part: str, name: str) -> int:
     return int(part)
 
 
-def _fingerprint(tables: Tables, label: str) -> str:
-    text = json.dumps([tables, label], sort_keys=True, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()[:24]
+def _check_writable(keep: str | Path) -> None:
+    try:
+        Path(keep).open("ab").close()
+    except OSError as error:
+        raise SystemModelError(f"{keep}: cannot be written: {error}") from None
 
 
 def _read(keep: str | Path) -> dict[str, dict[str, Any]]:

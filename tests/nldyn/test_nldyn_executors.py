@@ -12,7 +12,17 @@ import numpy as np
 import pytest
 from one_dof import make_one_dof
 
-from nldyn import Plane, TaskError, basins, brute_force, run_all
+from nldyn import (
+    FlowMap,
+    Plane,
+    SystemModelError,
+    TaskError,
+    basins,
+    brute_force,
+    executors,
+    run_all,
+    simulate,
+)
 from nldyn.executors import as_finished
 
 
@@ -44,12 +54,65 @@ def test_failures_are_kept_beside_results():
                 found[2].value_or_raise()
 
 
-def test_a_broken_pool_is_a_failure_of_each_case_left():
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_case_that_kills_its_process_fails_alone(workers):
+    with processes(workers) as pool:
+        for items in ([0, 1, 2, 3], [4, 5]):  # the pool stays broken
+            found = run_all(cluster_tasks.die, items, pool)
+            assert [outcome.value for outcome in found] == [i if i != 1 else None for i in items]
+            assert all(("BrokenProcessPool" in o.failure) == (i == 1)
+                       for i, o in zip(items, found, strict=True))  # fmt: skip
+
+
+def test_processes_that_always_end_are_given_up(monkeypatch):
+    monkeypatch.setattr(executors, "HOPELESS", 2)
     with processes(1) as pool:
-        found = run_all(cluster_tasks.die, [0, 1, 2, 3], pool)
-    assert len(found) == 4
-    assert "BrokenProcessPool" in found[1].failure
-    assert "BrokenProcessPool" in found[3].failure
+        found = run_all(cluster_tasks.die, [1, 1, 1, 1], pool)
+    assert all("BrokenProcessPool" in outcome.failure for outcome in found)
+    assert "2 processes ended one after the other" in found[3].failure
+
+
+def test_an_executor_of_a_wrong_kind_is_named():
+    with pytest.raises(SystemModelError, match="executor must be an Executor or None, got 2"):
+        run_all(cluster_tasks.square, [1], 2)
+
+
+def wrapped_interrupt(value):
+    try:
+        raise KeyboardInterrupt
+    except KeyboardInterrupt as error:
+        raise SystemError("a kernel returned a result with an exception set") from error
+
+
+def test_ctrl_c_is_no_failure_of_a_case():
+    with pytest.raises(KeyboardInterrupt):
+        run_all(wrapped_interrupt, [1, 2])
+    with ThreadPoolExecutor(1) as pool, pytest.raises(KeyboardInterrupt):
+        run_all(wrapped_interrupt, [1, 2], pool)
+
+
+def test_ctrl_c_in_a_compiled_kernel_ends_all_cases():
+    flow = FlowMap(make_one_dof())
+    simulate(flow, 36.0, 1)  # compiled before the signal comes
+    begun = []
+
+    def case(index):
+        begun.append(index)
+        if index == 0:
+            signal.setitimer(signal.ITIMER_REAL, 0.05)
+        simulate(flow, 36.0, 1, transient=10**7)
+
+    def stop(number, frame):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, stop)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            run_all(case, range(3))
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    assert begun == [0]
 
 
 def test_a_caller_may_stop_early():

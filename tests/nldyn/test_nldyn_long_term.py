@@ -23,6 +23,7 @@ from nldyn import (
     contact_measures,
     find_attractors,
     impact_section,
+    impacts,
     plot_basins,
     plot_brute_force,
     plot_section,
@@ -399,6 +400,10 @@ def test_pictures_show_what_was_found(one_dof, from_35_to_40, at_50_hz, tmp_path
     ax.figure.savefig(tmp_path / "basins.png")
 
 
+def small_plane(system):
+    return Plane.at_interface(system, (-2e-4, 0.0), (-0.05, 0.05))
+
+
 @pytest.mark.parametrize(
     ("call", "said"),
     [
@@ -411,8 +416,41 @@ def test_pictures_show_what_was_found(one_dof, from_35_to_40, at_50_hz, tmp_path
         (lambda s: stable_manifold(solve_orbit(s, 25.3), None), "is no saddle: 0 of its two"),
         (lambda s: impact_section(simulate(s, 20.0, 1), 3), "stop must be a whole number"),
         (lambda s: contact_measures(solve_orbit(s, 25.3), stop=1), "stop must be a whole number"),
+        (lambda s: brute_force(s, (30.0, 40.0), directions=None), "directions must be a Sequence"),
+        (lambda s: brute_force(s, (30.0, 40.0), executor=2), "executor must be an Executor"),
+        (lambda s: find_attractors(s, 25.3, executor=2), "executor must be an Executor"),
+        (lambda s: classify(s, 25.3, options={}), "options must be an AttractorOptions"),
+        (lambda s: impacts(None), "motion must be a Motion or an Orbit, got None"),
+        (lambda s: Plane.at_interface(s, 1.0, (0.0, 1.0)), "displacement must be a Sequence"),
+        (lambda s: Plane.at_interface(s, (0.0, 1.0), None), "velocity must be a Sequence"),
+        (lambda s: basins(s, 50.0, None), "plane must be a Plane, got None"),
+        (lambda s: basins(s, 50.0, small_plane(s), shape=5), "basins: shape must be a Sequence"),
+        (lambda s: small_plane(s).states(4), "plane: shape must be a Sequence"),
+        (lambda s: basins(s, 50.0, small_plane(s), executor=2), "executor must be an Executor"),
+        (lambda s: basins(s, 50.0, small_plane(s), attractors=[1]), "entry 0 must be an Attractor"),
+        (lambda s: simulate(s, 20.0, 1, start=[1e300, 0.0]), "the motion at 20 Hz failed at once"),
+        (lambda s: sweep(s, (20.0, 21.0), 1.0, start=[1e300, 0.0]), "sweep from 20 Hz failed"),
+        (lambda s: simulate(s, 20.0, 1).states(0.01), r"a list of times, got shape \(\)"),
+        (lambda s: simulate(s, 20.0, 1).frequency_hz(1e9), "time must lie between 0 and 0.05 s"),
+        (lambda s: simulate(s, 20.0, 1).frequency_hz(np.nan), "time has an entry that is not"),
     ],
 )
 def test_bad_input_is_one_sentence(one_dof, call, said):
     with pytest.raises((SystemModelError, ConvergenceError), match=said):
         call(one_dof)
+
+
+def test_basins_take_attractors_of_their_own_system_and_frequency_only(one_dof):
+    def of(system, hz):
+        found = classify(make_one_dof(**system), hz)
+        return basins(
+            one_dof, 50.0, small_plane(one_dof), shape=(2, 2), starts=1, checks=1,
+            attractors=[found],
+        )  # fmt: skip
+
+    assert [a.name for a in of({}, 50.0).attractors] == ["period 2"]  # equal, not the same object
+    with pytest.raises(SystemModelError, match=r"entry 0 is one at 25\.3 Hz, but .* at 50 Hz"):
+        of({}, 25.3)
+    for other in ({"stops": [Stop("middle", stiffness=4e9)]}, {"stops": []}):
+        with pytest.raises(SystemModelError, match="entry 0 is one of another system"):
+            of(other, 50.0)

@@ -20,7 +20,7 @@ from nldyn import (
     solve_orbit,
     sweep,
 )
-from nldyn.simulation import chirp_steps
+from nldyn.simulation import PIECE, chirp_steps, transient_end
 
 
 def ball(speed: float = -0.2, stop: Stop | None = None) -> tuple[System, list[float]]:
@@ -204,3 +204,20 @@ def test_largest_displacements_of_subharmonic_motion_are_those_of_a_dense_sampli
 def test_bad_input_is_one_sentence(call, said):
     with pytest.raises(SystemModelError, match=said):
         call(make_one_dof())
+
+
+def test_a_long_transient_is_cut_into_short_calls_and_ends_at_the_same_state(monkeypatch):
+    system = make_one_dof()
+    flow, omega, periods = FlowMap(system), 2.0 * np.pi * 26.0, 2 * PIECE + 7
+    phases = 2.0 * np.pi * np.arange(periods + 1)
+    whole = flow.shoot(np.zeros((1, 2)), phases, omega, sensitivities=False, chained=True)
+    counts, shoot = [], flow.shoot
+
+    def counted(nodes, phases, omega, **more):
+        counts.append(phases.size - 1)
+        return shoot(nodes, phases, omega, **more)
+
+    monkeypatch.setattr(flow, "shoot", counted)
+    end, failure = transient_end(flow, np.zeros(2), omega, periods)
+    assert (failure, counts) == ("", [PIECE, PIECE, 7])
+    np.testing.assert_allclose(end, whole.ends[-1], rtol=1e-9)

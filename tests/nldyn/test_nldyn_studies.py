@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from functools import partial
+from pathlib import Path
 
 import cluster_tasks
 import numpy as np
 import pytest
 
-from nldyn import SceneError, SystemModelError, study
+from nldyn import FlowMap, SceneError, Stop, SystemModelError, study
 from nldyn.resources import example
+from nldyn.study_keys import case_keys
 
 GAPS = [0.0, 5e-4, 1e-3]
 
@@ -49,9 +52,7 @@ def test_a_study_goes_on_where_it_was(tmp_path):
 def test_another_scene_does_not_use_the_cases_of_this_one(tmp_path):
     keep = tmp_path / "study.jsonl"
     grid(keep=keep)
-    study(
-        example("one_dof.toml"), {"stops.0.gap": [2e-4]}, cluster_tasks.frequencies, keep=keep
-    )
+    study(example("one_dof.toml"), {"stops.0.gap": [2e-4]}, cluster_tasks.frequencies, keep=keep)
     assert len(keep.read_text().splitlines()) == 7
 
 
@@ -84,6 +85,11 @@ def test_progress_counts_all_cases():
         ({"stop.0.gap": [0.0]}, {}, SceneError, "names no key of the scene: no 'stop' there"),
         ({"stops.0.gapp": [0.0]}, {}, SceneError, "gapp"),
         ({"damping.modal_ratio": [0.1, -1.0]}, {}, SceneError, "modal_ratio"),
+        (["stops.0.gap"], {}, SystemModelError, "study: parameters must be a Mapping"),
+        ({7: [0.0]}, {}, SystemModelError, "a key of parameters must be a str, got 7"),
+        ({"stops.0.gap": [0.0]}, {"executor": 2}, SystemModelError, "executor must be"),
+        ({"stops.0.gap": [0.0]}, {"keep": 3}, SystemModelError, "study: keep must be"),
+        ({"stops.0.gap": [0.0]}, {"keep_name": 3}, SystemModelError, "study: keep_name must be"),
         ({}, {}, SystemModelError, "name at least one parameter"),
         ({"stops.0.gap": 1.0}, {}, SystemModelError, "must list its values, got 1.0"),
         ({"stops.0.gap": [0.0]}, {"samples": 3}, SystemModelError, "a grid takes no samples"),
@@ -104,3 +110,106 @@ def test_a_file_that_is_no_study_is_refused(tmp_path):
     with pytest.raises(SystemModelError, match="line 1 is not a case of a study"):
         grid(keep=keep)
     assert keep.read_text() == "some notes\nof mine\n"
+
+
+def key_of(measure, name=None):
+    return case_keys([{}], Path(), measure, name)[0]
+
+
+def scaled(factor):
+    return lambda system: {"f": factor * system.frequencies_hz[0]}
+
+
+def weighted(system, weight=1.0, table=None):
+    return {"f": weight * system.frequencies_hz[0]}
+
+
+class Meter:
+    def __init__(self, factor):
+        self.factor = factor
+
+    def measure(self, system):
+        return {"f": self.factor * system.frequencies_hz[0]}
+
+
+def defined(text):
+    space = {"__name__": "a_script", "np": np}
+    exec(text, space)
+    return space["measure"]
+
+
+def test_measures_of_the_same_content_have_one_key():
+    assert key_of(scaled(2.0)) == key_of(scaled(2.0))
+    array = np.arange(3.0)
+    for more in ({"weight": 2.0}, {"table": array}, {"table": {"a": [1, Stop("tip", 1e9)]}}):
+        assert key_of(partial(weighted, **more)) == key_of(partial(weighted, **more))
+    text = "HZ = 3.0\ndef part(x): return np.linalg.norm(x)\ndef measure(s): return part(HZ)"
+    assert key_of(defined(text)) == key_of(defined(text))
+    recursive = "def measure(s, n=3): return measure(s, n - 1) if n else {'f': len([1])}"
+    assert key_of(defined(recursive)) == key_of(defined(recursive))
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (scaled(2.0), scaled(3.0)),
+        (partial(weighted, weight=2.0), partial(weighted, weight=3.0)),
+        (partial(weighted, table=np.arange(3.0)), partial(weighted, table=np.arange(3))),
+        (partial(weighted, table=Stop("tip", 1e9)), partial(weighted, table=Stop("tip", 2e9))),
+        (lambda s: {"f": 1.0}, lambda s: {"f": 2.0}),
+        (lambda s: {"f": max(s, key=lambda x: x)}, lambda s: {"f": max(s, key=lambda x: -x)}),
+        (lambda s: {"f": s.size}, lambda s: {"f": s.drive}),
+        (defined("def measure(s, w=1): return w"), defined("def measure(s, w=2): return w")),
+        (
+            defined("HZ = 1\ndef measure(s): return HZ"),
+            defined("HZ = 2\ndef measure(s): return HZ"),
+        ),
+        (
+            defined("def part(x): return x\ndef measure(s): return part(1)"),
+            defined("def part(x): return -x\ndef measure(s): return part(1)"),
+        ),
+    ],
+)
+def test_measures_of_other_content_have_other_keys(one, other):
+    assert key_of(one) != key_of(other)
+
+
+def test_two_measures_of_one_name_do_not_share_a_file(tmp_path):
+    keep = tmp_path / "study.jsonl"
+    found = [
+        study(example("one_dof.toml"), {"stops.0.gap": [0.0]}, scaled(factor), keep=keep)
+        for factor in (1.0, 2.0)
+    ]
+    assert float(found[1]["f"].item() / found[0]["f"].item()) == 2.0
+
+
+def test_another_mesh_of_the_same_name_has_other_keys(tmp_path):
+    tables = [{"mesh": {"file": "beam.msh"}}]
+    keys = set()
+    for content in (b"one", b"two", b"one"):
+        (tmp_path / "beam.msh").write_bytes(content)
+        keys.add(case_keys(tables, tmp_path, cluster_tasks.frequencies, None)[0])
+    assert len(keys) == 2
+
+
+def test_a_measure_with_objects_needs_a_name(one_dof):
+    flow = FlowMap(one_dof)
+    for measure in (Meter(2.0).measure, partial(weighted, table=flow), lambda s: {"f": flow}):
+        with pytest.raises(SystemModelError, match=r"keep cannot tell .*: name it by keep_name"):
+            key_of(measure)
+        assert key_of(measure, "one") == key_of(measure, "one") != key_of(measure, "two")
+
+
+def test_a_file_that_cannot_be_written_is_refused_before_any_case(tmp_path):
+    def measure(system):
+        raise AssertionError("a case was computed")
+
+    for keep in (tmp_path / "missing" / "study.jsonl", tmp_path):
+        with pytest.raises(SystemModelError, match="cannot be"):
+            study(example("one_dof.toml"), {"stops.0.gap": [0.0]}, measure, keep=keep)
+
+
+@pytest.mark.parametrize("name", ["failure", "stops.0.gap"])
+def test_a_measured_number_has_a_name_of_its_own(name):
+    with pytest.raises(SystemModelError, match=f"must not be named '{name}'"):
+        study(example("one_dof.toml"), {"stops.0.gap": [0.0]}, lambda system: {name: 1.0})
