@@ -996,9 +996,9 @@ def resolved(fl, tab, kind, noise, panel):
         deepest = largest(panel.output, a)
         if deepest <= 10.0 * noise[a]:
             continue
-        if o < na and singular_slope(fl, panel.active[a]):
-            if nearly_opens(tab, kind, panel.output, a, 10.0 * noise[a]):
-                return False
+        singular = o < na and singular_slope(fl, panel.active[a])
+        if singular and nearly_opens(tab, kind, panel.output, a, 10.0 * noise[a]):
+            return False
         tail = max(fl.tail, 20.0 * noise[a] / deepest)
         if o < na and legendre_tail(tab, panel.F, a) > tail * largest(panel.F, a):
             return False

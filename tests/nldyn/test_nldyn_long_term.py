@@ -293,9 +293,10 @@ def test_two_stable_orbits_share_the_plane_and_unstable_ones_sit_on_the_edge():
     assert saddles and not any(saddle.stable for saddle in saddles)
     flow = found.attractors[0].flow
     targets = [target_of(attractor) for attractor in found.attractors]
-    for point in points:  # tiny steps to all sides reach both attractors
-        sides = np.array([[1, 0], [-1, 0], [0, 200], [0, -200], [1, 200], [-1, 200]])
-        nearby = point + 1e-9 * sides
+    sides = np.array([[1, 0], [-1, 0], [0, 200], [0, -200], [1, 200], [-1, 200]])
+    steps = np.concatenate([size * sides for size in (1e-11, 1e-10, 1e-9)])
+    for point in points:  # the edge is folded: any neighbourhood holds both basins
+        nearby = point + steps
         starts = plane.origin + nearby[:, :1] * plane.x + nearby[:, 1:] * plane.y
         reached = settle(flow, 2.0 * np.pi * 22.8, targets, 500, flow.to_state(starts)).labels
         assert set(reached) == {0, 1}
