@@ -35,7 +35,7 @@ from nldyn import (
     stroboscopic_section,
     sweep,
 )
-from nldyn.attractors import Attractor, AttractorOptions, zero_one_test
+from nldyn.attractors import Attractor, zero_one_test
 from nldyn.basin_maps import settle, target_of
 from nldyn.orbit import ConvergenceError
 from nldyn.sections import BruteForce, Column
@@ -150,8 +150,7 @@ def test_chaos_that_ends_is_told_as_a_transient_of_the_orbit_after_it(one_dof):
     assert found.orbit is not None and found.orbit.stable
     assert found.chaotic_runs and found.chaotic_runs[0].chaotic
     assert "a chaotic transient before" in found.evidence
-    at_once = classify(one_dof, 35.38, options=AttractorOptions(confirmations=0, periods=300))
-    assert at_once.kind == "chaotic"  # the verdict that a short simulation would give
+
 
 
 def test_chaos_that_lasts_is_confirmed_by_a_second_run(one_dof):
