@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import TypeGuard
 
@@ -45,3 +46,18 @@ def check_positive(owner: object, **values: object) -> None:
     for name, value in values.items():
         if not (is_finite(value) and value > 0.0):
             raise ModelError(f"{owner}: {name} must be positive and finite, not {value!r}")
+
+
+def listed(source: str, name: str, given: object, kind: type[object]) -> tuple[object, ...]:
+    """The items of a model's list as a tuple; ModelError unless all are of a kind."""
+    if not (isinstance(given, Sequence) and all(isinstance(item, kind) for item in given)):
+        raise ModelError(f"{source}: {name} must be a list of {kind.__name__}, not {given!r}")
+    return tuple(given)
+
+
+def by_name(source: str, name: str, given: object, kind: object, words: str) -> dict[str, object]:
+    """The items of a model's table as a dictionary; ModelError unless all are of a kind."""
+    items = given.values() if isinstance(given, Mapping) else [None]
+    if not all(isinstance(item, kind) for item in items):  # type: ignore[arg-type]
+        raise ModelError(f"{source}: {name} must be a dictionary {words}, not {given!r}")
+    return dict(given)  # type: ignore[call-overload, no-any-return]

@@ -14,6 +14,7 @@ from fem.elements import turn
 from fem.errors import ModelError
 from fem.mesh import FloatArray, IntArray
 from fem.model import DIRECTIONS, FrameModel
+from fem.scatter import displacement_of
 from fem.store import load_model, save_model
 
 SparseArray = sparse.csr_array
@@ -77,12 +78,7 @@ class Component:
         return assemble_frame(load_model(path))
 
     def _all(self, u: FloatArray) -> FloatArray:
-        u = np.asarray(u, dtype=np.float64)
-        if u.shape != self.free.shape:
-            raise ModelError(
-                f"{self.model.mesh.source}: a displacement of the component has shape"
-                f" {self.free.shape}, not {u.shape}"
-            )
+        u = displacement_of(self, u)
         values = np.zeros(_dof_count(self.model))
         values[self.free] = u
         return values

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fem.errors import ModelError, check_positive, is_finite, quoted
+from fem.errors import ModelError, by_name, check_positive, is_finite, listed, quoted
 from fem.mesh import FrameMesh, IntArray
 from fem.sections import CrossSection
 
@@ -280,9 +280,11 @@ class FrameModel:
         if not isinstance(self.mesh, FrameMesh):
             raise ModelError(f"model: mesh must be a FrameMesh, not {self.mesh!r}")
         for name, kind in LISTS.items():
-            object.__setattr__(self, name, self._listed(name, kind))
+            given = getattr(self, name)
+            object.__setattr__(self, name, listed(self.mesh.source, name, given, kind))
         for name, kind in TABLES.items():
-            object.__setattr__(self, name, self._named(name, kind))
+            given, words = getattr(self, name), f"of {kind.__name__} by name"
+            object.__setattr__(self, name, by_name(self.mesh.source, name, given, kind, words))
         self._check_plane()
         self._check_spatial()
         self._check_points()
@@ -298,24 +300,6 @@ class FrameModel:
     def links(self) -> IntArray:
         """Pairs of nodes that are joined, shape (m, 2)."""
         return self.mesh.lines
-
-    def _listed(self, name: str, kind: type[object]) -> tuple[object, ...]:
-        given = getattr(self, name)
-        if not (isinstance(given, Sequence) and all(isinstance(item, kind) for item in given)):
-            raise ModelError(
-                f"{self.mesh.source}: {name} must be a list of {kind.__name__}, not {given!r}"
-            )
-        return tuple(given)
-
-    def _named(self, name: str, kind: type[object]) -> dict[str, object]:
-        given = getattr(self, name)
-        items = given.values() if isinstance(given, Mapping) else [None]
-        if not all(isinstance(item, kind) for item in items):
-            raise ModelError(
-                f"{self.mesh.source}: {name} must be a dictionary of {kind.__name__} by name,"
-                f" not {given!r}"
-            )
-        return dict(given)
 
     def _check_plane(self) -> None:
         z = self.mesh.points[:, 2]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
+from fem.errors import ModelError
 from fem.mesh import FloatArray, IntArray
 
 SparseArray = sparse.csr_array
@@ -76,3 +77,23 @@ def dense_scatter(matrices: FloatArray, dofs: IntArray, count: int) -> SparseArr
     columns = np.tile(dofs, (1, dofs.shape[1])).ravel()
     full = sparse.coo_array((matrices.ravel(), (rows, columns)), shape=(count, count))
     return sparse.csr_array(full.tocsr())
+
+
+class HasFree(Protocol):
+    """What `displacement_of` needs of a component."""
+
+    @property
+    def model(self) -> Any: ...
+    @property
+    def free(self) -> IntArray: ...
+
+
+def displacement_of(component: HasFree, u: npt.ArrayLike) -> FloatArray:
+    """Displacements of a component's free degrees of freedom (N,), checked for their number."""
+    values = np.asarray(u, dtype=np.float64)
+    if values.shape != component.free.shape:
+        raise ModelError(
+            f"{component.model.mesh.source}: a displacement of the component has shape"
+            f" {component.free.shape}, not {values.shape}"
+        )
+    return values

@@ -216,10 +216,24 @@ def mass_block(drawing: FrameSurface, lump: PointMass, side: FloatArray) -> Any:
     return oriented_box(centre, side, (edge, edge / 2 if halved else edge, edge))
 
 
-def stop_solids(drawing: FrameSurface, stop: StopSphere, scale: float) -> list[Any]:
-    """The sphere at the beam's surface plus ``scale`` times the gap, and what holds it."""
+def sphere_on_post(centre: FloatArray, axis: FloatArray, radius: float, post: float) -> list[Any]:
+    """Sphere of a stop and the post of a given length that holds it along an axis."""
     import pyvista
 
+    return [
+        pyvista.Sphere(radius=radius, center=centre, theta_resolution=48, phi_resolution=48),
+        pyvista.Cylinder(
+            center=centre + post / 2 * axis,
+            direction=axis,
+            radius=0.55 * radius,
+            height=post,
+            resolution=48,
+        ),
+    ]
+
+
+def stop_solids(drawing: FrameSurface, stop: StopSphere, scale: float) -> list[Any]:
+    """The sphere at the beam's surface plus ``scale`` times the gap, and what holds it."""
     component = drawing.component
     mesh = component.model.mesh
     node = mesh.node(stop.point)
@@ -230,14 +244,7 @@ def stop_solids(drawing: FrameSurface, stop: StopSphere, scale: float) -> list[A
     post = max(1.6 * mark_size(component), 4.0 * stop.radius)
     width = max(1.1 * mark_size(component), 3.0 * stop.radius)
     return [
-        pyvista.Sphere(radius=stop.radius, center=centre, theta_resolution=48, phi_resolution=48),
-        pyvista.Cylinder(
-            center=centre + post / 2 * axis,
-            direction=axis,
-            radius=0.55 * stop.radius,
-            height=post,
-            resolution=48,
-        ),
+        *sphere_on_post(centre, axis, stop.radius, post),
         oriented_box(
             centre + (post + 0.15 * width) * axis, towards, (0.3 * width, 2 * width, width)
         ),

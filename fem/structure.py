@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from fem.cells import KINDS
-from fem.errors import ModelError, check_positive, quoted
+from fem.errors import ModelError, by_name, check_positive, listed, quoted
 from fem.mesh import FloatArray, FrameMesh, IntArray
 from fem.model import (
     BeamPart,
@@ -171,6 +171,10 @@ LISTS = {
     "couplings": Coupling,
     "foundations": Foundation,
 }
+TABLES: tuple[tuple[str, object, str], ...] = (
+    ("parts", Part, "BeamPart and SolidPart"),
+    ("interfaces", Interface, "Interface"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,9 +234,11 @@ class StructureModel:
         if not isinstance(self.mesh, StructureMesh):
             raise ModelError(f"model: mesh must be a StructureMesh, not {self.mesh!r}")
         for name, kind in LISTS.items():
-            object.__setattr__(self, name, self._listed(name, kind))
-        object.__setattr__(self, "parts", self._named("parts", Part))
-        object.__setattr__(self, "interfaces", self._named("interfaces", Interface))
+            given = getattr(self, name)
+            object.__setattr__(self, name, listed(self.mesh.source, name, given, kind))
+        for name, sort, words in TABLES:
+            given, what = getattr(self, name), f"by name, of {words}"
+            object.__setattr__(self, name, by_name(self.mesh.source, name, given, sort, what))
         self._check_parts()
         object.__setattr__(self, "mesh", self._with_coupled_points())
         self._check_plane()
@@ -292,24 +298,6 @@ class StructureModel:
         inside[self.mesh.nodes(name)] = True
         on = {kind: facets[inside[facets].all(axis=1)] for kind, facets in self.facets.items()}
         return {kind: facets for kind, facets in on.items() if len(facets)}
-
-    def _listed(self, name: str, kind: type[object]) -> tuple[object, ...]:
-        given = getattr(self, name)
-        if not (isinstance(given, Sequence) and all(isinstance(item, kind) for item in given)):
-            raise ModelError(
-                f"{self.mesh.source}: {name} must be a list of {kind.__name__}, not {given!r}"
-            )
-        return tuple(given)
-
-    def _named(self, name: str, kind: object) -> dict[str, object]:
-        given = getattr(self, name)
-        items = given.values() if isinstance(given, Mapping) else [None]
-        if not all(isinstance(item, kind) for item in items):  # type: ignore[arg-type]
-            raise ModelError(
-                f"{self.mesh.source}: {name} must be a dictionary by name, of"
-                f" {getattr(kind, '__name__', 'BeamPart and SolidPart')}, not {given!r}"
-            )
-        return dict(given)
 
     def _check_parts(self) -> None:
         mesh = self.mesh

@@ -23,7 +23,7 @@ from fem.errors import ModelError
 from fem.locking import locking_warnings
 from fem.mesh import FloatArray, IntArray
 from fem.model import PointMass
-from fem.scatter import SparseArray, block_pattern, dense_scatter
+from fem.scatter import SparseArray, block_pattern, dense_scatter, displacement_of
 from fem.solids import (
     checked_volumes,
     gradients_and_volumes,
@@ -103,12 +103,7 @@ class StructureComponent:
 
     def all_values(self, u: FloatArray) -> FloatArray:
         """All degrees of freedom, also held and coupled ones, from the free ones (N,)."""
-        u = np.asarray(u, dtype=np.float64)
-        if u.shape != self.free.shape:
-            raise ModelError(
-                f"{self.model.mesh.source}: a displacement of the component has shape"
-                f" {self.free.shape}, not {u.shape}"
-            )
+        u = displacement_of(self, u)
         return np.asarray(self.constraints.transformation @ u, dtype=np.float64)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from fem.cells import KINDS
 from fem.mesh import FloatArray, IntArray
-from fem.scenery import BLOCK_DENSITY, MARK_FRACTION, StopSphere
+from fem.scenery import BLOCK_DENSITY, MARK_FRACTION, StopSphere, sphere_on_post
 from fem.structure_surface import StructureSurface
 
 LIFT = 1e-3
@@ -109,24 +109,13 @@ def mass_cubes(drawing: StructureSurface, stop: StopSphere | None) -> list[Cube]
 
 def stop_bodies(drawing: StructureSurface, stop: StopSphere, scale: float) -> list[Any]:
     """The sphere at the surface plus ``scale`` times the gap, and the post that holds it."""
-    import pyvista
-
     mesh = drawing.component.model.mesh
     point = mesh.points[mesh.node(stop.point)]
     towards = direction_of(stop)
     surface = reach_along(drawing, point, towards) + scale * stop.gap
     centre = point + (surface + stop.radius) * towards
     post = max(1.6 * MARK_FRACTION * size_of(drawing), 4.0 * stop.radius)
-    return [
-        pyvista.Sphere(radius=stop.radius, center=centre, theta_resolution=48, phi_resolution=48),
-        pyvista.Cylinder(
-            center=centre + post / 2 * towards,
-            direction=towards,
-            radius=0.55 * stop.radius,
-            height=post,
-            resolution=48,
-        ),
-    ]
+    return sphere_on_post(centre, towards, stop.radius, post)
 
 
 def direction_of(stop: StopSphere) -> FloatArray:

@@ -962,10 +962,9 @@ def nearly_opens(tab, kind, values, a, noise):
         if values[a, i - 1] >= values[a, i] <= values[a, i + 1]:
             left = tab.chi[kind, i - 1] - tab.chi[kind, i]
             right = tab.chi[kind, i + 1] - tab.chi[kind, i]
-            up = (values[a, i - 1] - values[a, i]) / left
-            on = (values[a, i + 1] - values[a, i]) / right
-            curvature = (on - up) / (right - left)
-            slope = up - curvature * left
+            slope, curvature = parabola(
+                left, right, values[a, i - 1], values[a, i], values[a, i + 1]
+            )
             if curvature > 0.0:
                 lowest = values[a, i] - 0.25 * slope * slope / curvature
                 if noise < lowest < curvature / 16.0:
@@ -1125,6 +1124,14 @@ def interpolate(tab, values, s):
 
 
 @inner
+def parabola(left, right, below, here, above):
+    """Slope and curvature, at its middle, of the parabola through values at left, 0 and right."""
+    up, on = (below - here) / left, (above - here) / right
+    curvature = (on - up) / (right - left)
+    return up - curvature * left, curvature
+
+
+@inner
 def first_root(tab, values, noise, edge):
     """First s at which the polynomial through `values` falls below -noise, at its end edge, or 2.
 
@@ -1144,9 +1151,7 @@ def first_root(tab, values, noise, edge):
             below = grid[i]
         elif i < n - 1 and fine[i - 1] >= fine[i] <= fine[i + 1]:
             left, right = grid[i - 1] - grid[i], grid[i + 1] - grid[i]
-            up, on = (fine[i - 1] - fine[i]) / left, (fine[i + 1] - fine[i]) / right
-            curvature = (on - up) / (right - left)
-            slope = up - curvature * left
+            slope, curvature = parabola(left, right, fine[i - 1], fine[i], fine[i + 1])
             if curvature > 0.0 and fine[i] - 0.25 * slope * slope / curvature < -0.5 * noise:
                 bottom = grid[i] - 0.5 * slope / curvature
                 if interpolate(tab, values, bottom) < -noise:
@@ -1416,9 +1421,9 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
         end_phase = phase + fl.omega * h
         fine = resolved(fl, tab, kind, noise, panel)
         if fine:
-            event = aim if kind % 2 == 1 else -1
+            to_switch = kind % 2 == 1
             fine = h <= 1.5 * graded_length(
-                fl, active, w_end, end_phase, h, -1.0, kind % 2 == 1, event
+                fl, active, w_end, end_phase, h, -1.0, to_switch, aim if to_switch else -1
             )
         event, where = first_event(fl, tab, kind, phase, w, h, closed, panel, w_end)
         at_end = where > (0.999 if event == aim else 1.0 - 1e-7)

@@ -15,7 +15,7 @@ from nldyn.branch import same_orbit, stroboscopic
 from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
 from nldyn.executors import run_all
 from nldyn.exploration import settling_periods
-from nldyn.flow import FlowMap
+from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.lyapunov import LyapunovSpectrum, spectrum_from
 from nldyn.orbit import ConvergenceError, Orbit, check_bounded, check_observe
@@ -249,7 +249,7 @@ def classify(
     >>> classify(system, frequency_hz=50.0).name
     'period 2'
     """
-    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    flow = flow_of(system)
     check_types(options=(options, AttractorOptions, None))
     check_frequency("frequency_hz", frequency_hz)
     check_bounded(flow.system, 2.0 * math.pi * frequency_hz)
@@ -330,8 +330,7 @@ def _periodic(
 
 def _strobe(flow: FlowMap, state: Real, omega: float, periods: int) -> Real:
     """States z (periods, 2n) after each of some periods from phase zero on."""
-    phases = np.linspace(0.0, 2.0 * np.pi * periods, periods + 1)
-    found = flow.shoot(state[None], phases, omega, sensitivities=False, chained=True)
+    found = flow.strobe(state, omega, periods)
     if found.failure:
         raise ConvergenceError(found.failure)
     return np.asarray(found.ends)
@@ -556,7 +555,7 @@ def find_attractors(
     >>> [share.attractor.name for share in find_attractors(system, 25.3, starts=4)]
     ['period 1']
     """
-    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    flow = flow_of(system)
     check_types(options=(options, AttractorOptions, None), executor=(executor, Executor, None))
     check_frequency("frequency_hz", frequency_hz)
     omega = 2.0 * math.pi * frequency_hz

@@ -31,7 +31,7 @@ from nldyn.errors import (
     shown,
 )
 from nldyn.executors import run_all
-from nldyn.flow import FlowMap, chain
+from nldyn.flow import FlowMap, chain, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import Orbit, check_bounded, check_observe
 from nldyn.system import System, numbers
@@ -321,7 +321,6 @@ def _orbit_target(orbit: Orbit) -> Target:
         shapes.append(shape / np.linalg.norm(shape, 2))
     rng = np.random.default_rng(1)
     tries = rng.standard_normal((40 * flow.system.size, states.shape[1]))
-    phases = np.linspace(0.0, 2.0 * np.pi * period, period + 1)
     radius = scale
 
     def comes_nearer(k: int, radius: float) -> bool:
@@ -330,7 +329,7 @@ def _orbit_target(orbit: Orbit) -> Target:
             for direction in tries:
                 off = np.linalg.solve(lower.T, direction / np.linalg.norm(direction))
                 start = states[k] + shell * radius * off
-                found = flow.shoot(start[None], phases, omega, sensitivities=False, chained=True)
+                found = flow.strobe(start, omega, period)
                 if found.failure:
                     return False
                 left = found.ends[-1] - states[k]
@@ -380,10 +379,9 @@ def _settle_one(
     flow: FlowMap, omega: float, targets: Sequence[Target], longest: int, found: Settled, row: int
 ) -> None:
     """Fill one row of what is found; see `settle`."""
-    phases = np.linspace(0.0, 2.0 * np.pi * CHUNK, CHUNK + 1)
     lingered = [0] * len(targets)
     for before in range(0, longest, CHUNK):
-        moved = flow.shoot(found.ends[row][None], phases, omega, sensitivities=False, chained=True)
+        moved = flow.strobe(found.ends[row], omega, CHUNK)
         if moved.failure:
             return
         found.ends[row] = moved.ends[-1]
@@ -489,7 +487,7 @@ def basins(
     G. Rega, S. Lenci (2005), Identifying, evaluating, and controlling dynamical integrity measures
     in non-linear mechanical oscillators, *Nonlinear Anal.* 63.
     """
-    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    flow = flow_of(system)
     check_types(
         plane=(plane, Plane), options=(options, AttractorOptions, None),
         executor=(executor, Executor, None), progress=(progress, Callable, None),

@@ -32,7 +32,7 @@ from nldyn.continuation import (
     switch_at_flip,
 )
 from nldyn.errors import SystemModelError, check_frequency, check_whole
-from nldyn.flow import FlowMap
+from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.normal_forms import switch_at_branch_point
 from nldyn.orbit import ConvergenceError, Orbit, check_observe
@@ -324,7 +324,7 @@ def diagram(
     OutputError
         If `checkpoint` cannot be written.
     """
-    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    flow = flow_of(system)
     low, high = check_range(range_hz)
     for period in periods:
         check_whole("periods: each", period, 1)

@@ -17,7 +17,7 @@ from nldyn.checkpoint import Checkpoint
 from nldyn.continuation import ContinuationOptions, check_range, shifts
 from nldyn.diagrams import Collector, Diagram, Progress
 from nldyn.errors import SystemModelError, check_whole, is_finite, shown
-from nldyn.flow import FlowMap
+from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import (
     ConvergenceError,
@@ -441,7 +441,7 @@ def explore(
     >>> sorted({branch.period for branch in found.diagram.branches})
     [1, 2]
     """
-    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    flow = flow_of(system)
     low, high = check_range(range_hz)
     check_whole("max_period", max_period, 1)
     question = Question(
@@ -588,8 +588,7 @@ class _Survey:
         states = np.array([start])
         while left > 0:
             count = min(left, max(PIECE, len(states) // 4))
-            phases = np.linspace(0.0, 2.0 * np.pi * count, count + 1)
-            found = flow.shoot(states[-1:], phases, known.omega, sensitivities=False, chained=True)
+            found = flow.strobe(states[-1], known.omega, count)
             if found.failure:
                 return None, None
             states = np.vstack([states, found.ends])

@@ -365,6 +365,11 @@ class FlowMap:
         )
         return Segments(ends, jacobians, d_omegas, d_parameters, closings, _REASONS[status])
 
+    def strobe(self, state: Real, omega: float, periods: int) -> Segments:
+        """Carry a state (2n,) over excitation periods from phase zero on, without derivatives."""
+        phases = np.linspace(0.0, 2.0 * np.pi * periods, periods + 1)
+        return self.shoot(state[None], phases, omega, sensitivities=False, chained=True)
+
     def _check_segments(self, nodes: Real, phases: Real, omega: float, chained: bool) -> None:
         if phases.ndim != 1 or phases.size < 2 or not (phases[1:] > phases[:-1]).all():
             raise SystemModelError("phases must be two or more ascending numbers")
@@ -545,6 +550,11 @@ class FlowMap:
             np.empty((capacity, len(self.system.stops), self.tables.nodes.size)),
             np.zeros(2, dtype=np.int64),
         )
+
+
+def flow_of(system: System | FlowMap) -> FlowMap:
+    """The flow map itself, or that of a system at the default accuracy."""
+    return system if isinstance(system, FlowMap) else FlowMap(system)
 
 
 @dataclass(frozen=True)

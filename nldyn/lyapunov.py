@@ -10,7 +10,7 @@ import numpy as np
 
 from nldyn._growth import growth_rates
 from nldyn.errors import SystemModelError, check_frequency, check_whole
-from nldyn.flow import FlowMap
+from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, check_bounded, contact_damping
 from nldyn.simulation import starting_state, transient_end
@@ -178,7 +178,7 @@ def lyapunov_exponents(
     I. Shimada, T. Nagashima (1979), *Prog. Theor. Phys.* 61, 1605-1616;
     H. Flyvbjerg, H. G. Petersen (1989), *J. Chem. Phys.* 91, 461-466.
     """
-    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    flow = flow_of(system)
     check_frequency("frequency_hz", frequency_hz)
     check_whole("transient", transient, 0)
     check_whole("periods", periods, 2 * FEWEST_BLOCKS)

@@ -266,8 +266,7 @@ def _lingering(
     flow: FlowMap, omega: float, targets: list[Target], state: Real, observe: str
 ) -> Orbit | None:
     """Unstable orbit near which a motion from the edge lingers before it reaches an attractor."""
-    phases = np.linspace(0.0, 2.0 * np.pi * LINGER, LINGER + 1)
-    run = flow.shoot(state[None], phases, omega, sensitivities=False, chained=True)
+    run = flow.strobe(state, omega, LINGER)
     if run.failure:
         return None
     reached = np.any([target.reached(run.ends) != UNDECIDED for target in targets], axis=0)

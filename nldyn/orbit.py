@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 
 from nldyn.elements import Stop
 from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
-from nldyn.flow import FlowMap, Solution, Trajectory, chain
+from nldyn.flow import FlowMap, Solution, Trajectory, chain, flow_of
 from nldyn.linear import Real
 from nldyn.multipliers import (
     COARSE,
@@ -541,7 +541,7 @@ def solve_orbit(
     >>> orbit.impacts
     0
     """
-    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    flow = flow_of(system)
     check_frequency("frequency_hz", frequency_hz)
     observe = check_observe(flow.system, observe)
     problem = shooting_problem(flow, period, segments)

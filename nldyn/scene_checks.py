@@ -64,10 +64,7 @@ def check_mesh_names(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
     """Check that the scene and the mesh agree on the names of parts and points."""
     assert scene.mesh is not None
     source = scene.mesh.file
-    for name in scene.parts:
-        if name not in mesh.parts:
-            fault = unknown_name(name, mesh.parts, f"a part of the mesh {source}")
-            raise scene_error(file, ("parts", name), fault.removeprefix(f"'{name}' "))
+    _check_parts_known(scene, mesh.parts, file)
     _check_parts_complete(scene, mesh, file)
     for key, name in _points_used(scene):
         _require(name, mesh.point_sets, f"a point set of the mesh {source}", file, key)
@@ -83,14 +80,19 @@ def check_mesh_names(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
         _require(hinge.part, mesh.parts, f"a part of the mesh {source}", file, key)
 
 
+def _check_parts_known(scene: Scene, known: Mapping[str, object], file: Path) -> None:
+    assert scene.mesh is not None
+    for name in scene.parts:
+        if name not in known:
+            fault = unknown_name(name, known, f"a part of the mesh {scene.mesh.file}")
+            raise scene_error(file, ("parts", name), fault.removeprefix(f"'{name}' "))
+
+
 def check_structure_names(scene: Scene, mesh: TaggedStructure, file: Path) -> None:
     """Check that the scene of a structure and its mesh agree on the names of parts and places."""
     assert scene.mesh is not None
     source = scene.mesh.file
-    for name in scene.parts:
-        if name not in mesh.groups:
-            fault = unknown_name(name, mesh.groups, f"a part of the mesh {source}")
-            raise scene_error(file, ("parts", name), fault.removeprefix(f"'{name}' "))
+    _check_parts_known(scene, mesh.groups, file)
     known = dict.fromkeys([*mesh.names, *(coupling.at for coupling in scene.couplings)])
     for key, name in (*_points_used(scene), *_faces_used(scene)):
         _require(

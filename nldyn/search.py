@@ -10,7 +10,7 @@ import numpy as np
 
 from nldyn.branch import minimal_period, same_orbit, stroboscopic
 from nldyn.errors import check_frequency, check_whole
-from nldyn.flow import FlowMap
+from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import (
     ConvergenceError,
@@ -100,10 +100,9 @@ def random_states(flow: FlowMap, omega: float, count: int, seed: int | Sequence[
 def simulate(flow: FlowMap, omega: float, starts: Real, transient: int, recorded: int) -> Strobe:
     """Simulate from each state (k, 2n) and record the state after each period of the excitation."""
     total = transient + recorded
-    phases = np.linspace(0.0, 2.0 * np.pi * total, total + 1)
     runs, failures = [], []
     for start in starts:
-        found = flow.shoot(start[None], phases, omega, sensitivities=False, chained=True)
+        found = flow.strobe(start, omega, total)
         if found.failure:
             failures.append(found.failure)
         else:
@@ -240,7 +239,7 @@ def find_orbits(
     >>> any(orbit.stable for orbit in orbits)
     True
     """
-    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    flow = flow_of(system)
     check_frequency("frequency_hz", frequency_hz)
     check_bounded(flow.system, 2.0 * math.pi * frequency_hz)
     options = options or SearchOptions()

@@ -16,7 +16,7 @@ from nldyn.contacts import impacts
 from nldyn.continuation import check_range
 from nldyn.errors import SystemModelError, check_types, check_whole, shown
 from nldyn.executors import run_all
-from nldyn.flow import FlowMap
+from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import check_bounded, check_observe
 from nldyn.search import random_states
@@ -210,7 +210,7 @@ def brute_force(
     >>> found.columns[1].attractor.kind  # at 36 Hz
     'chaotic'
     """
-    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    flow = flow_of(system)
     check_types(
         directions=(directions, Sequence), options=(options, AttractorOptions, None),
         executor=(executor, Executor, None), progress=(progress, Callable, None),

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from nldyn.errors import SystemModelError, check_frequency, check_whole, is_finite, shown
-from nldyn.flow import FlowMap, Trajectory
+from nldyn.flow import FlowMap, Trajectory, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import (
     ConvergenceError,
@@ -285,7 +285,7 @@ def simulate(
     >>> len(motion.strobe)
     11
     """
-    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    flow = flow_of(system)
     check_frequency("frequency_hz", frequency_hz)
     check_whole("periods", periods, 1)
     check_whole("transient", transient, 0)
@@ -332,8 +332,7 @@ def transient_end(
     """State z after some periods from phase zero on, or None and why there is none."""
     while periods > 0:
         count = min(periods, PIECE)
-        phases = np.linspace(0.0, 2.0 * np.pi * count, count + 1)
-        found = flow.shoot(state[None], phases, omega, sensitivities=False, chained=True)
+        found = flow.strobe(state, omega, count)
         if found.failure:
             return None, found.failure
         state = found.ends[-1]
@@ -404,7 +403,7 @@ def sweep(
     >>> len(hz)
     46
     """
-    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    flow = flow_of(system)
     first, last = _sweep_range(range_hz)
     if not (is_finite(rate_hz_per_s) and rate_hz_per_s > 0.0):
         raise SystemModelError(
