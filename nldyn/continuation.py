@@ -289,7 +289,11 @@ class Walk:
             return False
         problem = start.orbit.problem
         weights = problem.metric(start.orbit.point)
-        step = weights * (b.orbit.point - a.orbit.point)
+        chord = b.orbit.point - a.orbit.point
+        step = weights * chord
+        ahead = start.orbit.point[-1] - a.orbit.point[-1]
+        if ahead * ahead > 1.01 * float(chord @ step):  # `_passes` none of the start's shifts
+            return False
         places = zip(
             shifts(problem, start.orbit.point), shifts(problem, start.tangent), strict=True
         )

@@ -41,6 +41,7 @@ from nldyn.errors import (
 )
 from nldyn.gauss import GaussTables, gauss_tables
 from nldyn.interruption import interrupted
+from nldyn.kernel_cache import first_call
 from nldyn.linear import Complex, Real
 from nldyn.parameters import Parameter, parameter_tables
 from nldyn.system import System, numbers
@@ -499,11 +500,12 @@ class FlowMap:
         table, drive_by = (
             parameter_tables(self.system, parameters) if parameters else self._no_parameters
         )
+        arguments = (
+            self._data, self.tables, record, recording, omega, point, phases, bool(chained),
+            bool(sensitivities), table, drive_by, corrector,
+        )  # fmt: skip
         try:
-            found = newton(
-                self._data, self.tables, record, recording, omega, point, phases, bool(chained),
-                bool(sensitivities), table, drive_by, corrector,
-            )  # fmt: skip
+            found = newton(*arguments) if newton.overloads else first_call(newton, *arguments)
         except SystemError as error:
             if interrupted(error):
                 raise KeyboardInterrupt from error

@@ -1,8 +1,9 @@
-"""Where the compiled kernels are kept: beside the package, in the home directory, or nowhere."""
+"""Compiled kernels: where they are kept, when they are outdated, and their first call."""
 
 from __future__ import annotations
 
 import atexit
+import gc
 import hashlib
 import os
 import shutil
@@ -48,6 +49,21 @@ def resting_on(decorator: Any, *files: str | None) -> Any:
         return kernel
 
     return decorate
+
+
+def first_call(kernel: Any, *arguments: object) -> Any:
+    """Call a kernel that may have to be compiled for it, without Python's collector of cycles.
+
+    The compiler makes millions of objects that stay; to search them again and again for cycles
+    takes a sixth of its time.
+    """
+    if not gc.isenabled():
+        return kernel(*arguments)
+    gc.disable()
+    try:
+        return kernel(*arguments)
+    finally:
+        gc.enable()
 
 
 def _probe() -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import gc
+
 import numba
+import pytest
 
 from nldyn._sample import local_extremes, sample_states, state_at
-from nldyn.kernel_cache import resting_on
+from nldyn.kernel_cache import first_call, resting_on
 
 
 def double(x):
@@ -25,3 +28,17 @@ def test_kept_code_is_outdated_when_a_file_it_rests_on_changes(tmp_path):
 def test_kernels_that_call_those_of_another_file_rest_on_it():
     for kernel in (local_extremes, sample_states, state_at):
         assert isinstance(kernel._cache._cache_file._source_stamp, tuple)
+
+
+@pytest.mark.parametrize("collecting", [True, False])
+def test_the_collector_rests_during_a_first_call_and_is_as_before_afterwards(collecting):
+    was = gc.isenabled()
+    try:
+        (gc.enable if collecting else gc.disable)()
+        assert first_call(gc.isenabled) is False
+        assert gc.isenabled() is collecting
+        with pytest.raises(ZeroDivisionError):
+            first_call(divmod, 1, 0)
+        assert gc.isenabled() is collecting
+    finally:
+        (gc.enable if was else gc.disable)()
