@@ -26,6 +26,8 @@ from nldyn.branch import (
 from nldyn.checkpoint import Checkpoint, checkpoint_at
 from nldyn.crossings import check_requested, requested
 from nldyn.errors import (
+    LARGEST_FREQUENCY,
+    SMALLEST_FREQUENCY,
     SystemModelError,
     check_positive,
     check_types,
@@ -869,9 +871,10 @@ def check_range(range_hz: tuple[float, float]) -> tuple[float, float]:
     if ends.shape != (2,):
         raise SystemModelError(f"range_hz must be two frequencies, got {shown(range_hz)}")
     low, high = ends.tolist()
-    if not 0.0 < low < high:
+    if not SMALLEST_FREQUENCY <= low < high <= LARGEST_FREQUENCY:
         raise SystemModelError(
-            f"range_hz must be two positive frequencies, ascending; got ({low:g}, {high:g})"
+            f"range_hz must be two positive frequencies, ascending, from {SMALLEST_FREQUENCY:g} "
+            f"to {LARGEST_FREQUENCY:g}; got ({low:g}, {high:g})"
         )
     return low, high
 

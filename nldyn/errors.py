@@ -8,7 +8,7 @@ from numbers import Integral, Real
 from reprlib import repr as shortened
 from typing import Any, TypeGuard
 
-LARGEST_FREQUENCY = 1e12  # Hz, of an excitation
+SMALLEST_FREQUENCY, LARGEST_FREQUENCY = 1e-12, 1e12  # Hz, of an excitation
 
 
 class SystemModelError(ValueError):
@@ -36,9 +36,10 @@ def is_finite(value: object) -> TypeGuard[float]:
 
 def check_frequency(name: str, value: object) -> None:
     """Refuse anything but a frequency in Hz that an excitation can have, under its name."""
-    if not (is_finite(value) and 0.0 < value <= LARGEST_FREQUENCY):
+    if not (is_finite(value) and SMALLEST_FREQUENCY <= value <= LARGEST_FREQUENCY):
         raise SystemModelError(
-            f"{name} must be positive and at most {LARGEST_FREQUENCY:g}, got {shown(value)}"
+            f"{name} must be positive, from {SMALLEST_FREQUENCY:g} to {LARGEST_FREQUENCY:g}, "
+            f"got {shown(value)}"
         )
 
 

@@ -33,6 +33,7 @@ from nldyn._sample import local_extremes, sample_states
 from nldyn.contact_law import law_address
 from nldyn.errors import (
     LARGEST_FREQUENCY,
+    SMALLEST_FREQUENCY,
     SystemModelError,
     check_types,
     check_whole,
@@ -191,6 +192,28 @@ class Segments:
     def monodromy(self) -> Real:
         """Product of the segments' Jacobians, (2n, 2n)."""
         return chain(self.jacobians)
+
+
+@dataclass(frozen=True)
+class FlowError:
+    """Relative errors of the flow map over segments, in the norm of the coordinates z.
+
+    Parameters
+    ----------
+    state : float
+        Of the states at the ends of the segments.
+    monodromy : float
+        Of the monodromy matrix.
+    d_omega : float
+        Of the derivatives with respect to ω.
+    d_parameters : float
+        Of those with respect to the parameters asked for, in the columns' own units; the largest.
+    """
+
+    state: float
+    monodromy: float
+    d_omega: float
+    d_parameters: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -366,6 +389,45 @@ class FlowMap:
         )
         return Segments(ends, jacobians, d_omegas, d_parameters, closings, _REASONS[status])
 
+    def error(
+        self,
+        nodes: Real,
+        phases: Real,
+        omega: float,
+        *,
+        chained: bool = False,
+        parameters: Sequence[Parameter] = (),
+    ) -> FlowError:
+        """Estimate the errors of `shoot` by a finer map; infinite where either fails.
+
+        Parameters and exceptions are those of `shoot`.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import nldyn
+        >>> system = nldyn.System.from_modal(
+        ...     [10.0], {"a": [1.0]}, stops=[nldyn.Stop("a", 1e9)],
+        ...     excitation=[nldyn.HarmonicForce("a", 1.0)],
+        ... )
+        >>> flow = nldyn.FlowMap(system)
+        >>> flow.error(np.zeros((1, 2)), np.array([0.0, 2.0 * np.pi]), 50.0).state < 1e-9
+        True
+        """
+        here, finer = (
+            flow.shoot(nodes, phases, omega, chained=chained, parameters=parameters)
+            for flow in (self, self.finer)
+        )
+        if here.failure or finer.failure:
+            return FlowError(math.inf, math.inf, math.inf, math.inf if parameters else 0.0)
+        columns = zip(here.d_parameters.T, finer.d_parameters.T, strict=True)
+        return FlowError(
+            relative_error(here.ends, finer.ends),
+            relative_error(here.monodromy, finer.monodromy),
+            relative_error(here.d_omega, finer.d_omega),
+            max((relative_error(a, b) for a, b in columns), default=0.0),
+        )
+
     def strobe(self, state: Real, omega: float, periods: int) -> Segments:
         """Carry a state (2n,) over excitation periods from phase zero on, without derivatives."""
         phases = np.linspace(0.0, 2.0 * np.pi * periods, periods + 1)
@@ -383,9 +445,12 @@ class FlowMap:
             )
         if not math.isfinite(nodes.sum() + phases[-1] - phases[0]):
             raise SystemModelError("nodes and phases must be finite")
-        if not (is_finite(omega) and 0.0 < omega <= 2.0 * math.pi * LARGEST_FREQUENCY):
+        full = 2.0 * math.pi
+        if not (
+            is_finite(omega) and full * SMALLEST_FREQUENCY <= omega <= full * LARGEST_FREQUENCY
+        ):
             raise SystemModelError(
-                "omega must be positive, finite and at most that of "
+                f"omega must be positive, that of {SMALLEST_FREQUENCY:g} to "
                 f"{LARGEST_FREQUENCY:g} Hz, got {shown(omega)}"
             )
 
@@ -552,6 +617,12 @@ class FlowMap:
             np.empty((capacity, len(self.system.stops), self.tables.nodes.size)),
             np.zeros(2, dtype=np.int64),
         )
+
+
+def relative_error(value: Real, reference: Real) -> float:
+    """Length of the difference over that of the reference; without it where the latter is zero."""
+    size = float(np.linalg.norm(reference))
+    return float(np.linalg.norm(value - reference)) / (size or 1.0)
 
 
 def flow_of(system: System | FlowMap) -> FlowMap:

@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 
 from nldyn.elements import Stop
 from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
-from nldyn.flow import FlowMap, Solution, Trajectory, chain, flow_of
+from nldyn.flow import FlowError, FlowMap, Solution, Trajectory, chain, flow_of
 from nldyn.linear import Real
 from nldyn.multipliers import (
     COARSE,
@@ -97,22 +97,6 @@ class Impact:
     time: float
     penetration: float
     force: float
-
-
-@dataclass(frozen=True)
-class FlowError:
-    """Relative errors of the flow map over one period, in the norm of the coordinates z.
-
-    Parameters
-    ----------
-    state : float
-        Of the states at the ends of the segments.
-    monodromy : float
-        Of the monodromy matrix.
-    """
-
-    state: float
-    monodromy: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,22 +242,7 @@ class Orbit:
     def flow_error(self) -> FlowError:
         """Error of the flow map on this orbit, by a finer one; infinite where either fails."""
         problem = self.problem
-        nodes = problem.nodes(self.point)
-        here, finer = (
-            flow.shoot(nodes, problem.phases, self.omega)
-            for flow in (problem.flow, problem.flow.finer)
-        )
-        if here.failure or finer.failure:
-            return FlowError(math.inf, math.inf)
-        return FlowError(
-            *(
-                float(np.linalg.norm(a - b) / np.linalg.norm(b))
-                for a, b in (
-                    (here.ends, finer.ends),
-                    (here.monodromy, finer.monodromy),
-                )
-            )
-        )
+        return problem.flow.error(problem.nodes(self.point), problem.phases, self.omega)
 
     @cached_property
     def liouville_error(self) -> float:

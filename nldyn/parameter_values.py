@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from nldyn.errors import LARGEST_FREQUENCY, SystemModelError, is_finite, shown
+from nldyn.errors import LARGEST_FREQUENCY, SMALLEST_FREQUENCY, SystemModelError, is_finite, shown
 from nldyn.parameters import Parameter, parameter_tables
 from nldyn.system import System
 
@@ -199,8 +199,11 @@ class Chart:
             raise SystemModelError(
                 f"the range of {name} must be two finite numbers, ascending; got {shown(limits)}"
             )
-        if name == FREQUENCY and not 0.0 < low < high <= LARGEST_FREQUENCY:
-            raise SystemModelError(f"the range of {name} must be positive, got {shown(limits)}")
+        if name == FREQUENCY and not SMALLEST_FREQUENCY <= low < high <= LARGEST_FREQUENCY:
+            raise SystemModelError(
+                f"the range of {name} must be positive, from {SMALLEST_FREQUENCY:g} to "
+                f"{LARGEST_FREQUENCY:g}, got {shown(limits)}"
+            )
         return cls(parameter, float(low), float(high))
 
     def check_start(self, value: float) -> None:

@@ -29,15 +29,17 @@ def orbit_at(case, rtol: float) -> Orbit:
     return Orbit(ShootingProblem(flow, 1, 1), point, np.eye(2 * case.size)[None], 0.0, "")
 
 
-def true_errors(case, orbit: Orbit) -> tuple[float, float]:
+def true_errors(case, orbit: Orbit) -> tuple[float, float, float]:
     flow = orbit.problem.flow
     found = flow.shoot(orbit.problem.nodes(orbit.point), orbit.problem.phases, orbit.omega)
     basis = flow.system.linear
     state = flow.to_state(case.exact.state)
     monodromy = basis.left @ case.exact.monodromy @ basis.right
+    d_omega = flow.to_state(case.exact.d_omega)
     return (
         float(np.linalg.norm(found.ends[0] - state) / np.linalg.norm(state)),
         float(np.linalg.norm(found.monodromy - monodromy) / np.linalg.norm(monodromy)),
+        float(np.linalg.norm(found.d_omega[0] - d_omega) / np.linalg.norm(d_omega)),
     )
 
 
@@ -45,9 +47,10 @@ def true_errors(case, orbit: Orbit) -> tuple[float, float]:
 @pytest.mark.parametrize("name", CASES)
 def test_errors_are_within_the_tolerance(name, rtol):
     case = load_case(name)
-    state, monodromy = true_errors(case, orbit_at(case, rtol))
+    state, monodromy, d_omega = true_errors(case, orbit_at(case, rtol))
     assert state < rtol
     assert monodromy < 10.0 * rtol
+    assert d_omega < 10.0 * rtol
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -63,11 +66,39 @@ def test_error_estimates_are_true_within_a_factor_of_ten(name, rtol):
     orbit = orbit_at(case, rtol)
     rounding = 1e-13
     for estimate, true in zip(
-        (orbit.flow_error.state, orbit.flow_error.monodromy),
+        (orbit.flow_error.state, orbit.flow_error.monodromy, orbit.flow_error.d_omega),
         true_errors(case, orbit),
         strict=True,
     ):
         assert 0.1 * true - rounding < estimate < 10.0 * true + rounding
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-9])
+def test_error_estimates_of_parameter_derivatives_are_true_within_a_factor_of_ten(rtol):
+    case = load_case("two_dof")
+    wanted = [Parameter("stiffness"), Parameter("gap")]
+    coarse, tightest = (FlowMap(case.system, FlowOptions(rtol=r)) for r in (rtol, 1e-13))
+    start, period = coarse.to_state(case.start)[None], np.array([0.0, 2.0 * np.pi])
+    found, exact = (
+        flow.shoot(start, period, case.omega, parameters=wanted).d_parameters[0]
+        for flow in (coarse, tightest)
+    )
+    true = np.max(np.linalg.norm(found - exact, axis=0) / np.linalg.norm(exact, axis=0))
+    estimate = coarse.error(start, period, case.omega, parameters=wanted).d_parameters
+    assert 0.1 * true < estimate < 10.0 * true
+
+
+def test_the_error_of_a_map_that_fails_is_infinite():
+    flow = FlowMap(one_dof(0.0))
+    error = flow.error(np.array([[0.0, 1e300]]), np.array([0.0, 2.0 * np.pi]), 50.0)
+    assert error.state == error.monodromy == error.d_omega == np.inf
+
+
+@pytest.mark.parametrize("omega", [0.0, 1e-300, 1e-12, 1e14, np.nan])
+def test_a_frequency_that_no_excitation_has_is_refused(omega):
+    flow = FlowMap(one_dof(0.0))
+    with pytest.raises(SystemModelError, match="omega must be positive, that of 1e-12 to"):
+        flow.shoot(np.zeros((1, 2)), np.array([0.0, 2.0 * np.pi]), omega)
 
 
 def test_stiff_stops_of_mixed_exponents_agree_at_all_tolerances():
