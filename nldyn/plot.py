@@ -221,7 +221,7 @@ def plot_diagram(
     size = mark_size(sum(len(branch.special_points) for branch in branches))
     marked = [kind for kind in special_points if _draw_marks(ax, branches, kind, factor, size)]
     ax.set_xlabel("excitation frequency (Hz)")
-    ax.set_ylabel(f"max |y| ({unit})")
+    ax.set_ylabel(f"max |y|{_observed(branches)} ({unit})")
     ax.set_yscale(yscale)
     if yscale == "linear":
         ax.set_ylim(bottom=-0.02 * ax.get_ylim()[1])
@@ -230,6 +230,13 @@ def plot_diagram(
     if hover:
         _label_orbits(ax, branches, marked, factor, unit)
     return ax
+
+
+def _observed(branches: Sequence[Branch]) -> str:
+    """Where the displacement is taken, in words, if the structure has several interfaces."""
+    orbits = [branch.nodes[0].orbit for branch in branches]
+    places = {orbit.observe for orbit in orbits if len(orbit.system.interfaces) > 1}
+    return f" at {places.pop()}" if len(places) == 1 else ""
 
 
 def plot_orbit(

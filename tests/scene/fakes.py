@@ -12,6 +12,11 @@ SURE = Stability(0.5 + 0.2j, -0.62, 1e-7)
 
 
 @dataclass(frozen=True)
+class FakeSystem:
+    interfaces: tuple[str, ...] = ("middle",)
+
+
+@dataclass(frozen=True)
 class FakeOrbit:
     frequency_hz: float
     max_abs_displacement: float
@@ -23,6 +28,8 @@ class FakeOrbit:
     liouville_error: float = 1e-12
     largest_multiplier: complex = 0.5 + 0.2j
     stability: Stability = SURE
+    observe: str = "middle"
+    system: FakeSystem = FakeSystem()
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,13 @@ from fakes import diagram, resonance
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nldyn.continuation import continue_branch
+from nldyn.elements import Unbalance
 from nldyn.orbit import solve_orbit
 from nldyn.plot import branch_curve, length_unit, plot_diagram, plot_orbit, stability_runs
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
+from nldyn.system import System
 
 
 @given(st.lists(st.booleans(), max_size=30))
@@ -71,6 +74,17 @@ def test_diagram_names_units_and_marks():
         "flip (PD)",
         "grazing (GR)",
     ]
+
+
+def test_the_axis_names_the_interface_where_there_are_several():
+    system = System.from_modal(
+        [13.1], {"middle": [0.6], "tip": [1.2]}, modal_damping=0.01,
+        excitation=[Unbalance("middle", 5e-6)],
+    )  # fmt: skip
+    orbits = [solve_orbit(system, frequency_hz=10.0, observe=name) for name in ("middle", "tip")]
+    branches = [continue_branch(orbit, (9.0, 11.0)) for orbit in orbits]
+    labels = [plot_diagram(shown).get_ylabel() for shown in (branches[1], branches)]
+    assert labels == ["max |y| at tip (µm)", "max |y| (µm)"]
 
 
 def test_axes_of_the_caller_are_used():
