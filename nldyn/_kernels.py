@@ -48,12 +48,16 @@ inner = njit(cache=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_
 inlined = njit(cache=True, error_model="numpy", inline="always")
 
 OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_FULL = range(7)
+ROUNDED = 7
 FLIGHT = -1
 # |λ - iω| below this share of ω makes an eigenvalue λ near: a steady response is at most 1/NEAR
 # times as large as what the excitation brings about in 1/ω, and so are its rounding errors; in the
 # derivative by ω they are up to 1/NEAR² times as large
 NEAR = 3e-3
 
+
+# share of the speed at a stop that rounding of its penetration may cost in one contact
+WORST_ROUNDING = 1e-6
 
 # columns of `stops`
 GAP, STIFFNESS, EXPONENT, DISSIPATION, MOBILITY, DURATION, INSTANT = range(7)
@@ -392,7 +396,8 @@ def closing_time(fl, stop, w, phase, start, end):
 
     Every step is bounded by the third derivative, so that it cannot cross a contact; the steps
     converge to the contact at order three. Only contacts shorter than 1.6e-11 periods of the
-    excitation or of the fastest mode can be stepped over, and these carry no force.
+    excitation or of the fastest mode can be stepped over, and only where the approach is so slow
+    that the acceleration stops it in that time.
     """
     shortest = 1e-10 / max(fl.omega, fastest_rate(fl))
     longest = 2.0 * math.pi / fl.omega
@@ -1465,6 +1470,21 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
     return CONTACT_FAILED, kind, h, -1
 
 
+@inner
+def lost_to_rounding(fl, stop, w, peak):
+    """Share of the speed at a stop that rounding of the penetration costs in a contact so deep."""
+    if peak <= 0.0:
+        return 0.0
+    p = fl.stops[stop, EXPONENT]
+    rate = fl.stops[stop, STIFFNESS] * fl.stops[stop, MOBILITY]
+    impact_speed = math.sqrt(2.0 * rate * peak ** (p + 1.0) / (p + 1.0))
+    noise = output_noise(fl, stop, w)
+    speed = impact_speed + 1e15 * noise * fl.omega
+    for j in range(w.size):
+        speed += abs(fl.rows[1, stop, j] * w[j])
+    return noise / peak * impact_speed / speed
+
+
 @inlined
 def propagate(
     fl, tab, start, phase, duration, with_columns, rec, recording, end, jacobian, d_omega,
@@ -1624,6 +1644,8 @@ def run_pieces(
             panel = new_panel(fl, m, w.size, active)
         if n_active == 1 and start_switch == 1:
             peak, _, left = expected_contact(fl, active[0], w, here)
+            if lost_to_rounding(fl, active[0], w, peak) > WORST_ROUNDING:
+                return ROUNDED
             if peak <= 100.0 * output_noise(fl, active[0], w):  # a touch without force
                 closed[active[0]] = False
                 closings[active[0]] -= 1

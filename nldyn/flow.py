@@ -22,6 +22,7 @@ from nldyn._kernels import (
     NOT_CONVERGED,
     OK,
     RECORD_FULL,
+    ROUNDED,
     SINGULAR,
     TOO_MANY_PIECES,
     Corrector,
@@ -54,6 +55,7 @@ _REASONS = {
     TOO_MANY_PIECES: "more than 20000 flights and contact panels in one segment: too many contacts "
     "or too fast a mode (more segments help)",
     CONTACT_FAILED: "a contact phase could not be resolved",
+    ROUNDED: "a contact is hidden by rounding: the displacements are too large beside its depth",
     DIVERGED: "Newton's method diverged",
     SINGULAR: "singular Jacobian",
     NOT_CONVERGED: "Newton's method did not converge",

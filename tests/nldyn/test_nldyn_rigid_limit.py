@@ -15,7 +15,7 @@ import pytest
 import scipy.linalg as sla
 from scipy.optimize import brentq
 
-from nldyn import HarmonicForce, Stop, System, continue_branch, solve_orbit
+from nldyn import FlowMap, HarmonicForce, Stop, System, continue_branch, solve_orbit
 
 DAMPING, STIFFNESS, FORCE = 0.1, 1.0, 1.0
 
@@ -87,3 +87,43 @@ def test_flips_tend_to_the_impact_oscillators_with_the_duration_of_contact(expon
         (flip,) = (s for s in branch.special_points if s.kind == "PD")
         differences.append([flip.frequency_hz - expected])
     assert powers(stops, differences).item() == pytest.approx(1.0 / (exponent + 1.0), rel=0.02)
+
+
+def bounces(speed: float) -> tuple[float, int]:
+    """Speed after one period, and bounces, of Y'' = cos τ at a wall at Y <= 0 that it leaves.
+
+    From each bounce on, Y = (V - sin τ0) s + cos τ0 - cos(τ0 + s) exactly.
+    """
+    start, speed, count = 0.0, -speed, 1
+    while True:
+
+        def height(s, start=start, speed=speed):
+            fall = 2.0 * math.sin(start + 0.5 * s) * math.sin(0.5 * s)  # cos τ0 - cos(τ0 + s)
+            return (speed - math.sin(start)) * s + fall
+
+        times = np.linspace(0.0, 2.0 * math.pi - start, 20001)[1:]
+        above = np.flatnonzero(np.array([height(s) for s in times]) > 0.0)
+        if not above.size:
+            return speed - math.sin(start), count
+        until = brentq(height, times[above[0] - 1], times[above[0]], xtol=1e-15)
+        speed = -(speed + math.sin(start + until) - math.sin(start))
+        start, count = start + until, count + 1
+
+
+@pytest.mark.parametrize(
+    ("omega", "force"), [(1e-7, 1e-4), (1e-7, 1.0), (1e-5, 1.0), (1e-5, 1e-10), (1e-3, 1e-5)]
+)
+def test_a_free_body_far_out_bounces_as_at_a_wall_or_rounding_is_blamed(omega, force):
+    """The excursions are up to 1e17 times the gap, the contacts 1e-12 of a period."""
+    system = System.from_modal(
+        [0.0], {"a": [1.0]}, stops=[Stop("a", 1e9, gap=1e-3)],
+        excitation=[HarmonicForce("a", force)],
+    )  # fmt: skip
+    flow = FlowMap(system)
+    start = flow.to_state(np.array([[1e-3 * (1.0 - 1e-12), 0.01 * force / omega]]))
+    found = flow.shoot(start, np.array([0.0, 2.0 * np.pi]), omega)
+    if force / omega**2 > 1e9:  # rounding of the excursion is not small beside the penetration
+        assert "rounding" in found.failure
+    else:
+        speed, _ = bounces(0.01)
+        assert flow.to_modal(found.ends)[0, 1] * omega / force == pytest.approx(speed, rel=1e-5)
