@@ -13,7 +13,7 @@ import numpy as np
 
 from nldyn.branch import same_orbit, stroboscopic
 from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
-from nldyn.executors import run_all
+from nldyn.executors import values_of
 from nldyn.exploration import settling_periods
 from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
@@ -567,16 +567,16 @@ def find_attractors(
     else:
         check_whole("starts", starts, 1)
         states = random_states(flow, omega, int(starts), seed)
-    task = partial(_attractor_task, flow.system, flow.options, frequency_hz, name,
+    task = partial(attractor_task, flow.system, flow.options, frequency_hz, name,
                    options or AttractorOptions())  # fmt: skip
-    found = run_all(task, list(states), executor)
-    return distinct([outcome.value_or_raise() for outcome in found])
+    return distinct(values_of(task, list(states), executor))
 
 
-def _attractor_task(
+def attractor_task(
     system: System, flow_options: object, hz: float, observe: str, options: AttractorOptions,
     state: Real,
 ) -> Attractor:  # fmt: skip
+    """As `attractor_from`, with what a computation elsewhere is given."""
     flow = FlowMap(system, flow_options)  # type: ignore[arg-type]
     return attractor_from(flow, hz, state, observe, options)
 

@@ -18,6 +18,7 @@ from nldyn.attractors import (
     Attractor,
     AttractorOptions,
     attractor_from,
+    attractor_task,
     find_attractors,
     same_attractor,
 )
@@ -30,7 +31,7 @@ from nldyn.errors import (
     is_finite,
     shown,
 )
-from nldyn.executors import run_all
+from nldyn.executors import values_of
 from nldyn.flow import FlowMap, chain, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import Orbit, check_bounded, check_observe
@@ -525,23 +526,20 @@ def basins(
         targets = [target_of(attractor) for attractor in known]
         pieces = [left[k : k + CELLS] for k in range(0, len(left), CELLS)]
         task = partial(_settle_task, flow.system, flow.options, omega, targets, longest)
-        outcomes = run_all(task, [states[piece] for piece in pieces], executor, progress)
-        for piece, outcome in zip(pieces, outcomes, strict=True):
-            settled = outcome.value_or_raise()
+        ends = values_of(task, [states[piece] for piece in pieces], executor, progress)
+        for piece, settled in zip(pieces, ends, strict=True):
             labels[piece], states[piece] = settled.labels, settled.ends
             phases[piece] = settled.phases - periods[piece]
             periods[piece] += settled.periods
         done = len(known)
         left = order[labels[order] == UNDECIDED]
-        for state in states[left[:starts]]:
-            _add(known, attractor_from(flow, frequency_hz, state, name, options))
+        new = partial(attractor_task, flow.system, flow.options, frequency_hz, name, options)
+        for attractor in values_of(new, list(states[left[:starts]]), executor):
+            _add(known, attractor)
     checked = rng.choice(len(modal), min(checks, len(modal)), replace=False)
     again = partial(_index_task, flow.system, flow.options, frequency_hz, name, options, known)
-    results = run_all(again, [flow.to_state(modal[cell]) for cell in checked], executor)
-    wrong = sum(
-        outcome.value_or_raise() != labels[cell]
-        for cell, outcome in zip(checked, results, strict=True)
-    )
+    results = values_of(again, [flow.to_state(modal[cell]) for cell in checked], executor)
+    wrong = sum(index != labels[cell] for cell, index in zip(checked, results, strict=True))
     counts = np.array([max(attractor.period, 1) for attractor in known] + [1])
     return Basins(
         plane,

@@ -96,6 +96,22 @@ def run_all(
     return [outcomes[index] for index in range(len(items))]
 
 
+def values_of(
+    function: Callable[[Item], Value],
+    items: Sequence[Item],
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Value]:
+    """Values of `run_all`, where one failure is the failure of all.
+
+    Raises
+    ------
+    TaskError
+        For the first computation that failed, after all others are done.
+    """
+    return [outcome.value_or_raise() for outcome in run_all(function, items, executor, progress)]
+
+
 def as_finished(
     function: Callable[[Item], Value], items: Sequence[Item], executor: Executor | None = None
 ) -> Iterator[Outcome[Value]]:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, overload
 
 import numpy as np
 
 from nldyn._growth import growth_rates
-from nldyn.errors import SystemModelError, check_frequency, check_whole
-from nldyn.flow import FlowMap, flow_of
+from nldyn.errors import SystemModelError, check_types, check_whole
+from nldyn.executors import values_of
+from nldyn.flow import FlowMap, FlowOptions, flow_of
 from nldyn.linear import Real
-from nldyn.orbit import ConvergenceError, check_bounded, contact_damping
-from nldyn.simulation import starting_state, transient_end
+from nldyn.orbit import ConvergenceError, contact_damping
+from nldyn.simulation import cases_at, is_list, transient_end
 from nldyn.system import System
 
 BLOCK = 64  # periods in one call
@@ -123,15 +127,43 @@ class LyapunovSpectrum:
         return float(len(self.exponents))
 
 
+@overload
 def lyapunov_exponents(
     system: System | FlowMap,
     frequency_hz: float,
     *,
+    start: Real | None = ...,
+    transient: int = ...,
+    periods: int = ...,
+    executor: Executor | None = ...,
+    progress: Callable[[int, int], None] | None = ...,
+) -> LyapunovSpectrum: ...
+
+
+@overload
+def lyapunov_exponents(
+    system: System | FlowMap,
+    frequency_hz: Sequence[float] | Real,
+    *,
+    start: Real | None = ...,
+    transient: int = ...,
+    periods: int = ...,
+    executor: Executor | None = ...,
+    progress: Callable[[int, int], None] | None = ...,
+) -> list[LyapunovSpectrum]: ...
+
+
+def lyapunov_exponents(
+    system: System | FlowMap,
+    frequency_hz: float | Sequence[float] | Real,
+    *,
     start: Real | None = None,
     transient: int = 300,
     periods: int = 2000,
-) -> LyapunovSpectrum:
-    """All Lyapunov exponents of the motion that a state leads to.
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> LyapunovSpectrum | list[LyapunovSpectrum]:
+    """All Lyapunov exponents of the motion that a state leads to, or of several motions.
 
     An orthonormal basis is carried by the Jacobians of the flow map and made orthonormal again
     after every segment [Benettin et al. 1980; Shimada and Nagashima 1979]; as many periods as a
@@ -142,18 +174,24 @@ def lyapunov_exponents(
     ----------
     system : System or FlowMap
         What to simulate.
-    frequency_hz : float
-        Excitation frequency in Hz.
-    start : (2n,) array, optional
-        Modal displacements and velocities at forcing phase zero; at rest unless given.
+    frequency_hz : float or sequence of k
+        Excitation frequency in Hz. A list of them gives a list of spectra, each a computation of
+        its own.
+    start : (2n,) or (k, 2n) array, optional
+        Modal displacements and velocities at forcing phase zero; at rest unless given. One for
+        all, or one for each frequency.
     transient : int
         Excitation periods left out at the beginning.
     periods : int
         Excitation periods averaged over, at least 32.
+    executor : concurrent.futures.Executor, optional
+        Where to compute a list; here unless given.
+    progress : callable, optional
+        Called as ``progress(done, total)`` after each spectrum of a list.
 
     Returns
     -------
-    LyapunovSpectrum
+    LyapunovSpectrum or list of LyapunovSpectrum
 
     Raises
     ------
@@ -161,6 +199,8 @@ def lyapunov_exponents(
         For input that makes no sense.
     ConvergenceError
         If the motion cannot be simulated to its end.
+    TaskError
+        In place of a ConvergenceError, for one of a list.
 
     Examples
     --------
@@ -179,12 +219,29 @@ def lyapunov_exponents(
     H. Flyvbjerg, H. G. Petersen (1989), *J. Chem. Phys.* 91, 461-466.
     """
     flow = flow_of(system)
-    check_frequency("frequency_hz", frequency_hz)
+    check_types(executor=(executor, Executor, None), progress=(progress, Callable, None))
     check_whole("transient", transient, 0)
     check_whole("periods", periods, 2 * FEWEST_BLOCKS)
+    cases = cases_at(flow, frequency_hz, start)
+    if is_list(frequency_hz):
+        task = partial(_spectrum_task, flow.system, flow.options, transient, periods)
+        return values_of(task, cases, executor, progress)
+    return _spectrum_after(flow, *cases[0], transient, periods)
+
+
+def _spectrum_task(
+    system: System, flow_options: FlowOptions, transient: int, periods: int,
+    case: tuple[float, Real],
+) -> LyapunovSpectrum:  # fmt: skip
+    return _spectrum_after(FlowMap(system, flow_options), *case, transient, periods)
+
+
+def _spectrum_after(
+    flow: FlowMap, frequency_hz: float, start: Real, transient: int, periods: int
+) -> LyapunovSpectrum:
+    """Exponents of the motion from a state z, a transient left out."""
     omega = 2.0 * math.pi * frequency_hz
-    check_bounded(flow.system, omega)
-    state, failure = transient_end(flow, starting_state(flow, start), omega, transient)
+    state, failure = transient_end(flow, start, omega, transient)
     if state is None:
         raise ConvergenceError(f"the simulation at {frequency_hz:g} Hz failed: {failure}")
     return spectrum_from(flow, state, omega, periods)

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from functools import partial
 
 import numpy as np
 
 from nldyn.basin_maps import UNDECIDED, Basins, Plane, Target, settle, target_of
 from nldyn.branch import same_orbit, stroboscopic
-from nldyn.errors import SystemModelError, check_whole, is_finite, shown
-from nldyn.flow import FlowMap
+from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
+from nldyn.executors import values_of
+from nldyn.flow import FlowMap, FlowOptions
 from nldyn.linear import Real
 from nldyn.orbit import Orbit, near_returns
 from nldyn.search import orbit_near
+from nldyn.system import System
 
 NEWTON_STEPS = 12
 FIRST = 1e-4  # how far the first, straight piece reaches, as a share of the plane
@@ -22,7 +27,13 @@ MARGIN = 1.0  # how far beyond the plane a manifold is followed, in units of its
 
 
 def stable_manifold(
-    orbit: Orbit, plane: Plane, *, resolution: float = 0.005, max_points: int = 20000
+    orbit: Orbit,
+    plane: Plane,
+    *,
+    resolution: float = 0.005,
+    max_points: int = 20000,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> list[Real]:
     """Stable manifold of a saddle of a system with one mode, in a plane of initial states.
 
@@ -41,6 +52,10 @@ def stable_manifold(
         Largest distance of neighbouring points, in units of the sides of the plane.
     max_points : int
         Where to stop.
+    executor : concurrent.futures.Executor, optional
+        Where to compute, each piece by itself; here unless given.
+    progress : callable, optional
+        Called as ``progress(done, total)`` after each piece.
 
     Returns
     -------
@@ -51,7 +66,8 @@ def stable_manifold(
     Raises
     ------
     SystemModelError
-        If the system has more than one mode, or the orbit is no saddle.
+        If the system has more than one mode, or the orbit is no saddle, or for other input that
+        makes no sense.
 
     Examples
     --------
@@ -64,6 +80,10 @@ def stable_manifold(
     >>> len(stable_manifold(saddle, plane, max_points=100))
     2
     """
+    check_types(
+        orbit=(orbit, Orbit), plane=(plane, Plane), executor=(executor, Executor, None),
+        progress=(progress, Callable, None),
+    )  # fmt: skip
     flow = orbit.problem.flow
     if flow.system.size != 1:
         raise SystemModelError(
@@ -73,6 +93,10 @@ def stable_manifold(
     if not (is_finite(resolution) and 0.0 < resolution < 1.0):
         raise SystemModelError(f"resolution must lie between 0 and 1, got {shown(resolution)}")
     check_whole("max_points", max_points, 2)
+    if plane.origin.size != 2:
+        raise SystemModelError(
+            f"plane: states have {plane.origin.size} entries but the orbit's system needs 2"
+        )
     outside = int(np.sum(np.abs(orbit.multipliers) > 1.0))
     if outside != 1:
         raise SystemModelError(
@@ -80,20 +104,29 @@ def stable_manifold(
             "multipliers lie outside the unit circle"
         )
     count = orbit.period if min(orbit.multipliers.real) > 0.0 else 2 * orbit.period
-    pieces = []
-    for state in stroboscopic(orbit):
-        inverse = _Inverse(flow, orbit.omega, count, plane)
-        middle = inverse.to_plane(state)
-        values, vectors = np.linalg.eig(inverse.jacobian(middle))
-        stable = int(np.argmin(np.abs(values)))
-        along = np.real(vectors[:, stable])
-        along *= FIRST / float(np.linalg.norm(along))
-        shrink = abs(float(np.real(values[stable])))
-        for side in (1.0, -1.0):
-            piece = [middle + side * along * shrink**x for x in np.linspace(1.0, 0.0, 9)]
-            budget = max_points // (2 * orbit.period)
-            pieces.append(_grown(inverse, np.vstack([middle, *piece]), resolution, budget))
-    return [inverse.to_user(piece) for piece in pieces]
+    budget = max_points // (2 * orbit.period)
+    task = partial(
+        _piece_task, flow.system, flow.options, orbit.omega, count, plane, resolution, budget
+    )
+    sides = [(state, side) for state in stroboscopic(orbit) for side in (1.0, -1.0)]
+    return values_of(task, sides, executor, progress)
+
+
+def _piece_task(
+    system: System, flow_options: FlowOptions, omega: float, count: int, plane: Plane,
+    resolution: float, budget: int, begin: tuple[Real, float],
+) -> Real:  # fmt: skip
+    """The piece of a stable manifold on one side of a saddle's state z."""
+    state, side = begin
+    inverse = _Inverse(FlowMap(system, flow_options), omega, count, plane)
+    middle = inverse.to_plane(state)
+    values, vectors = np.linalg.eig(inverse.jacobian(middle))
+    stable = int(np.argmin(np.abs(values)))
+    along = np.real(vectors[:, stable])
+    along *= FIRST / float(np.linalg.norm(along))
+    shrink = abs(float(np.real(values[stable])))
+    piece = [middle + side * along * shrink**x for x in np.linspace(1.0, 0.0, 9)]
+    return inverse.to_user(_grown(inverse, np.vstack([middle, *piece]), resolution, budget))
 
 
 class _Inverse:
@@ -177,7 +210,13 @@ def _grown(inverse: _Inverse, curve: Real, resolution: float, budget: int) -> Re
 
 
 def basin_edge(
-    found: Basins, count: int = 200, *, seed: int = 20, width: float = 1e-12
+    found: Basins,
+    count: int = 200,
+    *,
+    seed: int = 20,
+    width: float = 1e-12,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> tuple[Real, list[Orbit]]:
     """Points on the boundary between basins, by bisection, and the saddles to which they lead.
 
@@ -195,6 +234,10 @@ def basin_edge(
         Of the choice.
     width : float
         Where bisection ends, in units of the distance of two cells.
+    executor : concurrent.futures.Executor, optional
+        Where to compute, each point by itself; here unless given.
+    progress : callable, optional
+        Called as ``progress(done, total)`` after each point.
 
     Returns
     -------
@@ -206,9 +249,18 @@ def basin_edge(
     Raises
     ------
     SystemModelError
-        If there are no two basins.
+        If there are no two basins, or for other input that makes no sense.
+    TaskError
+        If a computation ends in an error.
     """
+    check_types(
+        found=(found, Basins), executor=(executor, Executor, None),
+        progress=(progress, Callable, None),
+    )  # fmt: skip
     check_whole("basin_edge: count", count, 1)
+    check_whole("basin_edge: seed", seed, 0)
+    if not (is_finite(width) and 0.0 < width < 1.0):
+        raise SystemModelError(f"basin_edge: width must lie between 0 and 1, got {shown(width)}")
     attractors = found.attractors
     pairs = _neighbours(found)
     if not len(pairs):
@@ -221,17 +273,29 @@ def basin_edge(
     modal = found.plane.states((found.labels.shape[0], found.labels.shape[1]))
     observe = attractors[0].flow.system.interfaces[0]
     longest = int(found.periods.max()) + 16
+    pieces = [
+        (flow.to_state(np.array([modal[i, j], modal[k, m]])), int(found.labels[i, j]))
+        for (i, j), (k, m) in picked
+    ]
+    task = partial(_edge_task, flow.system, flow.options, omega, targets, longest, width, observe)
     points: list[Real] = []
     saddles: list[Orbit] = []
-    for (i, j), (k, m) in picked:
-        ends = flow.to_state(np.array([modal[i, j], modal[k, m]]))
-        low, high = _bisected(flow, omega, targets, longest, ends, int(found.labels[i, j]), width)
-        middle = flow.to_modal(0.5 * (low + high))
+    for middle, orbit in values_of(task, pieces, executor, progress):
         points.append(found.plane.coordinates(middle[None])[0][0])
-        orbit = _lingering(flow, omega, targets, low, observe)
         if orbit is not None and not any(same_orbit(orbit, other) for other in saddles):
             saddles.append(orbit)
     return np.array(points), saddles
+
+
+def _edge_task(
+    system: System, flow_options: FlowOptions, omega: float, targets: Sequence[Target],
+    longest: int, width: float, observe: str, piece: tuple[Real, int],
+) -> tuple[Real, Orbit | None]:  # fmt: skip
+    """Modal state between two states z of different basins, and the saddle it leads to."""
+    flow = FlowMap(system, flow_options)
+    ends, label = piece
+    low, high = _bisected(flow, omega, targets, longest, ends, label, width)
+    return flow.to_modal(0.5 * (low + high)), _lingering(flow, omega, targets, low, observe)
 
 
 def _neighbours(found: Basins) -> np.ndarray:
@@ -248,7 +312,7 @@ def _neighbours(found: Basins) -> np.ndarray:
 
 
 def _bisected(
-    flow: FlowMap, omega: float, targets: list[Target], longest: int, ends: Real, label: int,
+    flow: FlowMap, omega: float, targets: Sequence[Target], longest: int, ends: Real, label: int,
     width: float,
 ) -> tuple[Real, Real]:  # fmt: skip
     """Two states z as near to each other as wanted of which the first only leads to a target."""
@@ -263,7 +327,7 @@ def _bisected(
 
 
 def _lingering(
-    flow: FlowMap, omega: float, targets: list[Target], state: Real, observe: str
+    flow: FlowMap, omega: float, targets: Sequence[Target], state: Real, observe: str
 ) -> Orbit | None:
     """Unstable orbit near which a motion from the edge lingers before it reaches an attractor."""
     run = flow.strobe(state, omega, LINGER)

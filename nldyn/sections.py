@@ -15,7 +15,7 @@ from nldyn.attractors import Attractor, AttractorOptions, Kind, attractor_from
 from nldyn.contacts import impacts
 from nldyn.continuation import check_range
 from nldyn.errors import SystemModelError, check_types, check_whole, shown
-from nldyn.executors import run_all
+from nldyn.executors import values_of
 from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import check_bounded, check_observe
@@ -239,9 +239,8 @@ def brute_force(
         _columns, flow.system, flow.options, name, options or AttractorOptions(), recorded, starts,
         seed,
     )  # fmt: skip
-    outcomes = run_all(task, tasks, executor, progress)
-    columns = [column for outcome in outcomes for column in outcome.value_or_raise()]
-    return BruteForce(name, tuple(columns))
+    found = values_of(task, tasks, executor, progress)
+    return BruteForce(name, tuple(column for columns in found for column in columns))
 
 
 def _columns(

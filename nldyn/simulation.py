@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from typing import Any, overload
 
 import numpy as np
 
-from nldyn.errors import SystemModelError, check_frequency, check_whole, is_finite, shown
-from nldyn.flow import FlowMap, Trajectory, flow_of
+from nldyn.errors import (
+    SystemModelError,
+    check_frequency,
+    check_types,
+    check_whole,
+    is_finite,
+    shown,
+)
+from nldyn.executors import values_of
+from nldyn.flow import FlowMap, FlowOptions, Trajectory, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import (
     ConvergenceError,
@@ -236,15 +246,43 @@ def motion_of(orbit: Orbit, turns: int = 1) -> Motion:
     return Motion(orbit.problem.flow, (orbit.trajectory,) * turns, begins)
 
 
+@overload
 def simulate(
     system: System | FlowMap,
     frequency_hz: float,
     periods: int,
     *,
+    start: Real | None = ...,
+    transient: int = ...,
+    executor: Executor | None = ...,
+    progress: Callable[[int, int], None] | None = ...,
+) -> Motion: ...
+
+
+@overload
+def simulate(
+    system: System | FlowMap,
+    frequency_hz: Sequence[float] | Real,
+    periods: int,
+    *,
+    start: Real | None = ...,
+    transient: int = ...,
+    executor: Executor | None = ...,
+    progress: Callable[[int, int], None] | None = ...,
+) -> list[Motion]: ...
+
+
+def simulate(
+    system: System | FlowMap,
+    frequency_hz: float | Sequence[float] | Real,
+    periods: int,
+    *,
     start: Real | None = None,
     transient: int = 0,
-) -> Motion:
-    """Simulate a motion at constant excitation frequency.
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Motion | list[Motion]:
+    """Simulate a motion at constant excitation frequency, or several.
 
     Flights are exact, contact phases resolved to the tolerance of the flow map; no contact is
     passed over.
@@ -253,18 +291,24 @@ def simulate(
     ----------
     system : System or FlowMap
         What to simulate.
-    frequency_hz : float
-        Excitation frequency in Hz.
+    frequency_hz : float or sequence of k
+        Excitation frequency in Hz. A list of them gives a list of motions, each a computation of
+        its own.
     periods : int
         Excitation periods to record.
-    start : (2n,) array, optional
-        Modal displacements and velocities at forcing phase zero; at rest unless given.
+    start : (2n,) or (k, 2n) array, optional
+        Modal displacements and velocities at forcing phase zero; at rest unless given. One for
+        all, or one for each frequency.
     transient : int
         Excitation periods before the recording.
+    executor : concurrent.futures.Executor, optional
+        Where to compute a list; here unless given.
+    progress : callable, optional
+        Called as ``progress(done, total)`` after each motion of a list.
 
     Returns
     -------
-    Motion
+    Motion or list of Motion
         Its time counts from the start, transient included.
 
     Raises
@@ -274,6 +318,8 @@ def simulate(
     ConvergenceError
         If the transient cannot be simulated, or nothing of the recording. One that fails later is
         kept up to there, with the reason in `Motion.failure`.
+    TaskError
+        In place of a ConvergenceError, for one of a list.
 
     Examples
     --------
@@ -286,12 +332,58 @@ def simulate(
     11
     """
     flow = flow_of(system)
-    check_frequency("frequency_hz", frequency_hz)
+    check_types(executor=(executor, Executor, None), progress=(progress, Callable, None))
     check_whole("periods", periods, 1)
     check_whole("transient", transient, 0)
+    cases = cases_at(flow, frequency_hz, start)
+    if is_list(frequency_hz):
+        task = partial(_simulate_task, flow.system, flow.options, periods, transient)
+        return values_of(task, cases, executor, progress)
+    return _simulated(flow, *cases[0], periods, transient)
+
+
+def is_list(value: object) -> bool:
+    """Whether an argument lists several values: not a number, not a text."""
+    if isinstance(value, np.ndarray):
+        return value.ndim > 0
+    return isinstance(value, Sequence) and not isinstance(value, str | bytes)
+
+
+def cases_at(
+    flow: FlowMap, frequency_hz: float | Sequence[float] | Real, start: Real | None
+) -> list[tuple[float, Real]]:
+    """Checked frequencies, one or several, with the state z from which each motion begins."""
+    given: Any = frequency_hz
+    frequencies = list(given) if is_list(given) else [given]
+    if not frequencies:
+        raise SystemModelError("frequency_hz must name at least one frequency, got an empty list")
+    for hz in frequencies:
+        check_frequency("frequency_hz", hz)
+        check_bounded(flow.system, 2.0 * math.pi * hz)
+    return list(zip(map(float, frequencies), _starts(flow, start, len(frequencies)), strict=True))
+
+
+def _starts(flow: FlowMap, start: Real | None, count: int) -> list[Real]:
+    """States z from which several motions begin: one for all, or one for each."""
+    if start is None or np.ndim(start) != 2:
+        return [starting_state(flow, start)] * count
+    if len(start) != count:
+        raise SystemModelError(f"start has {len(start)} states for {count} motions")
+    return [starting_state(flow, np.asarray(row)) for row in start]
+
+
+def _simulate_task(
+    system: System, flow_options: FlowOptions, periods: int, transient: int,
+    case: tuple[float, Real],
+) -> Motion:  # fmt: skip
+    return _simulated(FlowMap(system, flow_options), *case, periods, transient)
+
+
+def _simulated(
+    flow: FlowMap, frequency_hz: float, state: Real, periods: int, transient: int
+) -> Motion:
+    """The motion from a state z at phase zero."""
     omega = 2.0 * math.pi * frequency_hz
-    check_bounded(flow.system, omega)
-    state = starting_state(flow, start)
     before, failure = transient_end(flow, state, omega, transient)
     if before is None:
         raise ConvergenceError(f"the transient at {frequency_hz:g} Hz failed: {failure}")
@@ -351,14 +443,42 @@ def _blocks(flow: FlowMap, state: Real, omega: float, periods: int) -> Iterator[
         periods -= count
 
 
+@overload
 def sweep(
     system: System | FlowMap,
     range_hz: tuple[float, float],
     rate_hz_per_s: float,
     *,
+    start: Real | None = ...,
+    steps_per_period: int = ...,
+    executor: Executor | None = ...,
+    progress: Callable[[int, int], None] | None = ...,
+) -> Motion: ...
+
+
+@overload
+def sweep(
+    system: System | FlowMap,
+    range_hz: Sequence[tuple[float, float]],
+    rate_hz_per_s: float,
+    *,
+    start: Real | None = ...,
+    steps_per_period: int = ...,
+    executor: Executor | None = ...,
+    progress: Callable[[int, int], None] | None = ...,
+) -> list[Motion]: ...
+
+
+def sweep(
+    system: System | FlowMap,
+    range_hz: tuple[float, float] | Sequence[tuple[float, float]],
+    rate_hz_per_s: float,
+    *,
     start: Real | None = None,
     steps_per_period: int = 4,
-) -> Motion:
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Motion | list[Motion]:
     """Simulate the run-up or run-down of a machine: the frequency changes at a constant rate.
 
     The forcing phase goes as ``2π (f₀ t ± rate t²/2)``, and the excitation has the phasor of the
@@ -372,18 +492,24 @@ def sweep(
     ----------
     system : System or FlowMap
         What to simulate.
-    range_hz : (float, float)
-        First and last frequency in Hz; a descending pair runs down.
+    range_hz : (float, float) or sequence of k pairs
+        First and last frequency in Hz; a descending pair runs down. A list of pairs, such as
+        ``[(20.0, 30.0), (30.0, 20.0)]``, gives a list of motions, each a computation of its own.
     rate_hz_per_s : float
         Size of the rate of change in Hz/s.
-    start : (2n,) array, optional
-        Modal displacements and velocities at forcing phase zero; at rest unless given.
+    start : (2n,) or (k, 2n) array, optional
+        Modal displacements and velocities at forcing phase zero; at rest unless given. One for
+        all, or one for each sweep.
     steps_per_period : int
         Steps of constant frequency in an excitation period.
+    executor : concurrent.futures.Executor, optional
+        Where to compute a list; here unless given.
+    progress : callable, optional
+        Called as ``progress(done, total)`` after each sweep of a list.
 
     Returns
     -------
-    Motion
+    Motion or list of Motion
 
     Raises
     ------
@@ -391,6 +517,8 @@ def sweep(
         For input that makes no sense, or a sweep of more than ten million steps.
     ConvergenceError
         If the motion fails at once.
+    TaskError
+        In place of a ConvergenceError, for one of a list.
 
     Examples
     --------
@@ -404,14 +532,39 @@ def sweep(
     46
     """
     flow = flow_of(system)
-    first, last = _sweep_range(range_hz)
+    check_types(executor=(executor, Executor, None), progress=(progress, Callable, None))
+    given: Any = range_hz
+    several = is_list(given) and len(given) > 0 and all(map(is_list, given))
+    ranges = [_sweep_range(ends) for ends in (given if several else [given])]
     if not (is_finite(rate_hz_per_s) and rate_hz_per_s > 0.0):
         raise SystemModelError(
             f"rate_hz_per_s must be positive and finite, got {shown(rate_hz_per_s)}"
         )
     check_whole("steps_per_period", steps_per_period, 1)
-    state = starting_state(flow, start)
-    phases, times = chirp_steps(first, last, rate_hz_per_s, steps_per_period)
+    for ends in ranges:
+        _chirp_count(*ends, rate_hz_per_s, steps_per_period)
+    cases = list(zip(ranges, _starts(flow, start, len(ranges)), strict=True))
+    if several:
+        task = partial(
+            _sweep_task, flow.system, flow.options, float(rate_hz_per_s), steps_per_period
+        )
+        return values_of(task, cases, executor, progress)
+    return _swept(flow, *cases[0], float(rate_hz_per_s), steps_per_period)
+
+
+def _sweep_task(
+    system: System, flow_options: FlowOptions, rate: float, steps: int,
+    case: tuple[tuple[float, float], Real],
+) -> Motion:  # fmt: skip
+    return _swept(FlowMap(system, flow_options), *case, rate, steps)
+
+
+def _swept(
+    flow: FlowMap, range_hz: tuple[float, float], state: Real, rate: float, steps: int
+) -> Motion:
+    """The sweep from a state z at phase zero."""
+    first, last = range_hz
+    phases, times = chirp_steps(first, last, rate, steps)
     stretches = []
     failure = ""
     for k in range(len(times) - 1):
@@ -443,19 +596,25 @@ def chirp_steps(first: float, last: float, rate: float, steps: int) -> tuple[Rea
     >>> float(times[-1]), float(round(phases[-1] / (2.0 * np.pi), 9))
     (2.0, 22.0)
     """
+    count, total = _chirp_count(first, last, rate, steps)
     slope = math.copysign(rate, last - first)
-    total = math.pi * (last**2 - first**2) / slope
+    phases = np.minimum(2.0 * np.pi / steps * np.arange(count + 1), total)
+    frequency = np.sqrt(first**2 + slope * phases / np.pi)
+    # f - f0 without cancellation
+    times = phases / (np.pi * (frequency + first))
+    return phases, times
+
+
+def _chirp_count(first: float, last: float, rate: float, steps: int) -> tuple[int, float]:
+    """Number of steps of a sweep, and the phase at its end."""
+    total = math.pi * abs(last**2 - first**2) / rate
     count = math.ceil(total * steps / (2.0 * math.pi) - 1e-9)
     if count > MOST_STEPS:
         raise SystemModelError(
             f"the sweep takes {count} steps of constant frequency, at most {MOST_STEPS} are "
             "allowed: choose a higher rate or fewer steps_per_period"
         )
-    phases = np.minimum(2.0 * np.pi / steps * np.arange(count + 1), total)
-    frequency = np.sqrt(first**2 + slope * phases / np.pi)
-    # f - f0 without cancellation
-    times = phases / (np.pi * (frequency + first))
-    return phases, times
+    return count, total
 
 
 def _sweep_range(range_hz: tuple[float, float]) -> tuple[float, float]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,11 +15,13 @@ from scipy.signal import welch
 
 from nldyn.attractors import Attractor
 from nldyn.contacts import impacts, panel_table
-from nldyn.errors import SystemModelError, check_whole
+from nldyn.errors import SystemModelError, check_types, check_whole
+from nldyn.executors import values_of
 from nldyn.fourier import modal_row
 from nldyn.linear import Real
 from nldyn.orbit import Orbit
 from nldyn.simulation import Motion, motion_of
+from nldyn.system import System
 
 UNITS = {
     "frequency_hz": "Hz",
@@ -113,10 +117,12 @@ def contact_measures(
     >>> f"{found.peak_force:.1f} N, {found.impact_rate:.1f} impacts per second"
     '119.4 N, 25.3 impacts per second'
     """
+    check_types(source=(source, Orbit, Motion, Attractor))
+    check_whole("contact_measures: periods", periods, 1)
+    check_whole("stop", stop, 0, len(_system_of(source).stops) - 1)
     if isinstance(source, Attractor):
         if source.kind == "failed":
             raise SystemModelError(f"the attractor's simulation failed: {source.failure}")
-        check_whole("contact_measures: periods", periods, 1)
         name = source.name
         source = source.orbit if source.orbit is not None else source.motion(periods)
     elif isinstance(source, Orbit):
@@ -125,7 +131,6 @@ def contact_measures(
         name = "motion"
     stable = not isinstance(source, Orbit) or source.stable
     motion = motion_of(source) if isinstance(source, Orbit) else source
-    check_whole("stop", stop, 0, len(motion.system.stops) - 1)
     table = panel_table(motion, stop)
     listed = impacts(source)
     speeds = listed.speed[listed.stop == stop]
@@ -149,7 +154,12 @@ def contact_measures(
 
 
 def measures_table(
-    sources: Iterable[Orbit | Motion | Attractor], *, stop: int = 0, periods: int = 256
+    sources: Iterable[Orbit | Motion | Attractor],
+    *,
+    stop: int = 0,
+    periods: int = 256,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, NDArray[Any]]:
     """Columns of `contact_measures`, one row for each source, ascending in frequency.
 
@@ -160,19 +170,44 @@ def measures_table(
         (``column.attractor for column in found.columns``), motions, or all of them.
     stop, periods
         As for `contact_measures`.
+    executor : concurrent.futures.Executor, optional
+        Where to compute, each source by itself; here unless given.
+    progress : callable, optional
+        Called as ``progress(done, total)`` after each source.
 
     Returns
     -------
     dict of str to (k,) array
         Units are in `nldyn.wear.UNITS`; ``pandas.DataFrame`` takes it as it is.
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense.
+    TaskError
+        If the measures of a source cannot be computed.
     """
-    rows = [
-        asdict(contact_measures(source, stop=stop, periods=periods))
-        for source in sources
-        if not (isinstance(source, Attractor) and source.kind == "failed")
-    ]
+    check_types(
+        sources=(sources, Iterable), executor=(executor, Executor, None),
+        progress=(progress, Callable, None),
+    )  # fmt: skip
+    check_whole("measures_table: periods", periods, 1)
+    chosen = list(sources)
+    for k, source in enumerate(chosen):
+        check_types(**{f"sources: entry {k}": (source, Orbit, Motion, Attractor)})
+        check_whole("stop", stop, 0, len(_system_of(source).stops) - 1)
+    chosen = [s for s in chosen if not (isinstance(s, Attractor) and s.kind == "failed")]
+    task = partial(contact_measures, stop=stop, periods=periods)
+    rows = [asdict(measures) for measures in values_of(task, chosen, executor, progress)]
     rows.sort(key=lambda row: float(row["frequency_hz"]))
     return {name: np.array([row[name] for row in rows]) for name in UNITS}
+
+
+def _system_of(source: Orbit | Motion | Attractor) -> System:
+    if isinstance(source, Motion):
+        return source.system
+    flow = source.problem.flow if isinstance(source, Orbit) else source.flow
+    return flow.system
 
 
 def power_spectrum(

@@ -17,17 +17,85 @@ from nldyn import (
     Plane,
     SystemModelError,
     TaskError,
+    basin_edge,
     basins,
     brute_force,
     executors,
+    find_attractors,
+    impacts,
+    lyapunov_exponents,
     run_all,
     simulate,
+    solve_orbit,
+    stable_manifold,
+    sweep,
 )
 from nldyn.executors import as_finished
+from nldyn.resources import example
+from nldyn.scene import build_system, load_scene
+from nldyn.wear import measures_table
 
 
 def processes(workers: int) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
+
+
+HERTZ = (25.3, 29.0, 33.0, 36.0, 41.0, 50.0)
+
+
+def swept_both_ways(executor, progress):
+    ranges = [(20.0, 24.0), (24.0, 20.0), (28.0, 30.0), (30.0, 28.0), (24.0, 25.0), (25.0, 24.0)]
+    motions = sweep(make_one_dof(), ranges, 1.0, executor=executor, progress=progress)
+    assert [motion.frequency_hz(motion.start_time) > motion.frequency_hz(motion.end_time)
+            for motion in motions] == [False, True] * 3  # fmt: skip
+    return [motion.period_peaks() for motion in motions]
+
+
+def simulated(executor, progress):
+    starts = np.linspace(-1e-4, 1e-4, 12).reshape(6, 2)
+    motions = simulate(make_one_dof(), HERTZ, 400, start=starts, transient=6000,
+                       executor=executor, progress=progress)  # fmt: skip
+    return [(motion.end, motion.strobe, impacts(motion).impulse) for motion in motions]
+
+
+def exponents(executor, progress):
+    found = lyapunov_exponents(
+        make_one_dof(), HERTZ, periods=4000, executor=executor, progress=progress
+    )
+    return [(s.frequency_hz, s.exponents, s.errors, s.divergence, s.end) for s in found]
+
+
+def measured(executor, progress):
+    attractors = [share.attractor for hz in (35.5, 36.0, 36.5)
+                  for share in find_attractors(make_one_dof(), hz, starts=1)]  # fmt: skip
+    sources = [*attractors, *simulate(make_one_dof(), HERTZ[:3], 200)]
+    table = measures_table(sources, periods=4000, executor=executor, progress=progress)
+    return [column.astype(str) for column in table.values()]
+
+
+def manifold(executor, progress):
+    system = make_one_dof()
+    saddle = solve_orbit(system, 50.0)
+    plane = Plane.at_interface(system, (-2e-4, 0.0), (-0.05, 0.05))
+    return stable_manifold(saddle, plane, max_points=800, executor=executor, progress=progress)
+
+
+LISTS = [swept_both_ways, simulated, exponents, measured, manifold]
+
+
+def assert_same_numbers(here, there):
+    assert len(here) == len(there) > 0
+    for one, other in zip(here, there, strict=True):
+        if isinstance(one, tuple):
+            assert_same_numbers(one, other)
+        else:
+            np.testing.assert_array_equal(one, other)
+
+
+@pytest.fixture(scope="module")
+def alone():
+    """What each list of computations gives here, one after the other."""
+    return {compute: compute(None, None) for compute in LISTS}
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +208,61 @@ def test_processes_give_the_same_diagram():
         np.testing.assert_array_equal(a.peaks, b.peaks)
 
 
-def test_a_cluster_that_loses_a_worker_gives_the_same_basins(plane, here, tmp_path):
+@pytest.mark.parametrize("compute", LISTS)
+def test_threads_give_the_same_numbers(compute, alone):
+    counts = []
+    with ThreadPoolExecutor(2) as pool:
+        found = compute(pool, lambda *done: counts.append(done))
+    assert_same_numbers(alone[compute], found)
+    assert counts[-1][0] == counts[-1][1] >= 2
+
+
+def test_processes_give_the_same_numbers(alone):
+    with processes(2) as pool:
+        for compute in LISTS:
+            assert_same_numbers(alone[compute], compute(pool, None))
+
+
+def test_a_list_of_one_is_what_the_single_call_gives():
+    system = make_one_dof()
+    (motion,) = simulate(system, [36.0], 50, transient=100)
+    np.testing.assert_array_equal(motion.end, simulate(system, 36.0, 50, transient=100).end)
+    (run_up,) = sweep(system, [(20.0, 21.0)], 1.0)
+    np.testing.assert_array_equal(run_up.end, sweep(system, (20.0, 21.0), 1.0).end)
+    (found,) = lyapunov_exponents(system, np.array([36.0]), periods=64)
+    single = lyapunov_exponents(system, 36.0, periods=64)
+    np.testing.assert_array_equal(found.exponents, single.exponents)
+
+
+def test_a_failure_in_a_list_says_which():
+    starts = np.array([[0.0, 0.0], [1e300, 0.0]])
+    with pytest.raises(TaskError, match="computation 1 failed: ConvergenceError: the motion at 36"):
+        simulate(make_one_dof(), [25.3, 36.0], 5, start=starts)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda s: simulate(s, [], 5), "at least one frequency, got an empty list"),
+        (lambda s: simulate(s, [20.0, -1.0], 5), r"frequency_hz must be positive .* got -1\.0"),
+        (lambda s: simulate(s, "20", 5), "frequency_hz must be positive .* got '20'"),
+        (lambda s: simulate(s, [20.0, 30.0], 5, start=np.zeros((3, 2))), "3 states for 2 motions"),
+        (lambda s: simulate(s, 20.0, 5, executor=2), "executor must be an Executor or None"),
+        (lambda s: lyapunov_exponents(s, [20.0, None]), "frequency_hz must be positive"),
+        (lambda s: lyapunov_exponents(s, 20.0, progress=2), "progress must be a function or None"),
+        (lambda s: sweep(s, [(20.0, 30.0), (30.0, 30.0)], 1.0), "begins and ends at 30 Hz"),
+        (lambda s: sweep(s, [(20.0, 30.0), (30.0, 20.0)], 1e-9), "choose a higher rate"),
+        (lambda s: sweep(s, None, 1.0), "range_hz must be two frequencies, got None"),
+    ],
+)
+def test_bad_lists_are_refused_before_anything_is_computed(call, said):
+    with pytest.raises(SystemModelError, match=said):
+        call(make_one_dof())
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    """A client of three worker processes on this machine."""
     distributed = pytest.importorskip("distributed")
     import dask
 
@@ -149,24 +271,59 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_basins(plane, here, tmp_pa
         dask.config.set(settings),
         distributed.LocalCluster(
             n_workers=3, threads_per_worker=1, processes=True, dashboard_address=None,
-            local_directory=str(tmp_path),
+            local_directory=str(tmp_path_factory.mktemp("dask")),
         ) as cluster,
         distributed.Client(cluster) as client,
     ):  # fmt: skip
-        pids = list(client.run(os.getpid).values())
-        assert len(set(pids)) == 3
-        killed = []
+        yield client
 
-        def kill_one(done: int, total: int) -> None:
-            if done == 1 and total > 4 and not killed:
-                os.kill(pids[0], signal.SIGKILL)
-                killed.append(pids[0])
 
-        found = basins(
-            make_one_dof(), 25.3, plane, shape=(30, 40), starts=3, checks=3,
-            executor=client.get_executor(), progress=kill_one,
-        )  # fmt: skip
-        assert killed
+class KillOne:
+    """Progress that kills a busy worker of a cluster in the middle of a computation, once."""
+
+    def __init__(self, client) -> None:
+        client.wait_for_workers(3)
+        self.client = client
+        self.pids = client.run(os.getpid)
+        assert len(set(self.pids.values())) == 3
+        self.killed = None
+
+    def __call__(self, done: int, total: int) -> None:
+        if self.killed or not 1 <= done < total - 1:
+            return
+        for address, tasks in self.client.processing().items():
+            if tasks and address in self.pids:
+                os.kill(self.pids[address], signal.SIGKILL)
+                self.killed = address
+                return
+
+
+def test_a_cluster_that_loses_a_worker_gives_the_same_basins(plane, here, cluster):
+    kill_one = KillOne(cluster)
+    found = basins(
+        make_one_dof(), 25.3, plane, shape=(30, 40), starts=3, checks=3,
+        executor=cluster.get_executor(), progress=kill_one,
+    )  # fmt: skip
+    assert kill_one.killed
     np.testing.assert_array_equal(found.labels, here.labels)
     np.testing.assert_array_equal(found.periods, here.periods)
     assert found.wrong == here.wrong == 0
+
+
+@pytest.mark.parametrize("compute", [swept_both_ways, simulated, exponents, measured])
+def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(compute, alone, cluster):
+    kill_one = KillOne(cluster)
+    found = compute(cluster.get_executor(), kill_one)
+    assert kill_one.killed
+    assert_same_numbers(alone[compute], found)
+
+
+def test_points_on_the_edge_of_basins_do_not_depend_on_the_executor():
+    system = build_system(load_scene(example("two_dof_xi_0.01.toml")))
+    plane = Plane.at_interface(system, (-3e-5, 1e-5), (-0.006, 0.006))
+    found = basins(system, 22.8, plane, shape=(6, 6), starts=8, checks=2)
+    points, saddles = basin_edge(found, 4)
+    with ThreadPoolExecutor(2) as pool:
+        again, others = basin_edge(found, 4, executor=pool)
+    np.testing.assert_array_equal(points, again)
+    assert [s.period for s in saddles] == [s.period for s in others]
