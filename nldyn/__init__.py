@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from nldyn.exploration import Coverage, Exploration, ExploreOptions, explore
     from nldyn.flow import FlowMap, FlowOptions
     from nldyn.fourier import Spectrum, spectrum
+    from nldyn.lifetimes import ChaosLifetime, chaos_lifetime
     from nldyn.long_term_plots import plot_basins, plot_brute_force, plot_section, plot_sweep
     from nldyn.lyapunov import LyapunovSpectrum, lyapunov_exponents
     from nldyn.manifolds import basin_edge, stable_manifold
@@ -77,6 +78,7 @@ _HOMES = {
     "flow": "FlowMap FlowOptions",
     "fourier": "Spectrum spectrum",
     "contacts": "Impacts impacts",
+    "lifetimes": "ChaosLifetime chaos_lifetime",
     "long_term_plots": "plot_basins plot_brute_force plot_section plot_sweep",
     "lyapunov": "LyapunovSpectrum lyapunov_exponents",
     "manifolds": "basin_edge stable_manifold",
@@ -106,6 +108,7 @@ __all__ = [
     "BranchPoint",
     "BruteForce",
     "Cascade",
+    "ChaosLifetime",
     "ContactMeasures",
     "ContinuationOptions",
     "ConvergenceError",
@@ -149,6 +152,7 @@ __all__ = [
     "brute_force",
     "cascade",
     "cascades_in",
+    "chaos_lifetime",
     "classify",
     "contact_measures",
     "continue_branch",

@@ -277,7 +277,7 @@ def attractor_from(
     try:
         while True:
             run = _strobe(flow, state, omega, window)
-            found = _reached_orbit(flow, run, omega, observe, options.max_period, floor)
+            found = reached_orbit(flow, run, omega, observe, options.max_period, floor)
             if found is not None:
                 return _periodic(flow, frequency_hz, *found, chaos)
             exponents = spectrum_from(flow, run[-1], omega, periods)
@@ -301,7 +301,7 @@ def attractor_from(
             periods *= 2
         cloud = _strobe(flow, state, omega, max(CLOUD, window))
         end = cloud[-1 - window :]
-        found = _reached_orbit(flow, end, omega, observe, options.max_period, floor)
+        found = reached_orbit(flow, end, omega, observe, options.max_period, floor)
     except ConvergenceError as error:
         return Attractor(flow, frequency_hz, "failed", state[None], failure=str(error))
     if found is not None:
@@ -358,7 +358,7 @@ def _settled(flow: FlowMap, state: Real, omega: float, periods: int) -> tuple[Re
     return state, largest
 
 
-def _reached_orbit(
+def reached_orbit(
     flow: FlowMap, run: Real, omega: float, observe: str, max_period: int, floor: float
 ) -> tuple[Orbit, float] | None:
     """Stable orbit that the end of a run (k, 2n) has reached, and how far it is from it still."""

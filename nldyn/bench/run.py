@@ -9,14 +9,14 @@ from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 
-from nldyn.bench import studies
+from nldyn.bench import studies, throughput
 from nldyn.bench.engines import ENGINES, NLDYN
 from nldyn.bench.figures import draw_model
 from nldyn.bench.measure import Sample, measure_engine, setting_label
 from nldyn.bench.models import MODELS, load_flip
 from nldyn.bench.page import Row, write_page
 from nldyn.bench.studies import BranchTime
-from nldyn.bench.targets import all_targets, fastest_rows, ratio_rows
+from nldyn.bench.targets import all_targets, fastest_rows, ratio_rows, throughput_targets
 from nldyn.flow import FlowOptions
 from nldyn.result_directory import check_directory, result_directory
 
@@ -57,10 +57,14 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
         tell(f"branch of {task.model}")
         branches.append(studies.time_branch(task))
         profiles[task.model] = studies.profile_branch(task)
+    tell("plain simulation, threads")
+    plain = [r for model in models if model in throughput.MODELS for r in throughput.measure(model)]
+    scaling = throughput.scaling()
     tell("first call")
     first = studies.first_call() if first_call else None
     default = setting_label(FlowOptions())
     targets = all_targets(samples, default, branches, modes, grazing, profiles["one_dof"], first)
+    targets += throughput_targets(plain)
     rivals = [e.name for e in ENGINES if e.has_monodromy]
     tables: dict[str, Sequence[Row]] = {
         "Targets": [vars(t) for t in targets],
@@ -92,6 +96,9 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
             }
             for g in grazing
         ],
+        "Plain simulation at equal error": throughput.equal_error_table(plain),
+        "Plain simulation": throughput.settings_table(plain),
+        "Threads": throughput.scaling_table(scaling),
         "First call": [
             {"what": what.replace("_", " "), "seconds": f"{seconds:.2f}"}
             for what, seconds in (vars(first) if first else {}).items()

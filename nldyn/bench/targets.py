@@ -6,12 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from nldyn.bench import throughput
 from nldyn.bench.engines import NLDYN
 from nldyn.bench.measure import Sample, curve
 from nldyn.bench.ratios import seconds_at, times_faster
 from nldyn.bench.studies import BranchTime, FirstCall, GrazingError, ModesTime
 
 WANTED_ERROR = 1e-8
+THROUGHPUT_GOALS = {"one_dof": 20000.0, "four_dof": 5000.0}
 
 
 @dataclass(frozen=True)
@@ -153,6 +155,23 @@ def all_targets(
                     f"{limit:g} s",
                     f"{seconds:.1f} s",
                     seconds <= limit,
+                )
+            )
+    return found
+
+
+def throughput_targets(rows: Sequence[throughput.Row]) -> list[Target]:
+    """Periods per second and core of plain simulation."""
+    found = []
+    for model, goal in THROUGHPUT_GOALS.items():
+        if any(row.model == model for row in rows):
+            rate = throughput.rate_at(rows, model, throughput.FLOW)
+            found.append(
+                target(
+                    f"plain simulation of {model}, error {throughput.WANTED:.0e} over a period",
+                    f"{goal:.0f} periods per second and core",
+                    "error not reached" if rate is None else f"{rate:.0f}",
+                    None if rate is None else rate >= goal,
                 )
             )
     return found

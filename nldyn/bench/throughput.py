@@ -1,10 +1,10 @@
 """``python -m nldyn.bench.throughput``: forcing periods per second of plain simulation.
 
 The same motions by the flow map, by `scipy.integrate.solve_ivp` and by a compiled Runge-Kutta
-scheme of fourth order with fixed steps, each at the coarsest setting whose error over a period is
-below 1e-8, or else at its finest. Times are processor times on one core. Two threads are measured
-by the wall clock and by the processor time that they get meanwhile, since other programs may take
-a core.
+scheme of fourth order with fixed steps, each with finer and finer settings until its error over a
+period is below 1e-8. Rates at equal error are interpolated between them. Times are processor times
+on one core. Two threads are measured by the wall clock and by the processor time that they get
+meanwhile, since other programs may take a core.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from numba import njit
 from scipy.integrate import solve_ivp
 
 from nldyn.bench.models import load_case
+from nldyn.bench.page import markdown
+from nldyn.bench.ratios import seconds_at
 from nldyn.flow import FlowMap, FlowOptions
 from nldyn.linear import Real
 from nldyn.system import System
@@ -28,7 +30,7 @@ from nldyn.system import System
 WANTED = 1e-8  # error over a period
 STATES = 12  # along the motion, from which errors are measured
 MODELS = ("one_dof", "two_dof", "four_dof")
-FLOW_SETTINGS = (1e-5, 1e-7, 1e-9, 1e-11)
+FLOW_SETTINGS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 IVP_SETTINGS = (1e-6, 1e-8, 1e-10, 1e-12)
 FIXED_STEPS = (1000, 4000, 16000, 64000)
 
@@ -162,15 +164,16 @@ def by_fixed_steps(system: System, omega: float, steps: float) -> Advance:
     return advance
 
 
+FLOW = "flow map"
 ENGINES: tuple[tuple[str, Any, Sequence[float], str], ...] = (
-    ("flow map", by_flow_map, FLOW_SETTINGS, "rtol {:g}"),
+    (FLOW, by_flow_map, FLOW_SETTINGS, "rtol {:g}"),
     ("solve_ivp, DOP853", by_solve_ivp, IVP_SETTINGS, "rtol {:g}"),
     ("compiled RK4, fixed steps", by_fixed_steps, FIXED_STEPS, "{:g} steps"),
 )
 
 
 def measure(model: str) -> list[Row]:
-    """All engines on one model."""
+    """All engines on one model, each from its coarsest setting to the first that is good enough."""
     case = load_case(model)
     system, omega = case.system, case.omega
     flow = FlowMap(system)
@@ -183,15 +186,50 @@ def measure(model: str) -> list[Row]:
     for engine, make, settings, label in ENGINES:
         for setting in settings:
             advance = make(system, omega, setting)
-            found = [advance(state) for state in states]
-            error = _median_error(found, ends, system.size)
-            if error <= WANTED or setting == settings[-1]:
+            error = _median_error([advance(state) for state in states], ends, system.size)
+            plain = engine == FLOW
+            rate = _plain_rate(system, omega, setting) if plain else _rate(advance, states)
+            rows.append(Row(model, engine, label.format(setting), error, rate))
+            if error <= WANTED:
                 break
-        rate = _plain_rate(system, omega, setting) if engine == "flow map" else 0.0
-        rows.append(
-            Row(model, engine, label.format(setting), error, rate or _rate(advance, states))
-        )
     return rows
+
+
+def rate_at(rows: Sequence[Row], model: str, engine: str) -> float | None:
+    """Periods per second of an engine at the error wanted; None if it does not reach it."""
+    curve = [(r.error, 1.0 / r.rate) for r in rows if (r.model, r.engine) == (model, engine)]
+    seconds = seconds_at(curve, WANTED)
+    return None if seconds is None else 1.0 / seconds
+
+
+def equal_error_table(rows: Sequence[Row]) -> list[dict[str, str]]:
+    """Rates at the error wanted, and how many times that of the flow map is as large."""
+    found = []
+    for model, engine in dict.fromkeys((row.model, row.engine) for row in rows):
+        rate, ours = rate_at(rows, model, engine), rate_at(rows, model, FLOW)
+        found.append(
+            {
+                "model": model,
+                "engine": engine,
+                f"periods per second at {WANTED:.0e}": "" if rate is None else f"{rate:.0f}",
+                "flow map over it": f"{ours / rate:.3g}" if ours and rate else "",
+            }
+        )
+    return found
+
+
+def settings_table(rows: Sequence[Row]) -> list[dict[str, str]]:
+    """Every setting that was measured."""
+    return [
+        {
+            "model": row.model,
+            "engine": row.engine,
+            "setting": row.setting,
+            "error over a period": f"{row.error:.1e}",
+            "periods per second": f"{row.rate:.0f}",
+        }
+        for row in rows
+    ]
 
 
 def _median_error(found: Sequence[Real], exact: Sequence[Real], n: int) -> float:
@@ -232,8 +270,35 @@ def _plain_rate(system: System, omega: float, rtol: float, seconds: float = 0.5)
     return count / (time.process_time() - start)
 
 
-def threads(model: str, workers: int, periods: int = 6400) -> tuple[float, float]:
-    """Periods per second of wall clock, and cores that were busy, with so many threads."""
+@dataclass(frozen=True)
+class Threads:
+    """Plain simulations on several threads of one process at once.
+
+    Parameters
+    ----------
+    model : str
+        What was simulated.
+    workers : int
+        Number of threads, each with a simulation of its own.
+    rate : float
+        Periods of all threads per second of wall clock.
+    busy : float
+        Cores that they had meanwhile.
+    """
+
+    model: str
+    workers: int
+    rate: float
+    busy: float
+
+    @property
+    def rate_per_core(self) -> float:
+        """Periods per second of processor time, on which other programs have little influence."""
+        return self.rate / self.busy
+
+
+def threads(model: str, workers: int, periods: int = 6400) -> Threads:
+    """Simulate on so many threads."""
     case = load_case(model)
     phases = np.linspace(0.0, 128.0 * np.pi, 65)
     size = 2 * case.system.size
@@ -242,34 +307,51 @@ def threads(model: str, workers: int, periods: int = 6400) -> tuple[float, float
         flow = FlowMap(case.system)
         state = np.zeros((1, size))
         for _ in range(0, periods, 64):
-            state = flow.shoot(
-                state, phases, case.omega, sensitivities=False, chained=True
-            ).ends[-1:]
+            found = flow.shoot(state, phases, case.omega, sensitivities=False, chained=True)
+            state = found.ends[-1:]
 
     simulate(0)
     with ThreadPoolExecutor(workers) as pool:
         wall, processor = time.perf_counter(), time.process_time()
         list(pool.map(simulate, range(workers)))
         wall, processor = time.perf_counter() - wall, time.process_time() - processor
-    return workers * periods / wall, processor / wall
+    rate, busy = workers * periods / wall, processor / wall
+    return Threads(model, workers, rate, busy)
+
+
+def scaling(models: Sequence[str] = MODELS, repeats: int = 3) -> list[Threads]:
+    """One and two threads in turn; the run with the most wall clock rate of each."""
+    found = []
+    for model in models:
+        runs = [threads(model, workers) for _ in range(repeats) for workers in (1, 2)]
+        for workers in (1, 2):
+            found.append(max((r for r in runs if r.workers == workers), key=lambda r: r.rate))
+    return found
+
+
+def scaling_table(found: Sequence[Threads]) -> list[dict[str, str]]:
+    """Threads beside each other, with the ratios to one thread."""
+    rows = []
+    for run in found:
+        one = next(r for r in found if (r.model, r.workers) == (run.model, 1))
+        rows.append(
+            {
+                "model": run.model,
+                "threads": str(run.workers),
+                "periods per second": f"{run.rate:.0f}",
+                "times one thread": f"{run.rate / one.rate:.2f}",
+                "cores busy": f"{run.busy:.2f}",
+                "per core, times one thread": f"{run.rate_per_core / one.rate_per_core:.2f}",
+            }
+        )
+    return rows
 
 
 def main() -> None:
-    """Print the table."""
-    print("| model | engine | setting | error over a period | periods per second |")
-    print("|---|---|---|---|---|")
-    for model in MODELS:
-        for row in measure(model):
-            print(
-                f"| {row.model} | {row.engine} | {row.setting} | {row.error:.1e} | "
-                f"{row.rate:,.0f} |"
-            )
-    print("\n| model | threads | periods per second of wall clock | cores busy |")
-    print("|---|---|---|---|")
-    for model in MODELS:
-        for workers in (1, 2):
-            rate, busy = threads(model, workers)
-            print(f"| {model} | {workers} | {rate:,.0f} | {busy:.2f} |")
+    """Print the tables."""
+    rows = [row for model in MODELS for row in measure(model)]
+    for table in (equal_error_table(rows), settings_table(rows), scaling_table(scaling())):
+        print(markdown(table) + "\n")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import multiprocessing
 import signal
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,9 +16,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from nldyn.attractors import AttractorOptions
-from nldyn.executors import as_finished
-from nldyn.paper.evidence import Finding
+from nldyn.attractors import Attractor, AttractorOptions
+from nldyn.executors import as_finished, values_of
+from nldyn.lifetimes import ChaosLifetime, chaos_lifetime
+from nldyn.paper.evidence import Finding, published_claims
 from nldyn.paper.jobs import _ended_at_failure, scene_system
 from nldyn.plot import save_figure
 from nldyn.progress import progress_line
@@ -26,6 +27,7 @@ from nldyn.sections import BruteForce, Direction, brute_force
 
 RANGE_HZ, POINTS = (18.0, 90.0), 145
 EFFORT = AttractorOptions(periods=500)
+STATES, PERIODS = 8, 5000  # motions from each chaotic one, and for how long they are followed
 MODELS = ("four_dof_xi_0.001", "four_dof_xi_0.01", "two_dof_xi_0.001", "two_dof_xi_0.01")
 NAMES = {"two_dof": "2-DOF model", "four_dof": "4-DOF model"}
 DAMPINGS = {"0.01": "#0072b2", "0.001": "#b03a00"}
@@ -50,36 +52,46 @@ class Chaos:
     ----------
     diagrams : mapping of str to BruteForce
         By the name of the model's scene.
+    lifetimes : mapping of str to list of ChaosLifetime
+        How long chaos lasts at the chaotic frequencies of the ranges that `CLAIMS` name.
     """
 
     diagrams: Mapping[str, BruteForce]
+    lifetimes: Mapping[str, Sequence[ChaosLifetime]]
 
     def ranges(self, figure: str) -> list[tuple[float, float]]:
         """Chaotic ranges in Hz that a figure shows."""
         return self.diagrams[SHADED[figure]].ranges() if figure in SHADED else []
 
     def finding(self, model: str, published: str) -> Finding:
-        """Whether motions are chaotic at most frequencies of each published range.
+        """Whether chaos lasts at most frequencies of each published range.
 
         A motion is chaotic if its largest Lyapunov exponent is positive by three standard errors.
+        Chaos lasts where more than half of `STATES` motions from states of it are chaotic for
+        `PERIODS` periods more.
         """
         found = self.diagrams[model]
         inside, texts, holds = 0, [], True
-        for text in published.split(" and "):
-            low, high = (float(end) for end in text.split("-"))
+        for low, high in published_ranges(published):
             count, total = found.share(low, high)
+            lives = [x for x in self.lifetimes[model] if low <= x.frequency_hz <= high]
+            lasting = sum(2 * life.lasting > life.count for life in lives)
             inside += count
-            holds = holds and 2 * count > total
-            texts.append(f"{text} Hz: {count} of {total}{_typical(found, low, high)}")
+            holds = holds and 2 * lasting > total
+            texts.append(
+                f"{low:g}-{high:g} Hz: {count} of {total}{_typical(found, low, high)}; it lasts at "
+                f"{lasting} of them{_shortest(lives)}"
+            )
         everywhere, _ = found.share(*RANGE_HZ)
         return Finding(
             holds=holds,
             text="frequencies with a chaotic motion, " + "; ".join(texts),
             note=f"swept up and down in steps of {_step(found):g} Hz; chaotic means a largest "
-            "Lyapunov exponent above zero by three standard errors; the statement holds if more "
-            "than half of the frequencies of each range have such a motion. "
+            "Lyapunov exponent above zero by three standard errors; it lasts where more than half "
+            f"of {STATES} motions from states of it are chaotic for {PERIODS} periods more; the "
+            "statement holds if it lasts at more than half of the frequencies of each range. "
             f"Outside, {everywhere - inside} of the other frequencies from {RANGE_HZ[0]:g} to "
-            f"{RANGE_HZ[1]:g} Hz have one, too",
+            f"{RANGE_HZ[1]:g} Hz have a chaotic motion, too",
         )
 
     def damping(self) -> tuple[bool, str]:
@@ -110,6 +122,30 @@ def _step(found: BruteForce) -> float:
     return (RANGE_HZ[1] - RANGE_HZ[0]) / (found.share(*RANGE_HZ)[1] - 1)
 
 
+def published_ranges(text: str) -> list[tuple[float, float]]:
+    """Ends in Hz of ranges as the paper names them.
+
+    Examples
+    --------
+    >>> published_ranges("30-37 and 59-66")
+    [(30.0, 37.0), (59.0, 66.0)]
+    """
+    ends = [part.split("-") for part in text.split(" and ")]
+    return [(float(low), float(high)) for low, high in ends]
+
+
+def _shortest(lives: Sequence[ChaosLifetime]) -> str:
+    """The shortest mean lifetime where some motions settle, in words."""
+    ending = [life.lifetime for life in lives if life.settled]
+    if not ending:
+        return ""
+    many = "frequency" if len(ending) == 1 else "frequencies"
+    return (
+        f" (some motions settle at {len(ending)} {many}, after {min(ending):.2g} to "
+        f"{max(ending):.2g} periods in the mean)"
+    )
+
+
 def _typical(found: BruteForce, low: float, high: float) -> str:
     """The median chaotic exponent in a range with its error, in words."""
     values = [
@@ -136,8 +172,21 @@ def _leave_ctrl_c() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
+def claimed(diagrams: Mapping[str, BruteForce]) -> list[tuple[str, Attractor]]:
+    """A chaotic attractor at each frequency of a published range that has one, with its model."""
+    found: dict[tuple[str, float], Attractor] = {}
+    published = {row["id"]: row["published"] for row in published_claims()}
+    for claim, model in CLAIMS.items():
+        for low, high in published_ranges(published[claim]):
+            for column in diagrams[model].columns:
+                hz = column.frequency_hz
+                if column.attractor.kind == "chaotic" and low <= hz <= high:
+                    found.setdefault((model, round(hz, 9)), column.attractor)
+    return [(model, found[model, hz]) for model, hz in sorted(found)]
+
+
 def compute_chaos(workers: int, points: int = POINTS) -> Chaos:
-    """Sweep all models up and down, on as many processes as workers."""
+    """Sweep all models up and down, on as many processes as workers, and see how chaos lasts."""
     tasks: list[tuple[str, Direction]] = [
         (model, direction) for model in MODELS for direction in ("up", "down")
     ]
@@ -151,15 +200,24 @@ def compute_chaos(workers: int, points: int = POINTS) -> Chaos:
         for outcome in as_finished(partial(_task, points), tasks, pool):
             halves[tasks[outcome.index]] = outcome.value_or_raise()
             report(f"Lyapunov exponents, {len(halves)} of {len(tasks)} sweeps", 0.0)
-    return Chaos(
-        {
+        diagrams = {
             model: BruteForce(
                 halves[model, "up"].observe,
                 halves[model, "up"].columns + halves[model, "down"].columns,
             )
             for model in MODELS
         }
-    )
+        chaotic = claimed(diagrams)
+        lives = values_of(
+            partial(chaos_lifetime, states=STATES, periods=PERIODS),
+            [attractor for _, attractor in chaotic],
+            pool,
+            lambda done, total: report(f"how long chaos lasts, {done} of {total}", 0.0),
+        )
+    lifetimes: dict[str, list[ChaosLifetime]] = {model: [] for model in MODELS}
+    for (model, _), life in zip(chaotic, lives, strict=True):
+        lifetimes[model].append(life)
+    return Chaos(diagrams, lifetimes)
 
 
 def write_chaos_figure(chaos: Chaos, folder: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +10,7 @@ from nldyn.diagrams import Diagram
 from nldyn.output import write_table
 from nldyn.paper.chaos import CLAIMS, Chaos
 from nldyn.paper.checks import CHECKS
-from nldyn.paper.evidence import READING_TOLERANCE, Finding
-
-DATA = Path(__file__).resolve().parent / "data"
+from nldyn.paper.evidence import READING_TOLERANCE, Finding, published_claims
 
 Results = Mapping[str, Diagram]
 
@@ -45,18 +42,6 @@ class Claim:
     deviation: str
     verdict: str
     note: str
-
-
-def published_claims() -> list[dict[str, str]]:
-    """Rows of ``data/claims.csv``: what the paper states.
-
-    Examples
-    --------
-    >>> published_claims()[0]["id"]
-    'linear.f1'
-    """
-    with (DATA / "claims.csv").open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def evaluate(results: Results, chaos: Chaos | None = None) -> list[Claim]:

@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 from nldyn.branch import Branch, SpecialPoint
 from nldyn.diagrams import Diagram
 from nldyn.orbit import Orbit
 from nldyn.peaks import Peak, resonance_peaks
 
+DATA = Path(__file__).resolve().parent / "data"
 READING_TOLERANCE = 0.01  # what a reader can measure in a plot
+
+
+def published_claims() -> list[dict[str, str]]:
+    """Rows of ``data/claims.csv``: what the paper states.
+
+    Examples
+    --------
+    >>> published_claims()[0]["id"]
+    'linear.f1'
+    """
+    with (DATA / "claims.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
 
 
 @dataclass(frozen=True)

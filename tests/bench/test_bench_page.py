@@ -8,6 +8,7 @@ import pytest
 from nldyn.bench import run
 from nldyn.bench.figures import draw_model
 from nldyn.bench.measure import Sample
+from nldyn.bench.models import load_case
 from nldyn.bench.page import write_page
 from nldyn.bench.run import auto_flip_points, auto_times, sample_row, special_point_rows
 from nldyn.bench.studies import (
@@ -19,7 +20,17 @@ from nldyn.bench.studies import (
     pair_up,
     profile_branch,
 )
-from nldyn.bench.targets import all_targets, fastest_rows, ratio_rows
+from nldyn.bench.targets import all_targets, fastest_rows, ratio_rows, throughput_targets
+from nldyn.bench.throughput import (
+    Row,
+    Threads,
+    by_fixed_steps,
+    by_flow_map,
+    by_solve_ivp,
+    equal_error_table,
+    rate_at,
+    scaling_table,
+)
 from nldyn.result_directory import OutputError
 
 ENGINES = ("nldyn", "solve_ivp DOP853", "solve_ivp DOP853 in numpy")
@@ -139,6 +150,8 @@ def stub_measurements(monkeypatch):
     samples = [s for s in made_up_samples() if s.model == "one_dof"]
     monkeypatch.setattr(run, "measure_model", lambda model: samples)
     studies = run.studies
+    monkeypatch.setattr(run.throughput, "measure", lambda model: plain_simulations()[:4])
+    monkeypatch.setattr(run.throughput, "scaling", lambda: [Threads("one_dof", 1, 1000.0, 1.0)])
     modes = [ModesTime(4, 1.0, 1, 0.0), ModesTime(64, 15.0, 1, 0.0)]
     monkeypatch.setattr(studies, "time_modes", lambda: modes)
     grazing = [GrazingError(0.1, 1.0, 0.0, 1e-9), GrazingError(0.01, 1.5, 0.0, 1e-10)]
@@ -147,6 +160,45 @@ def stub_measurements(monkeypatch):
         studies, "time_branch", lambda task: BranchTime(task, 0.2, 10, 2, 0, 1e-10, (("PD", 33.0),))
     )
     monkeypatch.setattr(studies, "profile_branch", lambda task: {"flow map": 0.6, "walk": 0.4})
+
+
+def plain_simulations():
+    return [
+        Row("one_dof", "flow map", "a", 1e-6, 40000.0),
+        Row("one_dof", "flow map", "b", 1e-10, 10000.0),
+        Row("one_dof", "rk", "c", 1e-4, 400.0),
+        Row("one_dof", "rk", "d", 1e-12, 4.0),
+        Row("four_dof", "flow map", "a", 1e-9, 4000.0),
+        Row("four_dof", "rk", "d", 1e-7, 4.0),
+    ]
+
+
+def test_rates_are_compared_at_equal_error():
+    rows = plain_simulations()
+    assert rate_at(rows, "one_dof", "flow map") == pytest.approx(20000.0)
+    assert rate_at(rows, "one_dof", "rk") == pytest.approx(40.0)
+    assert rate_at(rows, "four_dof", "rk") is None
+    table = equal_error_table(rows)
+    assert [row["flow map over it"] for row in table] == ["1", "500", "1", ""]
+    verdicts = {t.what: t.verdict for t in throughput_targets(rows)}
+    assert list(verdicts.values()) == ["met", "missed"]
+
+
+def test_threads_are_compared_with_one():
+    one, two = Threads("one_dof", 1, 1000.0, 0.5), Threads("one_dof", 2, 3600.0, 2.0)
+    row = scaling_table([one, two])[1]
+    assert row["times one thread"] == "3.60"
+    assert row["per core, times one thread"] == "0.90"
+
+
+@pytest.mark.parametrize("model", ["one_dof", "four_dof"])
+def test_engines_of_the_throughput_agree_on_a_period(model):
+    case = load_case(model)
+    exact = by_flow_map(case.system, case.omega, 1e-13)(case.start)
+    size = np.linalg.norm(exact)
+    for make, setting, error in ((by_solve_ivp, 1e-10, 1e-6), (by_fixed_steps, 16000, 1e-6)):
+        found = make(case.system, case.omega, setting)(case.start)
+        assert np.linalg.norm(found - exact) < error * size
 
 
 def test_special_points_stand_beside_the_published_ones():

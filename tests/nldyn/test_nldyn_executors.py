@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import cluster_tasks
@@ -181,6 +182,23 @@ def test_ctrl_c_in_a_compiled_kernel_ends_all_cases():
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
     assert begun == [0]
+
+
+def test_a_kernel_lets_other_threads_go_on():
+    flow = FlowMap(make_one_dof())
+    start = simulate(flow, 36.0, 1).end  # compiled before
+    turns = 0
+    with ThreadPoolExecutor(1) as pool:
+        phases = 2.0 * np.pi * np.arange(20001)  # one call, about a second
+        call = pool.submit(
+            flow.shoot, flow.to_state(start)[None], phases, 72.0 * np.pi, sensitivities=False,
+            chained=True,
+        )  # fmt: skip
+        while not call.done():
+            time.sleep(0.001)
+            turns += 1
+    assert not call.result().failure
+    assert turns > 20  # with the interpreter lock held it would be two or three
 
 
 def test_a_caller_may_stop_early():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from independent import Motion as Independent
 from one_dof import make_one_dof
+from scipy.optimize import brentq
 
 from nldyn import (
     FlowMap,
@@ -16,6 +17,7 @@ from nldyn import (
     SystemModelError,
     Unbalance,
     lyapunov_exponents,
+    simulate,
     solve_orbit,
 )
 from nldyn.lyapunov import spectrum_from, standard_errors
@@ -101,7 +103,7 @@ def test_duffing_oscillator_has_the_published_exponents():
 def test_growth_over_a_chaotic_motion_of_a_bilinear_oscillator_agrees_with_another_method():
     stop = Stop.linear("middle", 50.0 * 16877.0)
     system = make_one_dof(stops=[stop])
-    hz = 30.0
+    hz = 36.0
     flow = FlowMap(system)
     omega = 2.0 * np.pi * hz
     phases = np.linspace(0.0, 600.0 * np.pi, 301)
@@ -121,6 +123,90 @@ def test_growth_over_a_chaotic_motion_of_a_bilinear_oscillator_agrees_with_anoth
             logs.append(np.log(np.abs(np.diag(triangle))))
     expected = np.mean(logs, axis=0) * hz
     np.testing.assert_allclose(found.exponents, expected, atol=1e-3 * np.abs(expected).max())
+
+
+class PiecewiseBilinear:
+    """x'' + c x' + k x + s max(x - g, 0) = f cos(ωt) by its closed forms on either side of g.
+
+    Of a motion no more is used than where it goes: neither Jacobians nor the flow map.
+    """
+
+    SAMPLES = 128  # in a period, between which a crossing of g is looked for
+
+    def __init__(self, c: float, k: float, s: float, g: float, f: float, omega: float) -> None:
+        self.c, self.g, self.omega = c, g, omega
+        self.period = 2.0 * np.pi / omega
+        self.sides = []
+        for stiffness, rest in ((k, 0.0), (k + s, s * g / (k + s))):
+            response = f / (stiffness - omega**2 + 1j * c * omega)
+            own = np.sqrt(stiffness - 0.25 * c**2)
+            self.sides.append((stiffness, rest, response, own))
+
+    def ahead(self, side: int, t: float, x: float, v: float, after):
+        """Displacement and speed some time later, on one side."""
+        k, rest, response, own = self.sides[side]
+        before = response * np.exp(1j * self.omega * t)
+        a = x - rest - before.real
+        b = v - (1j * self.omega * before).real
+        turn = response * np.exp(1j * self.omega * (t + after))
+        decay = np.exp(-0.5 * self.c * after)
+        cos, sin = np.cos(own * after), np.sin(own * after) / own
+        return (
+            rest + turn.real + decay * (a * (cos + 0.5 * self.c * sin) + b * sin),
+            (1j * self.omega * turn).real + decay * (b * (cos - 0.5 * self.c * sin) - k * a * sin),
+        )
+
+    def after_a_period(self, x: float, v: float) -> tuple[float, float]:
+        """The stroboscopic map."""
+        t = 0.0
+        side = int(x > self.g or (x == self.g and v > 0.0))
+        while True:
+            left = self.period - t
+            times = np.linspace(0.0, left, self.SAMPLES + 1)[1:]
+            off = (self.ahead(side, t, x, v, times)[0] - self.g) * (1.0 if side else -1.0)
+            out = np.flatnonzero(off < 0.0)
+            if not out.size:
+                return self.ahead(side, t, x, v, left)
+            begin = times[out[0] - 1] if out[0] else 1e-9 * self.period
+            crossing = brentq(
+                lambda after, *at: self.ahead(*at, after)[0] - self.g,
+                begin, times[out[0]], (side, t, x, v), xtol=1e-15, rtol=1e-14,
+            )  # fmt: skip
+            x, v = self.g, self.ahead(side, t, x, v, crossing)[1]
+            t += crossing
+            side = 1 - side
+
+
+def test_exponent_of_a_bilinear_oscillator_is_the_rate_at_which_two_exact_motions_part():
+    """No Jacobian: two neighbours by closed forms, set near each other again after each period."""
+    mass, ratio, hz = 2.48, 0.0142, 36.0
+    stiffness = 16877.0
+    system = make_one_dof(stops=[Stop.linear("middle", 50.0 * stiffness)])
+    omega = 2.0 * np.pi * hz
+    own = np.sqrt(stiffness / mass)
+    exact = PiecewiseBilinear(
+        2.0 * ratio * own, own**2, 50.0 * own**2, 0.0, 4.92e-6 * omega**2 / mass, omega
+    )
+    motion = simulate(system, hz, 3, transient=300)
+    states = motion.strobe / np.sqrt(mass)  # the modal coordinate is √m x
+    near = [np.array(exact.after_a_period(*state)) for state in states[:-1]]
+    np.testing.assert_allclose(near, states[1:], rtol=1e-6, atol=1e-7 * np.abs(states).max())
+    size = np.abs(states).max(axis=0)
+    here, apart = states[0], 1e-7 * np.array([0.6, 0.8])
+    logs = []
+    for _ in range(1500):
+        beside = np.array(exact.after_a_period(*(here + apart * size)))
+        here = np.array(exact.after_a_period(*here))
+        gone = (beside - here) / size
+        logs.append(np.log(np.linalg.norm(gone) / 1e-7))
+        apart = 1e-7 * gone / np.linalg.norm(gone)
+    rates = hz * np.array(logs[30:])[:, None]
+    error = standard_errors(rates)[0]
+    found = lyapunov_exponents(system, hz, periods=4000)
+    assert found.chaotic
+    assert abs(found.largest - rates.mean()) < 3.0 * np.hypot(found.largest_error, error)
+    assert max(found.largest_error, error) < 0.1 * found.largest
+    assert found.exponents.sum() == pytest.approx(-2.0 * ratio * own, rel=1e-9)
 
 
 def test_error_of_a_mean_is_right_for_correlated_samples():

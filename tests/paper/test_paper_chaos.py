@@ -9,8 +9,17 @@ from fakes import FakeDiagram, resonance
 import nldyn.paper.figures
 from nldyn import FlowMap, System
 from nldyn.attractors import Attractor
+from nldyn.lifetimes import ChaosLifetime
 from nldyn.lyapunov import LyapunovSpectrum
-from nldyn.paper.chaos import MODELS, POINTS, RANGE_HZ, Chaos, compute_chaos, write_chaos_figure
+from nldyn.paper.chaos import (
+    MODELS,
+    POINTS,
+    RANGE_HZ,
+    Chaos,
+    claimed,
+    compute_chaos,
+    write_chaos_figure,
+)
 from nldyn.paper.claims import evaluate
 from nldyn.paper.evidence import Finding
 from nldyn.paper.figures import SHOWN, write_figures
@@ -39,15 +48,42 @@ def swept(*ranges: tuple[float, float]) -> BruteForce:
 def chaos() -> Chaos:
     more = swept((30.0, 37.0), (58.0, 62.0))
     less = swept((25.0, 50.0), (58.0, 70.0))
-    return Chaos({model: less if model.endswith("0.001") else more for model in MODELS})
+    diagrams = {model: less if model.endswith("0.001") else more for model in MODELS}
+    return Chaos(diagrams, {model: [lives_at(hz) for hz in LASTING] for model in MODELS})
 
 
-def test_a_range_agrees_where_most_of_its_frequencies_are_chaotic(chaos):
+LASTING = [*np.arange(30.0, 37.1, 0.5), *np.arange(58.0, 62.1, 0.5)]
+
+
+def lives_at(hz: float, *ended: int) -> ChaosLifetime:
+    return ChaosLifetime(hz, 5000, np.array([*ended, *([0] * (8 - len(ended)))]))
+
+
+def test_a_range_agrees_where_chaos_lasts_at_most_of_its_frequencies(chaos):
     found = chaos.finding("two_dof_xi_0.01", "30-37 and 58-63")
     assert found.holds
-    assert "30-37 Hz: 15 of 15 (median exponent 20 ± 0.8 1/s)" in found.text
+    assert "30-37 Hz: 15 of 15 (median exponent 20 ± 0.8 1/s); it lasts at 15" in found.text
     assert not chaos.finding("two_dof_xi_0.01", "30-37 and 59-70").holds
     assert "59-70 Hz: 7 of 23" in chaos.finding("two_dof_xi_0.01", "30-37 and 59-70").text
+
+
+def test_a_range_does_not_agree_where_chaos_is_a_transient(chaos):
+    lives = [lives_at(hz, 250, 500, 1000, 250) for hz in LASTING[:8]]
+    lives += [lives_at(hz, 2000) for hz in LASTING[8:]]
+    passing = Chaos(chaos.diagrams, {model: lives for model in MODELS})
+    found = passing.finding("two_dof_xi_0.01", "30-37 and 58-63")
+    assert not found.holds
+    # four settle after 250 + 500 + 1000 + 250 of 22 000 periods, one after 2000 of 37 000
+    assert "it lasts at 7 of them (some motions settle at 15 frequencies, " in found.text
+    assert "after 5.5e+03 to 3.7e+04 periods in the mean)" in found.text
+    assert "58-63 Hz: 9 of 11" in found.text and "it lasts at 9 of them" in found.text
+
+
+def test_lifetimes_are_asked_for_where_the_paper_says_chaos(chaos):
+    places = [(model, attractor.frequency_hz) for model, attractor in claimed(chaos.diagrams)]
+    four = [hz for model, hz in places if model == "four_dof_xi_0.01"]
+    assert four == [*np.arange(30.0, 37.1, 0.5), *np.arange(58.0, 62.1, 0.5)]
+    assert {model for model, _ in places} == {"two_dof_xi_0.01", "four_dof_xi_0.01"}
 
 
 def test_damping_counts_flips_and_chaotic_frequencies(chaos):
@@ -95,3 +131,4 @@ def test_all_models_are_swept_both_ways_on_processes():
     for diagram in found.diagrams.values():
         places = [(column.direction, column.frequency_hz) for column in diagram.columns]
         assert places == [("up", 18.0), ("up", 90.0), ("down", 90.0), ("down", 18.0)]
+    assert found.lifetimes == {model: [] for model in MODELS}  # neither lies in a claimed range

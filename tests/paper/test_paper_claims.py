@@ -14,11 +14,10 @@ from nldyn.paper.checks import CHECKS
 from nldyn.paper.claims import (
     judged,
     last_digit,
-    published_claims,
     verdict_counts,
     write_claims,
 )
-from nldyn.paper.evidence import Finding
+from nldyn.paper.evidence import Finding, published_claims
 from nldyn.paper.page import write_page
 
 

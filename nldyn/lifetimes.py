@@ -1,0 +1,201 @@
+"""How long chaos lasts: motions from many states of a chaotic one, and when they settle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from nldyn.attractors import Attractor, AttractorOptions, reached_orbit
+from nldyn.errors import SystemModelError, check_types, check_whole
+from nldyn.executors import values_of
+from nldyn.flow import FlowMap, FlowOptions
+from nldyn.linear import Real
+from nldyn.lyapunov import spectrum_from
+from nldyn.orbit import ConvergenceError, check_observe
+from nldyn.system import System
+
+LOOK = 250  # periods between two looks whether a motion has settled
+LAST = 500  # periods at the end over which exponents tell whether it is chaotic still
+CONFIDENCE = 0.95
+NOT_ENDED, UNCLEAR = 0, -1
+
+
+@dataclass(frozen=True, eq=False)
+class ChaosLifetime:
+    """How many motions from states of a chaotic one are chaotic still; see `chaos_lifetime`.
+
+    Parameters
+    ----------
+    frequency_hz : float
+        Excitation frequency in Hz.
+    periods : int
+        Excitation periods for which each motion was followed.
+    ended : (m,) int
+        For each motion the periods after which it was found on a stable orbit; 0 if it is chaotic
+        still, -1 if it is neither.
+    """
+
+    frequency_hz: float
+    periods: int
+    ended: NDArray[np.int64]
+
+    @property
+    def count(self) -> int:
+        """Number of motions m."""
+        return int(self.ended.size)
+
+    @property
+    def lasting(self) -> int:
+        """Motions that were chaotic for all periods."""
+        return int(np.sum(self.ended == NOT_ENDED))
+
+    @property
+    def settled(self) -> int:
+        """Motions that reached a stable orbit."""
+        return int(np.sum(self.ended > 0))
+
+    @property
+    def followed(self) -> int:
+        """Periods of all motions together, of each until it settled."""
+        return int(np.sum(np.where(self.ended > 0, self.ended, self.periods)))
+
+    @property
+    def escape_rate(self) -> float:
+        """Share of the chaotic motions that settle in a period, if they do so at a constant rate.
+
+        The estimate of greatest likelihood, motions that settled over the periods followed: 0 if
+        none did.
+        """
+        return self.settled / self.followed
+
+    @property
+    def largest_escape_rate(self) -> float:
+        """Upper bound of the rate with 95 % confidence, also where no motion has settled."""
+        return float(chi2.ppf(CONFIDENCE, 2 * (self.settled + 1)) / (2.0 * self.followed))
+
+    @property
+    def lifetime(self) -> float:
+        """Mean periods for which chaos lasts; infinite if no motion has settled."""
+        return math.inf if not self.settled else 1.0 / self.escape_rate
+
+    @property
+    def least_lifetime(self) -> float:
+        """Lower bound of the lifetime with 95 % confidence."""
+        return 1.0 / self.largest_escape_rate
+
+    @property
+    def evidence(self) -> str:
+        """What was seen, in a sentence."""
+        said = f"{self.lasting} of {self.count} motions are chaotic for {self.periods} periods more"
+        if self.settled:
+            said += f", {self.settled} settle after {self.lifetime:.2g} in the mean"
+        unclear = self.count - self.lasting - self.settled
+        if unclear:
+            said += f", {unclear} do neither"
+        return f"{said}; the mean is at least {self.least_lifetime:.2g} with 95 % confidence"
+
+
+def chaos_lifetime(
+    attractor: Attractor,
+    *,
+    states: int = 8,
+    periods: int = 5000,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> ChaosLifetime:
+    """Follow motions from several states of a chaotic one, and count those that stay chaotic.
+
+    Near a crisis chaos is a transient that may last for any time: its motions settle at a constant
+    rate [Lai and Tél 2011, section 1.2]. No finite simulation tells a long transient from an
+    attractor. What it tells is how many of m motions are chaotic for N periods, and bounds of the
+    rate, as for the failures in a test of lifetimes [Epstein and Sobel 1953].
+
+    Every 250 periods Newton's method looks for a stable orbit that a motion has reached, as
+    `nldyn.classify` does. At the end it is chaotic still if its largest Lyapunov exponent over the
+    last 500 periods is positive by three standard errors.
+
+    Parameters
+    ----------
+    attractor : Attractor
+        One of kind ``"chaotic"``, such as `nldyn.classify` gives.
+    states : int
+        Number of motions, from states evenly spread over those kept of the attractor.
+    periods : int
+        Excitation periods, at least 1000.
+    executor : concurrent.futures.Executor, optional
+        Where to compute, each motion by itself; here unless given.
+    progress : callable, optional
+        Called as ``progress(done, total)`` after each motion.
+
+    Returns
+    -------
+    ChaosLifetime
+
+    Raises
+    ------
+    SystemModelError
+        If the attractor is not chaotic, or for other input that makes no sense.
+    TaskError
+        If a motion cannot be simulated to its end.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance, chaos_lifetime, classify
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> found = chaos_lifetime(classify(system, 36.0), states=2, periods=1000)
+    >>> found.lasting, found.settled
+    (2, 0)
+
+    References
+    ----------
+    Y.-C. Lai, T. Tél (2011), *Transient Chaos*, Springer; B. Epstein, M. Sobel (1953), Life
+    testing, *J. Am. Stat. Assoc.* 48, 486-502.
+    """
+    check_types(
+        attractor=(attractor, Attractor), executor=(executor, Executor, None),
+        progress=(progress, Callable, None),
+    )  # fmt: skip
+    if attractor.kind != "chaotic":
+        raise SystemModelError(
+            f"chaos_lifetime needs a chaotic attractor, but the one at "
+            f"{attractor.frequency_hz:g} Hz is {attractor.name}"
+        )
+    check_whole("chaos_lifetime: states", states, 1, len(attractor.states))
+    check_whole("chaos_lifetime: periods", periods, 2 * LAST)
+    flow = attractor.flow
+    picked = np.linspace(0, len(attractor.states) - 1, states).round().astype(int)
+    task = partial(_ended, flow.system, flow.options, attractor.frequency_hz, periods)
+    ended = values_of(task, list(attractor.states[picked]), executor, progress)
+    return ChaosLifetime(attractor.frequency_hz, periods, np.array(ended, dtype=np.int64))
+
+
+def _ended(system: System, flow_options: FlowOptions, hz: float, periods: int, state: Real) -> int:
+    """Periods after which a motion from a state z was found on a stable orbit, or a mark."""
+    flow = FlowMap(system, flow_options)
+    omega = 2.0 * math.pi * hz
+    observe = check_observe(system, None)
+    longest = AttractorOptions().max_period
+    for before in range(0, periods - LAST, LOOK):
+        found = flow.strobe(state, omega, min(LOOK, periods - LAST - before))
+        if found.failure:
+            raise ConvergenceError(found.failure)
+        state = found.ends[-1]
+        run = found.ends[-3 * longest - 1 :]
+        if len(run) > 2 * longest and reached_orbit(flow, run, omega, observe, longest, 0.0):
+            return before + len(found.ends)
+    exponents = spectrum_from(flow, state, omega, LAST)
+    if exponents.chaotic:
+        return NOT_ENDED
+    found = flow.strobe(exponents.end, omega, 3 * longest + 1)
+    if not found.failure and reached_orbit(flow, found.ends, omega, observe, longest, 0.0):
+        return periods
+    return UNCLEAR
