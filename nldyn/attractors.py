@@ -20,8 +20,8 @@ from nldyn.linear import Real
 from nldyn.lyapunov import LyapunovSpectrum, spectrum_from
 from nldyn.orbit import ConvergenceError, Orbit, check_bounded, check_observe
 from nldyn.search import orbit_near, random_states
-from nldyn.simulation import Motion, simulate, starting_state, transient_end
-from nldyn.system import System
+from nldyn.simulation import MOST_PERIODS, Motion, simulate, starting_state, transient_end
+from nldyn.system import System, numbers
 
 Kind = Literal["periodic", "quasi-periodic", "chaotic", "undecided", "failed"]
 
@@ -31,6 +31,7 @@ SETTLED = 600  # most periods of a transient that is not chosen
 CLOUD = 1000  # stroboscopic states kept of a motion that is not periodic
 BLOCK = 64  # periods of an unforced transient between two looks whether it is at rest
 LONG_RUN = 20000  # most periods that a motion is followed to an orbit
+MOST_STARTS = 10**6
 LONGEST = 8  # a motion that has not decided itself is followed this much longer
 
 
@@ -184,6 +185,7 @@ class Attractor:
 
     def motion(self, periods: int = 64) -> Motion:
         """The motion on the attractor, recorded over some excitation periods."""
+        check_whole("periods", periods, 1, MOST_PERIODS)
         if periods not in self._cache:
             start = self.flow.to_modal(self.states[-1])
             self._cache[periods] = simulate(self.flow, self.frequency_hz, periods, start=start)
@@ -456,7 +458,7 @@ def zero_one_test(values: Real) -> float:
     Raises
     ------
     SystemModelError
-        For fewer than 100 values.
+        For fewer than 100 values, or what is no list of numbers.
 
     References
     ----------
@@ -470,6 +472,9 @@ def zero_one_test(values: Real) -> float:
     >>> bool(zero_one_test(np.array(logistic)) > 0.9)
     True
     """
+    values = numbers("values", values)
+    if values.ndim != 1:
+        raise SystemModelError(f"values must be a list of numbers, got shape {values.shape}")
     if values.size < 100:
         raise SystemModelError(f"the 0-1 test needs at least 100 values, got {values.size}")
     n = values.size
@@ -565,7 +570,7 @@ def find_attractors(
     if isinstance(starts, np.ndarray | list | tuple):
         states = np.array([starting_state(flow, np.asarray(start)) for start in starts])
     else:
-        check_whole("starts", starts, 1)
+        check_whole("starts", starts, 1, MOST_STARTS)
         states = random_states(flow, omega, int(starts), seed)
     task = partial(attractor_task, flow.system, flow.options, frequency_hz, name,
                    options or AttractorOptions())  # fmt: skip

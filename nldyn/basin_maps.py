@@ -76,7 +76,7 @@ class Plane:
     def __post_init__(self) -> None:
         for name in ("origin", "x", "y"):
             object.__setattr__(self, name, numbers(f"plane: {name}", getattr(self, name)))
-        if self.origin.ndim != 1 or self.x.shape != self.origin.shape != self.y.shape:
+        if self.origin.ndim != 1 or not self.x.shape == self.origin.shape == self.y.shape:
             raise SystemModelError("plane: origin, x and y must be vectors of one length")
         for name in ("x_range", "y_range"):
             ends = getattr(self, name)
@@ -160,6 +160,11 @@ class Plane:
 
     def coordinates(self, modal: Real) -> tuple[Real, NDArray[np.bool_]]:
         """Coordinates (k, 2) of states (k, 2n), and which of the states lie in the plane (k,)."""
+        modal = numbers("modal", modal)
+        if modal.ndim != 2 or modal.shape[1] != self.origin.size:
+            raise SystemModelError(
+                f"modal must be states (k, {self.origin.size}), got shape {modal.shape}"
+            )
         basis = np.array([self.x, self.y]).T
         unit = np.linalg.norm(basis, axis=1).max()
         found, *_ = np.linalg.lstsq(basis / unit, (modal - self.origin).T, rcond=None)
@@ -248,6 +253,7 @@ class Basins:
 
     def points(self, index: int) -> Real:
         """Coordinates (k, 2) of an attractor's stroboscopic states in the plane."""
+        check_whole("points: index", index, 0, len(self.attractors) - 1)
         attractor = self.attractors[index]
         found, inside = self.plane.coordinates(attractor.flow.to_modal(attractor.states))
         return found[inside]

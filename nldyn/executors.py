@@ -9,6 +9,8 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
+import numpy as np
+
 from nldyn.errors import check_types
 from nldyn.interruption import interrupted
 
@@ -87,7 +89,10 @@ def run_all(
     >>> run_all(len, [1])[0].failure
     "TypeError: object of type 'int' has no len()"
     """
-    check_types(executor=(executor, Executor, None), progress=(progress, Callable, None))
+    check_types(
+        function=(function, Callable), items=(items, Sequence, np.ndarray),
+        executor=(executor, Executor, None), progress=(progress, Callable, None),
+    )  # fmt: skip
     outcomes: dict[int, Outcome[Value]] = {}
     for outcome in as_finished(function, items, executor):
         outcomes[outcome.index] = outcome

@@ -15,10 +15,12 @@ from nldyn.attractors import Attractor
 from nldyn.basin_maps import UNDECIDED, Basins
 from nldyn.branch import Branch
 from nldyn.diagrams import Diagram
+from nldyn.errors import SystemModelError, check_types, shown
 from nldyn.linear import Real
 from nldyn.plot import PERIOD_COLOURS, length_unit, new_axes, plot_diagram
 from nldyn.sections import BruteForce, Column, stroboscopic_section
 from nldyn.simulation import Motion
+from nldyn.system import numbers
 
 KIND_COLOURS = {
     "periodic": "#222222",
@@ -27,6 +29,7 @@ KIND_COLOURS = {
     "undecided": "#999999",
 }
 SHADE = "#e8c9a0"
+UNITS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9}
 
 
 def plot_section(motion: Motion, ax: Axes | None = None, *, interface: str | None = None) -> Axes:
@@ -41,6 +44,7 @@ def plot_section(motion: Motion, ax: Axes | None = None, *, interface: str | Non
     interface : str, optional
         The first unless given.
     """
+    check_types(ax=(ax, Axes, None))
     y, v = stroboscopic_section(motion, interface)
     name = interface or motion.system.interfaces[0]
     factor, unit = length_unit(float(np.abs(y).max()))
@@ -75,10 +79,16 @@ def plot_brute_force(
     unit : str, optional
         m, mm, µm or nm; chosen from the size unless given.
     """
+    check_types(
+        found=(found, BruteForce), ax=(ax, Axes, None), diagram=(diagram, Diagram, Iterable, None),
+        unit=(unit, str, None),
+    )  # fmt: skip
+    if unit is not None and unit not in UNITS:
+        raise SystemModelError(f"unit must be one of {', '.join(UNITS)}, got {shown(unit)}")
     largest = max((float(c.peaks.max(initial=0.0)) for c in found.columns), default=1.0)
     factor, name = length_unit(largest)
     if unit is not None:
-        factor, name = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9}[unit], unit
+        factor, name = UNITS[unit], unit
     ax = ax if ax is not None else new_axes()
     if diagram is not None:
         branches = diagram if isinstance(diagram, Diagram) else list(diagram)
@@ -135,7 +145,15 @@ def plot_sweep(
     diagram : Diagram or iterable of Branch, optional
         Branches drawn below.
     """
+    check_types(
+        motions=(motions, Motion, Sequence), ax=(ax, Axes, None),
+        diagram=(diagram, Diagram, Iterable, None),
+    )  # fmt: skip
     listed = [motions] if isinstance(motions, Motion) else list(motions)
+    if not listed:
+        raise SystemModelError("motions must hold at least one motion, got an empty list")
+    for k, motion in enumerate(listed):
+        check_types(**{f"motions: entry {k}": (motion, Motion)})
     curves = [motion.period_peaks(interface) for motion in listed]
     factor, unit = length_unit(max(float(peaks.max(initial=0.0)) for _, peaks in curves))
     ax = ax if ax is not None else new_axes()
@@ -177,6 +195,12 @@ def plot_basins(
     times : bool
         Darken the cells whose motions take long to settle.
     """
+    check_types(
+        found=(found, Basins), ax=(ax, Axes, None), manifolds=(manifolds, Sequence, np.ndarray),
+        times=(times, bool),
+    )  # fmt: skip
+    manifolds = [_points(f"manifolds: entry {k}", curve) for k, curve in enumerate(manifolds)]
+    saddles = None if saddles is None else _points("saddles", saddles)
     ax = ax if ax is not None else new_axes(9.5, 6.5)
     plane = found.plane
     image, handles = _coloured(found)
@@ -206,6 +230,14 @@ def plot_basins(
     ax.set_title(f"basins at {found.frequency_hz:g} Hz, forcing phase zero")
     ax.legend(handles=handles, fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
     return ax
+
+
+def _points(name: str, given: Real) -> Real:
+    """Points (k, 2) in the plane."""
+    points = numbers(name, given)
+    if points.size and (points.ndim != 2 or points.shape[1] != 2):
+        raise SystemModelError(f"{name} must be points (k, 2), got shape {points.shape}")
+    return points
 
 
 def _title(attractor: Attractor) -> str:

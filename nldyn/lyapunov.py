@@ -17,8 +17,8 @@ from nldyn.executors import values_of
 from nldyn.flow import FlowMap, FlowOptions, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, contact_damping
-from nldyn.simulation import cases_at, is_list, transient_end
-from nldyn.system import System
+from nldyn.simulation import MOST_PERIODS, cases_at, is_list, transient_end
+from nldyn.system import System, numbers
 
 BLOCK = 64  # periods in one call
 FEWEST_BLOCKS = 16  # from which an error is estimated
@@ -220,8 +220,8 @@ def lyapunov_exponents(
     """
     flow = flow_of(system)
     check_types(executor=(executor, Executor, None), progress=(progress, Callable, None))
-    check_whole("transient", transient, 0)
-    check_whole("periods", periods, 2 * FEWEST_BLOCKS)
+    check_whole("transient", transient, 0, MOST_PERIODS)
+    check_whole("periods", periods, 2 * FEWEST_BLOCKS, MOST_PERIODS)
     cases = cases_at(flow, frequency_hz, start)
     if is_list(frequency_hz):
         task = partial(_spectrum_task, flow.system, flow.options, transient, periods)
@@ -313,7 +313,7 @@ def standard_errors(samples: Any) -> Real:
     Raises
     ------
     SystemModelError
-        For fewer than 32 samples.
+        For fewer than 32 samples, or what is no table of numbers.
 
     Examples
     --------
@@ -321,7 +321,9 @@ def standard_errors(samples: Any) -> Real:
     >>> bool(abs(standard_errors(samples)[0] * 64.0 - 1.0) < 0.3)
     True
     """
-    samples = np.asarray(samples, dtype=float)
+    samples = numbers("samples", samples)
+    if samples.ndim != 2:
+        raise SystemModelError(f"samples must be a table (k, n), got shape {samples.shape}")
     k, n = samples.shape
     if k < 2 * FEWEST_BLOCKS:
         raise SystemModelError(f"an error needs {2 * FEWEST_BLOCKS} samples, got {k}")

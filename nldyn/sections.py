@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import numbers
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from nldyn.simulation import Motion
 from nldyn.system import System
 
 Direction = Literal["up", "down", "random"]
+MOST_POINTS = 10**6
 
 
 def stroboscopic_section(motion: Motion, interface: str | None = None) -> tuple[Real, Real]:
@@ -46,6 +48,7 @@ def stroboscopic_section(motion: Motion, interface: str | None = None) -> tuple[
     >>> len(y)
     101
     """
+    check_types(motion=(motion, Motion))
     phi = motion.system.participation[check_observe(motion.system, interface)]
     states = motion.strobe
     return states[:, : phi.size] @ phi, states[:, phi.size :] @ phi
@@ -66,6 +69,7 @@ def impact_section(motion: Motion, stop: int = 0) -> tuple[Real, Real]:
     SystemModelError
         If there is no such stop.
     """
+    check_types(motion=(motion, Motion))
     check_whole("stop", stop, 0, len(motion.system.stops) - 1)
     found = impacts(motion)
     hit = found.stop == stop
@@ -125,6 +129,7 @@ class BruteForce:
         They begin and end half way to the neighbouring frequencies without one, and a single
         frequency counts, too.
         """
+        _check_kind(kind)
         frequencies = sorted({column.frequency_hz for column in self.columns})
         with_kind = {c.frequency_hz for c in self.columns if c.attractor.kind == kind}
         found: list[tuple[float, float]] = []
@@ -139,9 +144,19 @@ class BruteForce:
 
     def share(self, low_hz: float, high_hz: float, kind: Kind = "chaotic") -> tuple[int, int]:
         """At how many frequencies from `low_hz` to `high_hz` a kind was found, and of how many."""
+        _check_kind(kind)
+        for name, hz in (("low_hz", low_hz), ("high_hz", high_hz)):
+            check_types(**{name: (hz, numbers.Real)})
         inside = [c for c in self.columns if low_hz <= c.frequency_hz <= high_hz]
         with_kind = {c.frequency_hz for c in inside if c.attractor.kind == kind}
         return len(with_kind), len({c.frequency_hz for c in inside})
+
+
+def _check_kind(kind: object) -> None:
+    check_types(kind=(kind, str))
+    kinds = get_args(Kind)
+    if kind not in kinds:
+        raise SystemModelError(f"kind must be one of {', '.join(kinds)}, got {shown(kind)}")
 
 
 def brute_force(
@@ -216,9 +231,9 @@ def brute_force(
         executor=(executor, Executor, None), progress=(progress, Callable, None),
     )  # fmt: skip
     low, high = check_range(range_hz)
-    check_whole("points", points, 1)
-    check_whole("starts", starts, 0)
-    check_whole("recorded", recorded, 1)
+    check_whole("points", points, 1, MOST_POINTS)
+    check_whole("starts", starts, 0, MOST_POINTS)
+    check_whole("recorded", recorded, 1, MOST_POINTS)
     check_whole("seed", seed, 0)
     name = check_observe(flow.system, observe)
     for direction in directions:

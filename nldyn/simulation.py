@@ -35,6 +35,7 @@ from nldyn.system import System, numbers
 BLOCK = 64  # periods recorded in one call
 PIECE = 2000  # periods of a transient in one call: between two, Ctrl-C is answered
 MOST_STEPS = 10**7  # of a sweep
+MOST_PERIODS = 10**8
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,9 +162,9 @@ class Motion:
         Raises
         ------
         SystemModelError
-            If `samples` is not a whole number of at least 1.
+            If `samples` is not a whole number from 1 to 100 million.
         """
-        check_whole("history: samples", samples, 1)
+        check_whole("history: samples", samples, 1, MOST_PERIODS)
         time = np.linspace(self.start_time, self.end_time, samples + 1)
         return history_of(self.system, time, self.states(time))
 
@@ -333,8 +334,8 @@ def simulate(
     """
     flow = flow_of(system)
     check_types(executor=(executor, Executor, None), progress=(progress, Callable, None))
-    check_whole("periods", periods, 1)
-    check_whole("transient", transient, 0)
+    check_whole("periods", periods, 1, MOST_PERIODS)
+    check_whole("transient", transient, 0, MOST_PERIODS)
     cases = cases_at(flow, frequency_hz, start)
     if is_list(frequency_hz):
         task = partial(_simulate_task, flow.system, flow.options, periods, transient)
@@ -540,7 +541,7 @@ def sweep(
         raise SystemModelError(
             f"rate_hz_per_s must be positive and finite, got {shown(rate_hz_per_s)}"
         )
-    check_whole("steps_per_period", steps_per_period, 1)
+    check_whole("steps_per_period", steps_per_period, 1, MOST_STEPS)
     for ends in ranges:
         _chirp_count(*ends, rate_hz_per_s, steps_per_period)
     cases = list(zip(ranges, _starts(flow, start, len(ranges)), strict=True))

@@ -111,6 +111,7 @@ def study(
         "study: scene": (scene, Scene, str, Path),
         "study: parameters": (parameters, Mapping),
         "study: measure": (measure, Callable),
+        "study: design": (design, str),
         "study: keep": (keep, str, Path, None),
         "study: keep_name": (keep_name, str, None),
         "study: executor": (executor, Executor, None),

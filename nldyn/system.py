@@ -221,9 +221,15 @@ class System:
         Raises
         ------
         SystemModelError
-            If part of its flexibility has no mass (`residual_flexibility`), as by MacNeal's
-            method: its interfaces would move at once under a force. See also `System`.
+            If it is no reduced model, or part of its flexibility has no mass
+            (`residual_flexibility`), as by MacNeal's method: its interfaces would move at once
+            under a force. See also `System`.
         """
+        if not (hasattr(reduced, "frequencies_hz") and hasattr(reduced, "participation")):
+            raise SystemModelError(
+                "reduced must be a reduced model, with frequencies_hz and participation, got "
+                f"{shown(reduced)}"
+            )
         massless = getattr(reduced, "residual_flexibility", None)
         if massless is not None and np.any(massless):
             raise SystemModelError(

@@ -20,9 +20,10 @@ from nldyn.executors import values_of
 from nldyn.fourier import modal_row
 from nldyn.linear import Real
 from nldyn.orbit import Orbit
-from nldyn.simulation import Motion, motion_of
+from nldyn.simulation import MOST_PERIODS, Motion, motion_of
 from nldyn.system import System
 
+MOST_SAMPLES = 10**6  # in a period
 UNITS = {
     "frequency_hz": "Hz",
     "attractor": "",
@@ -118,7 +119,7 @@ def contact_measures(
     '119.4 N, 25.3 impacts per second'
     """
     check_types(source=(source, Orbit, Motion, Attractor))
-    check_whole("contact_measures: periods", periods, 1)
+    check_whole("contact_measures: periods", periods, 1, MOST_PERIODS)
     check_whole("stop", stop, 0, len(_system_of(source).stops) - 1)
     if isinstance(source, Attractor):
         if source.kind == "failed":
@@ -191,7 +192,7 @@ def measures_table(
         sources=(sources, Iterable), executor=(executor, Executor, None),
         progress=(progress, Callable, None),
     )  # fmt: skip
-    check_whole("measures_table: periods", periods, 1)
+    check_whole("measures_table: periods", periods, 1, MOST_PERIODS)
     chosen = list(sources)
     for k, source in enumerate(chosen):
         check_types(**{f"sources: entry {k}": (source, Orbit, Motion, Attractor)})
@@ -254,7 +255,8 @@ def power_spectrum(
     >>> float(hz[np.argmax(density)])
     20.0
     """
-    check_whole("samples_per_period", samples_per_period, 4)
+    check_types(motion=(motion, Motion), quantity=(quantity, str))
+    check_whole("samples_per_period", samples_per_period, 4, MOST_SAMPLES)
     if quantity not in ("displacement", "velocity"):
         raise SystemModelError(f"quantity must be 'displacement' or 'velocity', got '{quantity}'")
     omegas = {stretch.omega for stretch in motion.stretches}
