@@ -23,6 +23,7 @@ from nldyn.system import System
 
 LOOK = 250  # periods between two looks whether a motion has settled
 LAST = 500  # periods at the end over which exponents tell whether it is chaotic still
+LONGEST = 8  # and this many times as many where they do not
 CONFIDENCE = 0.95
 NOT_ENDED, UNCLEAR = 0, -1
 
@@ -77,8 +78,12 @@ class ChaosLifetime:
 
     @property
     def largest_escape_rate(self) -> float:
-        """Upper bound of the rate with 95 % confidence, also where no motion has settled."""
-        return float(chi2.ppf(CONFIDENCE, 2 * (self.settled + 1)) / (2.0 * self.followed))
+        """Upper bound of the rate with 95 % confidence, also where no motion has settled.
+
+        A motion that is neither settled nor chaotic counts as one that has settled.
+        """
+        ended = self.count - self.lasting
+        return float(chi2.ppf(CONFIDENCE, 2 * (ended + 1)) / (2.0 * self.followed))
 
     @property
     def lifetime(self) -> float:
@@ -95,11 +100,23 @@ class ChaosLifetime:
         """What was seen, in a sentence."""
         said = f"{self.lasting} of {self.count} motions are chaotic for {self.periods} periods more"
         if self.settled:
-            said += f", {self.settled} settle after {self.lifetime:.2g} in the mean"
+            said += f", {self.settled} settle after {two_digits(self.lifetime)} in the mean"
         unclear = self.count - self.lasting - self.settled
         if unclear:
             said += f", {unclear} do neither"
-        return f"{said}; the mean is at least {self.least_lifetime:.2g} with 95 % confidence"
+        least = two_digits(self.least_lifetime)
+        return f"{said}; the mean is at least {least} with 95 % confidence"
+
+
+def two_digits(value: float) -> str:
+    """A number of periods to two digits.
+
+    Examples
+    --------
+    >>> two_digits(3777.0)
+    '3800'
+    """
+    return f"{float(f'{value:.2g}'):.0f}"
 
 
 def chaos_lifetime(
@@ -119,7 +136,8 @@ def chaos_lifetime(
 
     Every 250 periods Newton's method looks for a stable orbit that a motion has reached, as
     `nldyn.classify` does. At the end it is chaotic still if its largest Lyapunov exponent over the
-    last 500 periods is positive by three standard errors.
+    last 500 periods, or up to 4000 more where that does not decide, is positive by three standard
+    errors.
 
     Parameters
     ----------
@@ -192,10 +210,15 @@ def _ended(system: System, flow_options: FlowOptions, hz: float, periods: int, s
         run = found.ends[-3 * longest - 1 :]
         if len(run) > 2 * longest and reached_orbit(flow, run, omega, observe, longest, 0.0):
             return before + len(found.ends)
-    exponents = spectrum_from(flow, state, omega, LAST)
-    if exponents.chaotic:
-        return NOT_ENDED
-    found = flow.strobe(exponents.end, omega, 3 * longest + 1)
-    if not found.failure and reached_orbit(flow, found.ends, omega, observe, longest, 0.0):
-        return periods
+    length = LAST
+    while length <= LONGEST * LAST:
+        exponents = spectrum_from(flow, state, omega, length)
+        if exponents.chaotic:
+            return NOT_ENDED
+        found = flow.strobe(exponents.end, omega, 3 * longest + 1)
+        if found.failure:
+            raise ConvergenceError(found.failure)
+        if reached_orbit(flow, found.ends, omega, observe, longest, 0.0):
+            return periods
+        state, length = exponents.end, 2 * length
     return UNCLEAR

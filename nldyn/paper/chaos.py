@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from nldyn.attractors import Attractor, AttractorOptions
 from nldyn.executors import as_finished, values_of
-from nldyn.lifetimes import ChaosLifetime, chaos_lifetime
+from nldyn.lifetimes import ChaosLifetime, chaos_lifetime, two_digits
 from nldyn.paper.evidence import Finding, published_claims
 from nldyn.paper.jobs import _ended_at_failure, scene_system
 from nldyn.plot import save_figure
@@ -80,7 +80,7 @@ class Chaos:
             holds = holds and 2 * lasting > total
             texts.append(
                 f"{low:g}-{high:g} Hz: {count} of {total}{_typical(found, low, high)}; it lasts at "
-                f"{lasting} of them{_shortest(lives)}"
+                f"{lasting} of them{_settling(lives)}"
             )
         everywhere, _ = found.share(*RANGE_HZ)
         return Finding(
@@ -134,15 +134,15 @@ def published_ranges(text: str) -> list[tuple[float, float]]:
     return [(float(low), float(high)) for low, high in ends]
 
 
-def _shortest(lives: Sequence[ChaosLifetime]) -> str:
+def _settling(lives: Sequence[ChaosLifetime]) -> str:
     """The shortest mean lifetime where some motions settle, in words."""
     ending = [life.lifetime for life in lives if life.settled]
     if not ending:
         return ""
     many = "frequency" if len(ending) == 1 else "frequencies"
     return (
-        f" (some motions settle at {len(ending)} {many}, after {min(ending):.2g} to "
-        f"{max(ending):.2g} periods in the mean)"
+        f" (some motions settle at {len(ending)} {many}, after {two_digits(min(ending))} to "
+        f"{two_digits(max(ending))} periods in the mean)"
     )
 
 
