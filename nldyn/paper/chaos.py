@@ -135,7 +135,7 @@ def published_ranges(text: str) -> list[tuple[float, float]]:
 
 
 def _settling(lives: Sequence[ChaosLifetime]) -> str:
-    """The shortest mean lifetime where some motions settle, in words."""
+    """How long chaos lasts where some of the motions settle, in words."""
     ending = [life.lifetime for life in lives if life.settled]
     if not ending:
         return ""
