@@ -366,11 +366,12 @@ def cases_at(
 
 def _starts(flow: FlowMap, start: Real | None, count: int) -> list[Real]:
     """States z from which several motions begin: one for all, or one for each."""
-    if start is None or np.ndim(start) != 2:
-        return [starting_state(flow, start)] * count
-    if len(start) != count:
-        raise SystemModelError(f"start has {len(start)} states for {count} motions")
-    return [starting_state(flow, np.asarray(row)) for row in start]
+    modal = None if start is None else numbers("start", start)
+    if modal is None or modal.ndim != 2:
+        return [starting_state(flow, modal)] * count
+    if len(modal) != count:
+        raise SystemModelError(f"start has {len(modal)} states for {count} motions")
+    return [starting_state(flow, row) for row in modal]
 
 
 def _simulate_task(

@@ -265,6 +265,7 @@ def test_a_failure_in_a_list_says_which():
         (lambda s: simulate(s, [20.0, -1.0], 5), r"frequency_hz must be positive .* got -1\.0"),
         (lambda s: simulate(s, "20", 5), "frequency_hz must be positive .* got '20'"),
         (lambda s: simulate(s, [20.0, 30.0], 5, start=np.zeros((3, 2))), "3 states for 2 motions"),
+        (lambda s: simulate(s, [20.0, 30.0], 5, start=[[0.0], [0.0, 1.0]]), "start must hold numb"),
         (lambda s: simulate(s, 20.0, 5, executor=2), "executor must be an Executor or None"),
         (lambda s: lyapunov_exponents(s, [20.0, None]), "frequency_hz must be positive"),
         (lambda s: lyapunov_exponents(s, 20.0, progress=2), "progress must be a function or None"),
