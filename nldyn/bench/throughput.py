@@ -203,7 +203,7 @@ def rate_at(rows: Sequence[Row], model: str, engine: str) -> float | None:
 
 
 def equal_error_table(rows: Sequence[Row]) -> list[dict[str, str]]:
-    """Rates at the error wanted, and how many times that of the flow map is as large."""
+    """Rates at the error wanted, and by how many times the flow map's is larger."""
     found = []
     for model, engine in dict.fromkeys((row.model, row.engine) for row in rows):
         rate, ours = rate_at(rows, model, engine), rate_at(rows, model, FLOW)
