@@ -135,9 +135,9 @@ def chaos_lifetime(
     rate, as for the failures in a test of lifetimes [Epstein and Sobel 1953].
 
     Every 250 periods Newton's method looks for a stable orbit that a motion has reached, as
-    `nldyn.classify` does: shorter lifetimes are not resolved. At the end it is chaotic still if its largest Lyapunov exponent over the
-    last 500 periods, or up to 4000 more where that does not decide, is positive by three standard
-    errors.
+    `nldyn.classify` does: shorter lifetimes are not resolved. At the end a motion is chaotic still
+    if its largest Lyapunov exponent over the last 500 periods, or up to 4000 more where that does
+    not decide, is positive by three standard errors.
 
     Parameters
     ----------
