@@ -301,6 +301,18 @@ def test_two_stable_orbits_share_the_plane_and_unstable_ones_sit_on_the_edge():
         assert set(reached) == {0, 1}
 
 
+@pytest.mark.parametrize("ratio", ["0.01", "0.001"])
+def test_of_the_two_stable_branches_below_23_hz_one_is_left_at_23_hz(ratio):
+    from nldyn.resources import example
+    from nldyn.scene import build_system, load_scene
+
+    system = build_system(load_scene(example(f"two_dof_xi_{ratio}.toml")))
+    for hz, impacts_of in ((22.8, {1, 2}), (23.0, {2})):
+        found = [share.attractor for share in find_attractors(system, hz, starts=12)]
+        assert {a.period for a in found} == {1}
+        assert {a.orbit.impacts for a in found if a.orbit} == impacts_of
+
+
 def test_neighbourhood_of_an_orbit_leads_to_it(one_dof):
     attractor = classify(one_dof, 25.3)
     target = target_of(attractor)
