@@ -192,7 +192,7 @@ def test_largest_displacements_of_subharmonic_motion_are_those_of_a_dense_sampli
     ("call", "said"),
     [
         (lambda s: simulate(s, -1.0, 5), "frequency_hz must be positive"),
-        (lambda s: simulate(s, 20.0, 0), "periods must be a whole number from 1 to 100000000, got 0"),
+        (lambda s: simulate(s, 20.0, 0), "periods must be a whole number from 1 to .*, got 0"),
         (lambda s: simulate(s, 20.0, 5, start=[1.0]), r"start must have 2 entries"),
         (lambda s: sweep(s, (20.0, 20.0), 1.0), "begins and ends at 20 Hz"),
         (lambda s: sweep(s, (20.0, 30.0), -1.0), "rate_hz_per_s must be positive"),
