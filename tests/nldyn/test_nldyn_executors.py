@@ -262,8 +262,8 @@ def test_a_failure_in_a_list_says_which():
     ("call", "said"),
     [
         (lambda s: simulate(s, [], 5), "at least one frequency, got an empty list"),
-        (lambda s: simulate(s, [20.0, -1.0], 5), r"frequency_hz must be positive .* got -1\.0"),
-        (lambda s: simulate(s, "20", 5), "frequency_hz must be positive .* got '20'"),
+        (lambda s: simulate(s, [20.0, -1.0], 5), r"frequency_hz must be positive.* got -1\.0"),
+        (lambda s: simulate(s, "20", 5), "frequency_hz must be positive.* got '20'"),
         (lambda s: simulate(s, [20.0, 30.0], 5, start=np.zeros((3, 2))), "3 states for 2 motions"),
         (lambda s: simulate(s, [20.0, 30.0], 5, start=[[0.0], [0.0, 1.0]]), "start must hold numb"),
         (lambda s: simulate(s, 20.0, 5, executor=2), "executor must be an Executor or None"),
