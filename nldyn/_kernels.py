@@ -1345,6 +1345,25 @@ def coarsest_instant(fl):
 
 
 @inner
+def with_event(fl, stop, w, phase, allowed, closed):
+    """Whether a stop is to open or close now, to within a time allowed or rounding."""
+    value, speed, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
+    reach = allowed * abs(speed) + 10.0 * output_noise(fl, stop, w)
+    return abs(value - fl.stops[stop, GAP]) <= reach and closed[stop] != (speed > 0.0)
+
+
+@inner
+def instant_with(fl, aim, w, phase, h, closed):
+    """Error allowed in the instant at which a stop and others with it open or close."""
+    allowed = fl.stops[aim, INSTANT] * h
+    for s in range(closed.size):
+        share = fl.stops[s, INSTANT] * h
+        if share < allowed and with_event(fl, s, w, phase, 10.0 * coarsest_instant(fl) * h, closed):
+            allowed = share
+    return allowed
+
+
+@inner
 def stop_at_switch(fl, w, phase, h, closed):
     """Stop that is to open or close now, to within a share of a length h of time, or -1."""
     stop, nearest = -1, np.inf
@@ -1451,7 +1470,7 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
                     aim = active[a]
         if aim >= 0 and not lost:
             dh = time_to_event(fl, aim, closed[aim], w_end, end_phase)
-            if abs(dh) <= fl.stops[aim, INSTANT] * h or (
+            if abs(dh) <= instant_with(fl, aim, w_end, end_phase, h, closed) or (
                 dh < np.inf and abs(distance(fl, aim, w_end, end_phase)) <= output_noise(fl, aim, w)
             ):
                 if fine:
@@ -1576,14 +1595,11 @@ def propagate(
 def switch_with(fl, w, phase, h, closed, closings):
     """Open and close the stops that do so at the very instant of another one's event.
 
-    The instant is known to a small share of the length h of the panel before it.
+    Each to the small share of the length h of the panel before it to which it must be known.
     """
-    allowed = 10.0 * coarsest_instant(fl) * h
     for s in range(closed.size):
-        value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
-        reach = allowed * abs(speed) + 10.0 * output_noise(fl, s, w)
-        if abs(value - fl.stops[s, GAP]) <= reach and closed[s] != (speed > 0.0):
-            closed[s] = speed > 0.0
+        if with_event(fl, s, w, phase, 10.0 * fl.stops[s, INSTANT] * h, closed):
+            closed[s] = not closed[s]
             if closed[s]:
                 closings[s] += 1
 
