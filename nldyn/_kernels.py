@@ -1450,7 +1450,10 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
                 fl, active, w_end, end_phase, h, -1.0, to_switch, aim if to_switch else -1
             )
         event, where = first_event(fl, tab, kind, phase, w, h, closed, panel, w_end)
-        at_end = where > (0.999 if event == aim else 1.0 - 1e-7)
+        near_end = 1e-3
+        if event >= 0 and event != aim:  # so near that `switch_with` will find it
+            near_end = max(min(5.0 * fl.stops[event, INSTANT], 1e-7), 1e-12)
+        at_end = where > 1.0 - near_end
         lost = attempt % 12 == 11  # the instant that is aimed at goes to and fro
         if event >= 0 and (aim < 0 or not at_end) and not lost:
             goal = switch
