@@ -1006,7 +1006,10 @@ def resolved(fl, tab, kind, noise, panel):
         tail = max(fl.tail, 20.0 * noise[a] / deepest)
         if o < na and legendre_tail(tab, panel.F, a) > tail * largest(panel.F, a):
             return False
-        if legendre_tail(tab, slopes, o) > 4.0 * tail * largest(slopes, o):
+        size = largest(slopes, o)
+        if o >= na and largest(panel.output, o) > 0.0:  # by speed: its share in the force counts
+            size = max(size, largest(panel.F, a) / largest(panel.output, o))
+        if legendre_tail(tab, slopes, o) > 4.0 * tail * size:
             return False
     return True
 

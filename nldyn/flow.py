@@ -432,8 +432,10 @@ class FlowMap:
 
     def strobe(self, state: Real, omega: float, periods: int) -> Segments:
         """Carry a state (2n,) over excitation periods from phase zero on, without derivatives."""
+        check_whole("periods", periods, 1)
         phases = np.linspace(0.0, 2.0 * np.pi * periods, periods + 1)
-        return self.shoot(state[None], phases, omega, sensitivities=False, chained=True)
+        nodes = _floats("state", state)[None]
+        return self.shoot(nodes, phases, omega, sensitivities=False, chained=True)
 
     def _check_segments(self, nodes: Real, phases: Real, omega: float, chained: bool) -> None:
         if phases.ndim != 1 or phases.size < 2 or not (phases[1:] > phases[:-1]).all():
@@ -602,11 +604,19 @@ class FlowMap:
 
     def to_modal(self, states: Real) -> Real:
         """Modal displacements and velocities (..., 2n) of states z."""
-        return np.asarray(np.asarray(states) @ self.system.linear.right.T)
+        return np.asarray(self._coordinates("states", states) @ self.system.linear.right.T)
 
     def to_state(self, modal: Real) -> Real:
         """States z of modal displacements and velocities (..., 2n)."""
-        return np.asarray(np.asarray(modal) @ self.system.linear.left.T)
+        return np.asarray(self._coordinates("modal", modal) @ self.system.linear.left.T)
+
+    def _coordinates(self, name: str, values: Real) -> Real:
+        values = _floats(name, values)
+        if values.ndim == 0 or values.shape[-1] != 2 * self.system.size:
+            raise SystemModelError(
+                f"{name} must have {2 * self.system.size} columns, got an array {values.shape}"
+            )
+        return values
 
     def _record(self, capacity: int) -> Record:
         return Record(
@@ -657,16 +667,50 @@ class Trajectory:
     failure: str
 
     def states(self, phases: Real) -> Real:
-        """States z (k, 2n) at ascending forcing phases within the motion."""
-        return self._evaluate(sample_states, np.asarray(phases, dtype=float))
+        """States z (k, 2n) at ascending forcing phases (k,) within the motion.
+
+        Raises
+        ------
+        SystemModelError
+            For phases that are no such list.
+        """
+        phases = _floats("phases", phases)
+        if phases.ndim != 1 or not (phases[1:] >= phases[:-1]).all():
+            raise SystemModelError("phases must be a list of ascending numbers")
+        first, last = self._span
+        slack = 1e-9 * max(1.0, abs(last))
+        if phases.size and not first - slack <= phases[0] <= phases[-1] <= last + slack:
+            raise SystemModelError(
+                f"phases must lie within the motion, {first:g} to {last:g}, got "
+                f"{phases[0]:g} to {phases[-1]:g}"
+            )
+        return self._evaluate(sample_states, phases)
+
+    @cached_property
+    def _span(self) -> tuple[float, float]:
+        """Forcing phases at which the motion begins and ends."""
+        rec = self.record
+        if not rec.phase.size:
+            return math.nan, math.nan
+        return float(rec.phase[0]), float(rec.phase[-1] + self.omega * rec.duration[-1])
 
     def extremes(self, output: int) -> Real:
         """Phase, value and kind (+1 maximum, -1 minimum) of an output's local extremes, (k, 3).
 
         The motion is taken as periodic. Outputs are the stops' penetrations without their gaps,
         then the interfaces' displacements.
+
+        Raises
+        ------
+        SystemModelError
+            If there is no such output.
         """
         flow = self.flow
+        count = len(flow.rows)
+        if not (isinstance(output, int | np.integer) and 0 <= output < count):
+            raise SystemModelError(
+                f"output must be a whole number from 0 to {count - 1}, got {shown(output)}"
+            )
         fastest = max(self.omega, flow.system.linear.fastest)
         return self._evaluate(local_extremes, flow.rows[output], flow.rate_rows[output], fastest)
 

@@ -91,10 +91,14 @@ class ShootingProblem:
         than `longest` (relative, as in `metric`) means failure.
         """
         level = float(row @ guess) if offset is None else offset
-        weight = self._weight(guess)
-        return self.flow.newton(
-            guess, row, level, self.phases, weight, rtol, longest, max_iterations
-        )
+        while True:
+            found = self.flow.newton(
+                guess, row, level, self.phases, self._weight(guess), rtol, longest, max_iterations
+            )
+            # steps count relative to the guess, and may still be large beside a small orbit
+            if not found.converged or self.scale(found.point) > 0.1 * self.scale(guess):
+                return found
+            guess = found.point
 
     def _weight(self, point: Real) -> float:
         """Weight of the square of a state's change."""

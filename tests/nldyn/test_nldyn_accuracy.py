@@ -152,3 +152,26 @@ def one_dof(dissipation):
 def test_senseless_segments_are_refused(nodes, phases, omega, says):
     with pytest.raises(SystemModelError, match=says):
         FlowMap(one_dof(0.0)).shoot(nodes, np.array(phases), omega)
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda flow, motion: motion.states(None), "phases"),
+        (lambda flow, motion: motion.states(1.0), "phases must be a list"),
+        (lambda flow, motion: motion.states([2.0, 1.0]), "phases must be a list of ascending"),
+        (lambda flow, motion: motion.states([0.0, 7.0]), "phases must lie within the motion"),
+        (lambda flow, motion: motion.states([-1.0]), "phases must lie within the motion"),
+        (lambda flow, motion: motion.extremes("a"), "output must be a whole number from 0 to 1"),
+        (lambda flow, motion: motion.extremes(2), "output must be a whole number from 0 to 1"),
+        (lambda flow, motion: motion.extremes(-1), "output must be a whole number from 0 to 1"),
+        (lambda flow, motion: flow.to_modal([1.0, 2.0, 3.0]), "states must have 2 columns"),
+        (lambda flow, motion: flow.to_state(1.0), "modal must have 2 columns"),
+        (lambda flow, motion: flow.strobe([0.0, 0.0], 50.0, 1.5), "periods"),
+    ],
+)
+def test_what_a_recorded_motion_cannot_tell_is_refused(call, sentence):
+    flow = FlowMap(one_dof(0.0))
+    motion = flow.trajectory(np.zeros((1, 2)), np.array([0.0, 2.0 * np.pi]), 50.0)
+    with pytest.raises(SystemModelError, match=sentence):
+        call(flow, motion)

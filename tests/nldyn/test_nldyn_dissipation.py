@@ -268,3 +268,31 @@ def test_smooth_law_is_not_taken_for_one_with_a_kink(steepness):
         return 1e6 / steepness * rise, 1e6 * (rise + 1.0), 0.0
 
     assert Stop("m", 1e6, exponent=1.0, law=stiffening).law is stiffening
+
+
+def test_a_slope_by_speed_that_is_nothing_but_rounding_does_not_shorten_panels():
+    def brake(depth, speed):  # beyond a speed of 8 the slope by speed is 1 - 1 but for rounding
+        share = math.tanh(2.4 * speed)
+        force = 4e5 * depth * (1.0 + 0.5 * share)
+        return force, 4e5 * (1.0 + 0.5 * share), 4.8e5 * depth * (1.0 - share * share)
+
+    system = System.from_modal(
+        [10.0], {"a": [1.0]}, modal_damping=0.01, stops=[Stop("a", 4e5, 1.0, law=brake)]
+    )
+    pieces = []
+    for rtol in (1e-9, 1e-13):
+        flow = FlowMap(system, FlowOptions(rtol=rtol))
+        start = flow.to_state(np.array([-1e-3, 6.5]))[None]
+        pieces.append(flow.trajectory(start, np.array([0.0, 2.0 * np.pi]), 300.0).record.kind.size)
+    assert max(pieces) < 20
+
+
+def test_an_orbit_is_as_exact_from_a_guess_that_is_far_too_large():
+    system = make_one_dof(stops=[])
+    exact = solve_orbit(system, frequency_hz=20.0)
+    problem = exact.problem
+    guess = np.append(1e30 * (1.0 + np.abs(exact.point[:-1])), exact.point[-1])
+    row = np.zeros(guess.size)
+    row[-1] = 1.0
+    found = problem.correct(guess, row)
+    np.testing.assert_allclose(found.point, exact.point, rtol=1e-10, atol=1e-22)
