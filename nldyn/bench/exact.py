@@ -20,7 +20,6 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from nldyn.elements import Unbalance
 from nldyn.linear import Real
 from nldyn.system import System
 
@@ -58,7 +57,7 @@ class Motion:
 
 
 class ExactFlow:
-    """The flow over one period of a system with one Hertz stop and one unbalance.
+    """The flow over one period of a system with one Hertz stop and one excitation.
 
     Parameters
     ----------
@@ -73,7 +72,7 @@ class ExactFlow:
     def __init__(self, system: System, omega: Number, precision: Precision) -> None:
         mp.dps = precision.digits
         (stop,), (source,) = system.stops, system.excitation
-        assert stop.exponent == 1.5 and isinstance(source, Unbalance)
+        assert stop.exponent == 1.5 and not stop.depends_on_speed and source.phase_deg == 0.0
         self.precision = precision
         self.n = system.size
         self.omega = mp.mpf(omega)
@@ -83,10 +82,10 @@ class ExactFlow:
         self.c = [mp.mpf(c) for c in system.stop_vector(stop)]
         self.gap = mp.mpf(stop.gap)
         self.k = mp.mpf(stop.stiffness)
-        amplitude = mp.mpf(source.mass_times_radius)
+        amplitude = mp.mpf(source.phasor.real)
         load = [mp.mpf(p) * amplitude for p in system.participation[source.at]]
-        self.load = [p * self.omega**2 for p in load]
-        self.d_load = [2 * p * self.omega for p in load]
+        self.load = [p * self.omega**source.order for p in load]
+        self.d_load = [source.order * p / self.omega for p in self.load]
 
     # Flights
 
@@ -234,7 +233,6 @@ class ExactFlow:
                 own = mp.fdot(self.damping[i], velocity) + self.stiffness[i] * x[i][j]
                 rates[i].append(self.load[i] * cos[j] - own - c[i] * force)
             t_sin.append(mp.fdot(t, sin[::-1]))
-            d_cos = 2 * w * cos[j] - w**2 * t_sin[j]
             for number, (column, rate, depth) in enumerate(
                 zip(columns, column_rates, cx, strict=True)
             ):
@@ -245,7 +243,7 @@ class ExactFlow:
                     own = mp.fdot(self.damping[i], velocity) + self.stiffness[i] * column[i][j]
                     rate[i].append(-own - c[i] * slope)
                     if number == 2 * n:
-                        rate[i][j] += self.load[i] / w**2 * d_cos
+                        rate[i][j] += self.d_load[i] * cos[j] - self.load[i] * t_sin[j]
             for vector, rate in zip([x, *columns], [rates, *column_rates], strict=True):
                 for i in range(n):
                     q_next = mp.fdot(vector[n + i], back) / (j + 1)
@@ -296,7 +294,7 @@ class ExactFlow:
         contacts = 0
         depth = mp.fdot(self.c, x[:n]) - self.gap
         u = mp.sqrt(depth) if depth > 0 else mp.zero
-        in_contact = depth > 0
+        in_contact = depth > 0 or (depth == 0 and mp.fdot(self.c, x[n:]) > 0)
         after_contact = False
         while True:
             if in_contact:

@@ -1,0 +1,1 @@
+"""Cases that are hard for programs of this kind, each with a known answer or a bound."""
