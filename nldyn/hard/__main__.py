@@ -11,6 +11,7 @@ def main() -> None:
     """Run the suite; the exit code is 1 if a case fails that is not known to."""
     parser = argparse.ArgumentParser(prog="python -m nldyn.hard")
     parser.add_argument("--out", type=Path, default=Path("results/hard"), metavar="DIR")
+    parser.add_argument("--only", default="", metavar="SUBJECT", help="cases of one subject")
     parser.add_argument("--quick", action="store_true", help="only the cases that the tests run")
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes")
     chosen = parser.parse_args()
@@ -20,7 +21,7 @@ def main() -> None:
     from nldyn.result_directory import OutputError
 
     try:
-        results = run(chosen.out, quick=chosen.quick, workers=chosen.workers)
+        results = run(chosen.out, quick=chosen.quick, only=chosen.only, workers=chosen.workers)
     except OutputError as error:
         parser.error(str(error))
     failed = [r for r in results if not r.passed]

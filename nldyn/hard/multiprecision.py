@@ -31,26 +31,33 @@ def exact_end(
 
 
 def flow_error(
-    flow: FlowMap, start: Real, omega: float, precision: Precision = DIGITS
+    flow: FlowMap,
+    start: Real,
+    omega: float,
+    precision: Precision = DIGITS,
+    instead: System | None = None,
 ) -> Measured:
     """Error of one period from a modal state (2n,): that of the Jacobian, or ten of the state's.
 
-    Both are relative, in the norm of the coordinates z.
+    Both are relative, in the norm of the coordinates z. The reference may be of another system
+    `instead`, which hardly differs.
     """
     found = flow.shoot(flow.to_state(start)[None], np.array([0.0, 2.0 * np.pi]), omega)
     if found.failure:
         return Measured(math.nan, found.failure)
-    exact = exact_end(flow.system, start, omega, precision)
+    exact = exact_end(instead or flow.system, start, omega, precision)
     state, jacobian = in_coordinates(flow, exact)
     off = relative(found.ends[0], state), relative(found.jacobians[0], jacobian)
-    note = f"state {off[0]:.1e}, Jacobian {off[1]:.1e}, {exact.contacts} contacts"
+    note = f"state {off[0]:.1e}, Jacobian {off[1]:.1e}, {exact.contacts} contacts begin"
     return Measured(max(10.0 * off[0], off[1]), note)
 
 
-def orbit_flow_error(orbit: Orbit) -> Measured:
+def orbit_flow_error(
+    orbit: Orbit, precision: Precision = DIGITS, instead: System | None = None
+) -> Measured:
     """The same from the state of an orbit at phase zero."""
     start = orbit.problem.flow.to_modal(orbit.problem.nodes(orbit.point)[0])
-    return flow_error(orbit.problem.flow, start, orbit.omega)
+    return flow_error(orbit.problem.flow, start, orbit.omega, precision, instead)
 
 
 def in_coordinates(flow: FlowMap, end: ExactEnd) -> tuple[Real, Real]:

@@ -17,7 +17,9 @@ from nldyn.hard.page import write_page
 from nldyn.result_directory import check_directory, result_directory
 
 
-def run(folder: Path, *, quick: bool = False, workers: int = 1) -> list[Result]:
+def run(
+    folder: Path, *, quick: bool = False, only: str = "", workers: int = 1
+) -> list[Result]:
     """Compute the cases and write their page and table.
 
     Parameters
@@ -26,6 +28,8 @@ def run(folder: Path, *, quick: bool = False, workers: int = 1) -> list[Result]:
         Where to write; it is written whole or not at all.
     quick : bool
         Only the cases that the tests run, too.
+    only : str
+        Only the cases of this subject; all unless given.
     workers : int
         Number of processes.
 
@@ -41,7 +45,11 @@ def run(folder: Path, *, quick: bool = False, workers: int = 1) -> list[Result]:
     """
     check_directory(folder)
     start = time.perf_counter()
-    chosen = [number for number, case in enumerate(CASES) if case.quick or not quick]
+    chosen = [
+        number
+        for number, case in enumerate(CASES)
+        if (case.quick or not quick) and only in ("", case.subject)
+    ]
     results = compute(chosen, workers)
     with result_directory(folder, "hard") as new:
         write_page(results, time.perf_counter() - start, new)
