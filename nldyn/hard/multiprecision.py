@@ -79,15 +79,13 @@ class ExactOrbit:
 
     Parameters
     ----------
-    starts : list of (2n,) lists
-        Modal states at phase zero of each excitation period.
     periods : list of ExactEnd
-        What each gives.
+        What each excitation period gives.
     correction : float
-        Length of the last Newton step, relative to the orbit.
+        Length of the Newton step that led there, relative to the orbit: the error of the orbit
+        that it came from.
     """
 
-    starts: list[Series]
     periods: list[ExactEnd]
     correction: float
 
@@ -98,34 +96,22 @@ class ExactOrbit:
         return sorted(values, key=abs, reverse=True)
 
 
-def exact_orbit(orbit: Orbit, steps: int = 2, precision: Precision = DIGITS) -> ExactOrbit:
-    """Newton's method in multiple precision from an orbit, one segment per excitation period.
-
-    `ExactOrbit.correction` of one step is the error of the orbit; after two it is below its
-    square.
-    """
+def exact_orbit(orbit: Orbit, precision: Precision = DIGITS) -> ExactOrbit:
+    """One Newton step in multiple precision from an orbit, one segment per excitation period."""
     mp.dps = precision.digits
     problem, system = orbit.problem, orbit.system
     omega = mp.exp(mp.mpf(float(orbit.point[-1])))
     each = problem.segments // problem.period
     nodes = problem.flow.to_modal(problem.nodes(orbit.point)[::each])
     starts: list[Series] = [[mp.mpf(float(x)) for x in node] for node in nodes]
-    correction = math.inf
-    for step in range(steps):
-        periods = [exact_end(system, start, omega, precision) for start in starts]
-        if step < steps - 1 or steps == 1:
-            moves = newton_steps(starts, periods)
-            correction = length(problem.flow, moves) / length(problem.flow, starts)
-            starts = [[x + d for x, d in zip(s, m, strict=True)] for s, m in
-                      zip(starts, moves, strict=True)]
-    return ExactOrbit(starts, periods, correction)
+    moves = newton_steps(starts, [exact_end(system, s, omega, precision) for s in starts])
+    correction = length(problem.flow, moves) / length(problem.flow, starts)
+    moved = [[x + d for x, d in zip(s, m, strict=True)] for s, m in zip(starts, moves, strict=True)]
+    return ExactOrbit([exact_end(system, s, omega, precision) for s in moved], correction)
 
 
 def newton_steps(starts: list[Series], periods: list[ExactEnd]) -> list[Series]:
-    """Newton steps of the states: the first from the product, the others one after the other.
-
-    The first step is found in as many digits as the growth over the orbit costs.
-    """
+    """Newton steps of the states: the first from the product, the others one after the other."""
     size = len(starts[0])
     product, shift = mp.eye(size), mp.zeros(size, 1)
     following = [*starts[1:], starts[0]]

@@ -15,7 +15,7 @@ def row(result: Result) -> Row:
     """A result as a row of the table."""
     case, measured = result.case, result.measured
     notes = [measured.note, *([case.fault] if not result.passed else [])]
-    return {
+    cells = {
         "case": case.name,
         "what is hard": case.hard,
         "reference": case.reference,
@@ -23,8 +23,9 @@ def row(result: Result) -> Row:
         "bound": f"{case.bound:.0e}, {case.bound_from}",
         "s": f"{result.seconds:.1f}",
         "verdict": "passed" if result.passed else "**FAILED**",
-        "note": "; ".join(note for note in notes if note).replace("|", "/"),
+        "note": "; ".join(note for note in notes if note),
     }
+    return {title: " ".join(cell.replace("|", "/").split()) for title, cell in cells.items()}
 
 
 def write_page(results: Sequence[Result], seconds: float, folder: Path) -> Path:
