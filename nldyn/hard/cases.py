@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nldyn.hard import damping, grazing, stiffness, unstable
+from nldyn.hard import damping, grazing, modes, stiffness, unstable
 from nldyn.hard.case import Case
 
-CASES: tuple[Case, ...] = (*stiffness.CASES, *grazing.CASES, *damping.CASES, *unstable.CASES)
+CASES: tuple[Case, ...] = (*stiffness.CASES, *grazing.CASES, *damping.CASES, *unstable.CASES, *modes.CASES)
