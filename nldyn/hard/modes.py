@@ -42,7 +42,7 @@ def spread_error() -> Measured:
         stops=[Stop("m", 1e11)],
         excitation=[FORCE],
     )
-    return orbit_flow_error(solve_orbit(system, 1.7), Precision(28, 36, 18))
+    return orbit_flow_error(solve_orbit(system, 1.7), Precision(24, 30, 16))
 
 
 def close_system(detuning: float) -> System:
