@@ -531,7 +531,9 @@ def solve_orbit(
         counts = (2, 3, 4, len(strobe)) if period == 1 else ()
         middles = [strobe[-count:].mean(axis=0) for count in counts]
         near = strobe[near_returns(strobe, period, 8)]
-        starts = (spread(problem, z, omega) for z in (strobe[-1], *near, *middles))
+        # at a sharp resonance the motion from rest takes too long to grow
+        linear = [] if flow.system.grows(omega) else [flow.system.steady(omega).real]
+        starts = (spread(problem, z, omega) for z in (strobe[-1], *near, *middles, *linear))
     else:
         guess = np.atleast_2d(numbers("guess", guess))
         if guess.shape not in ((1, problem.size), (problem.segments, problem.size)):

@@ -98,6 +98,13 @@ class ExactOrbit:
 
 def exact_orbit(orbit: Orbit, precision: Precision = DIGITS) -> ExactOrbit:
     """One Newton step in multiple precision from an orbit, one segment per excitation period."""
+    omega, moved, correction = newton_step(orbit, precision)
+    periods = [exact_end(orbit.system, start, omega, precision) for start in moved]
+    return ExactOrbit(periods, correction)
+
+
+def newton_step(orbit: Orbit, precision: Precision = DIGITS) -> tuple[Number, list[Series], float]:
+    """ω, the states to which a Newton step leads, and its length: the error of the orbit."""
     mp.dps = precision.digits
     problem, system = orbit.problem, orbit.system
     omega = mp.exp(mp.mpf(float(orbit.point[-1])))
@@ -107,7 +114,7 @@ def exact_orbit(orbit: Orbit, precision: Precision = DIGITS) -> ExactOrbit:
     moves = newton_steps(starts, [exact_end(system, s, omega, precision) for s in starts])
     correction = length(problem.flow, moves) / length(problem.flow, starts)
     moved = [[x + d for x, d in zip(s, m, strict=True)] for s, m in zip(starts, moves, strict=True)]
-    return ExactOrbit([exact_end(system, s, omega, precision) for s in moved], correction)
+    return omega, moved, correction
 
 
 def newton_steps(starts: list[Series], periods: list[ExactEnd]) -> list[Series]:
