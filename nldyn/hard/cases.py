@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nldyn.hard import chatter, damping, grazing, modes, resonance, stiffness, unstable
+from nldyn.hard import chatter, damping, elements, grazing, modes, resonance, stiffness, unstable
 from nldyn.hard.case import Case
 
-CASES: tuple[Case, ...] = (*stiffness.CASES, *grazing.CASES, *damping.CASES, *unstable.CASES, *modes.CASES, *chatter.CASES, *resonance.CASES)
+CASES: tuple[Case, ...] = (*stiffness.CASES, *grazing.CASES, *damping.CASES, *unstable.CASES, *modes.CASES, *chatter.CASES, *resonance.CASES, *elements.CASES)

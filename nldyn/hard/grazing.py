@@ -234,7 +234,7 @@ CASES = (
         "step sizes collapse where contacts begin",
         "the same branch with the stop out of reach",
         12.5,
-        "issue: no loss of step size; of its options, max_step over grazing_step",
+        "no loss of step size beyond its options: max_step over grazing_step",
         step_loss,
     ),
     Case(

@@ -1,0 +1,274 @@
+"""Finite elements and units: thin parts, slender cells, numbers far from one."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Sequence
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+from scipy.sparse.linalg import eigsh, spsolve
+
+import fem
+from nldyn.branch import Branch
+from nldyn.continuation import continue_branch
+from nldyn.elements import Stop, Unbalance
+from nldyn.hard.case import Case, Measured
+from nldyn.orbit import solve_orbit
+from nldyn.resources import example
+from nldyn.resources import mesh as mesh_file
+from nldyn.scene import build_system, load_scene
+from nldyn.system import System
+
+SUBJECT = "finite elements and units"
+STEEL = fem.Material(2.1e11, 7800.0, 0.0)  # without lateral contraction beam theory is exact
+CELLS = 50
+SCALED = 1e-10
+ASKED = "asked for: a scaled scene gives the scaled answer"
+ROUNDING = "of what the rounding of the stiffness matrix costs: 2^-53 times its condition"
+ASSEMBLED = (
+    "the stiffness matrix is rounded when its elements are summed; with a condition of 4e9 even "
+    "its exact eigenvalues differ by 1e-9 between the units"
+)
+
+
+def cantilever(thickness: float, cells: int = CELLS) -> fem.StructureComponent:
+    """A strip of 1 m by 50 mm in one layer of second-order cells, clamped at one end."""
+    mesh = fem.box_mesh("strip", (1.0, 0.05, thickness), (cells, 1, 1))
+    model = fem.StructureModel(
+        mesh,
+        parts={"strip": fem.SolidPart(STEEL)},
+        supports=[fem.Support("x0", ("x", "y", "z"))],
+        couplings=[fem.Coupling("tip", "x1", at=(1.0, 0.025, 0.5 * thickness))],
+        interfaces={"turn": fem.Interface("tip", "rotation_y")},
+    )
+    return fem.assemble(model)
+
+
+def flexibility_error(component: fem.StructureComponent, name: str, exact: float) -> Measured:
+    """Error of a flexibility, in roundings 2^-53 of the stiffness matrix times its condition."""
+    load, K = component.interfaces[name], component.stiffness.tocsc()
+    off = abs(float(load @ spsolve(K, load)) / exact - 1.0)
+    largest, smallest = (
+        float(eigsh(K, 1, return_eigenvectors=False, **which)[0])
+        for which in ({"which": "LM"}, {"sigma": 0.0})
+    )
+    note = f"relative error {off:.1e}, condition {largest / smallest:.0e}"
+    return Measured(off / (2.0**-53 * largest / smallest), note)
+
+
+def bending_error(thickness: float) -> Measured:
+    """Rotation of the tip under a moment, L/EI."""
+    exact = 12.0 / (STEEL.youngs_modulus * 0.05 * thickness**3)
+    return flexibility_error(cantilever(thickness), "turn", exact)
+
+
+def frequency_error(thickness: float) -> Measured:
+    """Lowest frequency, 1.8751² √(EI/ρA)/L²."""
+    component = cantilever(thickness)
+    squares = eigsh(
+        component.stiffness.tocsc(), 1, component.mass.tocsc(), sigma=0.0,
+        return_eigenvectors=False,
+    )  # fmt: skip
+    found = math.sqrt(float(squares[0])) / (2.0 * math.pi)
+    speed = math.sqrt(STEEL.youngs_modulus * thickness**2 / (12.0 * STEEL.density))
+    exact = 1.8751040687119611**2 * speed / (2.0 * math.pi)
+    return Measured(abs(found / exact - 1.0), f"{exact:.6f} Hz")
+
+
+def slender_error(aspect: float) -> Measured:
+    """Elongation of a bar of ten cells of 1 m under a force, L/EA."""
+    side = 1.0 / aspect
+    mesh = fem.box_mesh("bar", (10.0, side, side), (10, 1, 1))
+    model = fem.StructureModel(
+        mesh,
+        parts={"bar": fem.SolidPart(STEEL)},
+        supports=[fem.Support("x0", ("x", "y", "z"))],
+        couplings=[fem.Coupling("tip", "x1", at=(10.0, 0.5 * side, 0.5 * side))],
+        interfaces={"pull": fem.Interface("tip", "x")},
+    )
+    return flexibility_error(fem.assemble(model), "pull", 10.0 / (STEEL.youngs_modulus * side**2))
+
+
+# N, mm, t, s in place of N, m, kg, s
+MILLIMETRES = {
+    "youngs_modulus": 1e-6,
+    "density": 1e-12,
+    "width": 1e3,
+    "height": 1e3,
+    "mass": 1e-3,
+    "coefficient": 1e-3,
+    "stiffness": 1e3**-1.5,
+    "gap": 1e3,
+    "mass_times_radius": 1.0,
+}
+
+
+def in_millimetres(folder: Path) -> Path:
+    """Write the scene of the 4-DOF model, and its mesh, in mm, t and s."""
+    lines = []
+    for line in example("four_dof_xi_0.01.toml").read_text("utf-8").splitlines():
+        key, equals, rest = line.partition("=")
+        name = key.strip()
+        if equals and name in MILLIMETRES:
+            number = float(rest.partition("#")[0])
+            lines.append(f"{name} = {number * MILLIMETRES[name]!r}")
+        elif name == "file":
+            lines.append('file = "half_beam.vtu"')
+        elif name != "mirror":
+            lines.append(line)
+    mesh = fem.read_mesh(mesh_file("half_beam.msh"))
+    fem.write_mesh(mesh.with_points(1e3 * mesh.points), folder / "half_beam.vtu")
+    scene = folder / "scene.toml"
+    scene.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return scene
+
+
+@cache
+def scene_branch(millimetres: bool) -> tuple[System, Branch]:
+    """System and harmonic branch of the 4-DOF model, 25 to 40 Hz, in either units."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = in_millimetres(Path(folder)) if millimetres else example("four_dof_xi_0.01.toml")
+        scene = load_scene(file)
+        system = build_system(scene)
+    return system, continue_branch(solve_orbit(system, 35.0), (25.0, 40.0))
+
+
+def scaled_frequencies_error() -> Measured:
+    """Modal frequencies in mm, t, s against those in SI."""
+    found, exact = (scene_branch(millimetres)[0].frequencies_hz for millimetres in (True, False))
+    return Measured(float(np.abs(found / exact - 1.0).max()))
+
+
+def scaled_branch_error() -> Measured:
+    """Special points in mm, t, s against those in SI: kinds, frequencies, amplitudes."""
+    found, exact = (points_of(scene_branch(mm)[1]) for mm in (True, False))
+    return compared(found, [(kind, hz, 1e3 * height) for kind, hz, height in exact])
+
+
+SpecialRow = tuple[str, float, float]
+
+
+def points_of(branch: Branch) -> list[SpecialRow]:
+    """Kind, frequency in Hz and largest displacement of the special points, in order."""
+    return [
+        (s.kind, s.frequency_hz, s.orbit.max_abs_displacement) for s in branch.special_points
+    ]
+
+
+def compared(found: Sequence[SpecialRow], exact: Sequence[SpecialRow]) -> Measured:
+    """Largest relative difference of a frequency; infinite where the kinds differ.
+
+    Amplitudes count a hundredth: at a fold they change with the root of the frequency.
+    """
+    if [row[0] for row in found] != [row[0] for row in exact]:
+        return Measured(math.inf, f"{len(found)} special points in place of {len(exact)}")
+    hz = max(abs(a[1] / b[1] - 1.0) for a, b in zip(found, exact, strict=True))
+    height = max(abs(a[2] / b[2] - 1.0) for a, b in zip(found, exact, strict=True))
+    note = f"{len(found)} special points, frequencies {hz:.1e}, amplitudes {height:.1e}"
+    return Measured(max(hz, 0.01 * height), note)
+
+
+def one_dof(mass: float = 1.0, length: float = 1.0, time: float = 1.0) -> System:
+    """The 1-DOF model of the paper in other units: kg, m and s times these numbers."""
+    rate = mass / time**2
+    return System.from_matrices(
+        [[2.48 * mass]],
+        [[16877.0 * rate]],
+        {"middle": [1.0]},
+        modal_damping=0.0142,
+        stops=[Stop("middle", 5.17e9 * rate / math.sqrt(length))],
+        excitation=[Unbalance("middle", 4.92e-6 * mass * length)],
+    )
+
+
+def branch_in(mass: float, length: float, time: float) -> Branch:
+    """The harmonic branch from 11 to 36 Hz in these units."""
+    system = one_dof(mass, length, time)
+    return continue_branch(solve_orbit(system, 26.0 / time), (11.0 / time, 36.0 / time))
+
+
+def units_error(mass: float, length: float, time: float) -> Measured:
+    """Special points in other units against those in SI."""
+    exact = points_of(branch_in(1.0, 1.0, 1.0))
+    found = points_of(branch_in(mass, length, time))
+    return compared(found, [(kind, hz / time, height * length) for kind, hz, height in exact])
+
+
+CASES = (
+    *(
+        Case(
+            SUBJECT,
+            f"cantilever with thickness {thickness:g} of its length, moment",
+            f"cells of 20 by {1e3 * thickness:g} mm in one layer: locking",
+            "closed form L/EI",
+            1.0,
+            ROUNDING,
+            partial(bending_error, thickness),
+        )
+        for thickness in (1e-2, 1e-3)
+    ),
+    Case(
+        SUBJECT,
+        "cantilever with thickness 1e-3 of its length, frequency",
+        f"{CELLS} cells of 20 by 1 mm in one layer: locking",
+        "closed form 1.8751² √(EI/ρA)/L²",
+        0.25 / CELLS**2,
+        "1/(4n²): curvature that is constant in each of n cells",
+        partial(frequency_error, 1e-3),
+    ),
+    *(
+        Case(
+            SUBJECT,
+            f"bar of cells with aspect ratio {aspect:g}",
+            "stiffness along and across differ by its square",
+            "closed form L/EA",
+            1.0,
+            ROUNDING,
+            partial(slender_error, aspect),
+        )
+        for aspect in (1e3, 1e4)
+    ),
+    Case(
+        SUBJECT,
+        "scene in mm, t and s, modal frequencies",
+        "numbers from 1e-9 to 1e5",
+        "the same scene in SI",
+        SCALED,
+        ASKED,
+        scaled_frequencies_error,
+        fault=ASSEMBLED,
+    ),
+    Case(
+        SUBJECT,
+        "scene in mm, t and s, special points from 25 to 40 Hz",
+        "numbers from 1e-9 to 1e5",
+        "the same scene in SI",
+        SCALED,
+        ASKED,
+        scaled_branch_error,
+        fault=ASSEMBLED,
+    ),
+    *(
+        Case(
+            SUBJECT,
+            f"units of {mass:g} kg, {length:g} m, {time:g} s: special points from 11 to 36 Hz",
+            "parameters of 1e-12 and 1e12",
+            "the same model in SI",
+            SCALED,
+            ASKED,
+            partial(units_error, mass, length, time),
+        )
+        for mass, length, time in (
+            (1e-12, 1.0, 1.0),
+            (1e12, 1.0, 1.0),
+            (1.0, 1e-12, 1.0),
+            (1.0, 1e12, 1.0),
+            (1.0, 1.0, 1e-6),
+            (1.0, 1.0, 1e12),
+            (1e12, 1e-12, 1e-6),
+        )
+    ),
+)
