@@ -16,8 +16,9 @@ from nldyn.errors import SystemModelError
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# Beyond this condition number of the basis fewer than eight digits would be left.
-_MAX_CONDITION = 1e8
+# Beyond this condition number of the basis a Jacobian has fewer than eight digits left: its error
+# is about 200 roundings times the condition (the cases of `nldyn.hard.modes`).
+_MAX_CONDITION = 2e5
 _LARGEST_RATE = 1e100  # its square is far from the largest floating-point number
 
 
@@ -163,7 +164,8 @@ def linear_part(omega: Real, damping: Real) -> LinearPart:
     if not condition < _MAX_CONDITION:
         raise SystemModelError(
             "the linear part has (nearly) coinciding modes that damping makes inseparable "
-            f"(condition of their basis {condition:.1e}); change a frequency or damping slightly"
+            f"(condition of their basis {condition:.1e}); change a frequency or damping slightly, "
+            "by 1e-9 of it say"
         )
     to_state = 1.0 / np.concatenate([unit, np.ones(n)])
     scale = np.repeat(scales, 2)

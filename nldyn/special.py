@@ -31,6 +31,7 @@ CROSSING_ERROR = 1e-8  # relative, of an orbit where branches cross
 NEIGHBOUR = 1e-3  # arclength between two branch points at one turn, and dP/ds there
 SAME = 1e-7  # arclength between two branch points that cannot be told apart
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
+FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
 STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
 
 
@@ -213,7 +214,7 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
     not explain the change in the number of contacts or of unstable multipliers, the chord is
     halved; so it is where multipliers near the unit circle move far, which may cross it twice.
     """
-    if depth < 3 and travel(a.orbit.multipliers, b.orbit.multipliers) > 0.3:
+    if depth < 5 and travel(a.orbit.multipliers, b.orbit.multipliers) > FAR:
         middle = Chord(a, b).at(0.5)
         return special_points_between(a, middle, depth + 1) + special_points_between(
             middle, b, depth + 1

@@ -2,7 +2,27 @@
 
 from __future__ import annotations
 
-from nldyn.hard import chatter, damping, elements, grazing, modes, resonance, stiffness, unstable
+from nldyn.hard import (
+    chatter,
+    continuation,
+    damping,
+    elements,
+    grazing,
+    modes,
+    resonance,
+    stiffness,
+    unstable,
+)
 from nldyn.hard.case import Case
 
-CASES: tuple[Case, ...] = (*stiffness.CASES, *grazing.CASES, *damping.CASES, *unstable.CASES, *modes.CASES, *chatter.CASES, *resonance.CASES, *elements.CASES)
+CASES: tuple[Case, ...] = (
+    *stiffness.CASES,
+    *grazing.CASES,
+    *damping.CASES,
+    *unstable.CASES,
+    *modes.CASES,
+    *chatter.CASES,
+    *resonance.CASES,
+    *elements.CASES,
+    *continuation.CASES,
+)

@@ -102,7 +102,9 @@ def rest_depth(stiffness: float, gap: float, own: float = OWN) -> float:
     The spring pulls back with own² (gap + δ), the stop pushes with k δ^1.5.
     """
     return float(
-        brentq(lambda d: own**2 * (gap + d) + stiffness * d**1.5, 0.0, -gap, xtol=1e-300, rtol=1e-15)
+        brentq(
+            lambda d: own**2 * (gap + d) + stiffness * d**1.5, 0.0, -gap, xtol=1e-300, rtol=1e-15
+        )
     )
 
 

@@ -62,7 +62,9 @@ def damping_error(ratio: float) -> Measured:
 def multiplier_error(ratio: float) -> Measured:
     """Multipliers of the same orbit, relative to each."""
     orbit = solve_orbit(damped(ratio), 19.0)
-    exact = sorted((complex(mu) for mu in exact_orbit(orbit, precision=MORE).multipliers()), key=abs)
+    exact = sorted(
+        (complex(mu) for mu in exact_orbit(orbit, precision=MORE).multipliers()), key=abs
+    )
     found = sorted(orbit.multipliers, key=abs)
     off = [
         min(abs(a - b), abs(a - b.conjugate())) / abs(b) for a, b in zip(found, exact, strict=True)

@@ -17,9 +17,7 @@ from nldyn.hard.page import write_page
 from nldyn.result_directory import check_directory, result_directory
 
 
-def run(
-    folder: Path, *, quick: bool = False, only: str = "", workers: int = 1
-) -> list[Result]:
+def run(folder: Path, *, quick: bool = False, only: str = "", workers: int = 1) -> list[Result]:
     """Compute the cases and write their page and table.
 
     Parameters

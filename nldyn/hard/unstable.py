@@ -12,6 +12,7 @@ from nldyn.flow import FlowMap
 from nldyn.hard.case import Case, Measured
 from nldyn.hard.multiprecision import JACOBIAN, ORIGIN, ExactOrbit, exact_orbit
 from nldyn.hard.stiffness import beam_with_stop
+from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine, shooting_problem
 from nldyn.shooting import ShootingProblem
 
@@ -25,11 +26,11 @@ WANTED = ((30, 1e6, True), (80, 1e12, False), (110, 1e16, False))
 
 
 @cache
-def chaotic_states() -> np.ndarray:
+def chaotic_states() -> Real:
     """States z at every half period of a chaotic motion of the 1-DOF model."""
     flow = FlowMap(beam_with_stop(5.17e9))
-    start = flow.strobe(np.zeros(2), OMEGA, 300).ends[-1]
-    phases = np.pi * np.arange(2 * RECORDED + 1)
+    start: Real = flow.strobe(np.zeros(2), OMEGA, 300).ends[-1]
+    phases: Real = np.linspace(0.0, 2.0 * np.pi * RECORDED, 2 * RECORDED + 1)
     found = flow.shoot(start[None], phases, OMEGA, sensitivities=False, chained=True)
     return np.vstack([start[None], found.ends])
 

@@ -1,0 +1,76 @@
+"""The quick half of the hard cases, and what becomes of cases in the tables."""
+
+import math
+
+import pytest
+
+from nldyn.hard.case import Case, Measured
+from nldyn.hard.cases import CASES
+from nldyn.hard.page import row, write_page
+from nldyn.hard.run import measure, run
+from nldyn.result_directory import OutputError
+
+QUICK = [
+    pytest.param(
+        case,
+        id=f"{case.subject}: {case.name}",
+        marks=[pytest.mark.xfail(strict=True, reason=case.fault)] if case.fault else [],
+    )
+    for case in CASES
+    if case.quick
+]
+
+
+@pytest.mark.parametrize("case", QUICK)
+def test_hard_case_stays_within_its_bound(case):
+    result = measure(case)
+    assert result.passed, f"{result.measured.error:.1e} > {case.bound:.0e}: {result.measured.note}"
+
+
+def made_up(run, bound=1.0, fault=""):
+    return Case("subject", "name | x", "hard", "reference", bound, "origin", run, fault=fault)
+
+
+def failing():
+    raise ZeroDivisionError("no\nway")
+
+
+@pytest.mark.parametrize(
+    ("error", "passed"),
+    [(0.5, True), (1.0, True), (1.5, False), (math.nan, False), (math.inf, False)],
+)
+def test_a_case_passes_within_its_bound_only(error, passed):
+    assert measure(made_up(lambda: Measured(error))).passed is passed
+
+
+def test_an_exception_is_a_failed_row_that_says_why():
+    result = measure(made_up(failing, fault="known"))
+    line = row(result)
+    assert line["verdict"] == "**FAILED**"
+    assert line["note"] == "ZeroDivisionError: no way; known"
+    assert line["case"] == "name / x"
+
+
+def test_the_page_counts_what_failed(tmp_path):
+    good, bad = made_up(lambda: Measured(0.5, "fine")), made_up(failing)
+    page = write_page([measure(good), measure(bad)], 1.0, tmp_path)
+    text = page.read_text("utf-8")
+    assert "2 cases, 1 passed, 1 failed" in text
+    assert "## Subject" in text
+    table = (tmp_path / "hard_cases.csv").read_text("utf-8").splitlines()
+    assert len(table) == 3
+
+
+def test_the_suite_refuses_a_file_as_its_folder(tmp_path):
+    file = tmp_path / "file"
+    file.write_text("mine")
+    with pytest.raises(OutputError, match="is a file"):
+        run(file)
+
+
+def test_every_case_is_told_apart():
+    names = [(case.subject, case.name) for case in CASES]
+    assert len(set(names)) == len(names)
+    assert all(
+        case.bound > 0.0 and case.hard and case.reference and case.bound_from for case in CASES
+    )
