@@ -214,7 +214,8 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
     not explain the change in the number of contacts or of unstable multipliers, the chord is
     halved; so it is where multipliers near the unit circle move far, which may cross it twice.
     """
-    if depth < 5 and travel(a.orbit.multipliers, b.orbit.multipliers) > FAR:
+    most, far = (3, 0.3) if a.orbit.multipliers.size == 2 else (5, FAR)  # one mode: one pair
+    if depth < most and travel(a.orbit.multipliers, b.orbit.multipliers) > far:
         middle = Chord(a, b).at(0.5)
         return special_points_between(a, middle, depth + 1) + special_points_between(
             middle, b, depth + 1
