@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 import weakref
@@ -10,19 +11,20 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy import linalg, sparse
-from scipy.sparse.linalg import splu
 
+from cms.cholesky import Cholesky, NotPositiveDefiniteError
 from cms.component import FloatArray, SparseMatrix, times
+from cms.dissection import dissected
 from cms.errors import ReductionError
 
 DENSE_LIMIT = 1500
 GOOD_SOLUTION = 1e-12
 BAD_SOLUTION = 1e-6
-FILL, FILL_GROWTH = 12.6, 0.41  # entries of L and U over those of A, measured on blocks of bricks
 
 Solver = Callable[[FloatArray], FloatArray]
 
@@ -112,9 +114,13 @@ def factorise(matrix: SparseMatrix) -> Factor | None:
 
     A is first scaled to a unit diagonal, so that metres and radians weigh the same. Up to 1500
     rows LAPACK's Cholesky factorisation is used; above that PARDISO of the package pypardiso where
-    it is installed, else SuperLU in its symmetric mode with pivots on the diagonal only, so that
-    their signs count as in an L D L^T factorisation. The environment variable
-    ``CMS_SOLVER=superlu`` leaves PARDISO out.
+    it is installed, else `cms.cholesky`. The environment variable ``CMS_SOLVER=cholesky`` leaves
+    PARDISO out.
+
+    Raises
+    ------
+    ReductionError
+        If the factor needs more memory than there is, before it is computed.
     """
     diagonal = matrix.diagonal()
     if np.any(diagonal <= 0.0):
@@ -137,22 +143,42 @@ def factorise(matrix: SparseMatrix) -> Factor | None:
 
 
 def chosen_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
-    """The fastest sparse solver that is there, told to the listener before it begins."""
-    rows = matrix.shape[0]
-    name, solver, each = "SuperLU", sparse_solver, 36e-9
-    fill = FILL * (rows / 19800) ** FILL_GROWTH
-    if pardiso_is_there():
-        name, solver, each, fill = "PARDISO", pardiso_solver, 16e-9, 0.4 * fill
-    entries = fill * matrix.nnz
+    """PARDISO's solver or our own."""
+    return pardiso_solver(matrix) if pardiso_is_there() else cholesky_solver(matrix)
+
+
+@contextmanager
+def factorising(matrix: SparseMatrix, name: str, needed: float) -> Iterator[None]:
+    """Tell the listener of a factorisation and its memory in bytes before and after it.
+
+    Raises
+    ------
+    ReductionError
+        If there is not so much memory.
+    """
+    rows, there = matrix.shape[0], available_memory()
+    if needed > there:
+        raise ReductionError(
+            f"the factor of {rows} rows by {name} needs {1e-9 * needed:.3g} GB of memory, and only "
+            f"{1e-9 * there:.3g} GB are available: use a coarser mesh"
+        )
     announce(
-        f"factorising {rows} rows with {matrix.nnz} entries by {name}; on a solid this takes "
-        f"about {each * entries:.2g} GB at most, on plates and frames less"
-        + ("" if name == "PARDISO" else " (faster with the package pypardiso)")
+        f"factorising {rows} rows with {matrix.nnz} entries by {name}, which takes "
+        f"{1e-9 * needed:.2g} GB of memory"
     )
     start = time.perf_counter()
-    found = solver(matrix)
+    yield
     announce(f"factorised in {time.perf_counter() - start:.1f} s")
-    return found
+
+
+def available_memory() -> float:
+    """Memory in bytes that the system can still give; infinite where it does not say."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+    except OSError:
+        return math.inf
+    kilobytes = [line.split()[1] for line in lines if line.startswith("MemAvailable:")]
+    return 1024.0 * float(kilobytes[0]) if kilobytes else math.inf
 
 
 def dense_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
@@ -168,31 +194,22 @@ def dense_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
     return solver, float(np.min(np.diag(lower))) ** 2
 
 
-def sparse_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
-    """SuperLU solver and smallest pivot, or None if the matrix is not positive definite."""
-    try:
-        factors = splu(
-            matrix,
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError:  # exactly singular
-        return None
-    pivots = factors.U.diagonal()
-    if np.any(factors.perm_r != factors.perm_c) or np.any(pivots <= 0.0):
-        return None
-
-    def solver(right: FloatArray) -> FloatArray:
-        return np.asarray(factors.solve(np.ascontiguousarray(right)), dtype=np.float64)
-
-    return solver, float(np.min(pivots))
+def cholesky_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
+    """Solver and smallest pivot by fronts, or None if the matrix is not positive definite."""
+    announce(f"ordering {matrix.shape[0]} rows by nested dissection")
+    plan = dissected(matrix)
+    with factorising(matrix, "sparse Cholesky", 8.0 * plan.most_numbers):
+        try:
+            factor = Cholesky(matrix, plan)
+        except NotPositiveDefiniteError:
+            return None
+    return factor.solve, factor.smallest_pivot
 
 
 @cache
 def pardiso_is_there() -> bool:
     """Whether pypardiso and its MKL library can be loaded, and are not forbidden."""
-    if os.environ.get("CMS_SOLVER", "").lower() == "superlu":
+    if os.environ.get("CMS_SOLVER", "").lower() == "cholesky":
         return False
     try:
         import pypardiso
@@ -228,9 +245,14 @@ def pardiso_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
     pardiso.iparm[:] = 0
     for place, value in IPARM.items():
         pardiso.iparm[place - 1] = value
-    pardiso.set_phase(12)
+    nothing = np.zeros((matrix.shape[0], 1), order="F")
     try:
-        pardiso._call_pardiso(upper, np.zeros((matrix.shape[0], 1), order="F"))
+        pardiso.set_phase(11)
+        pardiso._call_pardiso(upper, nothing)
+        needed = 1024.0 * max(pardiso.iparm[14], float(pardiso.iparm[15]) + pardiso.iparm[16])
+        with factorising(matrix, "PARDISO", needed):
+            pardiso.set_phase(22)
+            pardiso._call_pardiso(upper, nothing)
     except pypardiso.pardiso_wrapper.PyPardisoError as error:
         if error.value == NOT_POSITIVE:
             return None

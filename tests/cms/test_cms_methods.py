@@ -355,7 +355,9 @@ class FakePardiso:
         self.phase = phase
 
     def _call_pardiso(self, upper, right):
-        if self.phase == 12:
+        if self.phase == 11:
+            self.iparm[14:17] = 100, 200, 300
+        if self.phase == 22:
             assert self.mtype == 2 and self.iparm[0] == 1
             whole = upper + sparse.triu(upper, k=1).T
             try:
@@ -400,11 +402,22 @@ def test_a_solver_that_returns_garbage_is_found_out(pardiso, monkeypatch, spoil)
         cms.reduce(chain(2500), modes=3)
 
 
-def test_superlu_can_be_asked_for(pardiso, monkeypatch):
-    monkeypatch.setenv("CMS_SOLVER", "superlu")
+def test_pardiso_can_be_left_out(pardiso, monkeypatch):
+    monkeypatch.setenv("CMS_SOLVER", "cholesky")
     told = []
     cms.reduce(chain(2500), modes=3, progress=told.append)
-    assert "by SuperLU" in told[0]
+    assert any("by sparse Cholesky" in text for text in told)
+
+
+def test_a_factor_that_needs_more_memory_than_there_is_is_refused(pardiso, monkeypatch):
+    """Before the work: PARDISO says after its analysis that it takes 500 kB."""
+    monkeypatch.setattr("cms.factor.available_memory", lambda: 4e5)
+    with pytest.raises(cms.ReductionError, match=r"PARDISO needs 0\.000512 GB .* 0\.0004 GB are"):
+        cms.reduce(chain(2500), modes=3)
+    monkeypatch.setenv("CMS_SOLVER", "cholesky")
+    cms.factor.pardiso_is_there.cache_clear()
+    with pytest.raises(cms.ReductionError, match="by sparse Cholesky needs"):
+        cms.reduce(chain(2500), modes=3)
 
 
 def test_fewer_modes_of_a_model_are_the_model_of_fewer_modes(cantilever):
