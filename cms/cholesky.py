@@ -83,26 +83,34 @@ class Cholesky:
 
     def solve(self, right: FloatArray) -> FloatArray:
         """A^-1 times ``right``, (N,) or (N, m)."""
-        x = right[self.plan.order].reshape(right.shape[0], -1)
+        x = np.ascontiguousarray(right[self.plan.order].reshape(right.shape[0], -1))
         blocks = list(zip(self.plan.fronts, self.diagonals, self.panels, strict=True))
         with one_thread():
             for front, factor, panel in blocks:
-                own = slice(front.start, front.stop)
-                x[own] = blas.dtrsm(1.0, factor, x[own], lower=1)
-                x[front.border] -= panel @ x[own]
+                own = x[front.start : front.stop]
+                own[:] = divided(factor, own, transposed=False)
+                x[front.border] -= panel @ own
             for front, factor, panel in reversed(blocks):
-                own = slice(front.start, front.stop)
-                left = x[own] - panel.T @ x[front.border]
-                x[own] = blas.dtrsm(1.0, factor, left, lower=1, trans_a=1)
+                own = x[front.start : front.stop]
+                own[:] = divided(factor, own - panel.T @ x[front.border], transposed=True)
         found = np.empty_like(x)
         found[self.plan.order] = x
         return found.reshape(right.shape)
 
 
+def divided(factor: FloatArray, right: FloatArray, *, transposed: bool) -> FloatArray:
+    """L^-1 or L^-T times ``right`` (n, m) in row order, as a division from the right, in place."""
+    if right.shape[1] == 1:
+        return np.asarray(blas.dtrsv(factor, right[:, 0], lower=1, trans=transposed))[:, None]
+    trans = not transposed
+    done = blas.dtrsm(1.0, factor, right.T, side=1, lower=1, trans_a=trans, overwrite_b=1)
+    return np.asarray(done.T)
+
+
 @cache
 def controller() -> ThreadpoolController:
-    """The thread pools of the libraries that numpy and scipy call."""
-    return ThreadpoolController()
+    """The thread pools of the libraries that numpy and scipy call; not those of MKL."""
+    return ThreadpoolController().select(internal_api="openblas")
 
 
 @contextmanager
@@ -112,7 +120,7 @@ def one_thread() -> Iterator[None]:
     Most blocks are small, and wait longer for a second thread than it saves where other programs
     run, too. The rounding does then not depend on the machine's number of cores.
     """
-    with controller().limit(limits=1, user_api="blas"):
+    with controller().limit(limits=1):
         yield
 
 

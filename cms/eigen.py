@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg
-from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigsh
 
 from cms.component import FloatArray, Pencil, SparseMatrix, times
 from cms.errors import ReductionError
@@ -18,6 +17,8 @@ RIGID_TOLERANCE = 64 * EPS
 ERROR_TOLERANCE = 1e-8
 LARGEST_ERROR = 1e-3
 GUARD_MODES = 2
+BLOCK = 4  # finds modes of one frequency, and takes a quarter of the passes over the factor
+DEPENDENT = 1e-12
 DENSE_AT_MOST = 6000
 
 
@@ -123,7 +124,7 @@ def lowest_modes(pencil: Pencil, shifted: Shifted, count: int) -> Modes:
     -----
     The inverse problem ``M phi = nu (K + s M) phi`` is solved, because the largest ``nu`` are the
     lowest frequencies and come out to full relative accuracy. Dense LAPACK up to 1500 degrees of
-    freedom, above that Lanczos with the sparse factorisation (ARPACK through scipy's ``eigsh``).
+    freedom, above that `lanczos_modes` with the sparse factorisation.
     """
     if count == 0:
         return Modes(np.zeros(0), np.zeros((pencil.size, 0)), np.zeros(0))
@@ -205,25 +206,56 @@ def with_fast_modes(
 
 
 def lanczos_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatArray, FloatArray]:
-    """w^2 (k,) and modes (N, k) by shift-invert Lanczos at -shift."""
-    size = pencil.size
+    """w^2 (k,) and modes (N, k) by block Lanczos for (K + s M)^-1 M, without restarts.
+
+    Each step is one solution with several right sides, which takes little longer than with one. A
+    mode has converged when what its image has outside of the basis is 1e-12 of it, or at the
+    rounding of the slowest mode. All blocks are kept orthogonal to each other (Golub and Van Loan
+    2013, *Matrix Computations*, 4th ed., section 10.3.6).
+    """
+    size, mass = pencil.size, pencil.mass
     wanted = min(count + GUARD_MODES, size - 1)
-    inverse = LinearOperator((size, size), matvec=shifted.factor.solve, dtype=np.float64)
-    start = np.random.default_rng(0).standard_normal(size)
-    try:
-        squares, vectors = eigsh(
-            pencil.stiffness,
-            k=wanted,
-            M=pencil.mass,
-            sigma=-shifted.shift,
-            OPinv=inverse,
-            v0=times(pencil.mass, start),
-            ncv=min(size, max(2 * wanted + 1, 20)),
-        )
-    except (ArpackNoConvergence, ArpackError) as error:
-        raise ReductionError(f"the eigen-solver did not converge to {count} modes") from error
-    order = np.argsort(squares)[:count]
-    return squares[order], vectors[:, order]
+    start = np.random.default_rng(0).standard_normal((size, min(BLOCK, size)))
+    basis, projected = np.zeros((size, 0)), np.zeros((0, 0))
+    image = shifted.factor.solve(times(mass, start))
+    while True:
+        fresh, outside = next_block(basis, image, mass)
+        nu, turn = linalg.eigh(projected) if projected.size else (np.zeros(0), projected)
+        nu, turn = nu[::-1][:wanted], turn[:, ::-1][:, :wanted]
+        if nu.size:
+            left = np.linalg.norm(outside @ turn[-outside.shape[1] :], axis=0)
+            converged = left <= np.maximum(1e-12 * nu, 10 * EPS * nu[0])
+            if fresh.shape[1] == 0 or (nu.size == wanted and np.all(converged)):
+                break
+        basis = np.hstack([basis, fresh])
+        image = shifted.factor.solve(times(mass, fresh))
+        columns = basis.T @ times(mass, image)
+        corner = columns[-fresh.shape[1] :]
+        above = columns[: -fresh.shape[1]]
+        projected = np.block([[projected, above], [above.T, (corner + corner.T) / 2]])
+    if nu.size < count or nu[count - 1] <= 0.0:
+        raise ReductionError(f"only {np.count_nonzero(nu > 0.0)} of {count} modes have mass")
+    return 1.0 / nu[:count] - shifted.shift, basis @ turn[:, :count]
+
+
+def next_block(
+    basis: FloatArray, image: FloatArray, mass: SparseMatrix
+) -> tuple[FloatArray, FloatArray]:
+    """What ``image`` (N, b) adds to a mass-orthonormal basis (N, m), and its coordinates there.
+
+    Directions at rounding level of the image are left out.
+    """
+    size = np.sqrt(np.maximum(np.sum(image * times(mass, image), axis=0), 0.0))
+    for _ in range(2):
+        image = image - basis @ (basis.T @ times(mass, image))
+    norms = np.sqrt(np.maximum(np.sum(image * times(mass, image), axis=0), 0.0))
+    image = np.divide(image, norms, out=np.zeros_like(image), where=norms > 10 * EPS * size)
+    share, directions = linalg.eigh(image.T @ times(mass, image))
+    directions = directions[:, share > DEPENDENT]
+    fresh = image @ (directions / np.sqrt(share[share > DEPENDENT]))
+    fresh = fresh - basis @ (basis.T @ times(mass, fresh))
+    fresh = mass_orthonormal(fresh, mass)
+    return fresh, (fresh.T @ times(mass, image)) * norms
 
 
 def mass_orthonormal(vectors: FloatArray, mass: SparseMatrix) -> FloatArray:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from cms.cholesky import one_thread
 from cms.component import (
     ComponentLike,
     FloatArray,
@@ -171,7 +172,7 @@ def reduce(
     check_count(modes, method, pencil)
     if method in FIXED and not pencil.names:
         raise ReductionError(f"method '{method}' needs an interface, and the component has none")
-    with announced(progress):
+    with announced(progress), one_thread():
         if method in FIXED:
             reduced = reduced_fixed(pencil, modes, cutoff_hz, method)
         else:
