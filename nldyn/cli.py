@@ -121,11 +121,14 @@ def run(scene: Path, out: Path, log: bool, quiet: bool) -> None:
 def check(scene: Path) -> None:
     """Check a scene, and print the modes of its structure."""
     with plain_errors():
+        from nldyn.progress import messages_shown
         from nldyn.scene import build_system, load_scene
         from nldyn.scene_checks import check_computable
 
         loaded = load_scene(scene)
-        click.echo(describe_system(build_system(loaded)))
+        with messages_shown():
+            system = build_system(loaded)
+        click.echo(describe_system(system))
         check_computable(loaded, scene)
         click.echo(f"{scene}: no fault found")
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 import shutil
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -41,6 +42,22 @@ def compilation_told(tell: Progress) -> Iterator[None]:
 
     with event.install_listener("numba:compile", Teller()):
         yield
+
+
+@contextmanager
+def messages_shown() -> Iterator[None]:
+    """Show on stderr what the package's logger is told: the solver, its memory, modes chosen."""
+    logger = logging.getLogger("nldyn")
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(logging.Formatter("\r\x1b[K%(message)s" if sys.stderr.isatty() else None))
+    before = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(before)
 
 
 @contextmanager
@@ -86,7 +103,7 @@ def progress_line(quiet: bool = False) -> Iterator[Progress]:
         print(line, end="" if terminal else "\n", file=sys.stderr, flush=True)
 
     try:
-        with compilation_told(report):
+        with compilation_told(report), nullcontext() if quiet else messages_shown():
             yield report
     finally:
         if terminal and not quiet:

@@ -5,6 +5,7 @@ This module joins `fem`, `cms` and `nldyn`.
 
 from __future__ import annotations
 
+import logging
 import re
 import tomllib
 from collections.abc import Iterator
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from nldyn.elements import Damper, Excitation, Stop
     from nldyn.exploration import Exploration
     from nldyn.flow import FlowMap
+    from nldyn.selection import Selection
     from nldyn.system import System
 
 __all__ = [
@@ -41,12 +43,15 @@ __all__ = [
     "SceneError",
     "build_component",
     "build_reduced",
+    "build_selection",
     "build_system",
     "compute",
     "explore_scene",
     "load_scene",
     "parse_scene",
 ]
+
+logger = logging.getLogger("nldyn")
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -136,9 +141,7 @@ def scene_from_tables(tables: dict[str, Any], file: str | Path, text: str = "") 
     return scene
 
 
-def build_component(
-    scene: Scene, refinement: int = 1
-) -> fem.Component | fem.StructureComponent:
+def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.StructureComponent:
     """Assemble the mesh of a scene.
 
     Parameters
@@ -229,6 +232,10 @@ def build_reduced(
     component = component or build_component(scene)
     table = scene.reduction
     assert table is not None
+    if table.tolerance is not None:
+        selection = build_selection(scene, component)
+        logger.info(selection.report())
+        return selection.reduced
     pieces = _count_pieces(len(component.model.mesh.points), component.model.links)
     hint = f"; the mesh is in {pieces} pieces that share no node" if pieces > 1 else ""
     with _told_as(scene, ("reduction",), cms.ReductionError, hint=hint):
@@ -238,12 +245,49 @@ def build_reduced(
             cutoff_hz=table.cutoff_hz,
             method=table.method,
             residual=table.residual,
+            progress=logger.info,
         )
         if pieces > 1 and reduced.rigid_body_modes:
             count = reduced.rigid_body_modes
             modes = f"{count} rigid-body mode{'s' if count > 1 else ''}"
             raise cms.ReductionError(f"the component floats ({modes})")
         return reduced
+
+
+def build_selection(
+    scene: Scene, component: fem.Component | fem.StructureComponent | None = None
+) -> Selection:
+    """Choose the modes of a scene by the tolerance of its ``[reduction]``.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with a ``[mesh]`` and ``tolerance`` in ``[reduction]``.
+    component : fem.Component or fem.StructureComponent, optional
+        What `build_component` gave for this scene, if it is at hand.
+
+    Returns
+    -------
+    Selection
+        As `nldyn.reduce_for` gives it.
+
+    Raises
+    ------
+    SceneError
+        As for `build_component`, if there is nothing to compute, and if no model can be chosen.
+    """
+    import cms
+    from nldyn.orbit import ConvergenceError
+    from nldyn.selection import reduce_for
+    from nldyn.setting import setting_of
+
+    table = scene.reduction
+    assert table is not None and table.tolerance is not None
+    setting = setting_of(scene)
+    component = component or build_component(scene)
+    faults = (cms.ReductionError, ConvergenceError, SystemModelError)
+    with _told_as(scene, ("reduction",), *faults):
+        return reduce_for(component, setting, tolerance=table.tolerance)
 
 
 def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> System:
@@ -605,9 +649,7 @@ def _observed_first(scene: Scene, interfaces: Any) -> dict[str, Any]:
 
 
 @contextmanager
-def _told_as(
-    scene: Scene, key: KeyPath, *kinds: type[ValueError], hint: str = ""
-) -> Iterator[None]:
+def _told_as(scene: Scene, key: KeyPath, *kinds: type[Exception], hint: str = "") -> Iterator[None]:
     """Tell an error of a lower layer as one of this scene's."""
     try:
         yield

@@ -180,6 +180,7 @@ class ReductionTable(Table):
 
     modes: Annotated[int, Field(ge=0)] | None = None
     cutoff_hz: Frequency | None = None
+    tolerance: Annotated[float, Field(ge=1e-6, lt=1.0)] | None = None
     residual: bool = True
     method: Literal["rubin", "craig-bampton", "guyan", "truncation"] = "rubin"
 
@@ -188,9 +189,12 @@ class ReductionTable(Table):
         if not self.residual and self.method not in ("rubin", "truncation"):
             raise ValueError("has 'residual = false', which is method 'truncation'; keep one")
         if self.method == "guyan":
-            _refuse(self, ("modes", "cutoff_hz"), "method 'guyan', which keeps no modes")
+            names = ("modes", "cutoff_hz", "tolerance")
+            _refuse(self, names, "method 'guyan', which keeps no modes")
             return self
-        _exactly_one(self, "modes", "cutoff_hz")
+        _exactly_one(self, "modes", "cutoff_hz", "tolerance")
+        if not self.residual or self.method != "rubin":
+            _refuse(self, ("tolerance",), "methods other than 'rubin'")
         return self
 
 
@@ -414,11 +418,13 @@ class Scene(Table):
         return self.observe.at if self.observe else self.interface_names[0]
 
 
-def _exactly_one(table: BaseModel, first: str, second: str) -> None:
-    given = [name for name in (first, second) if getattr(table, name) is not None]
+def _exactly_one(table: BaseModel, *names: str) -> None:
+    given = [name for name in names if getattr(table, name) is not None]
     if len(given) != 1:
-        fault = "has both" if given else "needs one of"
-        raise ValueError(f"{fault} '{first}' and '{second}'" + ("; keep one" if given else ""))
+        chosen = given or names
+        fault = ("has both" if len(given) == 2 else "has") if given else "needs one of"
+        listed = ", ".join(f"'{name}'" for name in chosen[:-1]) + f" and '{chosen[-1]}'"
+        raise ValueError(f"{fault} {listed}" + ("; keep one" if given else ""))
 
 
 def _refuse(table: BaseModel, names: tuple[str, ...], of: str) -> None:

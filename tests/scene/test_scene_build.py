@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from nldyn.resources import example, examples, mesh
 from nldyn.scene import (
     build_component,
     build_reduced,
+    build_selection,
     build_system,
     compute,
     load_scene,
@@ -89,6 +91,44 @@ def test_cutoff_gives_the_same_model_as_the_mode_count():
     np.testing.assert_allclose(
         build_reduced(other).frequencies_hz, build_reduced(scene).frequencies_hz, rtol=1e-8
     )
+
+
+def with_tolerance(*changes):
+    """The beam with its modes chosen by a tolerance."""
+    scene = load_scene(example("four_dof_xi_0.01.toml"))
+    text = scene.text
+    for old, new in (("modes = 3", "tolerance = 0.3"), *changes):
+        assert old in text
+        text = text.replace(old, new)
+    return parse_scene(text, scene.file)
+
+
+def test_a_tolerance_asks_for_a_selection_in_the_scenes_setting(monkeypatch, caplog):
+    asked = {}
+
+    def reduce_for(component, setting, *, tolerance):
+        assert set(component.interfaces) == {"middle"}
+        asked.update(range=setting.range_hz, tolerance=tolerance)
+        return SimpleNamespace(reduced="the model", report=lambda: "modes kept: 1")
+
+    monkeypatch.setattr("nldyn.selection.reduce_for", reduce_for)
+    with caplog.at_level("INFO", logger="nldyn"):
+        assert build_reduced(with_tolerance()) == "the model"
+    assert asked == {"range": (15.0, 90.0), "tolerance": 0.3}
+    assert "modes kept: 1" in caplog.text
+
+
+@pytest.mark.parametrize(
+    "old, new, sentence",
+    [
+        ("modal_ratio = 0.01", "modal_ratio = [0.01, 0.01]", "must be one number where the number"),
+        ("tolerance = 0.3", "tolerance = 0.01", "may matter, more than 3; reduce by hand"),
+    ],
+)
+def test_a_tolerance_that_cannot_be_met_is_told(old, new, sentence, monkeypatch):
+    monkeypatch.setattr("nldyn.selection.MOST_MODES", 3)
+    with pytest.raises(SceneError, match=sentence):
+        build_selection(with_tolerance((old, new)))
 
 
 def test_sections_of_every_kind(tmp_path):

@@ -299,6 +299,23 @@ def test_fault_in_modal_scene(tmp_path, old, new, sentence):
             "modes = 1\ncutoff_hz = 500.0",
             "reduction has both 'modes' and 'cutoff_hz'; keep one",
         ),
+        (
+            "modes = 1",
+            "modes = 1\ncutoff_hz = 500.0\ntolerance = 0.1",
+            "reduction has 'modes', 'cutoff_hz' and 'tolerance'; keep one",
+        ),
+        (
+            "modes = 1",
+            "",
+            "reduction needs one of 'modes', 'cutoff_hz' and 'tolerance'",
+        ),
+        ("modes = 1", "tolerance = 1.0", "reduction.tolerance must be less than 1, not 1.0"),
+        ("modes = 1", "tolerance = 0", "reduction.tolerance must be at least 1e-06, not 0"),
+        (
+            "modes = 1",
+            'tolerance = 0.1\nmethod = "truncation"',
+            "reduction has 'tolerance', which is not a key of methods other than 'rubin'",
+        ),
         ("half_beam.msh", "full.msh", "mesh.file names FULL, which does not exist"),
         ("half_beam.msh", "", "mesh.file names FOLDER, which is a folder"),
         (
