@@ -52,6 +52,7 @@ __all__ = [
 ]
 
 logger = logging.getLogger("nldyn")
+LARGE = 20000  # degrees of freedom from which on the factorisation takes seconds
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -245,7 +246,7 @@ def build_reduced(
             cutoff_hz=table.cutoff_hz,
             method=table.method,
             residual=table.residual,
-            progress=logger.info,
+            progress=logger.info if component.mass.shape[0] > LARGE else None,
         )
         if pieces > 1 and reduced.rigid_body_modes:
             count = reduced.rigid_body_modes

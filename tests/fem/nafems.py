@@ -2,8 +2,9 @@
 
 Dimensions and reference values are those of "Selected Benchmarks for Natural Frequency Analysis"
 (NAFEMS R0015, 1987) as quoted in the verification manual of OptiStruct (OS-V 0400 to 0455,
-help.altair.com), and for FV5 the issue of 1989 on caesarsystems.co.uk/NAFEMS_benchmarks. For the
-seventh mode of FV52 the manual prints 265.81 Hz beside a ratio that belongs to 167.89 Hz.
+help.altair.com), for FV3 in that of SOLIDWORKS Simulation (help.solidworks.com), and for FV5 the
+issue of 1989 on caesarsystems.co.uk/NAFEMS_benchmarks. For the seventh mode of FV52 the manual
+prints 265.81 Hz beside a ratio that belongs to 167.89 Hz.
 """
 
 from dataclasses import dataclass
@@ -57,6 +58,14 @@ def off_centre_masses():
             fem.PointMass("b", 1000.0, offset=(0.0, 2.0, 0.0)),
         ],
     )
+
+
+def square_frame():
+    """FV3: a free frame of 10 m by 10 m, bars 0.25 m square, in its plane."""
+    corners = {"a": (0, 0, 0), "b": (10, 0, 0), "c": (10, 10, 0), "d": (0, 10, 0)}
+    bars = [("bars", p, q, 8) for p, q in ("ab", "bc", "cd", "da")]
+    section = fem.BeamPart(STEEL, fem.RectangularSection(0.25, 0.25))
+    return fem.FrameModel(fem.frame_mesh(corners, bars), {"bars": section})
 
 
 def deep_beam():
@@ -121,6 +130,11 @@ BENCHMARKS = [
     Benchmark(
         "FV2 pin-ended double cross", double_cross, 0,
         (11.336, *[17.709] * 7, 45.345, *[57.390] * 7), "plane frame, 8 elements per arm", 0.006,
+    ),
+    Benchmark(
+        "FV3 free square frame", square_frame, 3,
+        (3.261, 5.668, 11.136, 11.136, 12.849, 24.570, 28.695, 28.695),
+        "plane frame, 8 elements per bar", 0.003,
     ),
     Benchmark(
         "FV4 cantilever, masses off centre", off_centre_masses, 0,
