@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import meshio
 import numpy as np
 import numpy.typing as npt
 
+from fem.abaqus import SOLIDS
 from fem.errors import ModelError, quoted
 from fem.files import plain_write_errors
-from fem.mesh import FrameMesh, IntArray
+from fem.mesh import FloatArray, FrameMesh, IntArray
 from fem.read import SET_PREFIX
 from fem.structure_mesh import StructureMesh
+
+ABAQUS_TYPES = {kind: name for name, kind in SOLIDS.items() if not name.startswith("CPE")}
+ABAQUS_TYPES |= {"line": "B31", "line3": "B32"}
 
 
 def write_mesh(mesh: FrameMesh | StructureMesh, path: str | Path) -> None:
@@ -21,15 +26,16 @@ def write_mesh(mesh: FrameMesh | StructureMesh, path: str | Path) -> None:
     Parameters
     ----------
     mesh
-        The mesh. One of a structure is written as ``.vtu`` only.
+        The mesh. One of a structure is written as ``.vtu`` or ``.inp`` only.
     path
-        File ending in ``.msh`` (Gmsh 2.2, ASCII), ``.vtu`` or ``.inp`` (Abaqus, B21 elements).
+        File ending in ``.msh`` (Gmsh 2.2, ASCII), ``.vtu`` or ``.inp`` (Abaqus: B21 elements of a
+        frame; B31, CPS and C3D elements of a structure).
 
     Raises
     ------
     ModelError
-        For another extension, for parts that overlap in a Gmsh file, which cannot say so, or if
-        the file cannot be written.
+        For another extension, for parts that overlap in a Gmsh file, which cannot say so, for
+        cells that Abaqus has no elements for, or if the file cannot be written.
 
     Examples
     --------
@@ -42,10 +48,11 @@ def write_mesh(mesh: FrameMesh | StructureMesh, path: str | Path) -> None:
     """
     path = Path(path)
     if isinstance(mesh, StructureMesh):
-        if path.suffix.lower() != ".vtu":
-            raise ModelError(f"{path}: the mesh of a structure is written as '.vtu' only")
+        structures = {".vtu": _write_structure, ".inp": _write_abaqus_structure}
+        if path.suffix.lower() not in structures:
+            raise ModelError(f"{path}: the mesh of a structure is written as '.vtu' or '.inp' only")
         with plain_write_errors(path):
-            _write_structure(mesh, path)
+            structures[path.suffix.lower()](mesh, path)
         return
     writers = {".msh": _write_gmsh, ".vtu": _write_vtu, ".inp": _write_abaqus}
     if path.suffix.lower() not in writers:
@@ -133,15 +140,48 @@ def _indicator(indices: IntArray, count: int) -> IntArray:
 
 
 def _write_abaqus(mesh: FrameMesh, path: Path) -> None:
+    _write_deck(path, mesh.points, [("B21", mesh.lines)], mesh.parts, mesh.point_sets)
+
+
+def _write_abaqus_structure(mesh: StructureMesh, path: Path) -> None:
+    for kind in mesh.cells:
+        if kind not in ABAQUS_TYPES:
+            raise ModelError(f"{path}: Abaqus has no elements for cells of kind {kind!r}")
+    counts = [len(cells) for cells in mesh.cells.values()]
+    first = dict(zip(mesh.cells, np.cumsum([0, *counts]).tolist(), strict=False))
+    groups = {
+        name: np.concatenate([first[kind] + cells for kind, cells in group.items()])
+        for name, group in mesh.groups.items()
+        if group
+    }
+    elements = [(ABAQUS_TYPES[kind], cells) for kind, cells in mesh.cells.items()]
+    _write_deck(path, mesh.points, elements, groups, mesh.point_sets)
+
+
+def _write_deck(
+    path: Path,
+    points: FloatArray,
+    elements: Sequence[tuple[str, IntArray]],
+    groups: Mapping[str, IntArray],
+    point_sets: Mapping[str, IntArray],
+) -> None:
+    """Nodes, elements by type and their sets, labelled from 1."""
     rows = ["*HEADING", path.stem, "*NODE"]
-    for label, xyz in enumerate(mesh.points.tolist(), start=1):
+    for label, xyz in enumerate(points.tolist(), start=1):
         rows.append(", ".join([str(label), *(repr(x) for x in xyz)]))
-    rows.append("*ELEMENT, TYPE=B21")
-    for label, (start, stop) in enumerate((mesh.lines + 1).tolist(), start=1):
-        rows.append(f"{label}, {start}, {stop}")
-    for keyword, sets in (("ELSET", mesh.parts), ("NSET", mesh.point_sets)):
+    label = 0
+    for name, cells in elements:
+        rows.append(f"*ELEMENT, TYPE={name}")
+        for nodes in (cells + 1).tolist():
+            label += 1
+            rows.append(",\n".join(_lines_of_16([label, *nodes])))
+    for keyword, sets in (("ELSET", groups), ("NSET", point_sets)):
         for name, indices in sets.items():
-            labels = [str(index + 1) for index in indices.tolist()]
             rows.append(f"*{keyword}, {keyword}={name}")
-            rows.extend(", ".join(labels[i : i + 16]) for i in range(0, len(labels), 16))
+            rows.extend(_lines_of_16((indices + 1).tolist()))
     path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+
+
+def _lines_of_16(labels: list[int]) -> list[str]:
+    """Numbers in lines of 16, more than which Abaqus does not read."""
+    return [", ".join(map(str, labels[i : i + 16])) for i in range(0, len(labels), 16)]

@@ -52,22 +52,39 @@ def test_hexahedra_of_gmsh_have_the_nodes_where_they_are_expected(kind):
     np.testing.assert_allclose(found[1], found[0], rtol=1e-8)
 
 
-def test_a_written_mesh_of_solids_comes_back_to_the_last_bit(tmp_path):
+@pytest.mark.parametrize("extension", [".vtu", ".inp"])
+def test_a_written_mesh_of_solids_comes_back_to_the_last_bit(tmp_path, extension):
     block = fem.box_mesh("block", (1 / 3, 0.1, np.pi), (2, 1, 2))
     tail = fem.structure_mesh(
         fem.frame_mesh({"a": (0, 0, 0), "b": (-1, 0, 0)}, [("t", "a", "b", 2)])
     )
     mesh = fem.joined([block, tail])
     assert len(mesh.points) == len(block.points) + len(tail.points) - 1
-    fem.write_mesh(mesh, tmp_path / "mesh.vtu")
-    back = fem.read_structure(tmp_path / "mesh.vtu")
+    path = tmp_path / f"mesh{extension}"
+    fem.write_mesh(mesh, path)
+    back = fem.read_structure(path)
     assert np.array_equal(back.points, mesh.points)
     assert all(np.array_equal(back.cells[kind], cells) for kind, cells in mesh.cells.items())
     assert back.part("t").keys() == {"line"} and back.part("block").keys() == {"hexahedron20"}
     for name in mesh.names:
         assert np.array_equal(back.nodes(name), mesh.nodes(name))
-    with pytest.raises(fem.ModelError, match=r"of a structure is written as '\.vtu' only"):
+    with pytest.raises(fem.ModelError, match=r"of a structure is written as '\.vtu' or '\.inp'"):
         fem.write_mesh(mesh, tmp_path / "mesh.msh")
+
+
+@pytest.mark.parametrize("kind", ["triangle6", "quad8", "tetra10", "hexahedron"])
+def test_abaqus_files_keep_every_kind_of_cell(tmp_path, kind):
+    lengths = (1.0, 0.5, 0.25)[: 2 if kind[0] in "tq" and kind != "tetra10" else 3]
+    mesh = fem.box_mesh("block", lengths, (2, 1, 1)[: len(lengths)], kind=kind)
+    fem.write_mesh(mesh, tmp_path / "block.inp")
+    back = fem.read_structure(tmp_path / "block.inp")
+    assert np.array_equal(back.cells[kind], mesh.cells[kind])
+
+
+def test_cells_that_abaqus_does_not_have_are_told(tmp_path):
+    mesh = fem.box_mesh("block", (1.0, 1.0), (1, 1), kind="quad9")
+    with pytest.raises(fem.ModelError, match="no elements for cells of kind 'quad9'"):
+        fem.write_mesh(mesh, tmp_path / "block.inp")
 
 
 def test_elements_of_abaqus_may_go_on_over_lines(tmp_path):
