@@ -12,8 +12,12 @@ from strings import MASSES, SETTING, string
 import cms
 import fem
 from nldyn import Setting, Stop, SystemModelError, Unbalance, reduce_for, solve_orbit
-from nldyn.convergence import largest_force
+from nldyn.convergence import harmonic_branch, largest_force
+from nldyn.peaks import resonance_peaks
+from nldyn.resources import example
+from nldyn.scene import build_component, load_scene
 from nldyn.selection import contact_duration
+from nldyn.setting import setting_of
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +69,6 @@ def test_true_error_lies_within_the_stated_band(selection):
     assert true_error(string(), SETTING, selection.reduced, MASSES) <= high * 1.05
 
 
-@pytest.mark.slow
 def test_true_error_of_a_solid_lies_within_the_stated_band():
     """A cantilever of second-order hexahedra with a stop below its tip, against 24 modes."""
     mesh = fem.box_mesh("bar", (0.3, 0.02, 0.01), (6, 1, 1))
@@ -118,6 +121,31 @@ def test_contact_of_a_sphere_is_hertz_formula():
 def test_a_tolerance_out_of_range_is_told(tolerance):
     with pytest.raises(SystemModelError, match="tolerance must lie in"):
         reduce_for(string(), SETTING, tolerance=tolerance)
+
+
+@pytest.mark.slow
+def test_true_error_of_the_beam_lies_within_the_stated_band():
+    """Harmonic branches of the chosen model and of 20 modes, at seven frequencies and the peak."""
+    scene = load_scene(example("four_dof_xi_0.01.toml"))
+    component, setting = build_component(scene), setting_of(scene)
+    selection = reduce_for(component, setting, tolerance=0.01)
+    models = (cms.reduce(component, modes=20), selection.reduced)
+    full, small = (harmonic_branch(setting.system(m), setting, lambda hz: None) for m in models)
+    pairs = [
+        (full.at(float(hz))[0], small.at(float(hz))[0])
+        for hz in np.geomspace(*setting.range_hz, 9)[1:-1]
+    ]
+    tops = [max(resonance_peaks(b), key=lambda p: p.height).orbit for b in (full, small)]
+    pairs.append((tops[0], tops[1]))
+    strongest = max(largest_force(exact) for exact, _ in pairs)
+    errors = [
+        max(
+            abs(found.max_abs_displacement / exact.max_abs_displacement - 1.0),
+            abs(largest_force(found) - largest_force(exact)) / strongest,
+        )
+        for exact, found in pairs
+    ]
+    assert max(errors) <= selection.error[1] * 1.05
 
 
 @pytest.mark.slow
