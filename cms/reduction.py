@@ -173,10 +173,17 @@ def reduce(
     if method in FIXED and not pencil.names:
         raise ReductionError(f"method '{method}' needs an interface, and the component has none")
     with announced(progress), one_thread():
-        if method in FIXED:
-            reduced = reduced_fixed(pencil, modes, cutoff_hz, method)
-        else:
-            reduced = reduced_free(pencil, modes, cutoff_hz, method)
+        try:
+            if method in FIXED:
+                reduced = reduced_fixed(pencil, modes, cutoff_hz, method)
+            else:
+                reduced = reduced_free(pencil, modes, cutoff_hz, method)
+        except np.linalg.LinAlgError as error:
+            reason = str(error).rstrip(".")
+            raise ReductionError(
+                "the modes cannot be computed, as the entries of the stiffness or of the mass "
+                f"differ too much in size ({reason})"
+            ) from error
     return with_component_damping(reduced, component)
 
 

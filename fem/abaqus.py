@@ -9,7 +9,7 @@ same `meshio.Mesh`.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -29,7 +29,8 @@ SOLIDS = {f"{p}{count}": kind for p in ("CPS", "CPE") for count, kind in _PLANE_
 SOLIDS |= {"C3D4": "tetra", "C3D8": "hexahedron", "C3D10": "tetra10", "C3D20": "hexahedron20"}
 """Solid elements by the kind of their cells; a suffix for another integration changes nothing."""
 
-LONGEST_RANGE = 10_000_000
+LONGEST_RANGE = 10_000_000  # numbers, of all ranges of a file together
+MOST_INCLUDED = 100  # files, each counted as often as it is included
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,9 @@ class _Keyword:
 @dataclass
 class _Deck:
     path: Path
+    folders: list[Path] = field(default_factory=list)
+    included: int = 0
+    generated: int = 0
     nodes: dict[int, list[float]] = field(default_factory=dict)
     elements: dict[int, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
     sets: dict[str, dict[str, tuple[str, list[int]]]] = field(
@@ -55,7 +59,7 @@ class _Deck:
         self.sets[kind].setdefault(name.upper(), (name, []))[1].extend(labels)
 
 
-def read_abaqus(path: str | Path) -> meshio.Mesh:
+def read_abaqus(path: str | Path, include_folders: Iterable[str | Path] = ()) -> meshio.Mesh:
     """Read the nodes, elements and sets of an Abaqus input file.
 
     Parameters
@@ -64,6 +68,8 @@ def read_abaqus(path: str | Path) -> meshio.Mesh:
         Input file with ``*NODE``, ``*ELEMENT``, ``*NSET``, ``*ELSET`` (lists, names of sets,
         GENERATE) and ``*INCLUDE``; other keywords are passed over. Upper and lower case are the
         same, and a set keeps the spelling of its first occurrence.
+    include_folders
+        Folders below which included files may be, beside that of the file.
 
     Returns
     -------
@@ -75,15 +81,16 @@ def read_abaqus(path: str | Path) -> meshio.Mesh:
     ------
     ModelError
         For a label defined twice (several parts in one file), one that is not defined, an
-        instance that is moved, or a second-order element.
+        instance that is moved, a second-order element, or an included file in another folder.
 
     Examples
     --------
     >>> read_abaqus("meshes/half_beam.inp").cells[0].type
     'line'
     """
-    deck = _Deck(Path(path))
-    for keyword in _keywords(deck.path):
+    folders = [Path(path).parent, *map(Path, include_folders)]
+    deck = _Deck(Path(path), [folder.resolve() for folder in folders])
+    for keyword in _keywords(deck, deck.path):
         if keyword.name in _ACTIONS:
             _ACTIONS[keyword.name](deck, keyword)
     if not deck.nodes:
@@ -91,18 +98,18 @@ def read_abaqus(path: str | Path) -> meshio.Mesh:
     return _to_meshio(deck)
 
 
-def _keywords(path: Path) -> Iterator[_Keyword]:
+def _keywords(deck: _Deck, path: Path) -> Iterator[_Keyword]:
     current: _Keyword | None = None
     for line in _logical_lines(path):
         words = [word.strip() for word in line.split(",")]
         if line.startswith("*"):
             if current:
-                yield from _included(path, current)
+                yield from _included(deck, path, current)
             current = _Keyword(words[0][1:].strip().upper(), _parameters(words[1:]), [])
         elif current:
             current.rows.append(words)
     if current:
-        yield from _included(path, current)
+        yield from _included(deck, path, current)
 
 
 def _logical_lines(path: Path) -> Iterator[str]:
@@ -117,14 +124,19 @@ def _logical_lines(path: Path) -> Iterator[str]:
             yield line
 
 
-def _included(path: Path, keyword: _Keyword) -> Iterator[_Keyword]:
+def _included(deck: _Deck, path: Path, keyword: _Keyword) -> Iterator[_Keyword]:
     if keyword.name != "INCLUDE":
         yield keyword
         return
     other = path.parent / keyword.parameters.get("INPUT", "")
+    if not any(other.resolve().is_relative_to(folder) for folder in deck.folders):
+        raise ModelError(f"{path}: the included file {other} is in a folder that is not allowed")
     if not other.is_file():
         raise ModelError(f"{path}: the included file {other} does not exist")
-    yield from _keywords(other)
+    deck.included += 1
+    if deck.included > MOST_INCLUDED:
+        raise ModelError(f"{path}: more than {MOST_INCLUDED} files are included, perhaps in a circle")
+    yield from _keywords(deck, other)
 
 
 def _parameters(words: list[str]) -> dict[str, str]:
@@ -178,7 +190,8 @@ def _read_set(deck: _Deck, keyword: _Keyword) -> None:
     for row in ([word for word in row if word] for row in keyword.rows):
         if "GENERATE" in keyword.parameters:
             first, last, step = [*(int(word) for word in row), 1][:3]
-            if step < 1 or last - first > LONGEST_RANGE * step:
+            deck.generated += max(0, last - first) // max(step, 1)
+            if step < 1 or deck.generated > LONGEST_RANGE:
                 raise deck.fail(f"set {name!r} cannot run from {first} to {last} by {step}")
             deck.grow(kind, name, list(range(first, last + 1, step)))
         else:

@@ -104,8 +104,8 @@ def write_page(
     }
     text = TEMPLATE.read_text(encoding="utf-8")
     text = text.replace("__TITLE__", html.escape(heading or "Shapes"))
-    # "</" could end the script; JSON allows "<\\/" for it
-    data = json.dumps(content, ensure_ascii=False).replace("</", "<\\/")
+    # "</script" could end the data, "<!--<script" hide their end; JSON has another way to write "<"
+    data = json.dumps(content, ensure_ascii=False).replace("<", "\\u003c")
     with plain_write_errors(target), draft_of(target) as draft:
         draft.write_text(text.replace("__DATA__", data), encoding="utf-8")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TypeVar
 
@@ -12,8 +12,10 @@ import numpy as np
 from fem.abaqus import read_abaqus
 from fem.cells import KINDS
 from fem.errors import ModelError, quoted
+from fem.gmsh import read_gmsh
 from fem.mesh import FloatArray, FrameMesh, IntArray
 from fem.structure_mesh import StructureMesh
+from fem.unpacking import bounded_unpacking
 
 Mesh = TypeVar("Mesh", FrameMesh, StructureMesh)
 
@@ -21,24 +23,20 @@ SET_PREFIX = "set:"
 FARTHEST = 1e50
 
 
-def read_gmsh(path: Path) -> meshio.Mesh:
-    """Read a Gmsh file that has its end: of one that is cut off, meshio reads what is there."""
-    content = path.read_bytes()
-    if b"$MeshFormat" not in content:
-        raise ModelError(f"{path}: is not a Gmsh file (there is no $MeshFormat)")
-    if b"$EndElements" not in content:
-        raise ModelError(f"{path}: the Gmsh file is cut off (there is no $EndElements)")
-    return meshio.gmsh.read(path)
+def read_vtu(path: Path) -> meshio.Mesh:
+    """Read a VTK file, without unpacking endlessly."""
+    with bounded_unpacking(path):
+        return meshio.vtu.read(path)
 
 
 READERS: dict[str, tuple[str, Callable[[Path], meshio.Mesh]]] = {
     ".msh": ("Gmsh", read_gmsh),
-    ".vtu": ("VTK", meshio.vtu.read),
+    ".vtu": ("VTK", read_vtu),
     ".inp": ("Abaqus", read_abaqus),
 }
 
 
-def read_mesh(path: str | Path) -> FrameMesh:
+def read_mesh(path: str | Path, include_folders: Iterable[str | Path] = ()) -> FrameMesh:
     """Read a line mesh with its named parts and points.
 
     Parameters
@@ -52,6 +50,9 @@ def read_mesh(path: str | Path) -> FrameMesh:
           cell array ``set:NAME`` that is not zero on the elements of a part names the part, and
           a point array ``set:NAME`` that is not zero at one node names a point.
         - ``.inp``: Abaqus input. ELSET and NSET, also those given on ``*ELEMENT`` and ``*NODE``.
+
+    include_folders
+        Folders from which an Abaqus file may ``*INCLUDE`` others, beside its own.
 
     Returns
     -------
@@ -73,10 +74,12 @@ def read_mesh(path: str | Path) -> FrameMesh:
     >>> sorted(mesh.parts), sorted(mesh.point_sets)
     (['beam', 'leaf'], ['corner', 'foot', 'middle'])
     """
-    return _read(path, from_meshio)
+    return _read(path, from_meshio, include_folders)
 
 
-def read_structure(path: str | Path) -> StructureMesh:
+def read_structure(
+    path: str | Path, include_folders: Iterable[str | Path] = ()
+) -> StructureMesh:
     """Read a mesh of lines, surfaces and volumes with its named groups and points.
 
     Parameters
@@ -85,6 +88,8 @@ def read_structure(path: str | Path) -> StructureMesh:
         A file as for `read_mesh`. In ``.msh`` files all physical groups are groups of cells, and
         physical points are point sets; in ``.vtu`` files the arrays ``set:NAME``; in ``.inp``
         files ELSET are groups and NSET point sets.
+    include_folders
+        As for `read_mesh`.
 
     Returns
     -------
@@ -102,10 +107,14 @@ def read_structure(path: str | Path) -> StructureMesh:
     >>> sorted(fem.read_structure("meshes/half_beam.msh").groups)
     ['beam', 'leaf']
     """
-    return _read(path, structure_from_meshio)
+    return _read(path, structure_from_meshio, include_folders)
 
 
-def _read(path: str | Path, build: Callable[[meshio.Mesh, str], Mesh]) -> Mesh:
+def _read(
+    path: str | Path,
+    build: Callable[[meshio.Mesh, str], Mesh],
+    include_folders: Iterable[str | Path],
+) -> Mesh:
     path = Path(path)
     if path.suffix.lower() not in READERS:
         raise ModelError(
@@ -117,13 +126,12 @@ def _read(path: str | Path, build: Callable[[meshio.Mesh, str], Mesh]) -> Mesh:
         raise ModelError(f"{path}: the mesh file is empty")
     kind, read = READERS[path.suffix.lower()]
     try:
-        return build(read(path), str(path))
+        content = read_abaqus(path, include_folders) if read is read_abaqus else read(path)
+        return build(content, str(path))
     except ModelError:
         raise
     except (Exception, SystemExit) as error:
         reason = " ".join(str(error).split()) or "it is damaged or cut off"
-        if "'gmsh:physical'" in reason:
-            reason = "some curves or points have a physical group and some have none"
         if "zero-size array" in reason:
             raise ModelError(f"{path}: the mesh is empty, it has no elements") from error
         raise ModelError(f"{path}: cannot be read as {kind} mesh ({reason})") from error
@@ -145,10 +153,11 @@ def from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> FrameMesh:
     points = _three_coordinates(content, source)
     lines, parts = _lines_and_parts(content, source)
     _check_far(points, source)
+    _check_nodes("line", lines, len(points), source)
     used = np.unique(lines)
     number = np.full(len(points), -1)
     number[used] = np.arange(len(used))
-    sets = {name: number[nodes] for name, nodes in _point_sets(content).items()}
+    sets = {name: number[nodes] for name, nodes in _point_sets(content, source).items()}
     return FrameMesh(
         points[used],
         number[lines],
@@ -197,7 +206,7 @@ def structure_from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> 
             for name, group in groups.items()
             if any(len(cells) for found in group.values() for cells in found)
         },
-        {name: nodes for name, nodes in _point_sets(content).items() if len(nodes)},
+        {name: nodes for name, nodes in _point_sets(content, source).items() if len(nodes)},
         source,
     )
 
@@ -209,6 +218,13 @@ def _check_far(points: FloatArray, source: str) -> None:
             f"{source}: the coordinates of node {bad[0]} (counted from 0) are not finite numbers"
             f" below {FARTHEST:g} m"
         )
+
+
+def _check_nodes(what: str, nodes: IntArray, count: int, source: str) -> None:
+    """Refuse nodes that are not there, which numpy would count from the end."""
+    bad = np.flatnonzero(((nodes < 0) | (nodes >= count)).reshape(len(nodes), -1).any(axis=1))
+    if len(bad):
+        raise ModelError(f"{source}: {what} {bad[0]} (counted from 0) has a node that is not there")
 
 
 def _three_coordinates(content: meshio.Mesh, source: str) -> FloatArray:
@@ -240,7 +256,7 @@ def _lines_and_parts(content: meshio.Mesh, source: str) -> tuple[IntArray, dict[
     return np.concatenate(lines), {name: np.concatenate(p) for name, p in parts.items()}
 
 
-def _point_sets(content: meshio.Mesh) -> dict[str, IntArray]:
+def _point_sets(content: meshio.Mesh, source: str) -> dict[str, IntArray]:
     sets: dict[str, list[IntArray]] = {}
     for name, nodes in content.point_sets.items():
         sets.setdefault(str(name), []).append(np.asarray(nodes, dtype=np.int64))
@@ -251,7 +267,10 @@ def _point_sets(content: meshio.Mesh) -> dict[str, IntArray]:
         if block.type == "vertex":
             for name, vertices in _groups(content, index, 0):
                 sets.setdefault(name, []).append(block.data[vertices].ravel())
-    return {name: np.unique(np.concatenate(nodes)) for name, nodes in sets.items()}
+    found = {name: np.unique(np.concatenate(nodes)) for name, nodes in sets.items()}
+    for name, nodes in found.items():
+        _check_nodes(f"point {name!r}", nodes, len(content.points), source)
+    return found
 
 
 def _groups(content: meshio.Mesh, index: int, dimension: int) -> Iterator[tuple[str, IntArray]]:

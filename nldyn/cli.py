@@ -35,6 +35,14 @@ out_option = click.option(
     metavar="DIR",
     help="Directory for the results: new, empty, or of an earlier run.",
 )
+mesh_option = click.option(
+    "--mesh-folder",
+    "mesh_folders",
+    multiple=True,
+    type=any_path,
+    metavar="DIR",
+    help="Folder from which the mesh may come, beside those of the scene and the current one.",
+)
 quiet_option = click.option("--quiet", is_flag=True, help="Show no progress.")
 
 
@@ -88,9 +96,12 @@ def main() -> None:
 @main.command()
 @scene_argument
 @out_option
+@mesh_option
 @click.option("--log", is_flag=True, help="Draw the displacement on a logarithmic axis.")
 @quiet_option
-def run(scene: Path, out: Path, log: bool, quiet: bool) -> None:
+def run(
+    scene: Path, out: Path, mesh_folders: tuple[Path, ...], log: bool, quiet: bool
+) -> None:
     """Compute the branches of a scene, and write tables and a diagram."""
     with plain_errors():
         from nldyn.progress import progress_line
@@ -98,7 +109,7 @@ def run(scene: Path, out: Path, log: bool, quiet: bool) -> None:
         from nldyn.scene import compute, explore_scene, load_scene
 
         start = time.perf_counter()
-        loaded = load_scene(scene)
+        loaded = load_scene(scene, mesh_folders)
         check_directory(out)
         with kept_at_interrupt(out) as unfinished:
             with progress_line(quiet) as report:
@@ -118,14 +129,15 @@ def run(scene: Path, out: Path, log: bool, quiet: bool) -> None:
 
 @main.command()
 @scene_argument
-def check(scene: Path) -> None:
+@mesh_option
+def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
     """Check a scene, and print the modes of its structure."""
     with plain_errors():
         from nldyn.progress import messages_shown
         from nldyn.scene import build_system, load_scene
         from nldyn.scene_checks import check_computable
 
-        loaded = load_scene(scene)
+        loaded = load_scene(scene, mesh_folders)
         with messages_shown():
             system = build_system(loaded)
         click.echo(describe_system(system))
@@ -136,6 +148,7 @@ def check(scene: Path) -> None:
 @main.command()
 @scene_argument
 @out_option
+@mesh_option
 @click.option(
     "--frequency-hz",
     type=click.FloatRange(1e-6, 1e12),
@@ -158,7 +171,13 @@ def check(scene: Path) -> None:
 )
 @quiet_option
 def render(
-    scene: Path, out: Path, frequency_hz: float | None, period: int, video: str, quiet: bool
+    scene: Path,
+    out: Path,
+    mesh_folders: tuple[Path, ...],
+    frequency_hz: float | None,
+    period: int,
+    video: str,
+    quiet: bool,
 ) -> None:
     """Draw mode shapes, deepest contact and one period in motion of a scene with a mesh."""
     if period != 1 and frequency_hz is None:
@@ -170,7 +189,7 @@ def render(
         from nldyn.result_directory import check_directory
         from nldyn.scene import load_scene
 
-        loaded = load_scene(scene)
+        loaded = load_scene(scene, mesh_folders)
         check_directory(out)
         try:
             with progress_line(quiet) as report:
@@ -211,6 +230,7 @@ def number_list(
 @main.command()
 @scene_argument
 @out_option
+@mesh_option
 @click.option(
     "--modes",
     callback=number_list,
@@ -236,6 +256,7 @@ def number_list(
 def converge(
     scene: Path,
     out: Path,
+    mesh_folders: tuple[Path, ...],
     modes: list[int] | None,
     methods: str,
     refinements: list[int] | None,
@@ -251,7 +272,7 @@ def converge(
         from nldyn.result_directory import check_directory
         from nldyn.scene import load_scene
 
-        loaded = load_scene(scene)
+        loaded = load_scene(scene, mesh_folders)
         check_directory(out)
         with progress_line(quiet) as report:
             study = study_of_scene(
@@ -283,11 +304,15 @@ def plain_errors() -> Iterator[None]:
     """Tell the user's errors in one line on stderr, without a traceback, and exit."""
     from nldyn.errors import SceneError, SystemModelError
     from nldyn.result_directory import OutputError
+    from nldyn.scene_messages import printable
 
     try:
         yield
     except (SceneError, SystemModelError, OutputError) as error:
-        click.echo(f"nldyn: {error}", err=True)
+        click.echo(f"nldyn: {printable(str(error))}", err=True)
+        sys.exit(BAD_INPUT)
+    except MemoryError:
+        click.echo("nldyn: the memory does not suffice for this", err=True)
         sys.exit(BAD_INPUT)
     except (KeyboardInterrupt, SystemError) as error:
         if not interrupted(error):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from nldyn.errors import SceneError, SystemModelError
+from nldyn.resources import data_directory
 from nldyn.scene_checks import (
     check_computable,
     check_mesh_names,
@@ -53,9 +54,12 @@ __all__ = [
 
 logger = logging.getLogger("nldyn")
 LARGE = 20000  # degrees of freedom from which on the factorisation takes seconds
+LARGEST_SCENE = 10_000_000  # bytes or letters
+_WORD = r"""(?:(?<![\w-])[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
+MANY_DOTS = re.compile(rf"(?:{_WORD}[ \t]*+\.[ \t]*+){{100}}")
 
 
-def load_scene(path: str | Path) -> Scene:
+def load_scene(path: str | Path, mesh_folders: Iterable[str | Path] = ()) -> Scene:
     """Read and check a scene file.
 
     Parameters
@@ -63,6 +67,8 @@ def load_scene(path: str | Path) -> Scene:
     path : str or Path
         A TOML file; ``docs/scene.md`` describes its keys. Its mesh is looked for relative to the
         folder of the file.
+    mesh_folders : iterable of str or Path
+        Folders from which its mesh may come, beside that of the scene and the current one.
 
     Returns
     -------
@@ -82,17 +88,21 @@ def load_scene(path: str | Path) -> Scene:
     """
     file = Path(path)
     try:
-        content = file.read_bytes()
+        check_regular(file)
+        with file.open("rb") as stream:
+            content = stream.read(LARGEST_SCENE + 1)
     except (OSError, ValueError) as error:
-        raise SceneError(f"{file}: {_unreadable(error)}") from None
+        raise scene_error(file, (), _unreadable(error)) from None
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise SceneError(f"{file}: is not a TOML file (its text is not UTF-8)") from None
-    return parse_scene(text, file)
+        raise scene_error(file, (), "is not a TOML file (its text is not UTF-8)") from None
+    return parse_scene(text, file, mesh_folders)
 
 
-def parse_scene(text: str, file: str | Path = "scene.toml") -> Scene:
+def parse_scene(
+    text: str, file: str | Path = "scene.toml", mesh_folders: Iterable[str | Path] = ()
+) -> Scene:
     """Check the text of a scene.
 
     Parameters
@@ -101,6 +111,8 @@ def parse_scene(text: str, file: str | Path = "scene.toml") -> Scene:
         TOML.
     file : str or Path
         Name used in errors; its folder is where the mesh is looked for.
+    mesh_folders : iterable of str or Path
+        As for `load_scene`.
 
     Raises
     ------
@@ -117,14 +129,24 @@ def parse_scene(text: str, file: str | Path = "scene.toml") -> Scene:
     ['tip']
     """
     file = Path(file)
+    if len(text) > LARGEST_SCENE:
+        raise scene_error(file, (), f"is larger than {LARGEST_SCENE // 10**6} MB; use a mesh")
+    if MANY_DOTS.search(text):  # reading it would take the square of their number
+        raise scene_error(file, (), "has a key of more than 100 words with dots between them")
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise SceneError(f"{file}: is not valid TOML: {_toml_fault(str(error))}") from None
-    return scene_from_tables(tables, file, text)
+        fault = f"is not valid TOML: {_toml_fault(str(error))}"
+        raise scene_error(file, (), fault) from None
+    return scene_from_tables(tables, file, text, mesh_folders)
 
 
-def scene_from_tables(tables: dict[str, Any], file: str | Path, text: str = "") -> Scene:
+def scene_from_tables(
+    tables: dict[str, Any],
+    file: str | Path,
+    text: str = "",
+    mesh_folders: Iterable[str | Path] = (),
+) -> Scene:
     """Check the tables of a scene that have been read from a text or changed since.
 
     Raises
@@ -138,6 +160,12 @@ def scene_from_tables(tables: dict[str, Any], file: str | Path, text: str = "") 
     except ValidationError as error:
         raise from_validation(file, Scene, error) from None
     scene._file, scene._text = file, text
+    try:
+        asked = (file.parent, Path(), *mesh_folders)
+        scene._mesh_folders = tuple(Path(folder).resolve() for folder in asked)
+    except (OSError, ValueError, RuntimeError) as error:  # the last one of links in a circle
+        fault = _lower_first(str(error))
+        raise SceneError(f"a folder for meshes cannot be used: {fault}") from None
     check_scene(scene, file)
     return scene
 
@@ -173,25 +201,18 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
 
     if scene.mesh is None:
         raise scene_error(scene.file, ("mesh",), "is missing: the structure is not given by a mesh")
-    path = scene.file.parent / scene.mesh.file
-    try:
-        if path.exists() and not (path.is_file() or path.is_dir()):
-            raise ValueError("it is not a regular file")  # opening a pipe would wait without end
-        path.open("rb").close()
-    except (OSError, ValueError) as error:
-        fault = f"names {path}, which {_unreadable(error)}"
-        raise scene_error(scene.file, ("mesh", "file"), fault) from None
+    path = _mesh_path(scene, scene.mesh.file)
     if scene.mesh.model == "structure":
         if refinement > 1:
             fault = 'is "structure", whose cells are refined in the mesher'
             raise scene_error(scene.file, ("mesh", "model"), fault)
         with _told_as(scene, ("mesh", "file"), fem.ModelError):
-            structure = fem.read_structure(path)
+            structure = fem.read_structure(path, _mesh_places(scene))
         check_structure_names(scene, structure, scene.file)
         with _told_as(scene, (), fem.ModelError):
             return fem.assemble(_structure_model(scene, structure))
     with _told_as(scene, ("mesh", "file"), fem.ModelError):
-        mesh = fem.read_mesh(path)
+        mesh = fem.read_mesh(path, _mesh_places(scene))
     check_mesh_names(scene, mesh, scene.file)
     with _told_as(scene, (), fem.ModelError):
         if refinement > 1:
@@ -663,7 +684,39 @@ def _told_as(scene: Scene, key: KeyPath, *kinds: type[Exception], hint: str = ""
         raise scene_error(scene.file, key, text, sep=": ") from error
 
 
-def _unreadable(error: OSError | ValueError) -> str:
+def _mesh_path(scene: Scene, name: str) -> Path:
+    """Where the mesh is: a file that can be read, in one of the places it may come from."""
+    path = scene.file.parent / name
+    try:
+        real = path.resolve()
+        if not any(real.is_relative_to(place) for place in _mesh_places(scene)):
+            fault = (
+                f"leads to {real}, outside the folder of the scene and the current one; if that is "
+                f"meant, allow it with --mesh-folder {real.parent}"
+            )
+            raise scene_error(scene.file, ("mesh", "file"), fault)
+        check_regular(path)
+        path.open("rb").close()
+    except SceneError:
+        raise
+    except (OSError, ValueError, RuntimeError) as error:  # the last one of links in a circle
+        fault = f"names {path}, which {_unreadable(error)}"
+        raise scene_error(scene.file, ("mesh", "file"), fault) from None
+    return path
+
+
+def _mesh_places(scene: Scene) -> list[Path]:
+    """Folders below which the mesh of a scene may be: those asked for, and the package's own."""
+    return [*scene.mesh_folders, (data_directory() / "meshes").resolve()]
+
+
+def check_regular(path: Path) -> None:
+    """Refuse what is no file: opening a pipe would wait without end, and a device has no end."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise ValueError("it is not a regular file")
+
+
+def _unreadable(error: OSError | ValueError | RuntimeError) -> str:
     """Say why a file cannot be opened."""
     if isinstance(error, FileNotFoundError):
         return "does not exist"

@@ -14,6 +14,7 @@ from nldyn.scene_messages import KeyPath, scene_error, show, unknown_name
 from nldyn.scene_schema import Matrix, Scene
 
 Report = Callable[[KeyPath, str], SceneError]
+LONGEST_NAME, LONGEST_TITLE = 100, 1000
 STRUCTURE_ONLY = ("couplings", "foundations")
 MESH_ONLY = (
     *("parts", "supports", "point_masses", "springs", "hinges"),
@@ -52,6 +53,7 @@ def check_scene(scene: Scene, file: Path) -> None:
     def report(key: KeyPath, fault: str) -> SceneError:
         return scene_error(file, key, fault)
 
+    _check_names(scene, report)
     _check_structure(scene, report)
     _check_modal(scene, report)
     _check_matrices(scene, report)
@@ -142,6 +144,30 @@ def _check_mirror(scene: Scene, point: str, file: Path) -> None:
             "or ['y', 'rotation'] and no more"
         )
         raise scene_error(file, ("mesh", "mirror"), fault)
+
+
+def _check_names(scene: Scene, report: Report) -> None:
+    """Refuse names that cannot be printed, or fill the screen."""
+    if len(scene.title) > LONGEST_TITLE or not scene.title.replace("\n", " ").isprintable():
+        fault = f"must be at most {LONGEST_TITLE} letters, lines and nothing that cannot be printed"
+        raise report(("title",), fault)
+    tables: dict[KeyPath, Iterable[str]] = {("parts",): scene.parts}
+    if scene.modal is not None:
+        tables["modal", "participation"] = scene.modal.participation
+    if scene.matrices is not None:
+        tables["matrices", "interfaces"] = scene.matrices.interfaces
+    tables[("interfaces",)] = scene.interfaces
+    for key, names in tables.items():
+        for name in names:
+            _check_name((*key, name), name, report)
+    for number, coupling in enumerate(scene.couplings):
+        _check_name(("couplings", number, "at"), coupling.at, report)
+
+
+def _check_name(key: KeyPath, name: str, report: Report) -> None:
+    if not 0 < len(name) <= LONGEST_NAME or not name.isprintable():
+        fault = f"must be a name of 1 to {LONGEST_NAME} letters that can be printed"
+        raise report(key, fault)
 
 
 def _check_structure(scene: Scene, report: Report) -> None:

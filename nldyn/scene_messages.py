@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import difflib
+import json
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -13,25 +15,65 @@ from pydantic_core import ErrorDetails
 from nldyn.errors import SceneError
 
 KeyPath = tuple[str | int, ...]
+MOST_SHOWN, LONGEST_SHOWN = 20, 60  # names in a list, letters of a name
+BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def scene_error(file: Path, key: KeyPath, fault: str, sep: str = " ") -> SceneError:
     """Make the error for one key of one scene file."""
     name = format_key(key)
-    return SceneError(f"{file}: {name}{sep}{fault}" if name else f"{file}: {fault}")
+    return SceneError(printable(f"{file}: {name}{sep}{fault}" if name else f"{file}: {fault}"))
+
+
+def printable(text: str) -> str:
+    r"""Write what a terminal would obey, such as the end of a line, as an escape.
+
+    Examples
+    --------
+    >>> print(printable("two\nlines"))
+    two\nlines
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        letter if letter.isprintable() else letter.encode("unicode_escape").decode()
+        for letter in text
+    )
 
 
 def format_key(key: KeyPath) -> str:
-    """Write a key as a user would: ``stops[0].stiffness``, entries counted from 0."""
+    """Write a key as a user would: ``stops[0].stiffness``, entries counted from 0.
+
+    Examples
+    --------
+    >>> format_key(("stops", 0, "at")), format_key(("parts", "left arm"))
+    ('stops[0].at', 'parts."left arm"')
+    """
     text = ""
     for step in key:
-        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+        if isinstance(step, int):
+            text += f"[{step}]"
+        else:
+            text += ("." if text else "") + _key_step(step)
     return text
 
 
+def _key_step(step: str) -> str:
+    short = shortened(step)
+    return short if BARE_KEY.fullmatch(step) else json.dumps(short, ensure_ascii=False)
+
+
+def shortened(name: str) -> str:
+    """A name, or the beginning of a long one."""
+    return name if len(name) <= LONGEST_SHOWN else name[: LONGEST_SHOWN - 3] + "..."
+
+
 def quoted(names: Iterable[str]) -> str:
-    """List names in quotes, in their own order."""
-    return ", ".join(f"'{name}'" for name in names) or "none"
+    """List names in quotes, in their own order, the first ones of many."""
+    every = list(names)
+    text = ", ".join(f"'{shortened(name)}'" for name in every[:MOST_SHOWN])
+    more = len(every) - MOST_SHOWN
+    return (text or "none") + (f" and {more} more" if more > 0 else "")
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
@@ -45,7 +87,7 @@ def unknown_name(name: str, known: Iterable[str], what: str) -> str:
     names = list(known)
     guess = nearest(name, names)
     hint = f"did you mean '{guess}'?" if guess else f"known: {quoted(names)}"
-    return f"'{name}' is not {what}; {hint}"
+    return f"'{shortened(name)}' is not {what}; {hint}"
 
 
 def from_validation(file: Path, model: type[BaseModel], error: ValidationError) -> SceneError:
@@ -56,7 +98,23 @@ def from_validation(file: Path, model: type[BaseModel], error: ValidationError) 
     more = len(details) - 1
     if more and first["type"] != "extra_forbidden":
         sentence += f" (and {more} more)"
-    return scene_error(file, first["loc"], sentence)
+    return scene_error(file, _own_steps(model, first["loc"]), sentence)
+
+
+def _own_steps(model: type[BaseModel], key: KeyPath) -> KeyPath:
+    """The steps of a key that are a user's, without those of pydantic into one of several types."""
+    here: Any = model
+    for number, step in enumerate(key):
+        while get_origin(here) is Annotated:
+            here = get_args(here)[0]
+        if isinstance(here, type) and issubclass(here, BaseModel):
+            field = here.model_fields.get(str(step))
+            here = _without_none(field.annotation) if field else None
+        elif get_origin(here) in (list, dict):
+            here = get_args(here)[-1]
+        else:
+            return key[:number]
+    return key
 
 
 def _fault(model: type[BaseModel], detail: ErrorDetails) -> str:

@@ -392,6 +392,7 @@ class Scene(Table):
 
     _file: Path = PrivateAttr(default=Path("scene.toml"))
     _text: str = PrivateAttr(default="")
+    _mesh_folders: tuple[Path, ...] = PrivateAttr(default=())
 
     @property
     def file(self) -> Path:
@@ -402,6 +403,11 @@ class Scene(Table):
     def text(self) -> str:
         """The text of the file, word for word."""
         return self._text
+
+    @property
+    def mesh_folders(self) -> tuple[Path, ...]:
+        """Folders below which the mesh may be: of the scene, the current one, and further ones."""
+        return self._mesh_folders
 
     @property
     def interface_names(self) -> list[str]:

@@ -128,7 +128,7 @@ def study(
     base = tomllib.loads(scene.text)
     cases = [_with_values(scene, base, names, row) for row in values]
     for tables in cases:
-        scene_from_tables(tables, scene.file)
+        scene_from_tables(tables, scene.file, mesh_folders=scene.mesh_folders)
     label = f"{getattr(measure, '__module__', '')}.{getattr(measure, '__qualname__', measure)}"
     keys, done = [str(k) for k in range(len(cases))], {}
     if keep is not None:
@@ -136,7 +136,8 @@ def study(
         done = _read(keep)
         _check_writable(keep)
     waiting = [k for k, key in enumerate(keys) if key not in done]
-    task = partial(_measured, str(scene.file), measure)
+    folders = tuple(map(str, scene.mesh_folders))
+    task = partial(_measured, str(scene.file), folders, measure)
     finished = len(cases) - len(waiting)
     if progress is not None and finished:
         progress(finished, len(cases))
@@ -158,8 +159,10 @@ def study(
     )  # fmt: skip
 
 
-def _measured(file: str, measure: Measure, tables: Tables) -> dict[str, float]:
-    found = measure(build_system(scene_from_tables(tables, file)))
+def _measured(
+    file: str, mesh_folders: tuple[str, ...], measure: Measure, tables: Tables
+) -> dict[str, float]:
+    found = measure(build_system(scene_from_tables(tables, file, mesh_folders=mesh_folders)))
     if not isinstance(found, Mapping):
         raise TypeError(f"measure must give numbers by name, got {shown(found)}")
     return {str(name): float(value) for name, value in found.items()}

@@ -49,9 +49,11 @@ def _hash(text: str) -> str:
 
 def _bytes_hash(path: Path) -> str:
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError:  # the case itself will tell
-        return "unreadable"
+        if path.is_file():  # no device, which would have no end
+            return hashlib.sha256(path.read_bytes()).hexdigest()
+    except (OSError, ValueError):
+        pass
+    return "unreadable"  # the case itself will tell why
 
 
 class MeasureKey:

@@ -1,0 +1,338 @@
+"""Read Gmsh files of versions 2.2 and 4.1, ASCII and binary.
+
+meshio 5.3 has a reader of its own, but it takes what a damaged file says: a node that is not there
+counts from the end of the list, an element with a number too many or too few gets other nodes, and
+a declared number of nodes is allocated before the first one is read. This one refuses these, and
+the result is the same `meshio.Mesh`. Physical groups are cell sets.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import meshio
+import numpy as np
+from meshio._common import num_nodes_per_cell
+from meshio.gmsh.common import _gmsh_to_meshio_order, _gmsh_to_meshio_type
+
+from fem.errors import ModelError
+from fem.mesh import FloatArray, IntArray
+
+VERSIONS = {"2": "2.2", "2.2": "2.2", "4": "4.1", "4.1": "4.1"}
+DIMENSION = {
+    kind: 0 if kind == "vertex" else 1 if "line" in kind else 2 if kind[:4] in ("tria", "quad") else 3
+    for kind in _gmsh_to_meshio_type.values()
+}
+Groups = dict[tuple[int, int], IntArray]
+SECTION = re.compile(rb"^[ \t]*\$(\w+)[ \t\r]*$", re.MULTILINE)
+
+
+@dataclass
+class _Numbers:
+    """The numbers of a section, one after the other."""
+
+    body: bytes
+    binary: bool
+    size_type: str = "<u8"
+    at: int = 0
+    words: list[bytes] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        if not self.binary:
+            self.words = self.body.split()
+
+    def take(self, count: int, kind: str) -> np.ndarray:
+        """The next so many numbers of a kind: "<i4", "<f8", "u1" or the size type."""
+        width = np.dtype(kind).itemsize if self.binary else 1
+        end = self.at + count * width
+        if count < 0 or end > len(self.body if self.binary else self.words):
+            raise ValueError(f"{count} numbers are declared, but the section ends before")
+        if self.binary:
+            found = np.frombuffer(self.body[self.at : end], kind)
+        elif kind == "<f8":
+            found = np.array(self.words[self.at : end], dtype="S").astype(np.float64)
+        else:
+            found = np.array([int(word) for word in self.words[self.at : end]], dtype=np.int64)
+        self.at = end
+        return found if kind == "<f8" else found.astype(np.int64)
+
+    def integers(self, count: int) -> IntArray:
+        return self.take(count, "<i4")
+
+    def sizes(self, count: int) -> IntArray:
+        return self.take(count, self.size_type)
+
+    def reals(self, count: int) -> FloatArray:
+        return self.take(count, "<f8")
+
+    def line(self) -> int:
+        """The whole number on a line of its own, which binary files have too."""
+        if not self.binary:
+            return int(self.take(1, "<i4")[0])
+        end = self.body.find(b"\n", self.at)
+        text, self.at = self.body[self.at : end], end + 1
+        return int(text)
+
+    def end(self) -> None:
+        """Refuse numbers beyond those declared."""
+        rest = self.body[self.at :].strip() if self.binary else self.words[self.at :]
+        if rest:
+            raise ValueError("a section goes on after the numbers that it declares")
+
+
+@dataclass
+class _Block:
+    """Elements of a type: numbers of their nodes (e, b) and physical groups (e, g), 0 for none."""
+
+    kind: str
+    nodes: IntArray
+    groups: IntArray
+
+
+def read_gmsh(path: Path) -> meshio.Mesh:
+    """Read the nodes, elements and physical groups of a Gmsh file.
+
+    Parameters
+    ----------
+    path
+        Version 2.2 or 4.1, ASCII or binary (little-endian).
+
+    Returns
+    -------
+    meshio.Mesh
+        One block of cells for each entity (4.1) or run of elements of one type (2.2), and the
+        physical groups as cell sets; a group without a name goes by its number.
+
+    Raises
+    ------
+    ModelError
+        If the file is not one of Gmsh, is cut off or contradicts itself.
+
+    References
+    ----------
+    C. Geuzaine, J.-F. Remacle, *Gmsh reference manual*, section "Gmsh file formats".
+
+    Examples
+    --------
+    >>> read_gmsh(Path("meshes/half_beam.msh")).cells[0].type
+    'vertex'
+    """
+    content = path.read_bytes()
+    if b"$MeshFormat" not in content:
+        raise ModelError(f"{path}: is not a Gmsh file (there is no $MeshFormat)")
+    if b"$EndElements" not in content:
+        raise ModelError(f"{path}: the Gmsh file is cut off (there is no $EndElements)")
+    try:
+        return _mesh(content)
+    except (ValueError, OverflowError) as error:
+        raise ModelError(f"{path}: cannot be read as Gmsh mesh ({error})") from error
+
+
+def _mesh(content: bytes) -> meshio.Mesh:
+    sections = _sections(content)
+    for name in ("MeshFormat", "Nodes", "Elements"):
+        if name not in sections:
+            raise ValueError(f"there is no ${name}")
+    version, binary, size_type = _header(sections["MeshFormat"])
+    nodes, elements, entities = (
+        _Numbers(sections.get(name, b""), binary, size_type)
+        for name in ("Nodes", "Elements", "Entities")
+    )
+    if version == "2.2":
+        labels, points = _nodes_22(nodes)
+        blocks = _binary_22(elements) if binary else _lines_22(sections["Elements"])
+    else:
+        labels, points = _nodes_41(nodes)
+        groups = _entities(entities) if "Entities" in sections else {}
+        blocks = _elements_41(elements, groups)
+    order = np.argsort(labels, kind="stable")
+    if (np.diff(labels[order]) == 0).any():
+        raise ValueError("two nodes have the same number")
+    cells = [
+        (block.kind, _gmsh_to_meshio_order(block.kind, _positions(block.nodes, labels, order)))
+        for block in blocks
+    ]
+    names = _names(sections.get("PhysicalNames", b"0"))
+    return meshio.Mesh(points, cells, cell_sets=_cell_sets(blocks, names))
+
+
+def _cell_sets(
+    blocks: list[_Block], names: dict[tuple[int, int], str]
+) -> dict[str, list[IntArray]]:
+    """Elements of each physical group, one list for each block."""
+    sets: dict[str, list[IntArray]] = {}
+    for number, block in enumerate(blocks):
+        for group in np.unique(block.groups[block.groups != 0]):
+            name = names.get((DIMENSION[block.kind], int(group)), str(group))
+            empty = [np.zeros(0, dtype=np.int64)] * len(blocks)
+            found = np.flatnonzero((block.groups == group).any(axis=1))
+            of_blocks = sets.setdefault(name, empty)
+            of_blocks[number] = np.union1d(of_blocks[number], found)
+    return sets
+
+
+def _sections(content: bytes) -> dict[str, bytes]:
+    """What stands between ``$NAME`` and ``$EndNAME``."""
+    found: dict[str, bytes] = {}
+    at = 0
+    while True:
+        start = SECTION.search(content, at)
+        between = content[at : start.start() if start else len(content)]
+        if between.strip():
+            raise ValueError("there is text between the sections")
+        if start is None:
+            return found
+        name = start[1].decode()
+        end = content.find(b"$End" + start[1], start.end())
+        if end < 0:
+            raise ValueError(f"${name} has no end")
+        if name in found and name in ("MeshFormat", "Nodes", "Elements", "Entities"):
+            raise ValueError(f"${name} is there twice")
+        found[name] = content[start.end() : end].removeprefix(b"\n")
+        at = end + len(b"$End" + start[1])
+
+
+def _header(body: bytes) -> tuple[str, bool, str]:
+    """Version, whether the file is binary, and the type of its sizes."""
+    words = body.split()[:3]
+    if len(words) < 3 or words[1] not in (b"0", b"1") or words[2] not in (b"4", b"8"):
+        raise ValueError("its format is not told as by Gmsh")
+    version = VERSIONS.get(words[0].decode())
+    if version is None:
+        raise ValueError(f"its version is {words[0].decode()}; export it as 4.1 or 2.2")
+    binary = words[1] == b"1"
+    if binary and body.partition(b"\n")[2][:4] != b"\x01\x00\x00\x00":
+        raise ValueError("its numbers are in another order of bytes")
+    return version, binary, f"<u{words[2].decode()}"
+
+
+def _names(body: bytes) -> dict[tuple[int, int], str]:
+    """Names of the physical groups by dimension and number."""
+    count, *lines = body.decode().strip().splitlines()
+    if len(lines) != int(count):
+        raise ValueError(f"there are {len(lines)} names of physical groups, not {int(count)}")
+    names = {}
+    for line in lines:
+        words = shlex.split(line)
+        if len(words) != 3:
+            raise ValueError("a name of a physical group is not told as by Gmsh")
+        names[int(words[0]), int(words[1])] = words[2]
+    return names
+
+
+def _nodes_22(numbers: _Numbers) -> tuple[IntArray, FloatArray]:
+    count = numbers.line()
+    if numbers.binary:
+        row = np.dtype([("label", "<i4"), ("place", "<f8", 3)])
+        data = np.frombuffer(numbers.take(count * row.itemsize, "u1").astype(np.uint8), row)
+        labels, points = data["label"].astype(np.int64), data["place"].astype(np.float64)
+    else:
+        rows = np.array(numbers.words[1:], dtype="S").reshape(-1, 4)
+        if len(rows) != count:
+            raise ValueError(f"{count} nodes are declared, but {len(rows)} are there")
+        labels = np.array([int(word) for word in rows[:, 0]], dtype=np.int64)
+        points = rows[:, 1:].astype(np.float64)
+        numbers.at = len(numbers.words)
+    numbers.end()
+    return labels, points
+
+
+def _lines_22(body: bytes) -> list[_Block]:
+    count, *lines = body.strip().splitlines()
+    if len(lines) != int(count):
+        raise ValueError(f"{int(count)} elements are declared, but {len(lines)} are there")
+    runs: list[tuple[str, list[list[int]], list[int]]] = []
+    for line in lines:
+        label, code, tags, *rest = (int(word) for word in line.split())
+        kind = _kind(code)
+        if tags < 0 or len(rest) != tags + num_nodes_per_cell[kind]:
+            raise ValueError(f"element {label} does not have the numbers of its type")
+        if not runs or runs[-1][0] != kind:
+            runs.append((kind, [], []))
+        runs[-1][1].append(rest[tags:])
+        runs[-1][2].append(abs(rest[0]) if tags else 0)
+    return [
+        _Block(kind, np.array(nodes, dtype=np.int64), np.array(groups, dtype=np.int64)[:, None])
+        for kind, nodes, groups in runs
+    ]
+
+
+def _binary_22(numbers: _Numbers) -> list[_Block]:
+    count, blocks = numbers.line(), []
+    while count > 0:
+        code, here, tags = numbers.integers(3).tolist()
+        kind = _kind(code)
+        if here < 1 or tags < 0:
+            raise ValueError("a block of elements is empty")
+        width = 1 + tags + num_nodes_per_cell[kind]
+        rows = numbers.integers(here * width).reshape(here, width)
+        groups = np.abs(rows[:, 1:2]) if tags else np.zeros((here, 1), dtype=np.int64)
+        blocks.append(_Block(kind, rows[:, 1 + tags :], groups))
+        count -= here
+    numbers.end()
+    return blocks
+
+
+def _entities(numbers: _Numbers) -> Groups:
+    """Physical groups of each entity, by dimension and number."""
+    groups: Groups = {}
+    for dimension, count in enumerate(numbers.sizes(4).tolist()):
+        for _ in range(count):
+            tag = int(numbers.integers(1)[0])
+            numbers.reals(6 if dimension else 3)
+            groups[dimension, tag] = np.abs(numbers.integers(int(numbers.sizes(1)[0])))
+            if dimension:
+                numbers.integers(int(numbers.sizes(1)[0]))
+    numbers.end()
+    return groups
+
+
+def _nodes_41(numbers: _Numbers) -> tuple[IntArray, FloatArray]:
+    blocks, count = numbers.sizes(4).tolist()[:2]
+    labels, points = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 3))]
+    for _ in range(blocks):
+        parametric = int(numbers.integers(3)[2])
+        if parametric:
+            raise ValueError("its nodes have parametric coordinates, which are not read")
+        here = int(numbers.sizes(1)[0])
+        labels.append(numbers.sizes(here))
+        points.append(numbers.reals(3 * here).reshape(here, 3))
+    numbers.end()
+    if sum(map(len, labels)) != count:
+        raise ValueError(f"{count} nodes are declared, but {sum(map(len, labels))} are there")
+    return np.concatenate(labels), np.concatenate(points)
+
+
+def _elements_41(numbers: _Numbers, groups: Groups) -> list[_Block]:
+    blocks, count = numbers.sizes(4).tolist()[:2]
+    found = []
+    for _ in range(blocks):
+        dimension, tag, code = numbers.integers(3).tolist()
+        kind, here = _kind(code), int(numbers.sizes(1)[0])
+        width = 1 + num_nodes_per_cell[kind]
+        rows = numbers.sizes(here * width).reshape(here, width)
+        of_entity = groups.get((dimension, tag), np.zeros(0, dtype=np.int64))
+        found.append(_Block(kind, rows[:, 1:], np.tile(of_entity, (here, 1))))
+    numbers.end()
+    if sum(len(block.nodes) for block in found) != count:
+        raise ValueError(f"{count} elements are declared, but others are there")
+    return found
+
+
+def _kind(code: int) -> str:
+    if code not in _gmsh_to_meshio_type:
+        raise ValueError(f"an element has the type {code}, which Gmsh does not write")
+    return str(_gmsh_to_meshio_type[code])
+
+
+def _positions(nodes: IntArray, labels: IntArray, order: IntArray) -> IntArray:
+    """Places in the list of nodes of those that are named by their numbers."""
+    if not nodes.size:
+        return nodes
+    at = np.searchsorted(labels, nodes, sorter=order).clip(max=max(len(labels) - 1, 0))
+    if not len(labels) or (labels[order[at]] != nodes).any():
+        raise ValueError("an element has a node that is not there")
+    return np.asarray(order[at], dtype=np.int64)

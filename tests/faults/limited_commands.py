@@ -1,0 +1,66 @@
+"""The command line called in this process, with limits of time and memory."""
+
+from __future__ import annotations
+
+import resource
+import signal
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from click.testing import CliRunner, Result
+
+from nldyn.cli import main
+
+SECONDS = 10.0  # for one command
+MEMORY = 2_000_000_000  # bytes beyond what the process has at the start
+
+
+class TooLongError(BaseException):
+    """A command took longer than it may; not an Exception, so that nothing catches it."""
+
+
+@contextmanager
+def limits(seconds: float = SECONDS, memory: int = MEMORY) -> Iterator[None]:
+    """End what takes longer than some seconds, and refuse it more than some memory."""
+
+    def stop(*_: object) -> None:
+        raise TooLongError
+
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + memory, before[1]))
+    handler = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, handler)
+        resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+def command(*arguments: object, seconds: float = SECONDS) -> Result:
+    """Call ``nldyn`` with some arguments."""
+    with limits(seconds):
+        return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def refusal(result: Result) -> str | None:
+    """The sentence with which a command refused its input, None if it did its work.
+
+    Fails where the command ended in any other way than these two.
+    """
+    error = result.exception
+    if error is not None and not isinstance(error, SystemExit):
+        raise AssertionError("".join(traceback.format_exception(error)))
+    if result.exit_code == 0:
+        return None
+    assert result.exit_code == 2, result.output
+    line, end, rest = result.stderr.rpartition("\r\x1b[K")[2].partition("\n")
+    assert line.startswith("nldyn: ") and end == "\n" and rest == "", result.stderr
+    assert line.isprintable(), repr(line)
+    assert len(line) < 2000, line
+    assert "Traceback" not in line
+    return line.removeprefix("nldyn: ")

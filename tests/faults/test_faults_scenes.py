@@ -1,0 +1,157 @@
+"""Fuzzed scenes: each is computed rightly or refused in one sentence; nothing else happens."""
+
+import tomllib
+from copy import deepcopy
+
+import numpy as np
+import pytest
+import scipy.linalg
+from hypothesis import given
+from hypothesis import strategies as st
+from limited_commands import command, refusal
+from scene_mutations import TEXTS, document, spoil, tweak
+from small_meshes import fuzz, write_meshes
+
+from nldyn.resources import mesh
+from nldyn.scene import build_component, build_system, load_scene
+
+QUICK, FULL = 200, 6000
+KEYS = {name: tomllib.loads(text) for name, text in TEXTS.items()}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder of scenes with the meshes, and what else paths may lead to."""
+    place = tmp_path_factory.mktemp("scenes")
+    write_meshes(place)
+    (place / "half_beam.msh").write_bytes(mesh("half_beam.msh").read_bytes())
+    return place
+
+
+def judge(folder, content):
+    """Check what `nldyn check` makes of a scene."""
+    file = folder / "scene.toml"
+    file.write_bytes(content)
+    result = command("check", file)
+    said = refusal(result)
+    if said is not None:
+        assert said.startswith(f"{file}: ")
+        return
+    assert "no fault found" in result.stdout
+    assert "nan" not in result.stdout.replace("nan'", "")
+    compare(load_scene(file))
+
+
+def compare(scene):
+    """Compare the frequencies of a scene with those of the full eigenproblem."""
+    found = build_system(scene).frequencies_hz
+    assert np.isfinite(found).all()
+    if scene.modal is not None:
+        assert np.allclose(np.sort(found), np.sort(scene.modal.frequencies_hz), rtol=1e-9)
+        return
+    if scene.matrices is not None:
+        stiffness, mass = np.array(scene.matrices.stiffness), np.array(scene.matrices.mass)
+    elif scene.reduction.method in ("guyan", "craig-bampton"):
+        return
+    else:
+        component = build_component(scene)
+        stiffness, mass = component.stiffness.toarray(), component.mass.toarray()
+    kept = len(found) if scene.matrices is not None else kept_modes(scene, len(found))
+    wanted = lowest_hz(stiffness, mass, kept)
+    assert np.allclose(np.sort(found)[:kept], wanted, rtol=1e-6, atol=1e-6 * wanted.max(initial=0))
+
+
+def lowest_hz(stiffness, mass, count):
+    """Frequencies from the problem M u = K u / w^2, whose rounding spares the low ones."""
+    try:
+        inverse = scipy.linalg.eigh(mass, stiffness, eigvals_only=True)[::-1][:count]
+        return 1.0 / np.sqrt(inverse) / (2 * np.pi)
+    except np.linalg.LinAlgError:  # it floats
+        squares = scipy.linalg.eigh(stiffness, mass, eigvals_only=True)[:count]
+        return np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+
+
+def kept_modes(scene, count):
+    """Free-interface modes among those of a reduced model; the others are residual modes."""
+    if scene.reduction.method == "truncation" or not scene.reduction.residual:
+        return count
+    return max(0, count - len(scene.interfaces))
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_the_scenes_to_spoil_are_good(folder, name):
+    file = folder / "scene.toml"
+    file.write_text(TEXTS[name])
+    assert refusal(command("check", file)) is None
+    compare(load_scene(file))
+    assert tomllib.loads(document(KEYS[name])) == KEYS[name]
+
+
+@st.composite
+def spoiled(draw):
+    """The text of a scene with up to four changes."""
+    tree = deepcopy(KEYS[draw(st.sampled_from(sorted(KEYS)))])
+    for _ in range(draw(st.integers(1, 4))):
+        spoil(draw, tree)
+    return document(tree).encode("utf-8", "surrogatepass")
+
+
+@fuzz(QUICK)
+@given(content=spoiled())
+def test_a_spoiled_scene_is_told_in_one_sentence_or_right(folder, content):
+    judge(folder, content)
+
+
+@pytest.mark.slow
+@fuzz(FULL)
+@given(content=spoiled())
+def test_thousands_of_spoiled_scenes(folder, content):
+    judge(folder, content)
+
+
+@st.composite
+def tweaked(draw):
+    """The text of a scene with one to three other values that are of the right kind."""
+    tree = deepcopy(KEYS[draw(st.sampled_from(sorted(KEYS)))])
+    for _ in range(draw(st.integers(1, 3))):
+        tweak(draw, tree)
+    return document(tree).encode()
+
+
+@fuzz(QUICK)
+@given(content=tweaked())
+def test_a_scene_of_other_values_is_told_in_one_sentence_or_right(folder, content):
+    judge(folder, content)
+
+
+@pytest.mark.slow
+@fuzz(FULL)
+@given(content=tweaked())
+def test_thousands_of_scenes_of_other_values(folder, content):
+    judge(folder, content)
+
+
+@st.composite
+def garbled(draw):
+    """The bytes of a scene, cut, doubled, swapped or overwritten somewhere."""
+    content = bytearray(TEXTS[draw(st.sampled_from(sorted(TEXTS)))].encode())
+    for _ in range(draw(st.integers(1, 3))):
+        first = draw(st.integers(0, len(content)))
+        last = first + draw(st.integers(0, 40))
+        piece = bytes(content[first:last])
+        other = draw(st.sampled_from((b"", piece * 2, piece[::-1], b"\x00", b"\xff", b"[[[", b"=")))
+        content[first:last] = other if draw(st.booleans()) else draw(st.binary(max_size=8))
+    return bytes(content)
+
+
+@fuzz(QUICK // 3)
+@given(content=garbled())
+def test_a_garbled_file_is_told_in_one_sentence_or_right(folder, content):
+    judge(folder, content)
+
+
+@pytest.mark.slow
+@fuzz(FULL // 4)
+@given(content=garbled())
+def test_thousands_of_garbled_files(folder, content):
+    judge(folder, content)
