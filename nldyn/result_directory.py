@@ -9,12 +9,18 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import secrets
 import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+
+try:
+    import fcntl
+except ImportError:  # Windows: drafts of a killed run stay there
+    fcntl = None  # type: ignore[assignment]
 
 MANIFEST = ".nldyn.json"
 
@@ -48,6 +54,7 @@ def check_directory(directory: str | Path) -> Path:
     True
     """
     try:
+        clear_leftovers(Path(directory).resolve())
         target = _checked(Path(directory).resolve(), directory)
         with _new_directory(target):
             return target
@@ -84,7 +91,8 @@ def _new_directory(target: Path) -> Iterator[Path]:
     new = target.with_name(f".{target.name}.{secrets.token_hex(4)}.new")
     try:
         new.mkdir(parents=True)
-        yield new
+        with in_use(new):
+            yield new
     finally:
         shutil.rmtree(new, ignore_errors=True)
         for folder in made:
@@ -177,10 +185,66 @@ def _swap(new: Path, target: Path) -> None:
         return
     shutil.copymode(target, new)
     old = target.with_name(f".{target.name}.{secrets.token_hex(4)}.old")
-    target.rename(old)
+    with in_use(target):
+        target.rename(old)
+        try:
+            new.rename(target)
+        except BaseException:
+            old.rename(target)
+            raise
+        shutil.rmtree(old, ignore_errors=True)
+
+
+@contextmanager
+def in_use(path: Path) -> Iterator[None]:
+    """Hold a lock that tells other processes that a draft is not left over; it ends with this one.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with in_use(Path(tempfile.mkdtemp()) / "not_there"):
+    ...     pass
+    """
+    handle = _locked(path)
     try:
-        new.rename(target)
-    except BaseException:
-        old.rename(target)
-        raise
-    shutil.rmtree(old, ignore_errors=True)
+        yield
+    finally:
+        if handle is not None:
+            os.close(handle)
+
+
+def _locked(path: Path) -> int | None:
+    """An open handle that locks a file or folder; None if another has it, or none can be had."""
+    if fcntl is None:
+        return None
+    try:
+        handle = os.open(path, os.O_RDONLY)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(handle)
+        return None
+    return handle
+
+
+def clear_leftovers(target: Path) -> None:
+    """Remove the drafts of runs that were killed, and put back results they had moved away."""
+    pattern = re.compile(rf"\.{re.escape(target.name)}\.[0-9a-f]{{8}}\.(new|old)")
+    try:
+        found = [entry for entry in target.parent.iterdir() if pattern.fullmatch(entry.name)]
+    except OSError:
+        return
+    for entry in found:
+        handle = _locked(entry)
+        if handle is None:
+            continue
+        with suppress(OSError):
+            if entry.name.endswith(".old") and not target.exists():
+                entry.rename(target)
+            elif entry.is_dir():
+                shutil.rmtree(entry, ignore_errors=True)
+            else:
+                entry.unlink()
+        os.close(handle)

@@ -34,7 +34,7 @@ from nldyn.exploration import Coverage, Exploration, ExploreOptions, Question, S
 from nldyn.flow import FlowMap, FlowOptions, Trajectory
 from nldyn.linear import LinearPart, Real
 from nldyn.orbit import Orbit
-from nldyn.result_directory import OutputError, is_writable
+from nldyn.result_directory import OutputError, in_use, is_writable
 from nldyn.shooting import ShootingProblem
 from nldyn.system import System
 from nldyn.tables import UNITS, orbit_columns
@@ -235,7 +235,7 @@ def write_whole(path: str | Path, content: bytes) -> None:
     target = check_writable(path)
     draft = target.with_name(f".{target.name}.{secrets.token_hex(4)}.new")
     try:
-        with draft.open("wb") as file:
+        with draft.open("wb") as file, in_use(draft):
             file.write(content)
             file.flush()
             os.fsync(file.fileno())

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from nldyn.result_directory import clear_leftovers
+
 ENDING = ".unfinished.h5"
 
 
@@ -45,6 +47,7 @@ def unfinished_file(directory: str | Path) -> Iterator[Path]:
     False
     """
     path = unfinished_path(directory)
+    clear_leftovers(path)
     made = [folder for folder in path.parents if not folder.exists()]
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
