@@ -135,7 +135,7 @@ def _included(deck: _Deck, path: Path, keyword: _Keyword) -> Iterator[_Keyword]:
         raise ModelError(f"{path}: the included file {other} does not exist")
     deck.included += 1
     if deck.included > MOST_INCLUDED:
-        raise ModelError(f"{path}: more than {MOST_INCLUDED} files are included, perhaps in a circle")
+        raise ModelError(f"{path}: more than {MOST_INCLUDED} files are included (in a circle?)")
     yield from _keywords(deck, other)
 
 

@@ -22,10 +22,8 @@ from fem.errors import ModelError
 from fem.mesh import FloatArray, IntArray
 
 VERSIONS = {"2": "2.2", "2.2": "2.2", "4": "4.1", "4.1": "4.1"}
-DIMENSION = {
-    kind: 0 if kind == "vertex" else 1 if "line" in kind else 2 if kind[:4] in ("tria", "quad") else 3
-    for kind in _gmsh_to_meshio_type.values()
-}
+_DIMENSIONS = {"vert": 0, "line": 1, "tria": 2, "quad": 2}  # by the beginning of a kind's name
+DIMENSION = {kind: _DIMENSIONS.get(kind[:4], 3) for kind in _gmsh_to_meshio_type.values()}
 Groups = dict[tuple[int, int], IntArray]
 SECTION = re.compile(rb"^[ \t]*\$(\w+)[ \t\r]*$", re.MULTILINE)
 

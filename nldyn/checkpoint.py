@@ -1,12 +1,14 @@
 """What a running continuation has found, kept in a file so that nothing is lost if it ends early.
 
 The file is written anew each time, whole or not at all, and not more often than a twentieth of
-the time allows.
+the time allows. A computation does not end because its file cannot be written, on a full disk for
+instance: a warning says so, and it is tried again later.
 """
 
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
@@ -16,6 +18,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from nldyn.errors import SystemModelError
+from nldyn.result_directory import OutputError
 
 if TYPE_CHECKING:
     from nldyn.branch import Branch, Course
@@ -61,6 +64,7 @@ class Checkpoint:
         self._earlier = list(earlier)
         self._strict = strict
         self._due = time.monotonic() + PAUSE
+        self._failed = False
 
     def __enter__(self) -> Self:
         return self
@@ -103,7 +107,12 @@ class Checkpoint:
             return
         start = time.monotonic()
         branch = self.work() if self.work else None
-        self._write([*self._finished, *([branch] if branch else []), *self._earlier])
+        try:
+            self._write([*self._finished, *([branch] if branch else []), *self._earlier])
+        except OutputError as error:
+            if not self._failed:
+                warnings.warn(f"{error}; the computation goes on without it", stacklevel=2)
+            self._failed = True
         end = time.monotonic()
         self._due = end + max(PAUSE, SHARE * (end - start))
 

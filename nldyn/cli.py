@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 import time
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -60,12 +61,13 @@ class PlainGroup(click.Group):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the options that stand before the command."""
-        with plain_usage(click.NoSuchOption):  # without any argument the help is shown
+        # without any argument the help is shown
+        with plain_interrupt(), plain_usage(click.NoSuchOption):
             return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> object:
         """Run the command that is asked for."""
-        with plain_usage(click.UsageError):
+        with plain_interrupt(), plain_usage(click.UsageError), plain_warnings():
             return super().invoke(ctx)
 
 
@@ -78,6 +80,30 @@ def plain_usage(kind: type[click.UsageError]) -> Iterator[None]:
         fault = error.format_message().rstrip(".")
         click.echo(f"nldyn: {fault[:1].lower()}{fault[1:]}", err=True)
         sys.exit(BAD_INPUT)
+
+
+@contextmanager
+def plain_interrupt() -> Iterator[None]:
+    """Tell Ctrl-C in one line on stderr, and exit; compiled code wraps it."""
+    try:
+        yield
+    except (KeyboardInterrupt, SystemError) as error:
+        if not interrupted(error):
+            raise
+        click.echo(STOPPED, err=True)
+        sys.exit(INTERRUPTED)
+
+
+@contextmanager
+def plain_warnings() -> Iterator[None]:
+    """Tell warnings in one line on stderr, without the place in the program."""
+
+    def show(message: Warning | str, *_: object, **__: object) -> None:
+        click.echo(f"nldyn: warning: {message}", err=True)
+
+    with warnings.catch_warnings():
+        warnings.showwarning = show
+        yield
 
 
 @click.group(cls=PlainGroup, context_settings={"help_option_names": ["-h", "--help"]})
@@ -314,21 +340,22 @@ def plain_errors() -> Iterator[None]:
     except MemoryError:
         click.echo("nldyn: the memory does not suffice for this", err=True)
         sys.exit(BAD_INPUT)
-    except (KeyboardInterrupt, SystemError) as error:
-        if not interrupted(error):
-            raise
-        click.echo(STOPPED, err=True)
-        sys.exit(INTERRUPTED)
 
 
 @contextmanager
 def kept_at_interrupt(out: Path) -> Iterator[Path]:
-    """Give the file that keeps what is computed, and name it after Ctrl-C if there is one."""
+    """Give the file that keeps what is computed, and name it if the end is not reached."""
+    from nldyn.result_directory import OutputError
     from nldyn.unfinished import unfinished_file
 
     with unfinished_file(out) as unfinished:
         try:
             yield unfinished
+        except OutputError as error:
+            if not unfinished.exists():
+                raise
+            fault = f"{error}; {unfinished} keeps what was computed, and the same command goes on"
+            raise OutputError(f"{fault} from there") from error
         except (KeyboardInterrupt, SystemError) as error:
             if not (interrupted(error) and unfinished.exists()):
                 raise

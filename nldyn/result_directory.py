@@ -74,6 +74,9 @@ def _checked(target: Path, directory: str | Path) -> Path:
         )
     if target.is_dir() and not is_writable(target):
         raise OutputError(f"{directory}: is read-only; choose another directory")
+    above = next(folder for folder in (target, *target.parents) if folder.exists())
+    if not is_writable(above):
+        raise OutputError(f"{directory}: cannot be made: {above} is read-only")
     if target.is_mount():
         raise OutputError(f"{directory}: cannot be replaced; choose a folder in it")
     return target
@@ -135,11 +138,15 @@ def result_directory(directory: str | Path, kind: str) -> Iterator[Path]:
     target = check_directory(directory)
     try:
         with _new_directory(target) as new:
-            yield new
+            try:
+                yield new
+            except OutputError as error:  # names a file of the draft
+                raise OutputError(str(error).replace(str(new), str(directory))) from error
             _complete(new, target, kind)
             _swap(new, target)
     except OSError as error:
-        raise OutputError(f"{directory}: cannot be written: {error}") from error
+        fault = (error.strerror or str(error)).lower()
+        raise OutputError(f"{directory}: cannot be written: {fault}") from error
 
 
 def _complete(new: Path, target: Path, kind: str) -> None:

@@ -58,8 +58,9 @@ def refusal(result: Result) -> str | None:
     if result.exit_code == 0:
         return None
     assert result.exit_code == 2, result.output
-    line, end, rest = result.stderr.rpartition("\r\x1b[K")[2].partition("\n")
-    assert line.startswith("nldyn: ") and end == "\n" and rest == "", result.stderr
+    *warnings, line = result.stderr.splitlines()
+    assert all(text.startswith("nldyn: warning: ") for text in warnings), result.stderr
+    assert line.startswith("nldyn: ") and result.stderr.endswith("\n"), result.stderr
     assert line.isprintable(), repr(line)
     assert len(line) < 2000, line
     assert "Traceback" not in line

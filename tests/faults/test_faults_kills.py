@@ -72,7 +72,8 @@ def kill_and_go_on(task, place, kills, seed):
             if chance.random() < 0.5:
                 code = forked(run(scene, out), log, chance.uniform(0.0, 1.05) * seconds)
             else:
-                code = forked(run(scene, out, int(chance.choice((5, 40, 90)) * chance.random())), log)
+                event = int(chance.choice((5, 40, 90)) * chance.random())
+                code = forked(run(scene, out, event), log)
             assert code in (0, -signal.SIGKILL), log.read_text()[-2000:]
             check_whole(out)
             if code == 0:
@@ -122,7 +123,7 @@ def test_kills_from_the_first_moment_of_the_process(task, place):
 
 def test_results_that_a_killed_run_had_moved_away_are_put_back(task, place):
     """Killed between the two renamings that exchange old and new results."""
-    scene, whole, _ = task
+    whole = task[1]
     out = place / "out"
     shutil.rmtree(out, ignore_errors=True)
     shutil.copytree(whole, place / ".out.0123abcd.old")

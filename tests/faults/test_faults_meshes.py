@@ -13,7 +13,7 @@ from small_meshes import fuzz, write_meshes
 import fem
 from nldyn.scene import build_component, build_system, load_scene
 
-QUICK, FULL = 200, 6000
+QUICK, FULL = 150, 4000
 
 PART = "{ youngs_modulus = 2e11, density = 7800, width = 0.03, height = 0.01 }"
 GMSH = f"""

@@ -15,7 +15,7 @@ from small_meshes import fuzz, write_meshes
 from nldyn.resources import mesh
 from nldyn.scene import build_component, build_system, load_scene
 
-QUICK, FULL = 200, 6000
+QUICK, FULL = 150, 4000
 KEYS = {name: tomllib.loads(text) for name, text in TEXTS.items()}
 
 

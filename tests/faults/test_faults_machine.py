@@ -1,0 +1,218 @@
+"""A machine that fails or lacks something: one sentence, the right exit code, nothing lost."""
+
+import errno
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from killing import check_whole, run, same_results
+from limited_commands import command, refusal
+
+from nldyn import checkpoint, continuation, output, plot
+from nldyn.resources import example
+
+START = "from nldyn.command import main; main()"
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    text = example("one_dof.toml").read_text()
+    text = text.replace("[5.0, 90.0]", "[24.0, 26.0]\nsearch_points = 1\nrtol = 1e-7")
+    file = tmp_path_factory.mktemp("scene") / "scene.toml"
+    file.write_text(text.replace("periods = [1, 2, 3]", "periods = [1]"))
+    return file
+
+
+@pytest.fixture(scope="module")
+def whole(scene):
+    out = scene.parent / "whole"
+    with pytest.raises(SystemExit) as end:
+        run(scene, out)()
+    assert end.value.code == 0
+    return out
+
+
+def invoke(scene, out):
+    return command("run", scene, "--out", out, "--quiet", seconds=120.0)
+
+
+def full(*_, **__):
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+# --- a full disk ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("module", "name"),
+    [(output, "write_table"), (plot, "save_diagram"), (os, "fsync")],
+)
+def test_a_disk_that_is_full_at_the_end_keeps_what_was_computed(
+    scene, whole, tmp_path, monkeypatch, module, name
+):
+    """And the same command goes on once there is space."""
+    out = tmp_path / "out"
+    with monkeypatch.context() as failing:
+        failing.setattr(module, name, full)
+        said = refusal(invoke(scene, out))
+    assert said.startswith(f"{out}") and ": cannot be written: no space left on device" in said
+    assert ".new" not in said
+    assert ("keeps what was computed" in said) == (tmp_path / "out.unfinished.h5").exists()
+    assert ("keeps what was computed" in said) == (name != "fsync")
+    assert not out.exists()
+    assert refusal(invoke(scene, out)) is None
+    same_results(out, whole)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_disk_that_is_full_on_the_way_does_not_end_the_computation(
+    scene, whole, tmp_path, monkeypatch
+):
+    """Only the file for going on is missing meanwhile; the results come as ever."""
+    monkeypatch.setattr(checkpoint, "PAUSE", 0.2)
+    monkeypatch.setattr(checkpoint, "SHARE", 0.0)
+    fsync, calls = os.fsync, []
+
+    def sometimes(handle):
+        calls.append(handle)
+        if len(calls) == 1:
+            full()
+        fsync(handle)
+
+    monkeypatch.setattr(os, "fsync", sometimes)
+    result = invoke(scene, tmp_path / "out")
+    assert result.exit_code == 0 and len(calls) > 2
+    assert result.stderr == (
+        f"nldyn: warning: {tmp_path / 'out.unfinished.h5'}: cannot be written: no space left on "
+        "device; the computation goes on without it\n"
+    )
+    same_results(tmp_path / "out", whole)
+
+
+LIMITED = """
+import resource, signal, sys
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # then the writing fails as on a full disk
+resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+from nldyn.command import main
+main()
+"""
+
+
+def test_files_that_the_system_refuses_to_grow(scene, tmp_path):
+    arguments = ["run", str(scene), "--out", str(tmp_path / "out"), "--quiet"]
+    end = subprocess.run(
+        [sys.executable, "-c", LIMITED, *arguments], capture_output=True, text=True, timeout=300
+    )
+    assert end.returncode == 2
+    assert all(line.startswith("nldyn: ") for line in end.stderr.splitlines()), end.stderr
+    assert end.stderr.splitlines()[-1].endswith("branches.h5: cannot be written: file too large")
+    assert not (tmp_path / "out").exists()
+    check_whole(tmp_path / "out")
+
+
+# --- folders that cannot be written to -----------------------------------------------------------
+
+
+def test_a_folder_that_cannot_be_written_to_is_told_before_the_work(scene, tmp_path, monkeypatch):
+    monkeypatch.setattr("nldyn.scene.compute", lambda *_: pytest.fail("computed"))
+    (tmp_path / "closed").mkdir(mode=0o555)
+    for place in (tmp_path / "closed" / "out", "/proc/out", tmp_path / ("x" * 300)):
+        said = refusal(invoke(scene, place))
+        assert said.startswith(f"{place}: ")
+
+
+def test_a_read_only_folder_for_compiled_code(scene, tmp_path):
+    """Compiled code is then kept for the time of the process, and one line says so."""
+    closed = tmp_path / "closed"
+    closed.mkdir(mode=0o555)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(closed / "cache"), "HOME": str(closed)}
+    environment["NUMBA_CACHE_LOCATOR_CLASSES"] = "UserProvidedCacheLocator"
+    drop = [] if os.getuid() else ["setpriv", "--reuid=65534", "--clear-groups"]
+    if drop and shutil.which("setpriv") is None:
+        pytest.skip("needs a user that is not root")
+    end = subprocess.run(
+        [*drop, sys.executable, "-c", START, "check", str(example("one_dof.toml"))],
+        capture_output=True, text=True, timeout=300, env=environment,
+    )  # fmt: skip
+    if end.returncode == 1 and "Permission denied" in end.stderr:
+        pytest.skip("that user cannot read the package")
+    assert end.returncode == 0, end.stderr
+    assert "no fault found" in end.stdout
+    assert end.stderr.count("\n") <= 1
+
+
+# --- one core ------------------------------------------------------------------------------------
+
+
+def test_one_core_gives_the_same_results(scene, whole, tmp_path):
+    code = f"import os; os.sched_setaffinity(0, [min(os.sched_getaffinity(0))]); {START}"
+    arguments = ["run", str(scene), "--out", str(tmp_path / "out"), "--quiet"]
+    subprocess.run([sys.executable, "-c", code, *arguments], check=True, timeout=300)
+    same_results(tmp_path / "out", whole)
+
+
+# --- Ctrl-C --------------------------------------------------------------------------------------
+
+
+def stopped_at(monkeypatch, owner, name, call):
+    """Ctrl-C at one of the calls of a function."""
+    function, calls = getattr(owner, name), []
+
+    def interrupted(*arguments, **named):
+        calls.append(None)
+        if len(calls) == call:
+            raise KeyboardInterrupt
+        return function(*arguments, **named)
+
+    monkeypatch.setattr(owner, name, interrupted)
+
+
+STAGES = {
+    "scene": ("nldyn.scene", "load_scene", 1, False),
+    "search": ("nldyn.diagrams", "simulate_strobe", 1, False),
+    "walk": ("nldyn.continuation.Walk", "_advance", 20, True),
+    "tables": ("nldyn.output", "write_table", 2, True),
+    "picture": ("nldyn.plot", "save_diagram", 1, True),
+    "exchange": ("nldyn.result_directory", "_swap", 1, True),
+}
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_ctrl_c_at_every_stage(scene, whole, tmp_path, monkeypatch, stage):
+    place, name, call, kept = STAGES[stage]
+    owner = sys.modules.get(place) or continuation.Walk
+    out = tmp_path / "out"
+    with monkeypatch.context() as pressed:
+        stopped_at(pressed, owner, name, call)
+        result = invoke(scene, out)
+    assert result.exit_code == 130
+    assert result.stderr.startswith("nldyn: stopped by Ctrl-C") and result.stderr.count("\n") == 1
+    assert ("keeps what was computed" in result.stderr) == kept
+    assert (tmp_path / "out.unfinished.h5").exists() == kept
+    assert not out.exists()
+    assert refusal(invoke(scene, out)) is None
+    same_results(out, whole)
+
+
+def test_ctrl_c_from_the_terminal(tmp_path):
+    """At any time from the first second of the process on, also within compiled code."""
+    out = tmp_path / "out"
+    scene = example("one_dof.toml")
+    arguments = [sys.executable, "-c", START, "run", str(scene), "--out", str(out)]
+    for seconds in (0.4, 1.5, 4.0, 8.0):
+        child = subprocess.Popen(arguments, stderr=subprocess.PIPE, text=True)
+        time.sleep(seconds)
+        child.send_signal(signal.SIGINT)
+        _, said = child.communicate(timeout=20.0)
+        if child.returncode == -signal.SIGINT:  # before Python has read the program
+            assert seconds < 1.0
+            continue
+        assert child.returncode == 130, said
+        assert said.splitlines()[-1].startswith("nldyn: stopped by Ctrl-C"), said
+        check_whole(out)
+
+
