@@ -1,11 +1,11 @@
 # `make paper` reproduces the paper's figures, `make test` runs the tests, `make bench` measures
-# speed against error, `make hard` computes the hard cases. All set up a virtual environment in
-# .venv first.
+# speed against error, `make hard` computes the hard cases, `make faults` tries thousands of bad
+# inputs and hundreds of kills. All set up a virtual environment in .venv first.
 PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 
-.PHONY: paper test check bench hard clean
+.PHONY: paper test check bench hard faults clean
 
 $(VENV)/.installed: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -28,6 +28,10 @@ bench: $(VENV)/.installed
 
 hard: $(VENV)/.installed
 	$(BIN)/python -m nldyn.hard --out results/hard
+
+# what no input and no machine may do to a run: docs/faults.md
+faults: $(VENV)/.installed
+	$(BIN)/python -m pytest tests/faults -m "slow or not slow" -o addopts=-q
 
 clean:
 	rm -rf results $(VENV)

@@ -152,6 +152,7 @@ class Walk:
     open_ends: Sequence[Real] = ()
     stop_reason: str = NOT_FINISHED
     stride: Stride | None = None
+    _obstacle: str = field(default="", init=False, repr=False)
 
     def __iter__(self) -> Iterator[BranchPoint]:
         """Walk along the branch."""
@@ -168,7 +169,7 @@ class Walk:
                 if attempt is None:
                     step *= 0.5
                     if step < self.options.min_step:
-                        self.stop_reason = f"{SHORT_STEP}{self.options.min_step:g}"
+                        self.stop_reason = f"{SHORT_STEP}{self.options.min_step:g}: {self._obstacle}"
                         return
             point, angle, miss = attempt
             low, high = self.range_hz
@@ -234,7 +235,11 @@ class Walk:
             max_iterations=8,
         )
         if not found.converged:
+            self._obstacle = found.failure
+            if found.last_step < math.inf:
+                self._obstacle += f", last relative step {found.last_step:.1e}"
             return None
+        self._obstacle = "what Newton's method finds is not the next point of the branch"
         miss = _length(weights, found.point - predicted) / step
         if step <= KINK and miss < 1.0:  # a linear stop that is touched bends the branch
             orbit = Orbit.of(problem, found, here.orbit.observe)
@@ -808,7 +813,8 @@ def goes_on(leg: Leg, course: Course) -> bool:
         return low * (1.0 + 1e-9) < leg.nodes[-1].orbit.frequency_hz < high * (1.0 - 1e-9)
     if leg.reason.endswith(POINTS):
         return options.max_points > end.count
-    return leg.reason != f"{SHORT_STEP}{options.min_step:g}" and leg.reason.startswith(SHORT_STEP)
+    shortest = leg.reason.partition(":")[0]
+    return shortest != f"{SHORT_STEP}{options.min_step:g}" and leg.reason.startswith(SHORT_STEP)
 
 
 def join(name: str, forward: Leg, backward: Leg | None, course: Course, origin: str) -> Branch:

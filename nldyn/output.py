@@ -53,6 +53,14 @@ SPECIAL_COLUMNS = (
 )
 
 
+END_COLUMNS = (
+    "branch",
+    "end",
+    "frequency_hz",
+    "max_abs_displacement_m",
+    "broken_off",
+    "reason",
+)
 COVERAGE_COLUMNS = ("frequency_hz", "periods", "settled", "unsettled", "failed")
 
 
@@ -71,7 +79,7 @@ def write_results(
         What `nldyn.scene.compute` or `nldyn.scene.explore_scene` gave.
     directory : str or Path
         New, empty, or written by an earlier run, whose files are replaced; other files in it
-        are kept. Gets ``branches.csv``, ``special_points.csv``, ``branches.h5``,
+        are kept. Gets ``branches.csv``, ``special_points.csv``, ``ends.csv``, ``branches.h5``,
         ``diagram.png``, ``diagram.svg``, ``summary.json``, with an exploration ``coverage.csv``
         and, with a scene, ``scene.toml``.
     scene : Scene, optional
@@ -108,6 +116,7 @@ def write_results(
     with result_directory(directory, "run") as folder:
         write_table(folder / "branches.csv", BRANCH_COLUMNS, branch_rows(diagram))
         write_table(folder / "special_points.csv", SPECIAL_COLUMNS, special_rows(diagram))
+        write_table(folder / "ends.csv", END_COLUMNS, end_rows(diagram))
         found.save(folder / "branches.h5")
         if exploration is not None:
             write_table(folder / "coverage.csv", COVERAGE_COLUMNS, coverage_rows(exploration))
@@ -127,6 +136,20 @@ def branch_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
         rows = zip(*(columns[name].tolist() for name in BRANCH_COLUMNS[2:]), strict=True)
         for number, row in enumerate(rows):
             yield (branch.name, number, *map(if_known, row))
+
+
+def end_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
+    """Give the rows of ``ends.csv``: the last good points of each branch, and why it ends there."""
+    from nldyn.branch import NOT_FINISHED, POINTS, SHORT_STEP
+
+    for branch in diagram.branches:
+        ends = zip(("first", "last"), branch.stop_reasons, (0, -1), strict=True)
+        for name, reason, index in ends:
+            orbit = branch.points[index]
+            broken = reason.startswith((SHORT_STEP, NOT_FINISHED)) or reason.endswith(POINTS)
+            hz = at_known(orbit.frequency_hz, diagram.range_hz)
+            size = float(orbit.max_abs_displacement)
+            yield (branch.name, name, hz, size, int(broken), reason)
 
 
 def coverage_rows(found: Exploration) -> Iterable[tuple[object, ...]]:

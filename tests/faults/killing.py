@@ -18,7 +18,7 @@ from nldyn import checkpoint, load_branches, load_diagram
 from nldyn.cli import main
 from nldyn.result_directory import MANIFEST
 
-TABLES = ("branches.csv", "special_points.csv", "branches.h5", "summary.json")
+TABLES = ("branches.csv", "special_points.csv", "ends.csv", "branches.h5", "summary.json")
 PICTURES = ("diagram.png", "diagram.svg")
 
 

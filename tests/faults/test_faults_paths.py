@@ -126,8 +126,8 @@ def test_results_go_nowhere_but_into_the_folder_asked_for(tmp_path, monkeypatch)
     result = command("run", "scene.toml", "--out", "out", "--quiet", seconds=120.0)
     assert refusal(result) is None
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out", "scene.toml"]
-    known = {"branches.csv", "special_points.csv", "branches.h5", "diagram.png", "diagram.svg",
-             "summary.json", "scene.toml", ".nldyn.json"}  # fmt: skip
+    known = {"branches.csv", "special_points.csv", "ends.csv", "branches.h5", "diagram.png",
+             "diagram.svg", "summary.json", "scene.toml", ".nldyn.json"}  # fmt: skip
     assert {entry.name for entry in (tmp_path / "out").iterdir()} == known
 
 

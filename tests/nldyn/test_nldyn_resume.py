@@ -99,7 +99,7 @@ def test_extension_in_many_small_pieces(start, whole):
 
 def test_a_shorter_smallest_step_goes_on_where_the_longer_one_gave_up(start, whole):
     part = continue_branch(start, RANGE_HZ, options=ContinuationOptions(min_step=1e-3), at=AT)
-    assert "step below 0.001" in part.stop_reasons
+    assert any(reason.startswith("step below 0.001: ") for reason in part.stop_reasons)
     assert_same_branches(part.extend(options=ContinuationOptions()), whole)
 
 

@@ -16,6 +16,7 @@ from nldyn.scene import load_scene
 FILES = {
     "branches.csv",
     "special_points.csv",
+    "ends.csv",
     "branches.h5",
     "diagram.png",
     "diagram.svg",

@@ -1,0 +1,110 @@
+"""A computation that fails is a result: how far it came and why, never a number that is none."""
+
+import csv
+import json
+import math
+
+import pytest
+from limited_commands import command
+
+ONE = """
+[matrices]
+mass = [[1.0]]
+stiffness = [[1e4]]
+interfaces.a = [1.0]
+[damping]
+modal_ratio = {damping}
+[[stops]]
+at = "a"
+stiffness = {stiffness}
+gap = {gap}
+[[excitation]]
+at = "a"
+kind = "harmonic"
+amplitude = {force}
+[continuation]
+range_hz = [14.0, 18.0]
+periods = [1]
+search_points = 2
+rtol = 1e-7
+"""
+PLAIN = {"damping": 0.01, "stiffness": 1e8, "gap": 1e-4, "force": 1.0}
+
+
+def computed(folder, **values):
+    """Exit code, what is said, and the tables of a scene with other values."""
+    file, out = folder / "scene.toml", folder / "out"
+    file.write_text(ONE.format(**{**PLAIN, **values}))
+    result = command("run", file, "--out", out, "--quiet", seconds=150.0)
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    tables = {}
+    for name in ("branches", "ends", "special_points"):
+        with (out / f"{name}.csv").open(newline="") as table:
+            tables[name] = list(csv.DictReader(table))
+    check_numbers(tables)
+    assert (out / "diagram.png").stat().st_size > 1000
+    assert "nan" not in (out / "diagram.svg").read_text().lower()
+    json.loads((out / "summary.json").read_text(), parse_constant=lambda text: pytest.fail(text))
+    return result, tables
+
+
+def check_numbers(tables):
+    """Check that all numbers are finite; only what may be unknown is empty."""
+    for row in tables["branches"]:
+        for name, value in row.items():
+            if name not in ("branch", "relative_uncertainty", "liouville_error"):
+                assert math.isfinite(float(value)), (name, value)
+    for table in tables.values():
+        assert not any(value in ("nan", "inf", "-inf") for row in table for value in row.values())
+
+
+def test_an_undamped_resonance_ends_the_branch_with_residual_and_last_point(tmp_path):
+    result, tables = computed(tmp_path, damping=0.0, gap=1e3)
+    assert result.exit_code == 0
+    broken = [end for end in tables["ends"] if end["broken_off"] == "1"]
+    assert broken
+    for end in broken:
+        assert end["reason"].startswith("step below 1e-08: ")
+        last = [row for row in tables["branches"] if row["branch"] == end["branch"]]
+        row = last[0 if end["end"] == "first" else -1]
+        assert end["frequency_hz"] == row["frequency_hz"]
+        assert end["max_abs_displacement_m"] == row["max_abs_displacement_m"]
+        assert f"branch {end['branch']} was broken off at" in result.stdout
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"stiffness": 1e50},
+        {"force": 1e40},
+        {"gap": -1e10},
+        {"stiffness": 1e20, "force": 1e6},
+    ],
+)
+def test_a_hopeless_scene_says_so(tmp_path, values):
+    """The tables may be empty, and then the exit code is 1 and the notes say what was tried."""
+    result, tables = computed(tmp_path, **values)
+    assert result.exit_code == (0 if tables["branches"] else 1)
+    if not tables["branches"]:
+        assert "note: " in result.stdout
+        assert result.stderr.splitlines()[-1] == (
+            "nldyn: no periodic orbit was found; the tables are empty"
+        )
+
+
+def test_whole_branches_are_told_as_such(tmp_path):
+    _, tables = computed(tmp_path)
+    assert {(end["end"], end["broken_off"], end["reason"]) for end in tables["ends"]} == {
+        ("first", "0", "end of the frequency range"),
+        ("last", "0", "end of the frequency range"),
+    }
+
+
+@pytest.mark.parametrize("force", [1e-40, pytest.param(1e30, marks=pytest.mark.slow)])
+def test_tiny_and_huge_forces_give_the_answer_of_the_linear_system(tmp_path, force):
+    """No stop is reached: the top of the resonance is F / (2 k zeta sqrt(1 - zeta^2))."""
+    _, tables = computed(tmp_path, force=force, gap=force)
+    top = max(float(row["max_abs_displacement_m"]) for row in tables["branches"])
+    zeta = PLAIN["damping"]
+    wanted = force / (2e4 * zeta * math.sqrt(1.0 - zeta**2))
+    assert 0.99 * wanted < top <= wanted * (1.0 + 1e-6)  # points lie beside the top
