@@ -169,7 +169,8 @@ class Walk:
                 if attempt is None:
                     step *= 0.5
                     if step < self.options.min_step:
-                        self.stop_reason = f"{SHORT_STEP}{self.options.min_step:g}: {self._obstacle}"
+                        shortest = f"{SHORT_STEP}{self.options.min_step:g}"
+                        self.stop_reason = f"{shortest}: {self._obstacle}"
                         return
             point, angle, miss = attempt
             low, high = self.range_hz

@@ -16,7 +16,7 @@ from killing import TABLES, check_results, check_whole, forked, run, same_result
 from nldyn import study
 from nldyn.resources import example
 
-QUICK, FULL = 12, 260
+QUICK, FULL = 12, 220
 SHARED_MEMORY = Path("/dev/shm")
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
