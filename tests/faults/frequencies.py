@@ -5,14 +5,16 @@ import scipy.linalg
 
 
 def lowest_hz(stiffness, mass, count):
-    """Frequencies in Hz, and by how much rounding may move them.
+    """Frequencies in Hz, and below which of them rounding of K cannot tell one from zero.
 
     From the problem M u = K u / w², whose rounding spares the low ones, but where K is singular.
     """
+    heavy = np.diag(mass) > 0.0
+    squares = np.diag(stiffness)[heavy] / np.diag(mass)[heavy]
+    rounding = np.sqrt(64 * np.finfo(float).eps * squares.max(initial=0.0)) / (2 * np.pi)
     try:
         inverse = scipy.linalg.eigh(mass, stiffness, eigvals_only=True)[::-1][:count]
-        return 1.0 / np.sqrt(inverse) / (2 * np.pi), 0.0
+        return 1.0 / np.sqrt(inverse) / (2 * np.pi), rounding
     except np.linalg.LinAlgError:  # it floats, or all but does
-        squares = scipy.linalg.eigh(stiffness, mass, eigvals_only=True)
-        rounding = np.sqrt(1e-15 * squares[-1]) / (2 * np.pi)
-        return np.sqrt(np.maximum(squares[:count], 0.0)) / (2 * np.pi), rounding
+        squares = scipy.linalg.eigh(stiffness, mass, eigvals_only=True)[:count]
+        return np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi), rounding

@@ -12,7 +12,7 @@ from small_meshes import fuzz, write_meshes
 import fem
 from nldyn.scene import build_component, build_system, load_scene
 
-QUICK, FULL = 150, 4000
+QUICK, FULL = 50, 4000
 
 PART = "{ youngs_modulus = 2e11, density = 7800, width = 0.03, height = 0.01 }"
 GMSH = f"""
@@ -69,7 +69,8 @@ def judge(folder, files, name, content):
     lowest, rounding = lowest_hz(stiffness, mass, 1)
     found = build_system(scene).frequencies_hz[0]
     share = 1e-3 if "craig" in SCENES[kind] else 1e-6
-    assert found == pytest.approx(lowest[0], rel=share, abs=1e-3 + rounding)  # 0 where it floats
+    floats = found == 0.0 and lowest[0] <= rounding
+    assert floats or found == pytest.approx(lowest[0], rel=share, abs=1e-3)
 
 
 def test_the_meshes_to_spoil_are_good(folder, files):

@@ -15,7 +15,7 @@ from small_meshes import fuzz, write_meshes
 from nldyn.resources import mesh
 from nldyn.scene import build_component, build_system, load_scene
 
-QUICK, FULL = 150, 4000
+QUICK, FULL = 50, 4000
 KEYS = {name: tomllib.loads(text) for name, text in TEXTS.items()}
 
 
@@ -57,13 +57,15 @@ def compare(scene):
         component = build_component(scene)
         stiffness, mass = component.stiffness.toarray(), component.mass.toarray()
     kept = len(found) if scene.matrices is not None else kept_modes(scene, len(found))
-    wanted, _ = lowest_hz(stiffness, mass, kept)
+    wanted, zero = lowest_hz(stiffness, mass, kept)
     if not kept or wanted[-1] == 0.0:
         assert not found[:kept].any()
         return
     rounding = 1e-14 * (wanted / max(wanted[0], 1e-12 * wanted[-1])) ** 2  # of the check itself
-    error = np.abs(np.sort(found)[:kept] - wanted)
-    assert (error <= (1e-6 + rounding) * wanted + 1e-6 * wanted[-1]).all()
+    values = np.sort(found)[:kept]
+    close = np.abs(values - wanted) <= (1e-6 + rounding) * wanted + 1e-6 * wanted[-1]
+    floats = (values == 0.0) & (wanted <= zero)
+    assert (close | floats).all()
 
 
 def kept_modes(scene, count):
