@@ -22,7 +22,7 @@ def main() -> None:
 
     try:
         results = run(chosen.out, quick=chosen.quick, only=chosen.only, workers=chosen.workers)
-    except OutputError as error:
+    except (OutputError, ValueError) as error:
         parser.error(str(error))
     failed = [r for r in results if not r.passed]
     print(f"{len(results)} cases, {len(failed)} failed; written to {chosen.out / 'page.md'}")

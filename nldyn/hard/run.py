@@ -38,9 +38,14 @@ def run(folder: Path, *, quick: bool = False, only: str = "", workers: int = 1) 
 
     Raises
     ------
+    ValueError
+        If there is no such subject.
     OutputError
         If the folder cannot be written or holds something else.
     """
+    subjects = dict.fromkeys(case.subject for case in CASES)
+    if only not in ("", *subjects):
+        raise ValueError(f"{only!r} is no subject of hard cases; there are {', '.join(subjects)}")
     check_directory(folder)
     start = time.perf_counter()
     chosen = [

@@ -73,7 +73,7 @@ def test_a_disk_that_is_full_on_the_way_does_not_end_the_computation(
     scene, whole, tmp_path, monkeypatch
 ):
     """Only the file for going on is missing meanwhile; the results come as ever."""
-    monkeypatch.setattr(checkpoint, "PAUSE", 0.2)
+    monkeypatch.setattr(checkpoint, "PAUSE", 0.05)
     monkeypatch.setattr(checkpoint, "SHARE", 0.0)
     fsync, calls = os.fsync, []
 

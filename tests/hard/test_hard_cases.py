@@ -74,3 +74,9 @@ def test_every_case_is_told_apart():
     assert all(
         case.bound > 0.0 and case.hard and case.reference and case.bound_from for case in CASES
     )
+
+
+def test_a_subject_that_there_is_not_is_named(tmp_path):
+    with pytest.raises(ValueError, match="'chatter' is no subject of hard cases; there are stiff"):
+        run(tmp_path / "out", only="chatter")
+    assert not (tmp_path / "out").exists()
