@@ -20,7 +20,8 @@ from nldyn.search import orbit_near
 from nldyn.system import System
 
 NEWTON_STEPS = 12
-FIRST = 1e-4  # how far the first, straight piece reaches, as a share of the plane
+STEP_HALVINGS = 10
+FIRST = 1e-5  # how far the first, straight piece reaches, as a share of the plane
 HALVINGS = 30
 LINGER = 64  # periods for which a motion from the edge is followed
 MARGIN = 1.0  # how far beyond the plane a manifold is followed, in units of its sides
@@ -40,7 +41,8 @@ def stable_manifold(
     A short piece along the stable eigenvector is taken back in time, again and again: its inverse
     image under the map over the orbit's period is longer by the inverse of the stable multiplier,
     and errors across the manifold shrink. Inverse images come from Newton's method with the exact
-    Jacobian, each from the one before; where they lie too far apart, points are put between.
+    Jacobian. Where they lie too far apart, points are put between, which come all the way from
+    the short piece: on the chord of two others they would be off the manifold.
 
     Parameters
     ----------
@@ -123,10 +125,9 @@ def _piece_task(
     values, vectors = np.linalg.eig(inverse.jacobian(middle))
     stable = int(np.argmin(np.abs(values)))
     along = np.real(vectors[:, stable])
-    along *= FIRST / float(np.linalg.norm(along))
-    shrink = abs(float(np.real(values[stable])))
-    piece = [middle + side * along * shrink**x for x in np.linspace(1.0, 0.0, 9)]
-    return inverse.to_user(_grown(inverse, np.vstack([middle, *piece]), resolution, budget))
+    along *= side * FIRST / float(np.linalg.norm(along))
+    piece = _Preimages(inverse, middle, along, abs(float(np.real(values[stable]))))
+    return inverse.to_user(_grown(piece, resolution, budget))
 
 
 class _Inverse:
@@ -163,50 +164,99 @@ class _Inverse:
         return found[1]
 
     def __call__(self, point: Real, guess: Real) -> Real | None:
-        """The point that is mapped to a given one, by Newton's method; None if none is found."""
-        here = guess
+        """The point that is mapped to a given one, by Newton's method; None if none is found.
+
+        Whole steps are fastest, but may go round in a circle: at a grazing contact the Jacobian
+        turns within a short way. Then a step is halved until it brings the image nearer.
+        """
+        found = self._newton(point, guess, 1)
+        return self._newton(point, guess, STEP_HALVINGS) if found is None else found
+
+    def _newton(self, point: Real, guess: Real, tries: int) -> Real | None:
+        here, there = guess, self.image(guess)
         for _ in range(NEWTON_STEPS):
-            found = self.image(here)
-            if found is None:
+            if there is None:
                 return None
-            step = np.linalg.solve(found[1], point - found[0])
+            image, jacobian = there
+            step = np.linalg.solve(jacobian, point - image)
             size = float(np.linalg.norm(step))
             if not math.isfinite(size):
                 return None
-            here = here + step * min(1.0, 0.2 / size if size > 0.0 else 1.0)
             if size < 1e-10:
-                return here
-        return None
-
-
-def _grown(inverse: _Inverse, curve: Real, resolution: float, budget: int) -> Real:
-    """Take the last part of a curve back in time, and append it, until the points are used up.
-
-    `curve` begins at the saddle's state; its points after that cover one fundamental piece.
-    """
-    points = list(curve)
-    parent = 1  # index of the point whose inverse image comes next
-    guess = points[-1]
-    while len(points) < budget and parent + 1 < len(points):
-        before, after = points[parent], points[parent + 1]
-        start, share = points[-1], 0.0
-        while share < 1.0 and len(points) < budget:
-            step = 1.0 - share
-            for _ in range(HALVINGS):
-                target = before + (share + step) * (after - before)
-                found = inverse(target, guess)
-                if found is not None and np.linalg.norm(found - start) <= resolution:
+                return np.asarray(here + step)
+            step *= min(1.0, 0.2 / size)
+            for _ in range(tries):
+                there = self.image(here + step)
+                if tries == 1 or (there and _distance(point, there[0]) < _distance(point, image)):
                     break
                 step *= 0.5
             else:
-                return np.array(points)
-            share += step
-            start = guess = found
+                return None
+            here = here + step
+        return None
+
+
+class _Preimages:
+    """Points of a stable manifold, each an inverse image of one next to the saddle.
+
+    Between the ends ``middle + along * shrink`` (share 0) and ``middle + along`` (share 1) lies a
+    fundamental piece of the straight line that touches the manifold; its k-th inverse images, for
+    all k, follow one another along the manifold.
+    """
+
+    def __init__(self, inverse: _Inverse, middle: Real, along: Real, shrink: float) -> None:
+        self.inverse, self.middle, self.along, self.shrink = inverse, middle, along, shrink
+
+    def first(self, share: float) -> Real:
+        """The point next to the saddle."""
+        return np.asarray(self.middle + self.along * self.shrink ** (1.0 - share))
+
+    def chain(self, share: float, near: Sequence[Real]) -> list[Real] | None:
+        """A point next to the saddle and its inverse images, as many as a chain near it has."""
+        points = [self.first(share)]
+        for guess in near[1:]:
+            found = self.inverse(points[-1], guess)
+            if found is None:
+                return None
             points.append(found)
-            if np.any(found < -MARGIN) or np.any(found > 1.0 + MARGIN):
+        return points
+
+
+def _grown(piece: _Preimages, resolution: float, budget: int) -> Real:
+    """Points along one side of a stable manifold, from the saddle on, until they are used up."""
+    shares = [0.0, 0.5, 1.0]
+    chains = [[piece.first(share)] for share in shares]
+    points = [piece.middle, *(chain[0] for chain in chains)]
+    while len(points) < budget:
+        end = piece.chain(0.0, [*chains[0], points[-1]])
+        if end is None:
+            break
+        kept, longer = [0.0], [end]
+        wanted = list(zip(shares, chains, strict=True))[:0:-1]
+        while wanted:
+            share, chain = wanted[-1]
+            found = piece.inverse(chain[-1], longer[-1][-1])
+            if found is None or _distance(found, longer[-1][-1]) > resolution:
+                added = None
+                while added is None:
+                    share = 0.5 * (kept[-1] + share)
+                    if share - kept[-1] < 0.5**HALVINGS:
+                        return np.array(points)
+                    added = piece.chain(share, longer[-1][:-1])
+                wanted.append((share, added))
+                continue
+            wanted.pop()
+            kept.append(share)
+            longer.append([*chain, found])
+            points.append(found)
+            if len(points) >= budget or np.any(np.abs(found - 0.5) > 0.5 + MARGIN):
                 return np.array(points)
-        parent += 1
+        shares, chains = kept, longer
     return np.array(points)
+
+
+def _distance(a: Real, b: Real) -> float:
+    return float(np.linalg.norm(a - b))
 
 
 def basin_edge(

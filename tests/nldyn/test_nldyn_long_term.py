@@ -266,16 +266,22 @@ def test_stable_manifold_separates_the_phases(one_dof, plane):
             image = simulate(flow, 50.0, periods=2, start=start).end
             place = plane.coordinates(image[None])[0][0]
             assert tree.query(place / width)[0] < 0.004
-    sides = []
-    middle = pieces[0][300]
-    along = (pieces[0][301] - pieces[0][299]) / width
-    across = np.array([-along[1], along[0]]) * width
-    for side in (1.0, -1.0):
-        x, y = middle + side * across
-        start = plane.origin + x * plane.x + y * plane.y
-        ends = simulate(flow, 50.0, periods=2, start=start, transient=2000).strobe
-        sides.append(ends[0, 0] > ends[1, 0])
-    assert sides[0] != sides[1]
+
+
+def test_points_of_a_stable_manifold_lie_on_the_edge_between_the_phases(one_dof, plane):
+    width = np.array([np.ptp(plane.x_range), np.ptp(plane.y_range)])
+
+    def phase(point: np.ndarray) -> bool:
+        start = plane.origin + point[0] * plane.x + point[1] * plane.y
+        ends = simulate(one_dof, 50.0, periods=2, start=start, transient=300).strobe
+        return bool(ends[0, 0] > ends[1, 0])
+
+    for piece in stable_manifold(solve_orbit(one_dof, 50.0), plane, max_points=1200):
+        assert len(piece) == 600
+        for k in range(10, 599, 40):
+            along = (piece[k + 1] - piece[k - 1]) / width
+            across = np.array([-along[1], along[0]]) / np.linalg.norm(along) * width
+            assert phase(piece[k] + 1e-8 * across) != phase(piece[k] - 1e-8 * across)
 
 
 def test_two_stable_orbits_share_the_plane_and_unstable_ones_sit_on_the_edge():
