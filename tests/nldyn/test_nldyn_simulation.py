@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from independent import Motion as Independent
@@ -11,6 +13,7 @@ from scipy.integrate import solve_ivp
 
 from nldyn import (
     FlowMap,
+    HarmonicForce,
     Stop,
     System,
     SystemModelError,
@@ -108,15 +111,16 @@ def test_permanent_contact_is_no_impact():
 
 def chirp_end(system: System, first: float, last: float, rate: float) -> np.ndarray:
     """State at the end of a sweep whose frequency changes at every instant."""
-    (c, stop), (phi, source) = Independent(system).stops[0], Independent(system).sources[0]
+    stops, (phi, source) = Independent(system).stops, Independent(system).sources[0]
     slope = np.copysign(rate, last - first)
     spring, damping = system.natural_frequencies[0] ** 2, system.total_damping[0, 0]
 
     def rate_of(t: float, x: np.ndarray) -> list[float]:
         omega = 2.0 * np.pi * (first + slope * t)
         phase = 2.0 * np.pi * (first * t + 0.5 * slope * t * t)
-        push = phi[0] * source.phasor.real * omega**2 * np.cos(phase)
-        push -= c[0] * contact(stop, c[0] * x[0] - stop.gap, c[0] * x[1])[0]
+        push = phi[0] * source.phasor.real * omega**source.order * np.cos(phase)
+        for c, stop in stops:
+            push -= c[0] * contact(stop, c[0] * x[0] - stop.gap, c[0] * x[1])[0]
         return [x[1], push - spring * x[0] - damping * x[1]]
 
     span = (0.0, abs(last - first) / rate)
@@ -125,18 +129,40 @@ def chirp_end(system: System, first: float, last: float, rate: float) -> np.ndar
     ).y[:, -1]
 
 
-@pytest.mark.parametrize("ends", [(20.0, 21.0), (21.0, 20.0)])
-def test_sweep_converges_to_the_true_sweep_with_the_square_of_the_step(ends):
+def sweep_error(system: System, ends: tuple[float, float], steps: int, exact: np.ndarray) -> float:
+    motion = sweep(system, ends, 2.0, steps_per_period=steps)
+    assert motion.end_time == pytest.approx(abs(ends[1] - ends[0]) / 2.0, rel=1e-12)
+    return float(np.abs(motion.end - exact).max() / np.abs(exact).max())
+
+
+SWEEPS = [(20.0, 21.0), (21.0, 20.0), (20.0, 22.0)]
+
+
+@pytest.mark.parametrize("ends", SWEEPS)
+def test_sweep_of_a_force_converges_with_the_fourth_power_of_the_step(ends):
+    system = make_one_dof(stops=[], excitation=[HarmonicForce("middle", 0.08)])
+    exact = chirp_end(system, *ends, 2.0)
+    errors = [sweep_error(system, ends, steps, exact) for steps in (4, 8, 16)]
+    assert errors[0] < 1e-4
+    assert errors[0] > 12.0 * errors[1] > 144.0 * errors[2]
+
+
+@pytest.mark.parametrize("ends", SWEEPS)
+def test_sweep_of_an_unbalance_converges_with_the_square_of_the_step(ends):
+    system = make_one_dof(stops=[])
+    exact = chirp_end(system, *ends, 2.0)
+    errors = [sweep_error(system, ends, steps, exact) for steps in (4, 8, 16, 32)]
+    assert errors[0] < 2e-3
+    for coarse, fine in pairwise(errors):
+        assert coarse > 3.5 * fine
+
+
+@pytest.mark.parametrize("ends", SWEEPS)
+def test_sweep_with_impacts_comes_near_the_true_one(ends):
     system = make_one_dof()
     exact = chirp_end(system, *ends, 2.0)
-    scale = np.abs(exact).max()
-    errors = []
-    for steps in (2, 4, 8):
-        motion = sweep(system, ends, 2.0, steps_per_period=steps)
-        assert motion.end_time == pytest.approx(0.5, rel=1e-12)
-        errors.append(float(np.abs(motion.end - exact).max()) / scale)
-    assert errors[1] / errors[2] > 3.0
-    assert errors[2] < 3e-3
+    for steps, bound in ((4, 1e-3), (8, 1e-3), (16, 1e-3), (32, 2e-5)):
+        assert sweep_error(system, ends, steps, exact) < bound
 
 
 def test_slow_sweep_follows_the_branch():
