@@ -173,7 +173,7 @@ def _pieces(motion: Motion) -> _Pieces:
 
 def _complete(motion: Motion) -> Impacts:
     pieces = _pieces(motion)
-    tables = [_of_stop(motion.flow, pieces, stop) for stop in range(len(motion.flow.system.stops))]
+    tables = [_of_stop(motion, pieces, stop) for stop in range(len(motion.flow.system.stops))]
     columns = {
         field.name: np.concatenate([table[field.name] for table in tables] or [np.empty(0)])
         for field in fields(Impacts)
@@ -211,13 +211,18 @@ def panel_table(motion: Motion, stop: int) -> PanelTable:
     """Integrals over all contact panels of a stop, also of contacts that are not complete."""
     pieces = _pieces(motion)
     closed = np.flatnonzero(pieces.depth[:, stop].any(axis=1))
-    return _panel_table(motion.flow, pieces, stop, closed)
+    return _panel_table(motion, pieces, stop, closed)
 
 
-def _panel_table(flow: FlowMap, pieces: _Pieces, stop: int, panels: NDArray[np.intp]) -> PanelTable:
-    weights = pieces.duration[panels, None] * flow.tables.weights[pieces.kind[panels]]
+def _panel_table(
+    motion: Motion, pieces: _Pieces, stop: int, panels: NDArray[np.intp]
+) -> PanelTable:
+    flow, kind = motion.flow, pieces.kind[panels]
+    weights = pieces.duration[panels, None] * flow.tables.weights[kind]
     nodal = pieces.force[panels, stop]
-    fine, rise = _panel_tables(flow.options.panel_nodes)
+    nodes = pieces.time[panels, None] + pieces.duration[panels, None] * flow.tables.chi[kind]
+    rate = _rates(flow, motion.states(nodes.ravel()), stop).reshape(nodes.shape)
+    fine = _fine_table(flow.options.panel_nodes)
     depth, force = pieces.depth[panels, stop] @ fine.T, nodal @ fine.T
     work = 0.5 * (force[:, 1:] + force[:, :-1]) * np.diff(depth, axis=1)
     return PanelTable(
@@ -225,10 +230,16 @@ def _panel_table(flow: FlowMap, pieces: _Pieces, stop: int, panels: NDArray[np.i
         np.einsum("pm,pm->p", weights, nodal),
         np.einsum("pm,pm->p", weights, nodal**2),
         np.maximum(work, 0.0).sum(axis=1),
-        np.einsum("pm,pm->p", nodal, pieces.depth[panels, stop] @ rise.T),
+        np.einsum("pm,pm,pm->p", weights, nodal, rate),
         _peaks(depth),
         _peaks(force),
     )
+
+
+def _rates(flow: FlowMap, modal: Real, stop: int) -> Real:
+    """Rates of penetration (k,) of modal displacements and velocities (k, 2n)."""
+    system = flow.system
+    return np.asarray(modal[:, system.size :] @ system.stop_vector(system.stops[stop]))
 
 
 def _peaks(values: Real) -> Real:
@@ -253,14 +264,12 @@ def _peaks(values: Real) -> Real:
     return np.where(inside, top, values.max(axis=1))
 
 
-def _of_stop(flow: FlowMap, pieces: _Pieces, stop: int) -> dict[str, NDArray[Any]]:
+def _of_stop(motion: Motion, pieces: _Pieces, stop: int) -> dict[str, NDArray[Any]]:
     """Columns of the complete contacts with one stop."""
     first, last, panels, group = contact_runs(pieces.depth[:, stop], pieces.event, stop)
-    table = _panel_table(flow, pieces, stop, panels)
+    table = _panel_table(motion, pieces, stop, panels)
     count = first.size
-    modal = flow.to_modal(pieces.start)
-    system = flow.system
-    speed = modal[:, system.size :] @ system.stop_vector(system.stops[stop])
+    speed = _rates(motion.flow, motion.flow.to_modal(pieces.start), stop)
     end = pieces.time[last] + pieces.duration[last]
     return {
         "stop": np.full(count, stop, dtype=np.int64),
@@ -317,15 +326,10 @@ def _largest(group: NDArray[np.intp], values: Real, count: int) -> Real:
 
 
 @lru_cache(maxsize=8)
-def _panel_tables(nodes: int) -> tuple[Real, Real]:
-    """Two matrices on values at the Gauss nodes of a panel, of the polynomial through them.
-
-    (FINE, nodes): values at equal steps of s from 0 to 1. (nodes, nodes): derivative by s at the
-    nodes, times the Gauss weights.
-    """
+def _fine_table(nodes: int) -> Real:
+    """Matrix (FINE, nodes): the polynomial through values at the Gauss nodes, at equal steps."""
     x, w = legendre.leggauss(nodes)
     degrees = np.arange(nodes)
     to_legendre = (0.5 * (2 * degrees + 1))[:, None] * legendre.legvander(x, nodes - 1).T * w
     fine = legendre.legvander(np.linspace(-1.0, 1.0, FINE), nodes - 1)
-    slopes = np.array([legendre.legval(x, legendre.legder(unit)) for unit in np.eye(nodes)]).T
-    return np.asarray(fine @ to_legendre), np.asarray(w[:, None] * (slopes @ to_legendre))
+    return np.asarray(fine @ to_legendre)

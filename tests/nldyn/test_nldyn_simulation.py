@@ -100,6 +100,20 @@ def test_a_contact_over_the_end_of_the_period_counts_once():
     assert len(impacts(solve_orbit(phased, 25.3))) == 1
 
 
+def test_loss_is_zero_to_the_accuracy_of_the_flow_map_where_the_stop_is_elastic():
+    found = impacts(simulate(make_one_dof(), 15.0, periods=10))
+    assert len(found) > 10
+    assert np.all(np.abs(found.loss) < 1e-8 * found.work)
+
+
+def test_loss_is_the_kinetic_energy_that_a_free_mass_leaves_in_the_stop():
+    system, start = ball(stop=Stop("x", 1e9, dissipation=3.0))
+    found = impacts(simulate(system, 1.0, periods=1, start=start))
+    energy = 0.5 * 2.0 * (found.speed**2 - found.rebound_speed**2)
+    assert len(found) == 1 and energy[0] > 0.1 * 0.5 * 2.0 * 0.2**2
+    np.testing.assert_allclose(found.loss, energy, rtol=1e-9)
+
+
 def test_permanent_contact_is_no_impact():
     system = make_one_dof(stops=[Stop("middle", 5.17e9, gap=-1e-3)])
     depth = (16877.0 * 1e-3 / 5.17e9) ** (2.0 / 3.0)  # where spring and stop balance
