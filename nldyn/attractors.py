@@ -23,7 +23,7 @@ from nldyn.search import orbit_near, random_states
 from nldyn.simulation import MOST_PERIODS, Motion, simulate, starting_state, transient_end
 from nldyn.system import System, numbers
 
-Kind = Literal["periodic", "quasi-periodic", "chaotic", "undecided", "failed"]
+Kind = Literal["periodic", "quasi-periodic", "chaotic", "drifting", "undecided", "failed"]
 
 NEAR = 0.1  # a return within this share of the motion is worth a Newton iteration
 ON_ORBIT = 1e-4  # distance from an orbit, relative to the motion, at which it is reached
@@ -32,6 +32,7 @@ CLOUD = 1000  # stroboscopic states kept of a motion that is not periodic
 BLOCK = 64  # periods of an unforced transient between two looks whether it is at rest
 LONG_RUN = 20000  # most periods that a motion is followed to an orbit
 MOST_STARTS = 10**6
+EVEN = 0.01  # relative difference of the ways that a body drifts in equal times
 LONGEST = 8  # a motion that has not decided itself is followed this much longer
 
 
@@ -80,7 +81,7 @@ class Attractor:
         The system.
     frequency_hz : float
         Excitation frequency in Hz.
-    kind : {"periodic", "quasi-periodic", "chaotic", "undecided", "failed"}
+    kind : {"periodic", "quasi-periodic", "chaotic", "drifting", "undecided", "failed"}
         See `classify`.
     states : (k, 2n)
         Stroboscopic states z on it: all of a periodic orbit, else some of the motion.
@@ -159,7 +160,26 @@ class Attractor:
                 f"the largest Lyapunov exponent is {_exponent_text(self.exponents)}, and the 0-1 "
                 f"test gives {self.zero_one:.2f}"
             )
-        return said + self._slowness + self._before
+        return said + self._growth + self._slowness + self._before
+
+    @property
+    def _growth(self) -> str:
+        """What decided about a motion that is neither periodic nor undecided."""
+        if self.kind == "drifting":
+            return "; a rigid-body mode drifts by the same distance in each quarter of the run"
+        if self.exponents is None:
+            return ""
+        if self.kind == "quasi-periodic":
+            return (
+                f"; a disturbance has grown by a factor of {math.exp(self.exponents.growth):.3g} "
+                "altogether, which is no more than a power of the time and decides"
+            )
+        if self.kind == "chaotic":
+            seen = self.exponents.periods + sum(run.periods for run in self.chaotic_runs)
+            return (
+                f"; seen for {seen} periods only: `chaos_lifetime` tells whether it may end later"
+            )
+        return ""
 
     @property
     def _slowness(self) -> str:
@@ -210,8 +230,10 @@ def classify(
       motion comes within 1e-4 of it.
     - *chaotic*: the largest Lyapunov exponent is positive by more than three standard errors, and
       so it is again over as many periods more (`AttractorOptions.confirmations`).
-    - *quasi-periodic*: it is zero within three standard errors, and small disturbances grow over
-      the whole motion by no more than a power of the time.
+    - *quasi-periodic*: small disturbances neither grow nor shrink over the whole motion by more
+      than a power of the time, ``e^5 N`` over N periods: its mean is zero as far as that tells.
+    - *drifting*: a rigid-body mode goes on by the same distance, within 1 %, in each quarter of the
+      last 1000 periods; nothing bounds its displacement.
     - *undecided*: it is negative but no orbit was reached (a period above `max_period`, a slow
       transient), the motion repeats itself without being attracted, or the error is too large
       after eight times the periods asked for.
@@ -312,6 +334,8 @@ def attractor_from(
     again = 0
     if exponents.chaotic:
         kind, chaos = "chaotic", chaos[:-1]
+    elif _drifts(flow, cloud):
+        kind = "drifting"
     elif exponents.vanishing:
         again = _repeats(end, options.max_period)
         kind = "undecided" if again else "quasi-periodic"
@@ -412,6 +436,22 @@ def _repeats(run: Real, max_period: int) -> int:
         if np.all(np.linalg.norm(run[period:] - run[:-period], axis=1) <= 1e-6 * scale):
             return period
     return 0
+
+
+def _drifts(flow: FlowMap, run: Real) -> bool:
+    """Whether a rigid-body mode goes on evenly through a run (k, 2n), by more than rounding.
+
+    The means of its four quarters, which leave out what swings, lie equally far apart.
+    """
+    free = np.flatnonzero(flow.system.natural_frequencies == 0.0)
+    if not free.size:
+        return False
+    places = flow.to_modal(run)[:, free]
+    means = np.array([part.mean(axis=0) for part in np.array_split(places, 4)])
+    steps = np.diff(means, axis=0)
+    step = np.abs(steps.mean(axis=0))
+    even = np.all(np.abs(steps - steps.mean(axis=0)) <= EVEN * step, axis=0)
+    return bool(np.any(even & (step > 1e-6 * _size(run, 0.0))))
 
 
 def _size(run: Real, floor: float) -> float:

@@ -474,7 +474,8 @@ def basins(
     Raises
     ------
     SystemModelError
-        For input that makes no sense.
+        For a system without damping, which has no attractors, and other input that makes no
+        sense.
     TaskError
         If a computation ends in an error.
 
@@ -503,6 +504,8 @@ def basins(
     check_frequency("frequency_hz", frequency_hz)
     omega = 2.0 * math.pi * frequency_hz
     check_bounded(flow.system, omega)
+    if flow.system.conservative:
+        raise SystemModelError("basins: a system without damping has no attractors")
     name = check_observe(flow.system, observe)
     options = options or AttractorOptions()
     for label, value, least in (
@@ -595,8 +598,8 @@ def _same_system(a: System, b: System) -> bool:
 
 
 def _add(known: list[Attractor], attractor: Attractor) -> None:
-    """Keep an attractor that is new and not a motion that has yet to settle."""
-    if attractor.kind in ("failed", "undecided"):
+    """Keep an attractor that is new and not a motion that has yet to settle, or never does."""
+    if attractor.kind in ("failed", "undecided", "drifting"):
         return
     if not any(same_attractor(attractor, other) for other in known):
         known.append(attractor)

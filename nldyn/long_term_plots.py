@@ -26,6 +26,7 @@ KIND_COLOURS = {
     "periodic": "#222222",
     "quasi-periodic": "#0072b2",
     "chaotic": "#b03a00",
+    "drifting": "#009e73",
     "undecided": "#999999",
 }
 SHADE = "#e8c9a0"

@@ -77,12 +77,40 @@ def test_chaos_is_found_by_two_independent_tests(one_dof):
     assert found.exponents is not None and found.exponents.chaotic
     assert found.zero_one > 0.8
     assert "Lyapunov" in found.evidence
+    assert "seen for 2000 periods only: `chaos_lifetime`" in found.evidence
+
+
+def free_body() -> System:
+    return System.from_modal(
+        [0.0, 29.2], {"a": [0.6, 0.5], "b": [0.3, -0.5]}, modal_damping=0.02,
+        excitation=[HarmonicForce("b", 1.0)],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("speed", [1e-3, -2.0])
+def test_a_free_body_that_moves_on_is_drifting(speed):
+    found = classify(free_body(), 20.0, start=[0.0, 0.0, speed, 0.0])
+    assert found.name == "drifting" and "rigid-body mode" in found.evidence
+    place = found.flow.to_modal(found.states)[:, 0]
+    way = speed * (len(place) - 1) / 20.0
+    assert place[-1] - place[0] == pytest.approx(way, rel=1e-6)
+
+
+def test_a_free_body_that_stays_is_not_drifting():
+    assert classify(free_body(), 20.0).kind == "undecided"
+
+
+def test_basins_of_a_system_without_damping_are_refused():
+    system = System.from_modal([13.0], {"a": [0.6]}, stops=[Stop("a", 1e9, gap=1e-4)])
+    plane = Plane.at_interface(system, (-1e-3, 1e-4), (-0.05, 0.05))
+    with pytest.raises(SystemModelError, match="system without damping has no attractors"):
+        basins(system, 20.0, plane, shape=(4, 4))
 
 
 def test_free_vibration_under_forcing_is_quasi_periodic():
     system = System.from_modal([10.0], {"tip": [1.0]}, excitation=[HarmonicForce("tip", 1.0)])
     found = classify(system, 10.0 * (1.0 + math.sqrt(5.0)), start=[1e-3, 0.0])
-    assert found.kind == "quasi-periodic"
+    assert found.kind == "quasi-periodic" and "power of the time" in found.evidence
     assert found.zero_one < 0.2
 
 
