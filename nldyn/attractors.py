@@ -14,7 +14,7 @@ import numpy as np
 from nldyn.branch import same_orbit, stroboscopic
 from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
 from nldyn.executors import values_of
-from nldyn.exploration import settling_periods
+from nldyn.exploration import MOST_MULTIPLE, settling_periods
 from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.lyapunov import LyapunovSpectrum, spectrum_from
@@ -33,6 +33,8 @@ BLOCK = 64  # periods of an unforced transient between two looks whether it is a
 LONG_RUN = 20000  # most periods that a motion is followed to an orbit
 MOST_STARTS = 10**6
 EVEN = 0.01  # relative difference of the ways that a body drifts in equal times
+MOST_CONFIRMATIONS = 10**4
+MOST_AVERAGED = 10**7  # periods of a first run
 LONGEST = 8  # a motion that has not decided itself is followed this much longer
 
 
@@ -64,11 +66,11 @@ class AttractorOptions:
     confirmations: int = 1
 
     def __post_init__(self) -> None:
-        check_whole("classify: confirmations", self.confirmations, 0)
-        check_whole("classify: max_period", self.max_period, 1)
-        check_whole("classify: periods", self.periods, 32)
+        check_whole("classify: confirmations", self.confirmations, 0, MOST_CONFIRMATIONS)
+        check_whole("classify: max_period", self.max_period, 1, MOST_MULTIPLE)
+        check_whole("classify: periods", self.periods, 32, MOST_AVERAGED)
         if self.transient is not None:
-            check_whole("classify: transient", self.transient, 0)
+            check_whole("classify: transient", self.transient, 0, MOST_PERIODS)
 
 
 @dataclass(frozen=True, eq=False)

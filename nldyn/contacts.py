@@ -10,11 +10,12 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from nldyn.errors import check_types
+from nldyn.errors import SystemModelError, check_types, check_whole
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
 from nldyn.orbit import Orbit
 from nldyn.simulation import Motion, end_state, motion_of
+from nldyn.system import System
 
 if TYPE_CHECKING:
     import pandas
@@ -94,6 +95,13 @@ class Impacts:
         frame = pandas.DataFrame(self.columns())
         frame.attrs["units"] = dict(UNITS)
         return frame
+
+
+def check_stop(system: System, stop: object) -> None:
+    """Refuse anything but the index of a stop of the system."""
+    if not system.stops:
+        raise SystemModelError("the system has no stops, so that nothing is hit")
+    check_whole("stop", stop, 0, len(system.stops) - 1)
 
 
 def impacts(motion: Motion | Orbit) -> Impacts:

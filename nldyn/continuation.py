@@ -50,6 +50,7 @@ from nldyn.system import numbers
 
 BORN = "born at the flip at"
 KINK = 1e-6  # step below which a branch may bend by any angle where the number of contacts changes
+MOST_POINTS = 10**8  # in one direction
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ class ContinuationOptions:
             raise SystemModelError(
                 f"continuation: max_angle must lie below 1.5, got {self.max_angle:g}"
             )
-        check_whole("continuation: max_points", self.max_points, 2)
+        check_whole("continuation: max_points", self.max_points, 2, MOST_POINTS)
 
 
 @dataclass(frozen=True, eq=False)

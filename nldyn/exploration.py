@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from nldyn.branch import Branch, minimal_period, same_orbit, stroboscopic
 from nldyn.checkpoint import Checkpoint
-from nldyn.continuation import ContinuationOptions, check_range, shifts
+from nldyn.continuation import MOST_POINTS, ContinuationOptions, check_range, shifts
 from nldyn.diagrams import Collector, Diagram, Progress
 from nldyn.errors import SystemModelError, check_whole, is_finite, shown
 from nldyn.flow import FlowMap, flow_of
@@ -28,7 +28,7 @@ from nldyn.orbit import (
     shooting_problem,
     spread,
 )
-from nldyn.search import orbit_near, random_states
+from nldyn.search import MOST_COUNT, orbit_near, random_states
 from nldyn.system import System
 
 RETURNS = 3.0  # recorded periods after settling, over the longest period looked for
@@ -41,6 +41,7 @@ TRANSIENT = 5  # periods of a motion beside which no orbits are looked for
 PIECE = 16  # periods simulated between two looks at the known orbits; later a quarter of all
 LONGEST = 0.5  # step of a deflated iteration, relative to the orbit
 ITERATIONS = 20  # of a deflated iteration
+MOST_MULTIPLE = 10**4  # longest period multiple looked for
 
 
 @dataclass(frozen=True)
@@ -91,13 +92,13 @@ class ExploreOptions:
             raise SystemModelError(
                 f"explore: spacing must lie between 0 and 1, got {shown(self.spacing)}"
             )
-        check_whole("explore: starts", self.starts, 1)
-        check_whole("explore: rounds", self.rounds, 1)
-        check_whole("explore: settling", self.settling, 1)
-        check_whole("explore: unstable_period", self.unstable_period, 0)
-        check_whole("explore: doubled_period", self.doubled_period, 1)
+        check_whole("explore: starts", self.starts, 1, MOST_COUNT)
+        check_whole("explore: rounds", self.rounds, 1, MOST_COUNT)
+        check_whole("explore: settling", self.settling, 1, MOST_COUNT)
+        check_whole("explore: unstable_period", self.unstable_period, 0, MOST_MULTIPLE)
+        check_whole("explore: doubled_period", self.doubled_period, 1, MOST_MULTIPLE)
         if self.doubled_points is not None:
-            check_whole("explore: doubled_points", self.doubled_points, 2)
+            check_whole("explore: doubled_points", self.doubled_points, 2, MOST_POINTS)
         check_whole("explore: seed", self.seed, 0)
 
 
@@ -443,7 +444,7 @@ def explore(
     """
     flow = flow_of(system)
     low, high = check_range(range_hz)
-    check_whole("max_period", max_period, 1)
+    check_whole("max_period", max_period, 1, MOST_MULTIPLE)
     question = Question(
         flow,
         (low, high),

@@ -19,6 +19,7 @@ from nldyn.flow import FlowMap, FlowOptions
 from nldyn.linear import Real
 from nldyn.lyapunov import spectrum_from
 from nldyn.orbit import ConvergenceError, check_observe
+from nldyn.simulation import MOST_PERIODS
 from nldyn.system import System
 
 LOOK = 250  # periods between two looks whether a motion has settled
@@ -188,7 +189,7 @@ def chaos_lifetime(
             f"{attractor.frequency_hz:g} Hz is {attractor.name}"
         )
     check_whole("chaos_lifetime: states", states, 1, len(attractor.states))
-    check_whole("chaos_lifetime: periods", periods, 2 * LAST)
+    check_whole("chaos_lifetime: periods", periods, 2 * LAST, MOST_PERIODS)
     flow = attractor.flow
     picked = np.linspace(0, len(attractor.states) - 1, states).round().astype(int)
     task = partial(_ended, flow.system, flow.options, attractor.frequency_hz, periods)

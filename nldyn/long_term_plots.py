@@ -133,7 +133,7 @@ def plot_sweep(
     interface: str | None = None,
     diagram: Diagram | Iterable[Branch] | None = None,
 ) -> Axes:
-    """Draw the largest displacement of each period of run-ups and run-downs.
+    """Draw the largest displacement of each excitation period of run-ups and run-downs.
 
     Parameters
     ----------
@@ -145,6 +145,11 @@ def plot_sweep(
         The first unless given.
     diagram : Diagram or iterable of Branch, optional
         Branches drawn below.
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense, or a motion shorter than an excitation period.
     """
     check_types(
         motions=(motions, Motion, Sequence), ax=(ax, Axes, None),
@@ -156,21 +161,36 @@ def plot_sweep(
     for k, motion in enumerate(listed):
         check_types(**{f"motions: entry {k}": (motion, Motion)})
     curves = [motion.period_peaks(interface) for motion in listed]
+    for k, (hz, _) in enumerate(curves):
+        if not hz.size:
+            raise SystemModelError(f"motions: entry {k} is shorter than an excitation period")
     factor, unit = length_unit(max(float(peaks.max(initial=0.0)) for _, peaks in curves))
     ax = ax if ax is not None else new_axes()
     if diagram is not None:
         branches = diagram if isinstance(diagram, Diagram) else list(diagram)
-        plot_diagram(branches, ax, special_points=(), unit=unit, legend=False)
-    for number, (hz, peaks) in enumerate(curves):
-        up = len(hz) > 1 and hz[-1] > hz[0]
-        colour = PERIOD_COLOURS[(1 if up else 2) % len(PERIOD_COLOURS)]
-        rate = abs(hz[-1] - hz[0]) / listed[number].duration
-        label = f"run-{'up' if up else 'down'}, {rate:.2g} Hz/s"
-        ax.plot(hz, peaks / factor, linewidth=0.8, color=colour, label=label)
-    ax.legend(fontsize="small")
+        plot_diagram(branches, ax, special_points=(), unit=unit)
+    before = ax.get_legend()
+    handles: list[Any] = list(before.legend_handles) if before is not None else []
+    for motion, (hz, peaks) in zip(listed, curves, strict=True):
+        colour, label = _sweep_style(motion)
+        mark = "." if motion.rate_hz_per_s == 0.0 else ""  # a line of one frequency has no length
+        handles += ax.plot(
+            hz, peaks / factor, marker=mark, linewidth=0.8, color=colour, label=label
+        )
+    ax.legend(handles=handles, fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
     ax.set_xlabel("excitation frequency (Hz)")
     ax.set_ylabel(f"largest displacement in a period ({unit})")
     return ax
+
+
+def _sweep_style(motion: Motion) -> tuple[str, str]:
+    """Colour and name of a motion in a picture of sweeps."""
+    rate = motion.rate_hz_per_s
+    if rate == 0.0:
+        hz = float(motion.frequency_hz(motion.start_time))
+        return KIND_COLOURS["undecided"], f"constant {hz:.4g} Hz"
+    up = rate > 0.0
+    return PERIOD_COLOURS[1 if up else 2], f"run-{'up' if up else 'down'}, {abs(rate):.3g} Hz/s"
 
 
 def plot_basins(

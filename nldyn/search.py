@@ -25,6 +25,8 @@ from nldyn.orbit import (
 from nldyn.shooting import ShootingProblem
 from nldyn.system import System
 
+MOST_COUNT = 10**7  # of starts, periods and candidates
+
 
 @dataclass(frozen=True)
 class SearchOptions:
@@ -50,9 +52,9 @@ class SearchOptions:
 
     def __post_init__(self) -> None:
         for name in ("starts", "recorded", "candidates"):
-            check_whole(f"search: {name}", getattr(self, name), 1)
-        for name in ("transient", "seed"):
-            check_whole(f"search: {name}", getattr(self, name), 0)
+            check_whole(f"search: {name}", getattr(self, name), 1, MOST_COUNT)
+        check_whole("search: transient", self.transient, 0, MOST_COUNT)
+        check_whole("search: seed", self.seed, 0)
 
 
 @dataclass(frozen=True, eq=False)

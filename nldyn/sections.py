@@ -13,7 +13,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from nldyn.attractors import Attractor, AttractorOptions, Kind, attractor_from
-from nldyn.contacts import impacts
+from nldyn.contacts import check_stop, impacts
 from nldyn.continuation import check_range
 from nldyn.errors import SystemModelError, check_types, check_whole, shown
 from nldyn.executors import values_of
@@ -67,10 +67,10 @@ def impact_section(motion: Motion, stop: int = 0) -> tuple[Real, Real]:
     Raises
     ------
     SystemModelError
-        If there is no such stop.
+        If the system has no stops, or no such one.
     """
     check_types(motion=(motion, Motion))
-    check_whole("stop", stop, 0, len(motion.system.stops) - 1)
+    check_stop(motion.system, stop)
     found = impacts(motion)
     hit = found.stop == stop
     return found.phase_deg[hit], found.speed[hit]

@@ -54,6 +54,9 @@ class Motion:
         Times in s at which the k stretches begin, and at which the last one ends.
     failure : str
         Empty, or why the simulation ended early.
+    rate_hz_per_s : float
+        Rate at which the excitation frequency changes; negative in a run-down, zero at constant
+        frequency.
 
     Examples
     --------
@@ -70,6 +73,7 @@ class Motion:
     stretches: tuple[Trajectory, ...]
     begins: Real
     failure: str = ""
+    rate_hz_per_s: float = 0.0
 
     @property
     def system(self) -> System:
@@ -589,7 +593,7 @@ def _swept(
     lost = stretches[-1]
     if lost.failure:
         begins[-1] = begins[-2] + (end_phase(lost) - lost.record.phase[0]) / lost.omega
-    return Motion(flow, tuple(stretches), begins, failure)
+    return Motion(flow, tuple(stretches), begins, failure, math.copysign(rate, last - first))
 
 
 def chirp_steps(first: float, last: float, rate: float, steps: int) -> tuple[Real, Real]:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from pydantic import ValidationError
 from scipy.stats import qmc
 
 from nldyn.errors import SceneError, SystemModelError, check_types, check_whole, is_finite, shown
@@ -60,7 +61,8 @@ def study(
         of a module.
     design : {"grid", "random", "latin hypercube"}
         Every combination, or samples of the ranges: independent, or with each parameter's range
-        covered evenly [McKay, Beckman and Conover 1979].
+        covered evenly [McKay, Beckman and Conover 1979]. Samples of a key that takes whole numbers
+        only are rounded to the nearest one, so that the ends of its range have half a share.
     samples : int, optional
         How many, of a design that is no grid.
     seed : int
@@ -121,11 +123,18 @@ def study(
     names = list(parameters)
     for name in names:
         check_types(**{"study: a key of parameters": (name, str)})
+        if not all(name.split(".")):
+            raise SystemModelError(f"study: a key of parameters has an empty part, got '{name}'")
     if not names:
         raise SystemModelError("study: name at least one parameter")
     check_whole("study: seed", seed, 0)
     values = _design(parameters, design, samples, seed)
     base = tomllib.loads(scene.text)
+    if design != "grid":
+        whole = _whole_keys(scene, base, names, values[0])
+        values = [
+            tuple(round(v) if w else v for v, w in zip(row, whole, strict=True)) for row in values
+        ]
     cases = [_with_values(scene, base, names, row) for row in values]
     for tables in cases:
         scene_from_tables(tables, scene.file, mesh_folders=scene.mesh_folders)
@@ -181,7 +190,7 @@ def _design(
         count = math.prod(len(given) for given in parameters.values())
         if count > MOST_CASES:
             raise SystemModelError(f"study: the grid has {count} cases, at most {MOST_CASES}")
-        lists = [np.asarray(given).tolist() for given in parameters.values()]
+        lists = [[_plain(value) for value in given] for given in parameters.values()]
         return list(itertools.product(*lists))
     if design not in ("random", "latin hypercube"):
         raise SystemModelError(
@@ -204,6 +213,29 @@ def _design(
         unit = qmc.LatinHypercube(len(lows), seed=rng).random(samples)
     scaled = np.array(lows) + unit * (np.array(highs) - np.array(lows))
     return [tuple(row) for row in scaled.tolist()]
+
+
+def _plain(value: Any) -> Any:
+    """A value as it would stand in a scene, numbers of numpy as those of Python."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return [_plain(entry) for entry in value] if isinstance(value, list | tuple) else value
+
+
+def _whole_keys(
+    scene: Scene, base: Tables, names: Sequence[str], row: Sequence[float]
+) -> list[bool]:
+    """Which of the sampled keys the scene takes as whole numbers only."""
+    pairs = zip(names, row, strict=True)
+    return [_refuses_fractions(_with_values(scene, base, [name], [value])) for name, value in pairs]
+
+
+def _refuses_fractions(tables: Tables) -> bool:
+    try:
+        Scene.model_validate(tables)
+    except ValidationError as error:
+        return any(detail["type"] == "int_type" for detail in error.errors())
+    return False
 
 
 def _with_values(scene: Scene, base: Tables, names: Sequence[str], row: Sequence[Any]) -> Tables:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from nldyn.attractors import Attractor
-from nldyn.contacts import impacts, panel_table
+from nldyn.contacts import check_stop, impacts, panel_table
 from nldyn.errors import SystemModelError, check_types, check_whole
 from nldyn.executors import values_of
 from nldyn.fourier import modal_row
@@ -120,7 +120,7 @@ def contact_measures(
     """
     check_types(source=(source, Orbit, Motion, Attractor))
     check_whole("contact_measures: periods", periods, 1, MOST_PERIODS)
-    check_whole("stop", stop, 0, len(_system_of(source).stops) - 1)
+    check_stop(_system_of(source), stop)
     if isinstance(source, Attractor):
         if source.kind == "failed":
             raise SystemModelError(f"the attractor's simulation failed: {source.failure}")
@@ -196,7 +196,7 @@ def measures_table(
     chosen = list(sources)
     for k, source in enumerate(chosen):
         check_types(**{f"sources: entry {k}": (source, Orbit, Motion, Attractor)})
-        check_whole("stop", stop, 0, len(_system_of(source).stops) - 1)
+        check_stop(_system_of(source), stop)
     chosen = [s for s in chosen if not (isinstance(s, Attractor) and s.kind == "failed")]
     task = partial(contact_measures, stop=stop, periods=periods)
     rows = [asdict(measures) for measures in values_of(task, chosen, executor, progress)]

@@ -10,9 +10,13 @@ from one_dof import make_one_dof
 from scipy.spatial import cKDTree
 
 from nldyn import (
+    AttractorOptions,
+    ContinuationOptions,
+    ExploreOptions,
     FlowMap,
     HarmonicForce,
     Plane,
+    SearchOptions,
     Stop,
     System,
     SystemModelError,
@@ -178,7 +182,6 @@ def test_chaos_that_ends_is_told_as_a_transient_of_the_orbit_after_it(one_dof):
     assert found.orbit is not None and found.orbit.stable
     assert found.chaotic_runs and found.chaotic_runs[0].chaotic
     assert "a chaotic transient before" in found.evidence
-
 
 
 def test_chaos_that_lasts_is_confirmed_by_a_second_run(one_dof):
@@ -444,6 +447,46 @@ def test_pictures_show_what_was_found(one_dof, from_35_to_40, at_50_hz, tmp_path
     assert plot_section(motion).get_xlabel() == "displacement of middle (µm)"
     assert len(plot_sweep(sweep(one_dof, (20.0, 21.0), 5.0)).lines) == 1
     ax.figure.savefig(tmp_path / "basins.png")
+
+
+def labels_of(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def test_a_sweep_is_labelled_with_the_rate_it_was_asked_for(one_dof):
+    up, down = sweep(one_dof, [(20.0, 21.0), (21.0, 20.0)], 5.0)
+    assert (up.rate_hz_per_s, down.rate_hz_per_s) == (5.0, -5.0)
+    steady = simulate(one_dof, 20.0, 10)
+    said = ["run-up, 5 Hz/s", "run-down, 5 Hz/s", "constant 20 Hz"]
+    assert labels_of(plot_sweep([up, down, steady])) == said
+    with pytest.raises(SystemModelError, match="entry 1 is shorter than an excitation period"):
+        plot_sweep([up, sweep(one_dof, (20.0, 20.01), 5.0)])
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: AttractorOptions(periods=10**29), "classify: periods must be a whole number"),
+        (lambda: AttractorOptions(max_period=10**15), "classify: max_period must be a whole"),
+        (lambda: AttractorOptions(transient=10**29), "classify: transient must be a whole"),
+        (lambda: AttractorOptions(confirmations=10**29), "classify: confirmations must be"),
+        (lambda: SearchOptions(starts=10**15), "search: starts must be a whole number"),
+        (lambda: SearchOptions(transient=10**15), "search: transient must be a whole number"),
+        (lambda: ExploreOptions(starts=10**15), "explore: starts must be a whole number"),
+        (lambda: ExploreOptions(unstable_period=10**15), "explore: unstable_period must be"),
+        (lambda: ExploreOptions(doubled_points=10**15), "explore: doubled_points must be"),
+        (lambda: ContinuationOptions(max_points=10**15), "continuation: max_points must be"),
+    ],
+)
+def test_effort_beyond_all_bounds_is_refused(call, said):
+    with pytest.raises(SystemModelError, match=f"{said}.* from .* to "):
+        call()
+
+
+@pytest.mark.parametrize("take", [contact_measures, impact_section, lambda m: measures_table([m])])
+def test_a_system_without_stops_is_told_so(take):
+    with pytest.raises(SystemModelError, match="the system has no stops"):
+        take(simulate(make_one_dof(stops=[]), 20.0, 2))
 
 
 def small_plane(system):

@@ -72,6 +72,40 @@ def test_latin_hypercube_covers_each_range_evenly_and_repeats():
     np.testing.assert_array_equal(runs[0]["gap"].values, runs[0]["stops.0.gap"].values)
 
 
+def modes(system):
+    return {"f1_hz": system.frequencies_hz[0], "size": system.size}
+
+
+@pytest.mark.parametrize("design", ["random", "latin hypercube"])
+def test_samples_of_a_key_of_whole_numbers_are_whole(design):
+    keys = {"reduction.modes": (1, 4), "damping.modal_ratio": (0.01, 0.02)}
+    found = study(example("two_dof_xi_0.01.toml"), keys, modes, design=design, samples=6)
+    assert (found["failure"] == "").all()
+    chosen = found["reduction.modes"].values
+    assert chosen.dtype.kind == "i" and len(set(chosen)) > 1
+    np.testing.assert_array_equal(found["size"].values, chosen + 1)  # and the residual one
+    ratios = found["damping.modal_ratio"].values
+    assert np.all((ratios > 0.01) & (ratios < 0.02))
+
+
+def test_whole_numbers_in_a_key_of_any_numbers_are_not_rounded():
+    keys = {"stops.0.gap": (0, 1)}  # also written without a point in some scenes
+    found = study(example("one_dof.toml"), keys, modes, design="random", samples=4)
+    assert not np.any(found["stops.0.gap"].values == found["stops.0.gap"].values.round())
+
+
+def ratios(system):
+    return {"second": system.damping[1, 1] / (4.0 * np.pi * system.frequencies_hz[1])}
+
+
+def test_values_of_a_grid_may_be_numbers_and_lists_in_turn():
+    keys = {"damping.modal_ratio": [[0.01, 0.02], 0.03, np.array([0.01, 0.02])]}
+    found = study(example("two_dof_xi_0.01.toml"), keys, ratios)
+    assert found["damping.modal_ratio"].values.tolist()[:2] == ["[0.01, 0.02]", "0.03"]
+    assert (found["failure"] == "").all()
+    np.testing.assert_allclose(found["second"].values, [0.02, 0.03, 0.02], rtol=1e-12)
+
+
 def test_progress_counts_all_cases():
     counts = []
     grid(progress=lambda done, total: counts.append((done, total)))
@@ -91,6 +125,8 @@ def test_progress_counts_all_cases():
         ({"stops.0.gap": [0.0]}, {"keep": 3}, SystemModelError, "study: keep must be"),
         ({"stops.0.gap": [0.0]}, {"keep_name": 3}, SystemModelError, "study: keep_name must be"),
         ({}, {}, SystemModelError, "name at least one parameter"),
+        ({"": [1]}, {}, SystemModelError, "a key of parameters has an empty part, got ''"),
+        ({"stops..gap": [1]}, {}, SystemModelError, "has an empty part, got 'stops..gap'"),
         ({"stops.0.gap": 1.0}, {}, SystemModelError, "must list its values, got 1.0"),
         ({"stops.0.gap": [0.0]}, {"samples": 3}, SystemModelError, "a grid takes no samples"),
         ({"stops.0.gap": (1.0, 0.0)}, {"design": "random", "samples": 2}, SystemModelError,
