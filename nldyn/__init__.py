@@ -34,7 +34,13 @@ if TYPE_CHECKING:
     from nldyn.flow import FlowMap, FlowOptions
     from nldyn.fourier import Spectrum, spectrum
     from nldyn.lifetimes import ChaosLifetime, chaos_lifetime
-    from nldyn.long_term_plots import plot_basins, plot_brute_force, plot_section, plot_sweep
+    from nldyn.long_term_plots import (
+        plot_basins,
+        plot_brute_force,
+        plot_section,
+        plot_sweep,
+        plot_wear,
+    )
     from nldyn.lyapunov import LyapunovSpectrum, lyapunov_exponents
     from nldyn.manifolds import basin_edge, stable_manifold
     from nldyn.multipliers import Stability
@@ -57,7 +63,12 @@ if TYPE_CHECKING:
     from nldyn.store import load_branch, load_branches, load_diagram, load_exploration
     from nldyn.studies import study
     from nldyn.system import System
-    from nldyn.wear import ContactMeasures, contact_measures
+    from nldyn.wear import (
+        ContactMeasures,
+        contact_measures,
+        measures_table,
+        spectra_table,
+    )
 
 _HOMES = {
     "attractors": "Attractor AttractorOptions classify find_attractors",
@@ -79,7 +90,7 @@ _HOMES = {
     "fourier": "Spectrum spectrum",
     "contacts": "Impacts impacts",
     "lifetimes": "ChaosLifetime chaos_lifetime",
-    "long_term_plots": "plot_basins plot_brute_force plot_section plot_sweep",
+    "long_term_plots": "plot_basins plot_brute_force plot_section plot_sweep plot_wear",
     "lyapunov": "LyapunovSpectrum lyapunov_exponents",
     "manifolds": "basin_edge stable_manifold",
     "multipliers": "Stability",
@@ -97,7 +108,7 @@ _HOMES = {
     "store": "load_branch load_branches load_diagram load_exploration",
     "studies": "study",
     "system": "System",
-    "wear": "ContactMeasures contact_measures",
+    "wear": "ContactMeasures contact_measures measures_table spectra_table",
 }
 
 __all__ = [
@@ -176,6 +187,7 @@ __all__ = [
     "load_diagram",
     "load_exploration",
     "lyapunov_exponents",
+    "measures_table",
     "normal_form",
     "plot_basins",
     "plot_brute_force",
@@ -187,12 +199,14 @@ __all__ = [
     "plot_section",
     "plot_spectrum",
     "plot_sweep",
+    "plot_wear",
     "reduce_for",
     "refine_special",
     "run_all",
     "save_curves",
     "simulate",
     "solve_orbit",
+    "spectra_table",
     "spectrum",
     "stable_manifold",
     "stroboscopic_section",

@@ -2,25 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
 from nldyn.attractors import Attractor
 from nldyn.basin_maps import UNDECIDED, Basins
-from nldyn.branch import Branch
+from nldyn.branch import Branch, check_branches, stroboscopic
 from nldyn.diagrams import Diagram
 from nldyn.errors import SystemModelError, check_types, shown
 from nldyn.linear import Real
-from nldyn.plot import PERIOD_COLOURS, length_unit, new_axes, plot_diagram
-from nldyn.sections import BruteForce, Column, stroboscopic_section
+from nldyn.orbit import check_observe
+from nldyn.plot import (
+    PERIOD_COLOURS,
+    STABLE,
+    UNSTABLE,
+    draw_legend,
+    length_unit,
+    new_axes,
+    period_colours,
+    plot_diagram,
+    stability_runs,
+)
+from nldyn.sections import BruteForce, Column, impact_section, stroboscopic_section
 from nldyn.simulation import Motion
 from nldyn.system import numbers
+from nldyn.wear import UNITS as MEASURE_UNITS
 
 KIND_COLOURS = {
     "periodic": "#222222",
@@ -30,11 +44,25 @@ KIND_COLOURS = {
     "undecided": "#999999",
 }
 SHADE = "#e8c9a0"
+Quantity = Literal["peak", "strobe", "impact speed", "impact phase"]
+QUANTITIES = {
+    "peak": "largest displacement of {}",
+    "strobe": "displacement of {} at forcing phase zero",
+    "impact speed": "impact speed",
+    "impact phase": "forcing phase of impacts",
+}
+WEAR_MARKS = "o^sDv"  # of measures, in their order: all can be hollow
 UNITS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9}
 
 
-def plot_section(motion: Motion, ax: Axes | None = None, *, interface: str | None = None) -> Axes:
-    """Draw velocity against displacement once per excitation period.
+def plot_section(
+    motion: Motion,
+    ax: Axes | None = None,
+    *,
+    interface: str | None = None,
+    stop: int | None = None,
+) -> Axes:
+    """Draw velocity against displacement once per excitation period, or the impacts on a stop.
 
     Parameters
     ----------
@@ -43,9 +71,18 @@ def plot_section(motion: Motion, ax: Axes | None = None, *, interface: str | Non
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure, free of pyplot, unless given.
     interface : str, optional
-        The first unless given.
+        Of the stroboscopic section; the first unless given.
+    stop : int, optional
+        Index of a stop: speed against forcing phase of each impact on it is drawn instead.
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense.
     """
     check_types(ax=(ax, Axes, None))
+    if stop is not None:
+        return _plot_impacts(motion, ax, stop)
     y, v = stroboscopic_section(motion, interface)
     name = interface or motion.system.interfaces[0]
     factor, unit = length_unit(float(np.abs(y).max()))
@@ -57,17 +94,29 @@ def plot_section(motion: Motion, ax: Axes | None = None, *, interface: str | Non
     return ax
 
 
+def _plot_impacts(motion: Motion, ax: Axes | None, stop: int) -> Axes:
+    """Draw speed against forcing phase of the impacts on a stop."""
+    phase, speed = impact_section(motion, stop)
+    pace, unit = length_unit(float(speed.max(initial=0.0)))
+    ax = ax if ax is not None else new_axes(7.0, 5.5)
+    ax.plot(phase, speed / pace, ".", markersize=1.5, color="black")
+    ax.set_xlabel(f"forcing phase of impacts on {motion.system.stops[stop].at} (°)")
+    ax.set_ylabel(f"impact speed ({unit}/s)")
+    return ax
+
+
 def plot_brute_force(
     found: BruteForce,
     ax: Axes | None = None,
     *,
+    quantity: Quantity = "peak",
     diagram: Diagram | Iterable[Branch] | None = None,
     unit: str | None = None,
 ) -> Axes:
-    """Draw the largest displacement of every recorded period, over the branches if they are given.
+    """Draw what motions settle on against frequency, over the branches if they are given.
 
-    The largest value of a periodic motion lies on the line of its branch; a motion of period n
-    shows up to n values. Ranges with chaotic motions are shaded.
+    The peak or the stroboscopic displacement of a periodic motion lies on the line of its branch;
+    a motion of period n shows up to n values. Ranges with chaotic motions are shaded.
 
     Parameters
     ----------
@@ -75,55 +124,130 @@ def plot_brute_force(
         What `nldyn.brute_force` gave.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure, free of pyplot, unless given.
+    quantity : {"peak", "strobe", "impact speed", "impact phase"}
+        The largest absolute displacement of each recorded period, the displacement at forcing
+        phase zero, or speed or forcing phase of each impact on any stop.
     diagram : Diagram or iterable of Branch, optional
-        Branches drawn below.
+        Branches drawn below, in the same quantity; of peaks or stroboscopic displacements only.
     unit : str, optional
-        m, mm, µm or nm; chosen from the size unless given.
+        m, mm, µm or nm, per second for a speed; chosen from the size unless given. A phase is in
+        degrees.
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense, or branches that observe another interface.
     """
     check_types(
-        found=(found, BruteForce), ax=(ax, Axes, None), diagram=(diagram, Diagram, Iterable, None),
-        unit=(unit, str, None),
+        found=(found, BruteForce), ax=(ax, Axes, None), quantity=(quantity, str),
+        diagram=(diagram, Diagram, Iterable, None), unit=(unit, str, None),
     )  # fmt: skip
+    if quantity not in QUANTITIES:
+        raise SystemModelError(
+            f"quantity must be one of {', '.join(QUANTITIES)}, got {shown(quantity)}"
+        )
     if unit is not None and unit not in UNITS:
         raise SystemModelError(f"unit must be one of {', '.join(UNITS)}, got {shown(unit)}")
-    largest = max((float(c.peaks.max(initial=0.0)) for c in found.columns), default=1.0)
-    factor, name = length_unit(largest)
-    if unit is not None:
+    branches = _branches_of(found, quantity, diagram)
+    sizes = [np.abs(_values(c, quantity)).max(initial=0.0) for c in found.columns]
+    factor, name = length_unit(float(max(sizes, default=1.0)))
+    if quantity == "impact phase":
+        factor, name = 1.0, "°"
+    elif unit is not None:
         factor, name = UNITS[unit], unit
     ax = ax if ax is not None else new_axes()
-    if diagram is not None:
-        branches = diagram if isinstance(diagram, Diagram) else list(diagram)
+    if branches and quantity == "peak":
         plot_diagram(branches, ax, special_points=(), unit=name)
+    elif branches:
+        _draw_strobes(ax, branches, found.observe, factor)
     shade_ranges(ax, found.ranges())
-    handles: list[Any] = []
-    for kind, colour in KIND_COLOURS.items():
-        chosen = [c for c in found.columns if c.attractor.kind == kind]
-        if chosen:
-            hz, values = _scattered(chosen)
-            ax.plot(hz, values / factor, ".", markersize=1.2, color=colour, zorder=3)
-            handles.append(
-                Line2D([], [], marker=".", linestyle="none", color=colour, label=f"{kind} motion")
-            )
-    handles.append(Patch(color=SHADE, label="chaotic range"))
+    handles = _draw_columns(ax, found, quantity, factor)
     before = ax.get_legend()
     if before is not None:
         handles = [*before.legend_handles, *handles]
     ax.legend(handles=handles, fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
     ax.set_xlabel("excitation frequency (Hz)")
-    ax.set_ylabel(f"largest displacement of {found.observe} ({name})")
+    ending = "/s" if quantity == "impact speed" else ""
+    ax.set_ylabel(f"{QUANTITIES[quantity].format(found.observe)} ({name}{ending})")
     return ax
+
+
+def _branches_of(
+    found: BruteForce, quantity: str, diagram: Diagram | Iterable[Branch] | None
+) -> list[Branch]:
+    """Branches that can be drawn with the motions."""
+    if diagram is None:
+        return []
+    if quantity not in ("peak", "strobe"):
+        raise SystemModelError(f"diagram: branches have no {quantity} to draw")
+    branches = list(diagram.branches if isinstance(diagram, Diagram) else diagram)
+    check_branches("diagram", branches)
+    for branch in branches:
+        observed = branch.nodes[0].orbit.observe
+        if quantity == "peak" and observed != found.observe:
+            raise SystemModelError(
+                f"diagram: a branch observes '{observed}', the motions '{found.observe}'"
+            )
+    return branches
+
+
+def _draw_columns(ax: Axes, found: BruteForce, quantity: str, factor: float) -> list[Any]:
+    """Draw the values of all columns, and give the entries of the legend."""
+    handles: list[Any] = []
+    for kind, colour in KIND_COLOURS.items():
+        chosen = [c for c in found.columns if c.attractor.kind == kind]
+        if chosen:
+            values = [_values(c, quantity) for c in chosen]
+            hz = np.repeat([c.frequency_hz for c in chosen], [v.size for v in values])
+            ax.plot(
+                hz, np.concatenate(values) / factor, ".", markersize=1.2, color=colour, zorder=3
+            )
+            handles.append(
+                Line2D([], [], marker=".", linestyle="none", color=colour, label=f"{kind} motion")
+            )
+    handles.append(Patch(color=SHADE, label="chaotic range"))
+    return handles
+
+
+def _values(column: Column, quantity: str) -> Real:
+    """What is drawn of a column."""
+    fields = {"strobe": column.strobe, "impact speed": column.impact_speed}
+    fields |= {"peak": column.peaks, "impact phase": column.impact_phase_deg}
+    return fields[quantity]
+
+
+def strobe_curves(branch: Branch, interface: str) -> tuple[Real, Real, NDArray[np.bool_]]:
+    """Frequencies (k,), displacements (k, n) at forcing phase zero, and stability of a branch.
+
+    A branch of period n has n values at each of its points.
+    """
+    orbits = branch.points
+    phi = orbits[0].system.participation[check_observe(orbits[0].system, interface)]
+    states = [orbit.problem.flow.to_modal(stroboscopic(orbit)) for orbit in orbits]
+    values = [modal[:, : phi.size] @ phi for modal in states]
+    stable = np.array([orbit.stable for orbit in orbits], dtype=bool)
+    return branch.frequency_hz, np.array(values), stable
+
+
+def _draw_strobes(ax: Axes, branches: Sequence[Branch], interface: str, factor: float) -> None:
+    """Draw the stroboscopic displacements of branches in the style of a diagram."""
+    colours = period_colours(branch.period for branch in branches)
+    for branch in branches:
+        hz, values, stable = strobe_curves(branch, interface)
+        for run in stability_runs(stable):
+            part = slice(run.start, run.stop)
+            style = STABLE if run.stable else UNSTABLE
+            ax.plot(
+                hz[part], values[part] / factor, color=colours[branch.period], linewidth=1.4,
+                linestyle=style,
+            )  # fmt: skip
+    draw_legend(ax, colours, branches, ())
 
 
 def shade_ranges(ax: Axes, ranges: Sequence[tuple[float, float]], colour: str = SHADE) -> None:
     """Shade ranges of frequencies, below everything else."""
     for low, high in ranges:
         ax.axvspan(low, high, color=colour, alpha=0.6, linewidth=0.0, zorder=0)
-
-
-def _scattered(columns: Iterable[Column]) -> tuple[Real, Real]:
-    columns = list(columns)
-    hz = np.concatenate([np.full(c.peaks.size, c.frequency_hz) for c in columns])
-    return hz, np.concatenate([c.peaks for c in columns])
 
 
 def plot_sweep(
@@ -193,6 +317,106 @@ def _sweep_style(motion: Motion) -> tuple[str, str]:
     return PERIOD_COLOURS[1 if up else 2], f"run-{'up' if up else 'down'}, {abs(rate):.3g} Hz/s"
 
 
+def plot_wear(
+    table: Mapping[str, NDArray[Any]],
+    ax: Axes | None = None,
+    *,
+    measures: Sequence[str] = ("peak_force", "rms_force"),
+    yscale: Literal["linear", "log"] = "log",
+) -> Axes:
+    """Draw contact measures of attractors against the excitation frequency.
+
+    Each kind of motion has a colour, each measure a mark, hollow where the orbit is unstable.
+
+    Parameters
+    ----------
+    table : mapping of str to (k,) array
+        What `nldyn.measures_table` gave.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure, free of pyplot, unless given.
+    measures : sequence of str
+        Columns of the table, up to five of one unit.
+    yscale : {"linear", "log"}
+        Scale of the measures; a logarithmic one cannot show zeros.
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance, brute_force, measures_table
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> table = measures_table(brute_force(system, (25.0, 26.0), points=3))
+    >>> plot_wear(table, measures=["impact_power"]).get_ylabel()
+    'impact power (W)'
+    """
+    check_types(
+        table=(table, Mapping), ax=(ax, Axes, None), measures=(measures, Sequence),
+        yscale=(yscale, str),
+    )  # fmt: skip
+    if yscale not in ("linear", "log"):
+        raise SystemModelError(f"yscale must be 'linear' or 'log', got {shown(yscale)}")
+    unit = _unit_of_measures(table, measures)
+    ax = ax if ax is not None else new_axes()
+    hz = np.asarray(table["frequency_hz"])
+    stable = np.asarray(table["stable"], dtype=bool)
+    kinds = np.array([_kind_of(str(name)) for name in table["attractor"]])
+    for kind in dict.fromkeys(kinds.tolist()):
+        colour = KIND_COLOURS.get(kind, "#009e73")
+        for measure, mark in zip(measures, WEAR_MARKS, strict=False):
+            values = np.asarray(table[measure])
+            label: str | None = f"{kind}, {_spoken(measure)}"
+            for here, face in ((stable, colour), (~stable, "white")):
+                chosen = (kinds == kind) & here
+                if chosen.any():
+                    ax.plot(
+                        hz[chosen], values[chosen], mark, markersize=3.0, color=colour,
+                        markerfacecolor=face, label=label,
+                    )  # fmt: skip
+                    label = None
+    if hz.size:
+        ax.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    ax.set_yscale(yscale)
+    ax.set_xlabel("excitation frequency (Hz)")
+    what = _spoken(measures[0]) if len(measures) == 1 else _common(measures)
+    ax.set_ylabel(f"{what} ({unit})")
+    return ax
+
+
+def _unit_of_measures(table: Mapping[str, Any], measures: Sequence[str]) -> str:
+    """Common unit of columns of a table of contact measures."""
+    known = [name for name in MEASURE_UNITS if name not in ("frequency_hz", "attractor", "stable")]
+    for column in ("frequency_hz", "attractor", "stable", *measures):
+        if column in measures and column not in known:
+            raise SystemModelError(f"measures must be of {', '.join(known)}, got {shown(column)}")
+        if column not in table:
+            raise SystemModelError(f"table has no column '{column}'")
+    units = {MEASURE_UNITS[name] for name in measures}
+    if isinstance(measures, str) or not 1 <= len(measures) <= len(WEAR_MARKS) or len(units) > 1:
+        raise SystemModelError(
+            f"measures must be one to {len(WEAR_MARKS)} names of one unit, got {shown(measures)}"
+        )
+    return units.pop()
+
+
+def _kind_of(attractor: str) -> str:
+    return "periodic" if attractor.startswith("period ") else attractor
+
+
+def _spoken(measure: str) -> str:
+    return measure.replace("_", " ").replace("rms", "r.m.s.")
+
+
+def _common(measures: Sequence[str]) -> str:
+    """What several measures are together."""
+    forces = all(name.endswith("force") for name in measures)
+    return "contact force" if forces else ", ".join(map(_spoken, measures))
+
+
 def plot_basins(
     found: Basins,
     ax: Axes | None = None,
@@ -245,12 +469,21 @@ def plot_basins(
         handles.append(Line2D([], [], marker="x", linestyle="none", color="black", label="saddle"))
     ax.set_xlim(plane.x_range)
     ax.set_ylim(plane.y_range)
-    ax.ticklabel_format(style="sci", scilimits=(-2, 4))
-    ax.set_xlabel(plane.x_label)
-    ax.set_ylabel(plane.y_label)
+    ax.set_xlabel(_scaled(ax.xaxis, plane.x_label, plane.x_range))
+    ax.set_ylabel(_scaled(ax.yaxis, plane.y_label, plane.y_range))
     ax.set_title(f"basins at {found.frequency_hz:g} Hz, forcing phase zero")
     ax.legend(handles=handles, fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
     return ax
+
+
+def _scaled(axis: Axis, label: str, ends: Sequence[float]) -> str:
+    """Show an axis in m or m/s, by its label, in a unit of its size; any other as it is."""
+    unit = next((u for u in ("m", "m/s") if label.endswith(f" ({u})")), None)
+    if unit is None:
+        return label
+    factor, name = length_unit(max(abs(float(end)) for end in ends))
+    axis.set_major_formatter(lambda value, _: f"{value / factor:g}")
+    return label.removesuffix(f"({unit})") + f"({name}{unit[1:]})"
 
 
 def _points(name: str, given: Real) -> Real:

@@ -226,7 +226,7 @@ def plot_diagram(
     if yscale == "linear":
         ax.set_ylim(bottom=-0.02 * ax.get_ylim()[1])
     if legend and branches:
-        _draw_legend(ax, colours, branches, marked)
+        draw_legend(ax, colours, branches, marked)
     if hover:
         _label_orbits(ax, branches, marked, factor, unit)
     return ax
@@ -390,9 +390,10 @@ def orbit_text(orbit: Orbit, factor: float, unit: str, *, stability: bool = True
     )
 
 
-def _draw_legend(
+def draw_legend(
     ax: Axes, colours: dict[int, str], branches: Sequence[Branch], marked: Sequence[str]
 ) -> None:
+    """Explain colours, lines and the marked kinds of special points."""
     periods = sorted({branch.period for branch in branches})
     entries = [Line2D([], [], color=colours[p], label=period_name(p)) for p in periods]
     entries += [

@@ -14,16 +14,20 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from nldyn.attractors import Attractor
+from nldyn.branch import Branch
 from nldyn.contacts import check_stop, impacts, panel_table
 from nldyn.errors import SystemModelError, check_types, check_whole
 from nldyn.executors import values_of
 from nldyn.fourier import modal_row
 from nldyn.linear import Real
 from nldyn.orbit import Orbit
+from nldyn.sections import BruteForce
 from nldyn.simulation import MOST_PERIODS, Motion, motion_of
 from nldyn.system import System
 
 MOST_SAMPLES = 10**6  # in a period
+MOST_ORDERS = 1000
+SAMPLES = 512  # in a period, for each 32 orders of a spectrum
 UNITS = {
     "frequency_hz": "Hz",
     "attractor": "",
@@ -124,16 +128,10 @@ def contact_measures(
     if isinstance(source, Attractor):
         if source.kind == "failed":
             raise SystemModelError(f"the attractor's simulation failed: {source.failure}")
-        name = source.name
-        source = source.orbit if source.orbit is not None else source.motion(periods)
-    elif isinstance(source, Orbit):
-        name = f"period {source.period}"
-    else:
-        name = "motion"
-    stable = not isinstance(source, Orbit) or source.stable
-    motion = motion_of(source) if isinstance(source, Orbit) else source
+        source = source.orbit if source.orbit is not None else source
+    motion, name, stable = _motion_on(source, periods)
     table = panel_table(motion, stop)
-    listed = impacts(source)
+    listed = impacts(source if isinstance(source, Orbit) else motion)
     speeds = listed.speed[listed.stop == stop]
     time = motion.duration
     lengths = zip(np.diff(motion.begins), motion.stretches, strict=True)
@@ -155,7 +153,7 @@ def contact_measures(
 
 
 def measures_table(
-    sources: Iterable[Orbit | Motion | Attractor],
+    sources: BruteForce | Branch | Iterable[BruteForce | Branch | Orbit | Motion | Attractor],
     *,
     stop: int = 0,
     periods: int = 256,
@@ -166,9 +164,9 @@ def measures_table(
 
     Parameters
     ----------
-    sources : iterable
-        The orbits of a branch (``branch.points``), the attractors of a diagram by brute force
-        (``column.attractor for column in found.columns``), motions, or all of them.
+    sources : BruteForce, Branch or iterable
+        A diagram by brute force, whose attractors count, a branch, whose points count, or a list of
+        such, of orbits, motions and attractors. Attractors whose simulation failed are left out.
     stop, periods
         As for `contact_measures`.
     executor : concurrent.futures.Executor, optional
@@ -188,20 +186,141 @@ def measures_table(
     TaskError
         If the measures of a source cannot be computed.
     """
-    check_types(
-        sources=(sources, Iterable), executor=(executor, Executor, None),
-        progress=(progress, Callable, None),
-    )  # fmt: skip
+    check_types(executor=(executor, Executor, None), progress=(progress, Callable, None))
     check_whole("measures_table: periods", periods, 1, MOST_PERIODS)
-    chosen = list(sources)
-    for k, source in enumerate(chosen):
-        check_types(**{f"sources: entry {k}": (source, Orbit, Motion, Attractor)})
+    chosen = _sources(sources)
+    for source in chosen:
         check_stop(_system_of(source), stop)
-    chosen = [s for s in chosen if not (isinstance(s, Attractor) and s.kind == "failed")]
     task = partial(contact_measures, stop=stop, periods=periods)
     rows = [asdict(measures) for measures in values_of(task, chosen, executor, progress)]
     rows.sort(key=lambda row: float(row["frequency_hz"]))
     return {name: np.array([row[name] for row in rows]) for name in UNITS}
+
+
+def _sources(given: BruteForce | Branch | Iterable[Any]) -> list[Orbit | Motion | Attractor]:
+    """Orbits, motions and attractors, also those of branches and diagrams; none that failed."""
+    check_types(sources=(given, Iterable, BruteForce, Branch))
+    kinds = (Orbit, Motion, Attractor, BruteForce, Branch)
+    chosen: list[Orbit | Motion | Attractor] = []
+    for k, entry in enumerate([given] if isinstance(given, BruteForce | Branch) else given):
+        check_types(**{f"sources: entry {k}": (entry, *kinds)})
+        if isinstance(entry, BruteForce):
+            chosen += [column.attractor for column in entry.columns]
+        elif isinstance(entry, Branch):
+            chosen += entry.points
+        else:
+            chosen.append(entry)
+    return [s for s in chosen if not (isinstance(s, Attractor) and s.kind == "failed")]
+
+
+def spectra_table(
+    sources: BruteForce | Branch | Iterable[BruteForce | Branch | Orbit | Motion | Attractor],
+    point: str | Real | None = None,
+    *,
+    orders: int = 5,
+    periods: int = 256,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, NDArray[Any]]:
+    """Leading harmonics of the displacement at a point against the excitation frequency.
+
+    The amplitude of order k is that of the Fourier coefficient at k times the excitation frequency
+    over a whole number of excitation periods. What lies between these lines, subharmonics and the
+    broad spectrum of chaos, and above the last of them is in ``rest``, by Parseval's theorem.
+
+    Parameters
+    ----------
+    sources : BruteForce, Branch or iterable
+        As for `measures_table`; no sweeps.
+    point : str or (n,) array, optional
+        An interface, or the displacement of each mode at any point of the mesh: a row of
+        ``reduced.expand(numpy.eye(n))``. The first interface unless given.
+    orders : int
+        Highest multiple of the excitation frequency.
+    periods : int
+        Excitation periods simulated on an attractor that is not periodic. The amplitudes of a
+        chaotic motion vary from one such record to the next, by about ``rest / sqrt(periods)``.
+    executor, progress
+        As for `measures_table`.
+
+    Returns
+    -------
+    dict of str to (k,) array
+        ``frequency_hz``, ``attractor`` and ``stable`` as in `measures_table`; ``mean`` in m, the
+        amplitudes ``order_1`` to ``order_<orders>`` in m, and ``rest``, the r.m.s. of all else, in
+        m. Rows ascend in frequency.
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense, or a motion whose frequency changes.
+    TaskError
+        If the spectrum of a source cannot be computed.
+
+    Examples
+    --------
+    >>> from nldyn import System, Unbalance, solve_orbit
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> orbit = solve_orbit(system, frequency_hz=20.0)
+    >>> table = spectra_table([orbit], orders=2)      # a linear system answers at one frequency
+    >>> bool(abs(table["order_1"][0] / orbit.max_abs_displacement - 1.0) < 1e-6)
+    True
+    """
+    check_types(executor=(executor, Executor, None), progress=(progress, Callable, None))
+    check_whole("spectra_table: orders", orders, 1, MOST_ORDERS)
+    check_whole("spectra_table: periods", periods, 1, MOST_PERIODS)
+    chosen = _sources(sources)
+    for source in chosen:
+        modal_row(_system_of(source), point)
+        if isinstance(source, Motion):
+            _constant_omega(source)
+    task = partial(_harmonics, point=point, orders=orders, periods=periods)
+    rows = values_of(task, chosen, executor, progress)
+    rows.sort(key=lambda row: float(row["frequency_hz"]))
+    names = ["frequency_hz", "attractor", "stable", "mean"]
+    names += [*(f"order_{k}" for k in range(1, orders + 1)), "rest"]
+    return {name: np.array([row[name] for row in rows]) for name in names}
+
+
+def _harmonics(
+    source: Orbit | Motion | Attractor, point: str | Real | None, orders: int, periods: int
+) -> dict[str, Any]:
+    """Row of `spectra_table`."""
+    motion, name, stable = _motion_on(source, periods)
+    row = modal_row(motion.system, point)
+    hz = _constant_omega(motion) / (2.0 * math.pi)
+    turns = math.floor(motion.duration * hz + 1e-6)
+    if turns < 1:
+        raise SystemModelError("a spectrum needs a motion of at least one excitation period")
+    count = SAMPLES * math.ceil(orders / 32)
+    times = motion.start_time + np.arange(turns * count) / (count * hz)
+    y = motion.states(times)[:, : row.size] @ row
+    phasors = np.fft.rfft(y)[: turns * orders + 1 : turns] / y.size
+    amplitudes = 2.0 * np.abs(phasors[1:])
+    rest = float(np.var(y)) - 0.5 * float(amplitudes @ amplitudes)
+    found: dict[str, Any] = {"frequency_hz": hz, "attractor": name, "stable": stable}
+    found["mean"] = float(phasors[0].real)
+    found |= {f"order_{k}": float(a) for k, a in enumerate(amplitudes, 1)}
+    return {**found, "rest": math.sqrt(max(rest, 0.0))}
+
+
+def _motion_on(source: Orbit | Motion | Attractor, periods: int) -> tuple[Motion, str, bool]:
+    """The motion to measure, what it is called, and whether it is stable."""
+    if isinstance(source, Motion):
+        return source, "motion", True
+    if isinstance(source, Attractor):
+        if source.orbit is None:
+            return source.motion(periods), source.name, True
+        source = source.orbit
+    return motion_of(source), f"period {source.period}", source.stable
+
+
+def _constant_omega(motion: Motion) -> float:
+    omegas = {stretch.omega for stretch in motion.stretches}
+    if len(omegas) > 1:
+        raise SystemModelError("a spectrum needs a motion at constant frequency")
+    return omegas.pop()
 
 
 def _system_of(source: Orbit | Motion | Attractor) -> System:
@@ -259,11 +378,8 @@ def power_spectrum(
     check_whole("samples_per_period", samples_per_period, 4, MOST_SAMPLES)
     if quantity not in ("displacement", "velocity"):
         raise SystemModelError(f"quantity must be 'displacement' or 'velocity', got '{quantity}'")
-    omegas = {stretch.omega for stretch in motion.stretches}
-    if len(omegas) > 1:
-        raise SystemModelError("a power spectrum needs a motion at constant frequency")
     row = modal_row(motion.system, point)
-    hz = omegas.pop() / (2.0 * math.pi)
+    hz = _constant_omega(motion) / (2.0 * math.pi)
     rate = samples_per_period * hz
     count = int(motion.duration * rate + 1e-6)
     if count < 16:

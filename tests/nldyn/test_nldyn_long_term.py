@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -25,15 +26,19 @@ from nldyn import (
     brute_force,
     classify,
     contact_measures,
+    continue_branch,
     find_attractors,
     impact_section,
     impacts,
+    measures_table,
     plot_basins,
     plot_brute_force,
     plot_section,
     plot_sweep,
+    plot_wear,
     simulate,
     solve_orbit,
+    spectra_table,
     spectrum,
     stable_manifold,
     stroboscopic_section,
@@ -41,9 +46,10 @@ from nldyn import (
 )
 from nldyn.attractors import Attractor, zero_one_test
 from nldyn.basin_maps import settle, target_of
+from nldyn.long_term_plots import strobe_curves
 from nldyn.orbit import ConvergenceError
 from nldyn.sections import BruteForce, Column
-from nldyn.wear import measures_table, power_spectrum
+from nldyn.wear import power_spectrum
 
 
 @pytest.fixture(scope="module")
@@ -412,6 +418,75 @@ def test_measures_of_chaos_and_of_branches_fit_one_table(one_dof, from_35_to_40)
     assert np.all(table["peak_force"] > table["rms_force"])
 
 
+def test_a_diagram_and_a_branch_are_measured_as_they_are(one_dof, from_35_to_40):
+    branch = continue_branch(solve_orbit(one_dof, 50.0, 2), (49.9, 50.1))
+    table = measures_table([branch, from_35_to_40], periods=64)
+    count = len(branch.points) + len(from_35_to_40.columns)
+    assert len(table["frequency_hz"]) == count
+    alone = measures_table(from_35_to_40, periods=64)
+    attractors = [column.attractor for column in from_35_to_40.columns]
+    listed = measures_table(attractors, periods=64)
+    np.testing.assert_array_equal(alone["peak_force"], listed["peak_force"])
+    assert measures_table(branch)["peak_force"].size == len(branch.points)
+
+
+def test_harmonics_of_orbits_are_those_of_their_spectra(one_dof):
+    orbits = [solve_orbit(one_dof, 25.3), solve_orbit(one_dof, 50.0, 2)]
+    table = spectra_table(orbits, orders=4)
+    for index, orbit in enumerate(orbits):
+        lines = spectrum(orbit)
+        assert table["mean"][index] == pytest.approx(lines.phasor[0].real, rel=1e-6)
+        for order in range(1, 5):
+            said = lines.amplitude[order * orbit.period]
+            assert table[f"order_{order}"][index] == pytest.approx(said, rel=1e-4)
+        others = np.delete(lines.amplitude, np.arange(5) * orbit.period)
+        rest = math.sqrt(0.5 * float(others @ others))
+        assert table["rest"][index] == pytest.approx(rest, rel=1e-3)
+    assert table["attractor"].tolist() == ["period 1", "period 2"]
+
+
+def test_harmonics_of_every_attractor_hold_its_whole_power(one_dof, from_35_to_40):
+    with ThreadPoolExecutor(1) as pool:
+        table = spectra_table(from_35_to_40, orders=3, periods=64, executor=pool)
+    assert len(table["frequency_hz"]) == len(from_35_to_40.columns)
+    assert np.all(np.diff(table["frequency_hz"]) >= 0.0)
+    chaotic = np.flatnonzero(table["attractor"] == "chaotic")[0]
+    hz = table["frequency_hz"][chaotic]
+    column = next(c for c in from_35_to_40.columns if math.isclose(c.frequency_hz, hz))
+    y = column.attractor.motion(64).history(64 * 1000).displacement["middle"][:-1]
+    lines = sum(table[f"order_{k}"][chaotic] ** 2 for k in (1, 2, 3))
+    power = 0.5 * lines + table["rest"][chaotic] ** 2
+    assert power == pytest.approx(float(np.var(y)), rel=1e-3)
+    assert table["rest"][chaotic] > 0.1 * math.sqrt(power)  # chaos lies between the lines
+
+
+def test_wear_is_drawn_by_kind_and_measure(one_dof, from_35_to_40):
+    table = measures_table([from_35_to_40, solve_orbit(one_dof, 50.0)], periods=64)
+    ax = plot_wear(table)
+    assert ax.get_ylabel() == "contact force (N)"
+    assert {"periodic, peak force", "chaotic, r.m.s. force"} <= set(labels_of(ax))
+    drawn = np.sort(np.concatenate([line.get_ydata() for line in ax.lines]))
+    expected = np.sort(np.concatenate([table["peak_force"], table["rms_force"]]))
+    np.testing.assert_array_equal(drawn, expected)
+    hollow = [line for line in ax.lines if line.get_markerfacecolor() == "white"]
+    np.testing.assert_allclose([line.get_xdata() for line in hollow], 50.0)  # it is unstable
+    assert len(hollow) == 2
+    for given, said in (
+        (["speed"], "measures must be of periods, peak_force"),
+        (["peak_force", "impact_power"], "names of one unit"),
+        ([], "names of one unit"),
+    ):
+        with pytest.raises(SystemModelError, match=said):
+            plot_wear(table, measures=given)
+    with pytest.raises(SystemModelError, match="table has no column 'stable'"):
+        plot_wear({"frequency_hz": np.ones(1)})
+
+
+def test_a_sweep_has_no_harmonics(one_dof):
+    with pytest.raises(SystemModelError, match="needs a motion at constant frequency"):
+        spectra_table([sweep(one_dof, (20.0, 21.0), 5.0)])
+
+
 def test_power_spectrum_holds_the_variance(one_dof):
     motion = simulate(one_dof, 36.0, periods=512, transient=300)
     hz, density = power_spectrum(motion)
@@ -447,6 +522,63 @@ def test_pictures_show_what_was_found(one_dof, from_35_to_40, at_50_hz, tmp_path
     assert plot_section(motion).get_xlabel() == "displacement of middle (µm)"
     assert len(plot_sweep(sweep(one_dof, (20.0, 21.0), 5.0)).lines) == 1
     ax.figure.savefig(tmp_path / "basins.png")
+
+
+def test_basins_are_drawn_in_units_of_their_size(at_50_hz):
+    ax = plot_basins(at_50_hz)
+    assert ax.get_xlabel() == "displacement of middle (µm)"
+    assert ax.get_ylabel() == "velocity of middle (mm/s)"
+    assert ax.xaxis.get_major_formatter()(-2e-4) == "-200"
+    assert ax.yaxis.get_major_formatter()(0.02) == "20"
+
+
+@pytest.mark.parametrize(
+    ("quantity", "said"),
+    [
+        ("peak", "largest displacement of middle (µm)"),
+        ("strobe", "displacement of middle at forcing phase zero (µm)"),
+        ("impact speed", "impact speed (mm/s)"),
+        ("impact phase", "forcing phase of impacts (°)"),
+    ],
+)
+def test_motions_are_drawn_in_the_quantity_asked_for(from_35_to_40, quantity, said):
+    ax = plot_brute_force(from_35_to_40, quantity=quantity)
+    assert ax.get_ylabel() == said
+    drawn = np.concatenate([line.get_ydata() for line in ax.lines])
+    fields = {"peak": "peaks", "impact speed": "impact_speed", "impact phase": "impact_phase_deg"}
+    columns = [getattr(c, fields.get(quantity, quantity)) for c in from_35_to_40.columns]
+    scale = {"impact speed": 1e3, "impact phase": 1.0}.get(quantity, 1e6)
+    np.testing.assert_allclose(np.sort(drawn), np.sort(np.concatenate(columns)) * scale)
+
+
+def test_stroboscopic_points_lie_on_the_curves_of_their_branch(one_dof):
+    branch = continue_branch(solve_orbit(one_dof, 50.0, 2), (49.0, 50.5))
+    hz, values, stable = strobe_curves(branch, "middle")
+    assert values.shape == (hz.size, 2) and stable.all()
+    found = brute_force(one_dof, (49.5, 50.0), points=2, directions=["up"], recorded=8)
+    for column in found.columns:
+        order = np.argsort(hz)
+        lines = [np.interp(column.frequency_hz, hz[order], y[order]) for y in values.T]
+        off = np.abs(column.strobe[:, None] - np.array(lines)).min(axis=1)
+        assert off.max() < 1e-3 * np.ptp(lines)
+    ax = plot_brute_force(found, quantity="strobe", diagram=[branch])
+    assert {"1/2 subharmonic", "periodic motion"} <= set(labels_of(ax))
+    with pytest.raises(SystemModelError, match="branches have no impact speed to draw"):
+        plot_brute_force(found, quantity="impact speed", diagram=[branch])
+    with pytest.raises(SystemModelError, match="quantity must be one of peak, strobe"):
+        plot_brute_force(found, quantity="speed")
+
+
+def test_impacts_are_drawn_by_phase_and_speed(one_dof):
+    motion = simulate(one_dof, 50.0, periods=8, transient=600)
+    ax = plot_section(motion, stop=0)
+    phase, speed = impact_section(motion)
+    np.testing.assert_allclose(ax.lines[0].get_xdata(), phase)
+    np.testing.assert_allclose(ax.lines[0].get_ydata(), speed * 1e3)
+    assert ax.get_xlabel() == "forcing phase of impacts on middle (°)"
+    assert ax.get_ylabel() == "impact speed (mm/s)"
+    with pytest.raises(SystemModelError, match="stop must be a whole number from 0 to 0"):
+        plot_section(motion, stop=3)
 
 
 def labels_of(ax):
