@@ -478,7 +478,7 @@ def test_wear_is_drawn_by_kind_and_measure(one_dof, from_35_to_40):
     ):
         with pytest.raises(SystemModelError, match=said):
             plot_wear(table, measures=given)
-    with pytest.raises(SystemModelError, match="table has no column 'stable'"):
+    with pytest.raises(SystemModelError, match="table has no column 'attractor'"):
         plot_wear({"frequency_hz": np.ones(1)})
 
 
