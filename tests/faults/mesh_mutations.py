@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import re
 import zlib
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +92,7 @@ def _cut(draw: Any, content: bytes) -> bytes:
     return content[: draw(st.integers(0, len(content)))]
 
 
+@cache
 def bombs() -> dict[str, bytes]:
     """Small files that declare, or unpack to, something huge."""
     head = b"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
