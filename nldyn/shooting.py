@@ -91,14 +91,21 @@ class ShootingProblem:
         than `longest` (relative, as in `metric`) means failure.
         """
         level = float(row @ guess) if offset is None else offset
-        while True:
-            found = self.flow.newton(
-                guess, row, level, self.phases, self._weight(guess), rtol, longest, max_iterations
+
+        def solved(start: Real) -> Solution:
+            return self.flow.newton(
+                start, row, level, self.phases, self._weight(start), rtol, longest, max_iterations
             )
-            # steps count relative to the guess, and may still be large beside a small orbit
-            if not found.converged or self.scale(found.point) > 0.1 * self.scale(guess):
-                return found
-            guess = found.point
+
+        found = solved(guess)
+        # steps count relative to the start, and may still be large beside a much smaller orbit;
+        # motions at rest are not found any better
+        while found.converged and self.scale(found.point) < 0.1 * self.scale(guess):
+            guess, finer = found.point, solved(found.point)
+            if not finer.converged:
+                break
+            found = finer
+        return found
 
     def _weight(self, point: Real) -> float:
         """Weight of the square of a state's change."""

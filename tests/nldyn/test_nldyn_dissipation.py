@@ -296,3 +296,13 @@ def test_an_orbit_is_as_exact_from_a_guess_that_is_far_too_large():
     row[-1] = 1.0
     found = problem.correct(guess, row)
     np.testing.assert_allclose(found.point, exact.point, rtol=1e-10, atol=1e-22)
+
+
+@pytest.mark.parametrize("size", [1.0, 0.1, 1e-3, 1e-33, 1e-98, 1e-126])
+def test_rest_is_found_from_a_guess_of_any_size(size):
+    problem = solve_orbit(make_one_dof(stops=[], excitation=[]), frequency_hz=20.0).problem
+    row = np.append(np.zeros(problem.segments * problem.size), 1.0)
+    guess = np.append(np.full(row.size - 1, size), math.log(100.0))
+    found = problem.correct(guess, row)
+    assert found.failure == ""
+    assert np.abs(found.point[:-1]).max() <= 1e-11 * size
