@@ -87,7 +87,7 @@ def plain_interrupt() -> Iterator[None]:
     """Tell Ctrl-C in one line on stderr, and exit; compiled code wraps it."""
     try:
         yield
-    except (KeyboardInterrupt, SystemError) as error:
+    except (KeyboardInterrupt, Exception) as error:
         if not interrupted(error):
             raise
         click.echo(STOPPED, err=True)
@@ -356,7 +356,7 @@ def kept_at_interrupt(out: Path) -> Iterator[Path]:
                 raise
             fault = f"{error}; {unfinished} keeps what was computed, and the same command goes on"
             raise OutputError(f"{fault} from there") from error
-        except (KeyboardInterrupt, SystemError) as error:
+        except (KeyboardInterrupt, Exception) as error:
             if not (interrupted(error) and unfinished.exists()):
                 raise
             click.echo(

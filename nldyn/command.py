@@ -5,9 +5,10 @@ It imports nothing large before it can answer.
 
 from __future__ import annotations
 
+import signal
 import sys
 
-from nldyn.interruption import interrupted
+from nldyn.interruption import heed_swallowed, interrupted
 
 INTERRUPTED = 130
 STOPPED = "nldyn: stopped by Ctrl-C, nothing is written"
@@ -15,6 +16,7 @@ STOPPED = "nldyn: stopped by Ctrl-C, nothing is written"
 
 def main() -> None:
     """Load the command line and run it."""
+    heed_swallowed()
     try:
         from nldyn.cli import main as command
 
@@ -26,3 +28,5 @@ def main() -> None:
             raise
         print(STOPPED, file=sys.stderr)
         sys.exit(INTERRUPTED)
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is to end

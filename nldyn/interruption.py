@@ -1,6 +1,17 @@
-"""Ctrl-C behind other errors: compiled code and imports wrap it."""
+"""Ctrl-C behind other errors: compiled code and imports wrap it, callbacks from C swallow it."""
 
 from __future__ import annotations
+
+import _thread
+import sys
+import threading
+from types import SimpleNamespace
+from typing import Any
+
+SOON = 0.2
+"""Seconds after which a Ctrl-C that was swallowed is tried again."""
+
+_swallowed = SimpleNamespace(any=False)
 
 
 def interrupted(error: BaseException | None) -> bool:
@@ -13,4 +24,24 @@ def interrupted(error: BaseException | None) -> bool:
     """
     if error is None or isinstance(error, KeyboardInterrupt):
         return error is not None
-    return interrupted(error.__cause__ or error.__context__)
+    return _swallowed.any or interrupted(error.__cause__ or error.__context__)
+
+
+def heed_swallowed() -> None:
+    """Let no Ctrl-C be lost that falls into a callback or destructor, whose errors Python drops.
+
+    The compiler makes many of both. Whatever error follows stands for the Ctrl-C, and where none
+    follows it comes again.
+    """
+    usual = sys.unraisablehook
+
+    def hook(unraisable: Any) -> None:
+        if not isinstance(unraisable.exc_value, KeyboardInterrupt):
+            usual(unraisable)
+            return
+        _swallowed.any = True
+        again = threading.Timer(SOON, _thread.interrupt_main)
+        again.daemon = True
+        again.start()
+
+    sys.unraisablehook = hook

@@ -216,3 +216,28 @@ def test_ctrl_c_from_the_terminal(tmp_path):
         check_whole(out)
 
 
+
+
+@pytest.mark.parametrize("after", ["raise RuntimeError", "while True: time.sleep(0.01)"])
+def test_ctrl_c_in_a_destructor_is_not_lost(after):
+    """Python drops what a destructor or a callback from C raises; the compiler has many."""
+    start = f"""
+import time
+import nldyn.cli
+from nldyn.command import main
+
+class Swallower:
+    def __del__(self):
+        raise KeyboardInterrupt
+
+def command(prog_name):
+    Swallower()
+    {after}
+
+nldyn.cli.main = command
+main()
+"""
+    arguments = [sys.executable, "-c", start]
+    child = subprocess.run(arguments, capture_output=True, text=True, timeout=15.0)
+    assert child.returncode == 130
+    assert child.stderr == "nldyn: stopped by Ctrl-C, nothing is written\n"
