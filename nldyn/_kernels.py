@@ -47,8 +47,9 @@ inner = njit(cache=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_
 # those with one caller: every level of calls is optimised anew, so this saves compile time
 inlined = njit(cache=True, error_model="numpy", inline="always")
 
-OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_FULL = range(7)
-ROUNDED = 7
+(
+    OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_FULL, ROUNDED,
+) = range(8)  # fmt: skip
 FLIGHT = -1
 # |λ - iω| below this share of ω makes an eigenvalue λ near: a steady response is at most 1/NEAR
 # times as large as what the excitation brings about in 1/ω, and so are its rounding errors; in the
@@ -327,14 +328,20 @@ def distance(fl, stop, w, phase):
 
 
 @inner
-def output_noise(fl, out, w):
-    """Rounding error to expect in an output: 4 units in the last place of its terms."""
+def output_size(fl, out, w):
+    """Sum of the sizes of an output's terms."""
     total = abs(fl.forced[0, 0, out])
     for k in range(fl.near.size):
         total += abs(fl.forced[1 + k, 0, out]) * (2.0 * math.pi / fl.omega)
     for j in range(w.size):
         total += abs(fl.rows[0, out, j] * w[j])
-    return 1e-15 * total
+    return total
+
+
+@inner
+def output_noise(fl, out, w):
+    """Rounding error to expect in an output: 4 units in the last place of its terms."""
+    return 1e-15 * output_size(fl, out, w)
 
 
 @inner
@@ -1496,15 +1503,14 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
 
 
 @inner
-def lost_to_rounding(fl, stop, w, peak):
+def lost_to_rounding(fl, stop, w, peak, noise):
     """Share of the speed at a stop that rounding of the penetration costs in a contact so deep."""
     if peak <= 0.0:
         return 0.0
     p = fl.stops[stop, EXPONENT]
     rate = fl.stops[stop, STIFFNESS] * fl.stops[stop, MOBILITY]
     impact_speed = math.sqrt(2.0 * rate * peak ** (p + 1.0) / (p + 1.0))
-    noise = output_noise(fl, stop, w)
-    speed = impact_speed + 1e15 * noise * fl.omega
+    speed = impact_speed + output_size(fl, stop, w) * fl.omega
     for j in range(w.size):
         speed += abs(fl.rows[1, stop, j] * w[j])
     return noise / peak * impact_speed / speed
@@ -1666,9 +1672,10 @@ def run_pieces(
             panel = new_panel(fl, m, w.size, active)
         if n_active == 1 and start_switch == 1:
             peak, _, left = expected_contact(fl, active[0], w, here)
-            if lost_to_rounding(fl, active[0], w, peak) > WORST_ROUNDING:
+            noise = output_noise(fl, active[0], w)
+            if lost_to_rounding(fl, active[0], w, peak, noise) > WORST_ROUNDING:
                 return ROUNDED
-            if peak <= 100.0 * output_noise(fl, active[0], w):  # a touch without force
+            if peak <= 100.0 * noise:  # a touch without force
                 closed[active[0]] = False
                 closings[active[0]] -= 1
                 start_switch, skip = 0, max(left, shortest)

@@ -24,7 +24,7 @@ from nldyn.curve_walk import (
     curve_point,
     on_chart_plane,
 )
-from nldyn.errors import SystemModelError, check_types, is_finite, shown
+from nldyn.errors import SystemModelError, check_choice, check_types, is_finite, shown
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit
 from nldyn.parameter_values import Chart, checked_parameter, value_of
@@ -118,9 +118,7 @@ class Curve:
         SystemModelError
             For an unknown part.
         """
-        if part not in get_args(CurvePart):
-            names = ", ".join(get_args(CurvePart))
-            raise SystemModelError(f"table: part must be one of {names}; got {shown(part)}")
+        check_choice("table: part", part, get_args(CurvePart))
         rows = self.points if part == "points" else self.marks
         columns: dict[str, NDArray[Any]] = {}
         if part == "marks":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from numbers import Integral, Real
 from reprlib import repr as shortened
 from typing import Any, TypeGuard
@@ -64,6 +64,13 @@ def _article(kind: Any) -> str:
         return "None" if kind is None else "a function"
     name: str = kind.__name__
     return f"an {name}" if name[0] in "AEIOU" else f"a {name}"
+
+
+def check_choice(name: str, value: object, choices: Iterable[str]) -> None:
+    """Refuse anything but one of some words, under its name."""
+    words = tuple(choices)
+    if not (isinstance(value, str) and value in words):
+        raise SystemModelError(f"{name} must be one of {', '.join(words)}, got {shown(value)}")
 
 
 def check_positive(name: str, value: object) -> None:

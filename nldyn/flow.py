@@ -706,11 +706,7 @@ class Trajectory:
             If there is no such output.
         """
         flow = self.flow
-        count = len(flow.rows)
-        if not (isinstance(output, int | np.integer) and 0 <= output < count):
-            raise SystemModelError(
-                f"output must be a whole number from 0 to {count - 1}, got {shown(output)}"
-            )
+        check_whole("output", output, 0, len(flow.rows) - 1)
         fastest = max(self.omega, flow.system.linear.fastest)
         return self._evaluate(local_extremes, flow.rows[output], flow.rate_rows[output], fastest)
 

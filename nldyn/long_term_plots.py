@@ -17,7 +17,7 @@ from nldyn.attractors import Attractor
 from nldyn.basin_maps import UNDECIDED, Basins
 from nldyn.branch import Branch, check_branches, stroboscopic
 from nldyn.diagrams import Diagram
-from nldyn.errors import SystemModelError, check_types, shown
+from nldyn.errors import SystemModelError, check_choice, check_types, shown
 from nldyn.linear import Real
 from nldyn.orbit import check_observe
 from nldyn.plot import (
@@ -142,12 +142,9 @@ def plot_brute_force(
         found=(found, BruteForce), ax=(ax, Axes, None), quantity=(quantity, str),
         diagram=(diagram, Diagram, Iterable, None), unit=(unit, str, None),
     )  # fmt: skip
-    if quantity not in QUANTITIES:
-        raise SystemModelError(
-            f"quantity must be one of {', '.join(QUANTITIES)}, got {shown(quantity)}"
-        )
-    if unit is not None and unit not in UNITS:
-        raise SystemModelError(f"unit must be one of {', '.join(UNITS)}, got {shown(unit)}")
+    check_choice("quantity", quantity, QUANTITIES)
+    if unit is not None:
+        check_choice("unit", unit, UNITS)
     branches = _branches_of(found, quantity, diagram)
     sizes = [np.abs(_values(c, quantity)).max(initial=0.0) for c in found.columns]
     factor, name = length_unit(float(max(sizes, default=1.0)))
@@ -358,8 +355,7 @@ def plot_wear(
         table=(table, Mapping), ax=(ax, Axes, None), measures=(measures, Sequence),
         yscale=(yscale, str),
     )  # fmt: skip
-    if yscale not in ("linear", "log"):
-        raise SystemModelError(f"yscale must be 'linear' or 'log', got {shown(yscale)}")
+    check_choice("yscale", yscale, ("linear", "log"))
     unit = _unit_of_measures(table, measures)
     ax = ax if ax is not None else new_axes()
     hz = np.asarray(table["frequency_hz"])

@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
 from nldyn.branch import check_branches
-from nldyn.errors import SystemModelError, check_types, shown
+from nldyn.errors import check_choice, check_types
 from nldyn.hover import show_labels
 
 if TYPE_CHECKING:
@@ -210,9 +210,9 @@ def plot_diagram(
     branches = list(several if isinstance(several, Iterable) else [several])
     check_branches("diagram", branches)
     check_types(ax=(ax, Axes, None), special_points=(special_points, Sequence))
-    _check_choice("yscale", yscale, ("linear", "log"))
+    check_choice("yscale", yscale, ("linear", "log"))
     for kind in special_points:
-        _check_choice("special_points", kind, tuple(MARKERS))
+        check_choice("special_points", kind, MARKERS)
     ax = ax if ax is not None else new_axes()
     factor, unit = _unit_of(branches, unit)
     colours = period_colours(branch.period for branch in branches)
@@ -438,10 +438,7 @@ def _unit_of(branches: Sequence[Branch], unit: str | None) -> tuple[float, str]:
     if unit is None:
         largest = [float(np.max(b.max_abs_displacement)) for b in branches if len(b.points)]
         return length_unit(max(largest, default=1.0))
-    _check_choice("unit", unit, tuple(name for _, name in PREFIXES))
+    check_choice("unit", unit, (name for _, name in PREFIXES))
     return next(prefix for prefix in PREFIXES if prefix[1] == unit)
 
 
-def _check_choice(name: str, value: object, choices: Sequence[str]) -> None:
-    if value not in choices:
-        raise SystemModelError(f"{name} must be one of {', '.join(choices)}, got {shown(value)}")

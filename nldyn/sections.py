@@ -15,7 +15,7 @@ import numpy as np
 from nldyn.attractors import Attractor, AttractorOptions, Kind, attractor_from
 from nldyn.contacts import check_stop, impacts
 from nldyn.continuation import check_range
-from nldyn.errors import SystemModelError, check_types, check_whole, shown
+from nldyn.errors import SystemModelError, check_choice, check_types, check_whole
 from nldyn.executors import values_of
 from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
@@ -129,7 +129,7 @@ class BruteForce:
         They begin and end half way to the neighbouring frequencies without one, and a single
         frequency counts, too.
         """
-        _check_kind(kind)
+        check_choice("kind", kind, get_args(Kind))
         frequencies = sorted({column.frequency_hz for column in self.columns})
         with_kind = {c.frequency_hz for c in self.columns if c.attractor.kind == kind}
         found: list[tuple[float, float]] = []
@@ -144,19 +144,12 @@ class BruteForce:
 
     def share(self, low_hz: float, high_hz: float, kind: Kind = "chaotic") -> tuple[int, int]:
         """At how many frequencies from `low_hz` to `high_hz` a kind was found, and of how many."""
-        _check_kind(kind)
+        check_choice("kind", kind, get_args(Kind))
         for name, hz in (("low_hz", low_hz), ("high_hz", high_hz)):
             check_types(**{name: (hz, numbers.Real)})
         inside = [c for c in self.columns if low_hz <= c.frequency_hz <= high_hz]
         with_kind = {c.frequency_hz for c in inside if c.attractor.kind == kind}
         return len(with_kind), len({c.frequency_hz for c in inside})
-
-
-def _check_kind(kind: object) -> None:
-    check_types(kind=(kind, str))
-    kinds = get_args(Kind)
-    if kind not in kinds:
-        raise SystemModelError(f"kind must be one of {', '.join(kinds)}, got {shown(kind)}")
 
 
 def brute_force(
@@ -237,8 +230,7 @@ def brute_force(
     check_whole("seed", seed, 0)
     name = check_observe(flow.system, observe)
     for direction in directions:
-        if direction not in ("up", "down"):
-            raise SystemModelError(f"directions must be 'up' or 'down', got {shown(direction)}")
+        check_choice("directions", direction, ("up", "down"))
     if not directions and not starts:
         raise SystemModelError("brute_force needs a direction or random starts")
     frequencies = np.linspace(low, high, points).tolist()

@@ -11,13 +11,21 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from pydantic import ValidationError
 from scipy.stats import qmc
 
-from nldyn.errors import SceneError, SystemModelError, check_types, check_whole, is_finite, shown
+from nldyn.errors import (
+    SceneError,
+    SystemModelError,
+    check_choice,
+    check_types,
+    check_whole,
+    is_finite,
+    shown,
+)
 from nldyn.executors import as_finished
 from nldyn.scene import Scene, build_system, load_scene, scene_from_tables
 from nldyn.study_keys import case_keys
@@ -184,6 +192,7 @@ def _design(
     for name, given in parameters.items():
         if isinstance(given, str) or not hasattr(given, "__len__") or not len(given):
             raise SystemModelError(f"study: '{name}' must list its values, got {shown(given)}")
+    check_choice("study: design", design, get_args(Design))
     if design == "grid":
         if samples is not None:
             raise SystemModelError("study: a grid takes no samples")
@@ -192,10 +201,6 @@ def _design(
             raise SystemModelError(f"study: the grid has {count} cases, at most {MOST_CASES}")
         lists = [[_plain(value) for value in given] for given in parameters.values()]
         return list(itertools.product(*lists))
-    if design not in ("random", "latin hypercube"):
-        raise SystemModelError(
-            f"study: design must be 'grid', 'random' or 'latin hypercube', got {shown(design)}"
-        )
     check_whole("study: samples", samples, 1, MOST_CASES)
     assert samples is not None
     lows, highs = [], []

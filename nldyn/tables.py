@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.branch import Branch, Part
-from nldyn.errors import SystemModelError, shown
+from nldyn.errors import SystemModelError, check_choice
 from nldyn.orbit import Orbit
 from nldyn.version import software_version
 
@@ -89,15 +89,13 @@ def at_known(frequency_hz: float, known_hz: Sequence[float]) -> float:
 def branch_table(branch: Branch, part: Part = "points") -> dict[str, NDArray[Any]]:
     """Give the columns of a part of a branch; see `Branch.table`."""
     special = branch.special_points if part == "special_points" else ()
+    check_choice("table: part", part, get_args(Part))
     if part == "points":
         points = list(branch.nodes)
     elif part == "special_points":
         points = [s.point for s in special]
-    elif part == "requested":
-        points = list(branch.requested)
     else:
-        names = ", ".join(get_args(Part))
-        raise SystemModelError(f"table: part must be one of {names}; got {shown(part)}")
+        points = list(branch.requested)
     course = branch.course
     known = (*course.range_hz, *course.at) if course else ()
     columns = orbit_columns([point.orbit for point in points], known)

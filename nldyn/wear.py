@@ -16,7 +16,7 @@ from scipy.signal import welch
 from nldyn.attractors import Attractor
 from nldyn.branch import Branch
 from nldyn.contacts import check_stop, impacts, panel_table
-from nldyn.errors import SystemModelError, check_types, check_whole
+from nldyn.errors import SystemModelError, check_choice, check_types, check_whole
 from nldyn.executors import values_of
 from nldyn.fourier import modal_row
 from nldyn.linear import Real
@@ -376,8 +376,7 @@ def power_spectrum(
     """
     check_types(motion=(motion, Motion), quantity=(quantity, str))
     check_whole("samples_per_period", samples_per_period, 4, MOST_SAMPLES)
-    if quantity not in ("displacement", "velocity"):
-        raise SystemModelError(f"quantity must be 'displacement' or 'velocity', got '{quantity}'")
+    check_choice("quantity", quantity, ("displacement", "velocity"))
     row = modal_row(motion.system, point)
     hz = _constant_omega(motion) / (2.0 * math.pi)
     rate = samples_per_period * hz

@@ -114,7 +114,7 @@ def test_table_has_the_parameters_and_the_orbits(curve, loaded):
         assert {len(column) for column in table.values()} == {len(rows)}
         again = loaded.table(part)
         assert list(again) == list(table)
-    with pytest.raises(SystemModelError, match="part must be one of points, marks; got 'nodes'"):
+    with pytest.raises(SystemModelError, match="part must be one of points, marks, got 'nodes'"):
         curve.table("nodes")
 
 
