@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from cms.cholesky import one_thread
 from nldyn.branch import (
     CLOSED,
     NOT_FINISHED,
@@ -198,7 +201,7 @@ class Walk:
                 self.stop_reason = CLOSED
                 yield point
                 return
-            if any(_passes(here, point, end) for end in self.open_ends):
+            if _passed(here, point, self._ends).any():
                 self.stop_reason = "meets another branch where that was broken off"
                 yield point
                 return
@@ -211,6 +214,12 @@ class Walk:
             self.stride = Stride(point, step, behind, self.stride.count + 1)
             yield point
         self.stop_reason = f"{self.options.max_points}{POINTS}"
+
+    @cached_property
+    def _ends(self) -> Real:
+        """Those of the open ends that are orbits of this period, (m, N + 1)."""
+        size = self.start.orbit.point.size
+        return np.array([end for end in self.open_ends if end.size == size]).reshape(-1, size)
 
     def _advance(
         self,
@@ -296,18 +305,17 @@ class Walk:
         start = self.start
         if b.arclength - start.arclength < 10.0 * (b.arclength - a.arclength):
             return False
-        problem = start.orbit.problem
-        weights = problem.metric(start.orbit.point)
-        chord = b.orbit.point - a.orbit.point
-        step = weights * chord
-        ahead = start.orbit.point[-1] - a.orbit.point[-1]
-        if ahead * ahead > 1.01 * float(chord @ step):  # `_passes` none of the start's shifts
-            return False
-        places = zip(
-            shifts(problem, start.orbit.point), shifts(problem, start.tangent), strict=True
-        )
-        return any(
-            float(step @ tangent) > 0.0 and _passes(a, b, place) for place, tangent in places
+        places, tangents = self._shifts
+        step = start.orbit.problem.metric(start.orbit.point) * (b.orbit.point - a.orbit.point)
+        return bool((_passed(a, b, places) & (tangents @ step > 0.0)).any())
+
+    @cached_property
+    def _shifts(self) -> tuple[Real, Real]:
+        """Shooting unknowns and tangents of the start shifted by its excitation periods."""
+        problem = self.start.orbit.problem
+        return (
+            np.array(shifts(problem, self.start.orbit.point)),
+            np.array(shifts(problem, self.start.tangent)),
         )
 
 
@@ -318,18 +326,20 @@ def shifts(problem: ShootingProblem, point: Real) -> list[Real]:
     return [np.append(np.roll(nodes, move, axis=0).ravel(), point[-1]) for move in moves]
 
 
-def _passes(a: BranchPoint, b: BranchPoint, place: Real) -> bool:
-    """Whether a place lies beside the step from a to b, nearer than a tenth of its length."""
-    if place.size != a.orbit.point.size:
-        return False
-    weights = a.orbit.problem.metric(place)
-    step, way = b.orbit.point - a.orbit.point, place - a.orbit.point
-    along = float(step @ (weights * way))
+def _passed(a: BranchPoint, b: BranchPoint, places: Real) -> NDArray[np.bool_]:
+    """Which places (m, N + 1) lie beside the step from a to b, nearer than 0.1 of its length."""
+    start, step = a.orbit.point, b.orbit.point - a.orbit.point
+    weights = a.orbit.problem.metric(start)
     length2 = float(step @ (weights * step))
-    if not 0.0 <= along <= length2:
-        return False
-    off = way - along / length2 * step
-    return float(off @ (weights * off)) < 0.01 * length2
+    passed = np.zeros(len(places), dtype=bool)
+    near = np.abs(places[:, -1] - start[-1]) <= 1.1 * math.sqrt(length2)  # few are
+    if near.any():
+        way = places[near] - start
+        along = way @ (weights * step)
+        off = way - np.outer(along / length2, step)
+        inside = (along >= 0.0) & (along <= length2)
+        passed[near] = inside & ((off * off) @ weights < 0.01 * length2)
+    return passed
 
 
 def open_ends(branch: Branch) -> list[Real]:
@@ -743,6 +753,7 @@ def continue_branch(
         return complete(name, None, None, start_point(orbit, 1.0), course, progress, kept)
 
 
+@one_thread()
 def complete(
     name: str,
     forward: Leg | None,

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cms.cholesky import one_thread
 from nldyn.branch import (
     POINTS,
     SHORT_STEP,
@@ -266,6 +267,7 @@ def _alike(a: Orbit, b: Orbit, rtol: float) -> bool:
     )
 
 
+@one_thread()
 def diagram(
     system: System | FlowMap,
     range_hz: tuple[float, float],

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from cms.cholesky import one_thread
 from nldyn.branch import Branch, minimal_period, same_orbit, stroboscopic
 from nldyn.checkpoint import Checkpoint
 from nldyn.continuation import MOST_POINTS, ContinuationOptions, check_range, shifts
@@ -377,6 +378,7 @@ class Exploration:
         return ranges
 
 
+@one_thread()
 def explore(
     system: System | FlowMap,
     range_hz: tuple[float, float],

@@ -28,17 +28,22 @@ def main(out: str | Path, workers: int = 2) -> None:
     --------
     >>> main("results/paper")        # doctest: +SKIP
     """
-    from nldyn.paper.chaos import compute_chaos, write_chaos_figure
+    from nldyn.paper.chaos import chaos_of, submit_sweeps, write_chaos_figure
     from nldyn.paper.claims import evaluate, verdict_counts, write_claims
     from nldyn.paper.figures import write_figures
-    from nldyn.paper.jobs import run_jobs
+    from nldyn.paper.jobs import submit_diagrams
     from nldyn.paper.page import write_page
+    from nldyn.paper.workers import ctrl_c_for_parent_only, worker_processes
     from nldyn.result_directory import check_directory, result_directory
 
     check_directory(out)
     start = time.perf_counter()
-    results = run_jobs(workers)
-    chaos = compute_chaos(workers)
+    with worker_processes(workers) as processes:
+        with ctrl_c_for_parent_only():  # as they start with what is submitted
+            diagrams = submit_diagrams(processes)
+            sweeps = submit_sweeps(processes)
+        results = processes.values(diagrams, "diagrams")
+        chaos = chaos_of(processes.values(sweeps, "sweeps"), processes)
     with result_directory(out, "paper") as folder:
         rows = evaluate(results, chaos)
         write_claims(rows, folder / "claims.csv")

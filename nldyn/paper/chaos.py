@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import multiprocessing
-import signal
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Literal, get_args
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,13 +16,15 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from nldyn.attractors import Attractor, AttractorOptions
-from nldyn.executors import as_finished, values_of
 from nldyn.lifetimes import ChaosLifetime, chaos_lifetime, two_digits
 from nldyn.paper.evidence import Finding, published_claims
-from nldyn.paper.jobs import _ended_at_failure, scene_system
+from nldyn.paper.jobs import scene_system
+from nldyn.paper.workers import Workers
 from nldyn.plot import save_figure
-from nldyn.progress import progress_line
-from nldyn.sections import BruteForce, Direction, brute_force
+from nldyn.sections import BruteForce, brute_force
+
+Way = Literal["up", "down"]
+Task = tuple[str, Way]
 
 RANGE_HZ, POINTS = (18.0, 90.0), 145
 EFFORT = AttractorOptions(periods=500)
@@ -159,17 +160,12 @@ def _typical(found: BruteForce, low: float, high: float) -> str:
     return f" (median exponent {value:.3g} ± {error:.1g} 1/s)"
 
 
-def _task(points: int, task: tuple[str, Direction]) -> BruteForce:
+def _swept(points: int, task: Task) -> BruteForce:
     model, direction = task
     return brute_force(
         scene_system(model), RANGE_HZ, points=points, directions=[direction], recorded=1,
         options=EFFORT,
     )  # fmt: skip
-
-
-def _leave_ctrl_c() -> None:
-    """Let a worker process leave Ctrl-C, which a terminal sends to all, to its parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def claimed(diagrams: Mapping[str, BruteForce]) -> list[tuple[str, Attractor]]:
@@ -185,37 +181,29 @@ def claimed(diagrams: Mapping[str, BruteForce]) -> list[tuple[str, Attractor]]:
     return [(model, found[model, hz]) for model, hz in sorted(found)]
 
 
-def compute_chaos(workers: int, points: int = POINTS) -> Chaos:
-    """Sweep all models up and down, on as many processes as workers, and see how chaos lasts."""
-    tasks: list[tuple[str, Direction]] = [
-        (model, direction) for model in MODELS for direction in ("up", "down")
-    ]
-    halves: dict[tuple[str, str], BruteForce] = {}
-    context = multiprocessing.get_context("spawn")
-    with (
-        progress_line() as report,
-        ProcessPoolExecutor(workers, context, _leave_ctrl_c) as pool,
-        _ended_at_failure(),
-    ):
-        for outcome in as_finished(partial(_task, points), tasks, pool):
-            halves[tasks[outcome.index]] = outcome.value_or_raise()
-            report(f"Lyapunov exponents, {len(halves)} of {len(tasks)} sweeps", 0.0)
-        diagrams = {
-            model: BruteForce(
-                halves[model, "up"].observe,
-                halves[model, "up"].columns + halves[model, "down"].columns,
-            )
-            for model in MODELS
-        }
-        chaotic = claimed(diagrams)
-        lives = values_of(
-            partial(chaos_lifetime, states=STATES, periods=PERIODS),
-            [attractor for _, attractor in chaotic],
-            pool,
-            lambda done, total: report(f"how long chaos lasts, {done} of {total}", 0.0),
+def submit_sweeps(workers: Workers, points: int = POINTS) -> dict[Task, Future[BruteForce]]:
+    """Begin to sweep all models up and down."""
+    tasks: list[Task] = [(model, way) for model in MODELS for way in get_args(Way)]
+    return {task: workers.pool.submit(_swept, points, task) for task in tasks}
+
+
+def chaos_of(halves: Mapping[Task, BruteForce], workers: Workers) -> Chaos:
+    """Join the sweeps up and down, and see how chaos lasts."""
+    diagrams = {
+        model: BruteForce(
+            halves[model, "up"].observe,
+            halves[model, "up"].columns + halves[model, "down"].columns,
         )
+        for model in MODELS
+    }
+    chaotic = claimed(diagrams)
+    lasts = partial(chaos_lifetime, states=STATES, periods=PERIODS)
+    futures = {
+        (model, attractor.frequency_hz): workers.pool.submit(lasts, attractor)
+        for model, attractor in chaotic
+    }
     lifetimes: dict[str, list[ChaosLifetime]] = {model: [] for model in MODELS}
-    for (model, _), life in zip(chaotic, lives, strict=True):
+    for (model, _), life in workers.values(futures, "times that chaos lasts").items():
         lifetimes[model].append(life)
     return Chaos(diagrams, lifetimes)
 

@@ -1,17 +1,11 @@
-"""The computations behind the figures, spread over processes."""
+"""The diagrams behind the figures."""
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
-import threading
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_EXCEPTION, ProcessPoolExecutor, wait
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from multiprocessing.queues import SimpleQueue
 
 import cms
 from nldyn.continuation import ContinuationOptions
@@ -19,7 +13,9 @@ from nldyn.diagrams import Diagram, Progress, Seed, diagram
 from nldyn.elements import Stop
 from nldyn.exploration import ExploreOptions, explore
 from nldyn.orbit import Orbit
-from nldyn.progress import compilation_told, progress_line
+from nldyn.paper import workers
+from nldyn.paper.workers import Workers
+from nldyn.progress import compilation_told
 from nldyn.resources import example
 from nldyn.scene import build_component, build_system, load_scene
 from nldyn.system import System
@@ -168,33 +164,15 @@ JOBS = (
 )
 
 
-Message = tuple[str, str, float]
-_tell: Callable[[Message], None]
-
-
-def _prepare_worker(messages: SimpleQueue[Message]) -> None:
-    """Let a worker process tell what it computes, and end when its parent ends."""
-    global _tell
-    _tell = messages.put
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
-
-
 def run_job(name: str) -> Diagram:
     """Compute the job of one name (in a worker process), with what the figures need of it."""
     job = next(job for job in JOBS if job.name == name)
 
-    def tell(what: str, frequency_hz: float) -> None:
-        _tell((name, what, frequency_hz))
+    def progress(what: str, frequency_hz: float) -> None:
+        workers.tell((f"{name}: {what}", frequency_hz))
 
-    with compilation_told(tell):
-        result = job.run(tell)
+    with compilation_told(progress):
+        result = job.run(progress)
     for branch in result.branches:
         for orbit in branch.points:
             _ = orbit.max_abs_displacement, orbit.max_penetration, orbit.stable
@@ -209,47 +187,7 @@ def _forget_motion(orbit: Orbit) -> None:
     vars(orbit).pop("trajectory", None)
 
 
-def run_jobs(workers: int) -> dict[str, Diagram]:
-    """Compute all jobs, the longest first, and say on stderr what is being computed."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: threads only hinder
+def submit_diagrams(processes: Workers) -> dict[str, Future[Diagram]]:
+    """Begin all jobs, the longest first."""
     scene_system("one_dof")  # fail early, before any process is started
-    context = multiprocessing.get_context("spawn")
-    messages: SimpleQueue[Message] = context.SimpleQueue()
-    with (
-        progress_line() as report,
-        ProcessPoolExecutor(workers, context, _prepare_worker, (messages,)) as pool,
-        _ended_at_failure(),
-    ):
-        with _ctrl_c_for_parent_only():
-            futures = {job.name: pool.submit(run_job, job.name) for job in JOBS}
-        waiting = set(futures.values())
-        while waiting:
-            ended, waiting = wait(waiting, timeout=0.1, return_when=FIRST_EXCEPTION)
-            for future in ended:
-                future.result()  # or the error that ended it
-            done = f"{len(futures) - len(waiting)} of {len(futures)} diagrams"
-            while not messages.empty():
-                name, what, frequency_hz = messages.get()
-                report(f"{done}, {name}: {what}", frequency_hz)
-        return {name: future.result() for name, future in futures.items()}
-
-
-@contextmanager
-def _ctrl_c_for_parent_only() -> Iterator[None]:
-    """Start processes that ignore Ctrl-C, which a terminal sends to all of them."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-@contextmanager
-def _ended_at_failure() -> Iterator[None]:
-    """End the worker processes at once when something goes wrong."""
-    try:
-        yield
-    except BaseException:
-        for worker in multiprocessing.active_children():
-            worker.terminate()
-        raise
+    return {job.name: processes.pool.submit(run_job, job.name) for job in JOBS}

@@ -16,13 +16,15 @@ from nldyn.paper.chaos import (
     POINTS,
     RANGE_HZ,
     Chaos,
+    chaos_of,
     claimed,
-    compute_chaos,
+    submit_sweeps,
     write_chaos_figure,
 )
 from nldyn.paper.claims import evaluate
 from nldyn.paper.evidence import Finding
 from nldyn.paper.figures import SHOWN, write_figures
+from nldyn.paper.workers import worker_processes
 from nldyn.sections import BruteForce, Column
 
 FLOW = FlowMap(System.from_modal([10.0], {"middle": [1.0]}, modal_damping=0.1))
@@ -126,7 +128,9 @@ def test_the_figure_shows_both_models_at_both_dampings(chaos, tmp_path):
 
 
 def test_all_models_are_swept_both_ways_on_processes():
-    found = compute_chaos(workers=2, points=2)
+    with worker_processes(2) as workers:
+        sweeps = submit_sweeps(workers, points=2)
+        found = chaos_of(workers.values(sweeps, "sweeps"), workers)
     assert set(found.diagrams) == set(MODELS)
     for diagram in found.diagrams.values():
         places = [(column.direction, column.frequency_hz) for column in diagram.columns]

@@ -12,7 +12,7 @@ import numba
 import pytest
 
 from nldyn import command, progress
-from nldyn.paper.jobs import _ended_at_failure
+from nldyn.paper.workers import _ended_at_failure
 
 
 def stop_loading(_):
