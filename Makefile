@@ -16,7 +16,7 @@ paper: $(VENV)/.installed
 	$(BIN)/nldyn paper --out results/paper
 
 test: $(VENV)/.installed
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 check: $(VENV)/.installed
 	$(BIN)/ruff check .
