@@ -36,7 +36,7 @@ RETURNS = 3.0  # recorded periods after settling, over the longest period looked
 DECAYS = 4.0  # time allowed for settling, over the slowest decay time of the linear part
 FEWEST, UNDAMPED = 30, 600  # periods of it: at least, and where nothing decays
 NEAR = 0.1  # a return within this share of the motion is worth a Newton iteration
-ARRIVED = 0.01  # a motion this near to a known stable orbit, relative, has settled on it
+ARRIVED = 0.01  # a motion this near to a known orbit, relative, has settled on it or passes it
 CANDIDATES = 5  # near returns of each motion and period from which Newton's method starts
 TRANSIENT = 5  # periods of a motion beside which no orbits are looked for
 PIECE = 16  # periods simulated between two looks at the known orbits; later a quarter of all
@@ -605,8 +605,7 @@ class _Survey:
         """Stable orbit to which a run comes near at its end, one of the known ones if it can be."""
         scale = float(np.linalg.norm(run, axis=1).max()) or 1.0
         for orbit in known:
-            states = stroboscopic(orbit)
-            if float(np.linalg.norm(states - run[-1], axis=1).min()) < 1e-4 * scale:
+            if _nearest(stroboscopic(orbit), run[-1]) < 1e-4 * scale:
                 return orbit
         for period in range(1, self.max_period + 1):
             tail = run[-period - self.max_period :]
@@ -616,8 +615,7 @@ class _Survey:
             found = self._orbit_near(run[-1 - period], period, omega)
             if found is None or not found.stable:
                 continue
-            nearest = np.linalg.norm(stroboscopic(found) - run[-1], axis=1).min()
-            if nearest < NEAR * scale:
+            if _nearest(stroboscopic(found), run[-1]) < NEAR * scale:
                 return next((other for other in known if same_orbit(found, other)), found)
         return None
 
@@ -636,7 +634,12 @@ class _Survey:
         for period in range(1, min(self.effort.unstable_period, self.max_period) + 1):
             for run in runs:
                 for start in near_returns(run[TRANSIENT:], period, CANDIDATES):
-                    orbit = self._orbit_near(run[TRANSIENT + start], period, omega)
+                    state = run[TRANSIENT + start]
+                    number = known.beside(state, period)
+                    if number is not None:
+                        known.met.append(number)
+                        continue
+                    orbit = self._orbit_near(state, period, omega)
                     if orbit is not None:
                         self._meet(orbit, known)
             starts = [run[-1] for run in wandering] + [stroboscopic(o)[0] for o in stable]
@@ -686,7 +689,7 @@ class _Known:
         self.omega = 2.0 * math.pi * frequency_hz
         self.met: list[int] = []
         self._orbits: list[tuple[int, Orbit]] = []
-        self._stable: list[tuple[Orbit, Real]] = []
+        self._places: list[Real] = []
         self._seen = 0
         self.take()
 
@@ -695,7 +698,7 @@ class _Known:
         for number in range(self._seen, len(self.box.branches)):
             orbits = self.box.branches[number].at(self.frequency_hz)
             self._orbits += [(number, orbit) for orbit in orbits]
-            self._stable += [(orbit, stroboscopic(orbit)) for orbit in orbits if orbit.stable]
+            self._places += [stroboscopic(orbit) for orbit in orbits]
         self._seen = len(self.box.branches)
 
     def of_period(self, period: int) -> list[Orbit]:
@@ -706,15 +709,30 @@ class _Known:
         """Number of the branch that an orbit lies on."""
         return next((i for i, other in self._orbits if same_orbit(orbit, other)), None)
 
+    def beside(self, state: Real, period: int) -> int | None:
+        """Number of the branch with an orbit near a state, its period the given one or a part."""
+        size = ARRIVED * (float(np.linalg.norm(state)) or 1.0)
+        for (number, orbit), places in zip(self._orbits, self._places, strict=True):
+            if period % orbit.period == 0 and _nearest(places, state) < size:
+                return number
+        return None
+
     def stable_near(self, states: Real) -> Orbit | None:
         """Stable orbit near which the last of some states lie, one period after the other."""
         size = ARRIVED * (float(np.linalg.norm(states, axis=1).max()) or 1.0)
-        for orbit, places in self._stable:
+        for (_, orbit), places in zip(self._orbits, self._places, strict=True):
+            if not orbit.stable:
+                continue
             tail = states[-orbit.period :]
             off = np.linalg.norm(places[:, None] - tail[None], axis=2).min(axis=0)
             if float(off.max()) < size:
                 return orbit
         return None
+
+
+def _nearest(places: Real, state: Real) -> float:
+    """Distance of a state from the nearest of some places (m, 2n)."""
+    return float(np.linalg.norm(places - state, axis=1).min())
 
 
 def chao_lower_bound(counts: Sequence[int], rounds: int) -> float:

@@ -136,7 +136,7 @@ LONG = ContinuationOptions(max_points=20000)
 # All branches up to period 3; those that are born at flips are followed further where the time
 # allows, docs/paper.md says what that leaves out.
 SEARCH = ExploreOptions(spacing=0.01, starts=6)
-CASCADES = replace(SEARCH, doubled_period=8, doubled_points=150)
+CASCADES = replace(SEARCH, doubled_period=8, doubled_points=50)
 ALL = (1, 2, 3)
 
 # The main 1/2 and 1/3 branches of the 4-DOF model at low damping, whose search takes too long.
