@@ -67,14 +67,14 @@ class Cholesky:
         self.diagonals: list[FloatArray] = []
         self.panels: list[FloatArray] = []
         handed: dict[int, FloatArray] = {}
-        for number, front in enumerate(plan.fronts):
-            own, panel, update = gathered(lower, plan, front, handed)
-            with one_thread():
+        with one_thread():
+            for number, front in enumerate(plan.fronts):
+                own, panel, update = gathered(lower, plan, front, handed)
                 factor, panel = eliminated(own, panel, update)
-            if front.border.size:
-                handed[number] = update
-            self.diagonals.append(factor)
-            self.panels.append(panel)
+                if front.border.size:
+                    handed[number] = update
+                self.diagonals.append(factor)
+                self.panels.append(panel)
 
     @property
     def smallest_pivot(self) -> float:

@@ -66,15 +66,6 @@ class Elimination:
         return sum(f.rows * (f.rows + f.border.size) for f in self.fronts)
 
     @property
-    def operations(self) -> float:
-        """Multiplications of the factorisation."""
-        total = 0.0
-        for f in self.fronts:
-            s, b = float(f.rows), float(f.border.size)
-            total += s**3 / 6.0 + s**2 * b / 2.0 + s * b**2 / 2.0
-        return total
-
-    @property
     def most_numbers(self) -> int:
         """Most numbers in memory at one time, with what fronts hand on."""
         kept = handed = most = 0

@@ -20,6 +20,8 @@ GUARD_MODES = 2
 BLOCK = 4  # finds modes of one frequency, and takes a quarter of the passes over the factor
 DEPENDENT = 1e-12
 DENSE_AT_MOST = 6000
+LOOK_ALWAYS = 200  # up to this many vectors it costs little to see after each block what converged
+LOOK_AGAIN = 1.15  # beyond, after the basis has grown by so much
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,26 +218,31 @@ def lanczos_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatAr
     size, mass = pencil.size, pencil.mass
     wanted = min(count + GUARD_MODES, size - 1)
     start = np.random.default_rng(0).standard_normal((size, min(BLOCK, size)))
-    basis, projected = np.zeros((size, 0)), np.zeros((0, 0))
+    room, used, looked = np.empty((size, 0), order="F"), 0, 0
+    projected = np.zeros((0, 0))
     image = shifted.factor.solve(times(mass, start))
     while True:
-        fresh, outside = next_block(basis, image, mass)
-        nu, turn = linalg.eigh(projected) if projected.size else (np.zeros(0), projected)
-        nu, turn = nu[::-1][:wanted], turn[:, ::-1][:, :wanted]
-        if nu.size:
+        fresh, outside = next_block(room[:, :used], image, mass)
+        if used and (used < LOOK_ALWAYS or used >= LOOK_AGAIN * looked or not fresh.shape[1]):
+            looked = used
+            nu, turn = linalg.eigh(projected)
+            nu, turn = nu[::-1][:wanted], turn[:, ::-1][:, :wanted]
             left = np.linalg.norm(outside @ turn[-outside.shape[1] :], axis=0)
             converged = left <= np.maximum(1e-12 * nu, 10 * EPS * nu[0])
             if fresh.shape[1] == 0 or (nu.size == wanted and np.all(converged)):
                 break
-        basis = np.hstack([basis, fresh])
+        if used + fresh.shape[1] > room.shape[1]:
+            room = np.asfortranarray(np.hstack([room, np.empty((size, used + 8 * BLOCK))]))
+        room[:, used : used + fresh.shape[1]] = fresh
+        used += fresh.shape[1]
         image = shifted.factor.solve(times(mass, fresh))
-        columns = basis.T @ times(mass, image)
+        columns = room[:, :used].T @ times(mass, image)
         corner = columns[-fresh.shape[1] :]
         above = columns[: -fresh.shape[1]]
         projected = np.block([[projected, above], [above.T, (corner + corner.T) / 2]])
     if nu.size < count or nu[count - 1] <= 0.0:
         raise ReductionError(f"only {np.count_nonzero(nu > 0.0)} of {count} modes have mass")
-    return 1.0 / nu[:count] - shifted.shift, basis @ turn[:, :count]
+    return 1.0 / nu[:count] - shifted.shift, room[:, :used] @ turn[:, :count]
 
 
 def next_block(

@@ -16,15 +16,18 @@ from typing import Any
 
 import numpy as np
 from scipy import linalg, sparse
+from scipy.sparse.linalg import splu
 
 from cms.cholesky import Cholesky, NotPositiveDefiniteError
 from cms.component import FloatArray, SparseMatrix, times
-from cms.dissection import dissected
+from cms.dissection import Elimination, dissected
 from cms.errors import ReductionError
 
 DENSE_LIMIT = 1500
 GOOD_SOLUTION = 1e-12
 BAD_SOLUTION = 1e-6
+SUPERLU_FILL = 2.0  # entries of L and U per entry of the Cholesky factor by fronts: 1.6 in blocks
+SUPERLU_BYTES = 40.0  # memory per such entry, with the copy from which the pivots are read
 
 Solver = Callable[[FloatArray], FloatArray]
 
@@ -114,13 +117,14 @@ def factorise(matrix: SparseMatrix) -> Factor | None:
 
     A is first scaled to a unit diagonal, so that metres and radians weigh the same. Up to 1500
     rows LAPACK's Cholesky factorisation is used; above that PARDISO of the package pypardiso where
-    it is installed, else `cms.cholesky`. The environment variable ``CMS_SOLVER=cholesky`` leaves
-    PARDISO out.
+    it is installed, else `cms.cholesky`, and SciPy's SuperLU where one of these fails. The
+    environment variable ``CMS_SOLVER`` names one of them: ``pardiso``, ``cholesky`` or ``superlu``.
 
     Raises
     ------
     ReductionError
-        If the factor needs more memory than there is, before it is computed.
+        If the factor needs more memory than there is, before it is computed, or the solver that
+        is asked for is not there or fails.
     """
     diagonal = matrix.diagonal()
     if np.any(diagonal <= 0.0):
@@ -143,8 +147,26 @@ def factorise(matrix: SparseMatrix) -> Factor | None:
 
 
 def chosen_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
-    """PARDISO's solver or our own."""
-    return pardiso_solver(matrix) if pardiso_is_there() else cholesky_solver(matrix)
+    """The solver that CMS_SOLVER names, else the first of those there are that does not fail."""
+    wanted = os.environ.get("CMS_SOLVER", "").lower()
+    if wanted:
+        if wanted not in SOLVERS:
+            raise ReductionError(
+                f"there is no solver CMS_SOLVER={wanted!r} (there are: {', '.join(SOLVERS)})"
+            )
+        if wanted == "pardiso" and not pardiso_is_there():
+            raise ReductionError("CMS_SOLVER=pardiso needs the package pypardiso with its library")
+        return SOLVERS[wanted](matrix)
+    for name in ("pardiso", "cholesky") if pardiso_is_there() else ("cholesky",):
+        try:
+            return SOLVERS[name](matrix)
+        except SolverError as error:
+            announce(f"{error}: taking another solver")
+    return superlu_solver(matrix)
+
+
+class SolverError(ReductionError):
+    """A solver fails, which says nothing of the matrix: another may do."""
 
 
 @contextmanager
@@ -196,21 +218,59 @@ def dense_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
 
 def cholesky_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
     """Solver and smallest pivot by fronts, or None if the matrix is not positive definite."""
-    announce(f"ordering {matrix.shape[0]} rows by nested dissection")
-    plan = dissected(matrix)
+    plan = announced_plan(matrix)
     with factorising(matrix, "sparse Cholesky", 8.0 * plan.most_numbers):
         try:
             factor = Cholesky(matrix, plan)
         except NotPositiveDefiniteError:
             return None
+        except ValueError as error:
+            raise SolverError(f"sparse Cholesky fails ({error})") from error
     return factor.solve, factor.smallest_pivot
+
+
+def announced_plan(matrix: SparseMatrix) -> Elimination:
+    """The order of elimination, told to the listener."""
+    announce(f"ordering {matrix.shape[0]} rows by nested dissection")
+    return dissected(matrix)
+
+
+def superlu_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
+    """SuperLU's solver and smallest pivot, or None if the matrix is not positive definite.
+
+    In its symmetric mode, by the same order of elimination; without exchange of rows all pivots
+    of a positive definite matrix are positive.
+    """
+    plan = announced_plan(matrix)
+    order = plan.order
+    if SUPERLU_FILL * plan.entries > np.iinfo(np.int32).max:
+        raise SolverError("SuperLU cannot count so many entries of a factor: use a coarser mesh")
+    with factorising(matrix, "SuperLU", SUPERLU_BYTES * plan.entries):
+        ordered = sparse.csc_matrix(matrix[order][:, order])
+        try:
+            factor = splu(
+                ordered,
+                permc_spec="NATURAL",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError:  # exactly singular
+            return None
+        smallest = float(np.min(factor.U.diagonal()))
+    if smallest <= 0.0 or not np.array_equal(factor.perm_r, factor.perm_c):
+        return None
+
+    def solver(right: FloatArray) -> FloatArray:
+        found = np.empty_like(right, dtype=np.float64)
+        found[order] = factor.solve(np.ascontiguousarray(right[order], dtype=np.float64))
+        return found
+
+    return solver, smallest
 
 
 @cache
 def pardiso_is_there() -> bool:
-    """Whether pypardiso and its MKL library can be loaded, and are not forbidden."""
-    if os.environ.get("CMS_SOLVER", "").lower() == "cholesky":
-        return False
+    """Whether pypardiso and its MKL library can be loaded."""
     try:
         import pypardiso
 
@@ -256,7 +316,7 @@ def pardiso_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
     except pypardiso.pardiso_wrapper.PyPardisoError as error:
         if error.value == NOT_POSITIVE:
             return None
-        raise ReductionError(f"PARDISO fails with its error code {error.value}") from error
+        raise SolverError(f"PARDISO fails with its error code {error.value}") from error
     pardiso.set_phase(33)
 
     def solver(right: FloatArray) -> FloatArray:
@@ -265,6 +325,13 @@ def pardiso_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
 
     weakref.finalize(solver, released, pardiso, upper)
     return solver, smallest_eigenvalue(solver, matrix)
+
+
+SOLVERS = {
+    "pardiso": pardiso_solver,
+    "cholesky": cholesky_solver,
+    "superlu": superlu_solver,
+}
 
 
 def released(pardiso: Any, upper: Any) -> None:

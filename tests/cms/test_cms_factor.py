@@ -11,6 +11,10 @@ from scipy.sparse.linalg import splu
 
 from cms.cholesky import Cholesky, NotPositiveDefiniteError
 from cms.dissection import dissected, quotient_graph, vertices
+from cms.eigen import SUSPECT_PIVOT
+from cms.factor import SOLVERS, factorise, pardiso_is_there
+
+THERE = [name for name in SOLVERS if name != "pardiso" or pardiso_is_there()]
 
 
 def grid(*counts: int, dofs: int = 1, shift: float = 1e-3) -> sparse.csc_array:
@@ -78,6 +82,27 @@ def test_an_indefinite_matrix_is_told():
     A = grid(15, 15, 15, shift=-1.0)
     with pytest.raises(NotPositiveDefiniteError):
         Cholesky(A, dissected(A))
+
+
+@pytest.mark.parametrize("name", THERE)
+def test_all_solvers_that_are_there_agree(monkeypatch, name):
+    """On the solution of a scaled grid, and on which matrices are not positive definite."""
+    monkeypatch.setenv("CMS_SOLVER", name)
+    scale = sparse.diags_array(np.geomspace(1.0, 1e3, 2700))
+    A = sparse.csc_array(scale @ grid(15, 12, 5, dofs=3) @ scale)
+    right = np.random.default_rng(0).standard_normal((2700, 2))
+    exact = np.linalg.solve(A.toarray(), right)
+    factor = factorise(A)
+    for b, x in ((right, exact), (right[:, 0], exact[:, 0])):
+        found = factor.solve(b)
+        assert found.shape == b.shape
+        np.testing.assert_allclose(found, x, rtol=0, atol=1e-9 * abs(exact).max())
+    assert 0.0 < factor.smallest_pivot < 1.0
+    assert factorise(grid(15, 12, 10, shift=-1.0)) is None
+    ends = np.zeros(2000)
+    ends[[0, -1]] = 1.0
+    floating = factorise(grid(2000, shift=0.0) - 1.3 * sparse.diags_array(ends))
+    assert floating is None or floating.smallest_pivot < SUSPECT_PIVOT
 
 
 def test_degrees_of_freedom_of_a_node_are_one_vertex():

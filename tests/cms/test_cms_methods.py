@@ -8,6 +8,7 @@ from chains import chain, fixed_free_hz, free_free_hz
 from scipy import linalg, sparse
 
 import cms
+import cms.factor
 
 RITZ = ["rubin", "craig-chang", "dual-craig-bampton", "craig-bampton", "truncation"]
 ALL = [*RITZ, "macneal"]
@@ -415,8 +416,49 @@ def test_a_factor_that_needs_more_memory_than_there_is_is_refused(pardiso, monke
     with pytest.raises(cms.ReductionError, match=r"PARDISO needs 0\.000512 GB .* 0\.0004 GB are"):
         cms.reduce(chain(2500), modes=3)
     monkeypatch.setenv("CMS_SOLVER", "cholesky")
-    cms.factor.pardiso_is_there.cache_clear()
     with pytest.raises(cms.ReductionError, match="by sparse Cholesky needs"):
+        cms.reduce(chain(2500), modes=3)
+    monkeypatch.setenv("CMS_SOLVER", "superlu")
+    with pytest.raises(cms.ReductionError, match="by SuperLU needs"):
+        cms.reduce(chain(2500), modes=3)
+
+
+def pardiso_fails(*_):
+    raise cms.factor.SolverError("PARDISO fails with its error code -2")
+
+
+def test_where_a_solver_fails_the_next_one_is_taken(monkeypatch):
+    """PARDISO, then the factor by fronts, then SuperLU; each change is told."""
+
+    def broken(*_):
+        raise np.linalg.LinAlgError("broken")
+
+    monkeypatch.delenv("CMS_SOLVER", raising=False)
+    monkeypatch.setattr("cms.factor.pardiso_is_there", lambda: True)
+    monkeypatch.setitem(cms.factor.SOLVERS, "pardiso", pardiso_fails)
+    told = []
+    cms.reduce(chain(2500), modes=3, progress=told.append)
+    assert told[0] == "PARDISO fails with its error code -2: taking another solver"
+    assert any("by sparse Cholesky" in text for text in told)
+    monkeypatch.setattr("cms.factor.Cholesky", broken)
+    told.clear()
+    reduced = cms.reduce(chain(2500), modes=3, progress=told.append)
+    assert "sparse Cholesky fails (broken): taking another solver" in told
+    assert any("by SuperLU" in text for text in told)
+    np.testing.assert_allclose(reduced.frequencies_hz[:3], fixed_free_hz(2500)[:3], rtol=1e-8)
+    monkeypatch.setenv("CMS_SOLVER", "cholesky")
+    with pytest.raises(cms.ReductionError, match="sparse Cholesky fails"):
+        cms.reduce(chain(2500), modes=3)
+
+
+@pytest.mark.parametrize(
+    "name, sentence",
+    [("mumps", "there is no solver CMS_SOLVER='mumps'"), ("pardiso", "needs the package")],
+)
+def test_a_solver_that_is_not_there_is_told(monkeypatch, name, sentence):
+    monkeypatch.setenv("CMS_SOLVER", name)
+    monkeypatch.setattr("cms.factor.pardiso_is_there", lambda: False)
+    with pytest.raises(cms.ReductionError, match=sentence):
         cms.reduce(chain(2500), modes=3)
 
 
