@@ -116,8 +116,12 @@ def _dof(model: FrameModel, point: str, direction: str) -> int:
 
 
 def _free_dofs(model: FrameModel) -> IntArray:
-    held = [_dof(model, s.point, direction) for s in model.supports for direction in s.directions]
-    free = np.setdiff1d(np.arange(_dof_count(model)), held)
+    held = [
+        3 * model.mesh.nodes(support.point) + DIRECTIONS.index(direction)
+        for support in model.supports
+        for direction in support.directions
+    ]
+    free = np.setdiff1d(np.arange(_dof_count(model)), np.concatenate([*held, np.zeros(0)]))
     if len(free) == 0:
         raise ModelError(f"{model.mesh.source}: the supports hold every degree of freedom")
     return free

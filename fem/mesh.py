@@ -84,6 +84,16 @@ class FrameMesh:
             )
         return self.parts[name]
 
+    def nodes(self, name: str) -> IntArray:
+        """Indices of the nodes of a point set; a `ModelError` if there is none or it is empty."""
+        if name not in self.point_sets:
+            raise ModelError(
+                f"{self.source}: there is no point {name!r}; there are {quoted(self.point_sets)}"
+            )
+        if len(self.point_sets[name]) == 0:
+            raise ModelError(f"{self.source}: point set {name!r} holds no node of the frame")
+        return self.point_sets[name]
+
     def node(self, name: str) -> int:
         """Index of the one node of a named point.
 
@@ -92,11 +102,7 @@ class FrameMesh:
         ModelError
             If there is no point set of the name, or it does not hold exactly one node.
         """
-        if name not in self.point_sets:
-            raise ModelError(
-                f"{self.source}: there is no point {name!r}; there are {quoted(self.point_sets)}"
-            )
-        nodes = self.point_sets[name]
+        nodes = self.nodes(name)
         if len(nodes) != 1:
             raise ModelError(
                 f"{self.source}: point {name!r} must hold exactly one node of the frame"

@@ -334,8 +334,9 @@ class FrameModel:
                 )
 
     def _check_points(self) -> None:
-        names = [support.point for support in self.supports]
-        names += [lump.point for lump in self.point_masses]
+        for support in self.supports:
+            self.mesh.nodes(support.point)
+        names = [lump.point for lump in self.point_masses]
         names += [spring.point for spring in self.springs]
         names += [hinge.point for hinge in self.hinges]
         names += [interface.point for interface in self.interfaces.values()]
@@ -393,7 +394,12 @@ class FrameModel:
         ]
 
     def _check_interfaces(self) -> None:
-        held = {(self.mesh.node(s.point), name) for s in self.supports for name in s.directions}
+        held = {
+            (int(node), direction)
+            for support in self.supports
+            for node in self.mesh.nodes(support.point)
+            for direction in support.directions
+        }
         for name, interface in self.interfaces.items():
             if (self.mesh.node(interface.point), interface.direction) in held:
                 raise ModelError(

@@ -71,7 +71,7 @@ def check_mesh_names(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
     for key, name in _points_used(scene):
         _require(name, mesh.point_sets, f"a point set of the mesh {source}", file, key)
         count = len(mesh.point_sets[name])
-        if count != 1:
+        if count == 0 or (count > 1 and key[0] != "supports"):
             fault = f"'{name}' must be a single point, but holds {count} nodes of the mesh {source}"
             raise scene_error(file, key, fault)
     _check_interfaces_free(scene, file)

@@ -132,7 +132,28 @@ def test_a_point_of_several_nodes_cannot_be_used_but_may_be_there():
     )
     fem.FrameModel(mesh, {"bar": BAR})
     with pytest.raises(fem.ModelError, match=r"'ends' must hold exactly one node .* holds 2"):
-        fem.FrameModel(mesh, {"bar": BAR}, supports=[fem.Support("ends", "x")])
+        fem.FrameModel(mesh, {"bar": BAR}, point_masses=[fem.PointMass("ends", 1.0)])
+
+
+def test_a_support_holds_all_points_of_a_set():
+    points = {"left": [0], "middle": [1], "right": [2], "ends": [0, 2]}
+    mesh = fem.FrameMesh(
+        [[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1], [1, 2]], {"bar": [0, 1]}, points
+    )
+    apart = [fem.Support("left", CLAMP), fem.Support("right", CLAMP)]
+    found, exact = (
+        fem.assemble(fem.FrameModel(mesh, {"bar": BAR}, supports=supports)).stiffness.toarray()
+        for supports in ([fem.Support("ends", CLAMP)], apart)
+    )
+    assert found.shape == (3, 3)
+    assert (found == exact).all()
+    with pytest.raises(fem.ModelError, match="which a support holds"):
+        fem.FrameModel(
+            mesh,
+            {"bar": BAR},
+            supports=[fem.Support("ends", "y")],
+            interfaces={"end": fem.Interface("right", "y")},
+        )
 
 
 def test_supports_that_hold_everything_leave_nothing_to_assemble():
