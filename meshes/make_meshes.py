@@ -6,7 +6,8 @@ Run as ``python meshes/make_meshes.py``. The files are written beside this scrip
 
 The beam lies along x, the leaf springs stand under its ends. The half beam reaches from its end
 "corner" at the origin to the "middle"; its leaf ends at the "foot". The full beam has
-"corner_left", "foot_left", "middle", "corner_right" and "foot_right".
+"corner_left", "foot_left", "middle", "corner_right" and "foot_right". half_beam_coarse.msh has two
+elements in half the beam and one in its leaf: the start of studies of the mesh.
 
 half_beam_solid.vtu is the half beam in second-order hexahedra, with the axes where the lines of the
 frame are: the leaf spring reaches up to the axis of the beam, and couplings to the point "corner"
@@ -195,11 +196,12 @@ def full_beam_model(mesh: fem.FrameMesh, middle_mass: float) -> fem.FrameModel:
 
 
 def main() -> None:
-    """Write half_beam.msh, .vtu, .inp and full_beam.msh."""
+    """Write all files."""
     dimensions = read_dimensions()
     half = half_beam_mesh(dimensions)
     for extension in (".msh", ".vtu", ".inp"):
         fem.write_mesh(half, HERE / f"half_beam{extension}")
+    fem.write_mesh(half_beam_mesh(dimensions, 2, 1), HERE / "half_beam_coarse.msh")
     fem.write_mesh(full_beam_mesh(dimensions), HERE / "full_beam.msh")
     fem.write_mesh(solid_half_beam_mesh(dimensions), HERE / "half_beam_solid.vtu")
 

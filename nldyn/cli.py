@@ -268,7 +268,7 @@ def number_list(
     default="rubin",
     show_default=True,
     metavar="LIST",
-    help="Methods to compare: rubin, craig-bampton, guyan, truncation.",
+    help="Methods to compare: rubin, craig-bampton, guyan, truncation, macneal.",
 )
 @click.option(
     "--refinements",

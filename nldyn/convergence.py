@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,7 +31,8 @@ SPECIAL_KINDS = ("LP", "PD")
 MATCH = 0.02  # special points of one kind farther apart are not the same
 INVISIBLE = 1e-9
 FULL = "full"
-SCENE_METHODS = ("rubin", "craig-bampton", "guyan", "truncation")
+METHODS = ("rubin", "craig-bampton", "guyan", "truncation", "macneal")
+MASSLESS = "its interfaces have no mass, so that a stop has no equation of motion"
 QUANTITIES = {
     "eigenfrequency": "eigenfrequencies",
     "receptance": "receptance",
@@ -49,10 +50,10 @@ class Measured:
 
     Parameters
     ----------
-    label : str
-        Which series it belongs to: a method or a mesh.
-    modes, size : int
-        Kept component modes, and modal coordinates of the system.
+    mesh, method : str
+        Name of the mesh, empty where there is one only, and how it was reduced.
+    dofs, modes, size : int
+        Degrees of freedom of the component, kept component modes, modal coordinates of the system.
     frequencies_hz : (k,) array
         Lowest eigenfrequencies that an interface sees.
     receptance : (f,) complex array
@@ -71,7 +72,9 @@ class Measured:
         What could not be computed.
     """
 
-    label: str
+    mesh: str
+    method: str
+    dofs: int
     modes: int
     size: int
     frequencies_hz: Real
@@ -82,6 +85,11 @@ class Measured:
     seconds_per_orbit: float
     seconds: float
     note: str = ""
+
+    @property
+    def label(self) -> str:
+        """Mesh and method."""
+        return " ".join(filter(None, (self.mesh, self.method)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +106,9 @@ class Errors:
         Frequency and height of the highest resonance peak.
     fold_flip : float
         Largest error of a fold's or flip's frequency, of those that both models have.
-    missing, extra : int
-        Folds and flips of the reference that the model lacks, and the other way round.
+    counts : (int, int) or None
+        Folds and flips of the reference that the model lacks, and the other way round; None if
+        it has no branch.
     force, contact : float
         Largest contact force and whole contact time per period of the orbit at the frequency of
         the study.
@@ -110,8 +119,7 @@ class Errors:
     peak_hz: float
     peak_m: float
     fold_flip: float
-    missing: int
-    extra: int
+    counts: tuple[int, int] | None
     force: float
     contact: float
 
@@ -127,48 +135,60 @@ class Study:
     at_hz : float
         Frequency of the orbits that are compared.
     models : tuple of Measured
-        All models, the reference last.
+        All models, the full one last.
     errors : tuple of Errors
-        One for each model, against the reference.
+        One for each model, against the references.
+    best : Measured
+        The model whose branch is that of reference.
     """
 
     setting: Setting
     at_hz: float
     models: tuple[Measured, ...]
     errors: tuple[Errors, ...]
+    best: Measured
 
     @property
     def reference(self) -> Measured:
-        """The model that the others are compared with."""
+        """The full model, with which eigenfrequencies and receptance are compared."""
         return self.models[-1]
 
     def series(self) -> dict[str, list[int]]:
-        """Indices of the models by label, without the reference."""
+        """Indices of the models with one mesh and method, by its label, without the full model."""
+        return self._grouped(lambda model: model.label)
+
+    def mesh_series(self) -> dict[str, list[int]]:
+        """Indices of the models by one method with one count on several meshes, by its name."""
+        found = self._grouped(lambda model: f"{model.method}, {counted_modes(model)}")
+        return {name: indices for name, indices in found.items() if len(indices) > 1}
+
+    def _grouped(self, name: Callable[[Measured], str]) -> dict[str, list[int]]:
         found: dict[str, list[int]] = {}
         for index, model in enumerate(self.models[:-1]):
-            found.setdefault(model.label, []).append(index)
+            found.setdefault(name(model), []).append(index)
         return found
 
-    def enough(self, quantity: str, tolerance: float, label: str) -> int | None:
-        """Smallest number of modes of a series from which on an error stays below a tolerance."""
+    def enough(self, quantity: str, tolerance: float, indices: Sequence[int]) -> Measured | None:
+        """First model of a series from which on an error stays below a tolerance."""
         found = None
-        for index in reversed(self.series()[label]):
+        for index in reversed(indices):
             if not getattr(self.errors[index], quantity) <= tolerance:
                 break
-            found = self.models[index].modes
+            found = self.models[index]
         return found
 
     def report(self) -> str:
         """The study as a table and a few sentences."""
-        head = ("label", "modes", "size", "eigenf.", "recept.", "peak Hz", "peak m", "LP/PD",
-                "lacks", "extra", "force", "contact", "ms/orbit", "branch s")  # fmt: skip
+        head = ("label", "dofs", "modes", "size", "eigenf.", "recept.", "peak Hz", "peak m",
+                "LP/PD", "lacks", "extra", "force", "contact", "ms/orbit", "branch s")  # fmt: skip
         rows: list[tuple[str, ...]] = [head]
         for model, error in zip(self.models, self.errors, strict=True):
             numbers = (error.eigenfrequency, error.receptance, error.peak_hz, error.peak_m,
                        error.fold_flip)  # fmt: skip
             rows.append((
-                model.label, str(model.modes), str(model.size), *map(shown_error, numbers),
-                str(error.missing), str(error.extra), shown_error(error.force),
+                model.label, str(model.dofs), str(model.modes), str(model.size),
+                *map(shown_error, numbers),
+                *map(str, error.counts or ("-", "-")), shown_error(error.force),
                 shown_error(error.contact), f"{1e3 * model.seconds_per_orbit:.3g}",
                 f"{model.seconds:.3g}",
             ))  # fmt: skip
@@ -179,36 +199,56 @@ class Study:
         ]
         lines.append(
             f"reference: the full model ({self.reference.size} modes) for eigenfrequencies and "
-            f"receptance{' and the orbit' if self.reference.orbit else ''}, the largest model for "
-            f"the rest; orbits at {self.at_hz:g} Hz"
+            f"receptance{' and the orbit' if self.reference.orbit else ''}, {self.best.label} with "
+            f"{counted_modes(self.best)} for the rest; orbits at {self.at_hz:g} Hz"
         )
-        for label in self.series():
-            for quantity, name in QUANTITIES.items():
-                counts = [self.enough(quantity, tolerance, label) for tolerance in (1e-2, 1e-4)]
-                said = ", ".join(
-                    f"{100 * tolerance:g} % from {count} modes"
-                    if count is not None
-                    else f"{100 * tolerance:g} % not reached"
-                    for tolerance, count in zip((1e-2, 1e-4), counts, strict=True)
-                )
-                lines.append(f"{label}, {name}: {said}")
-            lines += self.said_of_special_points(label)
-        lines += [f"note: {m.label}, {m.modes} modes: {m.note}" for m in self.models if m.note]
+        for label, indices in self.series().items():
+            if len(indices) > 1:
+                lines += self.said_of(label, indices, counted_modes)
+        for label, indices in self.mesh_series().items():
+            lines += self.said_of(label, indices, lambda m: f"{m.dofs} degrees of freedom")
+        notes: dict[str, list[str]] = {}
+        for model in self.models:
+            notes.setdefault(model.note, []).append(f"{model.label}, {counted_modes(model)}")
+        lines += [f"note: {'; '.join(names)}: {note}" for note, names in notes.items() if note]
         return "\n".join(lines)
 
-    def said_of_special_points(self, label: str) -> list[str]:
-        """From how many modes on a series has exactly the reference's folds and flips."""
-        found: int | None = None
-        for index in reversed(self.series()[label]):
-            error = self.errors[index]
-            if self.models[index].special_hz is None:
+    def said_of(
+        self, label: str, indices: Sequence[int], size: Callable[[Measured], str]
+    ) -> list[str]:
+        """From what size on the errors of a series are small."""
+        lines = []
+        for quantity, name in QUANTITIES.items():
+            if all(np.isnan(getattr(self.errors[index], quantity)) for index in indices):
                 continue
-            if error.missing or error.extra:
+            said = []
+            for tolerance in (1e-2, 1e-4):
+                model = self.enough(quantity, tolerance, indices)
+                place = f"from {size(model)}" if model else "not reached"
+                said.append(f"{100 * tolerance:g} % {place}")
+            lines.append(f"{label}, {name}: {', '.join(said)}")
+        return lines + self.said_of_special_points(label, indices, size)
+
+    def said_of_special_points(
+        self, label: str, indices: Sequence[int], size: Callable[[Measured], str]
+    ) -> list[str]:
+        """From what size on a series has exactly the reference's folds and flips."""
+        found: Measured | None = None
+        followed = [index for index in indices if self.models[index].special_hz is not None]
+        for index in reversed(followed):
+            if self.errors[index].counts != (0, 0):
                 break
-            found = self.models[index].modes
+            found = self.models[index]
+        if not followed:
+            return []
         if found is None:
-            return [f"{label}: no count has the same folds and flips as the reference"]
-        return [f"{label}: the same folds and flips as the reference from {found} modes"]
+            return [f"{label}: no model has the same folds and flips as the reference"]
+        return [f"{label}: the same folds and flips as the reference from {size(found)}"]
+
+
+def counted_modes(model: Measured) -> str:
+    """How many modes a model keeps, in words."""
+    return f"{model.modes} mode{'' if model.modes == 1 else 's'}"
 
 
 def converge(
@@ -232,7 +272,8 @@ def converge(
     modes : sequence of int
         Numbers of kept component modes.
     methods : sequence of str
-        Names as for `cms.reduce`; those whose interfaces have no mass are refused.
+        Names as for `cms.reduce`. By "macneal" interfaces have no mass, so that there is no
+        equation of motion with a stop: only the linear numbers are compared.
     at_hz : float, optional
         Frequency of the orbits that are compared; by default the geometric mean of the range.
     full : bool
@@ -255,9 +296,10 @@ def converge(
     Notes
     -----
     The reference is the full model, all modes of the component (of the last one of several) that
-    an interface can see, for eigenfrequencies and receptance, and the model with the most modes
-    for the harmonic branch. Every model has the setting's modal damping for all of its modes, also
-    the residual ones, whose damping is therefore not that of the full model.
+    an interface can see, for eigenfrequencies and receptance. For the harmonic branch it is the
+    model with the most coordinates; of several, the one with the best receptance. Every model has
+    the setting's modal damping for all of its modes, also the residual ones, whose damping is
+    therefore not that of the full model.
     The harmonic branch is followed downwards from the orbit that a simulation from rest finds at
     the upper end of the range.
     """
@@ -273,17 +315,19 @@ def converge(
     models: list[Measured] = []
     for mesh, component in components.items():
         for method in methods:
-            label = " ".join(filter(None, (mesh, method)))
             for count in sorted(set(modes)) if method != "guyan" else [0]:
                 asked = None if method == "guyan" else count
                 reduced = cms.reduce(component, modes=asked, method=method)
-                models.append(measured(label, reduced, setting, at_hz, progress))
-    finest = list(components.values())[-1]
-    best = best_of(models, list(components)[-1])
-    models.append(measured_full(finest, setting, at_hz, best, full, progress))
-    return Study(
-        setting, at_hz, tuple(models), tuple(errors_of(m, models[-1], best, full) for m in models)
-    )
+                models.append(measured(mesh, reduced, setting, at_hz, progress))
+    mesh, finest = list(components.items())[-1]
+    whole = full_model(finest)
+    linear = measured_linear("", FULL, whole, setting)
+    best = best_of([model for model in models if model.mesh == mesh], linear)
+    if full and best.orbit is not None:
+        linear = with_orbit(linear, whole, setting, best.orbit, progress)
+    models.append(linear)
+    errors = tuple(errors_of(model, linear, best, full) for model in models)
+    return Study(setting, at_hz, tuple(models), errors, best)
 
 
 def study_of_scene(
@@ -321,10 +365,10 @@ def study_of_scene(
     if min(refinements) < 1:
         raise SystemModelError("converge: a refinement must be 1 or more")
     for method in methods:
-        if method not in SCENE_METHODS:
+        if method not in METHODS:
             raise SystemModelError(
                 f"converge: there is no method '{method}' for a scene "
-                f"(there are: {', '.join(SCENE_METHODS)})"
+                f"(there are: {', '.join(METHODS)})"
             )
     components = {
         "" if len(refinements) == 1 else f"x{times}": build_component(scene, times)
@@ -344,71 +388,93 @@ def study_of_scene(
         raise scene_error(scene.file, ("reduction",), str(error), sep=": ") from None
 
 
-def best_of(models: Sequence[Measured], mesh: str) -> Measured:
-    """The largest model of the last mesh whose branch was followed."""
-    followed = [m for m in models if m.special_hz is not None and m.label.startswith(mesh)]
+def best_of(models: Sequence[Measured], full: Measured) -> Measured:
+    """Of the models whose branch was followed the largest, of several that with least error."""
+    followed = [model for model in models if model.special_hz is not None]
     if not followed:
         raise ConvergenceError("no model of the study has a harmonic branch: " + models[-1].note)
-    return max(followed, key=lambda model: model.size)
+    return min(followed, key=lambda m: (-m.size, distance(m.receptance, full.receptance)))
 
 
 def measured(
-    label: str,
+    mesh: str,
     reduced: cms.ReducedModel,
     setting: Setting,
     at_hz: float,
     progress: Progress | None = None,
 ) -> Measured:
     """Compute what a `Study` compares for one reduced model."""
-    system = setting.system(reduced)
-    name = f"{label}, {reduced.modes} modes"
-    linear = linear_part_of(label, reduced, setting, system)
+    linear = measured_linear(mesh, reduced.method, reduced, setting)
+    if reduced.has_massless_part:
+        return replace(linear, note=MASSLESS)
     start = time.perf_counter()
     try:
-        branch = harmonic_branch(system, setting, told(progress, name))
+        tell = told(progress, f"{linear.label}, {counted_modes(linear)}")
+        branch = harmonic_branch(setting.system(reduced), setting, tell)
     except ConvergenceError as error:
-        return Measured(*linear, None, None, None, np.nan, np.nan, str(error))
+        return replace(linear, note=str(error))
     seconds = time.perf_counter() - start
     peaks = resonance_peaks(branch)
-    peak = max(peaks, key=lambda p: p.height).orbit if peaks else None
     orbits = branch.at(at_hz)
-    orbit = orbits[0] if orbits else None
-    special = special_points_of(branch)
-    per_orbit = seconds_per_orbit(orbit) if orbit else np.nan
-    return Measured(*linear, peak, special, orbit, per_orbit, seconds, "; ".join(branch.notes))
+    return replace(
+        linear,
+        peak=max(peaks, key=lambda p: p.height).orbit if peaks else None,
+        special_hz=special_points_of(branch),
+        orbit=orbits[0] if orbits else None,
+        seconds_per_orbit=seconds_per_orbit(orbits[0]) if orbits else np.nan,
+        seconds=seconds,
+        note="; ".join(branch.notes),
+    )
 
 
-def measured_full(
-    component: cms.ComponentLike,
-    setting: Setting,
-    at_hz: float,
-    best: Measured,
-    with_orbit: bool,
-    progress: Progress | None = None,
+def measured_linear(
+    mesh: str, method: str, reduced: cms.ReducedModel, setting: Setting
 ) -> Measured:
-    """What the full model answers; its orbit is found from that of the best reduced one."""
+    """Counts, visible eigenfrequencies and receptance of a model."""
+    rows = np.array(list(reduced.participation.values()))
+    seen = np.any(np.abs(rows) > 1e-6 * np.abs(rows).max(axis=1, keepdims=True), axis=0)
+    return Measured(
+        mesh,
+        method,
+        dofs=int(reduced.basis.shape[0]),
+        modes=reduced.modes,
+        size=reduced.size,
+        frequencies_hz=np.sort(reduced.frequencies_hz[seen]),
+        receptance=receptance(reduced, setting, np.linspace(*setting.range_hz, GRID)),
+        peak=None,
+        special_hz=None,
+        orbit=None,
+        seconds_per_orbit=np.nan,
+        seconds=np.nan,
+    )
+
+
+def full_model(component: cms.ComponentLike) -> cms.ReducedModel:
+    """All modes of a component that an interface sees."""
     import cms
 
     size = int(component.mass.shape[0])
-    reduced = visible_modes(cms.reduce(component, modes=size, method="truncation"))
-    system = setting.system(reduced)
-    tell = told(progress, f"full model, {reduced.size} modes")
-    linear = linear_part_of(FULL, reduced, setting, system)
-    orbit, note, per_orbit = None, "", np.nan
-    if with_orbit and best.orbit is not None:
-        tell(at_hz)
-        try:
-            orbit = transferred(best.orbit, system)
-            per_orbit = seconds_per_orbit(orbit, repeats=1)
-        except ConvergenceError as error:
-            note = str(error)
-    return Measured(*linear, None, None, orbit, per_orbit, np.nan, note)
+    return visible_modes(cms.reduce(component, modes=size, method="truncation"))
+
+
+def with_orbit(
+    model: Measured,
+    reduced: cms.ReducedModel,
+    setting: Setting,
+    guess: Orbit,
+    progress: Progress | None,
+) -> Measured:
+    """The full model with its orbit, found from that of a reduced one."""
+    told(progress, f"full model, {reduced.size} modes")(guess.frequency_hz)
+    try:
+        orbit = transferred(guess, setting.system(reduced))
+    except ConvergenceError as error:
+        return replace(model, note=str(error))
+    return replace(model, orbit=orbit, seconds_per_orbit=seconds_per_orbit(orbit, repeats=1))
 
 
 def visible_modes(reduced: cms.ReducedModel) -> cms.ReducedModel:
     """The model without the modes that no interface sees."""
-    from dataclasses import replace
-
     rows = np.array(list(reduced.participation.values()))
     seen = np.any(np.abs(rows) > INVISIBLE * np.abs(rows).max(axis=1, keepdims=True), axis=0)
     return replace(
@@ -448,24 +514,11 @@ def transferred(guess: Orbit, system: System) -> Orbit:
     )
 
 
-def linear_part_of(
-    label: str, reduced: cms.ReducedModel, setting: Setting, system: System
-) -> tuple[str, int, int, Real, Complex]:
-    """Label, counts, visible eigenfrequencies and receptance of a model."""
-    rows = np.array(list(system.participation.values()))
-    seen = np.any(np.abs(rows) > 1e-6 * np.abs(rows).max(axis=1, keepdims=True), axis=0)
-    frequencies = np.sort(system.frequencies_hz[seen])
-    return (
-        label,
-        reduced.modes,
-        system.size,
-        frequencies,
-        receptance(system, np.linspace(*setting.range_hz, GRID)),
-    )
-
-
-def receptance(system: System, frequency_hz: Real) -> Complex:
+def receptance(reduced: cms.ReducedModel, setting: Setting, frequency_hz: Real) -> Complex:
     """Linear receptance (f,) at the observed interface, with all dampers."""
+    if reduced.has_massless_part:
+        return massless_receptance(reduced, setting, frequency_hz)
+    system = setting.system(reduced)
     row = next(iter(system.participation.values()))
     squares, D = system.natural_frequencies**2, system.total_damping
     if not np.any(D - np.diag(np.diag(D))):
@@ -474,6 +527,24 @@ def receptance(system: System, frequency_hz: Real) -> Complex:
     found = [
         row @ np.linalg.solve(np.diag(squares - w**2) + 1j * w * D, row)
         for w in 2 * np.pi * frequency_hz
+    ]
+    return np.array(found)
+
+
+def massless_receptance(reduced: cms.ReducedModel, setting: Setting, frequency_hz: Real) -> Complex:
+    """The same where part of the flexibility has no mass: dampers close R = P Z^-1 P^T + G."""
+    names = reduced.interfaces
+    observed = names.index(setting.observe or names[0])
+    R = np.array(
+        [
+            [reduced.receptance(frequency_hz, a, b, setting.modal_damping) for b in names]
+            for a in names
+        ]
+    )
+    C = np.diag([sum(d.coefficient for d in setting.dampers if d.at == name) for name in names])
+    found = [
+        np.linalg.solve(np.eye(len(names)) + 1j * w * R[:, :, k] @ C, R[:, observed, k])[observed]
+        for k, w in enumerate(2 * np.pi * frequency_hz)
     ]
     return np.array(found)
 
@@ -530,22 +601,26 @@ def errors_of(model: Measured, reference: Measured, best: Measured, full: bool) 
         if own.size == count
         else np.inf
     )
-    H, known = model.receptance, reference.receptance
-    fold_flip, missing, extra = np.nan, 0, 0
+    fold_flip, counts = np.nan, None
     if model.special_hz is not None and best.special_hz is not None:
-        fold_flip, missing, extra = matched(model.special_hz, best.special_hz)
+        fold_flip, *lacking = matched(model.special_hz, best.special_hz)
+        counts = (lacking[0], lacking[1])
     orbit = reference.orbit if full else best.orbit
     return Errors(
         eigenfrequency,
-        float(np.linalg.norm(H - known) / np.linalg.norm(known)),
+        distance(model.receptance, reference.receptance),
         relative(model.peak, best.peak, lambda o: o.frequency_hz),
         relative(model.peak, best.peak, lambda o: o.max_abs_displacement),
         fold_flip,
-        missing,
-        extra,
+        counts,
         relative(model.orbit, orbit, largest_force),
         relative(model.orbit, orbit, contact_time),
     )
+
+
+def distance(given: Complex, known: Complex) -> float:
+    """Relative distance of a function on the grid from a known one."""
+    return float(np.linalg.norm(given - known) / np.linalg.norm(known))
 
 
 def relative(a: Orbit | None, b: Orbit | None, number: Callable[[Orbit], float]) -> float:

@@ -11,9 +11,25 @@ from click.testing import CliRunner
 from strings import MASSES, SETTING, string
 
 import cms
-from nldyn import Setting, System, SystemModelError, Unbalance, converge, solve_orbit
+import fem
+from nldyn import (
+    Damper,
+    Setting,
+    Stop,
+    System,
+    SystemModelError,
+    Unbalance,
+    converge,
+    solve_orbit,
+)
 from nldyn.cli import main
-from nldyn.convergence import contact_time, largest_force, matched
+from nldyn.convergence import (
+    contact_time,
+    largest_force,
+    massless_receptance,
+    matched,
+    receptance,
+)
 from nldyn.convergence_output import write_study
 from nldyn.resources import example
 from nldyn.scene import build_component, load_scene
@@ -92,6 +108,78 @@ def test_files(study, tmp_path):
         assert (folder / name).stat().st_size > 0
 
 
+@pytest.fixture(scope="module")
+def meshes():
+    """A cantilever of 2 to 16 elements, by Rubin's and MacNeal's methods."""
+    components = {}
+    for count in (2, 4, 8, 16):
+        mesh = fem.frame_mesh({"root": (0, 0), "tip": (0.5, 0)}, [("arm", "root", "tip", count)])
+        part = fem.BeamPart(fem.Material(2.1e11, 7800.0), fem.RectangularSection(0.02, 0.01))
+        model = fem.FrameModel(
+            mesh,
+            {"arm": part},
+            supports=[fem.Support("root", ("x", "y", "rotation"))],
+            interfaces={"tip": fem.Interface("tip", "y")},
+        )
+        components[f"{count} elements"] = fem.assemble(model)
+    setting = Setting(
+        (20.0, 60.0),
+        stops=(Stop("tip", stiffness=1e8),),
+        excitation=(Unbalance("tip", 1e-4),),
+        dampers=(Damper("tip", 1.0),),
+        modal_damping=0.02,
+    )
+    return converge(components, setting, modes=(3,), methods=("rubin", "macneal"))
+
+
+def test_errors_of_a_beam_fall_with_the_fourth_power_of_its_elements(meshes):
+    """As those of its frequencies; against 16 elements the order seen is a little above."""
+    indices = meshes.mesh_series()["rubin, 3 modes"]
+    assert [meshes.models[i].dofs for i in indices] == [6, 12, 24, 48]
+    for quantity in ("eigenfrequency", "receptance", "force"):
+        errors = [getattr(meshes.errors[i], quantity) for i in indices]
+        assert 10 < errors[1] / errors[2] < 25, quantity
+    assert meshes.best.label == "16 elements rubin"
+    assert meshes.best.dofs == 48
+
+
+def test_macneals_method_is_compared_by_its_linear_numbers(meshes):
+    """One power of the squared frequency worse than Rubin's, and no branch."""
+    rubin, macneal = (meshes.mesh_series()[f"{name}, 3 modes"][-1] for name in ("rubin", "macneal"))
+    errors = meshes.errors[macneal]
+    assert meshes.errors[rubin].receptance < 0.1 * errors.receptance < 1e-5
+    assert np.isnan(errors.force) and errors.counts is None
+    said = meshes.report()
+    assert said.count("so that a stop has no equation of motion") == 1
+    assert "rubin, 3 modes, receptance: 1 % from 12 degrees of freedom" in said
+
+
+def test_a_study_of_meshes_is_drawn_over_their_size(meshes, tmp_path):
+    folder = write_study(meshes, tmp_path / "out", "A cantilever")
+    assert (folder / "meshes.png").is_file()
+    assert not (folder / "convergence.png").exists()
+    with (folder / "convergence.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["dofs"] for row in rows[:4]] == ["6", "6", "12", "12"]
+    assert rows[1]["missing"] == "" and rows[1]["force_error"] == "nan"
+
+
+def test_dampers_close_a_receptance_of_modes_and_flexibility():
+    """Against the modal equations with all dampers, where everything has mass."""
+    setting = replace(SETTING, dampers=(Damper("middle", 3.0), Damper("quarter", 5.0)))
+    whole = cms.reduce(string({"quarter": np.eye(MASSES)[10]}), modes=MASSES, method="truncation")
+    hz = np.linspace(20.0, 60.0, 9)
+    np.testing.assert_allclose(
+        massless_receptance(whole, setting, hz), receptance(whole, setting, hz), rtol=1e-10
+    )
+
+
+def test_the_reference_of_models_of_one_size_is_the_one_with_the_best_receptance():
+    for methods in (("craig-bampton", "rubin"), ("rubin", "craig-bampton")):
+        study = converge(string(), SETTING, modes=(4,), methods=methods, at_hz=36.0)
+        assert study.best.label == "rubin"
+
+
 def test_refined_meshes_converge_to_the_frequencies_of_the_beam():
     """Twice the elements: the names stay, and the frequencies move by h^4."""
     scene = load_scene(example("four_dof_xi_0.01.toml"))
@@ -124,7 +212,8 @@ def test_a_setting_without_excitation_is_refused():
     "options, words",
     [
         (["--modes", "one"], "is not a list of whole numbers"),
-        (["--methods", "macneal", "--modes", "1"], "no method 'macneal' for a scene"),
+        (["--methods", "mcneal", "--modes", "1"], "no method 'mcneal' for a scene"),
+        (["--methods", "macneal", "--modes", "1"], "has a harmonic branch: its interfaces have no"),
         (["--modes", "999"], "999"),
         (["--at-hz", "500", "--modes", "1"], "at_hz must lie in the range"),
     ],
