@@ -3,6 +3,7 @@
 from cms.accuracy import Accuracy, accuracy
 from cms.checks import Checks, check, mac
 from cms.component import ComponentLike
+from cms.coupled_accuracy import CoupledAccuracy, coupled_accuracy
 from cms.coupling import Joint, couple
 from cms.errors import ReductionError
 from cms.model import ReducedModel
@@ -13,6 +14,7 @@ __all__ = [
     "Accuracy",
     "Checks",
     "ComponentLike",
+    "CoupledAccuracy",
     "Joint",
     "Matrices",
     "ReducedModel",
@@ -20,6 +22,7 @@ __all__ = [
     "accuracy",
     "check",
     "couple",
+    "coupled_accuracy",
     "keep_modes",
     "mac",
     "reduce",

@@ -20,6 +20,24 @@ from cms.residual import residual_flexibility, without_modes
 
 
 @dataclass(frozen=True, eq=False)
+class Bounds:
+    """What is known of a component with free interfaces at one frequency.
+
+    Attributes
+    ----------
+    low, high : (m, m) array
+        The undamped receptance H of its interfaces lies between these: ``H - low`` and
+        ``high - H`` are positive semidefinite.
+    free : int
+        Number of its frequencies, with rigid-body modes, below the given one.
+    """
+
+    low: FloatArray
+    high: FloatArray
+    free: int
+
+
+@dataclass(frozen=True, eq=False)
 class Accuracy:
     """What is known of a reduced model's error without solving the full one, by `accuracy`.
 
@@ -127,6 +145,38 @@ class Accuracy:
                 bands.append((middle - reach, middle + reach))
         return np.array(bands)
 
+    def bounds(self, frequency_hz: float) -> Bounds | None:
+        """Bounds of the receptance as a matrix, and the count of frequencies below.
+
+        None from ``next_hz`` on, and where a resonance of the model by held interfaces lies in
+        the band.
+        """
+        model = self.reduced
+        if frequency_hz >= self.next_hz:
+            return None
+        square = (2.0 * np.pi * frequency_hz) ** 2
+        growth = 1.0 / (1.0 - (frequency_hz / self.next_hz) ** 2)
+        rows = np.array([model.participation[name] for name in model.interfaces])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            receptance = (rows / ((2.0 * np.pi * model.frequencies_hz) ** 2 - square)) @ rows.T
+        if not np.all(np.isfinite(receptance)):
+            return None
+        if model.method in ("craig-bampton", "guyan"):
+            below = int(np.count_nonzero(model.frequencies_hz < frequency_hz))
+            stiffness = linalg.inv(receptance)
+            softer = [stiffness - g * square**2 * self.gram for g in (1.0, growth)]
+            held = below - negative(stiffness)
+            if negative(softer[0]) != negative(softer[1]):
+                return None
+            low, high = map(linalg.inv, softer)
+            return Bounds(low, high, held + negative(softer[0]))
+        if model.residual_flexibility is not None:
+            receptance = receptance + model.residual_flexibility
+        below = int(np.count_nonzero(model.frequencies_hz[: model.modes] < frequency_hz))
+        return Bounds(
+            receptance + self._error(square, 1.0), receptance + self._error(square, growth), below
+        )
+
     def _error(self, square: float, growth: float) -> FloatArray:
         """Error (m, m) of the receptance at w^2 if every mode left out answers ``growth`` times."""
         model = self.reduced
@@ -215,6 +265,11 @@ def next_frequency(modes: Modes, kept: int) -> float:
     if modes.squares.size <= kept:
         return np.inf
     return float(np.sqrt(modes.squares[kept])) / (2.0 * np.pi)
+
+
+def negative(matrix: FloatArray) -> int:
+    """Number of negative eigenvalues of a symmetric matrix."""
+    return int(np.count_nonzero(np.linalg.eigvalsh(matrix) < 0.0)) if matrix.size else 0
 
 
 def semidefinite(matrix: FloatArray) -> FloatArray:

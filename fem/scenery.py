@@ -125,19 +125,17 @@ def support_solids(drawing: FrameSurface) -> Iterator[tuple[Any, bool]]:
     """Marks of all supports; with each whether it is the plane of symmetry of a half model."""
     for support in drawing.component.model.supports:
         plane = set(support.directions) in ({"x", "rotation"}, {"y", "rotation"})
-        node = drawing.component.model.mesh.node(support.point)
-        if on_mirror(drawing, node):
-            continue
-        for solid in support_solid(drawing.component, support):
-            yield from ((each, plane) for each in with_image(drawing, solid))
+        for node in drawing.component.model.mesh.nodes(support.point):
+            if on_mirror(drawing, node):
+                continue
+            for solid in support_solid(drawing.component, support, node):
+                yield from ((each, plane) for each in with_image(drawing, solid))
 
 
-def support_solid(component: Component, support: Support) -> Iterator[Any]:
-    """The mark of one support: a block behind a clamp, a thin plate, or cones."""
-    mesh = component.model.mesh
-    node = mesh.node(support.point)
+def support_solid(component: Component, support: Support, node: int) -> Iterator[Any]:
+    """The mark of one support at a node: a block behind a clamp, a thin plate, or cones."""
     mark = mark_size(component)
-    at = mesh.points[node]
+    at = component.model.mesh.points[node]
     held = set(support.directions)
     outward = ends_at(component, node).sum(axis=0)
     if np.linalg.norm(outward) < 0.5:

@@ -331,7 +331,7 @@ def symmetry_normal(component: Component, point: str) -> FloatArray | None:
     held = {
         name
         for support in model.supports
-        if model.mesh.node(support.point) == node
+        if node in model.mesh.nodes(support.point)
         for name in support.directions
     }
     normals = {"x": np.array([1.0, 0.0]), "y": np.array([0.0, 1.0])}
