@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -74,11 +74,14 @@ class Selection:
     error : (float, float)
         Band of the relative error of the harmonic response (largest displacement and contact
         force, at the peak and over the range).
-    special_error : float
-        Largest relative difference of a fold's or flip's frequency from the reference's; nan if
-        it was not asked for.
+    special_error : (float, float)
+        Band of the largest relative error of a fold's or flip's frequency, of those that the
+        model and the reference both have; nan if it was not asked for.
     missing, extra : int
         Folds and flips that only the reference has, and only the model.
+    doubtful : int
+        Folds and flips in which the reference itself differs from the model with all modes up to
+        the cut-off, so that it is not certain which of them the full model has.
     """
 
     reduced: cms.ReducedModel
@@ -89,9 +92,10 @@ class Selection:
     contact_s: float
     tolerance: float
     error: tuple[float, float]
-    special_error: float = math.nan
+    special_error: tuple[float, float] = (math.nan, math.nan)
     missing: int = 0
     extra: int = 0
+    doubtful: int = 0
 
     def report(self) -> str:
         """What was kept and left out, and the estimated error."""
@@ -114,10 +118,11 @@ class Selection:
             f"estimated error of the harmonic response: {low:.1e} to {high:.1e} "
             f"(asked for {self.tolerance:g})"
         )
-        if not math.isnan(self.special_error):
+        low, high = self.special_error
+        if not math.isnan(high):
             lines.append(
-                f"folds and flips: within {self.special_error:.1e}, {self.missing} missing, "
-                f"{self.extra} too many"
+                f"folds and flips: error {low:.1e} to {high:.1e}, {self.missing} missing, "
+                f"{self.extra} too many, {self.doubtful} uncertain"
             )
         return "\n".join(lines)
 
@@ -170,7 +175,8 @@ def reduce_for(
     tolerance : float
         Largest relative change of the harmonic response that leaving modes out may make.
     special_points : bool
-        Also follow the branch of the chosen model and compare its folds and flips.
+        Also follow the branches of the chosen model and of that with all modes up to the cut-off,
+        and compare their folds and flips with the reference's.
     progress : callable, optional
         Called as ``progress(what, frequency_hz)``.
 
@@ -201,7 +207,7 @@ def reduce_for(
        next mode happens to be one that the interface hardly sees, a small change would prove
        nothing.
     4. The error of the reference is judged by that of the model with all modes up to the cut-off;
-       both differences together make the band.
+       both differences together make the band. So it is for folds and flips.
     """
     import cms
 
@@ -245,14 +251,14 @@ def reduce_for(
         without = judge.error(cms.keep_modes(whole, fewer))
         if without <= tolerance:
             kept, error = fewer, without
-    doubt = judge.error(cms.keep_modes(whole, candidates)) if len(candidates) < len(seen) else 0.0
+    smaller = cms.keep_modes(whole, candidates) if len(candidates) < len(seen) else reference
+    doubt = 0.0 if smaller is reference else judge.error(smaller)
     reduced = cms.keep_modes(whole, kept)
-    special_error, missing, extra = math.nan, 0, 0
+    special_error, missing, extra, doubtful = (math.nan, math.nan), 0, 0, 0
     if special_points:
-        branch = harmonic_branch(setting.system(reduced), setting, tell)
-        special_error, missing, extra = matched(
-            special_points_of(branch), special_points_of(judge.branch)
-        )
+        moved_by, missing, extra = judge.special_error(reduced, tell)
+        uncertain, *lacking = judge.special_error(smaller, tell)
+        special_error, doubtful = around(moved_by, uncertain), sum(lacking)
     return Selection(
         reduced,
         tuple(kept),
@@ -261,11 +267,17 @@ def reduce_for(
         BEYOND * cutoff,
         contact,
         tolerance,
-        (max(error - doubt, 0.0), error + doubt),
+        around(error, doubt),
         special_error,
         missing,
         extra,
+        doubtful,
     )
+
+
+def around(error: float, doubt: float) -> tuple[float, float]:
+    """Band of an error that is known up to a doubt."""
+    return max(error - doubt, 0.0), error + doubt
 
 
 class Judge:
@@ -301,6 +313,15 @@ class Judge:
                 change = abs(largest_force(orbit) - largest_force(known))
                 worst = max(worst, change / strongest)
         return worst
+
+    def special_error(
+        self, model: cms.ReducedModel, tell: Callable[[float], None]
+    ) -> tuple[float, int, int]:
+        """Largest relative error of a fold or flip, and how many are missing and too many."""
+        if model is self.reference:
+            return 0.0, 0, 0
+        branch = harmonic_branch(self.setting.system(model), self.setting, tell)
+        return matched(special_points_of(branch), special_points_of(self.branch))
 
 
 def moved(

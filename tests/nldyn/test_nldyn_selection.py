@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from strings import MASSES, SETTING, string
 import cms
 import fem
 from nldyn import Setting, Stop, SystemModelError, Unbalance, reduce_for, solve_orbit
-from nldyn.convergence import harmonic_branch, largest_force
+from nldyn.convergence import harmonic_branch, largest_force, matched, special_points_of
 from nldyn.peaks import resonance_peaks
 from nldyn.resources import example
 from nldyn.scene import build_component, load_scene
@@ -67,6 +68,36 @@ def test_true_error_lies_within_the_stated_band(selection):
     _, high = selection.error
     assert high < 0.1
     assert true_error(string(), SETTING, selection.reduced, MASSES) <= high * 1.05
+
+
+@pytest.mark.parametrize(
+    "stiffness, range_hz",
+    [
+        (4e4, (39.0, 48.0)),
+        pytest.param(1e4, (18.0, 60.0), marks=pytest.mark.slow),
+        pytest.param(4e4, (18.0, 60.0), marks=pytest.mark.slow),
+    ],
+)
+def test_true_error_of_folds_and_flips_lies_within_the_stated_band(stiffness, range_hz):
+    """Of a string that meets a spring, against all of its 41 modes."""
+    setting = replace(
+        SETTING,
+        range_hz=range_hz,
+        stops=(Stop.linear("middle", stiffness),),
+        modal_damping=0.01,
+    )
+    found = reduce_for(string(), setting, tolerance=0.02, special_points=True)
+    models = (cms.reduce(string(), modes=MASSES), found.reduced)
+    exact, own = (
+        special_points_of(harmonic_branch(setting.system(m), setting, lambda hz: None))
+        for m in models
+    )
+    assert len(exact["PD"]) >= 2
+    error, missing, extra = matched(own, exact)
+    low, high = found.special_error
+    assert 0.95 * low <= error <= 1.05 * high < 0.01
+    assert abs(missing - found.missing) + abs(extra - found.extra) <= found.doubtful
+    assert f"folds and flips: error {low:.1e} to {high:.1e}" in found.report()
 
 
 def test_true_error_of_a_solid_lies_within_the_stated_band():
