@@ -14,7 +14,7 @@ from cms.component import FloatArray
 from cms.coupling import Joint, check_joints, couple, side_by_side
 from cms.errors import ReductionError
 
-FIRST_STEP = 1e-9
+FIRST_STEP = 1e-9  # no band is narrower, because of rounding
 GROWTH = 4.0
 BISECTIONS = 12
 
@@ -104,7 +104,7 @@ class CoupledAccuracy:
             fewest, most = self.counted(place)
             return most <= number if side < 0.0 else fewest > number
 
-        inner, outer = 0.0, FIRST_STEP * hz
+        inner = outer = FIRST_STEP * hz
         while not beyond(outer):
             inner, outer = outer, GROWTH * outer
             if not 0.0 < hz + side * outer < self.next_hz:
