@@ -170,6 +170,8 @@ def dense_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatArra
             f"{count} modes are more than a quarter of the component's {size} degrees of "
             f"freedom, which is done only up to {DENSE_AT_MOST} degrees of freedom"
         )
+    if size > DENSE_LIMIT and factorise(pencil.mass) is not None:
+        return direct_modes(pencil, shifted, count)
     mass, matrix = pencil.mass.toarray(), shifted.factor.matrix.toarray()
     nu, vectors = linalg.eigh(mass, matrix, subset_by_index=[size - count, size - 1])
     nu, vectors = nu[::-1], vectors[:, ::-1]
@@ -205,6 +207,27 @@ def with_fast_modes(
         squares = np.where(slow, 1.0 / nu - shifted.shift, direct)
         modes = np.where(slow, vectors / np.sqrt(np.abs(nu)), direct_vectors)
     return squares, modes
+
+
+def direct_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatArray, FloatArray]:
+    """w^2 (k,) and modes (N, k) by one dense problem, the direct one.
+
+    Its slow modes lack digits. One step of inverse iteration removes what they have of fast ones,
+    and the inverse problem projected on them gives them anew.
+    """
+    squares, vectors = linalg.eigh(
+        pencil.stiffness.toarray(), pencil.mass.toarray(), subset_by_index=[0, count - 1]
+    )
+    slowest = max(squares[0] + shifted.shift, EPS * shifted.fastest)
+    slow = squares + shifted.shift <= np.sqrt(slowest * shifted.fastest)
+    weighted = times(pencil.mass, vectors[:, slow])
+    image = shifted.factor.solve(weighted)
+    energy = image.T @ weighted
+    nu, turn = linalg.eigh(image.T @ times(pencil.mass, image), (energy + energy.T) / 2)
+    squares[slow] = 1.0 / nu[::-1] - shifted.shift
+    vectors[:, slow] = image @ (turn / np.sqrt(nu))[:, ::-1]
+    order = np.argsort(squares, kind="stable")
+    return squares[order], vectors[:, order]
 
 
 def lanczos_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatArray, FloatArray]:

@@ -478,3 +478,11 @@ def test_fewer_modes_of_a_model_are_the_model_of_fewer_modes(cantilever):
         cms.keep_modes(large, [0, 1])
     with pytest.raises(cms.ReductionError, match="by 'craig-bampton' cannot be left out"):
         cms.keep_modes(cms.reduce(cantilever, modes=3, method="craig-bampton"), [1])
+
+
+@pytest.mark.parametrize("left, exact", [(1.0, fixed_free_hz), (0.0, free_free_hz)])
+def test_half_of_all_modes_of_a_large_component_are_those_of_the_closed_form(left, exact):
+    """Held and floating; slow modes from a dense problem that gives the fast ones."""
+    reduced = cms.reduce(chain(1520, left=left), modes=760)
+    expected = exact(1520)[:760]
+    np.testing.assert_allclose(reduced.frequencies_hz[:760], expected, rtol=1e-9, atol=0.0)
