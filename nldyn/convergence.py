@@ -11,7 +11,7 @@ import numpy as np
 
 from nldyn.branch import Branch
 from nldyn.continuation import continue_branch
-from nldyn.errors import SystemModelError
+from nldyn.errors import SystemModelError, check_choice
 from nldyn.flow import FlowMap
 from nldyn.linear import Complex, Real
 from nldyn.orbit import ConvergenceError, Orbit, refine, solve_orbit
@@ -365,11 +365,7 @@ def study_of_scene(
     if min(refinements) < 1:
         raise SystemModelError("converge: a refinement must be 1 or more")
     for method in methods:
-        if method not in METHODS:
-            raise SystemModelError(
-                f"converge: there is no method '{method}' for a scene "
-                f"(there are: {', '.join(METHODS)})"
-            )
+        check_choice("converge: each method", method, METHODS)
     components = {
         "" if len(refinements) == 1 else f"x{times}": build_component(scene, times)
         for times in sorted(refinements)

@@ -212,7 +212,7 @@ def test_a_setting_without_excitation_is_refused():
     "options, words",
     [
         (["--modes", "one"], "is not a list of whole numbers"),
-        (["--methods", "mcneal", "--modes", "1"], "no method 'mcneal' for a scene"),
+        (["--methods", "mcneal", "--modes", "1"], "each method must be one of rubin, cr"),
         (["--methods", "macneal", "--modes", "1"], "has a harmonic branch: its interfaces have no"),
         (["--modes", "999"], "999"),
         (["--at-hz", "500", "--modes", "1"], "at_hz must lie in the range"),
