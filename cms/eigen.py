@@ -255,7 +255,9 @@ def lanczos_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatAr
             if fresh.shape[1] == 0 or (nu.size == wanted and np.all(converged)):
                 break
         if used + fresh.shape[1] > room.shape[1]:
-            room = np.asfortranarray(np.hstack([room, np.empty((size, used + 8 * BLOCK))]))
+            larger = np.empty((size, 2 * used + 8 * BLOCK), order="F")
+            larger[:, :used] = room[:, :used]
+            room = larger
         room[:, used : used + fresh.shape[1]] = fresh
         used += fresh.shape[1]
         image = shifted.factor.solve(times(mass, fresh))
