@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import cache
-
 import numpy as np
 from scipy import sparse
 from scipy.linalg import blas, lapack
-from threadpoolctl import ThreadpoolController
 
 from cms.component import FloatArray, SparseMatrix
 from cms.dissection import Elimination, Front, IntArray
+from cms.threads import one_thread
 
 CHUNK = 48  # columns that are added at once, few enough to stay in the cache
 
@@ -105,23 +101,6 @@ def divided(factor: FloatArray, right: FloatArray, *, transposed: bool) -> Float
     trans = not transposed
     done = blas.dtrsm(1.0, factor, right.T, side=1, lower=1, trans_a=trans, overwrite_b=1)
     return np.asarray(done.T)
-
-
-@cache
-def controller() -> ThreadpoolController:
-    """The thread pools of the libraries that numpy and scipy call; not those of MKL."""
-    return ThreadpoolController().select(internal_api="openblas")
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Within this BLAS takes one thread.
-
-    Most blocks are small, and wait longer for a second thread than it saves where other programs
-    run, too. The rounding does then not depend on the machine's number of cores.
-    """
-    with controller().limit(limits=1):
-        yield
 
 
 def eliminated(

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from cms.cholesky import one_thread
 from cms.component import (
     ComponentLike,
     FloatArray,
@@ -33,6 +32,7 @@ from cms.errors import ReductionError
 from cms.factor import Progress, announced
 from cms.model import ReducedModel
 from cms.residual import residual_flexibility, residual_modes
+from cms.threads import one_thread
 
 METHODS = (
     "rubin",

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from cms.cholesky import one_thread
+from cms.threads import one_thread
 from nldyn.branch import (
     CLOSED,
     NOT_FINISHED,

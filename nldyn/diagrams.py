@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.cholesky import one_thread
+from cms.threads import one_thread
 from nldyn.branch import (
     POINTS,
     SHORT_STEP,

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cms.cholesky import one_thread
+from cms.threads import one_thread
 from nldyn.branch import Branch, minimal_period, same_orbit, stroboscopic
 from nldyn.checkpoint import Checkpoint
 from nldyn.continuation import MOST_POINTS, ContinuationOptions, check_range, shifts
