@@ -1071,14 +1071,15 @@ def expected_contact(fl, stop, w, phase):
     elif speed < 0.0:
         left = min(0.5 * duration, -depth / speed)
     if accel < 0.0 and left > 0.0:
-        turned = (speed + np.sqrt(speed * speed - 2.0 * accel * depth)) / -accel
+        root = np.sqrt(speed * speed - 2.0 * accel * depth)
         if speed > 0.0:  # a slow touch is turned back by the deceleration
+            turned = (speed + root) / -accel
             share = turned / (turned + left)
             left *= share
             duration *= share
             peak *= share
-        else:
-            left = min(left, turned)
+        else:  # (speed + root) / -accel without cancellation, for an acceleration of any size
+            left = min(left, 2.0 * depth / (root - speed))
     return peak, duration, left
 
 

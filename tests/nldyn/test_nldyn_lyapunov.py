@@ -100,6 +100,32 @@ def test_duffing_oscillator_has_the_published_exponents():
     assert found.dimension == pytest.approx(1.0 + 0.1034 / 0.1534, abs=0.06)
 
 
+def driven(power: float) -> System:
+    """x'' + x |x|^(p - 1) = sin ωt, as one stop on either side of a mass without a spring."""
+    stops = [Stop("x", 1.0, power), Stop("x", 1.0, power, direction=-1)]
+    force = HarmonicForce("x", 1.0, phase_deg=-90.0)
+    return System.from_matrices([[1.0]], [[0.0]], {"x": [1.0]}, stops=stops, excitation=[force])
+
+
+# J. C. Sprott (2001), Simple Driven Conservative Chaotic Flows: exponent p, ω, largest exponent
+PUBLISHED = [(2.0, 1.61, 0.051), (3.0, 1.88, 0.097), (4.0, 2.00, 0.139)]
+
+
+@pytest.mark.parametrize(
+    ("power", "omega", "published", "periods"),
+    [(*PUBLISHED[2], 4000)]
+    + [pytest.param(*case, 20000, marks=pytest.mark.slow) for case in PUBLISHED],
+)
+def test_mass_between_two_stops_has_the_published_exponents(power, omega, published, periods):
+    found = lyapunov_exponents(
+        driven(power), omega / (2.0 * np.pi), transient=0, periods=periods
+    )
+    assert found.chaotic
+    assert found.divergence == 0.0 and found.sum_error < 1e-12
+    assert abs(found.largest - published) < 3.0 * found.largest_error + 5e-4  # three digits
+    assert found.largest_error < 0.013
+
+
 def test_growth_over_a_chaotic_motion_of_a_bilinear_oscillator_agrees_with_another_method():
     stop = Stop.linear("middle", 50.0 * 16877.0)
     system = make_one_dof(stops=[stop])

@@ -46,6 +46,20 @@ def test_simulation_agrees_with_adaptive_integration():
     assert np.all(np.abs(motion.end - x) < 1e-8 * scale)
 
 
+@pytest.mark.parametrize("start", [(-0.3, 1.0), (0.3, -1.0), (-1.2, 1.8), (0.0, 0.0)])
+def test_mass_between_two_stops_leaves_one_while_the_force_vanishes(start):
+    """At phase zero nothing but the stop accelerates the mass: the flight has no deceleration."""
+    stops = [Stop("x", 1.0, 3.0), Stop("x", 1.0, 3.0, direction=-1)]
+    force = HarmonicForce("x", 1.0, phase_deg=-90.0)
+    system = System.from_matrices([[1.0]], [[0.0]], {"x": [1.0]}, stops=stops, excitation=[force])
+    motion = simulate(system, 0.3, periods=4, start=np.array(start))
+    found = solve_ivp(
+        lambda t, x: [x[1], np.sin(0.6 * np.pi * t) - x[0] ** 3], (0.0, 4.0 / 0.3), start,
+        rtol=1e-12, atol=1e-13, method="DOP853",
+    )  # fmt: skip
+    np.testing.assert_allclose(motion.end, found.y[:, -1], atol=2e-8)
+
+
 def test_one_impact_of_a_free_mass_has_the_closed_form_of_hertz():
     system, start = ball()
     motion = simulate(system, 10.0, periods=1, start=start)
