@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         plot_basins,
         plot_brute_force,
         plot_section,
+        plot_spectra,
         plot_sweep,
         plot_wear,
     )
@@ -65,8 +66,10 @@ if TYPE_CHECKING:
     from nldyn.system import System
     from nldyn.wear import (
         ContactMeasures,
+        SpectraMap,
         contact_measures,
         measures_table,
+        spectra_map,
         spectra_table,
     )
 
@@ -90,7 +93,9 @@ _HOMES = {
     "fourier": "Spectrum spectrum",
     "contacts": "Impacts impacts",
     "lifetimes": "ChaosLifetime chaos_lifetime",
-    "long_term_plots": "plot_basins plot_brute_force plot_section plot_sweep plot_wear",
+    "long_term_plots": (
+        "plot_basins plot_brute_force plot_section plot_spectra plot_sweep plot_wear"
+    ),
     "lyapunov": "LyapunovSpectrum lyapunov_exponents",
     "manifolds": "basin_edge stable_manifold",
     "multipliers": "Stability",
@@ -108,7 +113,7 @@ _HOMES = {
     "store": "load_branch load_branches load_diagram load_exploration",
     "studies": "study",
     "system": "System",
-    "wear": "ContactMeasures contact_measures measures_table spectra_table",
+    "wear": "ContactMeasures SpectraMap contact_measures measures_table spectra_map spectra_table",
 }
 
 __all__ = [
@@ -149,6 +154,7 @@ __all__ = [
     "Selection",
     "Setting",
     "SpecialPoint",
+    "SpectraMap",
     "Spectrum",
     "Stability",
     "Stop",
@@ -197,6 +203,7 @@ __all__ = [
     "plot_history",
     "plot_phase_portrait",
     "plot_section",
+    "plot_spectra",
     "plot_spectrum",
     "plot_sweep",
     "plot_wear",
@@ -206,6 +213,7 @@ __all__ = [
     "save_curves",
     "simulate",
     "solve_orbit",
+    "spectra_map",
     "spectra_table",
     "spectrum",
     "stable_manifold",

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Literal
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from nldyn.branch import same_orbit, stroboscopic
 from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
-from nldyn.executors import values_of
+from nldyn.executors import check_execution, values_of
 from nldyn.exploration import MOST_MULTIPLE, settling_periods
 from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
@@ -561,6 +562,7 @@ def find_attractors(
     observe: str | None = None,
     options: AttractorOptions | None = None,
     executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> list[Share]:
     """Different attractors at one frequency, from many initial states.
 
@@ -579,6 +581,8 @@ def find_attractors(
         As for `classify`.
     executor : concurrent.futures.Executor, optional
         Where to compute; here unless given.
+    progress : callable, optional
+        Called as ``progress(done, total)`` after each initial state.
 
     Returns
     -------
@@ -603,7 +607,8 @@ def find_attractors(
     ['period 1']
     """
     flow = flow_of(system)
-    check_types(options=(options, AttractorOptions, None), executor=(executor, Executor, None))
+    check_types(options=(options, AttractorOptions, None))
+    check_execution(executor, progress)
     check_frequency("frequency_hz", frequency_hz)
     omega = 2.0 * math.pi * frequency_hz
     check_bounded(flow.system, omega)
@@ -611,12 +616,14 @@ def find_attractors(
     check_whole("seed", seed, 0)
     if isinstance(starts, np.ndarray | list | tuple):
         states = np.array([starting_state(flow, np.asarray(start)) for start in starts])
+        if not len(states):
+            raise SystemModelError("starts must hold at least one initial state, got none")
     else:
         check_whole("starts", starts, 1, MOST_STARTS)
         states = random_states(flow, omega, int(starts), seed)
     task = partial(attractor_task, flow.system, flow.options, frequency_hz, name,
                    options or AttractorOptions())  # fmt: skip
-    return distinct(values_of(task, list(states), executor))
+    return distinct(values_of(task, list(states), executor, progress))
 
 
 def attractor_task(
@@ -663,7 +670,6 @@ def overlap(a: Real, b: Real) -> bool:
     >>> overlap(cloud[:200], cloud[200:]), overlap(cloud[:200], cloud[200:] + 10.0)
     (True, False)
     """
-    from scipy.spatial import cKDTree
 
     def mostly_inside(points: Real, cloud: Real) -> bool:
         tree = cKDTree(cloud)

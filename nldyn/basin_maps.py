@@ -31,7 +31,7 @@ from nldyn.errors import (
     is_finite,
     shown,
 )
-from nldyn.executors import values_of
+from nldyn.executors import check_execution, values_of
 from nldyn.flow import FlowMap, chain, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import Orbit, check_bounded, check_observe
@@ -41,6 +41,7 @@ CHUNK = 16  # periods between two looks at where a motion is
 CELLS = 250  # initial states in one computation
 SHELLS = (1.0, 0.5, 0.2)  # of a neighbourhood, on which its contraction is tried
 LINGERS = 48  # periods in a row near an attractor that is not periodic
+MOST_CELLS = 10**7
 UNDECIDED = -1
 
 
@@ -498,9 +499,9 @@ def basins(
     flow = flow_of(system)
     check_types(
         plane=(plane, Plane), options=(options, AttractorOptions, None),
-        executor=(executor, Executor, None), progress=(progress, Callable, None),
         attractors=(attractors, Sequence),
     )  # fmt: skip
+    check_execution(executor, progress)
     check_frequency("frequency_hz", frequency_hz)
     omega = 2.0 * math.pi * frequency_hz
     check_bounded(flow.system, omega)
@@ -563,12 +564,14 @@ def basins(
 
 
 def check_shape(name: str, shape: tuple[int, int]) -> tuple[int, int]:
-    """Two whole numbers of at least 1, or a SystemModelError under the name."""
+    """Two whole numbers of at least 1 and of no huge product; a SystemModelError names them."""
     check_types(**{name: (shape, Sequence)})
     if len(shape) != 2:
         raise SystemModelError(f"{name} must be two numbers, got {shown(shape)}")
     for count in shape:
         check_whole(name, count, 1)
+    if shape[0] * shape[1] > MOST_CELLS:
+        raise SystemModelError(f"{name} may have up to {MOST_CELLS} cells, got {shown(shape)}")
     return shape
 
 

@@ -55,6 +55,11 @@ class Outcome(Generic[Value]):
         return self.value  # type: ignore[return-value]
 
 
+def check_execution(executor: object, progress: object) -> None:
+    """Refuse an executor or a progress function that is none; both are optional."""
+    check_types(executor=(executor, Executor, None), progress=(progress, Callable, None))
+
+
 def run_all(
     function: Callable[[Item], Value],
     items: Sequence[Item],
@@ -89,10 +94,8 @@ def run_all(
     >>> run_all(len, [1])[0].failure
     "TypeError: object of type 'int' has no len()"
     """
-    check_types(
-        function=(function, Callable), items=(items, Sequence, np.ndarray),
-        executor=(executor, Executor, None), progress=(progress, Callable, None),
-    )  # fmt: skip
+    check_types(function=(function, Callable), items=(items, Sequence, np.ndarray))
+    check_execution(executor, progress)
     outcomes: dict[int, Outcome[Value]] = {}
     for outcome in as_finished(function, items, executor):
         outcomes[outcome.index] = outcome

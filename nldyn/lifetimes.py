@@ -14,7 +14,7 @@ from scipy.stats import chi2
 
 from nldyn.attractors import Attractor, AttractorOptions, reached_orbit
 from nldyn.errors import SystemModelError, check_types, check_whole
-from nldyn.executors import values_of
+from nldyn.executors import check_execution, values_of
 from nldyn.flow import FlowMap, FlowOptions
 from nldyn.linear import Real
 from nldyn.lyapunov import spectrum_from
@@ -179,10 +179,8 @@ def chaos_lifetime(
     Y.-C. Lai, T. Tél (2011), *Transient Chaos*, Springer; B. Epstein, M. Sobel (1953), Life
     testing, *J. Am. Stat. Assoc.* 48, 486-502.
     """
-    check_types(
-        attractor=(attractor, Attractor), executor=(executor, Executor, None),
-        progress=(progress, Callable, None),
-    )  # fmt: skip
+    check_types(attractor=(attractor, Attractor))
+    check_execution(executor, progress)
     if attractor.kind != "chaotic":
         raise SystemModelError(
             f"chaos_lifetime needs a chaotic attractor, but the one at "

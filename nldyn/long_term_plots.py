@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.colors import to_rgb
+from matplotlib.colors import LogNorm, to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
@@ -17,11 +17,12 @@ from nldyn.attractors import Attractor
 from nldyn.basin_maps import UNDECIDED, Basins
 from nldyn.branch import Branch, check_branches, stroboscopic
 from nldyn.diagrams import Diagram
-from nldyn.errors import SystemModelError, check_choice, check_types, shown
+from nldyn.errors import SystemModelError, check_choice, check_positive, check_types, shown
 from nldyn.linear import Real
 from nldyn.orbit import check_observe
 from nldyn.plot import (
     PERIOD_COLOURS,
+    PREFIXES,
     STABLE,
     UNSTABLE,
     draw_legend,
@@ -35,6 +36,7 @@ from nldyn.sections import BruteForce, Column, impact_section, stroboscopic_sect
 from nldyn.simulation import Motion
 from nldyn.system import numbers
 from nldyn.wear import UNITS as MEASURE_UNITS
+from nldyn.wear import SpectraMap
 
 KIND_COLOURS = {
     "periodic": "#222222",
@@ -52,7 +54,7 @@ QUANTITIES = {
     "impact phase": "forcing phase of impacts",
 }
 WEAR_MARKS = "o^sDv"  # of measures, in their order: all can be hollow
-UNITS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9}
+UNITS = {name: factor for factor, name in PREFIXES}
 
 
 def plot_section(
@@ -411,6 +413,102 @@ def _common(measures: Sequence[str]) -> str:
     """What several measures are together."""
     forces = all(name.endswith("force") for name in measures)
     return "contact force" if forces else ", ".join(map(_spoken, measures))
+
+
+def plot_spectra(
+    found: SpectraMap,
+    ax: Axes | None = None,
+    *,
+    scale: Literal["frequency", "order"] = "frequency",
+    decades: float = 4.0,
+    unit: str | None = None,
+) -> Axes:
+    """Draw spectra as a map over the excitation frequency and the frequency in the spectrum.
+
+    Each motion fills a column as wide as half the ways to the frequencies beside it; where
+    several motions have one frequency, they share it from left to right. In Hz multiples of the
+    excitation frequency are rays and resonances lie level; in orders the multiples lie level.
+
+    Parameters
+    ----------
+    found : SpectraMap
+        What `nldyn.spectra_map` gave, of at least one motion.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure, free of pyplot, unless given.
+    scale : {"frequency", "order"}
+        What goes upwards: the frequency in the spectrum in Hz, or that over the excitation
+        frequency.
+    decades : float
+        Range of the colours, down from the largest value; what is smaller has the lowest colour.
+        The mean displacement is left out of the choice.
+    unit : {"m", "mm", "µm", "nm"}, optional
+        Of the displacements; chosen from the size unless given.
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense, or spectra of no motion or without any displacement.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance, brute_force, spectra_map
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> found = spectra_map(brute_force(system, (25.0, 27.0), points=3, directions=["up"]))
+    >>> plot_spectra(found).get_ylabel()
+    'frequency in the spectrum (Hz)'
+    """
+    check_types(found=(found, SpectraMap), ax=(ax, Axes, None))
+    check_choice("scale", scale, ("frequency", "order"))
+    check_positive("decades", decades)
+    if unit is not None:
+        check_choice("unit", unit, UNITS)
+    largest = float(found.rms[:, 1:].max(initial=0.0))
+    if largest == 0.0:
+        raise SystemModelError("found holds no motion with a displacement that changes")
+    factor, name = length_unit(largest) if unit is None else (UNITS[unit], unit)
+    ax = ax if ax is not None else new_axes()
+    width = float(found.order[1] - found.order[0])
+    edges = np.append(found.order - 0.5 * width, found.order[-1] + 0.5 * width)
+    edges[0] = 0.0
+    norm = LogNorm(largest / factor * 10.0**-decades, largest / factor, clip=True)
+    lefts, rights = _column_ends(found.frequency_hz)
+    heights = found.frequency_hz if scale == "frequency" else np.ones(lefts.size)
+    for k, height in enumerate(heights):
+        values = np.maximum(found.rms[k], 1e-300)[:, None] / factor
+        image = ax.pcolormesh(
+            [lefts[k], rights[k]], edges * height, values, norm=norm, cmap="magma", rasterized=True
+        )
+    ax.figure.colorbar(image, ax=ax, label=f"r.m.s. displacement in a band ({name})")
+    ax.set_xlim(lefts.min(), rights.max())
+    ax.set_ylim(0.0, float(edges[-1] * heights.max()))
+    ax.set_facecolor("0.85")
+    ax.set_xlabel("excitation frequency (Hz)")
+    ax.set_ylabel(
+        "frequency in the spectrum (Hz)" if scale == "frequency" else "order of the excitation"
+    )
+    return ax
+
+
+def _column_ends(hz: Real) -> tuple[Real, Real]:
+    """Left and right ends (k,) of columns around frequencies (k,), ascending; equal ones share.
+
+    Examples
+    --------
+    >>> left, right = _column_ends(np.array([10.0, 12.0, 12.0]))
+    >>> left.tolist(), right.tolist()
+    ([9.0, 11.0, 12.0], [11.0, 12.0, 13.0])
+    """
+    begins = np.append(True, np.diff(hz) > 1e-9 * hz[1:])  # what differs by rounding is equal
+    first, which = np.flatnonzero(begins), np.cumsum(begins) - 1
+    places, counts = hz[first], np.bincount(which)
+    middles = 0.5 * (places[1:] + places[:-1])
+    below, above = (places[1] - places[0], places[-1] - places[-2]) if middles.size else (1.0, 1.0)
+    ends = np.concatenate([[places[0] - 0.5 * below], middles, [places[-1] + 0.5 * above]])
+    widths = np.diff(ends)[which] / counts[which]
+    lefts = ends[which] + (np.arange(hz.size) - first[which]) * widths
+    return lefts, lefts + widths
 
 
 def plot_basins(

@@ -12,8 +12,8 @@ from typing import Any, overload
 import numpy as np
 
 from nldyn._growth import growth_rates
-from nldyn.errors import SystemModelError, check_types, check_whole
-from nldyn.executors import values_of
+from nldyn.errors import SystemModelError, check_whole
+from nldyn.executors import check_execution, values_of
 from nldyn.flow import FlowMap, FlowOptions, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, contact_damping
@@ -219,7 +219,7 @@ def lyapunov_exponents(
     H. Flyvbjerg, H. G. Petersen (1989), *J. Chem. Phys.* 91, 461-466.
     """
     flow = flow_of(system)
-    check_types(executor=(executor, Executor, None), progress=(progress, Callable, None))
+    check_execution(executor, progress)
     check_whole("transient", transient, 0, MOST_PERIODS)
     check_whole("periods", periods, 2 * FEWEST_BLOCKS, MOST_PERIODS)
     cases = cases_at(flow, frequency_hz, start)

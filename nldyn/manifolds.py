@@ -12,7 +12,7 @@ import numpy as np
 from nldyn.basin_maps import UNDECIDED, Basins, Plane, Target, settle, target_of
 from nldyn.branch import same_orbit, stroboscopic
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
-from nldyn.executors import values_of
+from nldyn.executors import check_execution, values_of
 from nldyn.flow import FlowMap, FlowOptions
 from nldyn.linear import Real
 from nldyn.orbit import Orbit, near_returns
@@ -82,10 +82,8 @@ def stable_manifold(
     >>> len(stable_manifold(saddle, plane, max_points=100))
     2
     """
-    check_types(
-        orbit=(orbit, Orbit), plane=(plane, Plane), executor=(executor, Executor, None),
-        progress=(progress, Callable, None),
-    )  # fmt: skip
+    check_types(orbit=(orbit, Orbit), plane=(plane, Plane))
+    check_execution(executor, progress)
     flow = orbit.problem.flow
     if flow.system.size != 1:
         raise SystemModelError(
@@ -303,10 +301,8 @@ def basin_edge(
     TaskError
         If a computation ends in an error.
     """
-    check_types(
-        found=(found, Basins), executor=(executor, Executor, None),
-        progress=(progress, Callable, None),
-    )  # fmt: skip
+    check_types(found=(found, Basins))
+    check_execution(executor, progress)
     check_whole("basin_edge: count", count, 1)
     check_whole("basin_edge: seed", seed, 0)
     if not (is_finite(width) and 0.0 < width < 1.0):

@@ -16,7 +16,7 @@ from nldyn.attractors import Attractor, AttractorOptions, Kind, attractor_from
 from nldyn.contacts import check_stop, impacts
 from nldyn.continuation import check_range
 from nldyn.errors import SystemModelError, check_choice, check_types, check_whole
-from nldyn.executors import values_of
+from nldyn.executors import check_execution, values_of
 from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import check_bounded, check_observe
@@ -219,10 +219,8 @@ def brute_force(
     'chaotic'
     """
     flow = flow_of(system)
-    check_types(
-        directions=(directions, Sequence), options=(options, AttractorOptions, None),
-        executor=(executor, Executor, None), progress=(progress, Callable, None),
-    )  # fmt: skip
+    check_types(directions=(directions, Sequence), options=(options, AttractorOptions, None))
+    check_execution(executor, progress)
     low, high = check_range(range_hz)
     check_whole("points", points, 1, MOST_POINTS)
     check_whole("starts", starts, 0, MOST_POINTS)

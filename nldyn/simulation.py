@@ -14,12 +14,11 @@ import numpy as np
 from nldyn.errors import (
     SystemModelError,
     check_frequency,
-    check_types,
     check_whole,
     is_finite,
     shown,
 )
-from nldyn.executors import values_of
+from nldyn.executors import check_execution, values_of
 from nldyn.flow import FlowMap, FlowOptions, Trajectory, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import (
@@ -337,7 +336,7 @@ def simulate(
     11
     """
     flow = flow_of(system)
-    check_types(executor=(executor, Executor, None), progress=(progress, Callable, None))
+    check_execution(executor, progress)
     check_whole("periods", periods, 1, MOST_PERIODS)
     check_whole("transient", transient, 0, MOST_PERIODS)
     cases = cases_at(flow, frequency_hz, start)
@@ -538,7 +537,7 @@ def sweep(
     46
     """
     flow = flow_of(system)
-    check_types(executor=(executor, Executor, None), progress=(progress, Callable, None))
+    check_execution(executor, progress)
     given: Any = range_hz
     several = is_list(given) and len(given) > 0 and all(map(is_list, given))
     ranges = [_sweep_range(ends) for ends in (given if several else [given])]

@@ -26,7 +26,7 @@ from nldyn.errors import (
     is_finite,
     shown,
 )
-from nldyn.executors import as_finished
+from nldyn.executors import as_finished, check_execution
 from nldyn.scene import Scene, build_system, load_scene, scene_from_tables
 from nldyn.study_keys import case_keys
 from nldyn.system import System
@@ -124,9 +124,8 @@ def study(
         "study: design": (design, str),
         "study: keep": (keep, str, Path, None),
         "study: keep_name": (keep_name, str, None),
-        "study: executor": (executor, Executor, None),
-        "study: progress": (progress, Callable, None),
     })  # fmt: skip
+    check_execution(executor, progress)
     scene = scene if isinstance(scene, Scene) else load_scene(scene)
     names = list(parameters)
     for name in names:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from functools import partial
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from nldyn.attractors import Attractor
 from nldyn.branch import Branch
 from nldyn.contacts import check_stop, impacts, panel_table
 from nldyn.errors import SystemModelError, check_choice, check_types, check_whole
-from nldyn.executors import values_of
+from nldyn.executors import check_execution, values_of
 from nldyn.fourier import modal_row
 from nldyn.linear import Real
 from nldyn.orbit import Orbit
@@ -28,6 +28,7 @@ from nldyn.system import System
 MOST_SAMPLES = 10**6  # in a period
 MOST_ORDERS = 1000
 SAMPLES = 512  # in a period, for each 32 orders of a spectrum
+Source = BruteForce | Branch | Orbit | Motion | Attractor
 UNITS = {
     "frequency_hz": "Hz",
     "attractor": "",
@@ -153,7 +154,7 @@ def contact_measures(
 
 
 def measures_table(
-    sources: BruteForce | Branch | Iterable[BruteForce | Branch | Orbit | Motion | Attractor],
+    sources: Source | Iterable[Source],
     *,
     stop: int = 0,
     periods: int = 256,
@@ -164,9 +165,9 @@ def measures_table(
 
     Parameters
     ----------
-    sources : BruteForce, Branch or iterable
-        A diagram by brute force, whose attractors count, a branch, whose points count, or a list of
-        such, of orbits, motions and attractors. Attractors whose simulation failed are left out.
+    sources : BruteForce, Branch, Orbit, Motion, Attractor or iterable
+        A diagram by brute force, whose attractors count, a branch, whose points count, an orbit, a
+        motion, an attractor, or a list of such. Attractors whose simulation failed are left out.
     stop, periods
         As for `contact_measures`.
     executor : concurrent.futures.Executor, optional
@@ -186,7 +187,7 @@ def measures_table(
     TaskError
         If the measures of a source cannot be computed.
     """
-    check_types(executor=(executor, Executor, None), progress=(progress, Callable, None))
+    check_execution(executor, progress)
     check_whole("measures_table: periods", periods, 1, MOST_PERIODS)
     chosen = _sources(sources)
     for source in chosen:
@@ -197,12 +198,12 @@ def measures_table(
     return {name: np.array([row[name] for row in rows]) for name in UNITS}
 
 
-def _sources(given: BruteForce | Branch | Iterable[Any]) -> list[Orbit | Motion | Attractor]:
+def _sources(given: Source | Iterable[Source]) -> list[Orbit | Motion | Attractor]:
     """Orbits, motions and attractors, also those of branches and diagrams; none that failed."""
-    check_types(sources=(given, Iterable, BruteForce, Branch))
-    kinds = (Orbit, Motion, Attractor, BruteForce, Branch)
+    kinds = get_args(Source)
+    check_types(sources=(given, Iterable, *kinds))
     chosen: list[Orbit | Motion | Attractor] = []
-    for k, entry in enumerate([given] if isinstance(given, BruteForce | Branch) else given):
+    for k, entry in enumerate([given] if isinstance(given, Source) else given):
         check_types(**{f"sources: entry {k}": (entry, *kinds)})
         if isinstance(entry, BruteForce):
             chosen += [column.attractor for column in entry.columns]
@@ -214,7 +215,7 @@ def _sources(given: BruteForce | Branch | Iterable[Any]) -> list[Orbit | Motion 
 
 
 def spectra_table(
-    sources: BruteForce | Branch | Iterable[BruteForce | Branch | Orbit | Motion | Attractor],
+    sources: Source | Iterable[Source],
     point: str | Real | None = None,
     *,
     orders: int = 5,
@@ -230,7 +231,7 @@ def spectra_table(
 
     Parameters
     ----------
-    sources : BruteForce, Branch or iterable
+    sources
         As for `measures_table`; no sweeps.
     point : str or (n,) array, optional
         An interface, or the displacement of each mode at any point of the mesh: a row of
@@ -267,26 +268,158 @@ def spectra_table(
     >>> bool(abs(table["order_1"][0] / orbit.max_abs_displacement - 1.0) < 1e-6)
     True
     """
-    check_types(executor=(executor, Executor, None), progress=(progress, Callable, None))
-    check_whole("spectra_table: orders", orders, 1, MOST_ORDERS)
-    check_whole("spectra_table: periods", periods, 1, MOST_PERIODS)
+    found = _spectra("spectra_table", sources, point, orders, periods, executor, progress)
+    columns = {
+        "frequency_hz": np.array([lines.frequency_hz for lines in found]),
+        "attractor": np.array([lines.attractor for lines in found]),
+        "stable": np.array([lines.stable for lines in found]),
+        "mean": np.array([lines.mean for lines in found]),
+    }
+    harmonics = [lines.square[lines.turns :: lines.turns][:orders] for lines in found]
+    for k in range(orders):
+        columns[f"order_{k + 1}"] = np.sqrt([2.0 * squares[k] for squares in harmonics])
+    others = [
+        lines.square[1:].sum() - squares.sum()
+        for lines, squares in zip(found, harmonics, strict=True)
+    ]
+    columns["rest"] = np.sqrt(np.maximum(others, 0.0))
+    return columns
+
+
+@dataclass(frozen=True, eq=False)
+class SpectraMap:
+    """Spectra of displacements against the excitation frequency; see `spectra_map`.
+
+    Parameters
+    ----------
+    frequency_hz : (k,)
+        Excitation frequency of each motion in Hz, ascending.
+    attractor : (k,) of str
+        Such as ``period 2`` or ``chaotic``.
+    stable : (k,) bool
+        False for an unstable orbit.
+    order : (m,)
+        Middles of the bands, as multiples of the excitation frequency: 0, 1/parts, 2/parts, ...
+    rms : (k, m)
+        Root of the mean square of what lies in each band, in m.
+    rest : (k,)
+        Root of the mean square of what lies above the last band, in m.
+    """
+
+    frequency_hz: Real
+    attractor: NDArray[np.str_]
+    stable: NDArray[np.bool_]
+    order: Real
+    rms: Real
+    rest: Real
+
+
+def spectra_map(
+    sources: Source | Iterable[Source],
+    point: str | Real | None = None,
+    *,
+    orders: int = 5,
+    parts: int = 12,
+    periods: int = 256,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> SpectraMap:
+    """Spectra of the displacement at a point, in bands, against the excitation frequency.
+
+    The bands have the width of a part of the excitation frequency, and their middles are its
+    multiples and the fractions between them, so that the lines of a subharmonic whose period
+    divides `parts` lie in the middles. The mean squares of all bands and of the rest add up to
+    that of the displacement (Parseval's theorem).
+
+    Parameters
+    ----------
+    sources, point, periods, executor, progress
+        As for `spectra_table`.
+    orders : int
+        Middle of the last band, as a multiple of the excitation frequency.
+    parts : int
+        Bands from one multiple to the next.
+
+    Returns
+    -------
+    SpectraMap
+        What `nldyn.plot_spectra` draws.
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense, or a motion whose frequency changes.
+    TaskError
+        If the spectrum of a source cannot be computed.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance, solve_orbit
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> found = spectra_map([solve_orbit(system, frequency_hz=50.0, period=2)], orders=2, parts=2)
+    >>> found.order.tolist()
+    [0.0, 0.5, 1.0, 1.5, 2.0]
+    >>> int(found.rms[0, 1:].argmax())                # half of the excitation frequency
+    0
+    """
+    check_whole("spectra_map: parts", parts, 1, MOST_ORDERS)
+    found = _spectra("spectra_map", sources, point, orders, periods, executor, progress)
+    count = orders * parts + 1
+    rms, rest = np.empty((len(found), count)), np.empty(len(found))
+    for k, lines in enumerate(found):
+        band = np.rint(np.arange(lines.square.size) * (parts / lines.turns)).astype(int)
+        squares = np.bincount(band, lines.square, minlength=count)
+        rms[k], rest[k] = np.sqrt(squares[:count]), math.sqrt(squares[count:].sum())
+    return SpectraMap(
+        np.array([lines.frequency_hz for lines in found]),
+        np.array([lines.attractor for lines in found], dtype=str),
+        np.array([lines.stable for lines in found], dtype=bool),
+        np.arange(count) / parts,
+        rms,
+        rest,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """Mean squares (m,) at multiples of 1/turns of the excitation frequency; signed mean."""
+
+    frequency_hz: float
+    attractor: str
+    stable: bool
+    turns: int
+    mean: float
+    square: Real
+
+
+def _spectra(
+    caller: str,
+    sources: Source | Iterable[Source],
+    point: str | Real | None,
+    orders: int,
+    periods: int,
+    executor: Executor | None,
+    progress: Callable[[int, int], None] | None,
+) -> list[_Lines]:
+    """Spectra of all sources, ascending in frequency, after all input is checked."""
+    check_execution(executor, progress)
+    check_whole(f"{caller}: orders", orders, 1, MOST_ORDERS)
+    check_whole(f"{caller}: periods", periods, 1, MOST_PERIODS)
     chosen = _sources(sources)
     for source in chosen:
         modal_row(_system_of(source), point)
         if isinstance(source, Motion):
             _constant_omega(source)
-    task = partial(_harmonics, point=point, orders=orders, periods=periods)
-    rows = values_of(task, chosen, executor, progress)
-    rows.sort(key=lambda row: float(row["frequency_hz"]))
-    names = ["frequency_hz", "attractor", "stable", "mean"]
-    names += [*(f"order_{k}" for k in range(1, orders + 1)), "rest"]
-    return {name: np.array([row[name] for row in rows]) for name in names}
+    task = partial(_lines, point=point, orders=orders, periods=periods)
+    return sorted(values_of(task, chosen, executor, progress), key=lambda lines: lines.frequency_hz)
 
 
-def _harmonics(
+def _lines(
     source: Orbit | Motion | Attractor, point: str | Real | None, orders: int, periods: int
-) -> dict[str, Any]:
-    """Row of `spectra_table`."""
+) -> _Lines:
+    """Spectrum over a whole number of excitation periods."""
     motion, name, stable = _motion_on(source, periods)
     row = modal_row(motion.system, point)
     hz = _constant_omega(motion) / (2.0 * math.pi)
@@ -296,13 +429,11 @@ def _harmonics(
     count = SAMPLES * math.ceil(orders / 32)
     times = motion.start_time + np.arange(turns * count) / (count * hz)
     y = motion.states(times)[:, : row.size] @ row
-    phasors = np.fft.rfft(y)[: turns * orders + 1 : turns] / y.size
-    amplitudes = 2.0 * np.abs(phasors[1:])
-    rest = float(np.var(y)) - 0.5 * float(amplitudes @ amplitudes)
-    found: dict[str, Any] = {"frequency_hz": hz, "attractor": name, "stable": stable}
-    found["mean"] = float(phasors[0].real)
-    found |= {f"order_{k}": float(a) for k, a in enumerate(amplitudes, 1)}
-    return {**found, "rest": math.sqrt(max(rest, 0.0))}
+    phasors = np.fft.rfft(y) / y.size
+    square = 2.0 * np.abs(phasors) ** 2
+    square[0] /= 2.0  # the mean, and at an even number of samples the last one, have no twin
+    square[-1] /= 2.0
+    return _Lines(hz, name, stable, turns, float(phasors[0].real), square)
 
 
 def _motion_on(source: Orbit | Motion | Attractor, periods: int) -> tuple[Motion, str, bool]:

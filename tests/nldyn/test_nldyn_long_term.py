@@ -34,10 +34,12 @@ from nldyn import (
     plot_basins,
     plot_brute_force,
     plot_section,
+    plot_spectra,
     plot_sweep,
     plot_wear,
     simulate,
     solve_orbit,
+    spectra_map,
     spectra_table,
     spectrum,
     stable_manifold,
@@ -458,6 +460,54 @@ def test_harmonics_of_every_attractor_hold_its_whole_power(one_dof, from_35_to_4
     power = 0.5 * lines + table["rest"][chaotic] ** 2
     assert power == pytest.approx(float(np.var(y)), rel=1e-3)
     assert table["rest"][chaotic] > 0.1 * math.sqrt(power)  # chaos lies between the lines
+
+
+def test_bands_of_a_spectra_map_hold_the_lines_of_orbits(one_dof):
+    orbits = [solve_orbit(one_dof, 50.0, 2), solve_orbit(one_dof, 25.3)]
+    found = spectra_map(orbits, orders=4, parts=6)
+    assert found.attractor.tolist() == ["period 1", "period 2"]
+    for rms, orbit in zip(found.rms, orbits[::-1], strict=True):
+        lines = spectrum(orbit, orders=4)
+        expected = np.zeros(25)
+        expected[:: 6 // orbit.period] = lines.amplitude / math.sqrt(2.0)
+        expected[0] *= math.sqrt(2.0)  # the mean has no twin
+        np.testing.assert_allclose(rms, expected, atol=1e-5 * expected.max())
+    assert spectra_map(orbits[0], orders=4, parts=6).rms.shape == (1, 25)  # one may stand alone
+
+
+def test_bands_of_a_chaotic_motion_hold_its_power_at_their_places(one_dof):
+    motion = simulate(one_dof, 36.0, periods=64, transient=300)
+    found = spectra_map([motion], orders=2, parts=3)
+    y = motion.history(64 * 1000).displacement["middle"][:-1]
+    total = float(found.rms[0] @ found.rms[0] + found.rest[0] ** 2)
+    assert total == pytest.approx(float(np.mean(y * y)), rel=1e-3)
+    power = np.abs(np.fft.fft(y) / y.size) ** 2
+    orders = np.abs(np.fft.fftfreq(y.size, 1.0 / 1000.0))  # 1000 samples in a period
+    for order, rms in zip(found.order, found.rms[0], strict=True):
+        here = np.abs(orders - order) < 1.0 / 6.0
+        assert rms == pytest.approx(math.sqrt(power[here].sum()), rel=2e-3)
+    assert found.rms[0, 1] > 0.1 * found.rms[0, 3]  # between the lines
+
+
+def test_spectra_map_is_drawn_in_columns_of_the_motions(one_dof):
+    orbits = [solve_orbit(one_dof, 50.0, 2), solve_orbit(one_dof, 50.0), solve_orbit(one_dof, 52.0)]
+    found = spectra_map(orbits, orders=3, parts=2)
+    ax = plot_spectra(found)
+    columns = [mesh.get_coordinates() for mesh in ax.collections]
+    ends = [[49.0, 50.0], [50.0, 51.0], [51.0, 53.0]]
+    np.testing.assert_allclose([c[0, :, 0] for c in columns], ends)
+    assert columns[2][:, 0, 1].max() == pytest.approx(3.25 * 52.0)
+    assert plot_spectra(spectra_map(orbits[2])).get_xlim() == pytest.approx((51.5, 52.5))
+    assert ax.figure.axes[1].get_ylabel() == "r.m.s. displacement in a band (µm)"
+    assert plot_spectra(found, scale="order").get_ylim() == (0.0, 3.25)
+    for bad, text in (
+        ({"found": spectra_map([])}, "no motion"),
+        ({"found": found, "decades": 0.0}, "decades must be"),
+        ({"found": found, "scale": "time"}, "scale must be one of"),
+        ({"found": found, "unit": "km"}, "unit must be one of"),
+    ):
+        with pytest.raises(SystemModelError, match=text):
+            plot_spectra(**bad)
 
 
 def test_wear_is_drawn_by_kind_and_measure(one_dof, from_35_to_40):

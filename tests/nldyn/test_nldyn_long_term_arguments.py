@@ -17,16 +17,19 @@ from nldyn import (
     brute_force,
     chaos_lifetime,
     contact_measures,
+    find_attractors,
     impact_section,
     impacts,
     lyapunov_exponents,
     plot_basins,
     plot_brute_force,
     plot_section,
+    plot_spectra,
     plot_sweep,
     run_all,
     simulate,
     solve_orbit,
+    spectra_map,
     stable_manifold,
     stroboscopic_section,
     sweep,
@@ -73,6 +76,19 @@ CALLS = {  # with the types that can be used
     "motion": (lambda g, value: impacts(value), ()),
     "source": (lambda g, value: contact_measures(value), ()),
     "sources": (lambda g, value: measures_table(value), ()),
+    "parts": (lambda g, value: spectra_map(g["motion"], parts=value), ()),
+    "orders": (lambda g, value: spectra_map(g["motion"], orders=value), ()),
+    "decades": (lambda g, value: plot_spectra(spectra_map(g["motion"]), decades=value), ()),
+    "scale": (lambda g, value: plot_spectra(spectra_map(g["motion"]), scale=value), ()),
+    "start": (lambda g, value: find_attractors(g["system"], 30.0, starts=value), ()),
+    "progress": (
+        lambda g, value: find_attractors(g["system"], 30.0, progress=value),
+        (type(None),),
+    ),
+    "executor": (
+        lambda g, value: sweep(g["system"], (20.0, 21.0), 1.0, executor=value),
+        (type(None),),
+    ),
     "quantity": (lambda g, value: power_spectrum(g["motion"], quantity=value), ()),
     "kind": (lambda g, value: g["diagram"].ranges(value), ()),
     "low_hz": (lambda g, value: g["diagram"].share(value, 90.0), (int, float)),
@@ -109,7 +125,7 @@ def test_what_is_no_motion_is_named(take):
             take(value)
 
 
-@pytest.mark.parametrize("draw", [plot_brute_force, plot_basins])
+@pytest.mark.parametrize("draw", [plot_brute_force, plot_basins, plot_spectra])
 def test_what_is_no_result_cannot_be_drawn(draw):
     for value in JUNK:
         with pytest.raises(SystemModelError, match="found must be a"):
@@ -121,3 +137,10 @@ def test_one_direction_of_a_plane_of_a_wrong_length_is_refused(name):
     vectors = {"x": [1.0, 0.0], "y": [0.0, 1.0], name: [1.0, 2.0, 3.0]}
     with pytest.raises(SystemModelError, match="origin, x and y must be vectors of one length"):
         Plane([0.0, 0.0], **vectors, x_range=(0.0, 1.0), y_range=(0.0, 1.0))
+
+
+def test_an_empty_list_of_initial_states_and_a_huge_plane_are_refused(given):
+    with pytest.raises(SystemModelError, match="starts must hold at least one initial state"):
+        find_attractors(given["system"], 30.0, starts=[])
+    with pytest.raises(SystemModelError, match="shape may have up to 10000000 cells"):
+        basins(given["system"], 50.0, given["plane"], shape=(10**6, 10**6))
