@@ -56,7 +56,12 @@ class ChaosLifetime:
     @property
     def lasting(self) -> int:
         """Motions that were chaotic for all periods."""
-        return int(np.sum(self.ended == NOT_ENDED))
+        return self.lasting_for(self.periods)
+
+    def lasting_for(self, periods: int) -> int:
+        """Motions that were chaotic for some periods, up to those for which they were followed."""
+        check_whole("lasting_for: periods", periods, 1, self.periods)
+        return int(np.sum((self.ended == NOT_ENDED) | (self.ended > periods)))
 
     @property
     def settled(self) -> int:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -28,7 +27,8 @@ Task = tuple[str, Way]
 
 RANGE_HZ, POINTS = (18.0, 90.0), 145
 EFFORT = AttractorOptions(periods=500)
-STATES, PERIODS = 8, 5000  # motions from each chaotic one, and for how long they are followed
+# motions from each chaotic one, and for how long they are followed: in published ranges, elsewhere
+CLAIMED, ELSEWHERE = (8, 5000), (4, 1000)
 MODELS = ("four_dof_xi_0.001", "four_dof_xi_0.01", "two_dof_xi_0.001", "two_dof_xi_0.01")
 NAMES = {"two_dof": "2-DOF model", "four_dof": "4-DOF model"}
 DAMPINGS = {"0.01": "#0072b2", "0.001": "#b03a00"}
@@ -42,7 +42,10 @@ SHADED = {
 }
 CLAIMS = {"fig4.chaos": "two_dof_xi_0.01", "fig7.chaos": "four_dof_xi_0.01"}
 FIGURE = "chaos"
-CAPTION = "Largest Lyapunov exponents: the damping reduces the chaotic ranges"
+CAPTION = (
+    "Largest Lyapunov exponents: the damping reduces the chaotic ranges "
+    f"(hollow: chaos that ends within {ELSEWHERE[1]} periods more)"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +57,8 @@ class Chaos:
     diagrams : mapping of str to BruteForce
         By the name of the model's scene.
     lifetimes : mapping of str to list of ChaosLifetime
-        How long chaos lasts at the chaotic frequencies of the ranges that `CLAIMS` name.
+        How long chaos lasts at each chaotic frequency; longest followed in the ranges that
+        `CLAIMS` name.
     """
 
     diagrams: Mapping[str, BruteForce]
@@ -68,9 +72,10 @@ class Chaos:
         """Whether chaos lasts at most frequencies of each published range.
 
         A motion is chaotic if its largest Lyapunov exponent is positive by three standard errors.
-        Chaos lasts where more than half of `STATES` motions from states of it are chaotic for
-        `PERIODS` periods more.
+        Chaos lasts where more than half of eight motions from states of it are chaotic for 5000
+        periods more (`CLAIMED`).
         """
+        states, periods = CLAIMED
         found = self.diagrams[model]
         inside, texts, holds = 0, [], True
         for low, high in published_ranges(published):
@@ -89,30 +94,46 @@ class Chaos:
             text="frequencies with a chaotic motion, " + "; ".join(texts),
             note=f"swept up and down in steps of {_step(found):g} Hz; chaotic means a largest "
             "Lyapunov exponent above zero by three standard errors; it lasts where more than half "
-            f"of {STATES} motions from states of it are chaotic for {PERIODS} periods more; the "
+            f"of {states} motions from states of it are chaotic for {periods} periods more; the "
             "statement holds if it lasts at more than half of the frequencies of each range. "
             f"Outside, {everywhere - inside} of the other frequencies from {RANGE_HZ[0]:g} to "
             f"{RANGE_HZ[1]:g} Hz have a chaotic motion, too",
         )
 
+    def transients(self, model: str) -> set[float]:
+        """Frequencies in Hz at which chaos ends: half of the motions or more within 1000 periods.
+
+        That is as long as motions are followed at every frequency (`ELSEWHERE`).
+        """
+        return {
+            life.frequency_hz
+            for life in self.lifetimes[model]
+            if 2 * life.lasting_for(ELSEWHERE[1]) <= life.count
+        }
+
     def damping(self) -> tuple[bool, str]:
-        """Whether more damping leaves fewer chaotic frequencies in both models, and the numbers."""
+        """Whether more damping leaves fewer chaotic frequencies in both models, and the numbers.
+
+        Frequencies at which chaos ends do not count.
+        """
         smaller, texts = True, []
         for model in NAMES:
-            more, less = (
-                self.diagrams[f"{model}_xi_{xi}"].share(*RANGE_HZ) for xi in ("0.01", "0.001")
-            )
-            smaller = smaller and more[0] < less[0]
-            texts.append(
-                f"{model}: chaotic at {more[0]} of {more[1]} frequencies at ξ = 0.01, at {less[0]} "
-                "at 0.001"
-            )
+            counts, parts = [], []
+            for xi in ("0.01", "0.001"):
+                found, total = self.diagrams[f"{model}_xi_{xi}"].share(*RANGE_HZ)
+                counts.append(found - len(self.transients(f"{model}_xi_{xi}")))
+                parts.append(f"{found} of {total} frequencies at ξ = {xi}, lasting at {counts[-1]}")
+            smaller = smaller and counts[0] < counts[1]
+            texts.append(f"{model}: chaotic at {'; at '.join(parts)}")
         return smaller, "; ".join(texts)
 
     def with_damping(self, flips: Finding) -> Finding:
         """The claim on the damping: fewer flips, and smaller chaotic ranges."""
         smaller, text = self.damping()
-        note = flips.note.partition(";")[0] + "; chaotic frequencies from 18 to 90 Hz"
+        note = flips.note.partition(";")[0] + (
+            "; chaotic frequencies from 18 to 90 Hz, lasting where more than half of the motions "
+            f"from states of it are chaotic for {ELSEWHERE[1]} periods more"
+        )
         return replace(
             flips, holds=bool(flips.holds) and smaller, text=f"{flips.text}; {text}", note=note
         )
@@ -168,17 +189,26 @@ def _swept(points: int, task: Task) -> BruteForce:
     )  # fmt: skip
 
 
-def claimed(diagrams: Mapping[str, BruteForce]) -> list[tuple[str, Attractor]]:
-    """A chaotic attractor at each frequency of a published range that has one, with its model."""
+def chaotic_places(diagrams: Mapping[str, BruteForce]) -> dict[tuple[str, float], Attractor]:
+    """A chaotic attractor at each frequency that has one, by its model and the frequency in Hz."""
     found: dict[tuple[str, float], Attractor] = {}
+    for model, diagram in diagrams.items():
+        for column in diagram.columns:
+            if column.attractor.kind == "chaotic":
+                found.setdefault((model, round(column.frequency_hz, 9)), column.attractor)
+    return dict(sorted(found.items()))
+
+
+def effort_at(model: str, frequency_hz: float) -> tuple[int, int]:
+    """How many motions are followed, and for how many periods: more where the paper says chaos."""
     published = {row["id"]: row["published"] for row in published_claims()}
-    for claim, model in CLAIMS.items():
-        for low, high in published_ranges(published[claim]):
-            for column in diagrams[model].columns:
-                hz = column.frequency_hz
-                if column.attractor.kind == "chaotic" and low <= hz <= high:
-                    found.setdefault((model, round(hz, 9)), column.attractor)
-    return [(model, found[model, hz]) for model, hz in sorted(found)]
+    ranges = [
+        ends
+        for claim, name in CLAIMS.items()
+        if name == model
+        for ends in published_ranges(published[claim])
+    ]
+    return CLAIMED if any(low <= frequency_hz <= high for low, high in ranges) else ELSEWHERE
 
 
 def submit_sweeps(workers: Workers, points: int = POINTS) -> dict[Task, Future[BruteForce]]:
@@ -196,12 +226,12 @@ def chaos_of(halves: Mapping[Task, BruteForce], workers: Workers) -> Chaos:
         )
         for model in MODELS
     }
-    chaotic = claimed(diagrams)
-    lasts = partial(chaos_lifetime, states=STATES, periods=PERIODS)
-    futures = {
-        (model, attractor.frequency_hz): workers.pool.submit(lasts, attractor)
-        for model, attractor in chaotic
-    }
+    futures = {}
+    for (model, hz), attractor in chaotic_places(diagrams).items():
+        states, periods = effort_at(model, hz)
+        futures[model, hz] = workers.pool.submit(
+            chaos_lifetime, attractor, states=states, periods=periods
+        )
     lifetimes: dict[str, list[ChaosLifetime]] = {model: [] for model in MODELS}
     for (model, _), life in workers.values(futures, "times that chaos lasts").items():
         lifetimes[model].append(life)
@@ -215,7 +245,8 @@ def write_chaos_figure(chaos: Chaos, folder: Path) -> None:
     axes = figure.subplots(2, 1, sharex=True)
     for ax, (model, name) in zip(axes, NAMES.items(), strict=True):
         for xi, colour in DAMPINGS.items():
-            _draw(ax, chaos.diagrams[f"{model}_xi_{xi}"], f"ξ = {xi}", colour)
+            scene = f"{model}_xi_{xi}"
+            _draw(ax, chaos.diagrams[scene], chaos.transients(scene), f"ξ = {xi}", colour)
         ax.axhline(0.0, color="0.4", linewidth=0.8)
         ax.set_ylabel("largest exponent (1/s)")
         ax.set_title(name)
@@ -225,7 +256,9 @@ def write_chaos_figure(chaos: Chaos, folder: Path) -> None:
     save_figure(axes[0], folder / FIGURE)
 
 
-def _draw(ax: Axes, found: BruteForce, label: str, colour: str) -> None:
+def _draw(
+    ax: Axes, found: BruteForce, transients: Collection[float], label: str, colour: str
+) -> None:
     largest: dict[float, tuple[float, float]] = {}
     for column in found.columns:
         value, error = column.attractor.largest_exponent
@@ -238,3 +271,6 @@ def _draw(ax: Axes, found: BruteForce, label: str, colour: str) -> None:
         frequencies, *values.T, color=colour, label=label, linewidth=0.8, elinewidth=0.8,
         marker=".", markersize=4.0,
     )  # fmt: skip
+    ended = [hz for hz in frequencies if any(math.isclose(hz, other) for other in transients)]
+    heights = [largest[hz][0] for hz in ended]
+    ax.plot(ended, heights, "o", color=colour, markersize=5.0, markerfacecolor="white", zorder=3)

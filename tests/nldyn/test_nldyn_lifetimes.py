@@ -53,6 +53,7 @@ def _states(attractor: Attractor, count: int) -> np.ndarray:
 def test_rate_and_bound_are_those_of_a_poisson_process():
     found = ChaosLifetime(30.0, 1000, np.array([250, 500, 0, 0, -1, 0]))
     assert (found.count, found.lasting, found.settled, found.followed) == (6, 3, 2, 4750)
+    assert [found.lasting_for(n) for n in (249, 250, 499, 500, 1000)] == [5, 4, 4, 3, 3]
     assert found.escape_rate == pytest.approx(2 / 4750)
     # at the upper bound of the rate so few ends, unclear ones included, have a probability of 5 %
     assert poisson.cdf(3, found.largest_escape_rate * 4750) == pytest.approx(0.05)

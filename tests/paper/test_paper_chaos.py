@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from fakes import FakeDiagram, resonance
 
+import nldyn.paper.chaos
 import nldyn.paper.figures
 from nldyn import FlowMap, System
 from nldyn.attractors import Attractor
@@ -17,7 +18,8 @@ from nldyn.paper.chaos import (
     RANGE_HZ,
     Chaos,
     chaos_of,
-    claimed,
+    chaotic_places,
+    effort_at,
     submit_sweeps,
     write_chaos_figure,
 )
@@ -81,18 +83,39 @@ def test_a_range_does_not_agree_where_chaos_is_a_transient(chaos):
     assert "58-63 Hz: 9 of 11" in found.text and "it lasts at 9 of them" in found.text
 
 
-def test_lifetimes_are_asked_for_where_the_paper_says_chaos(chaos):
-    places = [(model, attractor.frequency_hz) for model, attractor in claimed(chaos.diagrams)]
+def test_lifetimes_are_asked_for_at_each_chaotic_frequency_longest_where_the_paper_says_chaos(
+    chaos,
+):
+    places = list(chaotic_places(chaos.diagrams))
     four = [hz for model, hz in places if model == "four_dof_xi_0.01"]
     assert four == [*np.arange(30.0, 37.1, 0.5), *np.arange(58.0, 62.1, 0.5)]
-    assert {model for model, _ in places} == {"two_dof_xi_0.01", "four_dof_xi_0.01"}
+    assert {model for model, _ in places} == set(MODELS)
+    assert effort_at("four_dof_xi_0.01", 58.0) == effort_at("two_dof_xi_0.01", 66.0) == (8, 5000)
+    assert effort_at("two_dof_xi_0.01", 58.0) == effort_at("four_dof_xi_0.001", 30.0) == (4, 1000)
 
 
 def test_damping_counts_flips_and_chaotic_frequencies(chaos):
     found = chaos.with_damping(Finding(holds=True, text="flips", note="counted; not decided"))
     assert found.holds
-    assert "two_dof: chaotic at 24 of 145 frequencies at ξ = 0.01, at 76 at 0.001" in found.text
+    text = "two_dof: chaotic at 24 of 145 frequencies at ξ = 0.01, lasting at 24; at 76 of 145 "
+    assert text + "frequencies at ξ = 0.001, lasting at 76" in found.text
     assert not chaos.with_damping(Finding(holds=False, text="flips")).holds
+
+
+def test_transients_do_not_count_for_the_damping(chaos):
+    ending = {model: [] for model in MODELS}
+    for xi, many in (("0.01", 1), ("0.001", 53)):  # of 24 and of 76
+        hz = np.linspace(20.0, 80.0, many)
+        ending[f"two_dof_xi_{xi}"] = [lives_at(f, 250, 250, 750, 1000) for f in hz]
+    ending["four_dof_xi_0.001"] = [lives_at(30.0, 250, 250, 250), lives_at(31.0, *([1250] * 8))]
+    found = Chaos(chaos.diagrams, ending)
+    assert found.transients("four_dof_xi_0.001") == set()  # three of eight, and none so soon
+    assert found.damping() == (
+        False,  # 23 and 23
+        "two_dof: chaotic at 24 of 145 frequencies at ξ = 0.01, lasting at 23; at 76 of 145 "
+        "frequencies at ξ = 0.001, lasting at 23; four_dof: chaotic at 24 of 145 frequencies at "
+        "ξ = 0.01, lasting at 24; at 76 of 145 frequencies at ξ = 0.001, lasting at 76",
+    )
 
 
 def test_the_rows_on_chaotic_ranges_are_decided(chaos, monkeypatch):
@@ -120,8 +143,16 @@ def test_chaotic_ranges_are_shaded(chaos, tmp_path, monkeypatch):
     assert left == [pytest.approx(29.75), pytest.approx(57.75)]
 
 
-def test_the_figure_shows_both_models_at_both_dampings(chaos, tmp_path):
-    write_chaos_figure(chaos, tmp_path)
+def test_the_figure_shows_both_models_at_both_dampings(chaos, tmp_path, monkeypatch):
+    lives = {model: [lives_at(hz, *([500] * 8)) for hz in (30.0, 60.0)] for model in MODELS}
+    axes = []
+    save = nldyn.paper.chaos.save_figure
+    monkeypatch.setattr(
+        nldyn.paper.chaos, "save_figure", lambda ax, stem: (axes.append(ax), save(ax, stem))
+    )
+    write_chaos_figure(Chaos(chaos.diagrams, lives), tmp_path)
+    hollow = [line for line in axes[0].lines if line.get_markerfacecolor() == "white"]
+    assert [line.get_xdata().tolist() for line in hollow] == [[30.0, 60.0]] * 2
     text = (tmp_path / "chaos.svg").read_text(encoding="utf-8")
     assert (tmp_path / "chaos.png").stat().st_size > 10000
     assert "svg" in text
@@ -135,4 +166,6 @@ def test_all_models_are_swept_both_ways_on_processes():
     for diagram in found.diagrams.values():
         places = [(column.direction, column.frequency_hz) for column in diagram.columns]
         assert places == [("up", 18.0), ("up", 90.0), ("down", 90.0), ("down", 18.0)]
-    assert found.lifetimes == {model: [] for model in MODELS}  # neither lies in a claimed range
+    chaotic = set(chaotic_places(found.diagrams))
+    assert chaotic == {(m, x.frequency_hz) for m, lives in found.lifetimes.items() for x in lives}
+    assert all(life.count == 4 for lives in found.lifetimes.values() for life in lives)
