@@ -282,11 +282,11 @@ def classify(
     check_bounded(flow.system, 2.0 * math.pi * frequency_hz)
     name = check_observe(flow.system, observe)
     state = starting_state(flow, start)
-    return attractor_from(flow, frequency_hz, state, name, options or AttractorOptions())
+    return attractor_from(flow, frequency_hz, name, options or AttractorOptions(), state)
 
 
 def attractor_from(
-    flow: FlowMap, frequency_hz: float, state: Real, observe: str, options: AttractorOptions
+    flow: FlowMap, frequency_hz: float, observe: str, options: AttractorOptions, state: Real
 ) -> Attractor:
     """As `classify`, from a state z."""
     omega = 2.0 * math.pi * frequency_hz
@@ -621,18 +621,8 @@ def find_attractors(
     else:
         check_whole("starts", starts, 1, MOST_STARTS)
         states = random_states(flow, omega, int(starts), seed)
-    task = partial(attractor_task, flow.system, flow.options, frequency_hz, name,
-                   options or AttractorOptions())  # fmt: skip
+    task = partial(attractor_from, flow, frequency_hz, name, options or AttractorOptions())
     return distinct(values_of(task, list(states), executor, progress))
-
-
-def attractor_task(
-    system: System, flow_options: object, hz: float, observe: str, options: AttractorOptions,
-    state: Real,
-) -> Attractor:  # fmt: skip
-    """As `attractor_from`, with what a computation elsewhere is given."""
-    flow = FlowMap(system, flow_options)  # type: ignore[arg-type]
-    return attractor_from(flow, hz, state, observe, options)
 
 
 def distinct(attractors: Sequence[Attractor]) -> list[Share]:

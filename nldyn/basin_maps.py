@@ -18,7 +18,6 @@ from nldyn.attractors import (
     Attractor,
     AttractorOptions,
     attractor_from,
-    attractor_task,
     find_attractors,
     same_attractor,
 )
@@ -410,14 +409,6 @@ def _settle_one(
                 return
 
 
-def _settle_task(
-    system: System, flow_options: object, omega: float, targets: Sequence[Target], longest: int,
-    states: Real,
-) -> Settled:  # fmt: skip
-    flow = FlowMap(system, flow_options)  # type: ignore[arg-type]
-    return settle(flow, omega, targets, longest, states)
-
-
 def basins(
     system: System | FlowMap,
     frequency_hz: float,
@@ -535,7 +526,7 @@ def basins(
     while len(left) and done < len(known):
         targets = [target_of(attractor) for attractor in known]
         pieces = [left[k : k + CELLS] for k in range(0, len(left), CELLS)]
-        task = partial(_settle_task, flow.system, flow.options, omega, targets, longest)
+        task = partial(settle, flow, omega, targets, longest)
         ends = values_of(task, [states[piece] for piece in pieces], executor, progress)
         for piece, settled in zip(pieces, ends, strict=True):
             labels[piece], states[piece] = settled.labels, settled.ends
@@ -543,11 +534,11 @@ def basins(
             periods[piece] += settled.periods
         done = len(known)
         left = order[labels[order] == UNDECIDED]
-        new = partial(attractor_task, flow.system, flow.options, frequency_hz, name, options)
+        new = partial(attractor_from, flow, frequency_hz, name, options)
         for attractor in values_of(new, list(states[left[:starts]]), executor):
             _add(known, attractor)
     checked = rng.choice(len(modal), min(checks, len(modal)), replace=False)
-    again = partial(_index_task, flow.system, flow.options, frequency_hz, name, options, known)
+    again = partial(_index_of, flow, frequency_hz, name, options, known)
     results = values_of(again, [flow.to_state(modal[cell]) for cell in checked], executor)
     wrong = sum(index != labels[cell] for cell, index in zip(checked, results, strict=True))
     counts = np.array([max(attractor.period, 1) for attractor in known] + [1])
@@ -608,13 +599,12 @@ def _add(known: list[Attractor], attractor: Attractor) -> None:
         known.append(attractor)
 
 
-def _index_task(
-    system: System, flow_options: object, hz: float, observe: str, options: AttractorOptions,
+def _index_of(
+    flow: FlowMap, hz: float, observe: str, options: AttractorOptions,
     known: Sequence[Attractor], state: Real,
 ) -> int:  # fmt: skip
     """Index among the known attractors of the one that a state leads to."""
-    flow = FlowMap(system, flow_options)  # type: ignore[arg-type]
-    found = attractor_from(flow, hz, state, observe, options)
+    found = attractor_from(flow, hz, observe, options, state)
     for index, attractor in enumerate(known):
         if same_attractor(found, attractor):
             return index

@@ -293,6 +293,10 @@ class FlowMap:
         self.system = system
         self.options = options or FlowOptions()
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what defines the map alone: a compiled law has another address elsewhere."""
+        return FlowMap, (self.system, self.options)
+
     @cached_property
     def tables(self) -> GaussTables:
         """Collocation tables."""

@@ -15,12 +15,11 @@ from scipy.stats import chi2
 from nldyn.attractors import Attractor, AttractorOptions, reached_orbit
 from nldyn.errors import SystemModelError, check_types, check_whole
 from nldyn.executors import check_execution, values_of
-from nldyn.flow import FlowMap, FlowOptions
+from nldyn.flow import FlowMap
 from nldyn.linear import Real
 from nldyn.lyapunov import spectrum_from
 from nldyn.orbit import ConvergenceError, check_observe
 from nldyn.simulation import MOST_PERIODS
-from nldyn.system import System
 
 LOOK = 250  # periods between two looks whether a motion has settled
 LAST = 500  # periods at the end over which exponents tell whether it is chaotic still
@@ -195,16 +194,15 @@ def chaos_lifetime(
     check_whole("chaos_lifetime: periods", periods, 2 * LAST, MOST_PERIODS)
     flow = attractor.flow
     picked = np.linspace(0, len(attractor.states) - 1, states).round().astype(int)
-    task = partial(_ended, flow.system, flow.options, attractor.frequency_hz, periods)
+    task = partial(_ended, flow, attractor.frequency_hz, periods)
     ended = values_of(task, list(attractor.states[picked]), executor, progress)
     return ChaosLifetime(attractor.frequency_hz, periods, np.array(ended, dtype=np.int64))
 
 
-def _ended(system: System, flow_options: FlowOptions, hz: float, periods: int, state: Real) -> int:
+def _ended(flow: FlowMap, hz: float, periods: int, state: Real) -> int:
     """Periods after which a motion from a state z was found on a stable orbit, or a mark."""
-    flow = FlowMap(system, flow_options)
     omega = 2.0 * math.pi * hz
-    observe = check_observe(system, None)
+    observe = check_observe(flow.system, None)
     longest = AttractorOptions().max_period
     for before in range(0, periods - LAST, LOOK):
         found = flow.strobe(state, omega, min(LOOK, periods - LAST - before))

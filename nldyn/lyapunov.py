@@ -14,7 +14,7 @@ import numpy as np
 from nldyn._growth import growth_rates
 from nldyn.errors import SystemModelError, check_whole
 from nldyn.executors import check_execution, values_of
-from nldyn.flow import FlowMap, FlowOptions, flow_of
+from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, contact_damping
 from nldyn.simulation import MOST_PERIODS, cases_at, is_list, transient_end
@@ -224,22 +224,16 @@ def lyapunov_exponents(
     check_whole("periods", periods, 2 * FEWEST_BLOCKS, MOST_PERIODS)
     cases = cases_at(flow, frequency_hz, start)
     if is_list(frequency_hz):
-        task = partial(_spectrum_task, flow.system, flow.options, transient, periods)
+        task = partial(_spectrum_after, flow, transient, periods)
         return values_of(task, cases, executor, progress)
-    return _spectrum_after(flow, *cases[0], transient, periods)
-
-
-def _spectrum_task(
-    system: System, flow_options: FlowOptions, transient: int, periods: int,
-    case: tuple[float, Real],
-) -> LyapunovSpectrum:  # fmt: skip
-    return _spectrum_after(FlowMap(system, flow_options), *case, transient, periods)
+    return _spectrum_after(flow, transient, periods, cases[0])
 
 
 def _spectrum_after(
-    flow: FlowMap, frequency_hz: float, start: Real, transient: int, periods: int
+    flow: FlowMap, transient: int, periods: int, case: tuple[float, Real]
 ) -> LyapunovSpectrum:
-    """Exponents of the motion from a state z, a transient left out."""
+    """Exponents of the motion at a frequency in Hz from a state z, a transient left out."""
+    frequency_hz, start = case
     omega = 2.0 * math.pi * frequency_hz
     state, failure = transient_end(flow, start, omega, transient)
     if state is None:

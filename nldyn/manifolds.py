@@ -13,11 +13,10 @@ from nldyn.basin_maps import UNDECIDED, Basins, Plane, Target, settle, target_of
 from nldyn.branch import same_orbit, stroboscopic
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.executors import check_execution, values_of
-from nldyn.flow import FlowMap, FlowOptions
+from nldyn.flow import FlowMap
 from nldyn.linear import Real
 from nldyn.orbit import Orbit, near_returns
 from nldyn.search import orbit_near
-from nldyn.system import System
 
 NEWTON_STEPS = 12
 STEP_HALVINGS = 10
@@ -105,20 +104,18 @@ def stable_manifold(
         )
     count = orbit.period if min(orbit.multipliers.real) > 0.0 else 2 * orbit.period
     budget = max_points // (2 * orbit.period)
-    task = partial(
-        _piece_task, flow.system, flow.options, orbit.omega, count, plane, resolution, budget
-    )
+    task = partial(_piece, flow, orbit.omega, count, plane, resolution, budget)
     sides = [(state, side) for state in stroboscopic(orbit) for side in (1.0, -1.0)]
     return values_of(task, sides, executor, progress)
 
 
-def _piece_task(
-    system: System, flow_options: FlowOptions, omega: float, count: int, plane: Plane,
-    resolution: float, budget: int, begin: tuple[Real, float],
+def _piece(
+    flow: FlowMap, omega: float, count: int, plane: Plane, resolution: float, budget: int,
+    begin: tuple[Real, float],
 ) -> Real:  # fmt: skip
     """The piece of a stable manifold on one side of a saddle's state z."""
     state, side = begin
-    inverse = _Inverse(FlowMap(system, flow_options), omega, count, plane)
+    inverse = _Inverse(flow, omega, count, plane)
     middle = inverse.to_plane(state)
     values, vectors = np.linalg.eig(inverse.jacobian(middle))
     stable = int(np.argmin(np.abs(values)))
@@ -323,7 +320,7 @@ def basin_edge(
         (flow.to_state(np.array([modal[i, j], modal[k, m]])), int(found.labels[i, j]))
         for (i, j), (k, m) in picked
     ]
-    task = partial(_edge_task, flow.system, flow.options, omega, targets, longest, width, observe)
+    task = partial(_edge_point, flow, omega, targets, longest, width, observe)
     points: list[Real] = []
     saddles: list[Orbit] = []
     for middle, orbit in values_of(task, pieces, executor, progress):
@@ -333,12 +330,11 @@ def basin_edge(
     return np.array(points), saddles
 
 
-def _edge_task(
-    system: System, flow_options: FlowOptions, omega: float, targets: Sequence[Target],
-    longest: int, width: float, observe: str, piece: tuple[Real, int],
+def _edge_point(
+    flow: FlowMap, omega: float, targets: Sequence[Target], longest: int, width: float,
+    observe: str, piece: tuple[Real, int],
 ) -> tuple[Real, Orbit | None]:  # fmt: skip
     """Modal state between two states z of different basins, and the saddle it leads to."""
-    flow = FlowMap(system, flow_options)
     ends, label = piece
     low, high = _bisected(flow, omega, targets, longest, ends, label, width)
     return flow.to_modal(0.5 * (low + high)), _lingering(flow, omega, targets, low, observe)

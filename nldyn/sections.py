@@ -240,30 +240,26 @@ def brute_force(
     ]
     if starts:
         tasks += [("random", frequencies[k : k + 8]) for k in range(0, points, 8)]
-    task = partial(
-        _columns, flow.system, flow.options, name, options or AttractorOptions(), recorded, starts,
-        seed,
-    )  # fmt: skip
+    task = partial(_columns, flow, name, options or AttractorOptions(), recorded, starts, seed)
     found = values_of(task, tasks, executor, progress)
     return BruteForce(name, tuple(column for columns in found for column in columns))
 
 
 def _columns(
-    system: System, flow_options: object, observe: str, options: AttractorOptions, recorded: int,
-    starts: int, seed: int, task: tuple[Direction, list[float]],
+    flow: FlowMap, observe: str, options: AttractorOptions, recorded: int, starts: int, seed: int,
+    task: tuple[Direction, list[float]],
 ) -> list[Column]:  # fmt: skip
     """Columns of one sweep, or from random states."""
-    flow = FlowMap(system, flow_options)  # type: ignore[arg-type]
     direction, frequencies = task
     columns = []
-    state = np.zeros(2 * system.size)
+    state = np.zeros(2 * flow.system.size)
     for hz in frequencies:
         if direction == "random":
             fresh = random_states(flow, 2.0 * math.pi * hz, starts + 1, seed)[1:]
         else:
             fresh = state[None]
         for start in fresh:
-            attractor = attractor_from(flow, hz, start, observe, options)
+            attractor = attractor_from(flow, hz, observe, options, start)
             columns.append(column_of(direction, attractor, observe, recorded))
             failed = attractor.kind == "failed"
             state = np.zeros_like(state) if failed else attractor.states[-1]

@@ -19,7 +19,7 @@ from nldyn.errors import (
     shown,
 )
 from nldyn.executors import check_execution, values_of
-from nldyn.flow import FlowMap, FlowOptions, Trajectory, flow_of
+from nldyn.flow import FlowMap, Trajectory, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import (
     ConvergenceError,
@@ -341,9 +341,9 @@ def simulate(
     check_whole("transient", transient, 0, MOST_PERIODS)
     cases = cases_at(flow, frequency_hz, start)
     if is_list(frequency_hz):
-        task = partial(_simulate_task, flow.system, flow.options, periods, transient)
+        task = partial(_simulated, flow, periods, transient)
         return values_of(task, cases, executor, progress)
-    return _simulated(flow, *cases[0], periods, transient)
+    return _simulated(flow, periods, transient, cases[0])
 
 
 def is_list(value: object) -> bool:
@@ -377,17 +377,9 @@ def _starts(flow: FlowMap, start: Real | None, count: int) -> list[Real]:
     return [starting_state(flow, row) for row in modal]
 
 
-def _simulate_task(
-    system: System, flow_options: FlowOptions, periods: int, transient: int,
-    case: tuple[float, Real],
-) -> Motion:  # fmt: skip
-    return _simulated(FlowMap(system, flow_options), *case, periods, transient)
-
-
-def _simulated(
-    flow: FlowMap, frequency_hz: float, state: Real, periods: int, transient: int
-) -> Motion:
-    """The motion from a state z at phase zero."""
+def _simulated(flow: FlowMap, periods: int, transient: int, case: tuple[float, Real]) -> Motion:
+    """The motion at a frequency in Hz from a state z at phase zero."""
+    frequency_hz, state = case
     omega = 2.0 * math.pi * frequency_hz
     before, failure = transient_end(flow, state, omega, transient)
     if before is None:
@@ -550,25 +542,16 @@ def sweep(
         _chirp_count(*ends, rate_hz_per_s, steps_per_period)
     cases = list(zip(ranges, _starts(flow, start, len(ranges)), strict=True))
     if several:
-        task = partial(
-            _sweep_task, flow.system, flow.options, float(rate_hz_per_s), steps_per_period
-        )
+        task = partial(_swept, flow, float(rate_hz_per_s), steps_per_period)
         return values_of(task, cases, executor, progress)
-    return _swept(flow, *cases[0], float(rate_hz_per_s), steps_per_period)
-
-
-def _sweep_task(
-    system: System, flow_options: FlowOptions, rate: float, steps: int,
-    case: tuple[tuple[float, float], Real],
-) -> Motion:  # fmt: skip
-    return _swept(FlowMap(system, flow_options), *case, rate, steps)
+    return _swept(flow, float(rate_hz_per_s), steps_per_period, cases[0])
 
 
 def _swept(
-    flow: FlowMap, range_hz: tuple[float, float], state: Real, rate: float, steps: int
+    flow: FlowMap, rate: float, steps: int, case: tuple[tuple[float, float], Real]
 ) -> Motion:
-    """The sweep from a state z at phase zero."""
-    first, last = range_hz
+    """The sweep over a range in Hz from a state z at phase zero."""
+    (first, last), state = case
     phases, times = chirp_steps(first, last, rate, steps)
     slope = math.copysign(rate, last - first)
     stretches = []

@@ -29,3 +29,8 @@ def frequencies(system: System) -> dict[str, float]:
     if system.stops[0].gap > 0.9e-3:
         raise ValueError("the gap is too large")
     return {"f1_hz": system.frequencies_hz[0], "gap": system.stops[0].gap}
+
+
+def lossy_spring(depth: float, speed: float) -> tuple[float, float, float]:
+    """A law of the user's own: 5e7 N/m, with a force that grows with the speed."""
+    return 5e7 * depth * (1.0 + 0.1 * speed), 5e7 * (1.0 + 0.1 * speed), 5e6 * depth

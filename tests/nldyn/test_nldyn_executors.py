@@ -16,11 +16,14 @@ from one_dof import make_one_dof
 from nldyn import (
     FlowMap,
     Plane,
+    Stop,
     SystemModelError,
     TaskError,
     basin_edge,
     basins,
     brute_force,
+    classify,
+    contact_measures,
     executors,
     find_attractors,
     impacts,
@@ -239,6 +242,25 @@ def test_processes_give_the_same_numbers(alone):
     with processes(2) as pool:
         for compute in LISTS:
             assert_same_numbers(alone[compute], compute(pool, None))
+
+
+def test_a_law_of_ones_own_goes_to_another_process_and_back():
+    """Its machine code lies elsewhere there: what is sent must not hold its address."""
+    stop = Stop("middle", 5e7, 1.0, law=cluster_tasks.lossy_spring)
+    system = make_one_dof(stops=[stop])
+    here = classify(system, 50.0)
+    contact_measures(here)  # compiles the law
+    with processes(1) as pool:
+        [there] = [
+            share.attractor for share in find_attractors(system, 50.0, starts=1, executor=pool)
+        ]
+        measured = measures_table([here, there], executor=pool)
+    assert set(vars(there.flow)) <= {"system", "options"}  # nothing that was compiled
+    assert there.name == here.name == "period 2"
+    assert contact_measures(there) == contact_measures(here)
+    assert (
+        measured["peak_force"][0] == measured["peak_force"][1] == contact_measures(here).peak_force
+    )
 
 
 def test_a_list_of_one_is_what_the_single_call_gives():
