@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 import scipy.linalg as sla
@@ -293,11 +293,15 @@ class Target:
     def reached(self, strobe: Real) -> NDArray[np.int64]:
         """Index of the state that each of the states (m, 2n) is near to, or -1."""
         if self.shapes is None:
-            distance = np.asarray(cKDTree(self.states).query(strobe)[0])
+            distance = np.asarray(self._tree.query(strobe)[0])
             return np.where(distance <= self.reach, 0, UNDECIDED)
         off = strobe[:, None, :] - self.states[None]
         near = np.einsum("mki,kij,mkj->mk", off, self.shapes, off) < 1.0
         return np.where(near.any(axis=1), near.argmax(axis=1), UNDECIDED)
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.states)
 
 
 def target_of(attractor: Attractor) -> Target:

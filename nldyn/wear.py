@@ -19,7 +19,7 @@ from nldyn.contacts import check_stop, impacts, panel_table
 from nldyn.errors import SystemModelError, check_choice, check_types, check_whole
 from nldyn.executors import check_execution, values_of
 from nldyn.fourier import modal_row
-from nldyn.linear import Real
+from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
 from nldyn.sections import BruteForce
 from nldyn.simulation import MOST_PERIODS, Motion, motion_of
@@ -268,22 +268,31 @@ def spectra_table(
     >>> bool(abs(table["order_1"][0] / orbit.max_abs_displacement - 1.0) < 1e-6)
     True
     """
-    found = _spectra("spectra_table", sources, point, orders, periods, executor, progress)
-    columns = {
-        "frequency_hz": np.array([lines.frequency_hz for lines in found]),
-        "attractor": np.array([lines.attractor for lines in found]),
-        "stable": np.array([lines.stable for lines in found]),
-        "mean": np.array([lines.mean for lines in found]),
+    check_whole("spectra_table: orders", orders, 1, MOST_ORDERS)
+    harmonics = partial(_harmonics, orders=orders)
+    found = _spectra(harmonics, sources, point, orders, periods, executor, progress)
+    values = np.array([spectrum.values for spectrum in found]).reshape(-1, orders + 2)
+    names = ["mean", *(f"order_{k}" for k in range(1, orders + 1)), "rest"]
+    return {
+        "frequency_hz": np.array([spectrum.frequency_hz for spectrum in found]),
+        "attractor": np.array([spectrum.attractor for spectrum in found]),
+        "stable": np.array([spectrum.stable for spectrum in found]),
+        **dict(zip(names, values.T, strict=True)),
     }
-    harmonics = [lines.square[lines.turns :: lines.turns][:orders] for lines in found]
-    for k in range(orders):
-        columns[f"order_{k + 1}"] = np.sqrt([2.0 * squares[k] for squares in harmonics])
-    others = [
-        lines.square[1:].sum() - squares.sum()
-        for lines, squares in zip(found, harmonics, strict=True)
-    ]
-    columns["rest"] = np.sqrt(np.maximum(others, 0.0))
-    return columns
+
+
+def _harmonics(phasors: Complex, turns: int, orders: int) -> Real:
+    """Mean, amplitudes of the orders, and the r.m.s. of all else."""
+    amplitudes = 2.0 * np.abs(phasors[turns : turns * orders + 1 : turns])
+    rest = float(_squares(phasors)[1:].sum()) - 0.5 * float(amplitudes @ amplitudes)
+    return np.array([phasors[0].real, *amplitudes, math.sqrt(max(rest, 0.0))])
+
+
+def _squares(phasors: Complex) -> Real:
+    """Mean squares of the lines of a real Fourier transform of an even number of samples."""
+    squares = np.asarray(2.0 * np.abs(phasors) ** 2)
+    squares[[0, -1]] *= 0.5  # these two have no twin
+    return squares
 
 
 @dataclass(frozen=True, eq=False)
@@ -364,62 +373,68 @@ def spectra_map(
     >>> int(found.rms[0, 1:].argmax())                # half of the excitation frequency
     0
     """
+    check_whole("spectra_map: orders", orders, 1, MOST_ORDERS)
     check_whole("spectra_map: parts", parts, 1, MOST_ORDERS)
-    found = _spectra("spectra_map", sources, point, orders, periods, executor, progress)
     count = orders * parts + 1
-    rms, rest = np.empty((len(found), count)), np.empty(len(found))
-    for k, lines in enumerate(found):
-        band = np.rint(np.arange(lines.square.size) * (parts / lines.turns)).astype(int)
-        squares = np.bincount(band, lines.square, minlength=count)
-        rms[k], rest[k] = np.sqrt(squares[:count]), math.sqrt(squares[count:].sum())
+    bands = partial(_bands, parts=parts, count=count)
+    found = _spectra(bands, sources, point, orders, periods, executor, progress)
+    values = np.array([spectrum.values for spectrum in found]).reshape(-1, count + 1)
     return SpectraMap(
-        np.array([lines.frequency_hz for lines in found]),
-        np.array([lines.attractor for lines in found], dtype=str),
-        np.array([lines.stable for lines in found], dtype=bool),
+        np.array([spectrum.frequency_hz for spectrum in found]),
+        np.array([spectrum.attractor for spectrum in found], dtype=str),
+        np.array([spectrum.stable for spectrum in found], dtype=bool),
         np.arange(count) / parts,
-        rms,
-        rest,
+        values[:, :-1],
+        values[:, -1],
     )
 
 
+def _bands(phasors: Complex, turns: int, parts: int, count: int) -> Real:
+    """Roots of the mean squares in so many bands and above them."""
+    band = np.rint(np.arange(phasors.size) * (parts / turns)).astype(int)
+    return np.sqrt(np.bincount(np.minimum(band, count), _squares(phasors), minlength=count + 1))
+
+
 @dataclass(frozen=True, eq=False)
-class _Lines:
-    """Mean squares (m,) at multiples of 1/turns of the excitation frequency; signed mean."""
+class _Spectrum:
+    """What is wanted of the spectrum of one motion."""
 
     frequency_hz: float
     attractor: str
     stable: bool
-    turns: int
-    mean: float
-    square: Real
+    values: Real
 
 
 def _spectra(
-    caller: str,
+    wanted: Callable[[Complex, int], Real],
     sources: Source | Iterable[Source],
     point: str | Real | None,
     orders: int,
     periods: int,
     executor: Executor | None,
     progress: Callable[[int, int], None] | None,
-) -> list[_Lines]:
-    """Spectra of all sources, ascending in frequency, after all input is checked."""
+) -> list[_Spectrum]:
+    """What is wanted of the spectra of all sources, ascending in frequency."""
     check_execution(executor, progress)
-    check_whole(f"{caller}: orders", orders, 1, MOST_ORDERS)
-    check_whole(f"{caller}: periods", periods, 1, MOST_PERIODS)
+    check_whole("periods", periods, 1, MOST_PERIODS)
     chosen = _sources(sources)
     for source in chosen:
         modal_row(_system_of(source), point)
         if isinstance(source, Motion):
             _constant_omega(source)
-    task = partial(_lines, point=point, orders=orders, periods=periods)
-    return sorted(values_of(task, chosen, executor, progress), key=lambda lines: lines.frequency_hz)
+    task = partial(_spectrum, wanted, point, orders, periods)
+    found = values_of(task, chosen, executor, progress)
+    return sorted(found, key=lambda spectrum: spectrum.frequency_hz)
 
 
-def _lines(
-    source: Orbit | Motion | Attractor, point: str | Real | None, orders: int, periods: int
-) -> _Lines:
-    """Spectrum over a whole number of excitation periods."""
+def _spectrum(
+    wanted: Callable[[Complex, int], Real],
+    point: str | Real | None,
+    orders: int,
+    periods: int,
+    source: Orbit | Motion | Attractor,
+) -> _Spectrum:
+    """What is wanted of the Fourier coefficients over a whole number of excitation periods."""
     motion, name, stable = _motion_on(source, periods)
     row = modal_row(motion.system, point)
     hz = _constant_omega(motion) / (2.0 * math.pi)
@@ -429,11 +444,7 @@ def _lines(
     count = SAMPLES * math.ceil(orders / 32)
     times = motion.start_time + np.arange(turns * count) / (count * hz)
     y = motion.states(times)[:, : row.size] @ row
-    phasors = np.fft.rfft(y) / y.size
-    square = 2.0 * np.abs(phasors) ** 2
-    square[0] /= 2.0  # the mean, and at an even number of samples the last one, have no twin
-    square[-1] /= 2.0
-    return _Lines(hz, name, stable, turns, float(phasors[0].real), square)
+    return _Spectrum(hz, name, stable, wanted(np.fft.rfft(y) / y.size, turns))
 
 
 def _motion_on(source: Orbit | Motion | Attractor, periods: int) -> tuple[Motion, str, bool]:
