@@ -28,7 +28,7 @@ from nldyn.system import System
 MOST_SAMPLES = 10**6  # in a period
 MOST_ORDERS = 1000
 SAMPLES = 512  # in a period, for each 32 orders of a spectrum
-Source = BruteForce | Branch | Orbit | Motion | Attractor
+Source = Orbit | Motion | Attractor | BruteForce | Branch
 UNITS = {
     "frequency_hz": "Hz",
     "attractor": "",

@@ -74,8 +74,7 @@ def test_lifetimes_drawn_at_a_known_rate_are_covered_by_the_bound():
 
 def test_what_has_settled_is_found_settled(lasting):
     orbit = classify(make_one_dof(), 50.0)
-    system, options = orbit.flow.system, orbit.flow.options
-    assert _ended(system, options, 50.0, 1000, orbit.states[0]) == 250
+    assert _ended(orbit.flow, 50.0, 1000, orbit.states[0]) == 250
 
 
 @pytest.mark.parametrize(
