@@ -21,7 +21,14 @@ from nldyn.linear import Real
 from nldyn.lyapunov import LyapunovSpectrum, spectrum_from
 from nldyn.orbit import ConvergenceError, Orbit, check_bounded, check_observe
 from nldyn.search import orbit_near, random_states
-from nldyn.simulation import MOST_PERIODS, Motion, simulate, starting_state, transient_end
+from nldyn.simulation import (
+    MOST_PERIODS,
+    MOST_RECORDED,
+    Motion,
+    simulate,
+    starting_state,
+    transient_end,
+)
 from nldyn.system import System, numbers
 
 Kind = Literal["periodic", "quasi-periodic", "chaotic", "drifting", "undecided", "failed"]
@@ -208,7 +215,7 @@ class Attractor:
 
     def motion(self, periods: int = 64) -> Motion:
         """The motion on the attractor, recorded over some excitation periods."""
-        check_whole("periods", periods, 1, MOST_PERIODS)
+        check_whole("periods", periods, 1, MOST_RECORDED)
         if periods not in self._cache:
             start = self.flow.to_modal(self.states[-1])
             self._cache[periods] = simulate(self.flow, self.frequency_hz, periods, start=start)

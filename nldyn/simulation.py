@@ -33,7 +33,8 @@ from nldyn.system import System, numbers
 
 BLOCK = 64  # periods recorded in one call
 PIECE = 2000  # periods of a transient in one call: between two, Ctrl-C is answered
-MOST_STEPS = 10**7  # of a sweep
+MOST_STEPS = 10**6  # of a sweep, and
+MOST_RECORDED = 10**6  # periods of a recorded motion: 1 to 5 kB each with 1 to 4 modes
 MOST_PERIODS = 10**8
 
 
@@ -299,7 +300,7 @@ def simulate(
         Excitation frequency in Hz. A list of them gives a list of motions, each a computation of
         its own.
     periods : int
-        Excitation periods to record.
+        Excitation periods to record, at most a million: all of the motion is kept.
     start : (2n,) or (k, 2n) array, optional
         Modal displacements and velocities at forcing phase zero; at rest unless given. One for
         all, or one for each frequency.
@@ -337,7 +338,7 @@ def simulate(
     """
     flow = flow_of(system)
     check_execution(executor, progress)
-    check_whole("periods", periods, 1, MOST_PERIODS)
+    check_whole("periods", periods, 1, MOST_RECORDED)
     check_whole("transient", transient, 0, MOST_PERIODS)
     cases = cases_at(flow, frequency_hz, start)
     if is_list(frequency_hz):
@@ -511,7 +512,7 @@ def sweep(
     Raises
     ------
     SystemModelError
-        For input that makes no sense, or a sweep of more than ten million steps.
+        For input that makes no sense, or a sweep of more than a million steps.
     ConvergenceError
         If the motion fails at once.
     TaskError

@@ -22,7 +22,7 @@ from nldyn.fourier import modal_row
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
 from nldyn.sections import BruteForce
-from nldyn.simulation import MOST_PERIODS, Motion, motion_of
+from nldyn.simulation import MOST_RECORDED, Motion, motion_of
 from nldyn.system import System
 
 MOST_SAMPLES = 10**6  # in a period
@@ -124,7 +124,7 @@ def contact_measures(
     '119.4 N, 25.3 impacts per second'
     """
     check_types(source=(source, Orbit, Motion, Attractor))
-    check_whole("contact_measures: periods", periods, 1, MOST_PERIODS)
+    check_whole("contact_measures: periods", periods, 1, MOST_RECORDED)
     check_stop(_system_of(source), stop)
     if isinstance(source, Attractor):
         if source.kind == "failed":
@@ -188,7 +188,7 @@ def measures_table(
         If the measures of a source cannot be computed.
     """
     check_execution(executor, progress)
-    check_whole("measures_table: periods", periods, 1, MOST_PERIODS)
+    check_whole("measures_table: periods", periods, 1, MOST_RECORDED)
     chosen = _sources(sources)
     for source in chosen:
         check_stop(_system_of(source), stop)
@@ -416,7 +416,7 @@ def _spectra(
 ) -> list[_Spectrum]:
     """What is wanted of the spectra of all sources, ascending in frequency."""
     check_execution(executor, progress)
-    check_whole("periods", periods, 1, MOST_PERIODS)
+    check_whole("periods", periods, 1, MOST_RECORDED)
     chosen = _sources(sources)
     for source in chosen:
         modal_row(_system_of(source), point)

@@ -144,3 +144,13 @@ def test_an_empty_list_of_initial_states_and_a_huge_plane_are_refused(given):
         find_attractors(given["system"], 30.0, starts=[])
     with pytest.raises(SystemModelError, match="shape may have up to 10000000 cells"):
         basins(given["system"], 50.0, given["plane"], shape=(10**6, 10**6))
+
+
+def test_a_motion_too_long_to_keep_is_refused(given):
+    for call in (simulate, lambda s, hz, n: contact_measures(given["motion"], periods=n)):
+        with pytest.raises(
+            SystemModelError, match="periods must be a whole number from 1 to 1000000"
+        ):
+            call(given["system"], 30.0, 10**6 + 1)
+    with pytest.raises(SystemModelError, match="takes 10000000 steps of constant frequency"):
+        sweep(given["system"], (20.0, 30.0), 1e-4)
