@@ -34,7 +34,7 @@ from nldyn.executors import check_execution, values_of
 from nldyn.flow import FlowMap, chain, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import Orbit, check_bounded, check_observe
-from nldyn.system import System, numbers
+from nldyn.system import System, numbers, same_system
 
 CHUNK = 16  # periods between two looks at where a motion is
 CELLS = 250  # initial states in one computation
@@ -579,20 +579,8 @@ def _check_known(attractors: Sequence[Attractor], system: System, frequency_hz: 
                 f"attractors: entry {k} is one at {attractor.frequency_hz:g} Hz, but the basins "
                 f"are asked for at {frequency_hz:g} Hz"
             )
-        if not _same_system(attractor.flow.system, system):
+        if not same_system(attractor.flow.system, system):
             raise SystemModelError(f"attractors: entry {k} is one of another system")
-
-
-def _same_system(a: System, b: System) -> bool:
-    return a is b or (
-        np.array_equal(a.natural_frequencies, b.natural_frequencies)
-        and np.array_equal(a.damping, b.damping)
-        and list(a.participation) == list(b.participation)
-        and all(
-            np.array_equal(a.participation[name], b.participation[name]) for name in a.interfaces
-        )
-        and (a.stops, a.dampers, a.excitation) == (b.stops, b.dampers, b.excitation)
-    )
 
 
 def _add(known: list[Attractor], attractor: Attractor) -> None:

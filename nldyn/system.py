@@ -407,6 +407,26 @@ def _by_interface(name: str, vectors: Mapping[str, ArrayLike]) -> Mapping[str, A
     return vectors
 
 
+def same_system(a: System, b: System) -> bool:
+    """Whether two systems have the same numbers, interfaces and laws.
+
+    Examples
+    --------
+    >>> twins = [System.from_modal([13.1], {"middle": [0.635]}) for _ in range(2)]
+    >>> same_system(*twins), same_system(twins[0], System.from_modal([13.1], {"middle": [0.6]}))
+    (True, False)
+    """
+    return a is b or (
+        np.array_equal(a.natural_frequencies, b.natural_frequencies)
+        and np.array_equal(a.damping, b.damping)
+        and a.interfaces == b.interfaces
+        and all(
+            np.array_equal(a.participation[name], b.participation[name]) for name in a.interfaces
+        )
+        and (a.stops, a.dampers, a.excitation) == (b.stops, b.dampers, b.excitation)
+    )
+
+
 def numbers(name: str, values: ArrayLike) -> Real:
     """An array of finite floats, or a SystemModelError under the name."""
     try:
