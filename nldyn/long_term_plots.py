@@ -17,7 +17,7 @@ from nldyn.attractors import Attractor
 from nldyn.basin_maps import UNDECIDED, Basins
 from nldyn.branch import Branch, check_branches, stroboscopic
 from nldyn.diagrams import Diagram
-from nldyn.errors import SystemModelError, check_choice, check_positive, check_types, shown
+from nldyn.errors import SystemModelError, check_choice, check_types, is_finite, shown
 from nldyn.linear import Real
 from nldyn.orbit import check_observe
 from nldyn.plot import (
@@ -54,6 +54,7 @@ QUANTITIES = {
     "impact phase": "forcing phase of impacts",
 }
 WEAR_MARKS = "o^sDv"  # of measures, in their order: all can be hollow
+MOST_DECADES = 16  # beyond the digits of a number
 UNITS = {name: factor for factor, name in PREFIXES}
 
 
@@ -461,7 +462,10 @@ def plot_spectra(
     """
     check_types(found=(found, SpectraMap), ax=(ax, Axes, None))
     check_choice("scale", scale, ("frequency", "order"))
-    check_positive("decades", decades)
+    if not (is_finite(decades) and 0.0 < decades <= MOST_DECADES):
+        raise SystemModelError(
+            f"decades must lie above 0 and up to {MOST_DECADES}, got {shown(decades)}"
+        )
     if unit is not None:
         check_choice("unit", unit, UNITS)
     largest = float(found.rms[:, 1:].max(initial=0.0))

@@ -502,7 +502,8 @@ def test_spectra_map_is_drawn_in_columns_of_the_motions(one_dof):
     assert plot_spectra(found, scale="order").get_ylim() == (0.0, 3.25)
     for bad, text in (
         ({"found": spectra_map([])}, "no motion"),
-        ({"found": found, "decades": 0.0}, "decades must be"),
+        ({"found": found, "decades": 0.0}, "decades must lie"),
+        ({"found": found, "decades": 400}, "decades must lie"),
         ({"found": found, "scale": "time"}, "scale must be one of"),
         ({"found": found, "unit": "km"}, "unit must be one of"),
     ):
