@@ -44,7 +44,7 @@ CLAIMS = {"fig4.chaos": "two_dof_xi_0.01", "fig7.chaos": "four_dof_xi_0.01"}
 FIGURE = "chaos"
 CAPTION = (
     "Largest Lyapunov exponents: the damping reduces the chaotic ranges "
-    f"(hollow: chaos that ends within {ELSEWHERE[1]} periods more)"
+    f"(hollow: chaos that does not last for {ELSEWHERE[1]} periods more)"
 )
 
 
@@ -101,9 +101,10 @@ class Chaos:
         )
 
     def transients(self, model: str) -> set[float]:
-        """Frequencies in Hz at which chaos ends: half of the motions or more within 1000 periods.
+        """Frequencies in Hz at which chaos does not last for 1000 periods, for half of the motions.
 
-        That is as long as motions are followed at every frequency (`ELSEWHERE`).
+        So long motions are followed at every frequency (`ELSEWHERE`). One that is neither settled
+        nor chaotic at the end has not lasted.
         """
         return {
             life.frequency_hz
@@ -114,7 +115,7 @@ class Chaos:
     def damping(self) -> tuple[bool, str]:
         """Whether more damping leaves fewer chaotic frequencies in both models, and the numbers.
 
-        Frequencies at which chaos ends do not count.
+        Frequencies at which chaos does not last do not count.
         """
         smaller, texts = True, []
         for model in NAMES:
