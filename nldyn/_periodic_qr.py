@@ -246,7 +246,7 @@ def deflate_all(A, values, exponents):
         elif not split_at_zero(A, lo, hi, 16.0 * EPS if steps > PATIENCE else 0.0):
             if steps == MAX_STEPS:
                 return squeeze, False
-            double_step(A, lo, hi, steps % 40 == 39)
+            double_step(A, lo, hi, steps % 10 == 5, steps % 40 == 39)
             steps += 1
     return squeeze, True
 
@@ -354,9 +354,13 @@ def pair(A, lo, values, exponents):
 
 
 @inner
-def double_step(A, lo, hi, exceptional):
-    """An implicit QR step with two shifts on the diagonal blocks from `lo` to `hi`."""
-    x, y, z = start_of_step(A, lo, hi)
+def double_step(A, lo, hi, unshifted, exceptional):
+    """An implicit QR step with two shifts on the diagonal blocks from `lo` to `hi`.
+
+    Where eigenvalues differ by more than rounding, steps with the larger ones as shifts carry a
+    tiny one upwards without end; without shifts one step puts it below the others.
+    """
+    x, y, z = start_of_step(A, lo, hi, unshifted)
     size = max(abs(x), abs(y), abs(z))
     if exceptional or not 1e-250 < size < 1e250:
         x, y, z, size = 1.0, 0.7, -0.4, 1.0
@@ -373,7 +377,7 @@ def double_step(A, lo, hi, exceptional):
 
 
 @inner
-def start_of_step(A, lo, hi):
+def start_of_step(A, lo, hi, unshifted):
     """First column of (M - σ₁)(M - σ₂), of any length, for the product M and its shifts σ."""
     h = A.shape[0] - 1
     T, exponent = corner(A, lo, lo + 1)
@@ -383,6 +387,8 @@ def start_of_step(A, lo, hi):
     d = A[h, lo + 1, lo] * T[0, 1] + A[h, lo + 1, lo + 1] * T[1, 1]
     e = A[h, lo + 2, lo + 1] * T[1, 1]
     real, imaginary, power = shifts(A, hi)
+    if unshifted:
+        real, imaginary, power = 0.0, 0.0, exponent
     power = int(min(max(power - exponent, -2000.0), 2000.0))
     if power > 0:
         a, b = math.ldexp(a, -power), math.ldexp(b, -power)

@@ -135,11 +135,6 @@ def uncertainties(jacobians: Real, found: Spectrum, error: float) -> Real:
     (n,) array
         Infinite for multipliers of which nothing is known.
 
-    Raises
-    ------
-    MultiplierError
-        If the multipliers cannot be computed.
-
     Examples
     --------
     >>> matrix = np.diag([2.0, 1e-9])[None]
@@ -151,7 +146,10 @@ def uncertainties(jacobians: Real, found: Spectrum, error: float) -> Real:
     sizes = np.linalg.norm(jacobians, axis=(1, 2))[:, None, None]
     total = np.zeros(n)
     for direction in _directions(k, n):
-        moved = spectrum(jacobians + error * sizes * direction).log_moduli
+        try:
+            moved = spectrum(jacobians + error * sizes * direction).log_moduli
+        except MultiplierError:
+            return np.full(n, math.inf)
         with np.errstate(invalid="ignore"):
             total += (moved - found.log_moduli) ** 2
     return np.where(np.isnan(total), math.inf, np.sqrt(total))

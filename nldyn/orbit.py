@@ -213,10 +213,7 @@ class Orbit:
         """
         found, jacobians = self._spectrum
         error = 10.0 * max(self.problem.flow.options.rtol, self.error)
-        try:
-            return uncertainties(jacobians, found, error)
-        except MultiplierError as failure:
-            raise ConvergenceError(str(failure)) from None
+        return uncertainties(jacobians, found, error)
 
     @property
     def stability(self) -> Stability:

@@ -85,7 +85,7 @@ def check_results(out: Path) -> None:
         assert (out / name).is_file()
     with (out / "branches.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert rows and all(None not in row.values() and None not in row for row in rows)
+    assert all(None not in row.values() and None not in row for row in rows)
     points = sum(len(branch.points) for branch in load_diagram(out / "branches.h5").branches)
     assert json.loads((out / "summary.json").read_text())["points"] == points == len(rows)
     with (out / "special_points.csv").open(newline="") as file:

@@ -16,7 +16,17 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.special import mathieu_a, mathieu_b
 
-from nldyn import FlowMap, HarmonicForce, Stop, System, Unbalance, find_orbits, solve_orbit
+from nldyn import (
+    Damper,
+    FlowMap,
+    FlowOptions,
+    HarmonicForce,
+    Stop,
+    System,
+    Unbalance,
+    find_orbits,
+    solve_orbit,
+)
 from nldyn.multipliers import (
     MultiplierError,
     Stability,
@@ -434,6 +444,25 @@ def test_segments_that_squeeze_a_direction_below_rounding_are_cut():
     assert np.all(change < 1e-9)
     assert orbit.log_moduli.sum() == pytest.approx(-1000.0, abs=1e-9)
     assert orbit.multipliers[-1].real == pytest.approx(math.exp(orbit.log_moduli[-1]), rel=1e-9)
+
+
+def test_a_pair_beside_a_multiplier_that_is_far_smaller_converges_when_perturbed():
+    """Three coupled modes of which a damper holds one: multipliers from e^-0.04 to e^-4800."""
+    system = System.from_modal(
+        [10.0, 70.0, 490.0],
+        {"a": [1.4490123494225093, 1.4439612142167686, 0.114296]},
+        modal_damping=[0.000138054, 0.316228, 0.280733],
+        dampers=[Damper("a", 1e4)],
+        excitation=[HarmonicForce("a", 1.0)],
+    )
+    omega, n = system.natural_frequencies, system.size
+    state = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(omega**2), -system.total_damping]])
+    orbit = solve_orbit(FlowMap(system, FlowOptions(1e-5)), 5.01187)
+    exact = np.sort(np.linalg.eigvals(state).real)[::-1] / 5.01187
+    sure = orbit.log_modulus_uncertainties
+    assert np.isfinite(sure[:5]).all()
+    assert np.all(np.abs(orbit.log_moduli - exact)[:3] <= sure[:3])
+    assert abs(orbit.log_moduli[0] / exact[0] - 1.0) < 1e-6
 
 
 def test_multipliers_lost_to_damping_say_so():
