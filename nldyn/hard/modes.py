@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from functools import partial
 
 import numpy as np
@@ -29,10 +30,6 @@ from nldyn.system import System
 
 SUBJECT = "modes"
 FORCE = HarmonicForce("m", 1.0)
-REFUSED = (
-    "refused, since fewer than eight digits would be left; the same system with a damper that "
-    "differs by 1e-9 is computed"
-)
 MORE = Precision(50, 40, 24)  # near a defective matrix half of them are lost
 
 
@@ -167,8 +164,10 @@ def nearly_defective(distance: float) -> System:
 
 
 def defective_error(distance: float) -> Measured:
-    """Flow on an orbit of modes that damping makes hardly separable."""
-    system = nearly_defective(distance)
+    """Flow on an orbit of modes that damping makes hardly separable, or not at all."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that a frequency is moved: the error has its share
+        system = nearly_defective(distance)
     found = orbit_flow_error(solve_orbit(system, 13.0), MORE)
     return Measured(found.error, f"{found.note}, condition {system.linear.condition:.0e}")
 
@@ -233,7 +232,6 @@ CASES = (
             JACOBIAN,
             PROMISE,
             partial(defective_error, distance),
-            fault=REFUSED if distance < 1e-10 else "",
         )
         for distance in (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 0.0)
     ),

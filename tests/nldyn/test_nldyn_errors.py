@@ -26,6 +26,7 @@ from nldyn import (
     hertz_stiffness,
     solve_orbit,
 )
+from nldyn.hard.modes import nearly_defective
 
 NOT_FINITE = st.sampled_from([math.nan, math.inf, -math.inf])
 NEGATIVE = st.floats(-1e100, -1e-100)
@@ -224,6 +225,18 @@ def test_modes_that_damping_makes_inseparable():
         frequencies_hz=[0.0, 0.0], participation={"m": [1.0, 2.0]}, dampers=[Damper("m", 1.0)]
     )
     sentence(free, "coinciding modes", "damping")
+
+
+def test_two_modes_that_a_damper_makes_coincide_are_told_apart_with_a_warning():
+    """One of their frequencies is moved by at most 1e-10; the eigenvalues then by its root."""
+    with pytest.warns(UserWarning, match="the mode at 9.53463 Hz is moved by 1e-1"):
+        system = nearly_defective(0.0)
+    omega, n = system.natural_frequencies, system.size
+    state = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(omega**2), -system.total_damping]])
+    exact = np.linalg.eigvals(state)
+    for block in system.linear.blocks:
+        for value in np.linalg.eigvals(block):
+            assert np.abs(exact - value).min() < 2e-5 * abs(value)
 
 
 def test_undamped_mode_at_its_own_frequency():
