@@ -50,6 +50,7 @@ from nldyn.system import System, numbers
 
 __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
 
+BUNCH = 20  # excitation periods in one compiled call, where many follow each other
 _REASONS = {
     OK: "",
     TOO_MANY_PIECES: "more than 20000 flights and contact panels in one segment: too many contacts "
@@ -439,7 +440,19 @@ class FlowMap:
         check_whole("periods", periods, 1)
         phases = np.linspace(0.0, 2.0 * np.pi * periods, periods + 1)
         nodes = _floats("state", state)[None]
-        return self.shoot(nodes, phases, omega, sensitivities=False, chained=True)
+        parts: list[Segments] = []
+        for first in range(0, periods, BUNCH):  # between two of them Ctrl-C is answered
+            some = phases[first : first + BUNCH + 1]
+            parts.append(self.shoot(nodes, some, omega, sensitivities=False, chained=True))
+            if parts[-1].failure:
+                break
+            nodes = parts[-1].ends[-1:]
+        columns = [
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("ends", "jacobians", "d_omega", "d_parameters")
+        ]
+        closings = np.sum([part.closings for part in parts], axis=0)
+        return Segments(*columns, closings, parts[-1].failure)
 
     def _check_segments(self, nodes: Real, phases: Real, omega: float, chained: bool) -> None:
         if phases.ndim != 1 or phases.size < 2 or not (phases[1:] > phases[:-1]).all():
