@@ -44,8 +44,7 @@ from nldyn.shooting import ShootingProblem
 from nldyn.special import (
     Chord,
     LocateError,
-    differs,
-    hidden_dips,
+    insert_dip,
     special_points_between,
     without_repeats,
 )
@@ -556,7 +555,7 @@ class Trail:
             if progress is not None:
                 progress(point.orbit.frequency_hz)
             if len(self.nodes) > 2:
-                _insert_dips(self.nodes)
+                insert_dip(self.nodes, len(self.nodes) - 2)
             self._search(len(self.nodes) - 2)
             if self.walk.stride is not None and self.walk.stride.here is point:
                 self._mark = self._here()
@@ -612,40 +611,6 @@ class Trail:
         self._searched = max(self._searched, pairs)
         if len(self.special_points) > before:
             self.special_points = without_repeats(self.special_points)
-
-
-def _insert_dips(nodes: list[BranchPoint]) -> None:
-    """Add a point where a test or an extreme may have changed sign twice between two points."""
-    for where in hidden_dips(*nodes[-3:]):
-        if math.isnan(where):
-            continue
-        index = len(nodes) - 2 if where < nodes[-2].arclength else len(nodes) - 1
-        extra = _turned_over(nodes[index - 1], nodes[index], where)
-        if extra is not None:
-            nodes.insert(index, extra)
-            return
-
-
-def _turned_over(a: BranchPoint, b: BranchPoint, where: float) -> BranchPoint | None:
-    """Point between a and b at which a test or an extreme has changed its sign, or None.
-
-    It is looked for at an arclength, then where the parabola through what is found dips.
-    """
-    chord, span = Chord(a, b), b.arclength - a.arclength
-    for _ in range(3):
-        sigma = (where - a.arclength) / span
-        if span < 1e-6 or not 0.02 < sigma < 0.98:
-            return None
-        try:
-            extra = chord.at(sigma)
-        except LocateError:
-            return None
-        if differs(a, extra):
-            return extra
-        where = next((x for x in hidden_dips(a, extra, b) if not math.isnan(x)), math.nan)
-        if math.isnan(where):
-            return None
-    return None
 
 
 def _by_halves(

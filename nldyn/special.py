@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import islice, pairwise
 
 import numpy as np
 
@@ -32,6 +33,7 @@ NEIGHBOUR = 1e-3  # arclength between two branch points at one turn, and dP/ds t
 SAME = 1e-7  # arclength between two branch points that cannot be told apart
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
+DIVES = 8  # points at which to look for a change of sign between two others
 STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
 
 
@@ -207,19 +209,74 @@ def _inverse_interpolation(known: list[tuple[float, float]], low: float, high: f
     return found
 
 
-def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[SpecialPoint]:
-    """All special points between two neighbouring points, in order.
+def special_points_between(a: BranchPoint, b: BranchPoint) -> list[SpecialPoint]:
+    """All special points between two neighbouring points, in order."""
+    points = [a, *resolved(a, b), b]
+    for i in range(len(points) - 2, 0, -1):
+        insert_dip(points, i)
+    return [special for pair in pairwise(points) for special in located_between(*pair)]
+
+
+def resolved(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[BranchPoint]:
+    """Points between two others, so close that no multiplier near the unit circle moves far."""
+    most, far = (3, 0.3) if a.orbit.multipliers.size == 2 else (5, FAR)  # one mode: one pair
+    before, after = a.orbit.multipliers, b.orbit.multipliers
+    if depth == most or max(travel(before, after), travel(after, before)) <= far:
+        return []
+    middle = Chord(a, b).at(0.5)
+    return [*resolved(a, middle, depth + 1), middle, *resolved(middle, b, depth + 1)]
+
+
+def insert_dip(points: list[BranchPoint], index: int) -> None:
+    """Add a point beside one where a test or an extreme may have changed sign twice unseen."""
+    z, a, b = points[index - 1 : index + 2]
+    for number, where in enumerate(hidden_dips(z, a, b)):
+        extra = turned_over(z, a, b, number, where)
+        if extra is not None:
+            ahead = (extra.arclength - a.arclength) * (b.arclength - a.arclength) > 0.0
+            points.insert(index + 1 if ahead else index, extra)
+            return
+
+
+def turned_over(
+    z: BranchPoint, a: BranchPoint, b: BranchPoint, number: int, where: float
+) -> BranchPoint | None:
+    """Point between z and b at which a test or an extreme has changed its sign, or None.
+
+    It is looked for at an arclength, then where the parabola through the points nearest to that
+    dips; `number` counts the values of `hidden_dips`.
+    """
+    for _ in range(DIVES):
+        if math.isnan(where):
+            return None
+        ahead = (where - a.arclength) * (b.arclength - a.arclength) > 0.0
+        first, last = (a, b) if ahead else (z, a)
+        span = last.arclength - first.arclength
+        if abs(span) < 1e-6:
+            return None
+        sigma = min(max((where - first.arclength) / span, 0.02), 0.98)
+        try:
+            extra = Chord(first, last).at(sigma)
+        except LocateError:
+            return None
+        if differs(a, extra):
+            return extra
+        triples = ((a, extra, b), (z, a, extra)) if ahead else ((z, extra, a), (extra, a, b))
+        for triple in triples:
+            where = next(islice(hidden_dips(*triple), number, None), math.nan)
+            if not math.isnan(where):
+                z, a, b = triple
+                break
+    return None
+
+
+def located_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[SpecialPoint]:
+    """The special points between two points that their tests tell of, in order.
 
     Each change of sign is followed to its root. Where several happen in one step, or the events do
     not explain the change in the number of contacts or of unstable multipliers, the chord is
-    halved; so it is where multipliers near the unit circle move far, which may cross it twice.
+    halved.
     """
-    most, far = (3, 0.3) if a.orbit.multipliers.size == 2 else (5, FAR)  # one mode: one pair
-    if depth < most and travel(a.orbit.multipliers, b.orbit.multipliers) > far:
-        middle = Chord(a, b).at(0.5)
-        return special_points_between(a, middle, depth + 1) + special_points_between(
-            middle, b, depth + 1
-        )
     chord = Chord(a, b)
     before, after = tests(a), tests(b)
     changed = [k for k in before if before[k] * after[k] < 0.0]
@@ -233,9 +290,7 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
     clear = clear and not changes_hidden_by_birth(a.orbit, b.orbit)
     if not clear and depth < 10:
         middle = chord.at(0.5)
-        return special_points_between(a, middle, depth + 1) + special_points_between(
-            middle, b, depth + 1
-        )
+        return located_between(a, middle, depth + 1) + located_between(middle, b, depth + 1)
     found = [locate(k, chord, lambda point, k=k: tests(point)[k]) for k in kinds]  # type: ignore[misc]
     found = [s for s in found if s.kind != "NS" or _on_unit_circle(s.orbit.multipliers)]
     found = [_crossing_or_fold(s) for s in found]
@@ -244,9 +299,7 @@ def special_points_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> li
     found.sort(key=lambda s: s.point.arclength, reverse=bool(b.arclength < a.arclength))
     if depth < 8 and not accounted(a.orbit, found, b.orbit):
         middle = chord.at(0.5)
-        return special_points_between(a, middle, depth + 1) + special_points_between(
-            middle, b, depth + 1
-        )
+        return located_between(a, middle, depth + 1) + located_between(middle, b, depth + 1)
     return found
 
 
