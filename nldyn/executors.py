@@ -125,7 +125,8 @@ def as_finished(
 ) -> Iterator[Outcome[Value]]:
     """Give the outcomes of `run_all` one by one, as they are finished.
 
-    When the caller stops early, computations that have not begun are cancelled. Where a
+    When the caller stops early, computations that have not begun are cancelled; Ctrl-C ends the
+    processes of a ``ProcessPoolExecutor``, which takes no more work then. Where a
     ``ProcessPoolExecutor`` breaks because a computation kills its process, those left are done on
     processes of their own, and only the one that kills is a failure.
     """
@@ -150,6 +151,9 @@ def as_finished(
                     lost.append(futures[future])
                 else:
                     yield _outcome(futures[future], future)
+    except KeyboardInterrupt:
+        _end_processes(executor)
+        raise
     finally:
         for future in futures:
             future.cancel()
@@ -196,9 +200,23 @@ def _on_own_processes(
                     own = _pool_of_one(pool)
                     pools.append(own)
                 begin(own)
+    except KeyboardInterrupt:
+        for own in pools:
+            _end_processes(own)
+        raise
     finally:
         for own in pools:
             own.shutdown(wait=False, cancel_futures=True)
+
+
+def _end_processes(executor: Executor) -> None:
+    """End the processes of a pool at once, after Ctrl-C.
+
+    A terminal sends that to all of them. One that gets a second one while it waits for work ends
+    with the lock of the pool's queue, and all others wait for that without end.
+    """
+    for process in list((getattr(executor, "_processes", None) or {}).values()):
+        process.terminate()
 
 
 def _broken(future: Future[Value]) -> bool:

@@ -3,15 +3,18 @@
 import os
 import subprocess
 import sys
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 
 import numpy as np
 import pytest
 from killing import same_results
 
-from nldyn import study
+from nldyn import Plane, basins, simulate, study, sweep
+from nldyn.paper.jobs import JOBS, submit_diagrams
+from nldyn.paper.workers import worker_processes
 from nldyn.resources import example
+from nldyn.scene import build_system, load_scene
 
 START = "from nldyn.command import main; main()"
 
@@ -30,6 +33,56 @@ def test_two_processes_give_the_same_bytes(tmp_path):
             env={**os.environ, "PYTHONHASHSEED": seed, **threads},
         )  # fmt: skip
     same_results(tmp_path / "1", tmp_path / "2")
+
+
+@pytest.mark.slow
+def test_diagrams_of_the_paper_are_the_same_with_any_number_of_workers(tmp_path):
+    """Three of its jobs, compared as the files that keep them, to the byte."""
+    names = ("two_dof.high", "two_dof.bilinear", "one_dof.listed")
+    jobs = [job for job in JOBS if job.name in names]
+    files = {}
+    for workers in (1, 3):
+        with worker_processes(workers) as processes:
+            diagrams = processes.values(submit_diagrams(processes, jobs), "diagrams")
+        for name, found in diagrams.items():
+            file = tmp_path / f"{name}.{workers}.h5"
+            found.save(file)
+            files[name, workers] = file.read_bytes()
+    for name in names:
+        assert files[name, 1] == files[name, 3]
+
+
+def executors():
+    """Threads and processes, one to three of them."""
+    return [
+        *(ThreadPoolExecutor(count) for count in (1, 3)),
+        *(ProcessPoolExecutor(count, get_context("spawn")) for count in (1, 2, 3)),
+    ]
+
+
+@pytest.mark.slow
+def test_motions_and_basins_are_the_same_with_any_executor():
+    """To the last bit, alone, with threads and with processes."""
+    system = build_system(load_scene(example("one_dof.toml")))
+    corner = Plane(
+        np.zeros(2), np.array([1e-3, 0.0]), np.array([0.0, 0.1]), (-1.0, 1.0), (-1.0, 1.0)
+    )
+
+    def computed(executor):
+        motions = simulate(system, [25.0, 36.0, 50.0], 20, executor=executor)
+        ramps = [(30.0, 34.0), (34.0, 30.0), (50.0, 48.0)]
+        motions += sweep(system, ramps, 10.0, executor=executor)
+        found = basins(system, 50.0, corner, shape=(6, 6), starts=4, checks=2, executor=executor)
+        arrays = [motion.states(np.linspace(0.0, motion.end_time, 50)) for motion in motions]
+        return [*arrays, found.labels, found.periods, *(a.states for a in found.attractors)]
+
+    alone = computed(None)
+    for pool in executors():
+        with pool:
+            found = computed(pool)
+        assert len(found) == len(alone)
+        for one, other in zip(alone, found, strict=True):
+            np.testing.assert_array_equal(one, other)
 
 
 def response(system):

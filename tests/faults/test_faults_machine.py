@@ -216,8 +216,6 @@ def test_ctrl_c_from_the_terminal(tmp_path):
         check_whole(out)
 
 
-
-
 @pytest.mark.parametrize("after", ["raise RuntimeError", "while True: time.sleep(0.01)"])
 def test_ctrl_c_in_a_destructor_is_not_lost(after):
     """Python drops what a destructor or a callback from C raises; the compiler has many."""
@@ -241,3 +239,43 @@ main()
     child = subprocess.run(arguments, capture_output=True, text=True, timeout=15.0)
     assert child.returncode == 130
     assert child.stderr == "nldyn: stopped by Ctrl-C, nothing is written\n"
+
+
+POOL = """
+import time
+from concurrent.futures import ProcessPoolExecutor
+from nldyn.executors import run_all
+
+def second(x):
+    end = time.monotonic() + 1.0
+    while time.monotonic() < end:
+        pass
+
+if __name__ == "__main__":
+    with ProcessPoolExecutor(3) as pool:
+        run_all(second, range(100), pool, lambda *_: print("one", flush=True))
+"""
+
+
+@pytest.mark.parametrize("pause", [0.05, 0.5])
+def test_two_ctrl_c_end_a_pool_of_processes(tmp_path, pause):
+    """A process that gets the second one as it waits for work once left all others waiting."""
+    script = tmp_path / "pool.py"
+    script.write_text(POOL)
+    child = subprocess.Popen(
+        [sys.executable, str(script)], start_new_session=True, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    assert child.stdout.readline() == "one\n"
+    try:
+        for _ in range(2):
+            os.killpg(child.pid, signal.SIGINT)
+            time.sleep(pause)
+            if child.poll() is not None:
+                break
+        child.wait(timeout=60)
+    finally:
+        if child.poll() is None:
+            os.killpg(child.pid, signal.SIGKILL)
+        child.stdout.close()
+    assert child.returncode == -signal.SIGINT
