@@ -447,12 +447,14 @@ class FlowMap:
             if parts[-1].failure:
                 break
             nodes = parts[-1].ends[-1:]
-        columns = [
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("ends", "jacobians", "d_omega", "d_parameters")
-        ]
-        closings = np.sum([part.closings for part in parts], axis=0)
-        return Segments(*columns, closings, parts[-1].failure)
+        return Segments(
+            np.concatenate([part.ends for part in parts]),
+            np.concatenate([part.jacobians for part in parts]),
+            np.concatenate([part.d_omega for part in parts]),
+            np.concatenate([part.d_parameters for part in parts]),
+            np.sum([part.closings for part in parts], axis=0),
+            parts[-1].failure,
+        )
 
     def _check_segments(self, nodes: Real, phases: Real, omega: float, chained: bool) -> None:
         if phases.ndim != 1 or phases.size < 2 or not (phases[1:] > phases[:-1]).all():

@@ -34,6 +34,7 @@ SAME = 1e-7  # arclength between two branch points that cannot be told apart
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
 DIVES = 8  # points at which to look for a change of sign between two others
+FAR_ALONE = 0.3  # the same of the only pair of a single mode
 STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
 
 
@@ -211,20 +212,24 @@ def _inverse_interpolation(known: list[tuple[float, float]], low: float, high: f
 
 def special_points_between(a: BranchPoint, b: BranchPoint) -> list[SpecialPoint]:
     """All special points between two neighbouring points, in order."""
-    points = [a, *resolved(a, b), b]
+    several = a.orbit.multipliers.size > 2
+    least = 2 if several and changed(a, b) else 0  # beside one change of sign two others may hide
+    points = [a, *resolved(a, b, least, 5 if several else 3, FAR if several else FAR_ALONE), b]
     for i in range(len(points) - 2, 0, -1):
         insert_dip(points, i)
     return [special for pair in pairwise(points) for special in located_between(*pair)]
 
 
-def resolved(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[BranchPoint]:
-    """Points between two others, so close that no multiplier near the unit circle moves far."""
-    most, far = (3, 0.3) if a.orbit.multipliers.size == 2 else (5, FAR)  # one mode: one pair
+def resolved(
+    a: BranchPoint, b: BranchPoint, least: int, most: int, far: float
+) -> list[BranchPoint]:
+    """Points between two others, halved at least so often, until no multiplier moves far."""
     before, after = a.orbit.multipliers, b.orbit.multipliers
-    if depth == most or max(travel(before, after), travel(after, before)) <= far:
+    if most == 0 or (least <= 0 and max(travel(before, after), travel(after, before)) <= far):
         return []
     middle = Chord(a, b).at(0.5)
-    return [*resolved(a, middle, depth + 1), middle, *resolved(middle, b, depth + 1)]
+    first = resolved(a, middle, least - 1, most - 1, far)
+    return [*first, middle, *resolved(middle, b, least - 1, most - 1, far)]
 
 
 def insert_dip(points: list[BranchPoint], index: int) -> None:
@@ -278,12 +283,11 @@ def located_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[Spec
     halved.
     """
     chord = Chord(a, b)
-    before, after = tests(a), tests(b)
-    changed = [k for k in before if before[k] * after[k] < 0.0]
-    if "NS" in changed and not leaves_circle(a.orbit.multipliers, b.orbit.multipliers):
-        changed.remove("NS")
-    kinds = [k for k in changed if not (k == "BP" and "LP" in changed)]
-    lonely_fold = "LP" in changed and "BP" not in changed
+    signs = changed(a, b)
+    if "NS" in signs and not leaves_circle(a.orbit.multipliers, b.orbit.multipliers):
+        signs.remove("NS")
+    kinds = [k for k in signs if not (k == "BP" and "LP" in signs)]
+    lonely_fold = "LP" in signs and "BP" not in signs
     contacts = abs(a.orbit.impacts - b.orbit.impacts)
     touches = touching_extremes(a.orbit, b.orbit)
     clear = len(touches) == contacts and len(kinds) + contacts <= 1 and not lonely_fold
@@ -462,6 +466,10 @@ def hidden_dips(z: BranchPoint, a: BranchPoint, b: BranchPoint) -> Iterator[floa
 
 def differs(a: BranchPoint, b: BranchPoint) -> bool:
     """Whether a test or an extreme changes its sign between two points."""
+    return bool(changed(a, b) or touching_extremes(a.orbit, b.orbit))
+
+
+def changed(a: BranchPoint, b: BranchPoint) -> list[str]:
+    """Tests that change their sign between two points."""
     before, after = tests(a), tests(b)
-    changed = any(before[kind] * after[kind] < 0.0 for kind in before)
-    return changed or bool(touching_extremes(a.orbit, b.orbit))
+    return [kind for kind in before if before[kind] * after[kind] < 0.0]

@@ -27,7 +27,7 @@ from nldyn import (
     switch_at_flip,
 )
 from nldyn._events import branch_point_test, flip_test, torus_test
-from nldyn.branch import minimal_period, same_orbit
+from nldyn.branch import BranchPoint, minimal_period, same_orbit
 from nldyn.continuation import start_point, trace
 from nldyn.peaks import lowest_orbit, resonance_peaks
 from nldyn.resources import example
@@ -380,7 +380,8 @@ def test_no_special_points_between_the_same_two_points_in_either_direction(harmo
     nodes = harmonic_branch.nodes
     i = next(k for k, n in enumerate(nodes) if n.arclength > flip.point.arclength)
     forward = special_points_between(nodes[i - 1], nodes[i])
-    backward = special_points_between(nodes[i], nodes[i - 1])
+    there, here = (BranchPoint(n.orbit, -n.tangent, -n.arclength) for n in nodes[i - 1 : i + 1])
+    backward = special_points_between(here, there)
     assert [s.kind for s in forward] == [s.kind for s in backward] == ["PD"]
     assert forward[0].frequency_hz == pytest.approx(backward[0].frequency_hz, rel=1e-9)
 
