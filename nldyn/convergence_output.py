@@ -17,14 +17,14 @@ from nldyn.convergence import (
     counted_modes,
     largest_force,
 )
-from nldyn.output import write_table
+from nldyn.output import if_known, write_table
 from nldyn.plot import MARKERS, PERIOD_COLOURS, new_axes, save_figure
 from nldyn.result_directory import result_directory
 
 COLUMNS = (
     "label", "dofs", "modes", "size", "peak_hz", "peak_m", "force_n", "contact_s", "folds", "flips",
     "seconds_per_orbit", "branch_seconds",
-    *(f"{quantity}_error" for quantity in QUANTITIES), "missing", "extra",
+    *(f"{quantity}_error" for quantity in QUANTITIES), "missing", "extra", "note",
 )  # fmt: skip
 SMALLEST = 1e-14
 
@@ -62,10 +62,10 @@ def counts_vary(study: Study) -> bool:
 
 
 def model_rows(study: Study) -> Iterator[tuple[object, ...]]:
-    """Rows of ``convergence.csv``; the reference comes last."""
+    """Rows of ``convergence.csv``, empty where nothing is known; the reference comes last."""
     for model, error in zip(study.models, study.errors, strict=True):
         peak, orbit, special = model.peak, model.orbit, model.special_hz
-        yield (
+        row = (
             model.label,
             model.dofs,
             model.modes,
@@ -80,7 +80,9 @@ def model_rows(study: Study) -> Iterator[tuple[object, ...]]:
             model.seconds,
             *(getattr(error, quantity) for quantity in QUANTITIES),
             *(error.counts or ("", "")),
+            model.note,
         )
+        yield tuple(map(if_known, row))
 
 
 def special_rows(study: Study) -> Iterator[tuple[object, ...]]:
@@ -175,13 +177,10 @@ def draw_series(
         ax.plot(x, y, marker + line, color=palette[label], markersize=4, linewidth=1.0)
         if numbers:
             for place, value, index in zip(x, y, indices, strict=True):
-                ax.annotate(
-                    str(numbers[index]),
-                    (place, value),
-                    (4, 2),
-                    textcoords="offset points",
-                    fontsize=7,
-                )
+                if not math.isfinite(place + value):
+                    continue
+                count = str(numbers[index])
+                ax.annotate(count, (place, value), (4, 2), textcoords="offset points", fontsize=7)
     if drawn:
         ax.set_yscale("log")
     ax.grid(True, which="major", linewidth=0.3)

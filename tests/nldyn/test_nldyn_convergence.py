@@ -104,6 +104,7 @@ def test_files(study, tmp_path):
         rows = list(csv.DictReader(file))
     assert [row["label"] for row in rows] == ["rubin"] * 4 + ["truncation"] * 4 + ["full"]
     assert float(rows[1]["force_error"]) == study.errors[1].force
+    assert not any(value in ("nan", "inf") for row in rows for value in row.values())
     for name in ("convergence.png", "speed_against_error.svg", "special_points_by_model.csv"):
         assert (folder / name).stat().st_size > 0
 
