@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -97,10 +99,15 @@ def run_all(
     check_types(function=(function, Callable), items=(items, Sequence, np.ndarray))
     check_execution(executor, progress)
     outcomes: dict[int, Outcome[Value]] = {}
-    for outcome in as_finished(function, items, executor):
-        outcomes[outcome.index] = outcome
-        if progress is not None:
-            progress(len(outcomes), len(items))
+    try:
+        for outcome in as_finished(function, items, executor):
+            outcomes[outcome.index] = outcome
+            if progress is not None:
+                progress(len(outcomes), len(items))
+    except KeyboardInterrupt:
+        if executor is not None:
+            _end_processes(executor)
+        raise
     return [outcomes[index] for index in range(len(items))]
 
 
@@ -215,8 +222,14 @@ def _end_processes(executor: Executor) -> None:
     A terminal sends that to all of them. One that gets a second one while it waits for work ends
     with the lock of the pool's queue, and all others wait for that without end.
     """
-    for process in list((getattr(executor, "_processes", None) or {}).values()):
-        process.terminate()
+    alone = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN) if alone else None
+    try:
+        for process in list((getattr(executor, "_processes", None) or {}).values()):
+            process.terminate()
+    finally:
+        if alone:
+            signal.signal(signal.SIGINT, before)
 
 
 def _broken(future: Future[Value]) -> bool:
