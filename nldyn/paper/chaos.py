@@ -28,7 +28,7 @@ Task = tuple[str, Way]
 RANGE_HZ, POINTS = (18.0, 90.0), 145
 EFFORT = AttractorOptions(periods=500)
 # motions from each chaotic one, and for how long they are followed: in published ranges, elsewhere
-CLAIMED, ELSEWHERE = (4, 2000), (4, 500)
+CLAIMED, ELSEWHERE = (4, 2500), (4, 1000)
 MODELS = ("four_dof_xi_0.001", "four_dof_xi_0.01", "two_dof_xi_0.001", "two_dof_xi_0.01")
 NAMES = {"two_dof": "2-DOF model", "four_dof": "4-DOF model"}
 DAMPINGS = {"0.01": "#0072b2", "0.001": "#b03a00"}
@@ -72,7 +72,7 @@ class Chaos:
         """Whether chaos lasts at most frequencies of each published range.
 
         A motion is chaotic if its largest Lyapunov exponent is positive by three standard errors.
-        Chaos lasts where more than half of four motions from states of it are chaotic for 2000
+        Chaos lasts where more than half of four motions from states of it are chaotic for 2500
         periods more (`CLAIMED`).
         """
         states, periods = CLAIMED
@@ -101,7 +101,7 @@ class Chaos:
         )
 
     def transients(self, model: str) -> set[float]:
-        """Frequencies in Hz at which chaos does not last for 500 periods, for half of the motions.
+        """Frequencies in Hz at which chaos does not last for 1000 periods, for half of the motions.
 
         So long motions are followed at every frequency (`ELSEWHERE`). One that is neither settled
         nor chaotic at the end has not lasted.

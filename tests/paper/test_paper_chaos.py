@@ -90,7 +90,7 @@ def test_lifetimes_are_asked_for_at_each_chaotic_frequency_longest_where_the_pap
     four = [hz for model, hz in places if model == "four_dof_xi_0.01"]
     assert four == [*np.arange(30.0, 37.1, 0.5), *np.arange(58.0, 62.1, 0.5)]
     assert {model for model, _ in places} == set(MODELS)
-    assert effort_at("four_dof_xi_0.01", 58.0) == effort_at("two_dof_xi_0.01", 66.0) == (8, 5000)
+    assert effort_at("four_dof_xi_0.01", 58.0) == effort_at("two_dof_xi_0.01", 66.0) == (4, 2500)
     assert effort_at("two_dof_xi_0.01", 58.0) == effort_at("four_dof_xi_0.001", 30.0) == (4, 1000)
 
 
