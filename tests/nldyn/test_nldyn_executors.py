@@ -5,8 +5,11 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import threading
 import time
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
 
 import cluster_tasks
 import numpy as np
@@ -319,33 +322,37 @@ def cluster(tmp_path_factory):
         yield client
 
 
-class KillOne:
-    """Progress that kills a busy worker of a cluster in the middle of a computation, once."""
+@contextmanager
+def one_worker_killed(client) -> Iterator[Executor]:
+    """Kill a worker of a cluster while there is something that it was given to do.
 
-    def __init__(self, client) -> None:
-        client.wait_for_workers(3)
-        self.client = client
-        self.pids = client.run(os.getpid)
-        assert len(set(self.pids.values())) == 3
-        self.killed = None
+    It is stopped before, so that it has not done that, however fast the computations are.
+    """
+    client.wait_for_workers(3)
+    pids = client.run(os.getpid)
+    assert len(set(pids.values())) == 3
+    address, pid = next(iter(pids.items()))
+    lost = []
 
-    def __call__(self, done: int, total: int) -> None:
-        if self.killed or not 1 <= done < total - 1:
-            return
-        for address, tasks in self.client.processing().items():
-            if tasks and address in self.pids:
-                os.kill(self.pids[address], signal.SIGKILL)
-                self.killed = address
-                return
+    def kill() -> None:
+        while not lost:
+            time.sleep(0.05)
+            lost.extend(client.processing()[address])
+        os.kill(pid, signal.SIGKILL)
+
+    os.kill(pid, signal.SIGSTOP)
+    killer = threading.Thread(target=kill, daemon=True)
+    killer.start()
+    yield client.get_executor()
+    killer.join(10.0)
+    assert lost
 
 
 def test_a_cluster_that_loses_a_worker_gives_the_same_basins(plane, here, cluster):
-    kill_one = KillOne(cluster)
-    found = basins(
-        make_one_dof(), 25.3, plane, shape=(30, 40), starts=3, checks=3,
-        executor=cluster.get_executor(), progress=kill_one,
-    )  # fmt: skip
-    assert kill_one.killed
+    with one_worker_killed(cluster) as executor:
+        found = basins(
+            make_one_dof(), 25.3, plane, shape=(30, 40), starts=3, checks=3, executor=executor
+        )
     np.testing.assert_array_equal(found.labels, here.labels)
     np.testing.assert_array_equal(found.periods, here.periods)
     assert found.wrong == here.wrong == 0
@@ -353,9 +360,8 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_basins(plane, here, cluste
 
 @pytest.mark.parametrize("compute", [swept_both_ways, simulated, exponents, measured])
 def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(compute, alone, cluster):
-    kill_one = KillOne(cluster)
-    found = compute(cluster.get_executor(), kill_one)
-    assert kill_one.killed
+    with one_worker_killed(cluster) as executor:
+        found = compute(executor, None)
     assert_same_numbers(alone[compute], found)
 
 
