@@ -162,11 +162,9 @@ def _settling(lives: Sequence[ChaosLifetime]) -> str:
     ending = [life.lifetime for life in lives if life.settled]
     if not ending:
         return ""
+    ends = " to ".join(dict.fromkeys(two_digits(f(ending)) for f in (min, max)))
     many = "frequency" if len(ending) == 1 else "frequencies"
-    return (
-        f" (some motions settle at {len(ending)} {many}, after {two_digits(min(ending))} to "
-        f"{two_digits(max(ending))} periods in the mean)"
-    )
+    return f" (some motions settle at {len(ending)} {many}, after {ends} periods in the mean)"
 
 
 def _typical(found: BruteForce, low: float, high: float) -> str:
