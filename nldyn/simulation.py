@@ -32,7 +32,7 @@ from nldyn.orbit import (
 from nldyn.system import System, numbers
 
 BLOCK = 64  # periods recorded in one call
-PIECE = 2000  # periods of a transient in one call: between two, Ctrl-C is answered
+PIECE = 2000  # periods of a transient whose states are held at once
 MOST_STEPS = 10**6  # of a sweep, and
 MOST_RECORDED = 10**6  # periods of a recorded motion: 1 to 5 kB each with 1 to 4 modes
 MOST_PERIODS = 10**8
