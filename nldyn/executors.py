@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -99,15 +100,11 @@ def run_all(
     check_types(function=(function, Callable), items=(items, Sequence, np.ndarray))
     check_execution(executor, progress)
     outcomes: dict[int, Outcome[Value]] = {}
-    try:
+    with _ended_by_ctrl_c([executor]):
         for outcome in as_finished(function, items, executor):
             outcomes[outcome.index] = outcome
             if progress is not None:
                 progress(len(outcomes), len(items))
-    except KeyboardInterrupt:
-        if executor is not None:
-            _end_processes(executor)
-        raise
     return [outcomes[index] for index in range(len(items))]
 
 
@@ -148,19 +145,17 @@ def as_finished(
     futures: dict[Any, int] = {}
     lost: list[int] = []
     try:
-        for index, item in enumerate(items):
-            futures[_submitted(executor, function, item)] = index
-        waiting = set(futures)
-        while waiting:
-            ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-            for future in sorted(ended, key=futures.__getitem__):
-                if isinstance(executor, ProcessPoolExecutor) and _broken(future):
-                    lost.append(futures[future])
-                else:
-                    yield _outcome(futures[future], future)
-    except KeyboardInterrupt:
-        _end_processes(executor)
-        raise
+        with _ended_by_ctrl_c([executor]):
+            for index, item in enumerate(items):
+                futures[_submitted(executor, function, item)] = index
+            waiting = set(futures)
+            while waiting:
+                ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                for future in sorted(ended, key=futures.__getitem__):
+                    if isinstance(executor, ProcessPoolExecutor) and _broken(future):
+                        lost.append(futures[future])
+                    else:
+                        yield _outcome(futures[future], future)
     finally:
         for future in futures:
             future.cancel()
@@ -192,31 +187,39 @@ def _on_own_processes(
 
     ends = 0
     try:
-        for _ in range(min(_processes(pool), len(indices))):
-            pools.append(_pool_of_one(pool))
-            begin(pools[-1])
-        while running:
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                index, own = running.pop(future)
-                ends = ends + 1 if _broken(future) else 0
-                yield _outcome(index, future)
-                if ends >= HOPELESS:
-                    reason = f"BrokenProcessPool: {HOPELESS} processes ended one after the other"
-                    yield from (Outcome(index, None, reason) for index in waiting)
-                if _broken(future):
-                    own = _pool_of_one(pool)
-                    pools.append(own)
-                begin(own)
-    except KeyboardInterrupt:
-        for own in pools:
-            _end_processes(own)
-        raise
+        with _ended_by_ctrl_c(pools):
+            for _ in range(min(_processes(pool), len(indices))):
+                pools.append(_pool_of_one(pool))
+                begin(pools[-1])
+            while running:
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    index, own = running.pop(future)
+                    ends = ends + 1 if _broken(future) else 0
+                    yield _outcome(index, future)
+                    if ends >= HOPELESS:
+                        why = f"{HOPELESS} processes ended one after the other"
+                        yield from (Outcome(i, None, f"BrokenProcessPool: {why}") for i in waiting)
+                    if _broken(future):
+                        own = _pool_of_one(pool)
+                        pools.append(own)
+                    begin(own)
     finally:
         for own in pools:
             own.shutdown(wait=False, cancel_futures=True)
 
 
-def _end_processes(executor: Executor) -> None:
+@contextmanager
+def _ended_by_ctrl_c(pools: Sequence[Executor | None]) -> Iterator[None]:
+    """Within this Ctrl-C ends the processes of pools, also of those that are added."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        for pool in pools:
+            _end_processes(pool)
+        raise
+
+
+def _end_processes(executor: Executor | None) -> None:
     """End the processes of a pool at once, after Ctrl-C.
 
     A terminal sends that to all of them. One that gets a second one while it waits for work ends

@@ -688,8 +688,7 @@ class _Known:
         self.box, self.frequency_hz = box, frequency_hz
         self.omega = 2.0 * math.pi * frequency_hz
         self.met: list[int] = []
-        self._orbits: list[tuple[int, Orbit]] = []
-        self._places: list[Real] = []
+        self._orbits: list[tuple[int, Orbit, Real]] = []  # with their stroboscopic states
         self._seen = 0
         self.take()
 
@@ -697,22 +696,21 @@ class _Known:
         """Take the orbits of branches that were found since."""
         for number in range(self._seen, len(self.box.branches)):
             orbits = self.box.branches[number].at(self.frequency_hz)
-            self._orbits += [(number, orbit) for orbit in orbits]
-            self._places += [stroboscopic(orbit) for orbit in orbits]
+            self._orbits += [(number, orbit, stroboscopic(orbit)) for orbit in orbits]
         self._seen = len(self.box.branches)
 
     def of_period(self, period: int) -> list[Orbit]:
         """Orbits of one period multiple."""
-        return [orbit for _, orbit in self._orbits if orbit.period == period]
+        return [orbit for _, orbit, _ in self._orbits if orbit.period == period]
 
     def number(self, orbit: Orbit) -> int | None:
         """Number of the branch that an orbit lies on."""
-        return next((i for i, other in self._orbits if same_orbit(orbit, other)), None)
+        return next((i for i, other, _ in self._orbits if same_orbit(orbit, other)), None)
 
     def beside(self, state: Real, period: int) -> int | None:
         """Number of the branch with an orbit near a state, its period the given one or a part."""
         size = ARRIVED * (float(np.linalg.norm(state)) or 1.0)
-        for (number, orbit), places in zip(self._orbits, self._places, strict=True):
+        for number, orbit, places in self._orbits:
             if period % orbit.period == 0 and _nearest(places, state) < size:
                 return number
         return None
@@ -720,7 +718,7 @@ class _Known:
     def stable_near(self, states: Real) -> Orbit | None:
         """Stable orbit near which the last of some states lie, one period after the other."""
         size = ARRIVED * (float(np.linalg.norm(states, axis=1).max()) or 1.0)
-        for (_, orbit), places in zip(self._orbits, self._places, strict=True):
+        for _, orbit, places in self._orbits:
             if not orbit.stable:
                 continue
             tail = states[-orbit.period :]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -447,13 +447,10 @@ class FlowMap:
             if parts[-1].failure:
                 break
             nodes = parts[-1].ends[-1:]
-        return Segments(
-            np.concatenate([part.ends for part in parts]),
-            np.concatenate([part.jacobians for part in parts]),
-            np.concatenate([part.d_omega for part in parts]),
-            np.concatenate([part.d_parameters for part in parts]),
-            np.sum([part.closings for part in parts], axis=0),
-            parts[-1].failure,
+        return replace(
+            parts[-1],
+            ends=np.concatenate([part.ends for part in parts]),
+            closings=np.sum([part.closings for part in parts], axis=0),
         )
 
     def _check_segments(self, nodes: Real, phases: Real, omega: float, chained: bool) -> None:

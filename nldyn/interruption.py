@@ -5,13 +5,12 @@ from __future__ import annotations
 import _thread
 import sys
 import threading
-from types import SimpleNamespace
 from typing import Any
 
 SOON = 0.2
 """Seconds after which a Ctrl-C that was swallowed is tried again."""
 
-_swallowed = SimpleNamespace(any=False)
+_swallowed = threading.Event()
 
 
 def interrupted(error: BaseException | None) -> bool:
@@ -24,7 +23,7 @@ def interrupted(error: BaseException | None) -> bool:
     """
     if error is None or isinstance(error, KeyboardInterrupt):
         return error is not None
-    return _swallowed.any or interrupted(error.__cause__ or error.__context__)
+    return _swallowed.is_set() or interrupted(error.__cause__ or error.__context__)
 
 
 def heed_swallowed() -> None:
@@ -39,7 +38,7 @@ def heed_swallowed() -> None:
         if not isinstance(unraisable.exc_value, KeyboardInterrupt):
             usual(unraisable)
             return
-        _swallowed.any = True
+        _swallowed.set()
         again = threading.Timer(SOON, _thread.interrupt_main)
         again.daemon = True
         again.start()

@@ -576,7 +576,7 @@ def _swept(
     lost = stretches[-1]
     if lost.failure:
         begins[-1] = begins[-2] + (end_phase(lost) - lost.record.phase[0]) / lost.omega
-    return Motion(flow, tuple(stretches), begins, failure, math.copysign(rate, last - first))
+    return Motion(flow, tuple(stretches), begins, failure, slope)
 
 
 def chirp_steps(first: float, last: float, rate: float, steps: int) -> tuple[Real, Real]:

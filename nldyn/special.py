@@ -33,8 +33,8 @@ NEIGHBOUR = 1e-3  # arclength between two branch points at one turn, and dP/ds t
 SAME = 1e-7  # arclength between two branch points that cannot be told apart
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
-DIVES = 8  # points at which to look for a change of sign between two others
 FAR_ALONE = 0.3  # the same of the only pair of a single mode
+DIVES = 8  # points at which to look for a change of sign between two others
 STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
 
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -200,14 +201,15 @@ def chaotic_places(diagrams: Mapping[str, BruteForce]) -> dict[tuple[str, float]
 
 def effort_at(model: str, frequency_hz: float) -> tuple[int, int]:
     """How many motions are followed, and for how many periods: more where the paper says chaos."""
-    published = {row["id"]: row["published"] for row in published_claims()}
-    ranges = [
-        ends
-        for claim, name in CLAIMS.items()
-        if name == model
-        for ends in published_ranges(published[claim])
-    ]
-    return CLAIMED if any(low <= frequency_hz <= high for low, high in ranges) else ELSEWHERE
+    inside = any(low <= frequency_hz <= high for low, high in claimed_ranges(model))
+    return CLAIMED if inside else ELSEWHERE
+
+
+@cache
+def claimed_ranges(model: str) -> tuple[tuple[float, float], ...]:
+    """Ends in Hz of the ranges in which the paper finds a model chaotic."""
+    texts = [row["published"] for row in published_claims() if CLAIMS.get(row["id"]) == model]
+    return tuple(ends for text in texts for ends in published_ranges(text))
 
 
 def submit_sweeps(workers: Workers, points: int = POINTS) -> dict[Task, Future[BruteForce]]:

@@ -13,8 +13,7 @@ from nldyn.diagrams import Diagram, Progress, Seed, diagram
 from nldyn.elements import Stop
 from nldyn.exploration import ExploreOptions, explore
 from nldyn.orbit import Orbit
-from nldyn.paper import workers
-from nldyn.paper.workers import Workers
+from nldyn.paper.workers import Workers, tell
 from nldyn.progress import compilation_told
 from nldyn.resources import example
 from nldyn.scene import build_component, build_system, load_scene
@@ -169,7 +168,7 @@ def run_job(name: str) -> Diagram:
     job = next(job for job in JOBS if job.name == name)
 
     def progress(what: str, frequency_hz: float) -> None:
-        workers.tell((f"{name}: {what}", frequency_hz))
+        tell(f"{name}: {what}", frequency_hz)
 
     with compilation_told(progress):
         result = job.run(progress)
@@ -187,7 +186,7 @@ def _forget_motion(orbit: Orbit) -> None:
     vars(orbit).pop("trajectory", None)
 
 
-def submit_diagrams(processes: Workers, jobs: Sequence[Job] = JOBS) -> dict[str, Future[Diagram]]:
+def submit_diagrams(workers: Workers, jobs: Sequence[Job] = JOBS) -> dict[str, Future[Diagram]]:
     """Begin jobs, the longest first."""
     scene_system("one_dof")  # fail early, before any process is started
-    return {job.name: processes.pool.submit(run_job, job.name) for job in jobs}
+    return {job.name: workers.pool.submit(run_job, job.name) for job in jobs}

@@ -6,7 +6,7 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from nldyn.progress import progress_line
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 Message = tuple[str, float]
-tell: Callable[[Message], None] = lambda message: None  # noqa: E731
+_messages: SimpleQueue[Message] | None = None  # of a worker process, to its parent
 
 
 @dataclass(frozen=True)
@@ -70,10 +70,16 @@ def worker_processes(count: int) -> Iterator[Workers]:
         yield Workers(pool, messages, report)
 
 
+def tell(what: str, frequency_hz: float) -> None:
+    """Say from within a worker process what it is at; nobody listens elsewhere."""
+    if _messages is not None:
+        _messages.put((what, frequency_hz))
+
+
 def _prepare(messages: SimpleQueue[Message]) -> None:
     """Let a worker process tell what it computes, and end when its parent ends."""
-    global tell
-    tell = messages.put
+    global _messages
+    _messages = messages
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
