@@ -264,6 +264,11 @@ class Branch:
         """Logarithms of ω (rad/s) at the `places`, in the order along the branch."""
         return np.array([point.orbit.point[-1] for point in self.places])
 
+    @cached_property
+    def stroboscopic_states(self) -> Real:
+        """States (places, n, 2n_modes) at the start of each excitation period at the `places`."""
+        return np.array([stroboscopic(point.orbit) for point in self.places])
+
     def at(self, frequency_hz: float) -> list[Orbit]:
         """All orbits of the branch at one frequency, in order along it.
 
@@ -415,9 +420,9 @@ class Branch:
 
     def contains(self, orbit: Orbit) -> bool:
         """Whether the branch passes through an orbit (up to a shift by whole periods)."""
-        if orbit.period != self.period:
-            return False
-        return any(same_orbit(orbit, other) for other in self.at(orbit.frequency_hz))
+        from nldyn.crossings import passes
+
+        return orbit.period == self.period and passes(self, orbit)
 
 
 def stroboscopic(orbit: Orbit) -> Real:

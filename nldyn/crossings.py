@@ -6,15 +6,17 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from nldyn.branch import Branch, BranchPoint
+from nldyn.branch import Branch, BranchPoint, same_orbit, stroboscopic
 from nldyn.errors import SystemModelError, check_frequency, shown
 from nldyn.linear import Real
 from nldyn.orbit import Orbit
 from nldyn.special import Chord, LocateError, root
 
 SAME = 4e-15  # difference of two logarithms of a frequency that is rounding
+BESIDE = 2.0  # an orbit further from a chord, in its lengths, is not on the branch between its ends
 
 
 def crossings(branch: Branch, frequency_hz: float) -> list[BranchPoint]:
@@ -29,6 +31,41 @@ def crossings(branch: Branch, frequency_hz: float) -> list[BranchPoint]:
         If the frequency is not a positive number.
     """
     return _crossings(branch, frequency_hz)[0]
+
+
+def passes(branch: Branch, orbit: Orbit) -> bool:
+    """Whether a branch passes through an orbit of its period (up to a shift by whole periods).
+
+    The branch is solved for only where its chord comes near the orbit.
+    """
+    p = float(orbit.point[-1])
+    on, passed = _passages(branch, p)
+    if any(same_orbit(branch.places[i].orbit, orbit) for i in on):
+        return True
+    for i in passed[_chords_beside(branch, passed, orbit)]:
+        try:
+            found = _crossing(branch.places[i], branch.places[i + 1], p)
+        except LocateError:
+            continue
+        if same_orbit(found.orbit, orbit):
+            return True
+    return False
+
+
+def _chords_beside(branch: Branch, first: NDArray[np.intp], orbit: Orbit) -> NDArray[np.bool_]:
+    """Which chords, given by the number of their first point, come near an orbit."""
+    level = branch.log_frequencies - orbit.point[-1]
+    states, target = branch.stroboscopic_states, stroboscopic(orbit)
+    share = level[first] / (level[first] - level[first + 1])
+    chords = states[first + 1] - states[first]
+    line = states[first] + share[:, None, None] * chords
+    shifts = range(orbit.period)
+    away = [np.linalg.norm(line - np.roll(target, s, axis=0), axis=(1, 2)) for s in shifts]
+    lengths = np.linalg.norm(chords, axis=(1, 2))
+    near: NDArray[np.bool_] = (
+        np.min(away, axis=0) <= BESIDE * lengths + 1e-5 * float(np.linalg.norm(target))
+    )
+    return near
 
 
 def requested(branch: Branch) -> tuple[list[BranchPoint], list[str]]:
@@ -68,13 +105,12 @@ def _arclength(point: BranchPoint) -> float:
 def _crossings(branch: Branch, frequency_hz: float) -> tuple[list[BranchPoint], list[str]]:
     check_frequency("frequency_hz", frequency_hz)
     p = math.log(2.0 * math.pi * frequency_hz)
-    places, level = branch.places, branch.log_frequencies - p
+    on, passed = _passages(branch, p)
+    places, exact = branch.places, set(on.tolist())
     found: list[BranchPoint] = []
     lost: list[str] = []
-    on = np.abs(level) <= SAME
-    passed = (level[:-1] * level[1:] < 0.0) & ~on[:-1] & ~on[1:]
-    for i in np.flatnonzero(on | np.append(passed, False)):
-        if on[i]:
+    for i in np.sort(np.append(on, passed)):
+        if i in exact:
             found.append(places[i])
             continue
         try:
@@ -82,6 +118,14 @@ def _crossings(branch: Branch, frequency_hz: float) -> tuple[list[BranchPoint], 
         except LocateError as error:
             lost.append(f"the orbit of the branch at {frequency_hz:.8g} Hz is missing: {error}")
     return found, lost
+
+
+def _passages(branch: Branch, p: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Numbers of the places at ln ω = p, and of those between which and the next one it lies."""
+    level = branch.log_frequencies - p
+    on = np.abs(level) <= SAME
+    passed = (level[:-1] * level[1:] < 0.0) & ~on[:-1] & ~on[1:]
+    return np.flatnonzero(on), np.flatnonzero(passed)
 
 
 def _log_frequency(point: BranchPoint) -> float:

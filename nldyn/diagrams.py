@@ -23,7 +23,6 @@ from nldyn.branch import (
 )
 from nldyn.checkpoint import Checkpoint, checkpoint_of_several
 from nldyn.continuation import (
-    BORN,
     ContinuationOptions,
     born_at,
     check_range,
@@ -179,15 +178,16 @@ class Collector:
             except ConvergenceError as error:
                 self.notes.append(f"orbit of period {orbit.period} found but not followed: {error}")
             else:
-                if not self._begins_at_known_flip(branch):
+                if not self._repeats(branch):
                     self.add(branch)
 
-    def _begins_at_known_flip(self, branch: Branch) -> bool:
-        """Whether a branch is one that was followed from a flip, found between flip and start."""
-        return any(
-            other.stop_reasons[0].startswith(BORN)
-            and branch.contains(other.nodes[len(other.nodes) // 2].orbit)
-            for other in self.of_period(branch.period)
+    def _repeats(self, branch: Branch) -> bool:
+        """Whether a branch is a known one after all: beside folds and flips that may not be seen.
+
+        One of the two holds the middle of the other, which may be broken off.
+        """
+        return self.known(_middle(branch)) or any(
+            branch.contains(_middle(other)) for other in self.of_period(branch.period)
         )
 
     def from_flip(self, special: SpecialPoint, options: ContinuationOptions | None = None) -> None:
@@ -232,6 +232,10 @@ class Collector:
         else:
             branch = complete("", None, None, start, course, progress, self.checkpoint, origin)
         self.add(branch)
+
+
+def _middle(branch: Branch) -> Orbit:
+    return branch.nodes[len(branch.nodes) // 2].orbit
 
 
 def _is_at(end: Orbit, special: SpecialPoint) -> bool:

@@ -29,7 +29,7 @@ from nldyn.orbit import (
     shooting_problem,
     spread,
 )
-from nldyn.search import MOST_COUNT, orbit_near, random_states
+from nldyn.search import MOST_COUNT, orbit_beside, orbit_near, random_states
 from nldyn.system import System
 
 RETURNS = 3.0  # recorded periods after settling, over the longest period looked for
@@ -630,7 +630,8 @@ class _Survey:
         known: _Known,
     ) -> None:
         """Look for unstable orbits of short periods beside all motions, and by deflation."""
-        omega = known.omega
+        box, omega = self.box, known.omega
+        low, high = box.range_hz
         for period in range(1, min(self.effort.unstable_period, self.max_period) + 1):
             for run in runs:
                 for start in near_returns(run[TRANSIENT:], period, CANDIDATES):
@@ -639,8 +640,8 @@ class _Survey:
                     if number is not None:
                         known.met.append(number)
                         continue
-                    orbit = self._orbit_near(state, period, omega)
-                    if orbit is not None:
+                    orbit = orbit_beside(box.flow, state, period, omega, box.observe)
+                    if orbit is not None and low <= orbit.frequency_hz <= high:
                         self._meet(orbit, known)
             starts = [run[-1] for run in wandering] + [stroboscopic(o)[0] for o in stable]
             for start in starts:
@@ -704,8 +705,11 @@ class _Known:
         return [orbit for _, orbit, _ in self._orbits if orbit.period == period]
 
     def number(self, orbit: Orbit) -> int | None:
-        """Number of the branch that an orbit lies on."""
-        return next((i for i, other, _ in self._orbits if same_orbit(orbit, other)), None)
+        """Number of the branch that an orbit, perhaps of another frequency, lies on."""
+        if orbit.omega == self.omega:
+            return next((i for i, other, _ in self._orbits if same_orbit(orbit, other)), None)
+        branches = self.box.branches
+        return next((i for i, branch in enumerate(branches) if branch.contains(orbit)), None)
 
     def beside(self, state: Real, period: int) -> int | None:
         """Number of the branch with an orbit near a state, its period the given one or a part."""

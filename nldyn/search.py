@@ -26,6 +26,10 @@ from nldyn.shooting import ShootingProblem
 from nldyn.system import System
 
 MOST_COUNT = 10**7  # of starts, periods and candidates
+FREQUENCY_WEIGHT = 10.0  # of a relative change of the frequency against one of the states
+LONGEST_STEP, NEARBY = 0.5, 1e-3  # of least-length steps: the longest, and short enough to end with
+LEAST_LENGTH_STEPS = 14
+FREQUENCY_SHIFT = 0.05  # how far the frequency may go, relative
 
 
 @dataclass(frozen=True)
@@ -182,6 +186,49 @@ def orbit_near(flow: FlowMap, start: Real, period: int, omega: float, observe: s
     except ConvergenceError:
         return None
     return orbit
+
+
+def orbit_beside(
+    flow: FlowMap, start: Real, period: int, omega: float, observe: str
+) -> Orbit | None:
+    """Orbit beside a state z at a frequency near ω, by its minimal period; None if none is found.
+
+    The frequency is free, and each Newton step is the shortest of those that solve the linearised
+    equations, the Gauss-Newton method of Allgower and Georg [1990, chapter 3]. So a state beside
+    a branch that does not reach ω leads to it, and folds do no harm.
+    """
+    problem = shooting_problem(flow, period)
+    try:
+        point = np.append(spread(problem, start, omega).ravel(), math.log(omega))
+        row = np.zeros(point.size)
+        row[-1] = 1.0
+        for _ in range(LEAST_LENGTH_STEPS):
+            found = problem.correct(point, row, max_iterations=1)
+            if not np.any(found.along):
+                return None
+            metric = problem.metric(point)
+            metric[-1] *= FREQUENCY_WEIGHT
+            row = metric * found.along
+            step = found.point - point
+            step -= found.along * float(row @ step) / float(row @ found.along)
+            length = math.sqrt(float(step @ (metric * step)))
+            point = point + step * min(1.0, LONGEST_STEP / length if length else 1.0)
+            if not abs(point[-1] - math.log(omega)) < FREQUENCY_SHIFT:
+                return None
+            if length < NEARBY:
+                break
+        else:
+            return None
+        found = problem.correct(point, row, max_iterations=8)
+        if not found.converged:
+            return None
+        orbit = Orbit.of(problem, found, observe)
+        shorter = minimal_period(orbit)
+        if shorter == period:
+            return orbit
+        return orbit_near(flow, stroboscopic(orbit)[0], shorter, orbit.omega, observe)
+    except ConvergenceError:
+        return None
 
 
 def _refined(problem: ShootingProblem, start: Real, omega: float, observe: str) -> Orbit | None:

@@ -20,6 +20,7 @@ from nldyn import (
     Unbalance,
     checkpoint,
     explore,
+    find_orbits,
     load_branches,
     load_diagram,
     load_exploration,
@@ -422,4 +423,18 @@ def test_an_orbit_between_a_flip_and_the_first_point_beside_it_is_known():
     near = switch_at_flip(flip, amplitude=1e-3).orbit
     assert not box.known(near)
     box.from_orbits([near])
+    assert len(box.branches) == 2
+
+
+def test_orbits_beside_the_ends_of_a_doubled_branch_are_known():
+    """At the frequency of one beside a flip, Newton's method may come to the single period."""
+    flow = FlowMap(system_of("two_dof_xi_0.01"))
+    box = Collector(flow, (17.9, 18.9), "middle", ContinuationOptions(), lambda what, hz: None)
+    box.from_orbits([solve_orbit(flow, 18.4), *find_orbits(flow, 18.6, 2)])
+    harmonic, doubled = box.branches
+    flips = [s for s in harmonic.special_points if s.kind == "PD"]
+    beside = [switch_at_flip(f, amplitude=a).orbit for f in flips for a in (1e-2, 1e-3)]
+    assert len(beside) == 4
+    assert not all(doubled.contains(orbit) for orbit in beside)
+    box.from_orbits(beside)
     assert len(box.branches) == 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -26,8 +27,9 @@ from nldyn import (
     find_orbits,
     solve_orbit,
 )
-from nldyn.branch import minimal_period, same_orbit
+from nldyn.branch import minimal_period, same_orbit, stroboscopic
 from nldyn.continuation import open_ends
+from nldyn.search import orbit_beside, orbit_near
 
 # where the paper's text sees subharmonics: 1/3 near 37.1, 1/5 near 62.2, 1/7 near 58, 1/13 near 81
 PLACES = [(3, 37.1), (5, 62.2), (7, 58.0), (13, 80.19), (2, 50.6), (3, 76.0)]
@@ -54,6 +56,28 @@ def test_subharmonic_returns_under_runge_kutta_after_its_period_only(one_dof):
     assert np.abs((x - states[0]) / scale).max() < 1e-7
     for other in states[1:]:
         assert np.abs((other - states[0]) / scale).max() > 1e-2
+
+
+@pytest.mark.parametrize("beyond", [1e-5, 1e-4, 1e-3])
+def test_steps_of_least_length_find_the_branch_that_a_frequency_just_misses(
+    harmonic_branch, beyond
+):
+    folds = [s for s in harmonic_branch.special_points if s.kind == "LP"]
+    assert len(folds) >= 2
+    for fold in folds:
+        state, flow = stroboscopic(fold.orbit)[0], fold.orbit.problem.flow
+        before, after = (
+            len(harmonic_branch.at(fold.frequency_hz * (1.0 + s * 1e-5))) for s in (-1.0, 1.0)
+        )
+        omega = fold.orbit.omega * (1.0 + (beyond if before > after else -beyond))
+        held = orbit_near(flow, state, 1, omega, "middle")
+        if held is not None:  # another part of the branch
+            assert np.linalg.norm(stroboscopic(held)[0] - state) > 0.1 * np.linalg.norm(state)
+        found = orbit_beside(flow, state, 1, omega, "middle")
+        assert found is not None
+        assert harmonic_branch.contains(found)
+        assert np.linalg.norm(stroboscopic(found)[0] - state) < 0.1 * np.linalg.norm(state)
+        assert abs(math.log(found.omega / fold.orbit.omega)) < beyond
 
 
 def test_search_is_repeatable(one_dof):
