@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from nldyn.errors import SceneError, SystemModelError
     from nldyn.executors import Outcome, TaskError, run_all
     from nldyn.exploration import Coverage, Exploration, ExploreOptions, explore
+    from nldyn.fixed_point_index import index_sum
     from nldyn.flow import FlowMap, FlowOptions
     from nldyn.fourier import Spectrum, spectrum
     from nldyn.lifetimes import ChaosLifetime, chaos_lifetime
@@ -89,6 +90,7 @@ _HOMES = {
     "errors": "SceneError SystemModelError",
     "executors": "Outcome TaskError run_all",
     "exploration": "Coverage Exploration ExploreOptions explore",
+    "fixed_point_index": "index_sum",
     "flow": "FlowMap FlowOptions",
     "fourier": "Spectrum spectrum",
     "contacts": "Impacts impacts",
@@ -186,6 +188,7 @@ __all__ = [
     "hertz_stiffness",
     "impact_section",
     "impacts",
+    "index_sum",
     "load_branch",
     "load_branches",
     "load_curve",

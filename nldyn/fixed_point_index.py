@@ -1,0 +1,91 @@
+"""Indices of fixed points: they add up to one at a frequency, unless orbits are missing there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from nldyn.branch import Branch
+from nldyn.errors import SystemModelError, check_frequency, check_whole
+from nldyn.orbit import Orbit
+from nldyn.system import System
+
+
+def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) -> int:
+    """Sum of the indices of all fixed points of Pⁿ on some branches, at one frequency.
+
+    P takes the state over one period of the excitation. A fixed point has the index +1 or -1, the
+    sign of det(I - DPⁿ), that is of ∏(1 - μᵢ). Motions of a structure with damping in all of its
+    modes, forced periodically and held back by stops, end in a ball that Pⁿ maps into itself,
+    whatever the stiffness of the stops; then the indices of all fixed points of Pⁿ add up to one
+    [Krasnosel'skii 1968, chapter 2]. Another sum proves that orbits whose period divides n are
+    missing from the branches, or that a branch was broken off.
+
+    The converse does not hold: the two halves of an isola have opposite indices.
+
+    Parameters
+    ----------
+    branches : iterable of Branch
+        Of one system; those of a `Diagram`, for example.
+    frequency_hz : float
+        Excitation frequency in Hz, within the range that the branches were followed in.
+    period : int
+        Number n of excitation periods.
+
+    Returns
+    -------
+    int
+        Every orbit of period p counts p times, once for each of its points.
+
+    Raises
+    ------
+    SystemModelError
+        If the frequency or the period is none, or if a mode is not damped.
+
+    References
+    ----------
+    M. A. Krasnosel'skii (1968), *The Operator of Translation along the Trajectories of Differential
+    Equations*, American Mathematical Society.
+
+    Examples
+    --------
+    At 12.15 Hz the superharmonic resonance has two stable orbits and an unstable one.
+
+    >>> from nldyn import Stop, System, Unbalance, continue_branch, index_sum, solve_orbit
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> branch = continue_branch(solve_orbit(system, 13.0), (11.0, 14.0))
+    >>> [orbit.stable for orbit in branch.at(12.15)], index_sum([branch], 12.15)
+    ([True, False, True], 1)
+    """
+    check_frequency("frequency_hz", frequency_hz)
+    check_whole("period", period, 1)
+    total = 0
+    for branch in branches:
+        if period % branch.period == 0:
+            _check_damped(branch.nodes[0].orbit.problem.flow.system)
+            times = period // branch.period
+            total += sum(orbit.period * index(orbit, times) for orbit in branch.at(frequency_hz))
+    return total
+
+
+def index(orbit: Orbit, times: int = 1) -> int:
+    """Sign of det(I - DPⁿ) with n = `times` periods of an orbit: the sign of ∏(1 - μᵢ^times).
+
+    Complex multipliers come in pairs that contribute a positive factor, so that only real ones
+    outside of the unit circle count.
+    """
+    real = np.real(orbit.multipliers[np.imag(orbit.multipliers) == 0.0])
+    outside = np.abs(real) > 1.0 if times % 2 == 0 else real > 1.0
+    return 1 - 2 * (int(np.count_nonzero(outside)) % 2)
+
+
+def _check_damped(system: System) -> None:
+    slowest = max(float(np.linalg.eigvals(block).real.max()) for block in system.linear.blocks)
+    if not slowest < 0.0 or not math.isfinite(slowest):
+        raise SystemModelError(
+            "index_sum: the indices add up to one only where every mode is damped, but one is not"
+        )

@@ -1,0 +1,64 @@
+"""Indices of fixed points add up to one where no orbit is missing."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from one_dof import RANGE_HZ
+
+from nldyn import Stop, System, SystemModelError, Unbalance, diagram, index_sum, solve_orbit
+from nldyn.continuation import continue_branch
+from nldyn.fixed_point_index import index
+
+
+@pytest.fixture(scope="module")
+def doubled(one_dof):
+    """The harmonic branch between two flips, and what is born there."""
+    return diagram(one_dof, (28.0, 60.0), (1, 2))
+
+
+@settings(max_examples=40, deadline=None)
+@given(share=st.floats(0.001, 0.999))
+def test_the_harmonic_branch_has_the_sum_one_at_every_frequency(harmonic_branch, share):
+    frequency = RANGE_HZ[0] * (RANGE_HZ[1] / RANGE_HZ[0]) ** share
+    assert index_sum([harmonic_branch], frequency) == 1
+
+
+@pytest.mark.parametrize("frequency", [29.0, 33.0, 40.0, 50.0, 59.0])
+def test_with_doubled_orbits_the_sum_of_two_periods_is_one(doubled, frequency):
+    assert index_sum(doubled.branches, frequency, 1) == 1
+    assert index_sum(doubled.branches, frequency, 2) == 1
+
+
+def test_a_missing_doubled_branch_shows_between_its_flips(doubled):
+    harmonic = [branch for branch in doubled.branches if branch.period == 1]
+    (orbit,) = harmonic[0].at(50.0)
+    assert orbit.multipliers[0].real < -1.0
+    assert index_sum(harmonic, 50.0, 1) == 1
+    assert index_sum(harmonic, 50.0, 2) == -1
+
+
+def test_a_branch_that_is_broken_off_shows(harmonic_branch):
+    """Above the fold at 12.2 Hz; one of the three orbits is left out."""
+    orbits = harmonic_branch.at(12.15)
+    assert len(orbits) == 3
+    assert [index(orbit) for orbit in orbits] == [1, -1, 1]
+
+
+def test_the_index_is_the_sign_of_the_determinant(doubled):
+    for branch in doubled.branches:
+        for orbit in branch.points[1:-1:10]:
+            for times in (1, 2, 3):
+                map_by = np.linalg.matrix_power(orbit.monodromy, times)
+                determinant = np.linalg.det(np.eye(2) - map_by)
+                if abs(determinant) > 1e-6:
+                    assert index(orbit, times) == np.sign(determinant)
+
+
+def test_a_mode_without_damping_is_refused():
+    system = System.from_modal(
+        [13.0], {"tip": [1.0]}, stops=[Stop("tip", 1e9)], excitation=[Unbalance("tip", 1e-6)]
+    )
+    branch = continue_branch(solve_orbit(system, 30.0), (29.9, 30.1))
+    with pytest.raises(SystemModelError, match="damped"):
+        index_sum([branch], 30.0)
