@@ -461,7 +461,8 @@ def basins(
     executor : concurrent.futures.Executor, optional
         Where to compute; here unless given.
     progress : callable, optional
-        Called as ``progress(done, total)`` after every 250 cells.
+        Called as ``progress(done, total)`` in each stage, counted anew: after each motion that
+        looks for attractors, after every 250 cells, after each check.
 
     Returns
     -------
@@ -520,8 +521,9 @@ def basins(
     picked = rng.choice(len(modal), min(starts, len(modal)), replace=False)
     known = list(attractors)
     for share in find_attractors(
-        flow, frequency_hz, starts=modal[picked], observe=name, options=options, executor=executor
-    ):
+        flow, frequency_hz, starts=modal[picked], observe=name, options=options,
+        executor=executor, progress=progress,
+    ):  # fmt: skip
         _add(known, share.attractor)
     states = flow.to_state(modal)
     labels, phases, periods = (np.full(len(modal), value) for value in (UNDECIDED, 0, 0))
@@ -539,11 +541,11 @@ def basins(
         done = len(known)
         left = order[labels[order] == UNDECIDED]
         new = partial(attractor_from, flow, frequency_hz, name, options)
-        for attractor in values_of(new, list(states[left[:starts]]), executor):
+        for attractor in values_of(new, list(states[left[:starts]]), executor, progress):
             _add(known, attractor)
     checked = rng.choice(len(modal), min(checks, len(modal)), replace=False)
     again = partial(_index_of, flow, frequency_hz, name, options, known)
-    results = values_of(again, [flow.to_state(modal[cell]) for cell in checked], executor)
+    results = values_of(again, [flow.to_state(modal[cell]) for cell in checked], executor, progress)
     wrong = sum(index != labels[cell] for cell, index in zip(checked, results, strict=True))
     counts = np.array([max(attractor.period, 1) for attractor in known] + [1])
     return Basins(

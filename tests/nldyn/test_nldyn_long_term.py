@@ -329,7 +329,13 @@ def test_two_stable_orbits_share_the_plane_and_unstable_ones_sit_on_the_edge():
 
     system = build_system(load_scene(example("two_dof_xi_0.01.toml")))
     plane = Plane.at_interface(system, (-3e-5, 1e-5), (-0.006, 0.006))
-    found = basins(system, 22.8, plane, shape=(10, 10), starts=12, checks=10)
+    told = []
+    found = basins(
+        system, 22.8, plane, shape=(10, 10), starts=12, checks=10,
+        progress=lambda done, total: told.append((done, total)),
+    )  # fmt: skip
+    every_stage = [(done, 12) for done in range(1, 13)], [(done, 10) for done in range(1, 11)]
+    assert told[:12] == every_stage[0] and told[-10:] == every_stage[1]
     assert found.wrong == 0 and found.undecided == 0.0
     impacts_of = sorted(a.orbit.impacts for a in found.attractors)
     assert impacts_of == [1, 2]  # branches (c) and (a) of Figure 4
