@@ -181,6 +181,24 @@ class Collector:
                 if not self._repeats(branch):
                     self.add(branch)
 
+    def follow(
+        self, orbit: Orbit, longest: int, options: Callable[[int], ContinuationOptions]
+    ) -> None:
+        """Follow an orbit's branch unless it is known, and those that it leads to.
+
+        Doubled branches are followed up to the longest period, with the step control of theirs.
+        """
+        count = len(self.branches)
+        self.from_orbits([orbit])
+        while count < len(self.branches):
+            branch = self.branches[count]
+            count += 1
+            for special in branch.special_points:
+                if special.kind == "PD" and 2 * branch.period <= longest:
+                    self.from_flip(special, options(2 * branch.period))
+                elif special.kind == "BP":
+                    self.from_branch_point(special, options(branch.period))
+
     def _repeats(self, branch: Branch) -> bool:
         """Whether a branch is a known one after all: beside folds and flips that may not be seen.
 

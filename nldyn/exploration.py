@@ -662,17 +662,8 @@ class _Survey:
 
     def _follow(self, orbit: Orbit) -> None:
         """Follow an orbit's branch unless it is known, and those that it leads to."""
-        box, count = self.box, len(self.box.branches)
         longest = max(self.max_period, self.effort.doubled_period)
-        box.from_orbits([orbit])
-        while count < len(box.branches):
-            branch = box.branches[count]
-            count += 1
-            for special in branch.special_points:
-                if special.kind == "PD" and 2 * branch.period <= longest:
-                    box.from_flip(special, self._options(2 * branch.period))
-                elif special.kind == "BP":
-                    box.from_branch_point(special, self._options(branch.period))
+        self.box.follow(orbit, longest, self._options)
 
     def _options(self, period: int) -> ContinuationOptions:
         """Step control of the branches of a period."""
