@@ -321,8 +321,10 @@ def paper(out: Path) -> None:
     """Reproduce the figures and numbers of the paper."""
     with plain_errors():
         from nldyn.paper import main as reproduce
+        from nldyn.paper.kept import unfinished_folder
 
-        reproduce(out)
+        with told_what_is_kept(unfinished_folder(out)):
+            reproduce(out)
 
 
 @contextmanager
@@ -345,26 +347,33 @@ def plain_errors() -> Iterator[None]:
 @contextmanager
 def kept_at_interrupt(out: Path) -> Iterator[Path]:
     """Give the file that keeps what is computed, and name it if the end is not reached."""
-    from nldyn.result_directory import OutputError
     from nldyn.unfinished import unfinished_file
 
-    with unfinished_file(out) as unfinished:
-        try:
-            yield unfinished
-        except OutputError as error:
-            if not unfinished.exists():
-                raise
-            fault = f"{error}; {unfinished} keeps what was computed, and the same command goes on"
-            raise OutputError(f"{fault} from there") from error
-        except (KeyboardInterrupt, Exception) as error:
-            if not (interrupted(error) and unfinished.exists()):
-                raise
-            click.echo(
-                f"nldyn: stopped by Ctrl-C; {unfinished} keeps what was computed, and the same "
-                "command goes on from there",
-                err=True,
-            )
-            sys.exit(INTERRUPTED)
+    with unfinished_file(out) as unfinished, told_what_is_kept(unfinished):
+        yield unfinished
+
+
+@contextmanager
+def told_what_is_kept(unfinished: Path) -> Iterator[None]:
+    """Name the place of unfinished work where an error of the output or Ctrl-C ends it."""
+    from nldyn.result_directory import OutputError
+
+    try:
+        yield
+    except OutputError as error:
+        if not unfinished.exists():
+            raise
+        fault = f"{error}; {unfinished} keeps what was computed, and the same command goes on"
+        raise OutputError(f"{fault} from there") from error
+    except (KeyboardInterrupt, Exception) as error:
+        if not (interrupted(error) and unfinished.exists()):
+            raise
+        click.echo(
+            f"nldyn: stopped by Ctrl-C; {unfinished} keeps what was computed, and the same "
+            "command goes on from there",
+            err=True,
+        )
+        sys.exit(INTERRUPTED)
 
 
 def describe(diagram: Diagram, seconds: float, out: Path) -> str:

@@ -204,8 +204,8 @@ class Collector:
 
         One of the two holds the middle of the other, which may be broken off.
         """
-        return self.known(_middle(branch)) or any(
-            branch.contains(_middle(other)) for other in self.of_period(branch.period)
+        return self.known(middle_orbit(branch)) or any(
+            branch.contains(middle_orbit(other)) for other in self.of_period(branch.period)
         )
 
     def from_flip(self, special: SpecialPoint, options: ContinuationOptions | None = None) -> None:
@@ -252,7 +252,8 @@ class Collector:
         self.add(branch)
 
 
-def _middle(branch: Branch) -> Orbit:
+def middle_orbit(branch: Branch) -> Orbit:
+    """Orbit halfway along a branch, by the number of its points: away from where it ends."""
     return branch.nodes[len(branch.nodes) // 2].orbit
 
 

@@ -750,7 +750,7 @@ def chao_lower_bound(counts: Sequence[int], rounds: int) -> float:
     if rounds < 2:
         return math.nan
     once, twice = counts.count(1), counts.count(2)
-    return (rounds - 1) / rounds * once * (once - 1) / (2.0 * (twice + 1))
+    return (rounds - 1) / rounds * once * max(once - 1, 0) / (2.0 * (twice + 1))
 
 
 def settling_periods(system: System, frequency_hz: float) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -15,7 +16,8 @@ def main(out: str | Path, workers: int = 2) -> None:
     Parameters
     ----------
     out : str or Path
-        Directory of results; it is written whole or not at all.
+        Directory of results; it is written whole or not at all. What was computed is kept beside
+        it until then, and the same call goes on from there.
     workers : int
         Number of processes.
 
@@ -32,13 +34,15 @@ def main(out: str | Path, workers: int = 2) -> None:
     from nldyn.paper.claims import evaluate, verdict_counts, write_claims
     from nldyn.paper.figures import write_figures
     from nldyn.paper.jobs import submit_diagrams
+    from nldyn.paper.kept import kept_folder
     from nldyn.paper.page import write_page
     from nldyn.paper.workers import ctrl_c_for_parent_only, worker_processes
     from nldyn.result_directory import check_directory, result_directory
 
     check_directory(out)
+    folder_kept = kept_folder(out)
     start = time.perf_counter()
-    with worker_processes(workers) as processes:
+    with worker_processes(workers, folder_kept) as processes:
         with ctrl_c_for_parent_only():  # as they start with what is submitted
             diagrams = submit_diagrams(processes)
             sweeps = submit_sweeps(processes)
@@ -50,6 +54,7 @@ def main(out: str | Path, workers: int = 2) -> None:
         write_figures(results, folder, chaos)
         write_chaos_figure(chaos, folder)
         write_page(rows, results, time.perf_counter() - start, folder)
+    shutil.rmtree(folder_kept.parent)
     seconds = time.perf_counter() - start
     counts = verdict_counts(rows)
     print(f"{len(rows)} claims: {counts}; {seconds:.0f} s; written to {out}", file=sys.stderr)

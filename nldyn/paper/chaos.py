@@ -215,7 +215,10 @@ def claimed_ranges(model: str) -> tuple[tuple[float, float], ...]:
 def submit_sweeps(workers: Workers, points: int = POINTS) -> dict[Task, Future[BruteForce]]:
     """Begin to sweep all models up and down."""
     tasks: list[Task] = [(model, way) for model in MODELS for way in get_args(Way)]
-    return {task: workers.pool.submit(_swept, points, task) for task in tasks}
+    return {
+        (model, way): workers.submit(f"sweep_{way}_{model}_{points}", _swept, points, (model, way))
+        for model, way in tasks
+    }
 
 
 def chaos_of(halves: Mapping[Task, BruteForce], workers: Workers) -> Chaos:
@@ -229,14 +232,17 @@ def chaos_of(halves: Mapping[Task, BruteForce], workers: Workers) -> Chaos:
     }
     futures = {}
     for (model, hz), attractor in chaotic_places(diagrams).items():
-        states, periods = effort_at(model, hz)
-        futures[model, hz] = workers.pool.submit(
-            chaos_lifetime, attractor, states=states, periods=periods
+        futures[model, hz] = workers.submit(
+            f"lifetime_{model}_{hz:.9g}", _lifetime, attractor, *effort_at(model, hz)
         )
     lifetimes: dict[str, list[ChaosLifetime]] = {model: [] for model in MODELS}
     for (model, _), life in workers.values(futures, "times that chaos lasts").items():
         lifetimes[model].append(life)
     return Chaos(diagrams, lifetimes)
+
+
+def _lifetime(attractor: Attractor, states: int, periods: int) -> ChaosLifetime:
+    return chaos_lifetime(attractor, states=states, periods=periods)
 
 
 def write_chaos_figure(chaos: Chaos, folder: Path) -> None:

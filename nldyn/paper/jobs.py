@@ -11,8 +11,8 @@ import cms
 from nldyn.continuation import ContinuationOptions
 from nldyn.diagrams import Diagram, Progress, Seed, diagram
 from nldyn.elements import Stop
-from nldyn.exploration import ExploreOptions, explore
 from nldyn.orbit import Orbit
+from nldyn.paper.starts import follow_starts, read_starts
 from nldyn.paper.workers import Workers, tell
 from nldyn.progress import compilation_told
 from nldyn.resources import example
@@ -44,8 +44,9 @@ class Job:
         Frequencies searched.
     options : ContinuationOptions, optional
         Step control.
-    effort : ExploreOptions, optional
-        If given, all branches up to the longest of the periods are looked for, without seeds.
+    doubled : (int, int), optional
+        If given, the branches through the starts that the search of this model gave, and doubled
+        ones as `follow_starts` says.
     """
 
     name: str
@@ -55,21 +56,16 @@ class Job:
     seeds: tuple[Seed, ...] = ()
     search_points: int = 12
     options: ContinuationOptions | None = None
-    effort: ExploreOptions | None = None
+    doubled: tuple[int, int] | None = None
 
     def run(self, progress: Progress | None = None) -> Diagram:
-        """Compute the diagram; its notes tell what was searched, if it was explored."""
-        if self.effort is not None:
-            found = explore(
-                self.system(),
-                self.range_hz,
-                max(self.periods),
-                effort=self.effort,
-                options=self.options,
-                progress=progress,
+        """Compute the diagram."""
+        if self.doubled is not None:
+            starts = read_starts(self.name)
+            found = follow_starts(
+                self.system(), starts, self.range_hz, LONG, self.doubled, progress
             )
-            notes = (*found.coverage_lines(), *_summed_up(found.diagram.notes))
-            return replace(found.diagram, notes=notes)
+            return replace(found, notes=tuple(_summed_up(found.notes)))
         return diagram(
             self.system(),
             self.range_hz,
@@ -132,20 +128,14 @@ LISTED = (
 # followed again from the next orbit.
 LONG = ContinuationOptions(max_points=20000)
 
-# All branches up to period 3; those that are born at flips are followed further where the time
-# allows, docs/paper.md says what that leaves out.
-SEARCH = ExploreOptions(spacing=0.01, starts=6)
-CASCADES = replace(SEARCH, doubled_period=8, doubled_points=50)
-ALL = (1, 2, 3)
-
-# The main 1/2 and 1/3 branches of the 4-DOF model at low damping, whose search takes too long.
-MAIN = (Seed(2, 45.0), Seed(3, 68.0))
+# Flips are followed to period 8. Branches of period 4 and more are broken off after so many points.
+DOUBLED = (8, 50)
 
 JOBS = (
-    Job("two_dof_xi_0.01", _scene("two_dof_xi_0.01"), (15.0, 90.0), ALL, (), 6, LONG, CASCADES),
-    Job("two_dof_xi_0.001", _scene("two_dof_xi_0.001"), (18.0, 90.0), ALL, (), 6, LONG, SEARCH),
-    Job("four_dof_xi_0.01", _scene("four_dof_xi_0.01"), (15.0, 90.0), ALL, (), 6, LONG, SEARCH),
-    Job("four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (18.0, 90.0), (1,), MAIN, 6, LONG),
+    Job("two_dof_xi_0.01", _scene("two_dof_xi_0.01"), (15.0, 90.0), doubled=DOUBLED),
+    Job("two_dof_xi_0.001", _scene("two_dof_xi_0.001"), (18.0, 90.0), doubled=DOUBLED),
+    Job("four_dof_xi_0.01", _scene("four_dof_xi_0.01"), (15.0, 90.0), doubled=DOUBLED),
+    Job("four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (18.0, 90.0), doubled=DOUBLED),
     Job("one_dof.listed", _scene("one_dof"), (5.0, 90.0), (), LISTED),
     Job("one_dof", _scene("one_dof"), (5.0, 90.0), (1, 2), (Seed(3, 76.0),)),
     Job("five_dof_xi_0.01", five_dof_system, (15.0, 90.0), search_points=6),
@@ -189,4 +179,4 @@ def _forget_motion(orbit: Orbit) -> None:
 def submit_diagrams(workers: Workers, jobs: Sequence[Job] = JOBS) -> dict[str, Future[Diagram]]:
     """Begin jobs, the longest first."""
     scene_system("one_dof")  # fail early, before any process is started
-    return {job.name: workers.pool.submit(run_job, job.name) for job in jobs}
+    return {job.name: workers.submit(job.name, run_job, job.name) for job in jobs}

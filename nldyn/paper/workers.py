@@ -6,14 +6,16 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.queues import SimpleQueue
+from pathlib import Path
 from typing import TypeVar
 
 from nldyn.diagrams import Progress
+from nldyn.paper.kept import kept
 from nldyn.progress import progress_line
 
 Key = TypeVar("Key")
@@ -34,11 +36,20 @@ class Workers:
         What each of them is at, with a frequency in Hz.
     report : callable
         Called as ``report(what, frequency_hz)``.
+    folder : Path
+        Keeps what is computed.
     """
 
     pool: ProcessPoolExecutor
     messages: SimpleQueue[Message]
     report: Progress
+    folder: Path
+
+    def submit(
+        self, name: str, function: Callable[..., Value], *arguments: object
+    ) -> Future[Value]:
+        """Compute a function in one of the processes, unless its value is kept under this name."""
+        return self.pool.submit(kept, self.folder / f"{name}.pickle", function, *arguments)
 
     def values(self, futures: Mapping[Key, Future[Value]], what: str) -> dict[Key, Value]:
         """Results of computations of one kind, once all are done; a failure is raised at once."""
@@ -57,7 +68,7 @@ class Workers:
 
 
 @contextmanager
-def worker_processes(count: int) -> Iterator[Workers]:
+def worker_processes(count: int, folder: Path) -> Iterator[Workers]:
     """Processes that end with their parent and at once when something goes wrong."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: threads only hinder
     context = multiprocessing.get_context("spawn")
@@ -67,7 +78,7 @@ def worker_processes(count: int) -> Iterator[Workers]:
         ProcessPoolExecutor(count, context, _prepare, (messages,)) as pool,
         _ended_at_failure(),
     ):
-        yield Workers(pool, messages, report)
+        yield Workers(pool, messages, report, folder)
 
 
 def tell(what: str, frequency_hz: float) -> None:

@@ -42,7 +42,8 @@ def test_diagrams_of_the_paper_are_the_same_with_any_number_of_workers(tmp_path)
     jobs = [job for job in JOBS if job.name in names]
     files = {}
     for workers in (1, 3):
-        with worker_processes(workers) as processes:
+        (tmp_path / str(workers)).mkdir()
+        with worker_processes(workers, tmp_path / str(workers)) as processes:
             diagrams = processes.values(submit_diagrams(processes, jobs), "diagrams")
         for name, found in diagrams.items():
             file = tmp_path / f"{name}.{workers}.h5"

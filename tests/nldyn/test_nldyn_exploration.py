@@ -209,6 +209,7 @@ def test_chao_bound_is_what_is_missing_where_all_are_met_alike():
     expected = [round(n * math.comb(r, k) * p**k * (1 - p) ** (r - k)) for k in range(r + 1)]
     counts = [k for k in range(1, r + 1) for _ in range(expected[k])]
     assert chao_lower_bound(counts, r) == pytest.approx(expected[0], rel=1e-4)
+    assert str(chao_lower_bound([2, 2], 2)) == "0.0"  # not -0.0
 
 
 def test_chao_bound_is_low_where_some_are_met_rarely():

@@ -1,0 +1,58 @@
+"""What an interrupted `nldyn paper` has computed, kept beside its results until all is done."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+from nldyn.resources import PACKAGE
+
+Value = TypeVar("Value")
+ENDING = ".unfinished"
+BESIDE = ("cms", "fem", "meshes", "docs/examples")  # what results depend on, beside the package
+
+
+def unfinished_folder(directory: str | Path) -> Path:
+    """Folder beside a directory of results that keeps what an interrupted run has computed."""
+    target = Path(directory).resolve()
+    return target.with_name(target.name + ENDING)
+
+
+def kept_folder(directory: str | Path) -> Path:
+    """Folder in it for what the code as it is now computes; that of other code is removed."""
+    above = unfinished_folder(directory)
+    folder = above / _stamp()
+    for other in above.glob("*"):
+        if other != folder:
+            shutil.rmtree(other, ignore_errors=True)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def kept(path: Path, function: Callable[..., Value], *arguments: object) -> Value:
+    """Value of a function, from a file if it was computed before."""
+    if path.exists():
+        with path.open("rb") as file:
+            value: Value = pickle.load(file)
+        return value
+    value = function(*arguments)
+    draft = path.with_suffix(f".{os.getpid()}.new")
+    with draft.open("wb") as file:
+        pickle.dump(value, file, pickle.HIGHEST_PROTOCOL)
+    draft.replace(path)
+    return value
+
+
+def _stamp() -> str:
+    """Digest of the code and the data that results depend on."""
+    digest = hashlib.sha256()
+    for place in (PACKAGE, *(PACKAGE.parent / name for name in BESIDE)):
+        for path in sorted(place.rglob("*")):
+            if path.suffix in (".py", ".csv", ".toml", ".msh", ".vtu", ".inp"):
+                digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()[:16]

@@ -1,0 +1,136 @@
+"""Orbits from which the branches of the larger models are followed.
+
+The search for them (`nldyn.paper.search`) takes longer than to follow what it finds, and chaotic
+motions make its outcome differ by a few small branches between versions of the program. So its
+orbits are kept, one of each branch; every one is solved for again before its branch is followed.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from nldyn.branch import Branch, stroboscopic
+from nldyn.continuation import ContinuationOptions
+from nldyn.diagrams import Collector, Diagram, Progress, middle_orbit
+from nldyn.fixed_point_index import index_sum
+from nldyn.flow import flow_of
+from nldyn.linear import Real
+from nldyn.orbit import check_observe
+from nldyn.search import orbit_near
+from nldyn.system import System
+
+DATA = Path(__file__).parent / "data"
+LONGEST = 3  # period of the orbits looked for
+INDEX_FREQUENCIES = 60  # at which the indices are added up
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """An orbit in a file of starts.
+
+    Parameters
+    ----------
+    period : int
+        Period multiple n.
+    frequency_hz : float
+        Excitation frequency in Hz.
+    state : (2n_modes,) array
+        At forcing phase zero.
+    """
+
+    period: int
+    frequency_hz: float
+    state: Real
+
+
+def read_starts(name: str, folder: Path = DATA) -> list[Start]:
+    """The orbits that a search of the model of this name gave."""
+    path = starts_path(name, folder)
+    with path.open(newline="", encoding="utf-8") as file:
+        return [
+            Start(int(row[0]), float(row[1]), np.array(row[2:], dtype=float))
+            for row in list(csv.reader(file))[1:]
+        ]
+
+
+def starts_path(name: str, folder: Path = DATA) -> Path:
+    """File of the starts of a model."""
+    return folder / f"starts_{name}.csv"
+
+
+def write_starts(path: Path, branches: Sequence[Branch]) -> None:
+    """Write one orbit of each branch, to the last digit, by period and frequency."""
+    orbits = sorted(map(middle_orbit, branches), key=lambda o: (o.period, o.frequency_hz))
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        entries = range(orbits[0].problem.size)
+        table.writerow(["period", "frequency_hz", *(f"state_{i}" for i in entries)])
+        for orbit in orbits:
+            table.writerow([orbit.period, orbit.frequency_hz, *stroboscopic(orbit)[0].tolist()])
+
+
+def follow_starts(
+    system: System,
+    starts: Sequence[Start],
+    range_hz: tuple[float, float],
+    options: ContinuationOptions,
+    doubled: tuple[int, int],
+    progress: Progress | None = None,
+) -> Diagram:
+    """Follow the branches through some orbits, and those that they lead to.
+
+    Parameters
+    ----------
+    system : System
+        Of the orbits.
+    starts : sequence of Start
+        Where to begin.
+    range_hz : (float, float)
+        Frequencies.
+    options : ContinuationOptions
+        Step control.
+    doubled : (int, int)
+        Longest period to which flips are followed, and most points in one direction of branches
+        that are longer in period than `LONGEST`.
+    progress : callable, optional
+        Called as ``progress(what, frequency_hz)``.
+    """
+    flow = flow_of(system)
+    observe = check_observe(system, None)
+    box = Collector(flow, range_hz, observe, options, progress or (lambda what, hz: None))
+    longest, most = doubled
+    shorter = replace(options, max_points=most)
+    lost = 0
+    for start in starts:
+        omega = 2.0 * math.pi * start.frequency_hz
+        orbit = orbit_near(flow, start.state, start.period, omega, observe)
+        if orbit is None or orbit.period != start.period:
+            lost += 1
+            continue
+        box.follow(orbit, longest, lambda period: options if period <= LONGEST else shorter)
+    notes = [f"from {len(starts)} starts, {lost} of which lead to no orbit"]
+    notes.append(index_note(box.branches, range_hz))
+    return Diagram(tuple(box.branches), range_hz, observe, (*notes, *box.notes))
+
+
+def index_note(branches: Sequence[Branch], range_hz: tuple[float, float]) -> str:
+    """Whether the indices of all fixed points of P, P² and P³ add up to one, in a sentence."""
+    low, high = range_hz
+    inside = np.geomspace(low, high, INDEX_FREQUENCIES + 2)[1:-1].tolist()
+    wrong = [
+        f"P^{n} at {hz:.4g} Hz"
+        for n in range(1, LONGEST + 1)
+        for hz in inside
+        if index_sum(branches, hz, n) != 1
+    ]
+    where = f"P to P^{LONGEST} at {len(inside)} frequencies"
+    if not wrong:
+        return f"indices of the fixed points of {where} add up to one"
+    return f"indices of the fixed points of {where} add up to one but for {', '.join(wrong)}"
+

@@ -1,0 +1,36 @@
+"""An interrupted `nldyn paper` goes on with what it has computed."""
+
+import nldyn.paper.kept
+from nldyn.paper.kept import kept, kept_folder, unfinished_folder
+from nldyn.paper.workers import worker_processes
+
+
+def test_a_value_is_computed_once(tmp_path):
+    calls = []
+
+    def square(x):
+        calls.append(x)
+        return x * x
+
+    assert [kept(tmp_path / "nine.pickle", square, 3) for _ in range(3)] == [9, 9, 9]
+    assert calls == [3]
+    assert [path.name for path in tmp_path.iterdir()] == ["nine.pickle"]
+
+
+def test_processes_take_what_an_earlier_run_has_kept(tmp_path):
+    for argument in (-2, -5):  # the second run asks for the same, and its function is not called
+        with worker_processes(1, tmp_path) as workers:
+            found = workers.values({"two": workers.submit("two", abs, argument)}, "numbers")
+        assert found == {"two": 2}
+
+
+def test_what_other_code_computed_is_removed(tmp_path, monkeypatch):
+    results = tmp_path / "paper"
+    folder = kept_folder(results)
+    (folder / "value.pickle").write_bytes(b"1")
+    assert kept_folder(results) == folder
+    assert (folder / "value.pickle").exists()
+    monkeypatch.setattr(nldyn.paper.kept, "BESIDE", ())  # other sources count
+    other = kept_folder(results)
+    assert other != folder and not folder.exists()
+    assert list(unfinished_folder(results).iterdir()) == [other]
