@@ -18,6 +18,7 @@ from nldyn.checkpoint import Checkpoint
 from nldyn.continuation import MOST_POINTS, ContinuationOptions, check_range, shifts
 from nldyn.diagrams import Collector, Diagram, Progress
 from nldyn.errors import SystemModelError, check_whole, is_finite, shown
+from nldyn.fixed_point_index import is_damped, sum_of_indices
 from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import (
@@ -43,6 +44,7 @@ PIECE = 16  # periods simulated between two looks at the known orbits; later a q
 LONGEST = 0.5  # step of a deflated iteration, relative to the orbit
 ITERATIONS = 20  # of a deflated iteration
 MOST_MULTIPLE = 10**4  # longest period multiple looked for
+AGAIN = 4  # times that a frequency is searched again while its indices say that orbits are missing
 
 
 @dataclass(frozen=True)
@@ -532,6 +534,13 @@ class _Survey:
             starts = np.vstack([starts, random_states(flow, omega, self.effort.starts, seed)])
         known = _Known(box, frequency)
         here, carried = self._search(starts, known, also_unstable=up)
+        for again in range(AGAIN if up else 0):
+            if not known.incomplete(min(self.effort.unstable_period, self.max_period)):
+                break
+            starts = random_states(
+                flow, omega, self.effort.starts, (self.effort.seed, turn, place, again)
+            )
+            here = here.with_more(self._search(starts, known, also_unstable=True)[0])
         both = {c.frequency_hz: c for c in stage.coverage}
         both[frequency] = both[frequency].with_more(here) if frequency in both else here
         met = np.zeros((turn + 1, len(box.branches)), dtype=bool)
@@ -694,6 +703,16 @@ class _Known:
     def of_period(self, period: int) -> list[Orbit]:
         """Orbits of one period multiple."""
         return [orbit for _, orbit, _ in self._orbits if orbit.period == period]
+
+    def incomplete(self, longest: int) -> bool:
+        """Whether the indices of the fixed points of some Pⁿ up to a period do not add up to one.
+
+        They need not where a mode is not damped.
+        """
+        if not is_damped(self.box.flow.system):
+            return False
+        orbits = [orbit for _, orbit, _ in self._orbits]
+        return any(sum_of_indices(orbits, n) != 1 for n in range(1, longest + 1))
 
     def number(self, orbit: Orbit) -> int | None:
         """Number of the branch that an orbit, perhaps of another frequency, lies on."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -63,13 +62,17 @@ def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) 
     """
     check_frequency("frequency_hz", frequency_hz)
     check_whole("period", period, 1)
-    total = 0
-    for branch in branches:
-        if period % branch.period == 0:
-            _check_damped(branch.nodes[0].orbit.problem.flow.system)
-            times = period // branch.period
-            total += sum(orbit.period * index(orbit, times) for orbit in branch.at(frequency_hz))
-    return total
+    counted = [branch for branch in branches if period % branch.period == 0]
+    if not all(is_damped(branch.nodes[0].orbit.problem.flow.system) for branch in counted):
+        raise SystemModelError(
+            "index_sum: the indices add up to one only where every mode is damped, but one is not"
+        )
+    return sum_of_indices([o for branch in counted for o in branch.at(frequency_hz)], period)
+
+
+def sum_of_indices(orbits: Iterable[Orbit], period: int) -> int:
+    """Sum of the indices of the fixed points of Pⁿ on orbits, whose own period divides n."""
+    return sum(o.period * index(o, period // o.period) for o in orbits if period % o.period == 0)
 
 
 def index(orbit: Orbit, times: int = 1) -> int:
@@ -83,9 +86,6 @@ def index(orbit: Orbit, times: int = 1) -> int:
     return 1 - 2 * (int(np.count_nonzero(outside)) % 2)
 
 
-def _check_damped(system: System) -> None:
-    slowest = max(float(np.linalg.eigvals(block).real.max()) for block in system.linear.blocks)
-    if not slowest < 0.0 or not math.isfinite(slowest):
-        raise SystemModelError(
-            "index_sum: the indices add up to one only where every mode is damped, but one is not"
-        )
+def is_damped(system: System) -> bool:
+    """Whether every mode of the structure without its stops loses energy."""
+    return all(float(np.linalg.eigvals(b).real.max()) < 0.0 for b in system.linear.blocks)

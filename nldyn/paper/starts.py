@@ -69,8 +69,8 @@ def write_starts(path: Path, branches: Sequence[Branch]) -> None:
     orbits = sorted(map(middle_orbit, branches), key=lambda o: (o.period, o.frequency_hz))
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
-        entries = range(orbits[0].problem.size)
-        table.writerow(["period", "frequency_hz", *(f"state_{i}" for i in entries)])
+        size = orbits[0].problem.size if orbits else 0
+        table.writerow(["period", "frequency_hz", *(f"state_{i}" for i in range(size))])
         for orbit in orbits:
             table.writerow([orbit.period, orbit.frequency_hz, *stroboscopic(orbit)[0].tolist()])
 

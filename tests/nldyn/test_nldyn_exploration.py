@@ -19,8 +19,10 @@ from nldyn import (
     SystemModelError,
     Unbalance,
     checkpoint,
+    exploration,
     explore,
     find_orbits,
+    index_sum,
     load_branches,
     load_diagram,
     load_exploration,
@@ -84,6 +86,18 @@ def test_every_simulation_is_accounted_for(around_37):
         assert c.settled + c.unsettled + c.failed >= 12
         assert all(period <= 4 for period in c.periods)
         assert bool(c.periods) == (c.settled > 0)
+
+
+def test_a_frequency_is_searched_until_the_indices_of_its_orbits_add_up(monkeypatch):
+    """Branches that pass a short range may be missed; their indices are missed, too."""
+    system, effort = system_of("two_dof_xi_0.01"), ExploreOptions(spacing=0.01, starts=6)
+    sums = []
+    for again in (0, exploration.AGAIN):
+        monkeypatch.setattr(exploration, "AGAIN", again)
+        branches = explore(system, (36.0, 37.0), 3, effort=effort).diagram.branches
+        sums.append([index_sum(branches, hz, n) for hz in (36.2, 36.8) for n in (1, 2, 3)])
+    assert set(sums[0]) != {1}
+    assert set(sums[1]) == {1}
 
 
 def test_report_tells_what_was_tried(around_37):

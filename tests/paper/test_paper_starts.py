@@ -1,0 +1,80 @@
+"""Orbits from which the branches of the larger models are followed."""
+
+import math
+
+import pytest
+
+from nldyn import ContinuationOptions, ExploreOptions, explore, index_sum
+from nldyn.flow import FlowMap
+from nldyn.paper.jobs import JOBS, scene_system
+from nldyn.paper.search import MODELS, search
+from nldyn.paper.starts import follow_starts, index_note, read_starts, starts_path, write_starts
+from nldyn.search import orbit_near
+
+WITHOUT_DOUBLED = (1, 50)
+
+
+@pytest.fixture(scope="module")
+def found():
+    """Branches of the 2-DOF model in a short range, by exploring it."""
+    effort = ExploreOptions(spacing=0.01, starts=6)
+    return explore(scene_system("two_dof_xi_0.01"), (35.5, 36.5), 3, effort=effort).diagram
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_starts_lead_to_orbits_of_their_period(name):
+    job = next(job for job in JOBS if job.name == name)
+    flow = FlowMap(job.system())
+    starts = read_starts(name)
+    assert {start.period for start in starts} == {1, 2, 3}
+    for start in starts:
+        assert job.range_hz[0] <= start.frequency_hz <= job.range_hz[1]
+    for start in starts[::10]:
+        omega = 2.0 * math.pi * start.frequency_hz
+        orbit = orbit_near(flow, start.state, start.period, omega, "middle")
+        assert orbit is not None and orbit.period == start.period
+
+
+def test_what_is_followed_from_starts_is_what_the_search_found(found, tmp_path):
+    write_starts(starts_path("some", tmp_path), found.branches)
+    starts = read_starts("some", tmp_path)
+    assert len(starts) == len(found.branches)
+    options = ContinuationOptions()
+    system = scene_system("two_dof_xi_0.01")
+    again = follow_starts(system, starts, found.range_hz, options, WITHOUT_DOUBLED)
+    assert len(again.branches) == len(found.branches) > 5
+    for branch in found.branches:
+        middle = branch.points[len(branch.points) // 2]
+        assert sum(other.contains(middle) for other in again.branches) == 1
+    assert again.notes[:2] == (
+        f"from {len(starts)} starts, 0 of which lead to no orbit",
+        "indices of the fixed points of P to P^3 at 60 frequencies add up to one",
+    )
+
+
+def test_a_missing_branch_is_told_by_its_indices(found):
+    through = next(b for b in found.branches if index_sum([b], 36.0, b.period) not in (0, 1))
+    others = [branch for branch in found.branches if branch is not through]
+    assert f"but for P^{through.period} at" in index_note(others, found.range_hz)
+
+
+def test_a_start_that_leads_nowhere_is_counted(found, tmp_path):
+    write_starts(starts_path("some", tmp_path), found.branches[:1])
+    path = starts_path("some", tmp_path)
+    head, row = path.read_text(encoding="utf-8").splitlines()
+    far = ",".join([*row.split(",")[:2], "1", "-1", "1", "-1"])
+    path.write_text("\n".join([head, row, far]) + "\n", encoding="utf-8")
+    again = follow_starts(
+        scene_system("two_dof_xi_0.01"), read_starts("some", tmp_path), found.range_hz,
+        ContinuationOptions(), WITHOUT_DOUBLED,
+    )  # fmt: skip
+    assert again.notes[0] == "from 2 starts, 1 of which lead to no orbit"
+
+
+def test_a_search_is_kept_and_gives_starts(tmp_path):
+    effort = ExploreOptions(spacing=0.3, starts=2, unstable_period=0)
+    done = search("two_dof_xi_0.01", tmp_path, effort)
+    assert (tmp_path / "two_dof_xi_0.01.h5").exists()
+    assert len(read_starts("two_dof_xi_0.01", tmp_path)) == len(done.diagram.branches) > 0
+    again = search("two_dof_xi_0.01", tmp_path, effort)
+    assert again.stage.steps == done.stage.steps
