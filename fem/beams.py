@@ -106,6 +106,55 @@ def spatial_matrices(
     )
 
 
+def plane_rows(part: BeamPart, lengths: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
+    """Rows (e, 4, 4) of the natural form and their stiffness (e, 4), see `fem.natural.line_rows`.
+
+    Along the axis, for (u2 - u1, w2 - w1) and the rotations of both ends.
+    """
+    bending, stiffness = bending_rows(plane_bending(part, what), lengths, part.axial_force)
+    stretching = part.material.youngs_modulus * part.section.area / lengths
+    rows = np.zeros((len(lengths), 4, 4))
+    rows[:, 0, 0] = 1.0
+    rows[:, 1:, 1:] = bending
+    return rows, np.column_stack([stretching, stiffness])
+
+
+def spatial_rows(part: BeamPart, lengths: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
+    """The same in space, (e, 8, 9) and (e, 8), for (u, v, w)2 - (u, v, w)1 and six rotations."""
+    torsion = shear_modulus(part, what) * section_number(part.section, "torsion_constant", what)
+    stretching = part.material.youngs_modulus * part.section.area
+    upright, first = bending_rows(plane_bending(part, what), lengths, part.axial_force)
+    across, second = bending_rows(across_bending(part, what), lengths, part.axial_force)
+    rows = np.zeros((len(lengths), 8, 9))
+    rows[:, 0, 0] = 1.0
+    rows[:, 1, [3, 6]] = -1.0, 1.0
+    rows[:, 2:5, [1, 5, 8]] = upright
+    rows[:, 5:, [2, 4, 7]] = across * np.array([1.0, -1.0, -1.0])
+    return rows, np.column_stack([stretching / lengths, torsion / lengths, first, second])
+
+
+def bending_rows(
+    numbers: Bending, lengths: FloatArray, axial_force: float
+) -> tuple[FloatArray, FloatArray]:
+    """Rows (e, 3, 3) for (w2 - w1, r1, r2) in which bending is diagonal, and its numbers (e, 3).
+
+    The rows are r1 - r2, r1 + r2 less twice the chord's turn c, and c. With p as in
+    `fem.elements.bending_matrices` and the axial force P the numbers are EI/L + PL/12,
+    3 EI/(L (1 + p)) + PL/(20 (1 + p)²) and PL.
+    """
+    ratio = np.zeros(len(lengths))
+    if numbers.shear_stiffness is not None:
+        ratio = 12.0 * numbers.stiffness / (numbers.shear_stiffness * lengths**2)
+    own, tension = numbers.stiffness / lengths, axial_force * lengths
+    even = own + tension / 12.0
+    odd = 3.0 * own / (1.0 + ratio) + tension / (20.0 * (1.0 + ratio) ** 2)
+    rows = np.zeros((len(lengths), 3, 3))
+    rows[:, 0] = 0.0, 1.0, -1.0
+    rows[:, 1] = 0.0, 1.0, 1.0
+    rows[:, 1, 0], rows[:, 2, 0] = -2.0 / lengths, 1.0 / lengths
+    return rows, np.column_stack([even, odd, tension])
+
+
 def _stretching(part: BeamPart, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
     ones, area = np.ones(len(lengths)), part.section.area
     material = part.material
@@ -176,6 +225,19 @@ def cross_matrix(vectors: FloatArray) -> FloatArray:
     return np.stack(
         [np.stack(row, axis=-1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))], axis=-2
     )
+
+
+def element_rows(
+    part: BeamPart, spans: FloatArray, what: str
+) -> tuple[FloatArray, FloatArray]:
+    """Rows (e, 8, 9) of the natural form for the nodes' displacements, and stiffness (e, 8)."""
+    rows, stiffness = spatial_rows(part, np.linalg.norm(spans, axis=1), what)
+    T = to_nodes(part, local_axes(part, spans, what))
+    relative = np.zeros((len(spans), 9, 9))
+    relative[:, :3, :3] = T[:, :3, :3]
+    relative[:, :3, 3:6], relative[:, :3, 6:] = -T[:, :3, 3:6], T[:, :3, 3:6]
+    relative[:, 3:6, 3:6] = relative[:, 6:, 6:] = T[:, 3:6, 3:6]
+    return rows @ relative, stiffness
 
 
 def element_matrices(part: BeamPart, spans: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:

@@ -5,15 +5,17 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 
-from fem.beams import plane_matrices
-from fem.elements import turn
+from fem.beams import plane_matrices, plane_rows
+from fem.elements import rotations, turn
 from fem.errors import ModelError
 from fem.mesh import FloatArray, IntArray
 from fem.model import DIRECTIONS, FrameModel
+from fem.natural import NaturalForm, chosen_rows, ground_rows, line_rows, natural_form
 from fem.scatter import displacement_of
 from fem.store import load_model, save_model
 
@@ -47,6 +49,11 @@ class Component:
     model: FrameModel
     free: IntArray
     element_dofs: IntArray
+
+    @cached_property
+    def natural_form(self) -> NaturalForm:
+        """K = AᵀdA, which keeps digits that the entries of K have lost."""
+        return frame_form(self.model, self.element_dofs, self.free)
 
     def shape(self, u: FloatArray) -> FloatArray:
         """Translations and rotation (ux, uy, rotation) of every node of the mesh.
@@ -137,6 +144,23 @@ def _element_matrices(model: FrameModel) -> tuple[FloatArray, FloatArray]:
         pair = plane_matrices(model.parts[name], mesh.lengths[elements], what)
         stiffness[elements], mass[elements] = pair
     return turn(stiffness, directions), turn(mass, directions)
+
+
+def frame_form(model: FrameModel, element_dofs: IntArray, free: IntArray) -> NaturalForm:
+    """The natural form of a frame's stiffness."""
+    mesh, size = model.mesh, _dof_count(model)
+    rows, stiffness = np.zeros((len(mesh.lines), 4, 4)), np.zeros((len(mesh.lines), 4))
+    for name, elements in model.element_parts().items():
+        what = f"{mesh.source}: part {name!r}"
+        pair = plane_rows(model.parts[name], mesh.lengths[elements], what)
+        rows[elements], stiffness[elements] = pair
+    turn = np.tile(np.eye(4), (len(rows), 1, 1))
+    turn[:, :2, :2] = rotations(mesh.spans[:, :2] / mesh.lengths[:, None])[:, :2, :2]
+    parts = [line_rows(rows @ turn, stiffness, element_dofs, size, 2)]
+    springs = _spring_diagonal(model)
+    held = np.flatnonzero(springs)
+    parts.append(ground_rows(springs[held, None, None], held[:, None], size))
+    return natural_form(parts, sparse.csr_array(chosen_rows(free, size).T))
 
 
 def _spring_diagonal(model: FrameModel) -> FloatArray:

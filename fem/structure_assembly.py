@@ -6,11 +6,12 @@ import os
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 
-from fem.beams import cross_matrix, element_matrices, local_axes, to_nodes
+from fem.beams import cross_matrix, element_matrices, element_rows, local_axes, to_nodes
 from fem.cells import KINDS, CellKind
 from fem.constraints import (
     Constraints,
@@ -23,6 +24,7 @@ from fem.errors import ModelError
 from fem.locking import locking_warnings
 from fem.mesh import FloatArray, IntArray
 from fem.model import PointMass
+from fem.natural import NaturalForm, Rows, ground_rows, line_rows, natural_form, solid_rows
 from fem.scatter import SparseArray, block_pattern, dense_scatter, displacement_of
 from fem.solids import (
     checked_volumes,
@@ -69,6 +71,15 @@ class StructureComponent:
     def free(self) -> IntArray:
         """Indices of the free degrees of freedom among all, shape (N,)."""
         return self.constraints.free
+
+    @cached_property
+    def natural_form(self) -> NaturalForm:
+        """K = AᵀdA, which keeps digits that the entries of K have lost.
+
+        Made when it is first asked for; it keeps the gradients of all solids' shape functions.
+        """
+        rows = [*cell_rows(self.model, self.numbering), *attached_rows(self.model, self.numbering)]
+        return natural_form(rows, self.constraints.transformation)
 
     def shape(self, u: FloatArray) -> FloatArray:
         """Translations and rotations (x, y, z) of every node of the mesh, shape (n, 6).
@@ -186,6 +197,30 @@ def solid_matrices(model: StructureModel, numbering: Numbering) -> tuple[SparseA
     return pattern.matrix(stiffness), pattern.same_in_all_directions(mass)
 
 
+def cell_rows(model: StructureModel, numbering: Numbering) -> Iterator[Rows]:
+    """Rows of the natural form of all solids, in batches."""
+    for name, (part, kinds) in model.solids.items():
+        for kind, nodes in ((KINDS[each], nodes) for each, nodes in kinds.items()):
+            what = f"{model.mesh.source}: part {name!r}: {kind.name}"
+            for batch in _batches(len(nodes), kind):
+                coordinates = model.mesh.points[nodes[batch]]
+                gradients, weights = weighted_gradients(part, kind, coordinates, what, batch.start)
+                blocks = numbering.translation[nodes[batch]]
+                dofs = 3 * blocks[..., None] + np.arange(kind.dimension)
+                yield solid_rows(gradients, weights, dofs, 3 * numbering.count, part.lame)
+
+
+def attached_rows(model: StructureModel, numbering: Numbering) -> Iterator[Rows]:
+    """Rows of the natural form of beams, springs and foundations."""
+    size = 3 * numbering.count
+    for name, (part, lines) in model.beams.items():
+        spans = model.mesh.points[lines[:, 1]] - model.mesh.points[lines[:, 0]]
+        rows, stiffness = element_rows(part, spans, f"{model.mesh.source}: part {name!r}")
+        yield line_rows(rows, stiffness, beam_dofs(model, numbering, name), size, 3)
+    for matrices, dofs in (*_foundations(model, numbering), *_springs(model, numbering)):
+        yield ground_rows(matrices, dofs, size)
+
+
 def _batches(count: int, kind: CellKind) -> Iterator[slice]:
     values = (kind.node_count * kind.dimension) ** 2 + 9 * len(kind.quadrature[1]) * kind.node_count
     step = max(int(BATCH_BYTES / (8 * values)), 1)
@@ -206,15 +241,21 @@ def cell_matrices(
     >>> K.shape, round(float(M.sum()), 12)
     ((1, 8, 3, 8, 3), 1.0)
     """
-    places, weights = kind.quadrature
-    gradients, volumes = gradients_and_volumes(kind, coordinates[..., : kind.dimension], places)
-    weighted = checked_volumes(volumes, what, first) * weights
-    if part.thickness is not None:
-        weighted = weighted * part.thickness
+    gradients, weighted = weighted_gradients(part, kind, coordinates, what, first)
     return (
         stiffness_matrices(gradients, weighted, part.lame),
         mass_matrices(kind, weighted, part.material.density),
     )
+
+
+def weighted_gradients(
+    part: SolidPart, kind: CellKind, coordinates: FloatArray, what: str, first: int
+) -> tuple[FloatArray, FloatArray]:
+    """Gradients (e, q, b, d) at the places of integration and the volumes (e, q) there."""
+    places, weights = kind.quadrature
+    gradients, volumes = gradients_and_volumes(kind, coordinates[..., : kind.dimension], places)
+    weighted = checked_volumes(volumes, what, first) * weights
+    return gradients, weighted if part.thickness is None else weighted * part.thickness
 
 
 def attached_matrices(
