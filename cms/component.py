@@ -9,6 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import aslinearoperator
 
 from cms.errors import ReductionError
 
@@ -16,6 +17,8 @@ FloatArray = NDArray[np.float64]
 SparseMatrix = sparse.csc_array[np.float64]
 
 SYMMETRY_TOLERANCE = 1e-9
+NATURAL_TOLERANCE = 1e-6
+MOST_BYTES = 3e8  # of deformations at a time
 
 
 @runtime_checkable
@@ -28,6 +31,12 @@ class ComponentLike(Protocol):
         Symmetric, in consistent units (N/m and kg for translations).
     interfaces : mapping of str to (N,) array
         A load f at the interface is ``vector * f``; its displacement is ``vector @ u``.
+
+    Notes
+    -----
+    A ``natural_form`` is optional: an object whose ``deformations`` A, an (m, N) array or linear
+    operator, and ``stiffness`` d, (m,), give ``K = A^T d A``. Where A keeps the digits of
+    deformations beside those of rigid motion, all results do, whatever the condition of K.
     """
 
     @property
@@ -41,18 +50,73 @@ class ComponentLike(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
+class NaturalForm:
+    """K = A^T d A by deformations A, a linear operator (m, N), and their stiffness d (m,)."""
+
+    deformations: Any
+    stiffness: FloatArray
+
+    def after(self, turn: SparseMatrix) -> NaturalForm:
+        """That of ``turn^T K turn``."""
+        return NaturalForm(self.deformations @ aslinearoperator(turn), self.stiffness)
+
+    def forces(self, vectors: FloatArray) -> FloatArray:
+        """``K V``, (N, k)."""
+        found = np.empty_like(vectors)
+        for columns in self.chunks(vectors.shape[1]):
+            stress = self.stiffness[:, None] * (self.deformations @ vectors[:, columns])
+            found[:, columns] = self.deformations.T @ stress
+        return found
+
+    def energies(self, vectors: FloatArray) -> FloatArray:
+        """``V^T K V``, (k, k)."""
+        count = vectors.shape[1]
+        found = np.empty((count, count))
+        for columns in self.chunks(count):
+            deformed = self.deformations @ vectors[:, columns]
+            stress = self.stiffness[:, None] * deformed
+            found[columns, columns] = stress.T @ deformed
+            for others in self.chunks(columns.start):
+                block = stress.T @ (self.deformations @ vectors[:, others])
+                found[columns, others], found[others, columns] = block, block.T
+        return (found + found.T) / 2
+
+    def chunks(self, count: int) -> list[slice]:
+        """Columns whose deformations fit into memory together."""
+        step = max(int(MOST_BYTES / (8 * max(self.stiffness.size, 1))), 1)
+        return [slice(first, min(first + step, count)) for first in range(0, count, step)]
+
+
+@dataclass(frozen=True, eq=False)
 class Pencil:
-    """The checked matrices K and M (N, N) and the interface vectors B, one column per name."""
+    """The checked matrices K and M (N, N) and the interface vectors B, one column per name.
+
+    Products with K go by its natural form where there is one; K itself is for factors.
+    """
 
     stiffness: SparseMatrix
     mass: SparseMatrix
     names: tuple[str, ...]
     loads: FloatArray
+    natural: NaturalForm | None = None
 
     @property
     def size(self) -> int:
         """Number of degrees of freedom N."""
         return int(self.stiffness.shape[0])
+
+    def forces(self, vectors: FloatArray) -> FloatArray:
+        """``K V``, (N, k)."""
+        if self.natural is None:
+            return times(self.stiffness, vectors)
+        return self.natural.forces(vectors)
+
+    def energies(self, vectors: FloatArray) -> FloatArray:
+        """``V^T K V``, (k, k)."""
+        if self.natural is not None:
+            return self.natural.energies(vectors)
+        found = vectors.T @ times(self.stiffness, vectors)
+        return np.asarray((found + found.T) / 2)
 
 
 def times(matrix: SparseMatrix, vectors: FloatArray) -> FloatArray:
@@ -145,7 +209,38 @@ def checked_pencil(component: ComponentLike) -> Pencil:
     names = tuple(component.interfaces)
     vectors = [interface_vector(component.interfaces[name], name, size) for name in names]
     loads = np.column_stack(vectors) if vectors else np.zeros((size, 0))
-    return Pencil(stiffness, mass, names, loads)
+    natural = checked_form(getattr(component, "natural_form", None), stiffness)
+    return Pencil(stiffness, mass, names, loads, natural)
+
+
+def checked_form(form: Any, stiffness: SparseMatrix) -> NaturalForm | None:
+    """The natural form of a component, if it has one, checked to be that of K (N, N).
+
+    Raises
+    ------
+    ReductionError
+        If its shapes or its product with a vector differ.
+    """
+    if form is None:
+        return None
+    try:
+        stiffnesses = np.asarray(form.stiffness, dtype=np.float64)
+        found = NaturalForm(aslinearoperator(form.deformations), stiffnesses)
+    except (AttributeError, TypeError, ValueError) as error:
+        raise ReductionError("the natural form needs 'deformations' and 'stiffness'") from error
+    size = stiffness.shape[0]
+    if stiffnesses.ndim != 1 or found.deformations.shape != (stiffnesses.size, size):
+        raise ReductionError(
+            f"the natural form has deformations of shape {found.deformations.shape} and stiffness "
+            f"of shape {stiffnesses.shape}, but the component has {size} degrees of freedom"
+        )
+    weights = 1.0 / np.sqrt(np.maximum(stiffness.diagonal(), np.finfo(np.float64).tiny))
+    trial = np.where(stiffness.diagonal() > 0.0, weights, 0.0)[:, None]
+    trial = trial * np.random.default_rng(0).standard_normal((size, 1))
+    left = np.abs(found.forces(trial) - times(stiffness, trial)).max()
+    if not left <= NATURAL_TOLERANCE * np.abs(times(stiffness, trial)).max():
+        raise ReductionError("the natural form is not that of the stiffness matrix")
+    return found
 
 
 def check_diagonal(matrix: SparseMatrix, what: str) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 
 from cms.component import FloatArray, Pencil, SparseMatrix, times
-from cms.eigen import EPS, RIGID_TOLERANCE, SUSPECT_PIVOT, Shifted, mass_orthonormal, shifted_factor
+from cms.eigen import Shifted, shifted_factor
 from cms.errors import ReductionError
 from cms.inertia import elastic_solutions
 
@@ -72,9 +72,13 @@ def fixed_interface(pencil: Pencil) -> FixedInterface:
     M = sparse.csc_array(turn.T @ pencil.mass @ turn)
     n = inner.size
     coupling = K[:n, n:].toarray()
-    interior = Pencil(symmetric(K[:n, :n]), symmetric(M[:n, :n]), (), np.zeros((n, 0)))
+    natural = None if pencil.natural is None else pencil.natural.after(turn[:, :n])
+    interior = Pencil(symmetric(K[:n, :n]), symmetric(M[:n, :n]), (), np.zeros((n, 0)), natural)
     shifted = shifted_factor(interior)
     shapes = np.vstack([elastic_solutions(interior, shifted, -coupling), np.eye(m)])
+    if natural is not None:
+        left = times(sparse.csc_array(turn.T), pencil.forces(times(turn, shapes)))[:n]
+        shapes[:n] -= elastic_solutions(interior, shifted, left)
     dropped = pencil.loads.shape[1] - m
     return FixedInterface(pencil, turn, interior, shifted, times(turn, shapes), dropped)
 
@@ -96,51 +100,6 @@ def independent_interfaces(loads: FloatArray) -> tuple[IntArray, IntArray]:
     return interfaces, dofs[:rank]
 
 
-def ritz(basis: FloatArray, pencil: Pencil, fastest: float) -> tuple[FloatArray, FloatArray]:
-    """w^2 (r,) ascending and mass-normalised vectors (N, r) of K and M projected on a basis (N, r).
-
-    Where the projected stiffness is singular, w^2 at rounding level (of the fastest w^2 of the
-    component) are exactly zero. Slow modes come from the inverse problem, fast ones from the
-    direct one, as in `cms.eigen.with_fast_modes`.
-
-    Raises
-    ------
-    ReductionError
-        If a direction of the basis has no mass.
-    """
-    if basis.shape[1] == 0:
-        return np.zeros(0), basis
-    K = basis.T @ times(pencil.stiffness, basis)
-    M = basis.T @ times(pencil.mass, basis)
-    K, M = (K + K.T) / 2, (M + M.T) / 2
-    shift = 0.0 if definite(K) else np.sqrt(EPS) * fastest
-    nu, directions = linalg.eigh(M, K + shift * M)
-    nu, directions = nu[::-1], directions[:, ::-1]
-    if nu[-1] <= 0.0:
-        raise ReductionError("an interface has no mass to move: give it some")
-    squares, directions = 1.0 / nu - shift, directions / np.sqrt(nu)
-    direct, direct_directions = linalg.eigh(K, M)
-    slow = direct + shift <= np.sqrt(1.0 / (nu[0] * nu[-1]))
-    squares = np.where(slow, squares, direct)
-    directions = np.where(slow, directions, direct_directions)
-    if shift:
-        squares = np.where(np.abs(squares) <= RIGID_TOLERANCE * fastest, 0.0, squares)
-    return squares, mass_orthonormal(basis @ directions, pencil.mass)
-
-
-def definite(matrix: FloatArray) -> bool:
-    """Whether a symmetric matrix scaled to a unit diagonal has no pivot at rounding level."""
-    diagonal = np.diag(matrix)
-    if np.any(diagonal <= 0.0):
-        return False
-    scale = 1.0 / np.sqrt(diagonal)
-    try:
-        lower = linalg.cholesky(scale[:, None] * matrix * scale, lower=True)
-    except linalg.LinAlgError:
-        return False
-    return bool(np.min(np.diag(lower)) ** 2 > SUSPECT_PIVOT)
-
-
 def fixed_interface_errors(
     fixed: FixedInterface, squares: FloatArray, vectors: FloatArray
 ) -> FloatArray:
@@ -149,8 +108,7 @@ def fixed_interface_errors(
     The residual of a Ritz vector is orthogonal to the constraint modes, so that
     ``r^T K^-1 r = r_i^T K_ii^-1 r_i``.
     """
-    K, M = fixed.whole.stiffness, fixed.whole.mass
-    residual = times(K, vectors) - times(M, vectors) * squares
+    residual = fixed.whole.forces(vectors) - times(fixed.whole.mass, vectors) * squares
     inner = times(sparse.csc_array(fixed.turn.T), residual)[: fixed.interior.size]
     energy = np.sum(inner * fixed.shifted.factor.solve(inner), axis=0)
     scale = squares + fixed.shifted.shift

@@ -9,6 +9,7 @@ from cms.eigen import EPS, Shifted
 from cms.errors import ReductionError
 
 MOST_STEPS = 200
+MOST_REFINEMENTS = 8
 STEP_TOLERANCE = 4 * EPS
 RESIDUAL_TOLERANCE = 1e-6
 BALANCE_TOLERANCE = 1e-12
@@ -54,7 +55,7 @@ def elastic_solutions(pencil: Pencil, shifted: Shifted, loads: FloatArray) -> Fl
     (2006), section 17.2.
     """
     if shifted.shift == 0.0:
-        return shifted.factor.solve(loads, refinements=1)
+        return refined_solutions(pencil, shifted, loads)
     rigid = shifted.rigid_modes
     residual = balanced(pencil, loads, rigid)
     whole = np.maximum(column_products(residual, shifted.factor.solve(residual)), 0.0)
@@ -68,7 +69,7 @@ def elastic_solutions(pencil: Pencil, shifted: Shifted, loads: FloatArray) -> Fl
         if not np.any(running):
             break
         move = ahead + move * quotient(energy, before)
-        stretch = times(pencil.stiffness, move)
+        stretch = pencil.forces(move)
         length = np.where(running, quotient(energy, column_products(move, stretch)), 0.0)
         solution = solution + move * length
         residual = residual - stretch * length
@@ -78,11 +79,25 @@ def elastic_solutions(pencil: Pencil, shifted: Shifted, loads: FloatArray) -> Fl
     return solution
 
 
+def refined_solutions(pencil: Pencil, shifted: Shifted, loads: FloatArray) -> FloatArray:
+    """``K^-1 F`` with steps of iterative refinement as long as each is half the one before."""
+    solution = shifted.factor.solve(loads)
+    before = np.full(loads.shape[1], np.inf)
+    for _ in range(MOST_REFINEMENTS):
+        step = shifted.factor.solve(loads - pencil.forces(solution))
+        size = np.linalg.norm(step, axis=0)
+        solution = solution + step
+        if not np.any((size < before / 2) & (size > EPS * np.linalg.norm(solution, axis=0))):
+            break
+        before = size
+    return solution
+
+
 def check_solution(
     pencil: Pencil, shifted: Shifted, solution: FloatArray, loads: FloatArray, whole: FloatArray
 ) -> None:
     """Raise ReductionError where K u differs from the load by more than 1e-6 in energy."""
-    left = loads - times(pencil.stiffness, solution)
+    left = loads - pencil.forces(solution)
     error = np.sqrt(np.abs(column_products(left, shifted.factor.solve(left))))
     failed = error > RESIDUAL_TOLERANCE * np.sqrt(whole)
     if np.any(failed):

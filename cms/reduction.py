@@ -18,7 +18,7 @@ from cms.component import (
     symmetric_matrix,
     times,
 )
-from cms.constraint import fixed_interface, fixed_interface_errors, ritz
+from cms.constraint import fixed_interface, fixed_interface_errors
 from cms.eigen import (
     Modes,
     Shifted,
@@ -26,6 +26,7 @@ from cms.eigen import (
     lowest_modes,
     mode_errors,
     modes_up_to,
+    ritz,
     shifted_factor,
 )
 from cms.errors import ReductionError

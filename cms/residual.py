@@ -90,7 +90,7 @@ def residual_modes(pencil: Pencil, shifted: Shifted, modes: FloatArray) -> Resid
 
 def independent_part(residual: FloatArray, pencil: Pencil, at_most: int) -> FloatArray:
     """A K-orthonormal basis (N, p) of the residuals (N, m), p being their numerical rank."""
-    energy = residual.T @ times(pencil.stiffness, residual)
+    energy = pencil.energies(residual)
     share, directions = linalg.eigh(energy) if energy.size else (np.zeros(0), energy)
     kept = np.flatnonzero(share > DEPENDENCE_TOLERANCE)[::-1][: max(at_most, 0)]
     return (residual @ directions[:, kept]) / np.sqrt(share[kept])
@@ -100,9 +100,8 @@ def diagonalised(basis: FloatArray, pencil: Pencil) -> tuple[FloatArray, FloatAr
     """w^2 (p,) and mass-normalised vectors (N, p) of K and M projected on the basis (N, p)."""
     if basis.shape[1] == 0:
         return np.zeros(0), basis
-    stiffness = basis.T @ times(pencil.stiffness, basis)
     mass = basis.T @ times(pencil.mass, basis)
-    nu, directions = linalg.eigh((mass + mass.T) / 2, (stiffness + stiffness.T) / 2)
+    nu, directions = linalg.eigh((mass + mass.T) / 2, pencil.energies(basis))
     nu, directions = nu[::-1], directions[:, ::-1]
     if nu[-1] <= 0.0:
         raise ReductionError("a residual mode has no mass: give its interface some mass")
