@@ -227,8 +227,8 @@ def accuracy(component: ComponentLike, reduced: ReducedModel) -> Accuracy:
     kept = modes.vectors[:, : reduced.modes]
     if reduced.method in ("truncation", "macneal"):
         shapes = residual_flexibility(pencil, shifted, kept)
-        weight = pencil.stiffness if reduced.method == "truncation" else pencil.mass
-        gram = shapes.T @ times(weight, shapes)
+        truncated = reduced.method == "truncation"
+        gram = pencil.energies(shapes) if truncated else shapes.T @ times(pencil.mass, shapes)
     else:
         V = reduced.basis[:, reduced.modes :]
         inertia = times(pencil.mass, V)

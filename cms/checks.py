@@ -129,7 +129,7 @@ def check(
         for name, vector in (directions or {}).items()
     }
     masses = {name: float(d @ times(pencil.mass, d)) for name, d in given.items()}
-    energies = {name: float(d @ times(pencil.stiffness, d)) for name, d in given.items()}
+    energies = {name: float(pencil.energies(d[:, None])[0, 0]) for name, d in given.items()}
     errors, values = compared(pencil, shifted, reduced, modes)
     mass_error, stiffness_error = orthogonality(pencil, reduced)
     return Checks(
@@ -174,7 +174,7 @@ def orthogonality(pencil: Pencil, reduced: ReducedModel) -> tuple[float, float]:
     mass = V.T @ times(pencil.mass, V) - np.eye(reduced.size)
     slowest = float(np.min(squares, where=squares > 0.0, initial=np.inf))
     scale: FloatArray = np.sqrt(np.maximum(squares, slowest if slowest < np.inf else 1.0))
-    stiffness = (V.T @ times(pencil.stiffness, V) - np.diag(squares)) / np.outer(scale, scale)
+    stiffness = (pencil.energies(V) - np.diag(squares)) / np.outer(scale, scale)
     return float(np.abs(mass).max()), float(np.abs(stiffness).max())
 
 
@@ -189,9 +189,7 @@ def static_recovery(pencil: Pencil, shifted: Shifted, reduced: ReducedModel) -> 
         if reduced.residual_shapes is not None:
             shape = shape + reduced.residual_shapes[:, number]
         u = exact[:, number]
-        wrong = shape - u
-        whole = float(u @ times(pencil.stiffness, u))
-        part = float(wrong @ times(pencil.stiffness, wrong))
+        part, whole = np.diag(pencil.energies(np.column_stack([shape - u, u])))
         found[name] = float(np.sqrt(max(part, 0.0) / whole)) if whole > 0.0 else 0.0
     return found
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import aslinearoperator
+from scipy.sparse.linalg import LinearOperator, aslinearoperator
 
 from cms.errors import ReductionError
 
@@ -34,7 +34,7 @@ class ComponentLike(Protocol):
 
     Notes
     -----
-    A ``natural_form`` is optional: an object whose ``deformations`` A, an (m, N) array or linear
+    A ``natural_form`` is optional: an object whose ``deformations`` A, an (m, N) matrix or linear
     operator, and ``stiffness`` d, (m,), give ``K = A^T d A``. Where A keeps the digits of
     deformations beside those of rigid motion, all results do, whatever the condition of K.
     """
@@ -225,7 +225,10 @@ def checked_form(form: Any, stiffness: SparseMatrix) -> NaturalForm | None:
         return None
     try:
         stiffnesses = np.asarray(form.stiffness, dtype=np.float64)
-        found = NaturalForm(aslinearoperator(form.deformations), stiffnesses)
+        given = form.deformations
+        if not (sparse.issparse(given) or isinstance(given, LinearOperator)):
+            given = np.asarray(given, dtype=np.float64)
+        found = NaturalForm(aslinearoperator(given), stiffnesses)
     except (AttributeError, TypeError, ValueError) as error:
         raise ReductionError("the natural form needs 'deformations' and 'stiffness'") from error
     size = stiffness.shape[0]

@@ -10,7 +10,6 @@ from scipy import linalg, sparse
 
 from cms.component import FloatArray, Pencil, SparseMatrix, times
 from cms.eigen import Shifted, shifted_factor
-from cms.errors import ReductionError
 from cms.inertia import elastic_solutions
 
 IntArray = NDArray[np.intp]

@@ -298,9 +298,7 @@ def mass_orthonormal(vectors: FloatArray, mass: SparseMatrix) -> FloatArray:
     return vectors @ (1.5 * np.eye(gram.shape[0]) - 0.5 * gram)
 
 
-def refined(
-    pencil: Pencil, shifted: Shifted, squares: FloatArray, vectors: FloatArray
-) -> Modes:
+def refined(pencil: Pencil, shifted: Shifted, squares: FloatArray, vectors: FloatArray) -> Modes:
     """Modes with their errors; where K has a natural form, refined by it.
 
     The modes of the rounded entries of K take steps ``phi - (K + s M)^-1 (K phi - w^2 M phi)``.
@@ -317,7 +315,7 @@ def refined(
         if pencil.natural is None or worst <= REFINED or not left or not worst < before / 2:
             break
         before = worst
-        squares, vectors = ritz(vectors - step, pencil, shifted.fastest)
+        squares, vectors = ritz(vectors - step, pencil, shifted.fastest, shifted.shift)
         squares = np.where(squares == 0.0, 0.0, np.diag(pencil.energies(vectors)))
     return Modes(squares, vectors, errors)
 
@@ -328,12 +326,14 @@ def energy_errors(residual: FloatArray, step: FloatArray, squares: FloatArray) -
     return np.asarray(np.sqrt(np.abs(energy) / squares))
 
 
-def ritz(basis: FloatArray, pencil: Pencil, fastest: float) -> tuple[FloatArray, FloatArray]:
+def ritz(
+    basis: FloatArray, pencil: Pencil, fastest: float, shift: float | None = None
+) -> tuple[FloatArray, FloatArray]:
     """w^2 (r,) ascending and mass-normalised vectors (N, r) of K and M projected on a basis (N, r).
 
-    Where the projected stiffness is singular, w^2 at rounding level (of the fastest w^2 of the
-    component) are exactly zero. Slow modes come from the inverse problem, fast ones from the
-    direct one, as in `with_fast_modes`.
+    Where the projected stiffness is singular, which is found out unless its shift is given, w^2 at
+    rounding level (of the fastest w^2 of the component) are exactly zero. Slow modes come from the
+    inverse problem, fast ones from the direct one, as in `with_fast_modes`.
 
     Raises
     ------
@@ -344,7 +344,8 @@ def ritz(basis: FloatArray, pencil: Pencil, fastest: float) -> tuple[FloatArray,
         return np.zeros(0), basis
     K, M = pencil.energies(basis), basis.T @ times(pencil.mass, basis)
     M = (M + M.T) / 2
-    shift = 0.0 if definite(K) else np.sqrt(EPS) * fastest
+    if shift is None:
+        shift = 0.0 if definite(K) else np.sqrt(EPS) * fastest
     nu, directions = linalg.eigh(M, K + shift * M)
     nu, directions = nu[::-1], directions[:, ::-1]
     if nu[-1] <= 0.0:

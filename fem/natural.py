@@ -40,7 +40,7 @@ class Rows(Protocol):
         """The transposed product: (n, k) from (r, k)."""
 
 
-class Deformations(LinearOperator):  # type: ignore[misc]
+class Deformations(LinearOperator):
     """The deformations A (m, N) of all elements.
 
     Parameters
@@ -54,7 +54,8 @@ class Deformations(LinearOperator):  # type: ignore[misc]
     def __init__(self, parts: Sequence[Rows], transformation: SparseArray) -> None:
         self.parts, self.transformation = tuple(parts), transformation
         self.ends = np.cumsum([len(part.stiffness) for part in self.parts])
-        super().__init__(np.float64, (int(self.ends[-1]), transformation.shape[1]))
+        shape = int(self.ends[-1]), int(transformation.shape[1])
+        super().__init__(np.float64, shape)  # type: ignore[call-arg]
 
     def _matmat(self, V: FloatArray) -> FloatArray:
         U = np.asarray(self.transformation @ V)
@@ -62,7 +63,9 @@ class Deformations(LinearOperator):  # type: ignore[misc]
 
     def _rmatmat(self, S: FloatArray) -> FloatArray:
         pieces = np.split(S, self.ends[:-1])
-        forces = sum(part.forces(piece) for part, piece in zip(self.parts, pieces, strict=True))
+        forces = np.zeros((self.transformation.shape[0], S.shape[1]))
+        for part, piece in zip(self.parts, pieces, strict=True):
+            forces += part.forces(piece)
         return np.asarray(self.transformation.T @ forces)
 
 
@@ -121,7 +124,9 @@ def line_rows(
     stiffness
         Of the rows, shape (e, r).
     dofs
-        Degrees of freedom (e, m) of both ends among ``size``.
+        Degrees of freedom of both ends, shape (e, m).
+    size
+        Number of all degrees of freedom.
     moves
         Number of translations of an end.
 

@@ -11,11 +11,13 @@ from pathlib import Path
 import numpy as np
 from scipy.sparse.linalg import eigsh, spsolve
 
+import cms
 import fem
 from nldyn.branch import Branch
 from nldyn.continuation import continue_branch
 from nldyn.elements import Stop, Unbalance
 from nldyn.hard.case import Case, Measured
+from nldyn.hard.multiprecision import DIGITS, mp
 from nldyn.orbit import solve_orbit
 from nldyn.resources import example
 from nldyn.resources import mesh as mesh_file
@@ -28,10 +30,7 @@ CELLS = 50
 SCALED = 1e-10
 ASKED = "asked for: a scaled scene gives the scaled answer"
 ROUNDING = "of what the rounding of the stiffness matrix costs: 2^-53 times its condition"
-ASSEMBLED = (
-    "the stiffness matrix is rounded when its elements are summed; with a condition of 4e9 even "
-    "its exact eigenvalues differ by 1e-9 between the units"
-)
+ROOT = "of what the root of the condition leaves of double precision"
 
 
 def cantilever(thickness: float, cells: int = CELLS) -> fem.StructureComponent:
@@ -51,18 +50,66 @@ def flexibility_error(component: fem.StructureComponent, name: str, exact: float
     """Error of a flexibility, in roundings 2^-53 of the stiffness matrix times its condition."""
     load, K = component.interfaces[name], component.stiffness.tocsc()
     off = abs(float(load @ spsolve(K, load)) / exact - 1.0)
+    cost = condition(component)
+    return Measured(off / (2.0**-53 * cost), f"relative error {off:.1e}, condition {cost:.0e}")
+
+
+def condition(component: fem.StructureComponent) -> float:
+    """Largest over smallest eigenvalue of the stiffness matrix."""
+    K = component.stiffness.tocsc()
     largest, smallest = (
         float(eigsh(K, 1, return_eigenvectors=False, **which)[0])
         for which in ({"which": "LM"}, {"sigma": 0.0})
     )
-    note = f"relative error {off:.1e}, condition {largest / smallest:.0e}"
-    return Measured(off / (2.0**-53 * largest / smallest), note)
+    return largest / smallest
 
 
 def bending_error(thickness: float) -> Measured:
     """Rotation of the tip under a moment, L/EI."""
     exact = 12.0 / (STEEL.youngs_modulus * 0.05 * thickness**3)
     return flexibility_error(cantilever(thickness), "turn", exact)
+
+
+def reduced_bending_error(thickness: float) -> Measured:
+    """Rotation of the tip under a moment by a reduced model, in 2^-53 times root of condition."""
+    exact = 12.0 / (STEEL.youngs_modulus * 0.05 * thickness**3)
+    component = cantilever(thickness)
+    off = abs(cms.reduce(component, modes=2).static_flexibility("turn") / exact - 1.0)
+    root = math.sqrt(condition(component))
+    return Measured(off / (2.0**-53 * root), f"relative error {off:.1e}, root {root:.0e}")
+
+
+def fine_beam_error(count: int) -> Measured:
+    """Three frequencies of a beam on two pins, cut into many elements, against its exact matrices.
+
+    Node j moves by sin(kπj/n) and turns by cos(kπj/n) times numbers that solve K x = λ M x with
+    matrices of two rows.
+    """
+    mesh = fem.frame_mesh({"a": (0.0, 0.0), "b": (2.0, 0.0)}, [("beam", "a", "b", count)])
+    section = fem.RectangularSection(0.1, 0.05)
+    model = fem.FrameModel(
+        mesh,
+        parts={"beam": fem.BeamPart(STEEL, section)},
+        supports=[fem.Support("a", ("x", "y")), fem.Support("b", ("x", "y"))],
+        interfaces={"end": fem.Interface("a", "rotation")},
+    )
+    found = cms.reduce(fem.assemble(model), modes=3).frequencies_hz[:3]
+    mass, bending = STEEL.density * section.area, STEEL.youngs_modulus * section.second_moment
+    scale = math.sqrt(bending / mass) * (count / 2.0) ** 2 / (2.0 * math.pi)
+    exact = [scale * math.sqrt(lowest_square(count, number)) for number in (1, 2, 3)]
+    return Measured(float(np.abs(found / exact - 1.0).max()))
+
+
+def lowest_square(count: int, number: int) -> float:
+    """The lower λ of wave ``number`` with elements of length, EI and ρA of one, in 34 digits."""
+    with mp.workdps(DIGITS.digits):
+        angle = mp.pi * number / count
+        c, s = mp.cos(angle), mp.sin(angle)
+        K = mp.matrix([[24 - 24 * c, -12 * s], [-12 * s, 8 + 4 * c]])
+        M = mp.matrix([[312 + 108 * c, 26 * s], [26 * s, 8 - 6 * c]]) / 420
+        half = (K[0, 0] * M[1, 1] + K[1, 1] * M[0, 0]) / 2 - K[0, 1] * M[0, 1]
+        root = mp.sqrt(half**2 - mp.det(K) * mp.det(M))
+        return float(mp.det(K) / (half + root))
 
 
 def frequency_error(thickness: float) -> Measured:
@@ -214,6 +261,24 @@ CASES = (
     ),
     Case(
         SUBJECT,
+        "cantilever with thickness 0.001 of its length, moment, reduced model",
+        "the stiffness matrix, with a condition of 5e13, has lost nearly all digits of it",
+        "closed form L/EI",
+        1.0,
+        ROOT,
+        partial(reduced_bending_error, 1e-3),
+    ),
+    Case(
+        SUBJECT,
+        "beam of 1000 elements, three frequencies",
+        "condition of 1e13: the exact eigenvalues of the rounded matrix are off by 1e-6",
+        "closed form of the assembled beam, in 34 digits",
+        SCALED,
+        "what units are asked to keep",
+        partial(fine_beam_error, 1000),
+    ),
+    Case(
+        SUBJECT,
         "cantilever with thickness 1e-3 of its length, frequency",
         f"{CELLS} cells of 20 by 1 mm in one layer: locking",
         "closed form 1.8751² √(EI/ρA)/L²",
@@ -241,7 +306,6 @@ CASES = (
         SCALED,
         ASKED,
         scaled_frequencies_error,
-        fault=ASSEMBLED,
     ),
     Case(
         SUBJECT,
@@ -251,7 +315,6 @@ CASES = (
         SCALED,
         ASKED,
         scaled_branch_error,
-        fault=ASSEMBLED,
     ),
     *(
         Case(

@@ -34,7 +34,6 @@ def beams(theory, axial_force=0.0, offset=(0.0, 0.0)):
         parts={"p": part, "q": part},
         supports=[fem.Support("a", ("x", "y", "z"))],
         springs=[fem.PointSpring("b", "rotation_y", 1e4)],
-
         hinges=[fem.Hinge("b", "p")],
     )
 
