@@ -237,11 +237,11 @@ def checked_form(form: Any, stiffness: SparseMatrix) -> NaturalForm | None:
             f"the natural form has deformations of shape {found.deformations.shape} and stiffness "
             f"of shape {stiffnesses.shape}, but the component has {size} degrees of freedom"
         )
-    weights = 1.0 / np.sqrt(np.maximum(stiffness.diagonal(), np.finfo(np.float64).tiny))
-    trial = np.where(stiffness.diagonal() > 0.0, weights, 0.0)[:, None]
-    trial = trial * np.random.default_rng(0).standard_normal((size, 1))
-    left = np.abs(found.forces(trial) - times(stiffness, trial)).max()
-    if not left <= NATURAL_TOLERANCE * np.abs(times(stiffness, trial)).max():
+    diagonal = stiffness.diagonal()
+    weights = np.sqrt(np.where(diagonal > 0.0, diagonal, np.inf))
+    trial = (np.random.default_rng(0).standard_normal(size) / weights)[:, None]
+    exact = times(stiffness, trial)
+    if not np.abs(found.forces(trial) - exact).max() <= NATURAL_TOLERANCE * np.abs(exact).max():
         raise ReductionError("the natural form is not that of the stiffness matrix")
     return found
 

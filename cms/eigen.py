@@ -20,7 +20,7 @@ GUARD_MODES = 2
 BLOCK = 4  # finds modes of one frequency, and takes a quarter of the passes over the factor
 DEPENDENT = 1e-12
 MOST_REFINEMENTS = 8
-REFINED = 1e-12  # in energy; the error of w^2 is about its square
+REFINED = 1e-12  # bound of the error of w^2, which after a step is about its square
 DENSE_AT_MOST = 6000
 LOOK_ALWAYS = 200  # up to this many vectors it costs little to see after each block what converged
 LOOK_AGAIN = 1.15  # beyond, after the basis has grown by so much
@@ -306,18 +306,20 @@ def refined(pencil: Pencil, shifted: Shifted, squares: FloatArray, vectors: Floa
     residual has to be exact. After each step the modes are separated again, and w^2 is Rayleigh's
     quotient.
     """
-    before = np.inf
-    for left in range(MOST_REFINEMENTS, -1, -1):
+    modes, worst = None, np.inf
+    for _ in range(MOST_REFINEMENTS + 1):
         residual = pencil.forces(vectors) - times(pencil.mass, vectors) * squares
         step = shifted.factor.solve(residual)
         errors = energy_errors(residual, step, squares + shifted.shift)
-        worst = float(np.max(errors))
-        if pencil.natural is None or worst <= REFINED or not left or not worst < before / 2:
+        before, worst = worst, float(np.max(errors))
+        if modes is None or worst < before:
+            modes = Modes(squares, vectors, errors)
+        if pencil.natural is None or worst <= REFINED or not worst < before / 2:
             break
-        before = worst
         squares, vectors = ritz(vectors - step, pencil, shifted.fastest, shifted.shift)
         squares = np.where(squares == 0.0, 0.0, np.diag(pencil.energies(vectors)))
-    return Modes(squares, vectors, errors)
+    assert modes is not None
+    return modes
 
 
 def energy_errors(residual: FloatArray, step: FloatArray, squares: FloatArray) -> FloatArray:
