@@ -273,14 +273,17 @@ class ExactFlow:
         return step
 
     def _first_event(self, u: Series, t: Series, h: Number) -> Number | None:
-        """Where in a step the contact or the period ends, if it does."""
-        events = []
+        """Where in a step the contact or the period ends, if it does.
+
+        Beyond the end of the contact time would run backwards, since dt/ds is u.
+        """
+        release = None
         if _sum(u, h) <= 0:
             low = h * mp.mpf("1e-9") if u[0] == 0 else mp.zero
-            events.append(mp.findroot(lambda s: _sum(u, s), (low, h), solver="anderson"))
+            release = h = mp.findroot(lambda s: _sum(u, s), (low, h), solver="anderson")
         if _sum(t, h) >= self.T:
-            events.append(mp.findroot(lambda s: _sum(t, s) - self.T, (0, h), solver="anderson"))
-        return min(events, default=None)
+            return mp.findroot(lambda s: _sum(t, s) - self.T, (0, h), solver="anderson")
+        return release
 
     # The period
 

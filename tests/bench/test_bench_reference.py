@@ -10,6 +10,8 @@ from nldyn.bench.exact import ExactFlow, Precision
 from nldyn.bench.measure import errors
 from nldyn.bench.models import MODELS, Case, load_case, load_grazing, stored, to_system, to_table
 from nldyn.bench.reference import model_system
+from nldyn.flow import FlowMap
+from nldyn.hard.stiffness import beam_with_stop
 
 
 def by_runge_kutta(case: Case, rtol: float):
@@ -79,3 +81,15 @@ def test_a_contact_at_the_start_of_the_period_is_carried_on():
     other = motion.to_sensitivities(p, found.y[:, -1])
     assert np.allclose([float(a) for a in end.state], other.state, rtol=1e-6)
     assert np.allclose([float(a) for a in end.d_omega], other.d_omega, rtol=1e-5)
+
+
+def test_period_that_ends_just_before_a_contact_does():
+    """The Taylor steps in a fictitious time reach past both ends, where time runs backwards."""
+    system = beam_with_stop(5.17e9)
+    start, omega = np.array([-2.13485578e-05, -4.72967275e-04]), 72.0 * np.pi
+    end = ExactFlow(system, omega, Precision(26, 32, 18)).period(start)
+    flow = FlowMap(system)
+    found = flow.shoot(flow.to_state(start)[None], np.array([0.0, 2.0 * np.pi]), omega)
+    depth, speed = (float(value) for value in end.state)
+    assert 0.0 < depth < 1e-8
+    np.testing.assert_allclose(flow.to_modal(found.ends)[0], [depth, speed], rtol=1e-7)
