@@ -42,6 +42,7 @@ from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine
 from nldyn.shooting import ShootingProblem
 from nldyn.special import (
+    KINK,
     Chord,
     LocateError,
     insert_dip,
@@ -51,7 +52,9 @@ from nldyn.special import (
 from nldyn.system import numbers
 
 BORN = "born at the flip at"
-KINK = 1e-6  # step below which a branch may bend by any angle where the number of contacts changes
+MEETS_OPEN_END = "meets another branch where that was broken off"
+SHORTEST_DETOUR = 1e-6  # first step of a walk that looks closely at what lies within a step
+MOST_DETOUR = 500  # points of such a walk
 MOST_POINTS = 10**8  # in one direction
 
 
@@ -201,7 +204,7 @@ class Walk:
                 yield point
                 return
             if _passed(here, point, self._ends).any():
-                self.stop_reason = "meets another branch where that was broken off"
+                self.stop_reason = MEETS_OPEN_END
                 yield point
                 return
             bent = step <= KINK and point.orbit.impacts != here.orbit.impacts
@@ -556,12 +559,13 @@ class Trail:
                 progress(point.orbit.frequency_hz)
             if len(self.nodes) > 2:
                 insert_dip(self.nodes, len(self.nodes) - 2)
-            self._search(len(self.nodes) - 2)
-            if self.walk.stride is not None and self.walk.stride.here is point:
+            regular = self.walk.stride is not None and self.walk.stride.here is point
+            self._search(len(self.nodes) - 2, closely=regular)
+            if regular:
                 self._mark = self._here()
                 if keep is not None:
                     keep()
-        self._search(len(self.nodes) - 1)
+        self._search(len(self.nodes) - 1, closely=False)
         special = self.special_points
         if self.walk.stop_reason.startswith("joins"):  # the flip itself: a branch point of this one
             last = self.nodes[-2].arclength
@@ -597,20 +601,64 @@ class Trail:
         kept, special, notes, stride = self._mark
         return WalkEnd(stride.step, stride.behind, stride.count, node, kept, special, notes)
 
-    def _search(self, pairs: int) -> None:
-        """Locate the special points of the first pairs of nodes, as far as that is not done."""
+    def _walk_closely(self) -> bool:
+        """Put the points of a walk with shorter steps into the step searched, if it led on.
+
+        A narrow resonance may lie within one step: the branch leaves at its foot and comes back
+        beside it. What lies behind is moved by the length of the detour.
+        """
+        a, b = self.nodes[self._searched : self._searched + 2]
+        between = _detour(a, b, self.walk)
+        if between is None:
+            return False
+        last = between[-1]
+        weights = last.orbit.problem.metric(last.orbit.point)
+        end = last.arclength + _length(weights, b.orbit.point - last.orbit.point)
+        behind = self.nodes[self._searched + 1 :]
+        moved = [replace(p, arclength=p.arclength + (end - b.arclength)) for p in behind]
+        self.nodes[self._searched + 1 :] = [*between, *moved]
+        self.walk.stride = replace(self._stride, here=moved[-1])
+        return True
+
+    def _search(self, pairs: int, closely: bool = True) -> None:
+        """Locate the special points of the first pairs of nodes, as far as that is not done.
+
+        Where that fails, the step is walked again with shorter ones; not at the end of the walk,
+        whose last steps a longer one does anew.
+        """
         before = len(self.special_points)
-        for index in range(self._searched, pairs):
-            a, b = self.nodes[index : index + 2]
+        ahead = len(self.nodes) - pairs  # nodes that stay beyond those searched
+        while self._searched < len(self.nodes) - ahead:
+            a, b = self.nodes[self._searched : self._searched + 2]
             try:
                 self.special_points += special_points_between(a, b)
             except LocateError as error:
+                if closely and self._walk_closely():
+                    continue
                 found, lost = _by_halves(a, b, error)
                 self.special_points += found
                 self.notes += lost
-        self._searched = max(self._searched, pairs)
+            self._searched += 1
         if len(self.special_points) > before:
             self.special_points = without_repeats(self.special_points)
+
+
+def _detour(a: BranchPoint, b: BranchPoint, walk: Walk) -> list[BranchPoint] | None:
+    """Points of a walk with shorter steps from a that passes b in its direction, or None."""
+    first_step = (b.arclength - a.arclength) / 64.0
+    if first_step < max(SHORTEST_DETOUR, walk.options.min_step):
+        return None
+    options = replace(
+        walk.options, first_step=first_step, max_step=8.0 * first_step, max_points=MOST_DETOUR
+    )
+    inner = Walk(a, walk.range_hz, options, [b.orbit.point])
+    between = list(inner)[1:-1]
+    if inner.stop_reason != MEETS_OPEN_END or not between:
+        return None
+    last = between[-1]
+    weights = last.orbit.problem.metric(last.orbit.point)
+    ahead = float((b.orbit.point - last.orbit.point) @ (weights * b.tangent))
+    return between if ahead > 0.0 else None
 
 
 def _by_halves(

@@ -36,6 +36,8 @@ FAR = 0.1  # way of a multiplier near the unit circle within which it does not c
 FAR_ALONE = 0.3  # the same of the only pair of a single mode
 DIVES = 8  # points at which to look for a change of sign between two others
 STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
+STEEPEST = 0.5  # least cosine between a branch and the chord of a step: far above what steps allow
+KINK = 1e-6  # step below which a branch may bend by any angle where the number of contacts changes
 
 
 class LocateError(RuntimeError):
@@ -86,7 +88,9 @@ class Chord:
         Raises
         ------
         LocateError
-            If Newton's method fails there.
+            If Newton's method fails there, or finds an orbit at which the branch runs across the
+            chord: then it turns between the two points, and a tangent that is taken along the chord
+            would change its sign without passing a fold.
         """
         if sigma <= 0.0:
             return self.first
@@ -102,6 +106,8 @@ class Chord:
         if found.converged:
             orbit = Orbit.of(problem, found, a.orbit.observe)
             tangent = problem.tangent(found, self._secant)
+            if self._across(tangent):
+                raise LocateError("the branch turns within one step")
         else:
             crossing = correct_across(problem, self.between(sigma), row, offset)
             if crossing is None or crossing[2] > CROSSING_ERROR:
@@ -132,6 +138,16 @@ class Chord:
         secant = self.between(sigma + step) - self.between(sigma - step)
         weights = self.first.orbit.problem.metric(self.first.orbit.point)
         return np.asarray(secant / math.sqrt(float(secant @ (weights * secant))))
+
+    def _across(self, tangent: Real) -> bool:
+        """Whether a tangent departs from the chord by more than a branch may within a step."""
+        weights = self.first.orbit.problem.metric(self.first.orbit.point)
+        length, along, pace = (
+            math.sqrt(float(self._secant @ (weights * self._secant))),
+            float(self._secant @ (weights * tangent)),
+            math.sqrt(float(tangent @ (weights * tangent))),
+        )
+        return length > KINK and along < STEEPEST * length * pace
 
     def frequency_slope(self, point: BranchPoint) -> float:
         """Derivative of ln ω with respect to σ."""
