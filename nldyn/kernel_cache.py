@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core.caching import FunctionCache
 
 ADVICE = (
     "nldyn: no folder to keep compiled code in, so each start compiles for up to a minute; "
@@ -20,8 +21,17 @@ ADVICE = (
 )
 
 
+_save = FunctionCache.save_overload
+_told: set[str] = set()
+
+
 def ensure_cache() -> None:
-    """Give numba a folder for this process and its children where it finds none by itself."""
+    """Give numba a folder for this process and its children where it finds none by itself.
+
+    From then on code that cannot be kept in its folder, on a full disk for instance, is used all
+    the same.
+    """
+    FunctionCache.save_overload = _save_if_possible  # type: ignore[method-assign]
     try:
         numba.njit(cache=True)(_probe)
     except RuntimeError:
@@ -31,6 +41,22 @@ def ensure_cache() -> None:
         os.environ.setdefault("MPLCONFIGDIR", folder)  # matplotlib would complain in two lines
         numba.config.reload_config()  # type: ignore[no-untyped-call]
         print(ADVICE, file=sys.stderr)
+
+
+def _save_if_possible(cache: FunctionCache, signature: Any, data: Any) -> None:
+    """Keep compiled code as numba does; where that fails, say so once for each folder."""
+    try:
+        _save(cache, signature, data)  # type: ignore[no-untyped-call]
+    except OSError as error:
+        folder = cache.cache_path
+        if folder not in _told:
+            fault = (error.strerror or str(error)).lower()
+            print(
+                f"nldyn: warning: compiled code cannot be kept in {folder}: {fault}; without it "
+                "each start compiles for up to a minute",
+                file=sys.stderr,
+            )
+            _told.add(folder)
 
 
 def resting_on(decorator: Any, *files: str | None) -> Any:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 
 import numba
 import pytest
+from numba.core.caching import IndexDataCacheFile
 
 from nldyn._sample import local_extremes, sample_states, state_at
 from nldyn.kernel_cache import first_call, resting_on
@@ -42,3 +44,15 @@ def test_the_collector_rests_during_a_first_call_and_is_as_before_afterwards(col
         assert gc.isenabled() is collecting
     finally:
         (gc.enable if was else gc.disable)()
+
+
+def test_code_that_cannot_be_kept_is_used_and_told_of_once(monkeypatch, capsys):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(IndexDataCacheFile, "save", full)
+    assert [numba.njit(cache=True)(double)(x) for x in (2, 3)] == [4, 6]
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "compiled code cannot be kept in" in said
+    assert "no space left on device" in said
