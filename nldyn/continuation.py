@@ -42,7 +42,6 @@ from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine
 from nldyn.shooting import ShootingProblem
 from nldyn.special import (
-    KINK,
     Chord,
     LocateError,
     insert_dip,
@@ -52,6 +51,7 @@ from nldyn.special import (
 from nldyn.system import numbers
 
 BORN = "born at the flip at"
+KINK = 1e-6  # step below which a branch may bend by any angle where the number of contacts changes
 MEETS_OPEN_END = "meets another branch where that was broken off"
 SHORTEST_DETOUR = 1e-6  # first step of a walk that looks closely at what lies within a step
 MOST_DETOUR = 500  # points of such a walk

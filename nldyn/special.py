@@ -37,7 +37,7 @@ FAR_ALONE = 0.3  # the same of the only pair of a single mode
 DIVES = 8  # points at which to look for a change of sign between two others
 STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
 STEEPEST = 0.5  # least cosine between a branch and the chord of a step: far above what steps allow
-KINK = 1e-6  # step below which a branch may bend by any angle where the number of contacts changes
+BEND = 1e-4  # arclength of a chord, above which a branch does not depart from it by more
 
 
 class LocateError(RuntimeError):
@@ -147,7 +147,7 @@ class Chord:
             float(self._secant @ (weights * tangent)),
             math.sqrt(float(tangent @ (weights * tangent))),
         )
-        return length > KINK and along < STEEPEST * length * pace
+        return length > BEND and along < STEEPEST * length * pace
 
     def frequency_slope(self, point: BranchPoint) -> float:
         """Derivative of ln ω with respect to σ."""
