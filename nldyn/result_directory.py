@@ -23,6 +23,7 @@ except ImportError:  # Windows: drafts of a killed run stay there
     fcntl = None  # type: ignore[assignment]
 
 MANIFEST = ".nldyn.json"
+ATTEMPTS = 100  # to make a folder whose parents other processes make and remove
 
 
 class OutputError(ValueError):
@@ -54,8 +55,10 @@ def check_directory(directory: str | Path) -> Path:
     True
     """
     try:
-        clear_leftovers(Path(directory).resolve())
-        target = _checked(Path(directory).resolve(), directory)
+        target = Path(directory).resolve()
+        with _alone(target.parent):
+            clear_leftovers(target)
+            _check(target, directory)
         with _new_directory(target):
             return target
     except (OSError, ValueError, RuntimeError) as error:
@@ -65,7 +68,7 @@ def check_directory(directory: str | Path) -> Path:
         raise OutputError(f"{directory}: cannot be made: {fault}") from error
 
 
-def _checked(target: Path, directory: str | Path) -> Path:
+def _check(target: Path, directory: str | Path) -> None:
     if target.exists() and not target.is_dir():
         raise OutputError(f"{directory}: is a file, not a directory for results")
     if target.is_dir() and any(target.iterdir()) and not (target / MANIFEST).is_file():
@@ -79,7 +82,6 @@ def _checked(target: Path, directory: str | Path) -> Path:
         raise OutputError(f"{directory}: cannot be made: {above} is read-only")
     if target.is_mount():
         raise OutputError(f"{directory}: cannot be replaced; choose a folder in it")
-    return target
 
 
 def is_writable(folder: Path) -> bool:
@@ -92,15 +94,32 @@ def _new_directory(target: Path) -> Iterator[Path]:
     """Make the hidden directory beside the wanted one; leave nothing of it behind."""
     made = [folder for folder in target.parents if not folder.exists()]
     new = target.with_name(f".{target.name}.{secrets.token_hex(4)}.new")
+    handle = None
     try:
-        new.mkdir(parents=True)
-        with in_use(new):
-            yield new
+        handle = _make(new)
+        yield new
     finally:
+        if handle is not None:
+            os.close(handle)
         shutil.rmtree(new, ignore_errors=True)
         for folder in made:
             with suppress(OSError):
                 folder.rmdir()
+
+
+def _make(new: Path) -> int | None:
+    """Make a directory and lock it; another run may just be removing the folders above it."""
+    for left in reversed(range(ATTEMPTS)):
+        try:
+            if not new.parent.exists():
+                new.parent.mkdir(parents=True, exist_ok=True)
+            with _alone(new.parent):
+                new.mkdir()
+                return _locked(new)
+        except FileNotFoundError:
+            if not left:
+                raise
+    return None
 
 
 @contextmanager
@@ -142,8 +161,9 @@ def result_directory(directory: str | Path, kind: str) -> Iterator[Path]:
                 yield new
             except OutputError as error:  # names a file of the draft
                 raise OutputError(str(error).replace(str(new), str(directory))) from error
-            _complete(new, target, kind)
-            _swap(new, target)
+            with _alone(target.parent):
+                _complete(new, target, kind)
+                _swap(new, target)
     except OSError as error:
         fault = (error.strerror or str(error)).lower()
         raise OutputError(f"{directory}: cannot be written: {fault}") from error
@@ -200,6 +220,21 @@ def _swap(new: Path, target: Path) -> None:
             old.rename(target)
             raise
         shutil.rmtree(old, ignore_errors=True)
+
+
+@contextmanager
+def _alone(parent: Path) -> Iterator[None]:
+    """Let no other run put anything into a folder, or clear it, meanwhile."""
+    handle = None
+    if fcntl is not None:
+        with suppress(OSError):  # a file system without locks
+            handle = os.open(parent, os.O_RDONLY)
+            fcntl.flock(handle, fcntl.LOCK_EX)
+    try:
+        yield
+    finally:
+        if handle is not None:
+            os.close(handle)
 
 
 @contextmanager

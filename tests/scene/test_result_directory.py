@@ -2,6 +2,7 @@
 
 import os
 import sys
+from multiprocessing import get_context
 
 import pytest
 
@@ -169,3 +170,23 @@ def test_read_only_directory_is_refused(tmp_path):
         write(place, table="2")
     place.chmod(0o755)
     assert visible(place) == {"table": "1"}
+
+
+def write_often(place):
+    """Refusals of thirty runs one after the other."""
+    refused = []
+    for _ in range(30):
+        try:
+            write(place, table="1")
+        except OutputError as error:
+            refused.append(str(error))
+    return refused
+
+
+def test_runs_that_end_at_the_same_time_in_one_place_are_all_written(tmp_path):
+    """They make and remove the same parents, and replace each other's results."""
+    place = tmp_path / "a" / "b" / "results"
+    with get_context("spawn").Pool(4) as pool:
+        assert pool.map(write_often, [place] * 4, chunksize=1) == [[]] * 4
+    assert visible(place) == {"table": "1"}
+    assert leftovers(place) == []
