@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import signal
 import sys
+from collections.abc import Callable
 
 from nldyn.interruption import heed_swallowed, interrupted
 
@@ -16,11 +17,20 @@ STOPPED = "nldyn: stopped by Ctrl-C, nothing is written"
 
 def main() -> None:
     """Load the command line and run it."""
+    answering(_command_line)
+
+
+def _command_line() -> None:
+    from nldyn.cli import main as command
+
+    command(prog_name="nldyn")
+
+
+def answering(work: Callable[[], None]) -> None:
+    """Do the work of a process; Ctrl-C ends it with one line and exit code 130."""
     heed_swallowed()
     try:
-        from nldyn.cli import main as command
-
-        command(prog_name="nldyn")
+        work()
     except SystemExit:
         raise
     except BaseException as error:

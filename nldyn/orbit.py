@@ -357,8 +357,16 @@ class Orbit:
         return max(-float(found.fun), force(phase))
 
     def states(self, phases: Real) -> Real:
-        """Modal displacements and velocities (k, 2n) at any forcing phases."""
-        phases = np.asarray(phases, dtype=float)
+        """Modal displacements and velocities (k, 2n) at any forcing phases (k,) in radians.
+
+        Raises
+        ------
+        SystemModelError
+            If the phases are not a list of finite numbers.
+        """
+        phases = numbers("phases", phases)
+        if phases.ndim != 1:
+            raise SystemModelError(f"phases must be a list of phases, got shape {phases.shape}")
         within = phases % (2.0 * np.pi * self.period)
         order = np.argsort(within, kind="stable")
         states = np.empty((phases.size, 2 * self.system.size))

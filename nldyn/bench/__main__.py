@@ -7,6 +7,8 @@ import os
 import sys
 from pathlib import Path
 
+from nldyn.command import answering
+
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -33,4 +35,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    answering(main)

@@ -6,6 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from nldyn.command import answering
+
 
 def main() -> None:
     """Run the suite; the exit code is 1 if a case fails that is not known to."""
@@ -30,4 +32,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    answering(main)

@@ -216,6 +216,21 @@ def test_ctrl_c_from_the_terminal(tmp_path):
         check_whole(out)
 
 
+@pytest.mark.parametrize(
+    "arguments", [["nldyn.hard", "--only", "grazing"], ["nldyn.bench"]], ids=["hard", "bench"]
+)
+def test_ctrl_c_while_a_suite_is_computed(tmp_path, arguments):
+    start = [sys.executable, "-m", *arguments, "--out", str(tmp_path / "out")]
+    child = subprocess.Popen(start, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    time.sleep(4.0)
+    os.killpg(child.pid, signal.SIGINT)  # as a terminal does, to its processes too
+    _, said = child.communicate(timeout=20.0)
+    assert child.returncode == 130, said
+    assert said.splitlines()[-1] == "nldyn: stopped by Ctrl-C, nothing is written"
+    assert "Traceback" not in said
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize("after", ["raise RuntimeError", "while True: time.sleep(0.01)"])
 def test_ctrl_c_in_a_destructor_is_not_lost(after):
     """Python drops what a destructor or a callback from C raises; the compiler has many."""
