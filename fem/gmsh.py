@@ -51,9 +51,9 @@ class _Numbers:
         if self.binary:
             found = np.frombuffer(self.body[self.at : end], kind)
         elif kind == "<f8":
-            found = np.array(self.words[self.at : end], dtype="S").astype(np.float64)
+            found = _reals(self.words[self.at : end])
         else:
-            found = np.array([int(word) for word in self.words[self.at : end]], dtype=np.int64)
+            found = np.array([_whole(word) for word in self.words[self.at : end]], dtype=np.int64)
         self.at = end
         return found if kind == "<f8" else found.astype(np.int64)
 
@@ -72,7 +72,7 @@ class _Numbers:
             return int(self.take(1, "<i4")[0])
         end = self.body.find(b"\n", self.at)
         text, self.at = self.body[self.at : end], end + 1
-        return int(text)
+        return _whole(text)
 
     def end(self) -> None:
         """Refuse numbers beyond those declared."""
@@ -209,16 +209,44 @@ def _header(body: bytes) -> tuple[str, bool, str]:
 
 def _names(body: bytes) -> dict[tuple[int, int], str]:
     """Names of the physical groups by dimension and number."""
-    count, *lines = body.decode().strip().splitlines()
-    if len(lines) != int(count):
-        raise ValueError(f"there are {len(lines)} names of physical groups, not {int(count)}")
+    count, *lines = body.strip().splitlines()
+    if len(lines) != _whole(count):
+        raise ValueError(f"there are {len(lines)} names of physical groups, not {_whole(count)}")
     names = {}
     for line in lines:
-        words = shlex.split(line)
+        words = shlex.split(line.decode())
         if len(words) != 3:
             raise ValueError("a name of a physical group is not told as by Gmsh")
-        names[int(words[0]), int(words[1])] = words[2]
+        names[_whole(words[0].encode()), _whole(words[1].encode())] = words[2]
     return names
+
+
+def _whole(word: bytes) -> int:
+    try:
+        return int(word)
+    except ValueError:
+        raise ValueError(f"{_shown(word)} is not a whole number") from None
+
+
+def _reals(words: list[bytes]) -> FloatArray:
+    try:
+        return np.array(words, dtype="S").astype(np.float64)
+    except ValueError:
+        wrong = next(word for word in words if not _is_real(word))
+        raise ValueError(f"{_shown(wrong)} is not a number") from None
+
+
+def _is_real(word: bytes) -> bool:
+    try:
+        np.array([word]).astype(np.float64)
+    except ValueError:
+        return False
+    return True
+
+
+def _shown(word: bytes) -> str:
+    """A word of the file in quotes, without what cannot be printed."""
+    return ascii(word[:40].decode("latin-1"))
 
 
 def _nodes_22(numbers: _Numbers) -> tuple[IntArray, FloatArray]:
@@ -228,11 +256,12 @@ def _nodes_22(numbers: _Numbers) -> tuple[IntArray, FloatArray]:
         data = np.frombuffer(numbers.take(count * row.itemsize, "u1").astype(np.uint8), row)
         labels, points = data["label"].astype(np.int64), data["place"].astype(np.float64)
     else:
-        rows = np.array(numbers.words[1:], dtype="S").reshape(-1, 4)
-        if len(rows) != count:
-            raise ValueError(f"{count} nodes are declared, but {len(rows)} are there")
-        labels = np.array([int(word) for word in rows[:, 0]], dtype=np.int64)
-        points = rows[:, 1:].astype(np.float64)
+        words = numbers.words[1:]
+        if len(words) != 4 * count:
+            there = f"{len(words) // 4} are" if len(words) % 4 == 0 else f"{len(words)} numbers are"
+            raise ValueError(f"{count} nodes are declared, but {there} there")
+        labels = np.array([_whole(word) for word in words[::4]], dtype=np.int64)
+        points = np.stack([_reals(words[k::4]) for k in (1, 2, 3)], axis=1)
         numbers.at = len(numbers.words)
     numbers.end()
     return labels, points
@@ -240,11 +269,11 @@ def _nodes_22(numbers: _Numbers) -> tuple[IntArray, FloatArray]:
 
 def _lines_22(body: bytes) -> list[_Block]:
     count, *lines = body.strip().splitlines()
-    if len(lines) != int(count):
-        raise ValueError(f"{int(count)} elements are declared, but {len(lines)} are there")
+    if len(lines) != _whole(count):
+        raise ValueError(f"{_whole(count)} elements are declared, but {len(lines)} are there")
     runs: list[tuple[str, list[list[int]], list[int]]] = []
     for line in lines:
-        label, code, tags, *rest = (int(word) for word in line.split())
+        label, code, tags, *rest = (_whole(word) for word in line.split())
         kind = _kind(code)
         if tags < 0 or len(rest) != tags + num_nodes_per_cell[kind]:
             raise ValueError(f"element {label} does not have the numbers of its type")

@@ -649,6 +649,8 @@ def same_attractor(a: Attractor, b: Attractor) -> bool:
     """Whether two attractors at one frequency are the same, as far as their states tell."""
     if a.kind != b.kind:
         return False
+    if a.kind == "failed":
+        return a.failure == b.failure
     if a.orbit is not None and b.orbit is not None:
         return same_orbit(a.orbit, b.orbit)
     if a.settling is not None and b.settling is not None:

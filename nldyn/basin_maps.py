@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -210,7 +211,7 @@ class Basins:
     attractors : tuple of Attractor
         Those that were reached.
     labels : (ny, nx) int
-        Index of the attractor, or -1 where the motion did not settle in time.
+        Index of the attractor, or -1 where the motion did not settle in time or failed.
     phases : (ny, nx) int
         Of a subharmonic of period n, by how many excitation periods, 0 to n - 1, the motion runs
         ahead of the attractor's first state; else 0.
@@ -219,6 +220,8 @@ class Basins:
     checked, wrong : int
         Cells that were simulated and classified once more by themselves, and how many of them came
         to another result.
+    notes : tuple of str
+        How many simulations failed, and why.
     """
 
     plane: Plane
@@ -229,6 +232,7 @@ class Basins:
     periods: NDArray[np.int64]
     checked: int
     wrong: int
+    notes: tuple[str, ...] = ()
 
     @property
     def undecided(self) -> float:
@@ -363,12 +367,15 @@ class Settled:
         As in `Basins`.
     ends : (k, 2n)
         Last states z.
+    failures : (k,) of str
+        Why a simulation failed, if it did.
     """
 
     labels: NDArray[np.int64]
     phases: NDArray[np.int64]
     periods: NDArray[np.int64]
     ends: Real
+    failures: NDArray[np.object_]
 
 
 def settle(
@@ -380,6 +387,7 @@ def settle(
         np.zeros(len(states), dtype=np.int64),
         np.zeros(len(states), dtype=np.int64),
         states.copy(),
+        np.full(len(states), "", dtype=object),
     )
     for row in range(len(states)):
         _settle_one(flow, omega, targets, longest, found, row)
@@ -394,6 +402,7 @@ def _settle_one(
     for before in range(0, longest, CHUNK):
         moved = flow.strobe(found.ends[row], omega, CHUNK)
         if moved.failure:
+            found.failures[row] = moved.failure
             return
         found.ends[row] = moved.ends[-1]
         found.periods[row] = before + CHUNK
@@ -520,11 +529,15 @@ def basins(
     rng = np.random.default_rng(seed)
     picked = rng.choice(len(modal), min(starts, len(modal)), replace=False)
     known = list(attractors)
-    for share in find_attractors(
+    shares = find_attractors(
         flow, frequency_hz, starts=modal[picked], observe=name, options=options,
         executor=executor, progress=progress,
-    ):  # fmt: skip
+    )  # fmt: skip
+    for share in shares:
         _add(known, share.attractor)
+    failed = Counter({s.attractor.failure: s.count for s in shares if s.attractor.failure})
+    notes = _told(failed, len(picked), "simulations that look for attractors")
+    failures = np.full(len(modal), "", dtype=object)
     states = flow.to_state(modal)
     labels, phases, periods = (np.full(len(modal), value) for value in (UNDECIDED, 0, 0))
     order = rng.permutation(len(modal))  # so that all computations take about as long
@@ -536,6 +549,7 @@ def basins(
         ends = values_of(task, [states[piece] for piece in pieces], executor, progress)
         for piece, settled in zip(pieces, ends, strict=True):
             labels[piece], states[piece] = settled.labels, settled.ends
+            failures[piece] = settled.failures
             phases[piece] = settled.phases - periods[piece]
             periods[piece] += settled.periods
         done = len(known)
@@ -548,6 +562,7 @@ def basins(
     results = values_of(again, [flow.to_state(modal[cell]) for cell in checked], executor, progress)
     wrong = sum(index != labels[cell] for cell, index in zip(checked, results, strict=True))
     counts = np.array([max(attractor.period, 1) for attractor in known] + [1])
+    notes += _told(Counter(failures[failures != ""].tolist()), len(modal), "cells")
     return Basins(
         plane,
         frequency_hz,
@@ -557,7 +572,13 @@ def basins(
         periods.reshape(shape),
         len(checked),
         int(wrong),
+        tuple(notes),
     )
+
+
+def _told(failures: Mapping[str, int], total: int, what: str) -> list[str]:
+    """How many of the simulations failed for each reason."""
+    return [f"{n} of {total} {what} failed: {reason}" for reason, n in failures.items()]
 
 
 def check_shape(name: str, shape: tuple[int, int]) -> tuple[int, int]:

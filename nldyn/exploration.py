@@ -327,6 +327,13 @@ class Exploration:
                 f"{simulations} simulations at {len(self.coverage)} frequencies, "
                 f"{100.0 * self.settled_share:.1f} % ended on one of the branches"
             )
+        failed = [c for c in self.coverage if c.failed]
+        if failed:
+            lines.append(
+                f"{sum(c.failed for c in failed)} simulations could not be computed, at "
+                f"{len(failed)} frequencies from {failed[0].frequency_hz:.4g} to "
+                f"{failed[-1].frequency_hz:.4g} Hz"
+            )
         if not self.finished:
             turn, steps, length = self.question.place(self.stage.steps)
             lines.append(

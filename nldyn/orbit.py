@@ -607,6 +607,11 @@ def refine(
                 f"{where}: an undamped mode is excited at its own frequency, and its motion grows "
                 "without bound where it touches no stop"
             )
+        if not contact and np.any(problem.flow.system.natural_frequencies == 0.0):
+            raise ConvergenceError(
+                f"{where}: the structure is free to move as a whole, and where the motion touches "
+                "no stop, nothing tells its place; give a guess that touches one"
+            )
         step = f", last relative step {found.last_step:.1e}" if found.last_step < math.inf else ""
         raise ConvergenceError(
             f"{where}: {found.failure}{step} after {found.iterations} "

@@ -149,7 +149,7 @@ def _check_mirror(scene: Scene, point: str, file: Path) -> None:
 def _check_names(scene: Scene, report: Report) -> None:
     """Refuse names that cannot be printed, or fill the screen."""
     if len(scene.title) > LONGEST_TITLE or not scene.title.replace("\n", " ").isprintable():
-        fault = f"must be at most {LONGEST_TITLE} letters, lines and nothing that cannot be printed"
+        fault = f"must be at most {LONGEST_TITLE} letters that can be printed, and ends of lines"
         raise report(("title",), fault)
     tables: dict[KeyPath, Iterable[str]] = {("parts",): scene.parts}
     if scene.modal is not None:

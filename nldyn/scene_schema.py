@@ -321,8 +321,10 @@ class ContinuationTable(Table):
     def _ordered(cls, value: list[float]) -> list[float]:
         if len(value) != 2:
             raise ValueError(f"must be two frequencies, [lowest, highest], not {show(value)}")
-        if value[1] <= value[0] * (1.0 + 1e-9):
+        if value[1] <= value[0]:
             raise ValueError(f"must run from the lower to the higher frequency, not {show(value)}")
+        if value[1] <= value[0] * (1.0 + 1e-9):
+            raise ValueError(f"must be wider than 1e-9 of its frequencies, not {show(value)}")
         return value
 
     @field_validator("periods")

@@ -571,7 +571,8 @@ def _swept(
             break
         state = end_state(trajectory)
     if not stretches:
-        raise ConvergenceError(f"the sweep from {first:g} Hz failed at once: {failure}")
+        why = failure or f"{abs(last - first) / rate:g} s are too short to be simulated"
+        raise ConvergenceError(f"the sweep from {first:g} Hz failed at once: {why}")
     begins = np.array(times[: len(stretches) + 1])
     lost = stretches[-1]
     if lost.failure:

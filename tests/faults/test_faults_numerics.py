@@ -4,8 +4,24 @@ import csv
 import json
 import math
 
+import numpy as np
 import pytest
 from limited_commands import command
+
+from nldyn import (
+    ConvergenceError,
+    ExploreOptions,
+    HarmonicForce,
+    Plane,
+    Stop,
+    System,
+    Unbalance,
+    basins,
+    explore,
+    find_attractors,
+    solve_orbit,
+    sweep,
+)
 
 ONE = """
 [matrices]
@@ -108,3 +124,73 @@ def test_tiny_and_huge_forces_give_the_answer_of_the_linear_system(tmp_path, for
     zeta = PLAIN["damping"]
     wanted = force / (2e4 * zeta * math.sqrt(1.0 - zeta**2))
     assert 0.99 * wanted < top <= wanted * (1.0 + 1e-6)  # points lie beside the top
+
+
+# --- long-term behaviour ------------------------------------------------------------------------
+
+HIDDEN = "a contact is hidden by rounding"
+
+
+def rigid_stop(stiffness=1e50, unbalance=4.92e-6):
+    """A stop so stiff that no contact can be computed."""
+    return System.from_matrices(
+        [[2.48]], [[16877.0]], {"middle": [1.0]}, modal_damping=0.0142,
+        stops=[Stop("middle", stiffness=stiffness)], excitation=[Unbalance("middle", unbalance)],
+    )  # fmt: skip
+
+
+@pytest.mark.filterwarnings("error")
+def test_basins_say_why_no_cell_leads_anywhere():
+    system = rigid_stop()
+    plane = Plane.at_interface(system, displacement=(-4e-4, 5e-5), velocity=(-0.06, 0.06))
+    found = basins(system, 22.8, plane, shape=(4, 4), starts=4, checks=2)
+    assert np.all(found.labels == -1)
+    assert sum(int(note.split()[0]) for note in found.notes) == 4
+    assert any(HIDDEN in note for note in found.notes)
+
+
+@pytest.mark.filterwarnings("error")
+def test_basins_say_why_single_cells_fail():
+    """Beside an orbit of 1e30 m the cells lie at rest, and begin with too many contacts."""
+    system = rigid_stop(5.17e9, 1e30)
+    plane = Plane.at_interface(system, displacement=(-4e-4, 5e-5), velocity=(-0.06, 0.06))
+    shares = find_attractors(system, 20.0, starts=3)
+    known = [share.attractor for share in shares if share.attractor.kind == "periodic"]
+    found = basins(system, 20.0, plane, attractors=known, shape=(3, 3), starts=1, checks=0)
+    assert len(found.attractors) == 1
+    assert np.all(found.labels == -1)
+    failed = [note.split(":")[0] for note in found.notes if "cells" in note]
+    assert failed == ["9 of 9 cells failed"]
+
+
+def test_failures_with_one_reason_are_one_attractor():
+    shares = find_attractors(rigid_stop(), 22.8, starts=6)
+    assert sum(share.count for share in shares) == 6
+    reasons = [share.attractor.failure for share in shares]
+    assert all(reasons)
+    assert len(set(reasons)) == len(reasons)
+
+
+def test_an_exploration_says_how_many_simulations_failed():
+    effort = ExploreOptions(spacing=0.02, starts=2, settling=500)
+    found = explore(rigid_stop(), (49.0, 51.0), max_period=2, effort=effort)
+    total = sum(c.failed for c in found.coverage)
+    assert total > 0
+    assert f"{total} simulations could not be computed, at 4 frequencies from 49 to 51 Hz" in (
+        found.report()
+    )
+
+
+def test_a_sweep_of_no_time_says_so():
+    with pytest.raises(ConvergenceError, match="2e-30 s are too short"):
+        sweep(rigid_stop(5.17e9), (20.0, 22.0), 1e30)
+
+
+def test_a_free_structure_that_touches_nothing_has_no_place():
+    system = System.from_matrices(
+        np.diag([1.0, 2.0]), [[1e4, -1e4], [-1e4, 1e4]], {"a": [1.0, 0.0]},
+        damping=[[1.0, -1.0], [-1.0, 1.0]], stops=[Stop("a", 1e7, gap=1.0)],
+        excitation=[HarmonicForce("a", 5.0)],
+    )  # fmt: skip
+    with pytest.raises(ConvergenceError, match="free to move as a whole"):
+        solve_orbit(system, 15.0)

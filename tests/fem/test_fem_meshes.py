@@ -65,6 +65,25 @@ def test_a_file_of_gmsh_that_contradicts_itself_is_refused(tmp_path, name, chang
         fem.read_mesh(path)
 
 
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ("1 0 0 x", "'x' is not a number"),
+        ("1 0 0 \x1b", r"'\\x1b' is not a number"),
+        ("1.5 0 0 0", "'1.5' is not a whole number"),
+        ("1 0 0", "2 nodes are declared, but 7 numbers are there"),
+    ],
+)
+def test_a_word_that_is_no_number_is_quoted(tmp_path, wrong, sentence):
+    file = tmp_path / "a.msh"
+    file.write_text(
+        f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n2\n{wrong}\n2 1 0 0\n$EndNodes\n"
+        "$Elements\n1\n1 1 2 1 1 1 2\n$EndElements\n"
+    )
+    with pytest.raises(fem.ModelError, match=sentence):
+        read_gmsh(file)
+
+
 @pytest.mark.parametrize("name", sorted(path.name for path in DATA.glob("gmsh*.msh")))
 def test_files_of_gmsh_hold_what_meshio_reads(name):
     if name == "gmsh41_save_all.msh":

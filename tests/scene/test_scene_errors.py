@@ -184,8 +184,8 @@ def test_what_is_given_twice_is_told_in_words_of_toml(tmp_path, text, fault):
         (
             "[5.0, 90.0]",
             "[5.0, 5.000000000000001]",
-            "continuation.range_hz must run from the "
-            "lower to the higher frequency, not [5.0, 5.000000000000001]",
+            "continuation.range_hz must be wider than 1e-9 of its frequencies, "
+            "not [5.0, 5.000000000000001]",
         ),
         ("[[stops]]", "[stops]", "stops must be written with two brackets: [[stops]]"),
         (
