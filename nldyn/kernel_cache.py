@@ -31,7 +31,7 @@ def ensure_cache() -> None:
     From then on code that cannot be kept in its folder, on a full disk for instance, is used all
     the same.
     """
-    FunctionCache.save_overload = _save_if_possible  # type: ignore[method-assign]
+    FunctionCache.save_overload = _save_if_possible  # type: ignore[method-assign, assignment]
     try:
         numba.njit(cache=True)(_probe)
     except RuntimeError:

@@ -228,7 +228,7 @@ def _alone(parent: Path) -> Iterator[None]:
     handle = None
     if fcntl is not None:
         with suppress(OSError):  # a file system without locks
-            handle = os.open(parent, os.O_RDONLY)
+            handle = os.open(parent, os.O_RDONLY | os.O_DIRECTORY)
             fcntl.flock(handle, fcntl.LOCK_EX)
     try:
         yield
