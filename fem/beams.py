@@ -10,7 +10,7 @@ from fem.elements import bending_matrices, congruent, stretching_matrices
 from fem.errors import ModelError
 from fem.mesh import FloatArray
 from fem.model import BeamPart
-from fem.sections import section_number, shear_areas
+from fem.sections import CircularSection, section_number, shear_areas
 
 UPRIGHT = np.array([0, 0, 1.0])
 IN_PLANE = np.array([1, 5, 7, 11])
@@ -191,6 +191,8 @@ def local_axes(part: BeamPart, spans: FloatArray, what: str) -> FloatArray:
     x = spans / np.linalg.norm(spans, axis=1)[:, None]
     if part.orientation is None:
         z = UPRIGHT - x * x[:, 2:]
+        if isinstance(part.section, CircularSection) and not any(part.offset):
+            z[np.linalg.norm(z, axis=1) < 1e-6] = (1.0, 0.0, 0.0)  # round: any direction will do
         fault = "runs along z, so it needs an orientation (the direction of the section's height)"
     else:
         z = np.cross(x, np.asarray(part.orientation) / np.linalg.norm(part.orientation))

@@ -24,6 +24,9 @@ TETRAHEDRON_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
 CUBE_EDGES = (*SQUARE_EDGES, (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 CUBE_FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
 
+SPANS = {"line": ((0, 1),), "line3": ((0, 2), (2, 1))}
+"""How a line of a kind is cut into straight pieces with two nodes."""
+
 
 @dataclass(frozen=True)
 class CellKind:

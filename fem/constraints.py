@@ -13,6 +13,7 @@ from fem.beams import cross_matrix
 from fem.cells import KINDS
 from fem.errors import ModelError
 from fem.mesh import FloatArray, IntArray
+from fem.model import Support
 from fem.scatter import SparseArray, dense_scatter
 from fem.structure import AXES, IN_PLANE, Coupling, StructureModel, axis_index
 
@@ -183,15 +184,38 @@ def _held(model: StructureModel, numbering: Numbering) -> IntArray:
     for support in model.supports:
         nodes = model.mesh.nodes(support.point)
         columns = [axis_index(direction) for direction in support.directions]
-        dofs = numbering.dofs(nodes)[:, columns].ravel()
+        dofs = numbering.dofs(nodes)[:, columns]
         if (dofs < 0).all():
             raise ModelError(
                 f"{model.mesh.source}: support at {support.point!r} holds nothing: its nodes do"
                 f" not have {' or '.join(support.directions)}"
             )
-        held.append(dofs)
+        _check_turns(model, support, nodes, dofs)
+        held.append(dofs.ravel())
     found = np.unique(np.concatenate(held)) if held else np.zeros(0, dtype=np.int64)
     return found[found >= 0]
+
+
+def _check_turns(
+    model: StructureModel, support: Support, nodes: IntArray, dofs: IntArray
+) -> None:
+    """Rotations that no node has must be held by the translations: a face held in x cannot tip."""
+    columns = [axis_index(direction) for direction in support.directions]
+    lacking = [c for at, c in enumerate(columns) if (dofs[:, at] < 0).all()]
+    if not lacking:
+        return
+    place = (model.mesh.points[nodes] - model.mesh.points[nodes].mean(axis=0)) / model.mesh.size
+    shift = np.broadcast_to(np.eye(3), (len(nodes), 3, 3))
+    motions = np.concatenate([shift, -cross_matrix(place)], axis=2)
+    held = motions[:, [c for c in columns if c < 3]].reshape(-1, 6)
+    prevented = np.diag(np.linalg.pinv(held, rcond=1e-6) @ held) > 1.0 - 1e-6
+    for column in lacking:
+        if not prevented[column]:
+            raise ModelError(
+                f"{model.mesh.source}: support at {support.point!r}: its nodes are of solids and"
+                f" have no {AXES[column]}, and what else it holds does not prevent it; couple"
+                " them to a point, and hold that"
+            )
 
 
 def coupled(

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fem.cells import KINDS
+from fem.cells import KINDS, SPANS
 from fem.errors import ModelError, by_name, check_positive, listed, quoted
 from fem.mesh import FloatArray, FrameMesh, IntArray
 from fem.model import (
@@ -251,12 +251,20 @@ class StructureModel:
 
     @property
     def beams(self) -> dict[str, tuple[BeamPart, IntArray]]:
-        """Beam parts with the node pairs (e, 2) of their lines."""
+        """Beam parts with the node pairs (e, 2) of their lines; one of three nodes is two beams."""
         return {
-            name: (part, self.mesh.cells["line"][self.mesh.part(name)["line"]])
+            name: (part, self._spans(name))
             for name, part in self.parts.items()
             if isinstance(part, BeamPart)
         }
+
+    def _spans(self, name: str) -> IntArray:
+        pairs = [
+            self.mesh.cells[kind][at][:, list(ends)]
+            for kind, at in self.mesh.part(name).items()
+            for ends in SPANS[kind]
+        ]
+        return np.concatenate(pairs)
 
     @property
     def solids(self) -> dict[str, tuple[SolidPart, dict[str, IntArray]]]:
@@ -336,7 +344,7 @@ class StructureModel:
     @staticmethod
     def _kinds_for(part: Part) -> set[str]:
         if isinstance(part, BeamPart):
-            return {"line"}
+            return set(SPANS)
         dimension = 2 if part.plane else 3
         return {name for name, kind in KINDS.items() if kind.dimension == dimension}
 

@@ -9,16 +9,15 @@ from functools import cached_property
 import numpy as np
 
 from fem.beams import local_axes, to_nodes
-from fem.cells import KINDS
+from fem.cells import KINDS, SPANS
 from fem.errors import ModelError
 from fem.mesh import FloatArray, IntArray
 from fem.structure_assembly import StructureComponent
 from fem.sweep import PartSurface, hermite, hermite_slope, open_ends, outline
 
 SHARP_DEGREES = 30.0
-PIECES = {
-    "line": ((0, 1),),
-    "line3": ((0, 2), (2, 1)),
+PIECES: dict[str, tuple[tuple[int, ...], ...]] = {
+    **SPANS,
     "triangle": ((0, 1, 2),),
     "triangle6": ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
     "quad": ((0, 1, 2, 3),),

@@ -124,9 +124,15 @@ def folded():
     return fem.StructureModel(mesh.with_points(points), {"block": fem.SolidPart(STEEL)})
 
 
+def held_block(place, directions):
+    mesh = fem.box_mesh("bar", (1.0, 0.1, 0.1), (2, 1, 1)).with_point_sets({"corner": [0]})
+    support = fem.Support(place, directions)
+    return fem.StructureModel(mesh, {"bar": fem.SolidPart(STEEL)}, supports=[support])
+
+
 def upright(**options):
     mesh = fem.frame_mesh({"a": (0, 0, 0), "b": (0, 0, 1)}, [("mast", "a", "b", 2)], "m.msh")
-    section = options.pop("section", fem.CircularSection(0.1))
+    section = options.pop("section", fem.RectangularSection(0.1, 0.1))
     return fem.StructureModel(
         mesh, {"mast": fem.BeamPart(options.pop("material", STEEL), section, **options)}
     )
@@ -168,7 +174,7 @@ UP = {"orientation": (1.0, 0.0, 0.0)}
         (lambda: block(parts={"block": 1}), "parts must be a dictionary by name"),
         (
             lambda: block(parts={"block": fem.BeamPart(STEEL, fem.CircularSection(0.1))}),
-            "'block' is a BeamPart and needs cells out of 'line', but has 'hexahedron20'",
+            "'block' is a BeamPart and needs cells out of 'line', 'line3', but has 'hexahedron20'",
         ),
         (
             lambda: block(parts={"block": fem.SolidPart(STEEL, "stress", 0.1)}),
@@ -273,6 +279,14 @@ UP = {"orientation": (1.0, 0.0, 0.0)}
         ),
         (lambda: fem.StructureMesh([[0, 0, 0]], {}), "the mesh is empty"),
         (lambda: fem.joined([]), "there are no meshes to join"),
+        (
+            lambda: fem.assemble(held_block("x0", ("x", "rotation_x"))),
+            "support at 'x0': its nodes are of solids and have no rotation_x",
+        ),
+        (
+            lambda: fem.assemble(held_block("corner", ("x", "y", "z", "rotation_y"))),
+            "support at 'corner': its nodes are of solids and have no rotation_y",
+        ),
     ],
 )
 def test_a_bad_structure_is_one_sentence(make, sentence):

@@ -2,6 +2,7 @@
 
 import time
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -332,6 +333,36 @@ def test_a_beam_goes_on_where_the_solid_ends():
     )
     whole = fem.assemble(cantilever(part, elements=24))
     np.testing.assert_allclose(lowest_hz(fem.assemble(model), 4), lowest_hz(whole, 4), rtol=5e-3)
+
+
+def test_a_line_of_three_nodes_is_two_beams():
+    """As a mesher of second order makes them along a curve."""
+    two = cantilever(BAR, elements=4)
+    lines = two.mesh.cells["line"]
+    assert (lines[:-1, 1] == lines[1:, 0]).all()
+    threes = np.column_stack([lines[::2, 0], lines[1::2, 1], lines[::2, 1]])
+    mesh = fem.StructureMesh(
+        two.mesh.points, {"line3": threes}, {"arm": {"line3": [0, 1]}}, two.mesh.point_sets
+    )
+    three = fem.assemble(replace(two, mesh=mesh))
+    np.testing.assert_allclose(lowest_hz(three, 6), lowest_hz(fem.assemble(two), 6), rtol=1e-9)
+
+
+def test_a_round_bar_along_z_needs_no_orientation():
+    round_bar = replace(BAR, section=fem.CircularSection(0.03, bore=0.02))
+    upright = fem.assemble(cantilever(round_bar, (0.0, 0.0, 1.0)))
+    lying = fem.assemble(cantilever(round_bar))
+    np.testing.assert_allclose(lowest_hz(upright, 8), lowest_hz(lying, 8), rtol=1e-7)
+
+
+@pytest.mark.parametrize("turns", [(), TURNS])
+def test_rotations_held_on_a_face_of_a_solid_are_those_of_its_translations(turns):
+    model = fem.StructureModel(
+        fem.box_mesh("bar", (1.0, 0.1, 0.2), (3, 1, 1)),
+        {"bar": fem.SolidPart(STEEL)},
+        supports=[fem.Support("x0", ("x", "y", "z", *turns)), fem.symmetry("x1", "x")],
+    )
+    assert fem.assemble(model).stiffness.shape[0] == 3 * (2 * 8 + 3 * 4) + 2 * 8
 
 
 def test_half_a_structure_with_symmetry_has_the_symmetric_modes():
