@@ -274,7 +274,12 @@ def number_list(
     "--refinements",
     callback=number_list,
     metavar="LIST",
-    help="Meshes to compare: cut every element into so many; by default 1.",
+    help="Meshes to compare: cut every line into so many; by default 1.",
+)
+@click.option(
+    "--meshes",
+    metavar="LIST",
+    help="Meshes to compare: files with the names of the scene's, from coarse to fine.",
 )
 @click.option("--at-hz", type=click.FloatRange(1e-6, 1e12), metavar="HZ", help="Orbit to compare.")
 @click.option("--full", is_flag=True, help="Find this orbit in the full model, too (minutes).")
@@ -286,6 +291,7 @@ def converge(
     modes: list[int] | None,
     methods: str,
     refinements: list[int] | None,
+    meshes: str | None,
     at_hz: float | None,
     full: bool,
     quiet: bool,
@@ -306,6 +312,7 @@ def converge(
                 modes=modes or COUNTS,
                 methods=[name.strip() for name in methods.split(",")],
                 refinements=refinements or [1],
+                meshes=[name.strip() for name in meshes.split(",")] if meshes else (),
                 at_hz=at_hz,
                 full=full,
                 progress=report,

@@ -31,6 +31,9 @@ SPECIAL_KINDS = ("LP", "PD")
 MATCH = 0.02  # special points of one kind farther apart are not the same
 INVISIBLE = 1e-9
 FULL = "full"
+REFERENCE = "reference"
+ALL_MODES_UP_TO = 1500  # degrees of freedom; of larger components the reference is reduced, too
+FEWEST_REFERENCE_MODES = 40
 METHODS = ("rubin", "craig-bampton", "guyan", "truncation", "macneal")
 MASSLESS = "its interfaces have no mass, so that a stop has no equation of motion"
 QUANTITIES = {
@@ -135,11 +138,14 @@ class Study:
     at_hz : float
         Frequency of the orbits that are compared.
     models : tuple of Measured
-        All models, the full one last.
+        All models, the reference last.
     errors : tuple of Errors
         One for each model, against the references.
     best : Measured
         The model whose branch is that of reference.
+    reference_error : float
+        Bound, but for rounding, of the reference's own error: of the receptance without damping,
+        relative as in `Errors`. 0 for the full model.
     """
 
     setting: Setting
@@ -147,14 +153,17 @@ class Study:
     models: tuple[Measured, ...]
     errors: tuple[Errors, ...]
     best: Measured
+    reference_error: float = 0.0
 
     @property
     def reference(self) -> Measured:
-        """The full model, with which eigenfrequencies and receptance are compared."""
+        """The model with which eigenfrequencies and receptance are compared: the full one if
+        it is small enough.
+        """
         return self.models[-1]
 
     def series(self) -> dict[str, list[int]]:
-        """Indices of the models with one mesh and method, by its label, without the full model."""
+        """Indices of the models with one mesh and method, by its label, without the reference."""
         return self._grouped(lambda model: model.label)
 
     def mesh_series(self) -> dict[str, list[int]]:
@@ -197,11 +206,22 @@ class Study:
             "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
             for row in rows
         ]
+        whole = f"the full model ({self.reference.size} modes)"
+        if self.reference.method != FULL:
+            whole = (
+                f"rubin with {counted_modes(self.reference)} (its undamped receptance is within "
+                f"{self.reference_error:.1e} of the full model's but for rounding)"
+            )
         lines.append(
-            f"reference: the full model ({self.reference.size} modes) for eigenfrequencies and "
+            f"reference: {whole} for eigenfrequencies and "
             f"receptance{' and the orbit' if self.reference.orbit else ''}, {self.best.label} with "
             f"{counted_modes(self.best)} for the rest; orbits at {self.at_hz:g} Hz"
         )
+        known = self.reference.orbit or self.best.orbit
+        if known is not None and largest_force(known) == 0.0:
+            lines.append(
+                f"no stop is touched at {self.at_hz:g} Hz, so that there is no contact to compare"
+            )
         for label, indices in self.series().items():
             if len(indices) > 1:
                 lines += self.said_of(label, indices, counted_modes)
@@ -296,9 +316,11 @@ def converge(
     Notes
     -----
     The reference is the full model, all modes of the component (of the last one of several) that
-    an interface can see, for eigenfrequencies and receptance. For the harmonic branch it is the
-    model with the most coordinates; of several, the one with the best receptance. Every model has
-    the setting's modal damping for all of its modes, also the residual ones, whose damping is
+    an interface can see, for eigenfrequencies and receptance. Of a component with more than 1500
+    degrees of freedom it is a model by Rubin's method with twice the largest count, at least 40
+    modes; `cms.accuracy` bounds how far that is from the full one. For the harmonic branch it is
+    the model with the most coordinates; of several, the one with the best receptance. Every model
+    has the setting's modal damping for all of its modes, also the residual ones, whose damping is
     therefore not that of the full model.
     The harmonic branch is followed downwards from the orbit that a simulation from rest finds at
     the upper end of the range.
@@ -312,22 +334,28 @@ def converge(
     at_hz = setting.middle_hz if at_hz is None else at_hz
     if not setting.range_hz[0] <= at_hz <= setting.range_hz[1]:
         raise SystemModelError(f"converge: at_hz must lie in the range, got {at_hz:g}")
+    mesh, finest = list(components.items())[-1]
+    if full and finest.mass.shape[0] > ALL_MODES_UP_TO:
+        raise SystemModelError(
+            f"converge: full is for components with up to {ALL_MODES_UP_TO} degrees of freedom, "
+            f"this one has {finest.mass.shape[0]}"
+        )
+    whole = reference_model(finest, max(modes))
+    linear = measured_linear("", FULL if is_full(whole) else REFERENCE, whole, setting)
     models: list[Measured] = []
-    for mesh, component in components.items():
+    for name, component in components.items():
         for method in methods:
             for count in sorted(set(modes)) if method != "guyan" else [0]:
                 asked = None if method == "guyan" else count
                 reduced = cms.reduce(component, modes=asked, method=method)
-                models.append(measured(mesh, reduced, setting, at_hz, progress))
-    mesh, finest = list(components.items())[-1]
-    whole = full_model(finest)
-    linear = measured_linear("", FULL, whole, setting)
+                models.append(measured(name, reduced, setting, at_hz, progress))
     best = best_of([model for model in models if model.mesh == mesh], linear)
     if full and best.orbit is not None:
         linear = with_orbit(linear, whole, setting, best.orbit, progress)
     models.append(linear)
     errors = tuple(errors_of(model, linear, best, full) for model in models)
-    return Study(setting, at_hz, tuple(models), errors, best)
+    known = 0.0 if is_full(whole) else receptance_bound(finest, whole, linear, setting)
+    return Study(setting, at_hz, tuple(models), errors, best, known)
 
 
 def study_of_scene(
@@ -336,6 +364,7 @@ def study_of_scene(
     modes: Sequence[int] = COUNTS,
     methods: Sequence[str] = ("rubin",),
     refinements: Sequence[int] = (1,),
+    meshes: Sequence[str] = (),
     at_hz: float | None = None,
     full: bool = False,
     progress: Progress | None = None,
@@ -349,7 +378,10 @@ def study_of_scene(
     modes, methods, at_hz, full, progress
         As for `converge`.
     refinements : sequence of int
-        Meshes: every element is cut into so many.
+        Meshes: every line is cut into so many.
+    meshes : sequence of str
+        Mesh files to compare instead of the scene's, from coarse to fine, as ``file`` in
+        ``[mesh]``.
 
     Raises
     ------
@@ -366,10 +398,15 @@ def study_of_scene(
         raise SystemModelError("converge: a refinement must be 1 or more")
     for method in methods:
         check_choice("converge: each method", method, METHODS)
-    components = {
-        "" if len(refinements) == 1 else f"x{times}": build_component(scene, times)
-        for times in sorted(refinements)
-    }
+    if meshes:
+        if tuple(refinements) != (1,):
+            raise SystemModelError("converge: give either refinements or meshes")
+        components = {file: build_component(with_mesh(scene, file)) for file in meshes}
+    else:
+        components = {
+            "" if len(refinements) == 1 else f"x{times}": build_component(scene, times)
+            for times in sorted(refinements)
+        }
     try:
         return converge(
             components,
@@ -382,6 +419,13 @@ def study_of_scene(
         )
     except (cms.ReductionError, ConvergenceError) as error:
         raise scene_error(scene.file, ("reduction",), str(error), sep=": ") from None
+
+
+def with_mesh(scene: Scene, file: str) -> Scene:
+    """The scene with another mesh file."""
+    if scene.mesh is None:
+        return scene
+    return scene.model_copy(update={"mesh": scene.mesh.model_copy(update={"file": file})})
 
 
 def best_of(models: Sequence[Measured], full: Measured) -> Measured:
@@ -445,12 +489,31 @@ def measured_linear(
     )
 
 
-def full_model(component: cms.ComponentLike) -> cms.ReducedModel:
-    """All modes of a component that an interface sees."""
+def reference_model(component: cms.ComponentLike, modes: int) -> cms.ReducedModel:
+    """All modes of a component that an interface sees; of a large one more than a study's."""
     import cms
 
     size = int(component.mass.shape[0])
-    return visible_modes(cms.reduce(component, modes=size, method="truncation"))
+    if size <= ALL_MODES_UP_TO:
+        return visible_modes(cms.reduce(component, modes=size, method="truncation"))
+    return cms.reduce(component, modes=min(max(2 * modes, FEWEST_REFERENCE_MODES), size))
+
+
+def is_full(reference: cms.ReducedModel) -> bool:
+    """Whether a `reference_model` is the full model."""
+    return reference.method == "truncation"
+
+
+def receptance_bound(
+    component: cms.ComponentLike, whole: cms.ReducedModel, linear: Measured, setting: Setting
+) -> float:
+    """Bound of the error of a model's undamped receptance over the range, as in `Errors`."""
+    import cms
+
+    observed = setting.observe or whole.interfaces[0]
+    grid = np.linspace(*setting.range_hz, GRID)
+    band = cms.accuracy(component, whole).receptance_error(grid, observed, observed)
+    return float(np.linalg.norm(np.abs(band).max(axis=1)) / np.linalg.norm(linear.receptance))
 
 
 def with_orbit(
@@ -549,7 +612,14 @@ def harmonic_branch(system: System, setting: Setting, tell: Callable[[float], No
     """The harmonic branch downwards from the upper end of the range."""
     low, high = setting.range_hz
     tell(high)
-    orbit = solve_orbit(FlowMap(system), high * (1.0 - 1e-9), observe=setting.observe)
+    try:
+        orbit = solve_orbit(FlowMap(system), high * (1.0 - 1e-9), observe=setting.observe)
+    except ConvergenceError as error:
+        rigid = int(np.count_nonzero(system.frequencies_hz == 0.0))
+        if not rigid:
+            raise
+        modes = f"{rigid} mode{'' if rigid == 1 else 's'} at 0 Hz"
+        raise ConvergenceError(f"{error}; nothing holds the structure: it has {modes}") from None
     return continue_branch(orbit, (low, high))
 
 
@@ -620,11 +690,9 @@ def distance(given: Complex, known: Complex) -> float:
 
 
 def relative(a: Orbit | None, b: Orbit | None, number: Callable[[Orbit], float]) -> float:
-    """Relative difference of a number of two orbits; nan where one is missing."""
-    if a is None or b is None:
-        return np.nan
-    exact = number(b)
-    return abs(number(a) - exact) / abs(exact) if exact else abs(number(a))
+    """Relative difference of a number of two orbits; nan where one is missing, or b's is zero."""
+    exact = 0.0 if b is None else number(b)
+    return abs(number(a) - exact) / abs(exact) if a is not None and exact else np.nan
 
 
 def special_points_of(branch: Branch) -> dict[str, tuple[float, ...]]:

@@ -10,6 +10,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -178,7 +179,7 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
     scene : Scene
         A scene with a ``[mesh]``.
     refinement : int
-        Cut every element of a frame into this many.
+        Cut every line of a frame, or of a structure of lines alone, into this many.
 
     Returns
     -------
@@ -203,12 +204,14 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
         raise scene_error(scene.file, ("mesh",), "is missing: the structure is not given by a mesh")
     path = _mesh_path(scene, scene.mesh.file)
     if scene.mesh.model == "structure":
-        if refinement > 1:
-            fault = 'is "structure", whose cells are refined in the mesher'
-            raise scene_error(scene.file, ("mesh", "model"), fault)
         with _told_as(scene, ("mesh", "file"), fem.ModelError):
             structure = fem.read_structure(path, _mesh_places(scene))
         check_structure_names(scene, structure, scene.file)
+        if refinement > 1:
+            if set(structure.cells) - {"line", "vertex"}:
+                fault = "has cells other than two-node lines, which the mesher refines: use --meshes"
+                raise scene_error(scene.file, ("mesh", "file"), fault)
+            structure = refined_structure(structure, refinement)
         with _told_as(scene, (), fem.ModelError):
             return fem.assemble(_structure_model(scene, structure))
     with _told_as(scene, ("mesh", "file"), fem.ModelError):
@@ -572,25 +575,36 @@ def refined_mesh(mesh: fem.FrameMesh, times: int) -> fem.FrameMesh:
     >>> len(refined_mesh(mesh, 3).lines)
     6
     """
-    import numpy as np
-
     import fem
 
-    n, count = len(mesh.points), len(mesh.lines)
-    first, last = (mesh.points[mesh.lines[:, end]] for end in (0, 1))
+    points, lines, pieces = cut_lines(mesh.points, mesh.lines, times)
+    parts = {name: pieces[elements].ravel() for name, elements in mesh.parts.items()}
+    return fem.FrameMesh(points, lines, parts, mesh.point_sets, mesh.source)
+
+
+def refined_structure(mesh: fem.StructureMesh, times: int) -> fem.StructureMesh:
+    """The same for the lines of a structure."""
+    points, lines, pieces = cut_lines(mesh.points, mesh.cells["line"], times)
+    groups = {
+        name: {k: pieces[at].ravel() if k == "line" else at for k, at in group.items()}
+        for name, group in mesh.groups.items()
+    }
+    return replace(mesh, points=points, cells={**mesh.cells, "line": lines}, groups=groups)
+
+
+def cut_lines(
+    points: NDArray[np.float64], lines: NDArray[np.int64], times: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    """Points and lines where each line is cut into equal pieces, and their numbers (e, times)."""
+    n, count = len(points), len(lines)
+    first, last = (points[lines[:, end]] for end in (0, 1))
     share = np.arange(1, times)[None, :, None] / times
     inner = first[:, None] + share * (last - first)[:, None]
     numbers = n + np.arange(count * (times - 1)).reshape(count, times - 1)
-    chain = np.hstack([mesh.lines[:, :1], numbers, mesh.lines[:, 1:]])
-    lines = np.stack([chain[:, :-1], chain[:, 1:]], axis=-1).reshape(-1, 2)
+    chain = np.hstack([lines[:, :1], numbers, lines[:, 1:]])
+    cut = np.stack([chain[:, :-1], chain[:, 1:]], axis=-1).reshape(-1, 2)
     pieces = np.arange(count * times).reshape(count, times)
-    return fem.FrameMesh(
-        np.vstack([mesh.points, inner.reshape(-1, 3)]),
-        lines,
-        {name: pieces[elements].ravel() for name, elements in mesh.parts.items()},
-        mesh.point_sets,
-        mesh.source,
-    )
+    return np.vstack([points, inner.reshape(-1, 3)]), cut, pieces
 
 
 def _count_pieces(count: int, links: NDArray[np.int64]) -> int:

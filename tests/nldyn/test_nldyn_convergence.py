@@ -13,22 +13,30 @@ from strings import MASSES, SETTING, string
 import cms
 import fem
 from nldyn import (
+    ConvergenceError,
     Damper,
+    SceneError,
     Setting,
     Stop,
     System,
     SystemModelError,
     Unbalance,
     converge,
+    convergence,
     solve_orbit,
 )
 from nldyn.cli import main
 from nldyn.convergence import (
     contact_time,
+    distance,
+    harmonic_branch,
     largest_force,
     massless_receptance,
     matched,
+    measured_linear,
     receptance,
+    receptance_bound,
+    with_mesh,
 )
 from nldyn.convergence_output import write_study
 from nldyn.resources import example
@@ -54,6 +62,42 @@ def test_the_full_model_is_the_reference(study):
     assert largest_force(study.reference.orbit) == pytest.approx(largest_force(orbit), rel=1e-6)
     found = study.reference.orbit.max_abs_displacement
     assert found == pytest.approx(orbit.max_abs_displacement, rel=1e-6)
+
+
+def test_the_reference_of_a_large_component_has_a_bound_of_its_own_error(monkeypatch):
+    monkeypatch.setattr(convergence, "ALL_MODES_UP_TO", 40)
+    monkeypatch.setattr(convergence, "FEWEST_REFERENCE_MODES", 6)
+    study = converge(string(), SETTING, modes=(1, 2))
+    assert (study.reference.label, study.reference.modes) == ("reference", 6)
+    assert "reference: rubin with 6 modes (its undamped receptance is within" in study.report()
+    with pytest.raises(SystemModelError, match="up to 40 degrees of freedom, this one has 41"):
+        converge(string(), SETTING, modes=(1,), full=True)
+
+
+def test_the_bound_of_the_reference_holds():
+    setting, grid = replace(SETTING, modal_damping=0.0), np.linspace(*SETTING.range_hz, 400)
+    reduced = cms.reduce(string(), modes=2)
+    bound = receptance_bound(string(), reduced, measured_linear("", "", reduced, setting), setting)
+    full = receptance(cms.reduce(string(), modes=MASSES), setting, grid)
+    error = distance(receptance(reduced, setting, grid), full)
+    assert 0.5 * bound < error < bound
+
+
+def test_contacts_are_compared_only_where_there_are_any():
+    far = replace(SETTING, stops=(Stop("middle", stiffness=2e7, gap=1.0),))
+    study = converge(string(), far, modes=(1, 3))
+    assert all(np.isnan((error.force, error.contact)).all() for error in study.errors)
+    assert "no stop is touched at 36.7423 Hz" in study.report()
+    assert "contact force" not in study.report()
+
+
+def test_a_structure_that_nothing_holds_is_told():
+    K = 1e5 * (np.diag([1.0, 2.0, 1.0]) - np.eye(3, k=1) - np.eye(3, k=-1))
+    loads = {"middle": np.eye(3)[1], "end": np.eye(3)[2]}
+    free = cms.reduce(cms.Matrices(K, np.eye(3), loads), modes=3)
+    setting = replace(SETTING, stops=(), excitation=(Unbalance("middle", 1e-4),))
+    with pytest.raises(ConvergenceError, match="nothing holds the structure: it has 1 mode at 0"):
+        harmonic_branch(setting.system(free), setting, print)
 
 
 def test_errors_fall_with_the_number_of_modes(study):
@@ -191,6 +235,42 @@ def test_refined_meshes_converge_to_the_frequencies_of_the_beam():
     np.testing.assert_allclose(hz[1], hz[0], rtol=1e-6)
 
 
+SPACE_FRAME = """
+mesh = {file = "frame.inp", model = "structure"}
+parts.mast = {youngs_modulus = 2.1e11, density = 7800, poissons_ratio = 0.3, diameter = 0.02}
+parts.arm = {youngs_modulus = 2.1e11, density = 7800, poissons_ratio = 0.3, diameter = 0.02}
+interfaces.tip = {at = "tip", direction = "z"}
+reduction.modes = 3
+[[supports]]
+at = "foot"
+fixed = ["x", "y", "z", "rotation_x", "rotation_y", "rotation_z"]
+"""
+
+
+@pytest.fixture
+def space_frame(tmp_path):
+    """A scene with a mast and an arm on it, of four and eight elements in two files."""
+    points = {"foot": (0, 0, 0), "top": (0, 0, 1), "tip": (1, 0, 1)}
+    for file, count in (("frame.inp", 2), ("finer.inp", 4)):
+        members = [("mast", "foot", "top", count), ("arm", "top", "tip", count)]
+        fem.write_mesh(fem.frame_mesh(points, members), tmp_path / file)
+    (tmp_path / "scene.toml").write_text(SPACE_FRAME, encoding="utf-8")
+    return load_scene(tmp_path / "scene.toml")
+
+
+def test_lines_of_a_structure_are_cut_as_a_mesher_does(space_frame):
+    cut = cms.reduce(build_component(space_frame, 2), modes=4).frequencies_hz
+    finer = cms.reduce(build_component(with_mesh(space_frame, "finer.inp")), modes=4)
+    coarse = cms.reduce(build_component(space_frame), modes=4).frequencies_hz
+    np.testing.assert_allclose(cut, finer.frequencies_hz, rtol=1e-9)
+    assert np.all(coarse[:4] > cut[:4])
+
+
+def test_solids_are_refined_in_the_mesher():
+    with pytest.raises(SceneError, match="cells other than two-node lines, which the mesher refines"):
+        build_component(load_scene(example("plate.toml")), 2)
+
+
 @pytest.mark.parametrize(
     "changed, words",
     [
@@ -217,6 +297,8 @@ def test_a_setting_without_excitation_is_refused():
         (["--methods", "mcneal", "--modes", "1"], "each method must be one of rubin, cr"),
         (["--methods", "macneal", "--modes", "1"], "has a harmonic branch: its interfaces have no"),
         (["--modes", "999"], "999"),
+        (["--meshes", "a.msh,b.msh"], "mesh.file names"),
+        (["--meshes", "a.msh", "--refinements", "2"], "give either refinements or meshes"),
         (["--at-hz", "500", "--modes", "1"], "at_hz must lie in the range"),
     ],
 )
