@@ -15,7 +15,7 @@ from cms.constraint import FixedInterface, fixed_interface
 from cms.eigen import Modes, lowest_modes, shifted_factor
 from cms.errors import ReductionError
 from cms.inertia import elastic_solutions
-from cms.model import ReducedModel
+from cms.model import ReducedModel, positive
 from cms.residual import residual_flexibility, without_modes
 
 
@@ -89,7 +89,7 @@ class Accuracy:
         Raises
         ------
         ReductionError
-            If there is no such interface.
+            If there is no such interface, or a frequency is not a number.
 
         Notes
         -----
@@ -127,7 +127,7 @@ class Accuracy:
             self.reduced.static_flexibility(name)  # says if there is no such interface
         i, j = names.index(at), names.index(excited)
         bands = []
-        for hz in np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64)):
+        for hz in positive("frequency_hz", np.atleast_1d(frequency_hz)):
             if hz >= self.next_hz:
                 bands.append((-np.inf, np.inf))
                 continue

@@ -91,8 +91,8 @@ def shifted_factor(pencil: Pencil) -> Shifted:
     moved = factorise(pencil.stiffness + shift * pencil.mass)
     if moved is None:
         raise ReductionError(
-            "the stiffness or the mass matrix is indefinite, or a dof has neither: "
-            f"K + {shift:.3g} M is not positive definite"
+            "the stiffness or the mass matrix is indefinite (as beyond a buckling load), or a dof "
+            f"has neither: K + {shift:.3g} M is not positive definite"
         )
     shifted = Shifted(moved, shift, fastest, none)
     few = modes_up_to(pencil, shifted, 0.0)
@@ -142,7 +142,8 @@ def lowest_modes(pencil: Pencil, shifted: Shifted, count: int) -> Modes:
         squares = np.where(np.abs(squares) <= rounding, 0.0, squares)
     if squares[0] < 0.0:
         raise ReductionError(
-            f"the stiffness matrix is not positive: its lowest w^2 is {squares[0]:.3g} rad^2/s^2"
+            "the stiffness matrix is not positive, as of a structure beyond its buckling load: its "
+            f"lowest w^2 is {squares[0]:.3g} rad^2/s^2"
         )
     modes = refined(pencil, shifted, squares, vectors)
     check_errors(modes.errors, modes.squares, shifted)

@@ -120,8 +120,11 @@ class ReducedModel:
 
     @property
     def residual_modes(self) -> int:
-        """Number of residual modes, the last ones of the basis."""
-        return self.size - self.modes
+        """Number of residual modes, the last ones of the basis.
+
+        None by fixed-interface methods, whose constraint modes all modes of the model share.
+        """
+        return 0 if self.method in ("craig-bampton", "guyan") else self.size - self.modes
 
     @property
     def rigid_body_modes(self) -> int:

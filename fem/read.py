@@ -118,7 +118,8 @@ def _read(
     path = Path(path)
     if path.suffix.lower() not in READERS:
         raise ModelError(
-            f"{path}: unknown mesh extension {path.suffix!r}; known are {quoted(READERS)}"
+            f"{path}: unknown mesh extension {path.suffix!r}; known are {quoted(READERS)};"
+            " convert it in the mesher, so that its names stay, or by 'meshio convert'"
         )
     if not path.is_file():
         raise ModelError(f"{path}: there is no such mesh file")

@@ -14,7 +14,7 @@ from fem.errors import ModelError, quoted
 from fem.mesh import FloatArray, FrameMesh, IntArray, index_sets, numbers
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class StructureMesh:
     """A mesh of lines, surfaces and volumes.
 
@@ -46,6 +46,8 @@ class StructureMesh:
     ...     {"quad": [[0, 1, 2, 3]], "line": [[0, 3]]},
     ...     {"sheet": {"quad": [0]}, "edge": {"line": [0]}},
     ... )
+    >>> mesh
+    <StructureMesh mesh: 4 points, 1 quad, 1 line; names: 'sheet', 'edge'>
     >>> mesh.nodes("edge")
     array([0, 3])
     """
@@ -77,6 +79,11 @@ class StructureMesh:
         sets = index_sets(f"{self.source}: point", self.point_sets)
         object.__setattr__(self, "point_sets", sets)
         self._check()
+
+    def __repr__(self) -> str:
+        cells = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in self.cells.items())
+        names = ", ".join(map(repr, self.names)) or "none"
+        return f"<StructureMesh {self.source}: {len(self.points)} points, {cells}; names: {names}>"
 
     def part(self, name: str) -> Mapping[str, IntArray]:
         """Cells of a group by kind; a `ModelError` lists the groups if the name is unknown."""

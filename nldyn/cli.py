@@ -160,13 +160,14 @@ def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
     """Check a scene, and print the modes of its structure."""
     with plain_errors():
         from nldyn.progress import messages_shown
-        from nldyn.scene import build_system, load_scene
+        from nldyn.scene import build_reduced, build_system, load_scene
         from nldyn.scene_checks import check_computable
 
         loaded = load_scene(scene, mesh_folders)
         with messages_shown():
-            system = build_system(loaded)
-        click.echo(describe_system(system))
+            reduced = None if loaded.mesh is None else build_reduced(loaded)
+            system = build_system(loaded, reduced)
+        click.echo(describe_system(system, 0 if reduced is None else reduced.residual_modes))
         check_computable(loaded, scene)
         click.echo(f"{scene}: no fault found")
 
@@ -399,15 +400,19 @@ def describe(diagram: Diagram, seconds: float, out: Path) -> str:
     return "\n".join(lines)
 
 
-def describe_system(system: System) -> str:
-    """Tabulate frequencies and participation of the modes, and the static flexibility."""
+def describe_system(system: System, residual: int = 0) -> str:
+    """Tabulate frequencies and participation of the modes, and the static flexibility.
+
+    The last ``residual`` modes are marked as such.
+    """
     names = list(system.interfaces)
     width = max(14, *(len(name) + 2 for name in names))
     lines = ["mode   frequency (Hz)   participation (1/sqrt(kg)) at"]
     lines.append(" " * 23 + "".join(f"{name:>{width}}" for name in names))
     for mode, hz in enumerate(system.frequencies_hz):
         values = "".join(f"{system.participation[name][mode]:>{width}.6g}" for name in names)
-        lines.append(f"{mode + 1:>4}{hz:>19.6f}{values}")
+        mark = "  residual" if mode >= system.size - residual else ""
+        lines.append(f"{mode + 1:>4}{hz:>19.6f}{values}{mark}")
     flexibility = "".join(f"{static_flexibility(system, name):>{width}.6g}" for name in names)
     lines.append(f"{'static flexibility m/N':<23}{flexibility}")
     lines += [describe_stop(stop) for stop in system.stops]

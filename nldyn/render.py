@@ -237,7 +237,7 @@ class _Drawing:
     @property
     def mode_titles(self) -> list[str]:
         """What each mode of the reduced model is called."""
-        kept = self.reduced.modes
+        kept = self.reduced.size - self.reduced.residual_modes
         return [
             f"{'mode' if number < kept else 'residual mode'} {number + 1}: {hz:.1f} Hz"
             for number, hz in enumerate(self.reduced.frequencies_hz)

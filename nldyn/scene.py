@@ -209,7 +209,7 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
         check_structure_names(scene, structure, scene.file)
         if refinement > 1:
             if set(structure.cells) - {"line", "vertex"}:
-                fault = "has cells other than two-node lines, which the mesher refines: use --meshes"
+                fault = "has cells other than two-node lines; refine it in the mesher: --meshes"
                 raise scene_error(scene.file, ("mesh", "file"), fault)
             structure = refined_structure(structure, refinement)
         with _told_as(scene, (), fem.ModelError):

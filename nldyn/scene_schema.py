@@ -129,6 +129,13 @@ class PointMassTable(Table):
     ) = 0.0
     offset: Triple | None = None
 
+    @field_validator("rotary_inertia", mode="before")
+    @classmethod
+    def _one_or_three(cls, value: Any) -> Any:
+        if isinstance(value, list) and len(value) != 3:
+            raise ValueError(f"must be one number or three (about x, y and z), not {len(value)}")
+        return value
+
     @model_validator(mode="after")
     def _some(self) -> PointMassTable:
         if self.mass == 0.0 and self.rotary_inertia in (0.0, [0.0] * 3):

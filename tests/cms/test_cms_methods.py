@@ -202,6 +202,7 @@ def test_dependent_interfaces_have_no_constraint_mode_of_their_own():
     component = cms.Matrices(component.stiffness, component.mass, loads)
     reduced = cms.reduce(component, modes=2, method="craig-bampton")
     assert (reduced.size, reduced.dropped_residual_modes) == (4, 2)
+    assert reduced.residual_modes == 0
     assert reduced.static_flexibility("tip") == pytest.approx(20.0, rel=1e-10)
     assert reduced.static_flexibility("sum") == pytest.approx(20 + 9 + 6, rel=1e-10)
 

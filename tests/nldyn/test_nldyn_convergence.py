@@ -267,7 +267,7 @@ def test_lines_of_a_structure_are_cut_as_a_mesher_does(space_frame):
 
 
 def test_solids_are_refined_in_the_mesher():
-    with pytest.raises(SceneError, match="cells other than two-node lines, which the mesher refines"):
+    with pytest.raises(SceneError, match="has cells other than two-node lines; refine it"):
         build_component(load_scene(example("plate.toml")), 2)
 
 

@@ -239,6 +239,12 @@ def test_check_prints_the_model():
         assert text in result.stdout
 
 
+def test_check_tells_the_residual_mode_from_the_others():
+    """The two-DOF model has one of each."""
+    rows = invoke("check", example("two_dof_xi_0.01.toml")).stdout.splitlines()[2:4]
+    assert [row.endswith("  residual") for row in rows] == [False, True]
+
+
 def test_paper_is_handed_on(tmp_path, monkeypatch):
     given = []
     paper = types.ModuleType("nldyn.paper")

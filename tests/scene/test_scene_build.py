@@ -312,6 +312,8 @@ def test_a_scene_of_beams_in_space(tmp_path):
     [reduction]
     modes = 4
     """
+    with pytest.raises(SceneError, match="rotary_inertia must be one number or three"):
+        parse_scene(text.replace("0.02, 0.03]", "0.02]"), tmp_path / "mast.toml")
     scene = parse_scene(text, tmp_path / "mast.toml")
     section = fem.Section(1e-3, 1e-7, 2e-7, 1.5e-7)
     steel = fem.Material(2.1e11, 7800.0, 0.3)
