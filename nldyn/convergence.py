@@ -325,8 +325,6 @@ def converge(
     The harmonic branch is followed downwards from the orbit that a simulation from rest finds at
     the upper end of the range.
     """
-    import cms
-
     if not isinstance(components, Mapping):
         components = {"": components}
     if not components or not modes or not methods:
@@ -345,9 +343,7 @@ def converge(
     models: list[Measured] = []
     for name, component in components.items():
         for method in methods:
-            for count in sorted(set(modes)) if method != "guyan" else [0]:
-                asked = None if method == "guyan" else count
-                reduced = cms.reduce(component, modes=asked, method=method)
+            for reduced in reductions(component, sorted(set(modes)), method):
                 models.append(measured(name, reduced, setting, at_hz, progress))
     best = best_of([model for model in models if model.mesh == mesh], linear)
     if full and best.orbit is not None:
@@ -487,6 +483,21 @@ def measured_linear(
         seconds_per_orbit=np.nan,
         seconds=np.nan,
     )
+
+
+def reductions(
+    component: cms.ComponentLike, counts: Sequence[int], method: str
+) -> list[cms.ReducedModel]:
+    """Models by one method with ascending counts; those by Rubin's lie in the largest."""
+    import cms
+
+    if method == "guyan":
+        return [cms.reduce(component, method=method)]
+    if method != "rubin":
+        return [cms.reduce(component, modes=count, method=method) for count in counts]
+    largest = cms.reduce(component, modes=counts[-1])
+    fewer = [cms.keep_modes(largest, range(1, count + 1)) for count in counts[:-1]]
+    return [*fewer, largest]
 
 
 def reference_model(component: cms.ComponentLike, modes: int) -> cms.ReducedModel:
