@@ -352,6 +352,10 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
             "dampers": dampers,
             "excitation": excitation,
         }
+        rayleigh = scene.damping.rayleigh
+        if any(rayleigh) and scene.mesh is None:
+            fault = "has Rayleigh's damping, which needs a [mesh]"
+            raise scene_error(scene.file, ("damping",), fault)
         if scene.modal is not None:
             hz = scene.modal.frequencies_hz
             check_ratio_count(scene, len(hz), scene.file)
@@ -367,6 +371,8 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
                 )
         reduced = reduced or build_reduced(scene)
         check_ratio_count(scene, len(reduced.frequencies_hz), scene.file)
+        if any(rayleigh):
+            reduced = reduced.with_damping(rayleigh=rayleigh)
         return System.from_reduced(with_first(reduced, scene.observed), **acting)
 
 

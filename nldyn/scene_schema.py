@@ -222,9 +222,11 @@ class MatricesTable(Table):
 
 
 class DampingTable(Table):
-    """``[damping]``: the damping ratio of the modes, one number or one per mode."""
+    """``[damping]``: the damping ratio of the modes, one number or one per mode; Rayleigh's."""
 
     modal_ratio: float | list[float] = 0.0
+    rayleigh_mass: NotNegative = 0.0
+    rayleigh_stiffness: NotNegative = 0.0
 
     @field_validator("modal_ratio", mode="plain")
     @classmethod
@@ -237,6 +239,11 @@ class DampingTable(Table):
                     f"must be a number from 0 to below 1, or one per mode, not {show(number)}"
                 )
         return [float(n) for n in numbers] if isinstance(value, list) else float(value)
+
+    @property
+    def rayleigh(self) -> tuple[float, float]:
+        """Factors (1/s, s) of the mass and of the stiffness in the damping of a mesh."""
+        return self.rayleigh_mass, self.rayleigh_stiffness
 
 
 class DamperTable(Table):

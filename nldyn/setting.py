@@ -29,6 +29,8 @@ class Setting:
         Damping ratio of every mode, residual modes included.
     observe : str, optional
         Interface whose displacement is asked for; the first unless given.
+    rayleigh : (float, float)
+        alpha in 1/s and beta in s of the damping alpha M + beta K of the component.
 
     Raises
     ------
@@ -48,6 +50,7 @@ class Setting:
     excitation: tuple[Excitation, ...] = ()
     modal_damping: float = 0.0
     observe: str | None = None
+    rayleigh: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         low, high = self.range_hz
@@ -71,6 +74,8 @@ class Setting:
         SystemModelError
             As `System.from_reduced`.
         """
+        if any(self.rayleigh):
+            reduced = reduced.with_damping(rayleigh=self.rayleigh)
         return System.from_reduced(
             with_first(reduced, self.observe) if self.observe else reduced,
             modal_damping=self.modal_damping,
@@ -118,5 +123,11 @@ def setting_of(scene: Scene) -> Setting:
     low, high = scene.continuation.range_hz
     stops, dampers, excitation = acting_elements(scene)
     return Setting(
-        (low, high), stops, dampers, excitation, scene.damping.modal_ratio, scene.observed
+        (low, high),
+        stops,
+        dampers,
+        excitation,
+        scene.damping.modal_ratio,
+        scene.observed,
+        scene.damping.rayleigh,
     )

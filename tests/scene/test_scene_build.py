@@ -19,6 +19,7 @@ from nldyn.scene import (
     load_scene,
     parse_scene,
 )
+from nldyn.setting import setting_of
 
 MODAL = """
 [modal]
@@ -26,6 +27,19 @@ frequencies_hz = [13.1, 125.1]
 participation.a = [0.6, 0.5]
 participation.b = [0.4, -0.2]
 """
+
+
+def test_rayleighs_damping_of_a_mesh_is_that_of_its_matrices():
+    scene = load_scene(example("two_dof_xi_0.01.toml"))
+    keys = "[damping]\nrayleigh_mass = 2.0\nrayleigh_stiffness = 1e-5"
+    damped = parse_scene(scene.text.replace("[damping]", keys), scene.file)
+    squares = build_system(scene).natural_frequencies ** 2
+    added = build_system(damped).total_damping - build_system(scene).total_damping
+    np.testing.assert_allclose(added, np.diag(2.0 + 1e-5 * squares), rtol=1e-10, atol=1e-9)
+    asked = setting_of(damped).system(build_reduced(scene)).total_damping
+    np.testing.assert_allclose(asked, build_system(damped).total_damping, rtol=1e-12)
+    with pytest.raises(SceneError, match=r"Rayleigh's damping, which needs a \[mesh\]"):
+        build_system(parse_scene(MODAL + "[damping]\nrayleigh_mass = 1.0"))
 
 
 def test_one_dof_is_equation_3_1():
