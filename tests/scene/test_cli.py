@@ -4,17 +4,18 @@ import csv
 import shutil
 import subprocess
 import sys
-import types
 from dataclasses import replace
 
 import pytest
 from click.testing import CliRunner
 from fakes import diagram
 
+import nldyn.paper
 import nldyn.progress
 import nldyn.scene
 from nldyn import continuation, exploration, load_branches, load_diagram, load_exploration
 from nldyn.cli import main
+from nldyn.paper.kept import kept_folder
 from nldyn.resources import example, mesh
 
 ONE_DOF = str(example("one_dof.toml"))
@@ -247,11 +248,20 @@ def test_check_tells_the_residual_mode_from_the_others():
 
 def test_paper_is_handed_on(tmp_path, monkeypatch):
     given = []
-    paper = types.ModuleType("nldyn.paper")
-    paper.main = given.append
-    monkeypatch.setitem(sys.modules, "nldyn.paper", paper)
+    monkeypatch.setattr(nldyn.paper, "main", given.append)
     assert invoke("paper", "--out", tmp_path).exit_code == 0
     assert given == [tmp_path]
+
+
+def test_ctrl_c_in_the_paper_names_what_is_kept(tmp_path, monkeypatch):
+    def interrupted_after_a_while(out):
+        kept_folder(out)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(nldyn.paper, "main", interrupted_after_a_while)
+    result = invoke("paper", "--out", tmp_path / "paper")
+    assert result.exit_code == 130
+    assert f"{tmp_path / 'paper.unfinished'} keeps what was computed" in result.stderr
 
 
 def test_version_and_help():
