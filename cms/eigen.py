@@ -9,10 +9,9 @@ from scipy import linalg
 
 from cms.component import FloatArray, Pencil, SparseMatrix, times
 from cms.errors import ReductionError
-from cms.factor import DENSE_LIMIT, Factor, factorise
+from cms.factor import DENSE_LIMIT, SUSPECT_PIVOT, Factor, factorise
 
 EPS = float(np.finfo(np.float64).eps)
-SUSPECT_PIVOT = 1e-11
 RIGID_TOLERANCE = 64 * EPS
 ERROR_TOLERANCE = 1e-8
 LARGEST_ERROR = 1e-3
@@ -74,8 +73,8 @@ def fastest_square(pencil: Pencil) -> float:
 def shifted_factor(pencil: Pencil) -> Shifted:
     """Factorise K, or K plus a small multiple of M where the component floats.
 
-    A pivot at rounding level makes K suspect; whether it is singular is then decided by the
-    lowest frequencies of the shifted problem.
+    A pivot or an eigenvalue at rounding level makes K suspect; whether it is singular is then
+    decided by the lowest frequencies of the shifted problem.
 
     Raises
     ------
@@ -85,7 +84,7 @@ def shifted_factor(pencil: Pencil) -> Shifted:
     fastest = fastest_square(pencil)
     factor = factorise(pencil.stiffness)
     none = np.zeros((pencil.size, 0))
-    if factor is not None and factor.smallest_pivot > SUSPECT_PIVOT:
+    if factor is not None and not factor.suspect:
         return Shifted(factor, 0.0, fastest, none)
     shift = np.sqrt(EPS) * (fastest if fastest > 0.0 else 1.0)
     moved = factorise(pencil.stiffness + shift * pencil.mass)

@@ -29,6 +29,9 @@ BAD_SOLUTION = 1e-6
 SUPERLU_FILL = 2.0  # entries of L and U per entry of the Cholesky factor by fronts: 1.6 in blocks
 SUPERLU_BYTES = 40.0  # memory per such entry, with the copy from which the pivots are read
 
+SUSPECT_PIVOT = 1e-11  # of a matrix scaled to a unit diagonal: what rounding leaves of none
+SUSPECT_EIGENVALUE = 1e-13  # the same of an eigenvalue, which is smaller than every pivot
+
 Solver = Callable[[FloatArray], FloatArray]
 
 Progress = Callable[[str], None]
@@ -60,9 +63,9 @@ class Factor:
     ----------
     matrix : (N, N) sparse array
         A itself, for the residuals.
-    smallest_pivot : float
-        Smallest pivot of A scaled to a unit diagonal, or an estimate of its smallest eigenvalue:
-        near rounding if A is nearly singular.
+    suspect : bool
+        Whether A may be singular: of A scaled to a unit diagonal the smallest pivot, or an estimate
+        of the smallest eigenvalue, is near rounding.
     backsolve : callable
         One solve without refinement.
     size : float
@@ -70,7 +73,7 @@ class Factor:
     """
 
     matrix: SparseMatrix
-    smallest_pivot: float
+    suspect: bool
     backsolve: Callable[[FloatArray], FloatArray]
     size: float
 
@@ -136,17 +139,17 @@ def factorise(matrix: SparseMatrix) -> Factor | None:
     found = dense_solver(scaled) if small else chosen_solver(scaled)
     if found is None:
         return None
-    solver, smallest_pivot = found
+    solver, suspect = found
 
     def backsolve(right: FloatArray) -> FloatArray:
         column = scale if right.ndim == 1 else scale[:, None]
         return column * solver(column * right)
 
     size = float(abs(matrix).sum(axis=1).max())
-    return Factor(matrix, smallest_pivot, backsolve, size)
+    return Factor(matrix, suspect, backsolve, size)
 
 
-def chosen_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
+def chosen_solver(matrix: SparseMatrix) -> tuple[Solver, bool] | None:
     """The solver that CMS_SOLVER names, else the first of those there are that does not fail."""
     wanted = os.environ.get("CMS_SOLVER", "").lower()
     if wanted:
@@ -203,8 +206,8 @@ def available_memory() -> float:
     return 1024.0 * float(kilobytes[0]) if kilobytes else math.inf
 
 
-def dense_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
-    """Cholesky solver and smallest pivot, or None if the matrix is not positive definite."""
+def dense_solver(matrix: SparseMatrix) -> tuple[Solver, bool] | None:
+    """Cholesky solver, and whether the matrix may be singular, or None if it is not positive."""
     try:
         lower = linalg.cholesky(matrix.toarray(), lower=True)
     except linalg.LinAlgError:
@@ -213,11 +216,11 @@ def dense_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
     def solver(right: FloatArray) -> FloatArray:
         return np.asarray(linalg.cho_solve((lower, True), right), dtype=np.float64)
 
-    return solver, float(np.min(np.diag(lower))) ** 2
+    return solver, float(np.min(np.diag(lower))) ** 2 <= SUSPECT_PIVOT
 
 
-def cholesky_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
-    """Solver and smallest pivot by fronts, or None if the matrix is not positive definite."""
+def cholesky_solver(matrix: SparseMatrix) -> tuple[Solver, bool] | None:
+    """Solver by fronts, and whether the matrix may be singular, or None if it is not positive."""
     plan = announced_plan(matrix)
     with factorising(matrix, "sparse Cholesky", 8.0 * plan.most_numbers):
         try:
@@ -226,7 +229,7 @@ def cholesky_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
             return None
         except ValueError as error:
             raise SolverError(f"sparse Cholesky fails ({error})") from error
-    return factor.solve, factor.smallest_pivot
+    return factor.solve, factor.smallest_pivot <= SUSPECT_PIVOT
 
 
 def announced_plan(matrix: SparseMatrix) -> Elimination:
@@ -235,8 +238,8 @@ def announced_plan(matrix: SparseMatrix) -> Elimination:
     return dissected(matrix)
 
 
-def superlu_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
-    """SuperLU's solver and smallest pivot, or None if the matrix is not positive definite.
+def superlu_solver(matrix: SparseMatrix) -> tuple[Solver, bool] | None:
+    """SuperLU's solver, and whether the matrix may be singular, or None if it is not positive.
 
     In its symmetric mode, by the same order of elimination; without exchange of rows all pivots
     of a positive definite matrix are positive.
@@ -265,7 +268,7 @@ def superlu_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
         found[order] = factor.solve(np.ascontiguousarray(right[order], dtype=np.float64))
         return found
 
-    return solver, smallest
+    return solver, smallest <= SUSPECT_PIVOT
 
 
 @cache
@@ -291,8 +294,8 @@ POSITIVE_DEFINITE = 2
 NOT_POSITIVE = -4
 
 
-def pardiso_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
-    """PARDISO solver and an estimate of the smallest eigenvalue, None if that is not positive.
+def pardiso_solver(matrix: SparseMatrix) -> tuple[Solver, bool] | None:
+    """PARDISO's solver, and whether the matrix may be singular, or None if it is not positive.
 
     The matrix type is that of positive definite matrices, for which the default settings of
     pypardiso, made for unsymmetric ones, do not hold.
@@ -324,7 +327,7 @@ def pardiso_solver(matrix: SparseMatrix) -> tuple[Solver, float] | None:
         return np.asarray(found, dtype=np.float64)
 
     weakref.finalize(solver, released, pardiso, upper)
-    return solver, smallest_eigenvalue(solver, matrix)
+    return solver, smallest_eigenvalue(solver, matrix) <= SUSPECT_EIGENVALUE
 
 
 SOLVERS = {
