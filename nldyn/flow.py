@@ -144,21 +144,28 @@ def _floats(name: str, values: Real) -> Real:
     return values if known else numbers(name, values)
 
 
-def _nodes_for_switch(power: float, nodes: int, tail: float) -> int:
+def _nodes_for_switch(exponent: float, power: int, viscous: bool, nodes: int, tail: float) -> int:
     """Nodes, not fewer than asked for, with which the force after a switch can be resolved.
 
-    On a panel that is short enough the force goes as s^power and its slope, times dχ/ds, as
-    s^(power - 1); with too few nodes their Legendre tails stay above what is accepted, however
-    short it is. The coefficients of s^p are (2k+1) Γ(p+1)² / (Γ(p-k+1) Γ(p+k+2)).
+    On a panel that is short enough the penetration goes as s^power, the force as s^p with
+    p = exponent power, its slope, times dχ/ds, as s^(p - 1) and, if it depends on the rate, its
+    slope with that as s^(p + power - 1); with too few nodes their Legendre tails stay above what
+    is accepted of the value at the last node, however short it is. The coefficients of s^p are
+    (2k+1) Γ(p+1)² / (Γ(p-k+1) Γ(p+k+2)).
     """
+    force = exponent * power
 
-    def coefficient(p: float, k: int) -> float:
+    def unresolved(p: float, nodes: int, tail: float) -> bool:
+        last = 0.5 + 0.5 * float(np.polynomial.legendre.leggauss(nodes)[0][-1])
+        k = np.array([nodes - 2, nodes - 1])
         shares = rgamma(p - k + 1.0) * rgamma(p + k + 2.0)
-        return abs(float((2 * k + 1) * gamma(p + 1.0) ** 2 * shares))
+        coefficients = np.abs((2 * k + 1) * gamma(p + 1.0) ** 2 * shares)
+        return bool((coefficients > tail * last**p).any())
 
-    while any(
-        coefficient(power, k) > tail or coefficient(power - 1.0, k) > 4.0 * tail
-        for k in (nodes - 2, nodes - 1)
+    while (
+        unresolved(force, nodes, tail)
+        or unresolved(force - 1.0, nodes, 4.0 * tail)
+        or (viscous and unresolved(force + power - 1.0, nodes, 4.0 * tail))
     ):
         nodes += 1
     return nodes
@@ -305,8 +312,9 @@ class FlowMap:
         smooth = all(float(2.0 * exponent).is_integer() for exponent in exponents)
         power = 2 if smooth else 4
         nodes, tail = self.options.panel_nodes, self.options.panel_tail
-        for exponent in exponents:
-            nodes = _nodes_for_switch(power * exponent, nodes, tail)
+        for stop in self.system.stops:
+            viscous = stop.dissipation != 0.0
+            nodes = _nodes_for_switch(stop.exponent, power, viscous, nodes, tail)
         return gauss_tables(nodes, power)
 
     @cached_property

@@ -229,13 +229,16 @@ def test_three_accuracies_agree_on_random_systems(stops):
             assert np.abs(other - jacobian).max() < 1e-4 * growth
 
 
-@pytest.mark.parametrize("exponents", [(1.37, 3.0, 1.0), (1.2, 1.5, 2.0), (1.0, 2.5, 1.5)])
-def test_stops_of_mixed_laws_on_one_mass_are_resolved_at_every_tolerance(exponents):
+@pytest.mark.parametrize(
+    ("exponents", "seed"),
+    [((1.37, 3.0, 1.0), 3), ((1.2, 1.5, 2.0), 3), ((1.2, 1.5, 2.0), 5), ((1.0, 2.5, 1.5), 3)],
+)
+def test_stops_of_mixed_laws_on_one_mass_are_resolved_at_every_tolerance(exponents, seed):
     """Preloaded and open stops that are hit up to hundreds of times, some at almost one instant.
 
     The results are compared over a twentieth of the period, before impacts magnify differences.
     """
-    rng = np.random.default_rng(3)
+    rng = np.random.default_rng(seed)
     for _ in range(25):
         stops = [
             Stop(
