@@ -10,7 +10,7 @@ import sys
 import time
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -329,9 +329,9 @@ def paper(out: Path) -> None:
     """Reproduce the figures and numbers of the paper."""
     with plain_errors():
         from nldyn.paper import main as reproduce
-        from nldyn.paper.kept import unfinished_folder
+        from nldyn.paper.kept import has_values, unfinished_folder
 
-        with told_what_is_kept(unfinished_folder(out)):
+        with told_what_is_kept(unfinished_folder(out), has_values):
             reproduce(out)
 
 
@@ -362,19 +362,21 @@ def kept_at_interrupt(out: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def told_what_is_kept(unfinished: Path) -> Iterator[None]:
+def told_what_is_kept(
+    unfinished: Path, holds_work: Callable[[Path], bool] = Path.exists
+) -> Iterator[None]:
     """Name the place of unfinished work where an error of the output or Ctrl-C ends it."""
     from nldyn.result_directory import OutputError
 
     try:
         yield
     except OutputError as error:
-        if not unfinished.exists():
+        if not holds_work(unfinished):
             raise
         fault = f"{error}; {unfinished} keeps what was computed, and the same command goes on"
         raise OutputError(f"{fault} from there") from error
     except (KeyboardInterrupt, Exception) as error:
-        if not (interrupted(error) and unfinished.exists()):
+        if not (interrupted(error) and holds_work(unfinished)):
             raise
         click.echo(
             f"nldyn: stopped by Ctrl-C; {unfinished} keeps what was computed, and the same "

@@ -603,6 +603,8 @@ def receptance(reduced: cms.ReducedModel, setting: Setting, frequency_hz: Real) 
 
 def massless_receptance(reduced: cms.ReducedModel, setting: Setting, frequency_hz: Real) -> Complex:
     """The same where part of the flexibility has no mass: dampers close R = P Z^-1 P^T + G."""
+    if any(setting.rayleigh):  # not known where flexibility has no mass
+        return np.full(len(frequency_hz), np.nan, dtype=complex)
     names = reduced.interfaces
     observed = names.index(setting.observe or names[0])
     R = np.array(

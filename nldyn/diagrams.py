@@ -202,10 +202,13 @@ class Collector:
     def _repeats(self, branch: Branch) -> bool:
         """Whether a branch is a known one after all: beside folds and flips that may not be seen.
 
-        One of the two holds the middle of the other, which may be broken off.
+        One of the two holds the middle of the other. One that holds a known branch which was broken
+        off is more than that.
         """
         return self.known(middle_orbit(branch)) or any(
-            branch.contains(middle_orbit(other)) for other in self.of_period(branch.period)
+            branch.contains(middle_orbit(other))
+            for other in self.of_period(branch.period)
+            if not open_ends(other)
         )
 
     def from_flip(self, special: SpecialPoint, options: ContinuationOptions | None = None) -> None:

@@ -44,7 +44,7 @@ PIECE = 16  # periods simulated between two looks at the known orbits; later a q
 LONGEST = 0.5  # step of a deflated iteration, relative to the orbit
 ITERATIONS = 20  # of a deflated iteration
 MOST_MULTIPLE = 10**4  # longest period multiple looked for
-AGAIN = 4  # times that a frequency is searched again while its indices say that orbits are missing
+AGAIN = 12  # times that a frequency is searched again while its indices say that orbits are missing
 
 
 @dataclass(frozen=True)
@@ -545,7 +545,7 @@ class _Survey:
             if not known.incomplete(min(self.effort.unstable_period, self.max_period)):
                 break
             starts = random_states(
-                flow, omega, self.effort.starts, (self.effort.seed, turn, place, again)
+                flow, omega, self.effort.starts, (self.effort.seed, turn, place, again + 1)
             )
             here = here.with_more(self._search(starts, known, also_unstable=True)[0])
         both = {c.frequency_hz: c for c in stage.coverage}

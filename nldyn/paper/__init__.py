@@ -54,7 +54,7 @@ def main(out: str | Path, workers: int = 2) -> None:
         write_figures(results, folder, chaos)
         write_chaos_figure(chaos, folder)
         write_page(rows, results, time.perf_counter() - start, folder)
-    shutil.rmtree(folder_kept.parent)
+    shutil.rmtree(folder_kept.parent, ignore_errors=True)
     seconds = time.perf_counter() - start
     counts = verdict_counts(rows)
     print(f"{len(rows)} claims: {counts}; {seconds:.0f} s; written to {out}", file=sys.stderr)

@@ -6,7 +6,10 @@ import hashlib
 import os
 import pickle
 import shutil
+import sys
 from collections.abc import Callable
+from contextlib import suppress
+from importlib.metadata import version
 from pathlib import Path
 from typing import TypeVar
 
@@ -35,22 +38,33 @@ def kept_folder(directory: str | Path) -> Path:
 
 
 def kept(path: Path, function: Callable[..., Value], *arguments: object) -> Value:
-    """Value of a function, from a file if it was computed before."""
-    if path.exists():
-        with path.open("rb") as file:
-            value: Value = pickle.load(file)
-        return value
+    """Value of a function, from a file if it was computed before.
+
+    A file that cannot be read counts as none, and a value that cannot be written is given all the
+    same.
+    """
+    with suppress(OSError, EOFError, pickle.UnpicklingError), path.open("rb") as file:
+        known: Value = pickle.load(file)
+        return known
     value = function(*arguments)
     draft = path.with_suffix(f".{os.getpid()}.new")
-    with draft.open("wb") as file:
-        pickle.dump(value, file, pickle.HIGHEST_PROTOCOL)
-    draft.replace(path)
+    with suppress(OSError):
+        with draft.open("wb") as file:
+            pickle.dump(value, file, pickle.HIGHEST_PROTOCOL)
+        draft.replace(path)
     return value
 
 
+def has_values(folder: Path) -> bool:
+    """Whether anything is kept in a folder of `unfinished_folder`."""
+    return any(folder.glob("*/*.pickle"))
+
+
 def _stamp() -> str:
-    """Digest of the code and the data that results depend on."""
-    digest = hashlib.sha256()
+    """Digest of the code, the data and the packages that results depend on."""
+    digest = hashlib.sha256(sys.version.encode())
+    for package in ("numpy", "scipy", "numba", "scikit-fem"):
+        digest.update(version(package).encode())
     for place in (PACKAGE, *(PACKAGE.parent / name for name in BESIDE)):
         for path in sorted(place.rglob("*")):
             if path.suffix in (".py", ".csv", ".toml", ".msh", ".vtu", ".inp"):

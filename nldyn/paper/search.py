@@ -6,9 +6,10 @@ The directory keeps what is found, and the same command goes on where it was int
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
+from nldyn.command import answering
 from nldyn.exploration import Exploration, ExploreOptions, explore
 from nldyn.paper.jobs import JOBS, LONG
 from nldyn.paper.starts import LONGEST, starts_path, write_starts
@@ -30,15 +31,19 @@ def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Explorat
     return found
 
 
-def main(arguments: list[str]) -> None:
+def main() -> None:
     """Search the models named, or all."""
-    if not arguments or not set(arguments[1:]) <= set(MODELS):
-        sys.exit(f"usage: python -m nldyn.paper.search DIRECTORY [{' | '.join(MODELS)} ...]")
-    folder = Path(arguments[0])
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in arguments[1:] or MODELS:
-        print(f"{name}: {search(name, folder).report()}", flush=True)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("directory", type=Path)
+    parser.add_argument("models", nargs="*", metavar="MODEL", help=f"of {', '.join(MODELS)}")
+    given = parser.parse_args()
+    unknown = set(given.models) - set(MODELS)
+    if unknown:
+        parser.error(f"unknown model {sorted(unknown)[0]!r} (there are: {', '.join(MODELS)})")
+    given.directory.mkdir(parents=True, exist_ok=True)
+    for name in given.models or MODELS:
+        print(f"{name}: {search(name, given.directory).report()}", flush=True)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    answering(main)

@@ -156,6 +156,13 @@ def test_natural_form_must_be_that_of_the_stiffness(form, sentence):
         cms.reduce(component, modes=1)
 
 
+def test_natural_form_is_checked_at_soft_degrees_of_freedom_too():
+    component = cms.Matrices(np.diag([1.0, 1e14]), np.eye(2), {"x": [1.0, 0.0]})
+    object.__setattr__(component, "natural_form", Form(np.eye(2), [2.0, 1e14]))
+    with pytest.raises(cms.ReductionError, match="not that of the stiffness matrix"):
+        cms.reduce(component, modes=1)
+
+
 @pytest.mark.parametrize("kind", [list, np.asarray, sparse.csr_array])
 def test_natural_form_may_be_typed_in(kind):
     component = cms.Matrices([[5.0, -4.0], [-4.0, 4.0]], np.eye(2), {"x": [1.0, 0.0]})

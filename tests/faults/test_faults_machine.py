@@ -217,7 +217,7 @@ def test_ctrl_c_from_the_terminal(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "arguments", [["nldyn.hard", "--only", "grazing"], ["nldyn.bench"]], ids=["hard", "bench"]
+    "arguments", [["nldyn.hard", "--only", "continuation"], ["nldyn.bench"]], ids=["hard", "bench"]
 )
 def test_ctrl_c_while_a_suite_is_computed(tmp_path, arguments):
     start = [sys.executable, "-m", *arguments, "--out", str(tmp_path / "out")]

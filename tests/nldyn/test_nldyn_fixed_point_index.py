@@ -1,13 +1,24 @@
 """Indices of fixed points add up to one where no orbit is missing."""
 
+from itertools import count
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from one_dof import RANGE_HZ
 
-from nldyn import Stop, System, SystemModelError, Unbalance, diagram, index_sum, solve_orbit
-from nldyn.continuation import continue_branch
+from nldyn import (
+    ContinuationOptions,
+    Stop,
+    System,
+    SystemModelError,
+    Unbalance,
+    continue_branch,
+    diagram,
+    index_sum,
+    solve_orbit,
+)
 from nldyn.fixed_point_index import index
 
 
@@ -38,11 +49,16 @@ def test_a_missing_doubled_branch_shows_between_its_flips(doubled):
     assert index_sum(harmonic, 50.0, 2) == -1
 
 
-def test_a_branch_that_is_broken_off_shows(harmonic_branch):
-    """Above the fold at 12.2 Hz; one of the three orbits is left out."""
-    orbits = harmonic_branch.at(12.15)
-    assert len(orbits) == 3
-    assert [index(orbit) for orbit in orbits] == [1, -1, 1]
+def test_a_branch_that_is_broken_off_shows(harmonic_branch, one_dof):
+    """At 12.15 Hz it passes three times; with few points it ends after the second one."""
+    assert [index(orbit) for orbit in harmonic_branch.at(12.15)] == [1, -1, 1]
+    start = solve_orbit(one_dof, 13.0)
+    shorter = (
+        continue_branch(start, (11.0, 14.0), options=ContinuationOptions(max_points=points))
+        for points in count(2)
+    )
+    broken = next(branch for branch in shorter if len(branch.at(12.15)) == 2)
+    assert index_sum([broken], 12.15) == 0
 
 
 def test_the_index_is_the_sign_of_the_determinant(doubled):

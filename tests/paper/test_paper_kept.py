@@ -17,6 +17,14 @@ def test_a_value_is_computed_once(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["nine.pickle"]
 
 
+def test_a_damaged_file_and_a_folder_that_is_gone_do_no_harm(tmp_path):
+    path = tmp_path / "value.pickle"
+    path.write_bytes(b"\x80\x05cut")
+    assert kept(path, abs, -3) == 3
+    assert kept(path, abs, -4) == 3  # written anew
+    assert kept(tmp_path / "gone" / "value.pickle", abs, -5) == 5
+
+
 def test_processes_take_what_an_earlier_run_has_kept(tmp_path):
     for argument in (-2, -5):  # the second run asks for the same, and its function is not called
         with worker_processes(1, tmp_path) as workers:

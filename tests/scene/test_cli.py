@@ -15,7 +15,7 @@ import nldyn.progress
 import nldyn.scene
 from nldyn import continuation, exploration, load_branches, load_diagram, load_exploration
 from nldyn.cli import main
-from nldyn.paper.kept import kept_folder
+from nldyn.paper.kept import kept, kept_folder
 from nldyn.resources import example, mesh
 
 ONE_DOF = str(example("one_dof.toml"))
@@ -255,7 +255,7 @@ def test_paper_is_handed_on(tmp_path, monkeypatch):
 
 def test_ctrl_c_in_the_paper_names_what_is_kept(tmp_path, monkeypatch):
     def interrupted_after_a_while(out):
-        kept_folder(out)
+        kept(kept_folder(out) / "one.pickle", int)
         raise KeyboardInterrupt
 
     monkeypatch.setattr(nldyn.paper, "main", interrupted_after_a_while)
