@@ -46,8 +46,8 @@ def main(out: str | Path, workers: int = 2) -> None:
         with ctrl_c_for_parent_only():  # as they start with what is submitted
             diagrams = submit_diagrams(processes)
             sweeps = submit_sweeps(processes)
-        results = processes.values(diagrams, "diagrams")
         chaos = chaos_of(processes.values(sweeps, "sweeps"), processes)
+        results = processes.values(diagrams, "diagrams")
     with result_directory(out, "paper") as folder:
         rows = evaluate(results, chaos)
         write_claims(rows, folder / "claims.csv")

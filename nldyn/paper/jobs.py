@@ -133,10 +133,10 @@ LONG = ContinuationOptions(max_points=20000)
 DOUBLED, DOUBLED_ONCE = (8, 25), (2, 25)
 
 JOBS = (
+    Job("four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (18.0, 90.0), doubled=DOUBLED_ONCE),
     Job("two_dof_xi_0.01", _scene("two_dof_xi_0.01"), (15.0, 90.0), doubled=DOUBLED),
     Job("two_dof_xi_0.001", _scene("two_dof_xi_0.001"), (18.0, 90.0), doubled=DOUBLED),
     Job("four_dof_xi_0.01", _scene("four_dof_xi_0.01"), (15.0, 90.0), doubled=DOUBLED),
-    Job("four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (18.0, 90.0), doubled=DOUBLED_ONCE),
     Job("one_dof.listed", _scene("one_dof"), (5.0, 90.0), (), LISTED),
     Job("one_dof", _scene("one_dof"), (5.0, 90.0), (1, 2), (Seed(3, 76.0),)),
     Job("five_dof_xi_0.01", five_dof_system, (15.0, 90.0), search_points=6),
