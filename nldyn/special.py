@@ -36,7 +36,7 @@ FAR = 0.1  # way of a multiplier near the unit circle within which it does not c
 FAR_ALONE = 0.3  # the same of the only pair of a single mode
 DIVES = 8  # points at which to look for a change of sign between two others
 STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
-STEEPEST = 0.5  # least cosine between a branch and the chord of a step; a step that bends so is refused
+STEEPEST = 0.5  # least cosine between a branch and the chord of a step, below which it is refused
 BEND = 1e-4  # arclength of a chord, above which a branch does not depart from it by more
 
 
