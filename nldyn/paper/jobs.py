@@ -166,7 +166,7 @@ def run_job(name: str) -> Diagram:
     for branch in result.branches:
         for orbit in branch.points:
             _ = orbit.max_abs_displacement, orbit.max_penetration, orbit.stable
-            _ = orbit.impacts, orbit.observed_extremes
+            _ = orbit.impacts, orbit.observed_extremes, orbit.liouville_error
             _forget_motion(orbit)
     return result
 
