@@ -77,10 +77,10 @@ class Factor:
     backsolve: Callable[[FloatArray], FloatArray]
     size: float
 
-    def solve(self, right: FloatArray, refinements: int = 0) -> FloatArray:
-        """A^-1 times ``right`` (N,) or (N, m), with steps of iterative refinement.
+    def solve(self, right: FloatArray) -> FloatArray:
+        """A^-1 times ``right`` (N,) or (N, m).
 
-        Every solution is checked by its residual. One that fails gets one step more.
+        Every solution is checked by its residual. One that fails gets a step of refinement.
 
         Raises
         ------
@@ -88,12 +88,12 @@ class Factor:
             If ``max|b - A x|`` stays above 1e-6 of ``max|b|`` plus the row sum times ``max|x|``.
         """
         solution = self.backsolve(right)
-        for step in range(refinements + 2):
+        for again in (True, False):
             residual = right - self.matrix @ solution
             error = backward_error(residual, right, solution, self.size)
-            if step >= refinements and error <= GOOD_SOLUTION:
+            if error <= GOOD_SOLUTION:
                 return solution
-            if step <= refinements:
+            if again:
                 solution = solution + self.backsolve(residual)
         if error <= BAD_SOLUTION:
             return solution

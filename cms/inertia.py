@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from cms.component import FloatArray, Pencil, times
-from cms.eigen import EPS, Shifted
+from cms.eigen import EPS, MOST_REFINEMENTS, Shifted
 from cms.errors import ReductionError
 
 MOST_STEPS = 200
-MOST_REFINEMENTS = 8
 STEP_TOLERANCE = 4 * EPS
 RESIDUAL_TOLERANCE = 1e-6
 BALANCE_TOLERANCE = 1e-12

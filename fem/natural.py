@@ -16,6 +16,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -194,7 +195,7 @@ class SolidRows:
     size: int
     lame: tuple[float, float]
 
-    @property
+    @cached_property
     def stiffness(self) -> FloatArray:
         """Of the rows."""
         d, (first, second) = self.dofs.shape[2], self.lame
@@ -225,7 +226,12 @@ class SolidRows:
         forces = np.empty((e, b, d * k))
         forces[:, 1:] = np.matmul(self.gradients.transpose(0, 2, 1), stress.reshape(e, -1, d * k))
         forces[:, 0] = -forces[:, 1:].sum(axis=1)
-        return np.asarray(chosen_rows(self.dofs, self.size).T @ forces.reshape(-1, k))
+        return np.asarray(self._scatter @ forces.reshape(-1, k))
+
+    @cached_property
+    def _scatter(self) -> SparseArray:
+        """From the degrees of freedom of the cells to all."""
+        return sparse.csr_array(chosen_rows(self.dofs, self.size).T)
 
 
 def solid_rows(

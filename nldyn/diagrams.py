@@ -181,23 +181,25 @@ class Collector:
                 if not self._repeats(branch):
                     self.add(branch)
 
-    def follow(
-        self, orbit: Orbit, longest: int, options: Callable[[int], ContinuationOptions]
-    ) -> None:
+    def follow(self, orbit: Orbit, longest: int, wanted: int, most: int | None) -> None:
         """Follow an orbit's branch unless it is known, and those that it leads to.
 
-        Doubled branches are followed up to the longest period, with the step control of theirs.
+        Doubled branches are followed up to the longest period. Those that are longer in period than
+        wanted end after `most` points in one direction, if that is given.
         """
+        shorter = self.options if most is None else replace(self.options, max_points=most)
         count = len(self.branches)
         self.from_orbits([orbit])
         while count < len(self.branches):
             branch = self.branches[count]
             count += 1
             for special in branch.special_points:
-                if special.kind == "PD" and 2 * branch.period <= longest:
-                    self.from_flip(special, options(2 * branch.period))
+                period = branch.period * (2 if special.kind == "PD" else 1)
+                options = self.options if period <= wanted else shorter
+                if special.kind == "PD" and period <= longest:
+                    self.from_flip(special, options)
                 elif special.kind == "BP":
-                    self.from_branch_point(special, options(branch.period))
+                    self.from_branch_point(special, options)
 
     def _repeats(self, branch: Branch) -> bool:
         """Whether a branch is a known one after all: beside folds and flips that may not be seen.

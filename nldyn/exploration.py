@@ -679,14 +679,7 @@ class _Survey:
     def _follow(self, orbit: Orbit) -> None:
         """Follow an orbit's branch unless it is known, and those that it leads to."""
         longest = max(self.max_period, self.effort.doubled_period)
-        self.box.follow(orbit, longest, self._options)
-
-    def _options(self, period: int) -> ContinuationOptions:
-        """Step control of the branches of a period."""
-        options, most = self.question.options, self.effort.doubled_points
-        if period <= self.max_period or most is None:
-            return options
-        return replace(options, max_points=most)
+        self.box.follow(orbit, longest, self.max_period, self.effort.doubled_points)
 
 
 class _Known:

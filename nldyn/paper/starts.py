@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -105,7 +105,6 @@ def follow_starts(
     observe = check_observe(system, None)
     box = Collector(flow, range_hz, observe, options, progress or (lambda what, hz: None))
     longest, most = doubled
-    shorter = replace(options, max_points=most)
     lost = 0
     for start in starts:
         omega = 2.0 * math.pi * start.frequency_hz
@@ -113,7 +112,7 @@ def follow_starts(
         if orbit is None or orbit.period != start.period:
             lost += 1
             continue
-        box.follow(orbit, longest, lambda period: options if period <= LONGEST else shorter)
+        box.follow(orbit, longest, LONGEST, most)
     notes = [f"from {len(starts)} starts, {lost} of which lead to no orbit"]
     notes.append(index_note(box.branches, range_hz))
     return Diagram(tuple(box.branches), range_hz, observe, (*notes, *box.notes))
@@ -133,4 +132,3 @@ def index_note(branches: Sequence[Branch], range_hz: tuple[float, float]) -> str
     if not wrong:
         return f"indices of the fixed points of {where} add up to one"
     return f"indices of the fixed points of {where} add up to one but for {', '.join(wrong)}"
-
