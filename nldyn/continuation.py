@@ -42,10 +42,12 @@ from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, refine
 from nldyn.shooting import ShootingProblem
 from nldyn.special import (
+    NEIGHBOUR,
     Chord,
     LocateError,
     insert_dip,
     special_points_between,
+    tests,
     without_repeats,
 )
 from nldyn.system import numbers
@@ -53,6 +55,8 @@ from nldyn.system import numbers
 BORN = "born at the flip at"
 KINK = 1e-6  # step below which a branch may bend by any angle where the number of contacts changes
 MEETS_OPEN_END = "meets another branch where that was broken off"
+SHORTEST_CROSSING = 1e-4  # step over which a branch may cross another one
+ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
 SHORTEST_DETOUR = 1e-6  # first step of a walk that looks closely at what lies within a step
 MOST_DETOUR = 500  # points of such a walk
 MOST_POINTS = 10**8  # in one direction
@@ -199,7 +203,7 @@ class Walk:
                 self.stop_reason = f"joins {half} at the flip at {end.orbit.frequency_hz:.6g} Hz"
                 yield end
                 return
-            if self._closed(here, point):
+            if self.closes(here, point):
                 self.stop_reason = CLOSED
                 yield point
                 return
@@ -277,7 +281,10 @@ class Walk:
         # behind a grazing point the branch may turn on a very short length
         if step > self.options.grazing_step and orbit.impacts != here.orbit.impacts:
             return None
-        return BranchPoint(orbit, tangent, here.arclength + step), angle, miss
+        point = BranchPoint(orbit, tangent, here.arclength + step)
+        if step > SHORTEST_CROSSING and _crosses(here, point):
+            return None
+        return point, angle, miss
 
     def _range_end(self, a: BranchPoint, b: BranchPoint, end_hz: float) -> BranchPoint | None:
         """Point of the branch exactly at an end of the range."""
@@ -299,7 +306,7 @@ class Walk:
         length = a.arclength + share * (b.arclength - a.arclength)
         return BranchPoint(orbit, tangent, length)
 
-    def _closed(self, a: BranchPoint, b: BranchPoint) -> bool:
+    def closes(self, a: BranchPoint, b: BranchPoint) -> bool:
         """Whether the walk from a to b passes the start again, in the same direction.
 
         The orbit may have come back shifted by some of its excitation periods.
@@ -433,15 +440,35 @@ def _half_difference(problem: ShootingProblem, point: Real) -> Real:
 
 
 def _jumped_to_shift(problem: ShootingProblem, here: Real, guess: Real, there: Real) -> bool:
-    """Whether a step has landed on the same orbit shifted by half its period.
+    """Whether a step has landed on the same orbit shifted by some of its excitation periods.
 
-    Through a flip the halves change places steadily, as the tangent foretells; not in a jump.
+    Then some other shift of where it has landed lies nearer to where it began. Only through a flip
+    the halves change places steadily, as the tangent foretells; not in a jump.
     """
+    begin, end = problem.nodes(here), problem.nodes(there)
+    apart = float(np.linalg.norm(end - begin))
+    for move in range(1, problem.period):
+        shifted = np.roll(end, move * (problem.segments // problem.period), axis=0)
+        if 2 * move != problem.period and float(np.linalg.norm(shifted - begin)) < apart:
+            return True
     if problem.period % 2:
         return False
     a, g, b = (_half_difference(problem, point) for point in (here, guess, there))
     size = max(float(np.linalg.norm(a)), float(np.linalg.norm(b)))
     return float(a @ b) < 0.0 and float(np.linalg.norm(b - g)) > 0.5 * size
+
+
+def _crosses(a: BranchPoint, b: BranchPoint) -> bool:
+    """Whether a branch crosses another one between two points, or jumps to it.
+
+    The determinant of the shooting equations bordered by the tangent keeps its sign along a branch
+    up to where it crosses another one. It has the sign of det(Φ - 1) over the tangent's frequency
+    part, for both vanish at a fold.
+    """
+    first, last = tests(a), tests(b)
+    if min(abs(first["BP"]), abs(last["BP"])) < ROUNDED:
+        return False
+    return first["BP"] * first["LP"] * last["BP"] * last["LP"] < 0.0
 
 
 def start_point(orbit: Orbit, direction: float) -> BranchPoint:
@@ -568,8 +595,10 @@ class Trail:
         self._search(len(self.nodes) - 1, closely=False)
         special = self.special_points
         if self.walk.stop_reason.startswith("joins"):  # the flip itself: a branch point of this one
-            last = self.nodes[-2].arclength
+            last = min(self.nodes[-2].arclength, self.nodes[-1].arclength - NEIGHBOUR)
             special = [s for s in special if s.kind != "BP" or s.point.arclength < last]
+        elif self.walk.stop_reason == CLOSED:  # the last step leads beyond the start
+            special = [s for s in special if not self._is_repeated(s.point)]
         end = self._end(next(i for i, p in enumerate(self.nodes) if p is self._stride.here))
         return Leg(self.nodes, special, self.notes, self.walk.stop_reason, end)
 
@@ -585,6 +614,11 @@ class Trail:
             NOT_FINISHED,
             self._end(kept),
         )
+
+    def _is_repeated(self, point: BranchPoint) -> bool:
+        """Whether a point of a closed branch lies where the walk has begun again."""
+        here = self._stride.here
+        return point.arclength > here.arclength and self.walk.closes(here, point)
 
     @property
     def _stride(self) -> Stride:

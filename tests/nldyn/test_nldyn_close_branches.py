@@ -1,0 +1,67 @@
+"""Where a branch comes near another one, or near the shifts of its own orbits, it is not left."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_nldyn_uncoupled import oscillator
+
+from nldyn import ContinuationOptions, System, continue_branch, solve_orbit
+from nldyn.resources import example
+from nldyn.scene import build_system, load_scene
+
+SHORT = ContinuationOptions(first_step=0.005, max_step=0.005)
+LONG = ContinuationOptions(first_step=0.05)
+
+
+@pytest.fixture(scope="module")
+def beam() -> System:
+    """The two-mode model at low damping."""
+    return build_system(load_scene(example("two_dof_xi_0.001.toml")))
+
+
+def test_steps_do_not_jump_between_the_shifts_of_an_orbit(beam):
+    """At 36.05 Hz a 1/3 branch turns by 120° beside an orbit of period 1.
+
+    Its shifts by one and by two periods turn there as well, so that another of the three branches
+    lies straight ahead of each.
+    """
+    guess = np.array([-9.25373e-06, 8.53828e-07, 2.147340e-05, 3.81546e-05])
+    short = continue_branch(solve_orbit(beam, 36.2, 3, guess=guess), (35.9, 36.3), options=SHORT)
+    for start_hz in (36.2, 36.14, 36.08):
+        long = continue_branch(short.at(start_hz)[0], (35.9, 36.3), options=LONG)
+        assert not long.notes
+        for end in (0, -1):
+            found, expected = (branch.nodes[end].orbit.point for branch in (long, short))
+            assert np.abs(found - expected).max() < 1e-6 * np.abs(expected[:-1]).max()
+
+
+def test_branch_is_not_left_for_another_that_it_nearly_crosses(beam):
+    """Two 1/3 branches come near one another at 37.16 Hz, where one of them has a fold."""
+    guess = np.array([-9.25469e-06, 7.28332e-07, 5.27980e-05, 4.86787e-04])
+    short = continue_branch(solve_orbit(beam, 37.0, 3, guess=guess), (36.9, 37.3), options=SHORT)
+    for start_hz in (37.0, 37.05, 37.08):
+        long = continue_branch(short.at(start_hz)[0], (36.9, 37.3))
+        assert not long.notes
+        assert special_points(long) == [
+            (kind, pytest.approx(hz, rel=1e-9)) for kind, hz in special_points(short)
+        ]
+
+
+def test_special_points_where_a_closed_branch_closes_are_told_once():
+    """Its last step leads beyond the start, over a flip that lies there."""
+    symmetric = oscillator()
+    first, second = symmetric.stops
+    system = replace(symmetric, stops=(first, replace(second, gap=1.001 * second.gap)))
+    branch = continue_branch(solve_orbit(system, 0.55), (0.5, 1.0))
+    elsewhere = continue_branch(branch.at(0.54)[0], (0.5, 1.0))
+    assert branch.stop_reasons == elsewhere.stop_reasons == ("closed branch", "closed branch")
+    assert sorted(special_points(branch)) == [
+        (kind, pytest.approx(hz, rel=1e-8)) for kind, hz in sorted(special_points(elsewhere))
+    ]
+
+
+def special_points(branch):
+    return [(s.kind, s.frequency_hz) for s in branch.special_points]
