@@ -55,6 +55,8 @@ from nldyn.system import numbers
 BORN = "born at the flip at"
 KINK = 1e-6  # step below which a branch may bend by any angle where the number of contacts changes
 MEETS_OPEN_END = "meets another branch where that was broken off"
+EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
+MEETING_STEP = 0.004  # longest step over which a doubled branch may meet the one it comes from
 SHORTEST_CROSSING = 1e-4  # step over which a branch may cross another one
 ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
 SHORTEST_DETOUR = 1e-6  # first step of a walk that looks closely at what lies within a step
@@ -270,7 +272,7 @@ class Walk:
         off = _length(weights, found.point - straight)
         if off > 0.75 * self.options.max_angle * step:
             return None
-        if _jumped_to_shift(problem, here.orbit.point, straight, found.point):
+        if _jumped(problem, here.orbit.point, straight, found.point):
             return None
         tangent = problem.tangent(found, direction)
         cosine = float(direction @ (weights * tangent)) / _length(weights, tangent)
@@ -280,6 +282,8 @@ class Walk:
         orbit = Orbit.of(problem, found, here.orbit.observe)
         # behind a grazing point the branch may turn on a very short length
         if step > self.options.grazing_step and orbit.impacts != here.orbit.impacts:
+            return None
+        if step > MEETING_STEP and passed_flip(here.orbit, orbit):
             return None
         point = BranchPoint(orbit, tangent, here.arclength + step)
         if step > SHORTEST_CROSSING and _crosses(here, point):
@@ -439,11 +443,12 @@ def _half_difference(problem: ShootingProblem, point: Real) -> Real:
     return (nodes[:half] - nodes[half:]).ravel()
 
 
-def _jumped_to_shift(problem: ShootingProblem, here: Real, guess: Real, there: Real) -> bool:
-    """Whether a step has landed on the same orbit shifted by some of its excitation periods.
+def _jumped(problem: ShootingProblem, here: Real, guess: Real, there: Real) -> bool:
+    """Whether a step has landed on an orbit shifted by some excitation periods, or on half of one.
 
-    Then some other shift of where it has landed lies nearer to where it began. Only through a flip
-    the halves change places steadily, as the tangent foretells; not in a jump.
+    Where it is shifted, some other shift of it lies nearer to where the step began. Only through a
+    flip the halves change places steadily, as the tangent foretells; not in a jump. Nor does a
+    doubled branch go on along the one that it comes from.
     """
     begin, end = problem.nodes(here), problem.nodes(there)
     apart = float(np.linalg.norm(end - begin))
@@ -454,8 +459,10 @@ def _jumped_to_shift(problem: ShootingProblem, here: Real, guess: Real, there: R
     if problem.period % 2:
         return False
     a, g, b = (_half_difference(problem, point) for point in (here, guess, there))
-    size = max(float(np.linalg.norm(a)), float(np.linalg.norm(b)))
-    return float(a @ b) < 0.0 and float(np.linalg.norm(b - g)) > 0.5 * size
+    before, after = float(np.linalg.norm(a)), float(np.linalg.norm(b))
+    if after < EQUAL_HALVES * before:  # on the branch of half the period
+        return True
+    return float(a @ b) < 0.0 and float(np.linalg.norm(b - g)) > 0.5 * max(before, after)
 
 
 def _crosses(a: BranchPoint, b: BranchPoint) -> bool:

@@ -50,6 +50,21 @@ def test_branch_is_not_left_for_another_that_it_nearly_crosses(beam):
         ]
 
 
+def test_doubled_branch_does_not_go_on_along_the_one_that_it_comes_from():
+    """The usual step across its second flip is longer than what is left of it."""
+    system = build_system(load_scene(example("four_dof_xi_0.001.toml")))
+    displacements = [-1.54709e-05, 4.83617e-07, -4.48871e-07, -4.75199e-07]
+    velocities = [4.57389e-03, -1.24879e-03, 2.06469e-03, -6.21826e-04]
+    guess = np.array([*displacements, *velocities])
+    branch = continue_branch(solve_orbit(system, 22.0472, 2, guess=guess), (22.0, 22.1))
+    ends = [branch.nodes[end].orbit for end in (0, -1)]
+    first = ends[0].states(np.array([0.0]))[0]
+    parent = continue_branch(solve_orbit(system, ends[0].frequency_hz, guess=first), (22.03, 22.1))
+    flips = [s.frequency_hz for s in parent.special_points if s.kind == "PD"]
+    assert [end.frequency_hz for end in ends] == pytest.approx(flips, rel=1e-10)
+    assert all(reason.startswith("joins the branch of period 1") for reason in branch.stop_reasons)
+
+
 def test_special_points_where_a_closed_branch_closes_are_told_once():
     """Its last step leads beyond the start, over a flip that lies there."""
     symmetric = oscillator()
