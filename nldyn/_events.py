@@ -59,6 +59,160 @@ def travel(before, after):
 
 
 @njit(cache=True, error_model="numpy")
+def meetings(before, after, way, error_before, error_after, coarse):
+    """Whether multipliers near the unit circle may meet, or touch it, between two sets of them.
+
+    Parameters
+    ----------
+    before, after : (n,) complex
+        The multipliers.
+    way : float
+        How far one moves between them.
+    error_before, error_after : float
+        Of the multipliers.
+    coarse : bool
+        Whether to say so, too, of multipliers that come near the circle alone.
+
+    Returns
+    -------
+    int
+        0: they do not, or too far inside to come out. 1: smaller steps tell. 2: the error hides it.
+    """
+    verdict, error = 0, max(error_before, error_after)
+    for i in range(before.size):
+        mu = before[i]
+        height = distance(mu)
+        if mu.imag < 0.0 or abs(height) > 0.4:
+            continue
+        j = closest(after, mu)
+        step, later = abs(after[j] - mu), distance(after[j])
+        off = min(abs(height), abs(later)) if height * later > 0.0 else 0.0
+        if 2.0 * (way + error) < off:
+            continue
+        gap = min(to_others(before, i), to_others(after, j))
+        if gap < 4.0 * (max(way, step) + error):
+            if 2.0 * error > off > 0.0:
+                return 2
+            verdict = 1
+        elif coarse:
+            near = abs(height) < 1.5 * error_before or abs(later) < 1.5 * error_after
+            if near or off < 0.5 * abs(height - later):
+                verdict = 1
+    return verdict
+
+
+@njit(cache=True, error_model="numpy")
+def doubtful(sigmas, sets, error):
+    """Where a multiplier that is followed through some sets may cross the circle more than once.
+
+    The error of ln|μ| is taken as a constant between -1 and 1 times `error` σ(1 - σ).
+
+    Parameters
+    ----------
+    sigmas : (m,)
+        Positions of the sets, from 0 to 1.
+    sets : (m, n) complex
+        Multipliers; the first and the last are exact.
+    error : float
+        Of the sets between them.
+
+    Returns
+    -------
+    int
+        Number of a set, or -1.
+    """
+    m, n = sets.shape
+    found, worst = -1, 0.0
+    ratios = np.empty(m)
+    for backward in (False, True):
+        for i in range(n):
+            at = i
+            for k in range(m):
+                now = m - 1 - k if backward else k
+                if k > 0:
+                    at = closest(sets[now], sets[now + 1 if backward else now - 1][at])
+                size = error * sigmas[now] * (1.0 - sigmas[now])
+                ratios[k] = distance(sets[now][at]) / max(size, 1e-300)
+            k = doubtful_in(ratios)
+            if k >= 0:
+                now = m - 1 - k if backward else k
+                if sigmas[now] * (1.0 - sigmas[now]) > worst:
+                    found, worst = now, sigmas[now] * (1.0 - sigmas[now])
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def dips_towards_circle(sets, errors):
+    """Beside which sets (m, n) of multipliers one comes near the circle and goes again.
+
+    That is where its distance is less than what a parabola may dip between three of them, and not
+    hidden by the error, (m,).
+    """
+    m, n = sets.shape
+    found = np.zeros(m, dtype=np.bool_)
+    for k in range(1, m - 1):
+        for i in range(n):
+            here = distance(sets[k][i])
+            size = abs(here)
+            if not errors[k] < size < 0.4:
+                continue
+            before = distance(sets[k - 1][closest(sets[k - 1], sets[k][i])])
+            after = distance(sets[k + 1][closest(sets[k + 1], sets[k][i])])
+            if before * here > 0.0 and here * after > 0.0:
+                least = min(abs(before), abs(after))
+                if size <= least and size < 0.5 * (abs(before) + abs(after) - 2.0 * size):
+                    found[k] = True
+    return found
+
+
+@inner
+def doubtful_in(ratios):
+    """The first place at which a number in -1 ... 1 may be passed for the second time, or -1."""
+    m = ratios.size
+    rising = ratios[m - 1] > 0.0
+    if rising == (ratios[0] > 0.0):
+        best, where = 1.0, -1
+        for k in range(1, m - 1):
+            ratio = ratios[k] if rising else -ratios[k]
+            if ratio < best:
+                best, where = ratio, k
+        return where
+    reached = -np.inf
+    for k in range(m):
+        ratio = ratios[k] if rising else -ratios[k]
+        if ratio < min(reached, 1.0) and reached > -1.0:
+            return k - 1 if k == m - 1 else k
+        reached = max(reached, ratio)
+    return -1
+
+
+@inner
+def distance(mu):
+    """ln|μ|, negative within the unit circle, not below ln 0.001."""
+    return math.log(max(abs(mu), 1e-3))
+
+
+@inner
+def closest(multipliers, mu):
+    """Index of the multiplier nearest to another one."""
+    best, least = 0, np.inf
+    for k in range(multipliers.size):
+        if abs(multipliers[k] - mu) < least:
+            best, least = k, abs(multipliers[k] - mu)
+    return best
+
+
+@inner
+def to_others(multipliers, i):
+    """Distance of a multiplier from the nearest of the others."""
+    least = np.inf
+    for k in range(multipliers.size):
+        if k != i:
+            least = min(least, abs(multipliers[k] - multipliers[i]))
+    return least
+
+
+@njit(cache=True, error_model="numpy")
 def number_outside(multipliers, tolerance):
     """Fewest and most multipliers outside the unit circle, if each modulus may be off so far."""
     fewest, most = 0, 0

@@ -671,8 +671,10 @@ class Trail:
         ahead = len(self.nodes) - pairs  # nodes that stay beyond those searched
         while self._searched < len(self.nodes) - ahead:
             a, b = self.nodes[self._searched : self._searched + 2]
+            behind = self.nodes[self._searched - 1] if self._searched else None
+            ahead_of = next(iter(self.nodes[self._searched + 2 :]), None)
             try:
-                self.special_points += special_points_between(a, b)
+                self.special_points += special_points_between(a, b, behind, ahead_of)
             except LocateError as error:
                 if closely and self._walk_closely():
                     continue

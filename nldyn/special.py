@@ -22,6 +22,7 @@ from nldyn._events import (
     torus_test,
     travel,
 )
+from nldyn.between import Between
 from nldyn.branch import BranchPoint, SpecialPoint
 from nldyn.critical import correct_across, turns_at_crossing
 from nldyn.linear import Complex, Real
@@ -33,6 +34,8 @@ NEIGHBOUR = 1e-3  # arclength between two branch points at one turn, and dP/ds t
 SAME = 1e-7  # arclength between two branch points that cannot be told apart
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
+MOST_LOOKS = 6  # times that a step is cut at such points
+CLOSE = 0.01  # part of a step within which a point beside it does not help
 FAR_ALONE = 0.3  # the same of the only pair of a single mode
 DIVES = 8  # points at which to look for a change of sign between two others
 STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
@@ -117,6 +120,11 @@ class Chord:
         length = a.arclength + sigma * (self.last.arclength - a.arclength)
         self.known[sigma] = BranchPoint(orbit, tangent, length)
         return self.known[sigma]
+
+    def place(self, point: BranchPoint) -> float:
+        """Position σ of a point of the branch, which may lie beyond the ends."""
+        way = point.orbit.point - self.first.orbit.point
+        return float(self._row @ way) / float(self._row @ self._secant)
 
     def between(self, sigma: float) -> Real:
         """Cubic interpolation of the shooting unknowns between the nearest known points."""
@@ -226,14 +234,50 @@ def _inverse_interpolation(known: list[tuple[float, float]], low: float, high: f
     return found
 
 
-def special_points_between(a: BranchPoint, b: BranchPoint) -> list[SpecialPoint]:
-    """All special points between two neighbouring points, in order."""
+def special_points_between(
+    a: BranchPoint,
+    b: BranchPoint,
+    before: BranchPoint | None = None,
+    after: BranchPoint | None = None,
+) -> list[SpecialPoint]:
+    """All special points between two neighbouring points, in order.
+
+    The points before and after them help to tell where two may hide.
+    """
     several = a.orbit.multipliers.size > 2
-    least = 2 if several and changed(a, b) else 0  # beside one change of sign two others may hide
-    points = [a, *resolved(a, b, least, 5 if several else 3, FAR if several else FAR_ALONE), b]
+    if several and smooth(a, b):
+        points = [a, *looked_into(before, a, b, after), b]
+    else:
+        least = 2 if several and changed(a, b) else 0  # beside one change two others may hide
+        points = [a, *resolved(a, b, least, 5 if several else 3, FAR if several else FAR_ALONE), b]
     for i in range(len(points) - 2, 0, -1):
         insert_dip(points, i)
     return [special for pair in pairwise(points) for special in located_between(*pair)]
+
+
+def smooth(a: BranchPoint, b: BranchPoint) -> bool:
+    """Whether multipliers may be interpolated between two points, and can cross the circle."""
+    if a.orbit.system.conservative or a.orbit.impacts != b.orbit.impacts:
+        return False
+    return leaves_circle(a.orbit.multipliers, b.orbit.multipliers)
+
+
+def looked_into(
+    z: BranchPoint | None, a: BranchPoint, b: BranchPoint, c: BranchPoint | None, most: int = MOST_LOOKS
+) -> list[BranchPoint]:
+    """Points between two others, such that between neighbours no multiplier crosses the circle twice."""
+    chord = Chord(a, b)
+    points, places = [a, b], [0.0, 1.0]
+    if z is not None and z.orbit.impacts == a.orbit.impacts and (place := chord.place(z)) < -CLOSE:
+        points, places = [z, *points], [place, *places]
+    if c is not None and c.orbit.impacts == b.orbit.impacts and (place := chord.place(c)) > 1.0 + CLOSE:
+        points, places = [*points, c], [*places, place]
+    where = Between([point.orbit for point in points], places).where_to_look()
+    if where is None or most == 0:
+        return []
+    middle = chord.at(where)
+    left = looked_into(z, a, middle, b, most - 1)
+    return [*left, middle, *looked_into(a, middle, b, c, most - 1)]
 
 
 def resolved(

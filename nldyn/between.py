@@ -1,0 +1,135 @@
+"""Where between two points of a branch multipliers may cross the unit circle and come back.
+
+The Jacobians of the shooting segments change smoothly along a branch, also where multipliers meet
+and part, which have no derivative there. Interpolated through the two points and those beside
+them, they tell the multipliers within the step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nldyn._events import dips_towards_circle, doubtful, meetings, travel
+from nldyn.linear import Complex, Real
+from nldyn.orbit import Orbit
+
+DEBUG = False
+COARSE = 0.1  # part of a step down to which a multiplier near the circle is followed
+FINEST = 2.0**-12  # part of a step to which meeting multipliers are followed
+MOST_SAMPLES = 96
+SAFE = 4.0  # times as far as multipliers move a multiplier must be off the circle, not to be watched
+
+
+class Between:
+    """Multipliers between two orbits of a branch.
+
+    Parameters
+    ----------
+    orbits : sequence of Orbit
+        Two, three or four neighbours of one branch, in its order.
+    places : sequence of float
+        Their positions along it, 0 and 1 for the two between which to look.
+    """
+
+    def __init__(self, orbits: Sequence[Orbit], places: Sequence[float]) -> None:
+        self.jacobians = np.array([orbit.jacobians for orbit in orbits])
+        self.places = np.array(places)
+        self.first = int(np.flatnonzero(self.places == 0.0)[0])
+        self.spectra = [orbit.multipliers for orbit in orbits]
+        self.ends = [orbits[self.first + i].multipliers for i in range(2)]
+
+    def at(self, sigmas: Sequence[float], chosen: slice = slice(None)) -> NDArray[np.complex128]:
+        """Multipliers (m, 2n) at positions (m,), interpolated through some of the orbits."""
+        places, jacobians = self.places[chosen], self.jacobians[chosen]
+        sigma = np.array(sigmas)[:, None]
+        weights = np.ones((len(sigmas), places.size))
+        for i, place in enumerate(places):
+            for other in np.delete(places, i):
+                weights[:, i] *= (sigma[:, 0] - other) / (place - other)
+        pieces = np.tensordot(weights, jacobians, 1)
+        product = pieces[:, 0]
+        for k in range(1, pieces.shape[1]):
+            product = pieces[:, k] @ product
+        return np.linalg.eigvals(product).astype(complex)
+
+    def error(self, middle: Complex) -> float:
+        """How far the multipliers near the circle move half-way where an orbit is left out."""
+        count = self.places.size
+        if count == 2:
+            return np.inf
+        fewer = [slice(0, count - 1), slice(1, count)] if count == 4 else [self._two()]
+        return max(travel(middle, self.at([0.5], some)[0]) for some in fewer)
+
+    def _two(self) -> slice:
+        return slice(self.first, self.first + 2)
+
+    def where_to_look(self) -> float | None:
+        """Position of an orbit that would tell whether a multiplier crosses the circle twice.
+
+        None where none does by what the interpolation says.
+        """
+        before, after = self.ends
+        way = max(travel(before, after), travel(after, before))
+        if far_from_circle(before, SAFE * way) and far_from_circle(after, SAFE * way):
+            return None
+        if self.places.size == 2:
+            return 0.5
+        middle = self.at([0.5])[0]
+        error = self.error(middle)
+        known = {0.0: before, 0.5: middle, 1.0: after}
+        pairs = ((before, middle), (middle, after))
+        speed = 2.0 * max(max(travel(a, b), travel(b, a)) for a, b in pairs)
+        fresh = {0.5}
+        while fresh:
+            sigmas = sorted(known)
+            split = set()
+            for low, high in pairwise(sigmas):
+                if low not in fresh and high not in fresh:
+                    continue
+                a, b, wide = known[low], known[high], high - low > COARSE
+                off = error * bulge(low), error * bulge(high)
+                way = speed * (high - low)
+                verdict = max(
+                    meetings(a, b, way, *off, wide), meetings(b, a, way, *off[::-1], wide)
+                )
+                if verdict == 2 or (verdict == 1 and high - low < FINEST):
+                    return 0.5 * (low + high)
+                if verdict == 1:
+                    split.add(0.5 * (low + high))
+            split |= self._beside_dips(known, error)
+            if len(known) + len(split) > MOST_SAMPLES:
+                return min(split)
+            wanted = sorted(split)
+            if wanted:
+                known.update(zip(wanted, self.at(wanted), strict=True))
+            fresh = split
+        sigmas = np.array(sorted(known))
+        if DEBUG: print("KNOWN", [(round(x,4), [(round(float(np.angle(z)),4), round(float(np.log(abs(z))),6)) for z in known[x] if z.imag>=0 and abs(np.log(abs(z)))<.06]) for x in sigmas.tolist()])
+        odd = doubtful(sigmas, np.array([known[sigma] for sigma in sigmas]), 4.0 * error)
+        return None if odd < 0 else float(sigmas[odd])
+
+    def _beside_dips(self, known: dict[float, Complex], error: float) -> set[float]:
+        """Positions half-way to the next known ones from where a multiplier nears the circle."""
+        beside = dict(zip(self.places.tolist(), self.spectra, strict=True)) | known
+        sigmas = sorted(beside)
+        sizes = np.array([error * max(bulge(sigma), 0.0) for sigma in sigmas])
+        found: set[float] = set()
+        for i in np.flatnonzero(dips_towards_circle(np.array([beside[x] for x in sigmas]), sizes)):
+            for low, high in ((sigmas[i - 1], sigmas[i]), (sigmas[i], sigmas[i + 1])):
+                if low >= 0.0 and high <= 1.0 and high - low > FINEST:
+                    found.add(0.5 * (low + high))
+        return found
+
+
+def bulge(sigma: float) -> float:
+    """Shape of the error of an interpolation between two points."""
+    return 4.0 * sigma * (1.0 - sigma)
+
+
+def far_from_circle(multipliers: Complex, far: float) -> bool:
+    """Whether all multipliers are further from the unit circle."""
+    return bool(np.abs(np.abs(multipliers) - 1.0).min() > far)
