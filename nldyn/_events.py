@@ -76,9 +76,10 @@ def meetings(before, after, way, error_before, error_after, coarse):
     Returns
     -------
     int
-        0: they do not, or too far inside to come out. 1: smaller steps tell. 2: the error hides it.
+        0: they do not, or too far inside to come out. 1: smaller steps tell, as where several
+        cross it. 2: the error hides it.
     """
-    verdict, error = 0, max(error_before, error_after)
+    verdict, error, crossings = 0, max(error_before, error_after), 0
     for i in range(before.size):
         mu = before[i]
         height = distance(mu)
@@ -89,6 +90,7 @@ def meetings(before, after, way, error_before, error_after, coarse):
         off = min(abs(height), abs(later)) if height * later > 0.0 else 0.0
         if 2.0 * (way + error) < off:
             continue
+        crossings += height * later < 0.0
         gap = min(to_others(before, i), to_others(after, j))
         if gap < 4.0 * (max(way, step) + error):
             if 2.0 * error > off > 0.0:
@@ -98,7 +100,7 @@ def meetings(before, after, way, error_before, error_after, coarse):
             near = abs(height) < 1.5 * error_before or abs(later) < 1.5 * error_after
             if near or off < 0.5 * abs(height - later):
                 verdict = 1
-    return verdict
+    return 1 if crossings > 1 else verdict
 
 
 @njit(cache=True, error_model="numpy")
@@ -162,6 +164,21 @@ def dips_towards_circle(sets, errors):
                 least = min(abs(before), abs(after))
                 if size <= least and size < 0.5 * (abs(before) + abs(after) - 2.0 * size):
                     found[k] = True
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def return_of_outside(sigmas, sets):
+    """At which of the sets more or fewer are outside than on the way from first to last, or -1."""
+    m = sigmas.size
+    counts = np.array([number_outside(multipliers, 0.0)[0] for multipliers in sets])
+    found, worst, reached = -1, 0.0, counts[0]
+    rising = 1 if counts[m - 1] >= counts[0] else -1
+    for k in range(1, m - 1):
+        beyond = rising * (counts[k] - counts[m - 1]) > 0 or rising * (counts[k] - reached) < 0
+        if beyond and sigmas[k] * (1.0 - sigmas[k]) > worst:
+            found, worst = k, sigmas[k] * (1.0 - sigmas[k])
+        reached = max(reached, counts[k]) if rising > 0 else min(reached, counts[k])
     return found
 
 

@@ -13,11 +13,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn._events import dips_towards_circle, doubtful, meetings, travel
+from nldyn._events import dips_towards_circle, doubtful, meetings, return_of_outside, travel
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
 
-DEBUG = False
 COARSE = 0.1  # part of a step down to which a multiplier near the circle is followed
 FINEST = 2.0**-12  # part of a step to which meeting multipliers are followed
 MOST_SAMPLES = 96
@@ -107,10 +106,10 @@ class Between:
             if wanted:
                 known.update(zip(wanted, self.at(wanted), strict=True))
             fresh = split
-        sigmas = np.array(sorted(known))
-        if DEBUG: print("KNOWN", [(round(x,4), [(round(float(np.angle(z)),4), round(float(np.log(abs(z))),6)) for z in known[x] if z.imag>=0 and abs(np.log(abs(z)))<.06]) for x in sigmas.tolist()])
-        odd = doubtful(sigmas, np.array([known[sigma] for sigma in sigmas]), 4.0 * error)
-        return None if odd < 0 else float(sigmas[odd])
+        places = np.array(sorted(known))
+        sets = np.array([known[sigma] for sigma in places])
+        odd = max(return_of_outside(places, sets), doubtful(places, sets, 4.0 * error))
+        return None if odd < 0 else float(places[odd])
 
     def _beside_dips(self, known: dict[float, Complex], error: float) -> set[float]:
         """Positions half-way to the next known ones from where a multiplier nears the circle."""
