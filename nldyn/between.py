@@ -13,7 +13,16 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn._events import dips_towards_circle, doubtful, meetings, return_of_outside, travel
+from nldyn._between import (
+    dips_towards_circle,
+    doubtful,
+    far_from_circle,
+    farthest_travel,
+    half_way,
+    interpolated,
+    meetings,
+    return_of_outside,
+)
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
 
@@ -41,30 +50,12 @@ class Between:
         self.spectra = [orbit.multipliers for orbit in orbits]
         self.ends = [orbits[self.first + i].multipliers for i in range(2)]
 
-    def at(self, sigmas: Sequence[float], chosen: slice = slice(None)) -> NDArray[np.complex128]:
-        """Multipliers (m, 2n) at positions (m,), interpolated through some of the orbits."""
-        places, jacobians = self.places[chosen], self.jacobians[chosen]
-        sigma = np.array(sigmas)[:, None]
-        weights = np.ones((len(sigmas), places.size))
-        for i, place in enumerate(places):
-            for other in np.delete(places, i):
-                weights[:, i] *= (sigma[:, 0] - other) / (place - other)
-        pieces = np.tensordot(weights, jacobians, 1)
-        product = pieces[:, 0]
-        for k in range(1, pieces.shape[1]):
-            product = pieces[:, k] @ product
-        return np.linalg.eigvals(product).astype(complex)
-
-    def error(self, middle: Complex) -> float:
-        """How far the multipliers near the circle move half-way where an orbit is left out."""
+    def at(self, sigmas: Sequence[float]) -> NDArray[np.complex128]:
+        """Multipliers (m, 2n) at positions (m,) by interpolation."""
         count = self.places.size
-        if count == 2:
-            return np.inf
-        fewer = [slice(0, count - 1), slice(1, count)] if count == 4 else [self._two()]
-        return max(travel(middle, self.at([0.5], some)[0]) for some in fewer)
-
-    def _two(self) -> slice:
-        return slice(self.first, self.first + 2)
+        return np.asarray(
+            interpolated(self.jacobians, self.places, 0, count, np.array(sigmas, dtype=float))
+        )
 
     def where_to_look(self) -> float | None:
         """Position of an orbit that would tell whether a multiplier crosses the circle twice.
@@ -72,16 +63,14 @@ class Between:
         None where none does by what the interpolation says.
         """
         before, after = self.ends
-        way = max(travel(before, after), travel(after, before))
+        way = farthest_travel(before, after)
         if far_from_circle(before, SAFE * way) and far_from_circle(after, SAFE * way):
             return None
         if self.places.size == 2:
             return 0.5
-        middle = self.at([0.5])[0]
-        error = self.error(middle)
+        middle, error = half_way(self.jacobians, self.places, self.first)
         known = {0.0: before, 0.5: middle, 1.0: after}
-        pairs = ((before, middle), (middle, after))
-        speed = 2.0 * max(max(travel(a, b), travel(b, a)) for a, b in pairs)
+        speed = 2.0 * max(farthest_travel(before, middle), farthest_travel(middle, after))
         fresh = {0.5}
         while fresh:
             sigmas = sorted(known)
@@ -128,7 +117,3 @@ def bulge(sigma: float) -> float:
     """Shape of the error of an interpolation between two points."""
     return 4.0 * sigma * (1.0 - sigma)
 
-
-def far_from_circle(multipliers: Complex, far: float) -> bool:
-    """Whether all multipliers are further from the unit circle."""
-    return bool(np.abs(np.abs(multipliers) - 1.0).min() > far)
