@@ -1,4 +1,4 @@
-"""Compiled: multipliers between two orbits of a branch, and where they may cross the unit circle."""
+"""Compiled: multipliers between two orbits, and where they may cross the unit circle."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ compiled = resting_on(njit(cache=True, error_model="numpy"), *_files)
 
 @compiled
 def interpolated(jacobians, places, first, last, sigmas):
-    """Multipliers (m, n) at positions (m,) from Jacobians (p, k, n, n) at places first ... last - 1.
+    """Multipliers (m, n) at positions (m,) between the Jacobians (p, k, n, n) of p orbits.
 
-    The polynomial through the Jacobians of each segment is taken, then their product.
+    Those from first up to last are taken, a polynomial for each segment, and then the product.
     """
     k, n = jacobians.shape[1:3]
     found = np.empty((sigmas.size, n), dtype=np.complex128)
@@ -57,15 +57,6 @@ def half_way(jacobians, places, first):
 def farthest_travel(before, after):
     """Longest way of a multiplier near the circle from one set to the other, either way."""
     return max(travel(before, after), travel(after, before))
-
-
-@compiled
-def far_from_circle(multipliers, far):
-    """Whether all multipliers are further from the unit circle."""
-    least = np.inf
-    for mu in multipliers:
-        least = min(least, abs(abs(mu) - 1.0))
-    return least > far
 
 
 @compiled

@@ -16,20 +16,18 @@ from numpy.typing import NDArray
 from nldyn._between import (
     dips_towards_circle,
     doubtful,
-    far_from_circle,
     farthest_travel,
     half_way,
     interpolated,
     meetings,
     return_of_outside,
 )
-from nldyn.linear import Complex, Real
+from nldyn.linear import Complex
 from nldyn.orbit import Orbit
 
 COARSE = 0.1  # part of a step down to which a multiplier near the circle is followed
 FINEST = 2.0**-12  # part of a step to which meeting multipliers are followed
 MOST_SAMPLES = 96
-SAFE = 4.0  # times as far as multipliers move a multiplier must be off the circle, not to be watched
 
 
 class Between:
@@ -63,9 +61,6 @@ class Between:
         None where none does by what the interpolation says.
         """
         before, after = self.ends
-        way = farthest_travel(before, after)
-        if far_from_circle(before, SAFE * way) and far_from_circle(after, SAFE * way):
-            return None
         if self.places.size == 2:
             return 0.5
         middle, error = half_way(self.jacobians, self.places, self.first)
@@ -116,4 +111,3 @@ class Between:
 def bulge(sigma: float) -> float:
     """Shape of the error of an interpolation between two points."""
     return 4.0 * sigma * (1.0 - sigma)
-

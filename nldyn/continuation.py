@@ -667,14 +667,14 @@ class Trail:
         Where that fails, the step is walked again with shorter ones; not at the end of the walk,
         whose last steps a longer one does anew.
         """
-        before = len(self.special_points)
+        known = len(self.special_points)
         ahead = len(self.nodes) - pairs  # nodes that stay beyond those searched
         while self._searched < len(self.nodes) - ahead:
             a, b = self.nodes[self._searched : self._searched + 2]
-            behind = self.nodes[self._searched - 1] if self._searched else None
-            ahead_of = next(iter(self.nodes[self._searched + 2 :]), None)
+            before = self.nodes[self._searched - 1] if self._searched else None
+            after = next(iter(self.nodes[self._searched + 2 :]), None)
             try:
-                self.special_points += special_points_between(a, b, behind, ahead_of)
+                self.special_points += special_points_between(a, b, before, after)
             except LocateError as error:
                 if closely and self._walk_closely():
                     continue
@@ -682,7 +682,7 @@ class Trail:
                 self.special_points += found
                 self.notes += lost
             self._searched += 1
-        if len(self.special_points) > before:
+        if len(self.special_points) > known:
             self.special_points = without_repeats(self.special_points)
 
 

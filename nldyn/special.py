@@ -263,21 +263,31 @@ def smooth(a: BranchPoint, b: BranchPoint) -> bool:
 
 
 def looked_into(
-    z: BranchPoint | None, a: BranchPoint, b: BranchPoint, c: BranchPoint | None, most: int = MOST_LOOKS
+    z: BranchPoint | None,
+    a: BranchPoint,
+    b: BranchPoint,
+    c: BranchPoint | None,
+    most: int = MOST_LOOKS,
 ) -> list[BranchPoint]:
-    """Points between two others, such that between neighbours no multiplier crosses the circle twice."""
+    """Points between a and b, so that between neighbours no multiplier crosses the circle twice.
+
+    The points z before and c after them count where the number of contacts is the same.
+    """
     chord = Chord(a, b)
-    points, places = [a, b], [0.0, 1.0]
-    if z is not None and z.orbit.impacts == a.orbit.impacts and (place := chord.place(z)) < -CLOSE:
-        points, places = [z, *points], [place, *places]
-    if c is not None and c.orbit.impacts == b.orbit.impacts and (place := chord.place(c)) > 1.0 + CLOSE:
-        points, places = [*points, c], [*places, place]
-    where = Between([point.orbit for point in points], places).where_to_look()
+    beside = [p for p in (z, c) if p is not None and p.orbit.impacts == a.orbit.impacts]
+    places = {chord.place(p): p for p in beside}
+    places = {x: p for x, p in places.items() if x < -CLOSE or x > 1.0 + CLOSE}
+    near = sorted([*places.items(), (0.0, a), (1.0, b)], key=_place)
+    where = Between([p.orbit for _, p in near], [x for x, _ in near]).where_to_look()
     if where is None or most == 0:
         return []
     middle = chord.at(where)
-    left = looked_into(z, a, middle, b, most - 1)
-    return [*left, middle, *looked_into(a, middle, b, c, most - 1)]
+    first = looked_into(z, a, middle, b, most - 1)
+    return [*first, middle, *looked_into(a, middle, b, c, most - 1)]
+
+
+def _place(placed: tuple[float, BranchPoint]) -> float:
+    return placed[0]
 
 
 def resolved(

@@ -138,6 +138,8 @@ SUBJECTS = {
     "_periodic_qr.py": "extremes and multipliers",
     "special.py": "special points",
     "_events.py": "special points",
+    "_between.py": "special points",
+    "between.py": "special points",
     "branch.py": "special points",
     "continuation.py": "walk",
     "linalg": "linear algebra (numpy)",
