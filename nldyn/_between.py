@@ -38,19 +38,26 @@ def interpolated(jacobians, places, first, last, sigmas):
 
 
 @compiled
-def half_way(jacobians, places, first):
-    """Multipliers half-way between the places first and first + 1, and their error.
+def error_half_way(jacobians, places, first, middle):
+    """How far the multipliers near the circle move where an orbit is left out.
 
-    The error is how far those near the circle move where an orbit is left out.
+    They are those half-way between the places first and first + 1.
     """
-    count, sigmas = places.size, np.array([0.5])
-    middle = interpolated(jacobians, places, 0, count, sigmas)[0]
-    if count == 3:
-        other = interpolated(jacobians, places, first, first + 2, sigmas)[0]
-        return middle, travel(middle, other)
+    sigmas = np.array([0.5])
+    if places.size == 3:
+        return travel(middle, interpolated(jacobians, places, first, first + 2, sigmas)[0])
     left = interpolated(jacobians, places, 0, 3, sigmas)[0]
     right = interpolated(jacobians, places, 1, 4, sigmas)[0]
-    return middle, max(travel(middle, left), travel(middle, right))
+    return max(travel(middle, left), travel(middle, right))
+
+
+@compiled
+def off_circle(multipliers):
+    """Distance of the nearest multiplier from the unit circle."""
+    least = np.inf
+    for mu in multipliers:
+        least = min(least, abs(abs(mu) - 1.0))
+    return least
 
 
 @compiled

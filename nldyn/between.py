@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from nldyn._between import (
     dips_towards_circle,
     doubtful,
+    error_half_way,
     farthest_travel,
-    half_way,
     interpolated,
     meetings,
+    off_circle,
     return_of_outside,
 )
 from nldyn.linear import Complex
@@ -27,6 +28,7 @@ from nldyn.orbit import Orbit
 
 COARSE = 0.1  # part of a step down to which a multiplier near the circle is followed
 FINEST = 2.0**-12  # part of a step to which meeting multipliers are followed
+CALM = 1.0  # of their distance to the circle: multipliers that move by less do not come to it
 MOST_SAMPLES = 96
 
 
@@ -63,9 +65,12 @@ class Between:
         before, after = self.ends
         if self.places.size == 2:
             return 0.5
-        middle, error = half_way(self.jacobians, self.places, self.first)
-        known = {0.0: before, 0.5: middle, 1.0: after}
+        middle = self.at([0.5])[0]
         speed = 2.0 * max(farthest_travel(before, middle), farthest_travel(middle, after))
+        known = {0.0: before, 0.5: middle, 1.0: after}
+        if self._calm(before, middle, speed) and self._calm(middle, after, speed):
+            return None
+        error = error_half_way(self.jacobians, self.places, self.first, middle)
         fresh = {0.5}
         while fresh:
             sigmas = sorted(known)
@@ -94,6 +99,10 @@ class Between:
         sets = np.array([known[sigma] for sigma in places])
         odd = max(return_of_outside(places, sets), doubtful(places, sets, 4.0 * error))
         return None if odd < 0 else float(places[odd])
+
+    def _calm(self, before: Complex, after: Complex, speed: float) -> bool:
+        """Whether all multipliers are too far from the circle to come near it in half a step."""
+        return bool(speed < CALM * min(off_circle(before), off_circle(after)))
 
     def _beside_dips(self, known: dict[float, Complex], error: float) -> set[float]:
         """Positions half-way to the next known ones from where a multiplier nears the circle."""
