@@ -35,6 +35,7 @@ SAME = 1e-7  # arclength between two branch points that cannot be told apart
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
 MOST_LOOKS = 6  # times that a step is cut at such points
+SHORTEST_LOOK = 1e-6  # arclength of a step, below which it is not cut there
 CLOSE = 0.01  # part of a step within which a point beside it does not help
 FAR_ALONE = 0.3  # the same of the only pair of a single mode
 DIVES = 8  # points at which to look for a change of sign between two others
@@ -273,13 +274,15 @@ def looked_into(
 
     The points z before and c after them count where the number of contacts is the same.
     """
+    if most == 0 or abs(b.arclength - a.arclength) < SHORTEST_LOOK:
+        return []
     chord = Chord(a, b)
     beside = [p for p in (z, c) if p is not None and p.orbit.impacts == a.orbit.impacts]
     places = {chord.place(p): p for p in beside}
     places = {x: p for x, p in places.items() if x < -CLOSE or x > 1.0 + CLOSE}
     near = sorted([*places.items(), (0.0, a), (1.0, b)], key=_place)
     where = Between([p.orbit for _, p in near], [x for x, _ in near]).where_to_look()
-    if where is None or most == 0:
+    if where is None:
         return []
     middle = chord.at(where)
     first = looked_into(z, a, middle, b, most - 1)
