@@ -60,6 +60,10 @@ NEAR = 3e-3
 # share of the speed at a stop that rounding of its penetration may cost in one contact
 WORST_ROUNDING = 1e-6
 
+# the share of a slope in a Jacobian's error, kick (4 tail)², is less than rtol, (tail / 0.3)², as
+# long as KICK kick is less than one
+KICK = 1.5
+
 # columns of `stops`
 GAP, STIFFNESS, EXPONENT, DISSIPATION, MOBILITY, DURATION, INSTANT = range(7)
 
@@ -345,6 +349,18 @@ def output_noise(fl, out, w):
 
 
 @inner
+def rise_noise(fl, stop, w, depth, h):
+    """The same in the penetration on a panel of length h that begins at a known depth."""
+    if fl.near.size > 0:
+        return output_noise(fl, stop, w)
+    turn = fl.omega * h
+    rise = abs(fl.forced[0, 0, stop]) * turn * (1.0 + turn)
+    for j in range(w.size):
+        rise += h * (abs(fl.rows[1, stop, j]) + h * abs(fl.rows[2, stop, j])) * abs(w[j])
+    return min(1e-15 * (abs(depth) + rise), output_noise(fl, stop, w))
+
+
+@inner
 def fastest_rate(fl):
     """Largest |eigenvalue| of the blocks, in 1/s."""
     fastest = 0.0
@@ -571,6 +587,10 @@ class Panel(NamedTuple):
     order: NDArray[np.int64]  # (na m,) its row swaps
     kept: NDArray[np.bool_]  # (1,) whether `factors` are worth keeping
     made: Real  # (2,) kind and length for which to, back and G were filled
+    rise: Real  # (na, m + 1, 2n) row (exp(A t_i) - 1) of the penetrations, the last at the end
+    # (2, na) penetration at start and end: carried apart from the state, whose rounding is a share
+    # of the displacement, which may be many times as large
+    depth: Real
 
 
 @inner
@@ -593,7 +613,25 @@ def new_panel(fl, m, n_states, active):
         np.empty(na * m, dtype=np.int64),
         np.zeros(1, dtype=np.bool_),
         np.zeros(2),
+        np.empty((na, m + 1, n_states)),
+        np.zeros((2, na)),
     )
+
+
+@inner
+def change_in(block, t, e00, e01, e10, e11):
+    """Diagonal of exp(block t) - 1 to its own precision, from the entries of the exponential."""
+    even = 0.5 * (e00 + e11)
+    odd = 0.5 * (e00 - e11)
+    half = 0.5 * (block[0, 0] - block[1, 1])
+    if block[0, 1] != 0.0:
+        odd = half * (e01 / block[0, 1])
+    elif block[1, 0] != 0.0:
+        odd = half * (e10 / block[1, 0])
+    less = even - 1.0
+    if even > 0.0:  # even² - odd² - e01 e10 is the determinant
+        less = (math.expm1((block[0, 0] + block[1, 1]) * t) + odd * odd + e01 * e10) / (even + 1.0)
+    return less + odd, less - odd
 
 
 @inner
@@ -610,15 +648,22 @@ def panel_responses(fl, tab, kind, h, panel):
     """Fill what a panel of length h needs to know of the linear part: to, back and G."""
     m = tab.nodes.size
     na = panel.active.size
-    to, back, G = panel.to, panel.back, panel.G
+    to, back, G, rise = panel.to, panel.back, panel.G, panel.rise
     if panel.made[0] == kind and panel.made[1] == h:
         return
     panel.made[0], panel.made[1] = kind, h
-    for i in range(m):
-        t = h * tab.chi[kind, i]
+    for i in range(m + 1):
+        t = h * tab.chi[kind, i] if i < m else h
         for b in range(fl.blocks.shape[0]):
             j = 2 * b
             e00, e01, e10, e11, i00, i01, i10, i11 = there_and_back(fl.blocks[b], t)
+            d00, d11 = change_in(fl.blocks[b], t, e00, e01, e10, e11)
+            for a in range(na):
+                x, y = fl.rows[0, panel.active[a], j], fl.rows[0, panel.active[a], j + 1]
+                rise[a, i, j] = x * d00 + y * e10
+                rise[a, i, j + 1] = x * e01 + y * d11
+            if i == m:
+                continue
             for o in range(to.shape[0]):
                 stop = panel.active[o % na]
                 x, y = fl.rows[o // na, stop, j], fl.rows[o // na, stop, j + 1]
@@ -713,23 +758,38 @@ def free_outputs(fl, tab, kind, phase, w, h, panel, free):
     m = tab.nodes.size
     na = panel.active.size
     for i in range(m):
-        turn = turned(phase + fl.omega * h * tab.chi[kind, i])
-        for o in range(panel.to.shape[0]):
-            steady = fl.forced[0, 0, panel.active[o % na]] * turn
-            if o < na:
-                value = steady.real - fl.stops[panel.active[o], GAP]
-            else:
-                value = -fl.omega * steady.imag
-            for k in range(w.size):
-                value += panel.to[o, i, k] * w[k]
-            free[o * m + i] = value
+        t = h * tab.chi[kind, i]
+        for a in range(na):
+            free[a * m + i] = free_depth(fl, phase, w, t, panel, a, i)
+        if panel.to.shape[0] > na:
+            turn = turned(phase + fl.omega * t)
+            for o in range(na, panel.to.shape[0]):
+                stop = panel.active[o - na]
+                value = -fl.omega * (fl.forced[0, 0, stop] * turn).imag
+                for k in range(w.size):
+                    value += panel.to[o, i, k] * w[k]
+                if fl.near.size > 0:
+                    _, rate, _, _ = swelling(
+                        fl.near, fl.forced, fl.omega, stop, phase + fl.omega * t
+                    )
+                    value += rate
+                free[o * m + i] = value
+
+
+@inner
+def free_depth(fl, phase, w, t, panel, a, i):
+    """Penetration at time t, node i of a panel, without forces: where it began, and the change."""
+    stop = panel.active[a]
+    s, c = math.sin(0.5 * fl.omega * t), math.cos(0.5 * fl.omega * t)
+    swing = turned(phase) * complex(-2.0 * s * s, 2.0 * s * c)  # e^{i(phase + ωt)} - e^{i phase}
+    value = panel.depth[0, a] + (fl.forced[0, 0, stop] * swing).real
+    for k in range(w.size):
+        value += panel.rise[a, i, k] * w[k]
     if fl.near.size > 0:
-        for i in range(m):
-            here = phase + fl.omega * h * tab.chi[kind, i]
-            for o in range(panel.to.shape[0]):
-                stop = panel.active[o % na]
-                s, s1, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, here)
-                free[o * m + i] += s if o < na else s1
+        there, _, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, phase + fl.omega * t)
+        here, _, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, phase)
+        value += there - here
+    return value
 
 
 @inner
@@ -877,8 +937,19 @@ def solve_panel(fl, tab, kind, phase, w, h, noise, panel):
 
 
 @inner
-def panel_end(fl, tab, kind, w, h, panel, w_end):
-    """State w_end at the end of a panel from the forces at its nodes."""
+def panel_end(fl, tab, kind, phase, w, h, panel, w_end):
+    """State w_end and penetrations at the end of a panel from the forces at its nodes."""
+    m = tab.nodes.size
+    for a in range(panel.active.size):
+        depth = free_depth(fl, phase, w, h, panel, a, m)
+        for b in range(panel.active.size):
+            for j in range(m):
+                response = 0.0
+                for k in range(w.size):
+                    row = fl.rows[0, panel.active[a], k] + panel.rise[a, m, k]
+                    response += row * panel.back[b, k, j]
+                depth -= h * tab.weights[kind, j] * panel.F[b, j] * response
+        panel.depth[1, a] = depth
     for k in range(w.size):
         w_end[k] = w[k]
     for a in range(panel.active.size):
@@ -992,10 +1063,12 @@ def singular_slope(fl, stop):
 
 
 @inner
-def resolved(fl, tab, kind, noise, panel):
+def resolved(fl, tab, kind, h, noise, panel):
     """Whether the Legendre tails of each force and of its slopes are small beside their largest.
 
-    A slope counts as it does in the sensitivities: times dχ/ds.
+    A slope counts as it does in the sensitivities: times dχ/ds. Where contacts are short against
+    the period, it kicks them to many times their final size, and its error, the square of the
+    tail, with them.
     """
     na = panel.active.size
     slopes = np.empty(panel.slope.shape)
@@ -1016,6 +1089,9 @@ def resolved(fl, tab, kind, noise, panel):
         size = largest(slopes, o)
         if o >= na and largest(panel.output, o) > 0.0:  # by speed: its share in the force counts
             size = max(size, largest(panel.F, a) / largest(panel.output, o))
+        if o < na:
+            kick = fl.stops[panel.active[a], MOBILITY] * largest(panel.slope, o) * h / fl.omega
+            tail = max(tail / math.sqrt(max(KICK * kick, 1.0)), 20.0 * noise[a] / deepest)
         if legendre_tail(tab, slopes, o) > 4.0 * tail * size:
             return False
     return True
@@ -1429,8 +1505,6 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
     panel.kept[0] = False
     guess = np.empty(tab.nodes.size)
     noise = np.empty(active.size)
-    for a in range(active.size):
-        noise[a] = output_noise(fl, active[a], w)
     smooth, switch = 2 * start_switch, 2 * start_switch + 1
     limit = h_max
     kind, h, aim = remembered_panel(rec, start_switch, h_max, panel)
@@ -1446,15 +1520,17 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
             if aim < 0:
                 aim = stop_at_switch(fl, w, phase, tried, closed)
             return OK if aim >= 0 else CONTACT_FAILED, kind, 0.0, aim
+        for a in range(active.size):
+            noise[a] = rise_noise(fl, active[a], w, panel.depth[0, a], h)
         if not solve_panel(fl, tab, kind, phase, w, h, noise, panel):
             limit = 0.4 * min(h, tried)
             aim = -1
             kind, h = guess_panel(fl, tab, phase, w, limit, h_mapped, start_switch, panel)
             tried = h
             continue
-        panel_end(fl, tab, kind, w, h, panel, w_end)
+        panel_end(fl, tab, kind, phase, w, h, panel, w_end)
         end_phase = phase + fl.omega * h
-        fine = resolved(fl, tab, kind, noise, panel)
+        fine = resolved(fl, tab, kind, h, noise, panel)
         if fine:
             to_switch = kind % 2 == 1
             fine = h <= 1.5 * graded_length(
@@ -1638,6 +1714,7 @@ def run_pieces(
     skip = 0.0
     flight, none = (FLIGHT, -1) if duration >= 0.0 else (0, 0)  # as above
     w_end = np.empty(w.size)
+    depth = np.full(n_stops, np.nan)  # penetrations of stops that have been closed for a panel
     for _ in range(20000):
         remain = duration - t
         if remain <= 0.0:
@@ -1682,6 +1759,12 @@ def run_pieces(
                 start_switch, skip = 0, max(left, shortest)
                 continue
         h_max = min(remain, h_mapped if start_switch == 1 else h_even)
+        for a in range(n_active):
+            panel.depth[0, a] = depth[active[a]]
+            if np.isnan(depth[active[a]]):
+                value = distance(fl, active[a], w, here)
+                known = abs(value) > output_noise(fl, active[a], w)
+                panel.depth[0, a] = value if known else 0.0  # it begins here
         status, kind, h, event = contact_panel(
             fl, tab, here, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec
         )
@@ -1703,6 +1786,8 @@ def run_pieces(
             for k in range(w.size):
                 w[k] = w_end[k]
             t = duration if h >= remain else t + h
+            for a in range(n_active):
+                depth[active[a]] = panel.depth[1, a]
         start_switch = 0
         if event >= 0:
             closed[event] = not closed[event]
@@ -1710,6 +1795,9 @@ def run_pieces(
             if closed[event]:
                 closings[event] += 1
             switch_with(fl, w, phase + fl.omega * t, h, closed, closings)
+            for s in range(n_stops):
+                if not closed[s]:
+                    depth[s] = np.nan
             skip = shortest if h < shortest else 0.0
     return TOO_MANY_PIECES
 
