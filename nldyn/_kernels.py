@@ -349,15 +349,15 @@ def output_noise(fl, out, w):
 
 
 @inner
-def rise_noise(fl, stop, w, depth, h):
-    """The same in the penetration on a panel of length h that begins at a known depth."""
+def rise_noise(fl, stop, w, depth, doubt, h):
+    """The same in the penetration on a panel of length h that begins at a depth known to doubt."""
     if fl.near.size > 0:
         return output_noise(fl, stop, w)
     turn = fl.omega * h
     rise = abs(fl.forced[0, 0, stop]) * turn * (1.0 + turn)
     for j in range(w.size):
         rise += h * (abs(fl.rows[1, stop, j]) + h * abs(fl.rows[2, stop, j])) * abs(w[j])
-    return min(1e-15 * (abs(depth) + rise), output_noise(fl, stop, w))
+    return min(doubt + 1e-15 * (abs(depth) + rise), output_noise(fl, stop, w))
 
 
 @inner
@@ -588,8 +588,8 @@ class Panel(NamedTuple):
     kept: NDArray[np.bool_]  # (1,) whether `factors` are worth keeping
     made: Real  # (2,) kind and length for which to, back and G were filled
     rise: Real  # (na, m + 1, 2n) row (exp(A t_i) - 1) of the penetrations, the last at the end
-    # (2, na) penetration at start and end: carried apart from the state, whose rounding is a share
-    # of the displacement, which may be many times as large
+    # (3, na) penetration at start and end, carried apart from the state, whose rounding is a share
+    # of the displacement, which may be many times as large; and the error of where it began
     depth: Real
 
 
@@ -614,7 +614,7 @@ def new_panel(fl, m, n_states, active):
         np.zeros(1, dtype=np.bool_),
         np.zeros(2),
         np.empty((na, m + 1, n_states)),
-        np.zeros((2, na)),
+        np.zeros((3, na)),
     )
 
 
@@ -799,9 +799,7 @@ def panel_forces(fl, panel, slope):
     for a in range(na):
         for i in range(m):
             speed = panel.output[na + a, i] if slope.shape[0] > na else 0.0
-            force, stiffness, viscosity = closed_law(
-                fl, panel.active[a], panel.output[a, i], speed
-            )
+            force, stiffness, viscosity = closed_law(fl, panel.active[a], panel.output[a, i], speed)
             panel.F[a, i] = force
             slope[a, i] = stiffness
             if slope.shape[0] > na:
@@ -922,7 +920,8 @@ def solve_panel(fl, tab, kind, phase, w, h, noise, panel):
             if o < na and longest > noise[o]:
                 change = max(change, longest / scale)
         # the error left: goes with the square after a step with a fresh matrix, else linearly
-        rate = change / before
+        # nothing moves where forces are too weak to: they may still not be the penetrations' own
+        rate = change / before if change > 0.0 else 0.0
         left = change * change if fresh else change * rate / max(1.0 - rate, 1e-3)
         if left <= 1e-13 and (fresh or before < np.inf or change == 0.0):
             panel_forces(fl, panel, slope)
@@ -1504,7 +1503,9 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
     active = panel.active
     panel.kept[0] = False
     guess = np.empty(tab.nodes.size)
-    noise = np.empty(active.size)
+    noise, rounding = np.empty(active.size), np.empty(active.size)
+    for a in range(active.size):
+        rounding[a] = output_noise(fl, active[a], w)  # events are found in the state
     smooth, switch = 2 * start_switch, 2 * start_switch + 1
     limit = h_max
     kind, h, aim = remembered_panel(rec, start_switch, h_max, panel)
@@ -1521,7 +1522,7 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
                 aim = stop_at_switch(fl, w, phase, tried, closed)
             return OK if aim >= 0 else CONTACT_FAILED, kind, 0.0, aim
         for a in range(active.size):
-            noise[a] = rise_noise(fl, active[a], w, panel.depth[0, a], h)
+            noise[a] = rise_noise(fl, active[a], w, panel.depth[0, a], panel.depth[2, a], h)
         if not solve_panel(fl, tab, kind, phase, w, h, noise, panel):
             limit = 0.4 * min(h, tried)
             aim = -1
@@ -1530,7 +1531,7 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
             continue
         panel_end(fl, tab, kind, phase, w, h, panel, w_end)
         end_phase = phase + fl.omega * h
-        fine = resolved(fl, tab, kind, h, noise, panel)
+        fine = resolved(fl, tab, kind, h, rounding, panel)
         if fine:
             to_switch = kind % 2 == 1
             fine = h <= 1.5 * graded_length(
@@ -1714,7 +1715,8 @@ def run_pieces(
     skip = 0.0
     flight, none = (FLIGHT, -1) if duration >= 0.0 else (0, 0)  # as above
     w_end = np.empty(w.size)
-    depth = np.full(n_stops, np.nan)  # penetrations of stops that have been closed for a panel
+    # penetrations of stops that have been closed for a panel, and the errors they began with
+    depth, doubt = np.full(n_stops, np.nan), np.zeros(n_stops)
     for _ in range(20000):
         remain = duration - t
         if remain <= 0.0:
@@ -1757,14 +1759,17 @@ def run_pieces(
                 closed[active[0]] = False
                 closings[active[0]] -= 1
                 start_switch, skip = 0, max(left, shortest)
+                depth[active[0]] = np.nan
                 continue
         h_max = min(remain, h_mapped if start_switch == 1 else h_even)
         for a in range(n_active):
             panel.depth[0, a] = depth[active[a]]
             if np.isnan(depth[active[a]]):
-                value = distance(fl, active[a], w, here)
-                known = abs(value) > output_noise(fl, active[a], w)
-                panel.depth[0, a] = value if known else 0.0  # it begins here
+                value, noise = distance(fl, active[a], w, here), output_noise(fl, active[a], w)
+                begins = abs(value) <= noise
+                panel.depth[0, a] = 0.0 if begins else value
+                doubt[active[a]] = 0.0 if begins else noise
+            panel.depth[2, a] = doubt[active[a]]
         status, kind, h, event = contact_panel(
             fl, tab, here, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec
         )
