@@ -136,21 +136,31 @@ def block_exponential(block, t):
 
 @inner
 def there_and_back(block, t):
-    """The four entries of exp(block t), then those of exp(-block t)."""
+    """The four entries of exp(block t), those of exp(-block t), the diagonal of exp(block t) - 1.
+
+    The last has its own precision, also where it is small.
+    """
     mean = 0.5 * (block[0, 0] + block[1, 1])
     half = 0.5 * (block[0, 0] - block[1, 1])
     square = half * half + block[0, 1] * block[1, 0]
+    rate = math.sqrt(abs(square))
+    less = math.expm1(mean * t)
+    size = 1.0 + less
     if square >= 0.0:
         e00, e01, e10, e11 = block_exponential(block, t)
         i00, i01, i10, i11 = block_exponential(block, -t)
-        return e00, e01, e10, e11, i00, i01, i10, i11
-    rate = math.sqrt(-square)
-    size = math.exp(mean * t)
-    even, odd = math.cos(rate * t), math.sin(rate * t) / rate
+        s, c = math.sinh(0.5 * rate * t), math.cosh(0.5 * rate * t)
+        swing, a = 2.0 * s * s, half * (2.0 * s * c / rate if rate > 0.0 else t)
+        d00, d11 = less + size * (swing + a), less + size * (swing - a)
+        return e00, e01, e10, e11, i00, i01, i10, i11, d00, d11
+    s, c = math.sin(0.5 * rate * t), math.cos(0.5 * rate * t)
+    swing, odd = -2.0 * s * s, 2.0 * s * c / rate  # cos - 1, sin / rate
+    even = 1.0 + swing
     a, b, c, d = odd * half, odd * block[0, 1], odd * block[1, 0], 1.0 / size
     return (
         size * (even + a), size * b, size * c, size * (even - a),
         d * (even - a), -d * b, -d * c, d * (even + a),
+        less + size * (swing + a), less + size * (swing - a),
     )  # fmt: skip
 
 
@@ -587,7 +597,7 @@ class Panel(NamedTuple):
     order: NDArray[np.int64]  # (na m,) its row swaps
     kept: NDArray[np.bool_]  # (1,) whether `factors` are worth keeping
     made: Real  # (2,) kind and length for which to, back and G were filled
-    rise: Real  # (na, m + 1, 2n) row (exp(A t_i) - 1) of the penetrations, the last at the end
+    rise: Real  # (na, m, 2n) row (exp(A t_i) - 1) of the penetrations
     # (3, na) penetration at start and end, carried apart from the state, whose rounding is a share
     # of the displacement, which may be many times as large; and the error of where it began
     depth: Real
@@ -613,25 +623,9 @@ def new_panel(fl, m, n_states, active):
         np.empty(na * m, dtype=np.int64),
         np.zeros(1, dtype=np.bool_),
         np.zeros(2),
-        np.empty((na, m + 1, n_states)),
+        np.empty((na, m, n_states)),
         np.zeros((3, na)),
     )
-
-
-@inner
-def change_in(block, t, e00, e01, e10, e11):
-    """Diagonal of exp(block t) - 1 to its own precision, from the entries of the exponential."""
-    even = 0.5 * (e00 + e11)
-    odd = 0.5 * (e00 - e11)
-    half = 0.5 * (block[0, 0] - block[1, 1])
-    if block[0, 1] != 0.0:
-        odd = half * (e01 / block[0, 1])
-    elif block[1, 0] != 0.0:
-        odd = half * (e10 / block[1, 0])
-    less = even - 1.0
-    if even > 0.0:  # even² - odd² - e01 e10 is the determinant
-        less = (math.expm1((block[0, 0] + block[1, 1]) * t) + odd * odd + e01 * e10) / (even + 1.0)
-    return less + odd, less - odd
 
 
 @inner
@@ -645,30 +639,26 @@ def same_stops(active, other):
 
 @inner
 def panel_responses(fl, tab, kind, h, panel):
-    """Fill what a panel of length h needs to know of the linear part: to, back and G."""
+    """Fill what a panel of length h needs to know of the linear part: to, rise, back and G."""
     m = tab.nodes.size
     na = panel.active.size
-    to, back, G, rise = panel.to, panel.back, panel.G, panel.rise
+    to, back, G = panel.to, panel.back, panel.G
     if panel.made[0] == kind and panel.made[1] == h:
         return
     panel.made[0], panel.made[1] = kind, h
-    for i in range(m + 1):
-        t = h * tab.chi[kind, i] if i < m else h
+    for i in range(m):
+        t = h * tab.chi[kind, i]
         for b in range(fl.blocks.shape[0]):
             j = 2 * b
-            e00, e01, e10, e11, i00, i01, i10, i11 = there_and_back(fl.blocks[b], t)
-            d00, d11 = change_in(fl.blocks[b], t, e00, e01, e10, e11)
-            for a in range(na):
-                x, y = fl.rows[0, panel.active[a], j], fl.rows[0, panel.active[a], j + 1]
-                rise[a, i, j] = x * d00 + y * e10
-                rise[a, i, j + 1] = x * e01 + y * d11
-            if i == m:
-                continue
+            e00, e01, e10, e11, i00, i01, i10, i11, d00, d11 = there_and_back(fl.blocks[b], t)
             for o in range(to.shape[0]):
                 stop = panel.active[o % na]
                 x, y = fl.rows[o // na, stop, j], fl.rows[o // na, stop, j + 1]
                 to[o, i, j] = x * e00 + y * e10
                 to[o, i, j + 1] = x * e01 + y * e11
+                if o < na:
+                    panel.rise[o, i, j] = x * d00 + y * e10
+                    panel.rise[o, i, j + 1] = x * e01 + y * d11
             for a in range(na):
                 x, y = fl.force[j, panel.active[a]], fl.force[j + 1, panel.active[a]]
                 back[a, j, i] = i00 * x + i01 * y
@@ -752,44 +742,43 @@ def forced_output(fl, out, phase):
 
 
 @inner
-def free_outputs(fl, tab, kind, phase, w, h, panel, free):
-    """Fill the panel's outputs at the nodes (n_outputs m,) without contact forces."""
-    always_inline()
-    m = tab.nodes.size
-    na = panel.active.size
-    for i in range(m):
-        t = h * tab.chi[kind, i]
-        for a in range(na):
-            free[a * m + i] = free_depth(fl, phase, w, t, panel, a, i)
-        if panel.to.shape[0] > na:
-            turn = turned(phase + fl.omega * t)
-            for o in range(na, panel.to.shape[0]):
-                stop = panel.active[o - na]
-                value = -fl.omega * (fl.forced[0, 0, stop] * turn).imag
-                for k in range(w.size):
-                    value += panel.to[o, i, k] * w[k]
-                if fl.near.size > 0:
-                    _, rate, _, _ = swelling(
-                        fl.near, fl.forced, fl.omega, stop, phase + fl.omega * t
-                    )
-                    value += rate
-                free[o * m + i] = value
+def swung(turn, angle):
+    """Change of a complex number as it turns by an angle, to its own precision."""
+    s, c = math.sin(0.5 * angle), math.cos(0.5 * angle)
+    return turn * complex(-2.0 * s * s, 2.0 * s * c)
 
 
 @inner
-def free_depth(fl, phase, w, t, panel, a, i):
-    """Penetration at time t, node i of a panel, without forces: where it began, and the change."""
-    stop = panel.active[a]
-    s, c = math.sin(0.5 * fl.omega * t), math.cos(0.5 * fl.omega * t)
-    swing = turned(phase) * complex(-2.0 * s * s, 2.0 * s * c)  # e^{i(phase + ωt)} - e^{i phase}
-    value = panel.depth[0, a] + (fl.forced[0, 0, stop] * swing).real
-    for k in range(w.size):
-        value += panel.rise[a, i, k] * w[k]
+def free_outputs(fl, tab, kind, phase, w, h, panel, free):
+    """Fill the panel's outputs at the nodes (n_outputs m,) without contact forces.
+
+    Penetrations are what they were at the start of the panel, and their changes.
+    """
+    always_inline()
+    m = tab.nodes.size
+    na = panel.active.size
+    start = turned(phase)
+    for i in range(m):
+        swing = swung(start, fl.omega * h * tab.chi[kind, i])
+        for o in range(panel.to.shape[0]):
+            steady = fl.forced[0, 0, panel.active[o % na]]
+            if o < na:
+                value = panel.depth[0, o] + (steady * swing).real
+                for k in range(w.size):
+                    value += panel.rise[o, i, k] * w[k]
+            else:
+                value = -fl.omega * (steady * (start + swing)).imag
+                for k in range(w.size):
+                    value += panel.to[o, i, k] * w[k]
+            free[o * m + i] = value
     if fl.near.size > 0:
-        there, _, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, phase + fl.omega * t)
-        here, _, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, phase)
-        value += there - here
-    return value
+        for o in range(panel.to.shape[0]):
+            stop = panel.active[o % na]
+            before, _, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, phase)
+            for i in range(m):
+                here = phase + fl.omega * h * tab.chi[kind, i]
+                s, s1, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, here)
+                free[o * m + i] += s - before if o < na else s1
 
 
 @inner
@@ -938,24 +927,29 @@ def solve_panel(fl, tab, kind, phase, w, h, noise, panel):
 @inner
 def panel_end(fl, tab, kind, phase, w, h, panel, w_end):
     """State w_end and penetrations at the end of a panel from the forces at its nodes."""
-    m = tab.nodes.size
-    for a in range(panel.active.size):
-        depth = free_depth(fl, phase, w, h, panel, a, m)
-        for b in range(panel.active.size):
-            for j in range(m):
-                response = 0.0
-                for k in range(w.size):
-                    row = fl.rows[0, panel.active[a], k] + panel.rise[a, m, k]
-                    response += row * panel.back[b, k, j]
-                depth -= h * tab.weights[kind, j] * panel.F[b, j] * response
-        panel.depth[1, a] = depth
-    for k in range(w.size):
-        w_end[k] = w[k]
-    for a in range(panel.active.size):
+    na = panel.active.size
+    kick = np.zeros(w.size)
+    for a in range(na):
         for k in range(w.size):
             for j in range(tab.nodes.size):
-                w_end[k] -= h * tab.weights[kind, j] * panel.F[a, j] * panel.back[a, k, j]
-    fly_state(fl.blocks, w_end, h)
+                kick[k] -= h * tab.weights[kind, j] * panel.F[a, j] * panel.back[a, k, j]
+    swing = swung(turned(phase), fl.omega * h)
+    for a in range(na):
+        stop = panel.active[a]
+        panel.depth[1, a] = panel.depth[0, a] + (fl.forced[0, 0, stop] * swing).real
+        if fl.near.size > 0:
+            there, _, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, phase + fl.omega * h)
+            before, _, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, phase)
+            panel.depth[1, a] += there - before
+    for b in range(fl.blocks.shape[0]):
+        j = 2 * b
+        e00, e01, e10, e11, _, _, _, _, d00, d11 = there_and_back(fl.blocks[b], h)
+        x, y = w[j] + kick[j], w[j + 1] + kick[j + 1]
+        w_end[j], w_end[j + 1] = e00 * x + e01 * y, e10 * x + e11 * y
+        x1, y1 = kick[j] + d00 * x + e01 * y, kick[j + 1] + e10 * x + d11 * y
+        for a in range(na):
+            stop = panel.active[a]
+            panel.depth[1, a] += fl.rows[0, stop, j] * x1 + fl.rows[0, stop, j + 1] * y1
 
 
 @inner
