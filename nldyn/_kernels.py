@@ -359,15 +359,14 @@ def output_noise(fl, out, w):
 
 
 @inner
-def rise_noise(fl, stop, w, depth, doubt, h):
-    """The same in the penetration on a panel of length h that begins at a depth known to doubt."""
+def rise_noise(fl, stop, w, h):
+    """The same in the change of a penetration within a time h, where it can be told."""
     if fl.near.size > 0:
-        return output_noise(fl, stop, w)
-    turn = fl.omega * h
-    rise = abs(fl.forced[0, 0, stop]) * turn * (1.0 + turn)
+        return np.inf
+    rise = abs(fl.forced[0, 0, stop]) * fl.omega * h
     for j in range(w.size):
         rise += h * (abs(fl.rows[1, stop, j]) + h * abs(fl.rows[2, stop, j])) * abs(w[j])
-    return min(doubt + 1e-15 * (abs(depth) + rise), output_noise(fl, stop, w))
+    return 1e-15 * rise
 
 
 @inner
@@ -928,11 +927,11 @@ def solve_panel(fl, tab, kind, phase, w, h, noise, panel):
 def panel_end(fl, tab, kind, phase, w, h, panel, w_end):
     """State w_end and penetrations at the end of a panel from the forces at its nodes."""
     na = panel.active.size
-    kick = np.zeros(w.size)
-    for a in range(na):
-        for k in range(w.size):
+    for k in range(w.size):
+        w_end[k] = 0.0
+        for a in range(na):
             for j in range(tab.nodes.size):
-                kick[k] -= h * tab.weights[kind, j] * panel.F[a, j] * panel.back[a, k, j]
+                w_end[k] -= h * tab.weights[kind, j] * panel.F[a, j] * panel.back[a, k, j]
     swing = swung(turned(phase), fl.omega * h)
     for a in range(na):
         stop = panel.active[a]
@@ -944,12 +943,13 @@ def panel_end(fl, tab, kind, phase, w, h, panel, w_end):
     for b in range(fl.blocks.shape[0]):
         j = 2 * b
         e00, e01, e10, e11, _, _, _, _, d00, d11 = there_and_back(fl.blocks[b], h)
-        x, y = w[j] + kick[j], w[j + 1] + kick[j + 1]
+        u, v = w_end[j], w_end[j + 1]  # what the forces have added, taken back to the start
+        x, y = w[j] + u, w[j + 1] + v
         w_end[j], w_end[j + 1] = e00 * x + e01 * y, e10 * x + e11 * y
-        x1, y1 = kick[j] + d00 * x + e01 * y, kick[j + 1] + e10 * x + d11 * y
+        u, v = u + d00 * x + e01 * y, v + e10 * x + d11 * y
         for a in range(na):
             stop = panel.active[a]
-            panel.depth[1, a] += fl.rows[0, stop, j] * x1 + fl.rows[0, stop, j + 1] * y1
+            panel.depth[1, a] += fl.rows[0, stop, j] * u + fl.rows[0, stop, j + 1] * v
 
 
 @inner
@@ -1516,7 +1516,8 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
                 aim = stop_at_switch(fl, w, phase, tried, closed)
             return OK if aim >= 0 else CONTACT_FAILED, kind, 0.0, aim
         for a in range(active.size):
-            noise[a] = rise_noise(fl, active[a], w, panel.depth[0, a], panel.depth[2, a], h)
+            apart = panel.depth[2, a] + 1e-15 * abs(panel.depth[0, a])
+            noise[a] = min(apart + rise_noise(fl, active[a], w, h), rounding[a])
         if not solve_panel(fl, tab, kind, phase, w, h, noise, panel):
             limit = 0.4 * min(h, tried)
             aim = -1
