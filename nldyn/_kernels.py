@@ -145,7 +145,7 @@ def there_and_back(block, t):
     square = half * half + block[0, 1] * block[1, 0]
     rate = math.sqrt(abs(square))
     less = math.expm1(mean * t)
-    size = 1.0 + less
+    size = 1.0 + less if less > -0.5 else math.exp(mean * t)
     if square >= 0.0:
         e00, e01, e10, e11 = block_exponential(block, t)
         i00, i01, i10, i11 = block_exponential(block, -t)
@@ -359,14 +359,14 @@ def output_noise(fl, out, w):
 
 
 @inner
-def rise_noise(fl, stop, w, h):
-    """The same in the change of a penetration within a time h, where it can be told."""
-    if fl.near.size > 0:
+def carried_noise(fl, stop, w, depth, h):
+    """The same in a penetration that is carried on from a depth over a time h."""
+    if fl.near.size > 0:  # a difference of values
         return np.inf
-    rise = abs(fl.forced[0, 0, stop]) * fl.omega * h
+    change = abs(fl.forced[0, 0, stop]) * fl.omega * h
     for j in range(w.size):
-        rise += h * (abs(fl.rows[1, stop, j]) + h * abs(fl.rows[2, stop, j])) * abs(w[j])
-    return 1e-15 * rise
+        change += h * (abs(fl.rows[1, stop, j]) + h * abs(fl.rows[2, stop, j])) * abs(w[j])
+    return 1e-15 * (abs(depth) + change)
 
 
 @inner
@@ -455,6 +455,28 @@ def fly_state(blocks, w, t):
         e00, e01, e10, e11 = block_exponential(blocks[b], t)
         x, y = w[2 * b], w[2 * b + 1]
         w[2 * b], w[2 * b + 1] = e00 * x + e01 * y, e10 * x + e11 * y
+
+
+@inner
+def swung(turn, angle):
+    """Change of a complex number as it turns by an angle, to its own precision."""
+    s, c = math.sin(0.5 * angle), math.cos(0.5 * angle)
+    return turn * complex(-2.0 * s * s, 2.0 * s * c)
+
+
+@inner
+def flown(fl, stop, phase, w, t):
+    """Change of a penetration in a flight of duration t from the state w, to its own precision.
+
+    The growth of near eigenvalues is left out.
+    """
+    value = (fl.forced[0, 0, stop] * swung(turned(phase), fl.omega * t)).real
+    for b in range(fl.blocks.shape[0]):
+        j = 2 * b
+        _, e01, e10, _, _, _, _, _, d00, d11 = there_and_back(fl.blocks[b], t)
+        value += fl.rows[0, stop, j] * (d00 * w[j] + e01 * w[j + 1])
+        value += fl.rows[0, stop, j + 1] * (e10 * w[j] + d11 * w[j + 1])
+    return value
 
 
 @inner
@@ -597,8 +619,8 @@ class Panel(NamedTuple):
     kept: NDArray[np.bool_]  # (1,) whether `factors` are worth keeping
     made: Real  # (2,) kind and length for which to, back and G were filled
     rise: Real  # (na, m, 2n) row (exp(A t_i) - 1) of the penetrations
-    # (3, na) penetration at start and end, carried apart from the state, whose rounding is a share
-    # of the displacement, which may be many times as large; and the error of where it began
+    # (4, na) penetration at the start and its rounding error, the same at the end: carried apart
+    # from the state, in which rounding is a share of the displacement
     depth: Real
 
 
@@ -623,7 +645,7 @@ def new_panel(fl, m, n_states, active):
         np.zeros(1, dtype=np.bool_),
         np.zeros(2),
         np.empty((na, m, n_states)),
-        np.zeros((3, na)),
+        np.empty((4, na)),
     )
 
 
@@ -738,13 +760,6 @@ def forced_output(fl, out, phase):
     """Response of an output to the excitation at a forcing phase."""
     value, _, _, _ = swelling(fl.near, fl.forced, fl.omega, out, phase)
     return value + (fl.forced[0, 0, out] * turned(phase)).real
-
-
-@inner
-def swung(turn, angle):
-    """Change of a complex number as it turns by an angle, to its own precision."""
-    s, c = math.sin(0.5 * angle), math.cos(0.5 * angle)
-    return turn * complex(-2.0 * s * s, 2.0 * s * c)
 
 
 @inner
@@ -926,30 +941,19 @@ def solve_panel(fl, tab, kind, phase, w, h, noise, panel):
 @inner
 def panel_end(fl, tab, kind, phase, w, h, panel, w_end):
     """State w_end and penetrations at the end of a panel from the forces at its nodes."""
-    na = panel.active.size
+    for a in range(panel.active.size):
+        panel.depth[2, a] = panel.depth[0, a]
     for k in range(w.size):
-        w_end[k] = 0.0
-        for a in range(na):
+        kick = 0.0  # what the forces have added, taken back to the start
+        for a in range(panel.active.size):
             for j in range(tab.nodes.size):
-                w_end[k] -= h * tab.weights[kind, j] * panel.F[a, j] * panel.back[a, k, j]
-    swing = swung(turned(phase), fl.omega * h)
-    for a in range(na):
-        stop = panel.active[a]
-        panel.depth[1, a] = panel.depth[0, a] + (fl.forced[0, 0, stop] * swing).real
-        if fl.near.size > 0:
-            there, _, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, phase + fl.omega * h)
-            before, _, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, phase)
-            panel.depth[1, a] += there - before
-    for b in range(fl.blocks.shape[0]):
-        j = 2 * b
-        e00, e01, e10, e11, _, _, _, _, d00, d11 = there_and_back(fl.blocks[b], h)
-        u, v = w_end[j], w_end[j + 1]  # what the forces have added, taken back to the start
-        x, y = w[j] + u, w[j + 1] + v
-        w_end[j], w_end[j + 1] = e00 * x + e01 * y, e10 * x + e11 * y
-        u, v = u + d00 * x + e01 * y, v + e10 * x + d11 * y
-        for a in range(na):
-            stop = panel.active[a]
-            panel.depth[1, a] += fl.rows[0, stop, j] * u + fl.rows[0, stop, j + 1] * v
+                kick -= h * tab.weights[kind, j] * panel.F[a, j] * panel.back[a, k, j]
+        w_end[k] = w[k] + kick
+        for a in range(panel.active.size):
+            panel.depth[2, a] += fl.rows[0, panel.active[a], k] * kick
+    for a in range(panel.active.size):
+        panel.depth[2, a] += flown(fl, panel.active[a], phase, w_end, h)
+    fly_state(fl.blocks, w_end, h)
 
 
 @inner
@@ -1516,8 +1520,9 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
                 aim = stop_at_switch(fl, w, phase, tried, closed)
             return OK if aim >= 0 else CONTACT_FAILED, kind, 0.0, aim
         for a in range(active.size):
-            apart = panel.depth[2, a] + 1e-15 * abs(panel.depth[0, a])
-            noise[a] = min(apart + rise_noise(fl, active[a], w, h), rounding[a])
+            more = carried_noise(fl, active[a], w, panel.depth[0, a], h)
+            panel.depth[3, a] = panel.depth[1, a] + more
+            noise[a] = min(panel.depth[3, a], rounding[a])
         if not solve_panel(fl, tab, kind, phase, w, h, noise, panel):
             limit = 0.4 * min(h, tried)
             aim = -1
@@ -1710,8 +1715,8 @@ def run_pieces(
     skip = 0.0
     flight, none = (FLIGHT, -1) if duration >= 0.0 else (0, 0)  # as above
     w_end = np.empty(w.size)
-    # penetrations of stops that have been closed for a panel, and the errors they began with
-    depth, doubt = np.full(n_stops, np.nan), np.zeros(n_stops)
+    # penetrations that are carried from panel to panel, and their rounding errors
+    depth, doubt = np.zeros(n_stops), np.full(n_stops, np.inf)
     for _ in range(20000):
         remain = duration - t
         if remain <= 0.0:
@@ -1723,6 +1728,8 @@ def run_pieces(
             if closed[s]:
                 active[n_active] = s
                 n_active += 1
+            else:
+                doubt[s] = np.inf
         if n_active == 0:
             first, stop = remain, none
             for s in range(n_stops):
@@ -1754,17 +1761,16 @@ def run_pieces(
                 closed[active[0]] = False
                 closings[active[0]] -= 1
                 start_switch, skip = 0, max(left, shortest)
-                depth[active[0]] = np.nan
                 continue
         h_max = min(remain, h_mapped if start_switch == 1 else h_even)
         for a in range(n_active):
-            panel.depth[0, a] = depth[active[a]]
-            if np.isnan(depth[active[a]]):
-                value, noise = distance(fl, active[a], w, here), output_noise(fl, active[a], w)
-                begins = abs(value) <= noise
-                panel.depth[0, a] = 0.0 if begins else value
+            noise = output_noise(fl, active[a], w)
+            if doubt[active[a]] >= noise:  # the state knows it as well
+                value = distance(fl, active[a], w, here)
+                begins = start_switch == 1 and abs(value) <= noise
+                depth[active[a]] = 0.0 if begins else value
                 doubt[active[a]] = 0.0 if begins else noise
-            panel.depth[2, a] = doubt[active[a]]
+            panel.depth[0, a], panel.depth[1, a] = depth[active[a]], doubt[active[a]]
         status, kind, h, event = contact_panel(
             fl, tab, here, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec
         )
@@ -1787,7 +1793,7 @@ def run_pieces(
                 w[k] = w_end[k]
             t = duration if h >= remain else t + h
             for a in range(n_active):
-                depth[active[a]] = panel.depth[1, a]
+                depth[active[a]], doubt[active[a]] = panel.depth[2, a], panel.depth[3, a]
         start_switch = 0
         if event >= 0:
             closed[event] = not closed[event]
@@ -1795,9 +1801,6 @@ def run_pieces(
             if closed[event]:
                 closings[event] += 1
             switch_with(fl, w, phase + fl.omega * t, h, closed, closings)
-            for s in range(n_stops):
-                if not closed[s]:
-                    depth[s] = np.nan
             skip = shortest if h < shortest else 0.0
     return TOO_MANY_PIECES
 

@@ -215,9 +215,8 @@ CASES = (
         PROMISE,
         chatter_orbit_error,
         quick=False,
-        fault="at any tolerance, by rounding of shallow penetrations, see stiffness; without that "
-        "1e-8 is left, as flights are carried as the difference to the steady response, 26 mm "
-        "where the motion is micrometres (one rounding of the motion before each impact: 5e-12)",
+        fault="1e-9 to 7e-9 at any tolerance, as the starts and the segments round; one rounding of "
+        "the force, a frequency or ω makes 6e-12",
     ),
     Case(
         SUBJECT,

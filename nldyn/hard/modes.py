@@ -182,8 +182,6 @@ CASES = (
         PROMISE,
         spread_error,
         quick=False,
-        fault="panels are as long as the fastest mode allows for the state; the Jacobian, which "
-        "short contacts amplify, has 4.5e-9 with panels 5 % shorter; its conditioning allows 2e-15",
     ),
     *(
         Case(

@@ -23,11 +23,6 @@ HZ = 0.3
 OMEGA = 2.0 * math.pi * HZ
 RIGID = "closed form of the impact oscillator with restitution 1 [Shaw and Holmes 1983]"
 RATE = 0.4  # a Hertz contact lasts s^(-2/5)
-ROUNDED = (
-    "displacements are rounded to 1e-16 of the amplitude, a share of the penetration that the "
-    "contact's stiff slope amplifies by speed over penetration; penetrations would have to be "
-    "carried apart from the state"
-)
 SECOND = "(ωτ)² of the contact's duration τ, the first term left out, or the promise of the state"
 
 
@@ -127,7 +122,6 @@ CASES = (
             JACOBIAN,
             PROMISE,
             partial(stiff_flow_error, stiffness),
-            fault=ROUNDED if stiffness > 1e11 else "",
         )
         for stiffness in (1e6, 1e9, 1e12, 1e15)
     ),
@@ -161,7 +155,6 @@ CASES = (
             second_order(stiffness),
             SECOND,
             partial(dwelling_error, stiffness),
-            fault=ROUNDED if stiffness > 1e20 else "",
         )
         for stiffness, hard in (
             (1e10, "short contacts"),
