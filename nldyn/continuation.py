@@ -45,9 +45,9 @@ from nldyn.special import (
     NEIGHBOUR,
     Chord,
     LocateError,
+    crosses,
     insert_dip,
     special_points_between,
-    tests,
     without_repeats,
 )
 from nldyn.system import numbers
@@ -58,7 +58,6 @@ MEETS_OPEN_END = "meets another branch where that was broken off"
 EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
 MEETING_STEP = 0.004  # longest step over which a doubled branch may meet the one it comes from
 SHORTEST_CROSSING = 1e-4  # step over which a branch may cross another one
-ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
 SHORTEST_DETOUR = 1e-6  # first step of a walk that looks closely at what lies within a step
 MOST_DETOUR = 500  # points of such a walk
 MOST_POINTS = 10**8  # in one direction
@@ -286,7 +285,7 @@ class Walk:
         if step > MEETING_STEP and passed_flip(here.orbit, orbit):
             return None
         point = BranchPoint(orbit, tangent, here.arclength + step)
-        if step > SHORTEST_CROSSING and _crosses(here, point):
+        if step > SHORTEST_CROSSING and crosses(here, point):
             return None
         return point, angle, miss
 
@@ -463,19 +462,6 @@ def _jumped(problem: ShootingProblem, here: Real, guess: Real, there: Real) -> b
     if after < EQUAL_HALVES * before:  # on the branch of half the period
         return True
     return float(a @ b) < 0.0 and float(np.linalg.norm(b - g)) > 0.5 * max(before, after)
-
-
-def _crosses(a: BranchPoint, b: BranchPoint) -> bool:
-    """Whether a branch crosses another one between two points, or jumps to it.
-
-    The determinant of the shooting equations bordered by the tangent keeps its sign along a branch
-    up to where it crosses another one. It has the sign of det(Φ - 1) over the tangent's frequency
-    part, for both vanish at a fold.
-    """
-    first, last = tests(a), tests(b)
-    if min(abs(first["BP"]), abs(last["BP"])) < ROUNDED:
-        return False
-    return first["BP"] * first["LP"] * last["BP"] * last["LP"] < 0.0
 
 
 def start_point(orbit: Orbit, direction: float) -> BranchPoint:

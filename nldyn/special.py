@@ -33,6 +33,7 @@ CROSSING_ERROR = 1e-8  # relative, of an orbit where branches cross
 NEIGHBOUR = 1e-3  # arclength between two branch points at one turn, and dP/ds there
 SAME = 1e-7  # arclength between two branch points that cannot be told apart
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
+ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
 MOST_LOOKS = 6  # times that a step is cut at such points
 SHORTEST_LOOK = 1e-6  # arclength of a step, below which it is not cut there
@@ -66,6 +67,19 @@ def tests(point: BranchPoint) -> dict[str, float]:
     return point.tests
 
 
+def crosses(a: BranchPoint, b: BranchPoint) -> bool:
+    """Whether a branch crosses another one between two points, or jumps to it.
+
+    The determinant of the shooting equations bordered by the tangent keeps its sign along a branch
+    up to where it crosses another one. It has the sign of det(Φ - 1) over the tangent's frequency
+    part, for both vanish at a fold.
+    """
+    first, last = tests(a), tests(b)
+    if min(abs(first["BP"]), abs(last["BP"])) < ROUNDED:
+        return False
+    return first["BP"] * first["LP"] * last["BP"] * last["LP"] < 0.0
+
+
 @dataclass(frozen=True)
 class Chord:
     """The piece of a branch between two neighbouring points, as a function of σ in [0, 1].
@@ -94,7 +108,7 @@ class Chord:
         LocateError
             If Newton's method fails there, or finds an orbit at which the branch runs across the
             chord: then it turns between the two points, and a tangent that is taken along the chord
-            would change its sign without passing a fold.
+            would change its sign without passing a fold. Or if it finds one of another branch.
         """
         if sigma <= 0.0:
             return self.first
@@ -119,8 +133,11 @@ class Chord:
             orbit = Orbit(problem, *crossing, a.orbit.observe)
             tangent = self._direction(sigma)
         length = a.arclength + sigma * (self.last.arclength - a.arclength)
-        self.known[sigma] = BranchPoint(orbit, tangent, length)
-        return self.known[sigma]
+        point = BranchPoint(orbit, tangent, length)
+        if crosses(self.first, point) and crosses(self.last, point):
+            raise LocateError("the branch turns within one step")
+        self.known[sigma] = point
+        return point
 
     def place(self, point: BranchPoint) -> float:
         """Position σ of a point of the branch, which may lie beyond the ends."""

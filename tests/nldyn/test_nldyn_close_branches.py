@@ -9,6 +9,7 @@ import pytest
 from test_nldyn_uncoupled import oscillator
 
 from nldyn import ContinuationOptions, System, continue_branch, solve_orbit
+from nldyn.hard.continuation import beam as four_modes
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
 
@@ -48,6 +49,16 @@ def test_branch_is_not_left_for_another_that_it_nearly_crosses(beam):
         assert special_points(long) == [
             (kind, pytest.approx(hz, rel=1e-9)) for kind, hz in special_points(short)
         ]
+
+
+def test_no_folds_are_found_on_another_branch_within_a_step():
+    """From 50.83 Hz a step leads over a narrow resonance with another branch beside it."""
+    above = continue_branch(solve_orbit(four_modes(0.001), 55.5), (50.4, 55.6))
+    orbit = above.at(50.8308)[0]
+    long, short = (continue_branch(orbit, (49.0, 52.5), options=o) for o in (LONG, SHORT))
+    assert special_points(long) == [
+        (kind, pytest.approx(hz, rel=1e-9)) for kind, hz in special_points(short)
+    ]
 
 
 def test_doubled_branch_does_not_go_on_along_the_one_that_it_comes_from():
