@@ -128,12 +128,11 @@ LISTED = (
 # followed again from the next orbit.
 LONG = ContinuationOptions(max_points=20000)
 
-# Flips are followed to period 8, branches longer in period than 3 with up to 25 points each way; at
-# low damping the 4-DOF model has too many: there, from period 1 to 2 only.
-DOUBLED, DOUBLED_ONCE = (8, 25), (2, 25)
+# Flips are followed to period 8, branches longer in period than 3 with up to 25 points each way.
+DOUBLED = (8, 25)
 
 JOBS = (
-    Job("four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (18.0, 90.0), doubled=DOUBLED_ONCE),
+    Job("four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (18.0, 90.0), doubled=DOUBLED),
     Job("two_dof_xi_0.01", _scene("two_dof_xi_0.01"), (15.0, 90.0), doubled=DOUBLED),
     Job("two_dof_xi_0.001", _scene("two_dof_xi_0.001"), (18.0, 90.0), doubled=DOUBLED),
     Job("four_dof_xi_0.01", _scene("four_dof_xi_0.01"), (15.0, 90.0), doubled=DOUBLED),

@@ -304,9 +304,9 @@ def test_bad_lists_are_refused_before_anything_is_computed(call, said):
         call(make_one_dof())
 
 
-@pytest.fixture(scope="module")
-def cluster(tmp_path_factory):
-    """A client of three worker processes on this machine."""
+@pytest.fixture
+def cluster(tmp_path):
+    """A client of three new worker processes: one that was killed is not always started again."""
     distributed = pytest.importorskip("distributed")
     import dask
 
@@ -315,7 +315,7 @@ def cluster(tmp_path_factory):
         dask.config.set(settings),
         distributed.LocalCluster(
             n_workers=3, threads_per_worker=1, processes=True, dashboard_address=None,
-            local_directory=str(tmp_path_factory.mktemp("dask")),
+            local_directory=str(tmp_path / "dask"),
         ) as cluster,
         distributed.Client(cluster) as client,
     ):  # fmt: skip
@@ -328,7 +328,7 @@ def one_worker_killed(client) -> Iterator[Executor]:
 
     It is stopped before, so that it has not done that, however fast the computations are.
     """
-    client.wait_for_workers(3)
+    client.wait_for_workers(3, timeout=120)
     pids = client.run(os.getpid)
     assert len(set(pids.values())) == 3
     address, pid = next(iter(pids.items()))
