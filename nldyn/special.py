@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice, pairwise
 
@@ -29,6 +29,7 @@ from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
 
 PRECISION = 1e-9  # in σ, to which a special point is located
+BESIDE = 1e-3  # in σ: the least distance of points that tell the direction of a branch
 CROSSING_ERROR = 1e-8  # relative, of an orbit where branches cross
 NEIGHBOUR = 1e-3  # arclength between two branch points at one turn, and dP/ds there
 SAME = 1e-7  # arclength between two branch points that cannot be told apart
@@ -131,7 +132,7 @@ class Chord:
             if crossing is None or crossing[2] > CROSSING_ERROR:
                 raise LocateError(found.failure)
             orbit = Orbit(problem, *crossing, a.orbit.observe)
-            tangent = self._direction(sigma)
+            tangent = self.direction(sigma)
         length = a.arclength + sigma * (self.last.arclength - a.arclength)
         point = BranchPoint(orbit, tangent, length)
         if crosses(self.first, point) and crosses(self.last, point):
@@ -158,12 +159,27 @@ class Chord:
             + x * x * (x - 1.0) * end
         )
 
-    def _direction(self, sigma: float) -> Real:
-        """Unit tangent from interpolated points: where branches cross the equations give none."""
-        step = 1e-3 * min(sigma, 1.0 - sigma)
-        secant = self.between(sigma + step) - self.between(sigma - step)
+    def direction(self, sigma: float) -> Real:
+        """Unit tangent by interpolation between points beside σ, or along a short chord.
+
+        Where branches cross, the equations give none, and very near to that none that is good.
+        """
+        if abs(self.last.arclength - self.first.arclength) < NEIGHBOUR:
+            return self._unit(self._secant)
+        below = max((s for s in self.known if s <= sigma - BESIDE), default=0.0)
+        above = min((s for s in self.known if s >= sigma + BESIDE), default=1.0)
+        a, b, width = self.at(below), self.at(above), above - below
+        x = (sigma - below) / width
+        towards = (
+            6.0 * x * (1.0 - x) * (b.orbit.point - a.orbit.point) / width
+            + (1.0 - x) * (1.0 - 3.0 * x) * self._slope(a)
+            + x * (3.0 * x - 2.0) * self._slope(b)
+        )
+        return self._unit(towards)
+
+    def _unit(self, vector: Real) -> Real:
         weights = self.first.orbit.problem.metric(self.first.orbit.point)
-        return np.asarray(secant / math.sqrt(float(secant @ (weights * secant))))
+        return np.asarray(vector / math.sqrt(float(vector @ (weights * vector))))
 
     def _across(self, tangent: Real) -> bool:
         """Whether a tangent departs from the chord by more than a branch may within a step."""
@@ -387,7 +403,7 @@ def located_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[Spec
         return located_between(a, middle, depth + 1) + located_between(middle, b, depth + 1)
     found = [locate(k, chord, lambda point, k=k: tests(point)[k]) for k in kinds]  # type: ignore[misc]
     found = [s for s in found if s.kind != "NS" or _on_unit_circle(s.orbit.multipliers)]
-    found = [_crossing_or_fold(s) for s in found]
+    found = [_along(chord, _crossing_or_fold(s)) for s in found]
     if contacts and touches:
         found.append(locate("GR", chord, touches[0].depth))
     found.sort(key=lambda s: s.point.arclength, reverse=bool(b.arclength < a.arclength))
@@ -401,12 +417,14 @@ def without_repeats(found: list[SpecialPoint]) -> list[SpecialPoint]:
     """Of neighbouring branch points where one branch turns, only the one nearest to the turn.
 
     A branch that turns where it meets another one has a multiplier that touches 1 there without
-    passing it, so that rounding decides how often the branch point's test changes sign.
+    passing it, so that rounding decides how often the branch point's test changes sign. The turn is
+    no fold.
     """
     kept: list[SpecialPoint] = []
     for special in found:
         if kept and _turns_twice(kept[-1], special):
-            kept[-1] = min(kept[-1], special, key=_pace)
+            crossings = [s for s in (kept[-1], special) if s.kind == "BP"]
+            kept[-1] = min(crossings, key=_pace)
         else:
             kept.append(special)
     return kept
@@ -415,7 +433,8 @@ def without_repeats(found: list[SpecialPoint]) -> list[SpecialPoint]:
 def _turns_twice(a: SpecialPoint, b: SpecialPoint) -> bool:
     apart = abs(a.point.arclength - b.point.arclength)
     turning = apart < NEIGHBOUR and max(_pace(a), _pace(b)) < NEIGHBOUR
-    return a.kind == b.kind == "BP" and (turning or apart < SAME)
+    kinds = {a.kind, b.kind}
+    return (kinds == {"BP"} and (turning or apart < SAME)) or (kinds == {"BP", "LP"} and turning)
 
 
 def _pace(special: SpecialPoint) -> float:
@@ -431,6 +450,15 @@ def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
     if special.kind == "LP" and turns_at_crossing(special.orbit):
         return SpecialPoint("BP", special.point, special.frequency_error)
     return special
+
+
+def _along(chord: Chord, special: SpecialPoint) -> SpecialPoint:
+    """A special point of a chord; a branch point with the tangent of the chord's branch."""
+    if special.kind != "BP":
+        return special
+    at = special.point
+    tangent = chord.direction(chord.place(at))
+    return replace(special, point=BranchPoint(at.orbit, tangent, at.arclength))
 
 
 def accounted(a: Orbit, found: list[SpecialPoint], b: Orbit) -> bool:

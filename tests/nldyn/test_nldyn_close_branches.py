@@ -8,8 +8,17 @@ import numpy as np
 import pytest
 from test_nldyn_uncoupled import oscillator
 
-from nldyn import ContinuationOptions, System, continue_branch, solve_orbit
+from nldyn import (
+    ContinuationOptions,
+    HarmonicForce,
+    Stop,
+    System,
+    continue_branch,
+    solve_orbit,
+    switch_at_branch_point,
+)
 from nldyn.hard.continuation import beam as four_modes
+from nldyn.normal_forms import is_symmetric
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
 
@@ -87,6 +96,25 @@ def test_special_points_where_a_closed_branch_closes_are_told_once():
     assert sorted(special_points(branch)) == [
         (kind, pytest.approx(hz, rel=1e-8)) for kind, hz in sorted(special_points(elsewhere))
     ]
+
+
+@pytest.mark.parametrize("max_step", [0.05, 0.02, 0.005])
+def test_halves_of_a_broken_symmetry_do_not_depend_on_the_step(max_step):
+    """At a pitchfork the equations have two tangents; that of the branch is known beside it."""
+    system = System.from_modal(
+        [10.0], {"m": [1.0]}, modal_damping=0.02, excitation=[HarmonicForce("m", 2.0)],
+        stops=[Stop.linear("m", 1e6, gap=1e-3, direction=side) for side in (1, -1)],
+    )  # fmt: skip
+    options = ContinuationOptions(max_step=max_step, first_step=0.005)
+    symmetric = continue_branch(solve_orbit(system, 4.0), (4.0, 12.0), options=options)
+    points = [s for s in symmetric.special_points if s.kind == "BP"]
+    assert [p.frequency_hz for p in points] == pytest.approx([7.0298072, 9.4031911], rel=1e-7)
+    for point in points:
+        halves = [half.orbit for half in switch_at_branch_point(point)]
+        assert len(halves) == 2 and not any(is_symmetric(orbit) for orbit in halves)
+    branch = continue_branch(halves[0], (9.0, 9.5), options=options)
+    turns = [s for s in branch.special_points if abs(s.frequency_hz - 9.4031911) < 1e-6]
+    assert [s.kind for s in turns] == ["BP"]
 
 
 def special_points(branch):
