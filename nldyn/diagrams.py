@@ -218,7 +218,7 @@ class Collector:
         if any(_is_at(end, special) for end in self.flip_ends):
             return
         try:
-            start = switch_at_flip(special)
+            start = _first_of_doubled(special)
         except LocateError as error:
             self.notes.append(str(error))
             return
@@ -255,6 +255,24 @@ class Collector:
         else:
             branch = complete("", None, None, start, course, progress, self.checkpoint, origin)
         self.add(branch)
+
+
+def _first_of_doubled(flip: SpecialPoint) -> BranchPoint:
+    """First point of a doubled branch, so near to its flip that no special point lies between.
+
+    As many multipliers lie outside the unit circle there as at a point still nearer to the flip.
+    """
+    start = switch_at_flip(flip)
+    for amplitude in (5e-3, 1.25e-3):
+        nearer = switch_at_flip(flip, amplitude)
+        if _outside(nearer.orbit) == _outside(start.orbit):
+            return start
+        start = nearer
+    return start
+
+
+def _outside(orbit: Orbit) -> int:
+    return int((np.abs(orbit.multipliers) > 1.0).sum())
 
 
 def middle_orbit(branch: Branch) -> Orbit:

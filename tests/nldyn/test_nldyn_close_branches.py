@@ -14,8 +14,10 @@ from nldyn import (
     Stop,
     System,
     continue_branch,
+    diagram,
     solve_orbit,
     switch_at_branch_point,
+    switch_at_flip,
 )
 from nldyn.hard.continuation import beam as four_modes
 from nldyn.normal_forms import is_symmetric
@@ -96,6 +98,20 @@ def test_special_points_where_a_closed_branch_closes_are_told_once():
     assert sorted(special_points(branch)) == [
         (kind, pytest.approx(hz, rel=1e-8)) for kind, hz in sorted(special_points(elsewhere))
     ]
+
+
+def test_flip_of_a_doubled_branch_close_to_its_birth_is_found(beam):
+    """It lies between the flip at 35.67148 Hz and the usual first point of a doubled branch."""
+    parent = solve_orbit(beam, 36.0)
+    flip = next(s for s in continue_branch(parent, (35.5, 36.5)).special_points if s.kind == "PD")
+    both_ways = continue_branch(switch_at_flip(flip).orbit, (35.5, 36.5))
+    found = diagram(parent.problem.flow, (35.5, 36.5), [1], doublings=1, search_points=1)
+    born = next(b for b in found.branches if b.stop_reasons[0].startswith("born at the flip"))
+    close, expected = (
+        [s.frequency_hz for s in b.special_points if s.kind == "PD" and s.frequency_hz < 35.672]
+        for b in (born, both_ways)
+    )
+    assert len(expected) == 1 and close == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("max_step", [0.05, 0.02, 0.005])
