@@ -449,12 +449,11 @@ def _jumped(problem: ShootingProblem, here: Real, guess: Real, there: Real) -> b
     flip the halves change places steadily, as the tangent foretells; not in a jump. Nor does a
     doubled branch go on along the one that it comes from.
     """
-    begin, end = problem.nodes(here), problem.nodes(there)
-    apart = float(np.linalg.norm(end - begin))
-    for move in range(1, problem.period):
-        shifted = np.roll(end, move * (problem.segments // problem.period), axis=0)
-        if 2 * move != problem.period and float(np.linalg.norm(shifted - begin)) < apart:
-            return True
+    apart, *others = (float(np.linalg.norm((p - here)[:-1])) for p in shifts(problem, there))
+    if problem.period % 2 == 0:  # half its period: a flip, below
+        del others[problem.period // 2 - 1]
+    if any(other < apart for other in others):
+        return True
     if problem.period % 2:
         return False
     a, g, b = (_half_difference(problem, point) for point in (here, guess, there))

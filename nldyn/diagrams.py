@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from cms.threads import one_thread
+from nldyn._events import number_outside
 from nldyn.branch import (
     POINTS,
     SHORT_STEP,
@@ -265,14 +266,11 @@ def _first_of_doubled(flip: SpecialPoint) -> BranchPoint:
     start = switch_at_flip(flip)
     for amplitude in (5e-3, 1.25e-3):
         nearer = switch_at_flip(flip, amplitude)
-        if _outside(nearer.orbit) == _outside(start.orbit):
+        there, here = (number_outside(p.orbit.multipliers, 0.0)[0] for p in (nearer, start))
+        if there == here:
             return start
         start = nearer
     return start
-
-
-def _outside(orbit: Orbit) -> int:
-    return int((np.abs(orbit.multipliers) > 1.0).sum())
 
 
 def middle_orbit(branch: Branch) -> Orbit:

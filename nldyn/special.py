@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice, pairwise
+from operator import itemgetter
 
 import numpy as np
 
@@ -313,17 +314,13 @@ def looked_into(
     beside = [p for p in (z, c) if p is not None and p.orbit.impacts == a.orbit.impacts]
     places = {chord.place(p): p for p in beside}
     places = {x: p for x, p in places.items() if x < -CLOSE or x > 1.0 + CLOSE}
-    near = sorted([*places.items(), (0.0, a), (1.0, b)], key=_place)
+    near = sorted([*places.items(), (0.0, a), (1.0, b)], key=itemgetter(0))
     where = Between([p.orbit for _, p in near], [x for x, _ in near]).where_to_look()
     if where is None:
         return []
     middle = chord.at(where)
     first = looked_into(z, a, middle, b, most - 1)
     return [*first, middle, *looked_into(a, middle, b, c, most - 1)]
-
-
-def _place(placed: tuple[float, BranchPoint]) -> float:
-    return placed[0]
 
 
 def resolved(
