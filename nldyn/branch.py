@@ -28,6 +28,7 @@ Part = Literal["points", "special_points", "requested"]
 
 # why a continuation stopped
 CLOSED = "closed branch"
+JOINS = "joins"  # the branch of half the period, at a flip
 RANGE_END = "end of the frequency range"
 NOT_FINISHED = "not finished"
 POINTS = " points"  # after their number
@@ -440,6 +441,25 @@ def same_orbit(a: Orbit, b: Orbit, rtol: float = 1e-5) -> bool:
     return any(
         float(np.abs(first - np.roll(second, shift, axis=0)).max()) <= rtol * scale
         for shift in range(a.period)
+    )
+
+
+def is_at(orbit: Orbit, special: SpecialPoint, multiple: int = 1) -> bool:
+    """Whether an orbit is that of a special point, run through several times, up to a shift.
+
+    Mirror images are not the same.
+    """
+    other = special.orbit
+    if orbit.period != multiple * other.period:
+        return False
+    if not math.isclose(orbit.frequency_hz, special.frequency_hz, rel_tol=1e-6):
+        return False
+    first = stroboscopic(orbit)
+    second = np.tile(stroboscopic(other), (multiple, 1))
+    size = 1e-3 * float(np.abs(second).max())
+    return any(
+        float(np.abs(first - np.roll(second, shift, axis=0)).max()) <= size
+        for shift in range(other.period)
     )
 
 

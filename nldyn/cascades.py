@@ -8,12 +8,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nldyn.branch import Branch, BranchPoint, SpecialPoint, check_branches, check_special
+from nldyn.branch import (
+    JOINS,
+    Branch,
+    BranchPoint,
+    SpecialPoint,
+    check_branches,
+    check_special,
+    is_at,
+)
 from nldyn.continuation import (
-    BORN,
     ContinuationOptions,
     Walk,
-    born_at,
     check_range,
     make_branch,
     switch_at_flip,
@@ -164,36 +170,42 @@ def cascades_in(branches: Sequence[Branch]) -> list[Cascade]:
         Each from the flip of an orbit that is not itself born at a flip.
     """
     check_branches("branches", branches)
-    origins = {branch.stop_reasons[0]: branch for branch in branches}
+    ends = [(b, end) for b in branches for end in (0, -1) if b.stop_reasons[end].startswith(JOINS)]
+    flips = [(b, special) for b in branches for special in b.special_points if special.kind == "PD"]
+    born = {
+        id(flip): (branch, end)
+        for branch, end in ends
+        for _, flip in flips
+        if is_at(branch.nodes[end].orbit, flip, 2)
+    }
+    children = [branch for branch, _ in born.values()]
     found = []
-    for branch in branches:
-        if branch.stop_reasons[0].startswith(BORN):
+    for parent, first in flips:
+        if any(parent is child for child in children):
             continue
-        for first in branch.special_points:
-            if first.kind == "PD":
-                flips, grown = [first], list[Branch]()
-                child = origins.get(born_at(first))
-                while child is not None and child.period == 2 * flips[-1].orbit.period:
-                    grown.append(child)
-                    following = _loss_of_stability(child)
-                    if following is None:
-                        break
-                    flips.append(following)
-                    child = origins.get(born_at(following))
-                if len(flips) > 2:
-                    found.append(Cascade(tuple(flips), tuple(grown), "no further branch"))
+        passed, grown = [first], list[Branch]()
+        while (following := born.get(id(passed[-1]))) is not None:
+            grown.append(following[0])
+            lost = _loss_of_stability(*following)
+            if lost is None:
+                break
+            passed.append(lost)
+        if len(passed) > 2:
+            found.append(Cascade(tuple(passed), tuple(grown), "no further branch"))
     return found
 
 
-def _loss_of_stability(branch: Branch) -> SpecialPoint | None:
-    """The flip at which a branch, followed from where it was born, loses its stability."""
+def _loss_of_stability(branch: Branch, end: int) -> SpecialPoint | None:
+    """The flip at which a branch, followed from one of its ends, loses its stability."""
+    way = 1 if end == 0 else -1
     lengths = [node.arclength for node in branch.nodes]
     stable = [node.orbit.stable for node in branch.nodes]
-    for special in branch.special_points:
+    for special in branch.special_points[::way]:
         after = int(np.searchsorted(lengths, special.point.arclength))
-        inside = special.kind == "PD" and 0 < after < len(stable)
-        if inside and stable[after - 1] and not stable[after]:
-            return special
+        if special.kind == "PD" and 0 < after < len(stable):
+            before_it, behind_it = stable[after - 1 : after + 1][::way]
+            if before_it and not behind_it:
+                return special
     return None
 
 
@@ -215,7 +227,8 @@ def _up_to_flip(
         if following is not None:
             break
     reason = walk.stop_reason if following is None else "a flip"
-    return make_branch("", nodes, specials, (born_at(flips[-1]), reason), []), following
+    first = f"begins at the flip at {flips[-1].frequency_hz:.6g} Hz"
+    return make_branch("", nodes, specials, (first, reason), []), following
 
 
 def _with_special_points(walk: Walk) -> Iterator[tuple[BranchPoint, list[SpecialPoint]]]:

@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 from cms.threads import one_thread
 from nldyn.branch import (
     CLOSED,
+    JOINS,
     NOT_FINISHED,
     POINTS,
     RANGE_END,
@@ -52,7 +53,6 @@ from nldyn.special import (
 )
 from nldyn.system import numbers
 
-BORN = "born at the flip at"
 KINK = 1e-6  # step below which a branch may bend by any angle where the number of contacts changes
 MEETS_OPEN_END = "meets another branch where that was broken off"
 EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
@@ -201,7 +201,7 @@ class Walk:
                         "that period was found"
                     )
                     return
-                self.stop_reason = f"joins {half} at the flip at {end.orbit.frequency_hz:.6g} Hz"
+                self.stop_reason = f"{JOINS} {half} at the flip at {end.orbit.frequency_hz:.6g} Hz"
                 yield end
                 return
             if self.closes(here, point):
@@ -586,7 +586,7 @@ class Trail:
                     keep()
         self._search(len(self.nodes) - 1, closely=False)
         special = self.special_points
-        if self.walk.stop_reason.startswith("joins"):  # the flip itself: a branch point of this one
+        if self.walk.stop_reason.startswith(JOINS):  # the flip itself: a branch point of this one
             last = min(self.nodes[-2].arclength, self.nodes[-1].arclength - NEIGHBOUR)
             special = [s for s in special if s.kind != "BP" or s.point.arclength < last]
         elif self.walk.stop_reason == CLOSED:  # the last step leads beyond the start
@@ -803,7 +803,6 @@ def complete(
     course: Course,
     progress: Callable[[float], None] | None,
     checkpoint: Checkpoint,
-    origin: str = "",
 ) -> Branch:
     """Walk the legs of a branch that are missing or may go on, forward first, and join them.
 
@@ -821,32 +820,26 @@ def complete(
         Called with the frequency of every point.
     checkpoint : Checkpoint
         Keeps what is computed.
-    origin : str
-        Why the branch begins at the start, if nothing lies behind it.
     """
 
-    def walked(leg: Leg | None, first: BranchPoint, whole: Callable[[Leg], Branch]) -> Leg:
+    def walked(
+        leg: Leg | None, first: BranchPoint, whole: Callable[[Leg | None], Branch | None]
+    ) -> Leg:
         if leg is not None and not goes_on(leg, course):
             return leg
         leg = leg or Leg([first], [], [], NOT_FINISHED, None)
         trail = Trail.going_on(leg, course.range_hz, course.options, course.open_ends)
 
-        def so_far() -> Branch | None:
-            part = trail.so_far()
-            return whole(part) if part else None
-
-        checkpoint.work = so_far
+        checkpoint.work = lambda: whole(trail.so_far())
         return trail.follow(progress, checkpoint.offer)
 
-    forward = walked(forward, start, lambda leg: join(name, leg, backward, course, origin))
+    forward = walked(forward, start, lambda leg: join(name, leg, backward, course) if leg else None)
     if forward.reason == CLOSED:
         backward = None
-    elif not origin:
-        first, done = start_point(start.orbit, -1.0), forward
-        if backward is not None:
-            backward.nodes[0] = first
-        backward = walked(backward, first, lambda leg: join(name, done, leg, course, origin))
-    branch = join(name, forward, backward, course, origin)
+    else:
+        done = forward
+        backward = walked(backward, _reversed(start), lambda leg: join(name, done, leg, course))
+    branch = join(name, forward, backward, course)
     points, lost = requested(branch)
     lost = [note for note in lost if note not in branch.notes]
     branch = replace(branch, requested=tuple(points), notes=(*branch.notes, *lost))
@@ -871,10 +864,10 @@ def goes_on(leg: Leg, course: Course) -> bool:
     return shortest != f"{SHORT_STEP}{options.min_step:g}" and leg.reason.startswith(SHORT_STEP)
 
 
-def join(name: str, forward: Leg, backward: Leg | None, course: Course, origin: str) -> Branch:
+def join(name: str, forward: Leg, backward: Leg | None, course: Course) -> Branch:
     """Branch of two legs from one start."""
     if backward is None:
-        first = CLOSED if forward.reason == CLOSED else origin or NOT_FINISHED
+        first = CLOSED if forward.reason == CLOSED else NOT_FINISHED
         backward = Leg([forward.nodes[0]], [], [], first, None)
     branch = make_branch(
         name,
@@ -945,11 +938,6 @@ def _reversed(point: BranchPoint) -> BranchPoint:
 
 def _reversed_special(special: SpecialPoint) -> SpecialPoint:
     return SpecialPoint(special.kind, _reversed(special.point), special.frequency_error)
-
-
-def born_at(flip: SpecialPoint) -> str:
-    """Where a doubled branch begins, in place of why its continuation stopped there."""
-    return f"{BORN} {flip.frequency_hz:.6g} Hz"
 
 
 def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoint:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,24 +11,23 @@ from pathlib import Path
 import numpy as np
 
 from cms.threads import one_thread
-from nldyn._events import number_outside
 from nldyn.branch import (
+    JOINS,
     POINTS,
     SHORT_STEP,
     Branch,
     BranchPoint,
     Course,
     SpecialPoint,
-    stroboscopic,
+    is_at,
 )
 from nldyn.checkpoint import Checkpoint, checkpoint_of_several
 from nldyn.continuation import (
     ContinuationOptions,
-    born_at,
     check_range,
     complete,
-    continue_branch,
     open_ends,
+    start_point,
     switch_at_flip,
 )
 from nldyn.errors import SystemModelError, check_frequency, check_whole
@@ -144,7 +142,7 @@ class Collector:
     def _keep(self, branch: Branch) -> None:
         self.branches.append(branch)
         ends = zip(branch.stop_reasons, (branch.nodes[0], branch.nodes[-1]), strict=True)
-        self.flip_ends += [node.orbit for reason, node in ends if reason.startswith("joins")]
+        self.flip_ends += [node.orbit for reason, node in ends if reason.startswith(JOINS)]
 
     def take_back(self, branches: Iterable[Branch], notes: Iterable[str]) -> None:
         """Take branches that an earlier run had found, named and followed up, in its order."""
@@ -157,7 +155,7 @@ class Collector:
 
     def _is_new_crossing(self, special: SpecialPoint) -> bool:
         """Whether a branch point was not met before; from now on it was."""
-        if any(_is_same_crossing(special, other) for other in self.crossings):
+        if any(is_at(special.orbit, other) for other in self.crossings):
             return False
         self.crossings.append(special)
         return True
@@ -168,19 +166,11 @@ class Collector:
             if self.known(orbit):
                 continue
             try:
-                branch = continue_branch(
-                    orbit,
-                    self.range_hz,
-                    options=self.options,
-                    progress=partial(self.progress, f"1/{orbit.period}"),
-                    open_ends=self.open_ends(orbit.period),
-                    checkpoint=self.checkpoint,
-                )
+                start = start_point(orbit, 1.0)
             except ConvergenceError as error:
                 self.notes.append(f"orbit of period {orbit.period} found but not followed: {error}")
             else:
-                if not self._repeats(branch):
-                    self.add(branch)
+                self.from_start(start)
 
     def follow(self, orbit: Orbit, longest: int, wanted: int, most: int | None) -> None:
         """Follow an orbit's branch unless it is known, and those that it leads to.
@@ -216,14 +206,14 @@ class Collector:
 
     def from_flip(self, special: SpecialPoint, options: ContinuationOptions | None = None) -> None:
         """Follow the branch that is born at a flip, unless it is known."""
-        if any(_is_at(end, special) for end in self.flip_ends):
+        if any(is_at(end, special, 2) for end in self.flip_ends):
             return
         try:
-            start = _first_of_doubled(special)
+            start = switch_at_flip(special)
         except LocateError as error:
             self.notes.append(str(error))
-            return
-        self.from_start(start, born_at(special), options)
+        else:
+            self.from_start(start, options)
 
     def from_branch_point(
         self, special: SpecialPoint, options: ContinuationOptions | None = None
@@ -237,15 +227,12 @@ class Collector:
             self.notes.append(str(error))
             return
         for start in starts:
-            origin = f"from the branch point at {special.frequency_hz:.6g} Hz"
-            self.from_start(start, origin, options)
+            self.from_start(start, options)
 
-    def from_start(
-        self, start: BranchPoint, origin: str, options: ContinuationOptions | None = None
-    ) -> None:
-        """Follow a branch from its first point one way, unless it is known or out of range."""
+    def from_start(self, start: BranchPoint, options: ContinuationOptions | None = None) -> None:
+        """Follow a branch from a point both ways, unless it is known or out of range."""
         low, high = self.range_hz
-        if not low < start.orbit.frequency_hz < high or self.known(start.orbit):
+        if not low <= start.orbit.frequency_hz <= high or self.known(start.orbit):
             return
         progress = partial(self.progress, f"1/{start.orbit.period}")
         open_ends = tuple(self.open_ends(start.orbit.period))
@@ -254,61 +241,14 @@ class Collector:
         if branch is not None:
             branch = branch.extend(progress=progress, checkpoint=self.checkpoint)
         else:
-            branch = complete("", None, None, start, course, progress, self.checkpoint, origin)
-        self.add(branch)
-
-
-def _first_of_doubled(flip: SpecialPoint) -> BranchPoint:
-    """First point of a doubled branch, so near to its flip that no special point lies between.
-
-    As many multipliers lie outside the unit circle there as at a point still nearer to the flip.
-    """
-    start = switch_at_flip(flip)
-    for amplitude in (5e-3, 1.25e-3):
-        nearer = switch_at_flip(flip, amplitude)
-        there, here = (number_outside(p.orbit.multipliers, 0.0)[0] for p in (nearer, start))
-        if there == here:
-            return start
-        start = nearer
-    return start
+            branch = complete("", None, None, start, course, progress, self.checkpoint)
+        if not self._repeats(branch):
+            self.add(branch)
 
 
 def middle_orbit(branch: Branch) -> Orbit:
     """Orbit halfway along a branch, by the number of its points: away from where it ends."""
     return branch.nodes[len(branch.nodes) // 2].orbit
-
-
-def _is_at(end: Orbit, special: SpecialPoint) -> bool:
-    """Whether a doubled branch ends at this flip."""
-    flip = special.orbit
-    return (
-        end.period == 2 * flip.period
-        and math.isclose(end.frequency_hz, flip.frequency_hz, rel_tol=2e-3)
-        and _alike(end, flip, 2e-2)
-    )
-
-
-def _is_same_crossing(a: SpecialPoint, b: SpecialPoint) -> bool:
-    """Whether two branch points, found on the two branches that cross there, are one."""
-    return (
-        a.orbit.period == b.orbit.period
-        and math.isclose(a.frequency_hz, b.frequency_hz, rel_tol=1e-6)
-        and _alike(a.orbit, b.orbit, 1e-3)
-    )
-
-
-def _alike(a: Orbit, b: Orbit, rtol: float) -> bool:
-    """Whether the states of two orbits agree once a period, up to a shift; mirror images do not.
-
-    The period of the first is a multiple of that of the second.
-    """
-    first, second = stroboscopic(a), stroboscopic(b)
-    second = np.tile(second, (len(first) // len(second), 1))
-    size = rtol * float(np.abs(second).max())
-    return any(
-        float(np.abs(first - np.roll(second, shift, axis=0)).max()) <= size
-        for shift in range(b.period)
-    )
 
 
 @one_thread()

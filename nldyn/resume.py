@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from nldyn.branch import CLOSED, NOT_FINISHED, Branch
+from nldyn.branch import Branch
 from nldyn.checkpoint import Checkpoint, checkpoint_at
 from nldyn.continuation import ContinuationOptions, check_range, complete, split
 from nldyn.crossings import check_requested
@@ -33,19 +33,16 @@ def extend(
             f"range_hz = ({low:g}, {high:g}) must contain the range of the branch, "
             f"({course.range_hz[0]:g}, {course.range_hz[1]:g})"
         )
-    first = branch.stop_reasons[0]
-    has_origin = course.ends[0] is None and first not in (NOT_FINISHED, CLOSED)
     new = replace(
         course,
         range_hz=(low, high),
         options=options or course.options,
         at=check_requested(course.at if at is None else at, (low, high)),
     )
-    origin = first if has_origin else ""
     with checkpoint_at(checkpoint) as kept:
         known = kept.branch_from(branch.points[course.start], new, course)
         if known is not None and known.course is not None and known.course.range_hz == (low, high):
             branch, course = known, known.course  # this very extension was begun before
         forward, backward = split(branch, course)
         start = branch.nodes[course.start]
-        return complete(branch.name, forward, backward, start, new, progress, kept, origin)
+        return complete(branch.name, forward, backward, start, new, progress, kept)

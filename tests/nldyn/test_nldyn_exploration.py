@@ -427,18 +427,19 @@ def test_bad_questions_are_refused_before_any_simulation(range_hz, period, says)
         explore(system_of("one_dof"), range_hz, period)
 
 
-def test_an_orbit_between_a_flip_and_the_first_point_beside_it_is_known():
-    """A doubled branch begins at some distance from its flip; what lies between belongs to it."""
+def test_a_doubled_branch_begins_at_its_flip():
+    """What lies between the flip and the orbit from which the branch is followed belongs to it."""
     flow = FlowMap(system_of("one_dof"))
     box = Collector(flow, (28.0, 60.0), "middle", ContinuationOptions(), lambda what, hz: None)
     box.from_orbits([solve_orbit(flow, 50.0)])
     flip = next(s for s in box.branches[0].special_points if s.kind == "PD")
     box.from_flip(flip)
     assert [branch.period for branch in box.branches] == [1, 2]
-    near = switch_at_flip(flip, amplitude=1e-3).orbit
-    assert not box.known(near)
-    box.from_orbits([near])
-    assert len(box.branches) == 2
+    assert box.branches[1].nodes[0].orbit.frequency_hz == pytest.approx(
+        flip.frequency_hz, rel=1e-10
+    )
+    for amplitude in (1e-2, 1e-3):
+        assert box.branches[1].contains(switch_at_flip(flip, amplitude).orbit)
 
 
 def test_orbits_beside_the_ends_of_a_doubled_branch_are_known():

@@ -10,12 +10,15 @@ from one_dof import RANGE_HZ
 
 from nldyn import (
     ContinuationOptions,
+    ExploreOptions,
+    HarmonicForce,
     Stop,
     System,
     SystemModelError,
     Unbalance,
     continue_branch,
     diagram,
+    explore,
     index_sum,
     solve_orbit,
 )
@@ -26,6 +29,30 @@ from nldyn.fixed_point_index import index
 def doubled(one_dof):
     """The harmonic branch between two flips, and what is born there."""
     return diagram(one_dof, (28.0, 60.0), (1, 2))
+
+
+def test_no_piece_of_a_doubled_branch_is_missing_beside_its_flip(doubled):
+    """The sums hold at any distance from the flips at which it begins and ends."""
+    harmonic = next(b for b in doubled.branches if b.period == 1 and b.special_points)
+    flips = [s.frequency_hz for s in harmonic.special_points if s.kind == "PD"]
+    assert flips
+    for flip in flips:
+        for distance in (1e-5, 1e-4, 1e-3):
+            for frequency in (flip * (1.0 - distance), flip * (1.0 + distance)):
+                assert [index_sum(doubled.branches, frequency, n) for n in (1, 2)] == [1, 1]
+
+
+def test_no_piece_of_a_crossing_branch_is_missing_beside_the_branch_point():
+    """Two facing linear stops break the symmetry; the halves meet where that is not far away."""
+    stops = [Stop.linear("m", 1e6, gap=1e-3, direction=side) for side in (1, -1)]
+    system = System.from_modal(
+        [10.0], {"m": [1.0]}, modal_damping=0.02, stops=stops, excitation=[HarmonicForce("m", 2.0)]
+    )
+    found = explore(
+        system, (9.2, 10.0), max_period=1, effort=ExploreOptions(spacing=0.05, starts=4)
+    )
+    for frequency in np.geomspace(9.21, 9.9, 40):
+        assert index_sum(found.diagram.branches, frequency, 1) == 1
 
 
 @settings(max_examples=40, deadline=None)
