@@ -12,14 +12,21 @@ from typing import Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nldyn.branch import same_orbit, stroboscopic
 from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
 from nldyn.executors import check_execution, values_of
-from nldyn.exploration import MOST_MULTIPLE, settling_periods
+from nldyn.exploration import settling_periods
 from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.lyapunov import LyapunovSpectrum, spectrum_from
-from nldyn.orbit import ConvergenceError, Orbit, check_bounded, check_observe
+from nldyn.orbit import (
+    LONGEST_PERIOD,
+    ConvergenceError,
+    Orbit,
+    check_bounded,
+    check_observe,
+    same_orbit,
+    stroboscopic,
+)
 from nldyn.search import orbit_near, random_states
 from nldyn.simulation import (
     MOST_PERIODS,
@@ -75,7 +82,7 @@ class AttractorOptions:
 
     def __post_init__(self) -> None:
         check_whole("classify: confirmations", self.confirmations, 0, MOST_CONFIRMATIONS)
-        check_whole("classify: max_period", self.max_period, 1, MOST_MULTIPLE)
+        check_whole("classify: max_period", self.max_period, 1, LONGEST_PERIOD)
         check_whole("classify: periods", self.periods, 32, MOST_AVERAGED)
         if self.transient is not None:
             check_whole("classify: transient", self.transient, 0, MOST_PERIODS)

@@ -22,7 +22,6 @@ from nldyn.attractors import (
     find_attractors,
     same_attractor,
 )
-from nldyn.branch import stroboscopic
 from nldyn.errors import (
     SystemModelError,
     check_frequency,
@@ -34,7 +33,7 @@ from nldyn.errors import (
 from nldyn.executors import check_execution, values_of
 from nldyn.flow import FlowMap, chain, flow_of
 from nldyn.linear import Real
-from nldyn.orbit import Orbit, check_bounded, check_observe
+from nldyn.orbit import Orbit, check_bounded, check_observe, stroboscopic
 from nldyn.system import System, numbers, same_system
 
 CHUNK = 16  # periods between two looks at where a motion is

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.errors import SystemModelError, shown
+from nldyn.errors import SystemModelError, check_types, shown
 from nldyn.linear import Real
-from nldyn.orbit import Orbit
+from nldyn.orbit import Orbit, same_orbit, stroboscopic
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -423,25 +423,8 @@ class Branch:
         """Whether the branch passes through an orbit (up to a shift by whole periods)."""
         from nldyn.crossings import passes
 
+        check_types(orbit=(orbit, Orbit))
         return orbit.period == self.period and passes(self, orbit)
-
-
-def stroboscopic(orbit: Orbit) -> Real:
-    """States (n, 2n_modes) at the start of each excitation period."""
-    problem = orbit.problem
-    return problem.nodes(orbit.point)[:: problem.segments // problem.period]
-
-
-def same_orbit(a: Orbit, b: Orbit, rtol: float = 1e-5) -> bool:
-    """Whether two orbits at one frequency agree up to a shift by whole excitation periods."""
-    if a.period != b.period or not math.isclose(a.omega, b.omega, rel_tol=1e-9):
-        return False
-    first, second = stroboscopic(a), stroboscopic(b)
-    scale = a.problem.scale(a.point)
-    return any(
-        float(np.abs(first - np.roll(second, shift, axis=0)).max()) <= rtol * scale
-        for shift in range(a.period)
-    )
 
 
 def is_at(orbit: Orbit, special: SpecialPoint, multiple: int = 1) -> bool:
@@ -461,15 +444,3 @@ def is_at(orbit: Orbit, special: SpecialPoint, multiple: int = 1) -> bool:
         float(np.abs(first - np.roll(second, shift, axis=0)).max()) <= size
         for shift in range(other.period)
     )
-
-
-def minimal_period(orbit: Orbit, rtol: float = 1e-6) -> int:
-    """Smallest number of excitation periods after which the orbit really repeats."""
-    states = stroboscopic(orbit)
-    scale = orbit.problem.scale(orbit.point)
-    for n in range(1, orbit.period):
-        if orbit.period % n == 0:
-            shifted = np.roll(states, n, axis=0)
-            if float(np.abs(states - shifted).max()) <= rtol * scale:
-                return n
-    return orbit.period

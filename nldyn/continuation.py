@@ -40,7 +40,7 @@ from nldyn.errors import (
     shown,
 )
 from nldyn.linear import Real
-from nldyn.orbit import ConvergenceError, Orbit, refine
+from nldyn.orbit import ConvergenceError, Orbit, check_minimal, refine
 from nldyn.shooting import ShootingProblem
 from nldyn.special import (
     NEIGHBOUR,
@@ -164,6 +164,9 @@ class Walk:
     stop_reason: str = NOT_FINISHED
     stride: Stride | None = None
     _obstacle: str = field(default="", init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        check_types(start=(self.start, BranchPoint), options=(self.options, ContinuationOptions))
 
     def __iter__(self) -> Iterator[BranchPoint]:
         """Walk along the branch."""
@@ -775,7 +778,9 @@ def continue_branch(
         name=(name, str),
         options=(options, ContinuationOptions, None),
         progress=(progress, Callable, None),
+        open_ends=(open_ends, Sequence),
     )
+    check_minimal(orbit)
     low, high = check_range(range_hz)
     if not low * (1.0 - 1e-9) <= orbit.frequency_hz <= high * (1.0 + 1e-9):
         raise SystemModelError(
@@ -784,7 +789,7 @@ def continue_branch(
     course = Course(
         (low, high),
         options or ContinuationOptions(),
-        tuple(open_ends),
+        tuple(numbers("open_ends", end) for end in open_ends),
         check_requested(at, (low, high)),
     )
     with checkpoint_at(checkpoint) as kept:

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from nldyn.branch import Branch, BranchPoint, same_orbit, stroboscopic
+from nldyn.branch import Branch, BranchPoint
 from nldyn.errors import SystemModelError, check_frequency, shown
 from nldyn.linear import Real
-from nldyn.orbit import Orbit
+from nldyn.orbit import Orbit, same_orbit, stroboscopic
 from nldyn.special import Chord, LocateError, root
 
 SAME = 4e-15  # difference of two logarithms of a frequency that is rounding

@@ -21,7 +21,7 @@ from nldyn.conditions import MONITORS, BranchPoint, Grazing, Held, Singular
 from nldyn.curve_marks import LocatedPoint
 from nldyn.curve_walk import CurvePoint
 from nldyn.curves import Curve
-from nldyn.errors import SystemModelError, shown
+from nldyn.errors import SystemModelError, check_types, shown
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
 from nldyn.orbit import Orbit
@@ -37,6 +37,7 @@ from nldyn.store import (
     _read_flow,
     _set_attribute,
     _write_flow,
+    checked_laws,
     write_whole,
 )
 from nldyn.tables import UNITS
@@ -84,9 +85,11 @@ def load_curves(
     path: str | Path, *, laws: Laws | None = None, monitor: OwnMonitor | None = None
 ) -> list[Curve]:
     """Read all curves of a file; see `load_curve`."""
+    known = checked_laws(laws)
+    check_types(monitor=(monitor, Callable, None))
     with _opened(path, FORMAT, FORMAT_VERSION) as root:
         groups = root.group("curves").groups()
-        return [_read_curve(group, laws or {}, monitor) for group in groups]
+        return [_read_curve(group, known, monitor) for group in groups]
 
 
 def load_curve(

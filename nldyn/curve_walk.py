@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ from nldyn.bordered import (
     gradient,
     tangent_surface,
 )
+from nldyn.branch import SHORT_STEP
 from nldyn.codimension import codimension_tests, is_torus
 from nldyn.conditions import Both, BranchPoint, Grazing, Singular
 from nldyn.continuation import ContinuationOptions, passed_flip
@@ -212,6 +213,7 @@ class CurveWalk:
     start: CurvePoint
     options: ContinuationOptions
     stop_reason: str = "not finished"
+    _obstacle: str = field(default="", init=False, repr=False)
 
     def __iter__(self) -> Iterator[CurvePoint]:
         """Walk along the curve."""
@@ -235,7 +237,9 @@ class CurveWalk:
                         if corner is not None:
                             attempt = corner, self.options.max_angle, self.options.max_miss
                     if step < self.options.min_step:
-                        self.stop_reason = f"step below {self.options.min_step:g}"
+                        self.stop_reason = (
+                            f"{SHORT_STEP}{self.options.min_step:g}: {self._obstacle}"
+                        )
                         return
             there, angle, miss = attempt
             last = self._end(here, there)
@@ -270,7 +274,9 @@ class CurveWalk:
             family, predicted, here.condition, row, float(row @ straight), max_iterations=8
         )
         if not found.converged:
+            self._obstacle = found.failure
             return None
+        self._obstacle = "what Newton's method finds is not the next point of the curve"
         miss = _length(weights, found.at.point - predicted) / step
         off = _length(weights, found.at.point - straight)
         if miss > self.options.max_miss or off > 0.75 * self.options.max_angle * step:

@@ -26,7 +26,7 @@ from nldyn.curve_walk import (
 )
 from nldyn.errors import SystemModelError, check_choice, check_types, is_finite, shown
 from nldyn.linear import Real
-from nldyn.orbit import ConvergenceError, Orbit
+from nldyn.orbit import ConvergenceError, Orbit, check_minimal
 from nldyn.parameter_values import Chart, checked_parameter, value_of
 from nldyn.parameters import Parameter
 from nldyn.special import LocateError, root
@@ -441,6 +441,7 @@ def _charts(
         options=(options, ContinuationOptions, None),
         progress=(progress, Callable, None),
     )
+    check_minimal(orbit)
     if len(parameters) != count:
         raise SystemModelError(f"a curve of this kind needs two parameters, got {len(parameters)}")
     if len(ranges) != count:

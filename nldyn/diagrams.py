@@ -30,7 +30,7 @@ from nldyn.continuation import (
     start_point,
     switch_at_flip,
 )
-from nldyn.errors import SystemModelError, check_frequency, check_whole
+from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
 from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.normal_forms import switch_at_branch_point
@@ -312,6 +312,15 @@ def diagram(
     """
     flow = flow_of(system)
     low, high = check_range(range_hz)
+    check_types(
+        periods=(periods, Sequence),
+        seeds=(seeds, Sequence),
+        options=(options, ContinuationOptions, None),
+        search=(search, SearchOptions, None),
+        progress=(progress, Callable, None),
+    )
+    for seed in seeds:
+        check_types(**{"seeds: each": (seed, Seed)})
     for period in periods:
         check_whole("periods: each", period, 1)
     wanted = sorted(set(periods))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nldyn.contact_law import ContactLaw, check_law
-from nldyn.errors import SystemModelError, is_finite, shown
+from nldyn.errors import SystemModelError, check_types, is_finite, shown
 from nldyn.linear import Real
 
 LARGEST_EXPONENT = 4.0
@@ -181,6 +181,7 @@ class Stop:
     law: ContactLaw | None = None
 
     def __post_init__(self) -> None:
+        check_types(**{"stop: at": (self.at, str), "stop: against": (self.against, str, None)})
         owner = f"stop at '{self.at}'"
         _positive(owner, "stiffness", self.stiffness)
         _finite(owner, "exponent", self.exponent)
@@ -319,6 +320,7 @@ class Damper:
     coefficient: float
 
     def __post_init__(self) -> None:
+        check_types(**{"damper: at": (self.at, str)})
         owner = f"damper at '{self.at}'"
         _finite(owner, "coefficient", self.coefficient)
         if self.coefficient < 0.0:
@@ -399,6 +401,7 @@ Excitation = HarmonicForce | Unbalance
 
 
 def _check_excitation(at: str, name: str, value: float, phase_deg: float) -> None:
+    check_types(**{"excitation: at": (at, str)})
     owner = f"excitation at '{at}'"
     _finite(owner, name, value)
     if value < 0.0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -13,22 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cms.threads import one_thread
-from nldyn.branch import Branch, minimal_period, same_orbit, stroboscopic
+from nldyn.branch import Branch
 from nldyn.checkpoint import Checkpoint
 from nldyn.continuation import MOST_POINTS, ContinuationOptions, check_range, shifts
 from nldyn.diagrams import Collector, Diagram, Progress
-from nldyn.errors import SystemModelError, check_whole, is_finite, shown
+from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.fixed_point_index import is_damped, sum_of_indices
 from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import (
+    LONGEST_PERIOD,
     ConvergenceError,
     Orbit,
     check_observe,
+    minimal_period,
     near_returns,
     refine,
+    same_orbit,
     shooting_problem,
     spread,
+    stroboscopic,
 )
 from nldyn.search import MOST_COUNT, orbit_beside, orbit_near, random_states
 from nldyn.system import System
@@ -43,7 +47,7 @@ TRANSIENT = 5  # periods of a motion beside which no orbits are looked for
 PIECE = 16  # periods simulated between two looks at the known orbits; later a quarter of all
 LONGEST = 0.5  # step of a deflated iteration, relative to the orbit
 ITERATIONS = 20  # of a deflated iteration
-MOST_MULTIPLE = 10**4  # longest period multiple looked for
+FINEST_SPACING = 1e-6
 AGAIN = 12  # times that a frequency is searched again while its indices say that orbits are missing
 
 
@@ -91,15 +95,16 @@ class ExploreOptions:
     seed: int = 20
 
     def __post_init__(self) -> None:
-        if not (is_finite(self.spacing) and 0.0 < self.spacing < 1.0):
+        if not (is_finite(self.spacing) and FINEST_SPACING <= self.spacing < 1.0):
             raise SystemModelError(
-                f"explore: spacing must lie between 0 and 1, got {shown(self.spacing)}"
+                f"explore: spacing must lie between {FINEST_SPACING:g} and 1, "
+                f"got {shown(self.spacing)}"
             )
         check_whole("explore: starts", self.starts, 1, MOST_COUNT)
         check_whole("explore: rounds", self.rounds, 1, MOST_COUNT)
         check_whole("explore: settling", self.settling, 1, MOST_COUNT)
-        check_whole("explore: unstable_period", self.unstable_period, 0, MOST_MULTIPLE)
-        check_whole("explore: doubled_period", self.doubled_period, 1, MOST_MULTIPLE)
+        check_whole("explore: unstable_period", self.unstable_period, 0, LONGEST_PERIOD)
+        check_whole("explore: doubled_period", self.doubled_period, 1, LONGEST_PERIOD)
         if self.doubled_points is not None:
             check_whole("explore: doubled_points", self.doubled_points, 2, MOST_POINTS)
         check_whole("explore: seed", self.seed, 0)
@@ -454,8 +459,13 @@ def explore(
     [1, 2]
     """
     flow = flow_of(system)
+    check_types(
+        effort=(effort, ExploreOptions, None),
+        options=(options, ContinuationOptions, None),
+        progress=(progress, Callable, None),
+    )
     low, high = check_range(range_hz)
-    check_whole("max_period", max_period, 1, MOST_MULTIPLE)
+    check_whole("max_period", max_period, 1, LONGEST_PERIOD)
     question = Question(
         flow,
         (low, high),

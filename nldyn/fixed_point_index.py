@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from nldyn.branch import Branch
+from nldyn.branch import Branch, check_branches
 from nldyn.errors import SystemModelError, check_frequency, check_whole
 from nldyn.orbit import Orbit
 from nldyn.system import System
@@ -60,6 +60,8 @@ def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) 
     >>> [orbit.stable for orbit in branch.at(12.15)], index_sum([branch], 12.15)
     ([True, False, True], 1)
     """
+    branches = list(branches) if isinstance(branches, Iterable) else branches
+    check_branches("branches", branches)
     check_frequency("frequency_hz", frequency_hz)
     check_whole("period", period, 1)
     counted = [branch for branch in branches if period % branch.period == 0]

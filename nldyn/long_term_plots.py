@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from nldyn.attractors import Attractor
 from nldyn.basin_maps import UNDECIDED, Basins
-from nldyn.branch import Branch, check_branches, stroboscopic
+from nldyn.branch import Branch, check_branches
 from nldyn.diagrams import Diagram
 from nldyn.errors import SystemModelError, check_choice, check_types, is_finite, shown
 from nldyn.linear import Real
-from nldyn.orbit import check_observe
+from nldyn.orbit import check_observe, stroboscopic
 from nldyn.plot import (
     PERIOD_COLOURS,
     PREFIXES,

@@ -10,12 +10,11 @@ from functools import partial
 import numpy as np
 
 from nldyn.basin_maps import UNDECIDED, Basins, Plane, Target, settle, target_of
-from nldyn.branch import same_orbit, stroboscopic
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.executors import check_execution, values_of
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
-from nldyn.orbit import Orbit, near_returns
+from nldyn.orbit import Orbit, near_returns, same_orbit, stroboscopic
 from nldyn.search import orbit_near
 
 NEWTON_STEPS = 12

@@ -30,6 +30,8 @@ from nldyn.shooting import ShootingProblem
 from nldyn.system import System, numbers
 
 SEGMENTS_PER_PERIOD = 2
+LONGEST_PERIOD = 10**4  # excitation periods of an orbit
+MOST_SEGMENTS = 10**5
 
 
 @dataclass(frozen=True, eq=False)
@@ -375,6 +377,7 @@ class Orbit:
 
     def penetration(self, stop: int, phases: Real) -> Real:
         """Penetration of a stop (m, negative when open) at any forcing phases."""
+        check_whole("penetration: stop", stop, 0, len(self.system.stops) - 1)
         states = self.states(phases)
         return _depth_and_speed(self.system, self.system.stops[stop], states)[0]
 
@@ -454,10 +457,10 @@ def check_observe(system: System, observe: str | None) -> str:
 
 def shooting_problem(flow: FlowMap, period: int, segments: int | None = None) -> ShootingProblem:
     """Shooting equations with two segments per excitation period unless told otherwise."""
-    check_whole("period", period, 1)
+    check_whole("period", period, 1, LONGEST_PERIOD)
     if segments is None:
         segments = SEGMENTS_PER_PERIOD * period
-    check_whole("segments", segments, 1)
+    check_whole("segments", segments, 1, MOST_SEGMENTS)
     if segments % period:
         raise SystemModelError(f"segments must be a multiple of period {period}, got {segments}")
     return ShootingProblem(flow, period, segments)
@@ -504,7 +507,8 @@ def solve_orbit(
     SystemModelError
         For input that makes no sense.
     ConvergenceError
-        If the simulation fails or Newton's method does not converge; the text says why.
+        If the simulation fails, or Newton's method does not converge or comes to an orbit of a
+        shorter period; the text says why.
 
     Examples
     --------
@@ -553,9 +557,17 @@ def solve_orbit(
     failure = ConvergenceError()
     for nodes in starts:
         try:
-            return refine(problem, nodes, omega, observe)
+            orbit = refine(problem, nodes, omega, observe)
         except ConvergenceError as error:
             failure = error
+            continue
+        shortest = minimal_period(orbit)
+        if shortest == period:
+            return orbit
+        failure = ConvergenceError(
+            f"no orbit of period {period} found at {frequency_hz:g} Hz: Newton's method came to "
+            f"one of period {shortest}; give a guess beside the orbit, or try find_orbits"
+        )
     raise failure
 
 
@@ -628,3 +640,49 @@ def spread(problem: ShootingProblem, start: Real, omega: float) -> Real:
         start[None], problem.phases[:-1], omega, sensitivities=False, chained=True
     ).ends
     return np.vstack([start[None], ends])
+
+
+def stroboscopic(orbit: Orbit) -> Real:
+    """States (n, 2n_modes) at the start of each excitation period."""
+    problem = orbit.problem
+    return problem.nodes(orbit.point)[:: problem.segments // problem.period]
+
+
+def same_orbit(a: Orbit, b: Orbit, rtol: float = 1e-5) -> bool:
+    """Whether two orbits at one frequency agree up to a shift by whole excitation periods."""
+    if a.period != b.period or not math.isclose(a.omega, b.omega, rel_tol=1e-9):
+        return False
+    first, second = stroboscopic(a), stroboscopic(b)
+    scale = a.problem.scale(a.point)
+    return any(
+        float(np.abs(first - np.roll(second, shift, axis=0)).max()) <= rtol * scale
+        for shift in range(a.period)
+    )
+
+
+def minimal_period(orbit: Orbit, rtol: float = 1e-6) -> int:
+    """Smallest number of excitation periods after which the orbit really repeats."""
+    states = stroboscopic(orbit)
+    scale = orbit.problem.scale(orbit.point)
+    for n in range(1, orbit.period):
+        if orbit.period % n == 0:
+            shifted = np.roll(states, n, axis=0)
+            if float(np.abs(states - shifted).max()) <= rtol * scale:
+                return n
+    return orbit.period
+
+
+def check_minimal(orbit: Orbit) -> None:
+    """Refuse an orbit of a shorter period that is run through several times.
+
+    Raises
+    ------
+    SystemModelError
+        As said.
+    """
+    shortest = minimal_period(orbit)
+    if shortest < orbit.period:
+        raise SystemModelError(
+            f"the orbit of period {orbit.period} at {orbit.frequency_hz:g} Hz is one of period "
+            f"{shortest}, run through {orbit.period // shortest} times: solve for that"
+        )

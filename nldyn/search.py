@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nldyn.branch import minimal_period, same_orbit, stroboscopic
 from nldyn.errors import check_frequency, check_whole
 from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
@@ -17,10 +16,13 @@ from nldyn.orbit import (
     Orbit,
     check_bounded,
     check_observe,
+    minimal_period,
     near_returns,
     refine,
+    same_orbit,
     shooting_problem,
     spread,
+    stroboscopic,
 )
 from nldyn.shooting import ShootingProblem
 from nldyn.system import System

@@ -29,7 +29,7 @@ from nldyn.contact_law import ContactLaw
 from nldyn.continuation import ContinuationOptions
 from nldyn.diagrams import Diagram
 from nldyn.elements import Damper, Excitation, HarmonicForce, Stop, Unbalance
-from nldyn.errors import SystemModelError, shown
+from nldyn.errors import SystemModelError, check_types, shown
 from nldyn.exploration import Coverage, Exploration, ExploreOptions, Question, Stage
 from nldyn.flow import FlowMap, FlowOptions, Trajectory
 from nldyn.linear import LinearPart, Real
@@ -121,7 +121,7 @@ def load_branch(path: str | Path, name: str | None = None, *, laws: Laws | None 
 def load_branches(path: str | Path, *, laws: Laws | None = None) -> list[Branch]:
     """Read all branches of a file; see `load_branch`."""
     with _opened(path) as root:
-        return _read_branches(root, _read_flows(root, laws or {}))
+        return _read_branches(root, _read_flows(root, laws))
 
 
 def load_diagram(path: str | Path, *, laws: Laws | None = None) -> Diagram:
@@ -146,7 +146,7 @@ def load_diagram(path: str | Path, *, laws: Laws | None = None) -> Diagram:
     with _opened(path) as root:
         if not root.has_attribute("range_hz"):
             raise SystemModelError(f"{path}: holds branches without a diagram; use load_branches")
-        return _read_diagram(root, _read_flows(root, laws or {}))
+        return _read_diagram(root, _read_flows(root, laws))
 
 
 def load_exploration(path: str | Path, *, laws: Laws | None = None) -> Exploration:
@@ -171,7 +171,7 @@ def load_exploration(path: str | Path, *, laws: Laws | None = None) -> Explorati
     with _opened(path) as root:
         if "exploration" not in root:
             raise SystemModelError(f"{path}: holds no exploration; use load_branches")
-        flows = _read_flows(root, laws or {})
+        flows = _read_flows(root, laws)
         diagram = _read_diagram(root, flows)
         question, stage = _read_exploration(root.group("exploration"), flows, diagram)
         return Exploration(diagram, question, stage)
@@ -612,8 +612,15 @@ def _check_format(root: _Group, format_: str, newest: int) -> None:
         )
 
 
-def _read_flows(root: _Group, laws: Laws) -> list[FlowMap]:
-    return [_read_flow(group, laws) for group in root.group("flow_maps").groups()]
+def checked_laws(laws: Laws | None) -> Laws:
+    """Contact laws by the numbers of their stops."""
+    check_types(laws=(laws, Mapping, None))
+    return laws or {}
+
+
+def _read_flows(root: _Group, laws: Laws | None) -> list[FlowMap]:
+    known = checked_laws(laws)
+    return [_read_flow(group, known) for group in root.group("flow_maps").groups()]
 
 
 def _read_branches(root: _Group, flows: Sequence[FlowMap]) -> list[Branch]:

@@ -347,9 +347,10 @@ class System:
         other = copy.copy(self)
         vars(other).pop("drive", None)
         if stops is not None:
-            object.__setattr__(other, "stops", stops)
+            object.__setattr__(other, "stops", _listed("stops", stops))
         if excitation is not None:
-            object.__setattr__(other, "excitation", excitation)
+            object.__setattr__(other, "excitation", _listed("excitation", excitation))
+        other._check_interfaces()
         return other
 
     def _check_shapes(self) -> None:

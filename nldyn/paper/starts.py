@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from nldyn.branch import Branch, stroboscopic
+from nldyn.branch import Branch
 from nldyn.continuation import ContinuationOptions
 from nldyn.diagrams import Collector, Diagram, Progress, middle_orbit
 from nldyn.fixed_point_index import index_sum
 from nldyn.flow import flow_of
 from nldyn.linear import Real
-from nldyn.orbit import check_observe
+from nldyn.orbit import check_observe, stroboscopic
 from nldyn.search import orbit_near
 from nldyn.system import System
 

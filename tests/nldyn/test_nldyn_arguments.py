@@ -9,10 +9,17 @@ import numpy as np
 import pytest
 
 from nldyn import (
+    ContinuationOptions,
+    ConvergenceError,
+    Damper,
+    ExploreOptions,
     FlowMap,
     FlowOptions,
     Parameter,
+    Stop,
     SystemModelError,
+    Unbalance,
+    Walk,
     cascade,
     cascades_in,
     continue_branch,
@@ -20,8 +27,11 @@ from nldyn import (
     continue_in,
     continue_special,
     describe,
+    diagram,
     explore,
     find_orbits,
+    index_sum,
+    load_curve,
     normal_form,
     plot_contact_force,
     plot_curves,
@@ -242,3 +252,56 @@ def test_searches_name_a_system_that_is_none(one_dof):
         lambda value: find_orbits(value, 20.0, period=1),
     ):
         check_named(refused(search), "system")
+
+
+def test_other_arguments_of_a_wrong_kind_are_named(one_dof, orbit, harmonic_branch, tmp_path):
+    junk = [x for x in JUNK if x is not None]
+    check_named(refused(harmonic_branch.contains), "orbit must be an Orbit")
+    no_lists = [x for x in junk if x != []]
+    check_named(refused(lambda x: index_sum(x, 26.0), *no_lists), "branches must be a list")
+    check_named(refused(lambda x: orbit.penetration(x, [0.0]), 1, *JUNK), "penetration: stop must")
+    calls = {
+        "periods": lambda x: diagram(one_dof, (20.0, 30.0), x),
+        "effort": lambda x: explore(one_dof, (20.0, 30.0), effort=x),
+        "open_ends": lambda x: continue_branch(orbit, (25.0, 27.0), open_ends=x),
+    }
+    for name, call in calls.items():
+        check_named(refused(call, 3, math.nan, object()), f"{name} must be")
+    check_named(
+        refused(lambda x: diagram(one_dof, (20.0, 30.0), [], seeds=[x])), "seeds: each must be"
+    )
+    for kind, name in ((Stop, "stop"), (Unbalance, "excitation"), (Damper, "damper")):
+        said = refused(lambda x, kind=kind: kind(x, 1e9), 3, [], math.nan)
+        check_named(said, f"{name}: at must be a str")
+    curve = tmp_path / "curve.h5"
+    continue_in(orbit, "frequency_hz", (25.5, 26.5)).save(curve)
+    for name in ("laws", "monitor"):
+        said = refused(lambda x, name=name: load_curve(curve, **{name: x}), 3, "text", [1])
+        check_named(said, f"{name} must be")
+    check_named(refused(lambda x: Walk(x, (25.0, 27.0), ContinuationOptions())), "start must be")
+    check_named(refused(lambda x: one_dof.with_elements(stops=x), 3, [3]), "stop")
+
+
+@pytest.mark.parametrize("name", ["period", "segments"])
+def test_sizes_beyond_any_use_are_refused_before_any_work(one_dof, name):
+    said = refused(lambda x: solve_orbit(one_dof, 20.0, **{name: x}), 10**6, 10**12)
+    check_named(said, f"{name} must be a whole number from 1 to")
+    check_named(refused(lambda x: ExploreOptions(spacing=x), 1e-18, 0.0, 1.0), "spacing must lie")
+
+
+def test_an_orbit_of_a_shorter_period_is_not_told_as_one_of_the_period_asked_for(one_dof):
+    """At 20 Hz motions from rest settle on the harmonic orbit."""
+    with pytest.raises(ConvergenceError, match=r"no orbit of period 2 found at 20 Hz: .*period 1"):
+        solve_orbit(one_dof, 20.0, period=2)
+
+
+def test_an_orbit_run_through_twice_is_not_continued(flip):
+    window = (0.95 * flip.frequency_hz, 1.05 * flip.frequency_hz)
+    born = continue_branch(switch_at_flip(flip).orbit, window)
+    end = born.nodes[0 if born.stop_reasons[0].startswith("joins") else -1].orbit
+    for call in (
+        lambda: continue_branch(end, window),
+        lambda: continue_in(end, "gap", (-1e-6, 1e-6)),
+    ):
+        with pytest.raises(SystemModelError, match="is one of period 1, run through 2 times"):
+            call()

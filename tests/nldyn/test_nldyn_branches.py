@@ -27,8 +27,9 @@ from nldyn import (
     switch_at_flip,
 )
 from nldyn._events import branch_point_test, flip_test, torus_test
-from nldyn.branch import BranchPoint, minimal_period, same_orbit
+from nldyn.branch import BranchPoint
 from nldyn.continuation import start_point, trace
+from nldyn.orbit import minimal_period, same_orbit
 from nldyn.peaks import lowest_orbit, resonance_peaks
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene

@@ -29,9 +29,9 @@ from nldyn import (
     solve_orbit,
     switch_at_flip,
 )
-from nldyn.branch import stroboscopic
 from nldyn.diagrams import Collector
 from nldyn.exploration import chao_lower_bound, deflated_orbit, settling_periods
+from nldyn.orbit import stroboscopic
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
 from nldyn.search import random_states

@@ -27,8 +27,8 @@ from nldyn import (
     find_orbits,
     solve_orbit,
 )
-from nldyn.branch import minimal_period, same_orbit, stroboscopic
 from nldyn.continuation import open_ends
+from nldyn.orbit import minimal_period, same_orbit, stroboscopic
 from nldyn.search import orbit_beside, orbit_near
 
 # where the paper's text sees subharmonics: 1/3 near 37.1, 1/5 near 62.2, 1/7 near 58, 1/13 near 81
