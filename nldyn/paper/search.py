@@ -15,7 +15,7 @@ from nldyn.paper.jobs import JOBS, LONG
 from nldyn.paper.starts import LONGEST, starts_path, write_starts
 from nldyn.progress import progress_line
 
-EFFORT = ExploreOptions(spacing=0.01, starts=6, rounds=8)
+EFFORT = ExploreOptions(spacing=0.01, starts=6, rounds=24)
 MODELS = tuple(job.name for job in JOBS if job.doubled)
 
 

@@ -398,8 +398,8 @@ def test_long_doubled_branches_are_broken_off_where_told(whole):
 @pytest.mark.parametrize(
     ("given", "says"),
     [
-        ({"spacing": 0.0}, "spacing must lie between 0 and 1"),
-        ({"spacing": float("nan")}, "spacing must lie between 0 and 1"),
+        ({"spacing": 0.0}, "spacing must lie between 1e-06 and 1"),
+        ({"spacing": float("nan")}, "spacing must lie between 1e-06 and 1"),
         ({"starts": 0}, "explore: starts"),
         ({"rounds": 0}, "explore: rounds"),
         ({"unstable_period": -1}, "explore: unstable_period"),

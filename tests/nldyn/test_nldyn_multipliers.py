@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from one_dof import make_one_dof
+from repeated import run_through
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.special import mathieu_a, mathieu_b
@@ -403,8 +404,7 @@ def test_orbit_run_through_many_times_has_the_powers_of_its_multipliers(times):
         stops=[Stop("middle", stiffness=5.17e9)], excitation=[Unbalance("middle", 4.92e-6)],
     )  # fmt: skip
     once = solve_orbit(system, 60.0)
-    nodes = once.problem.flow.to_modal(once.problem.nodes(once.point))
-    often = solve_orbit(system, 60.0, period=times, guess=np.tile(nodes, (times, 1)))
+    often = run_through(once, times)
     np.testing.assert_allclose(often.log_moduli, times * once.log_moduli, rtol=1e-11)
     assert often.multipliers[0] == pytest.approx(once.multipliers[0] ** times, rel=1e-10)
     assert often.multipliers[1] == pytest.approx(once.multipliers[1] ** times, rel=1e-10)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from independent import Motion, state_map
 from one_dof import make_one_dof
+from repeated import run_through
 
 from nldyn import (
     ConvergenceError,
@@ -197,7 +198,7 @@ def test_unstable_orbit_is_found_from_a_guess():
 def test_minimal_period_of_an_orbit_run_through_several_times():
     single = solve_orbit(make_one_dof(), 26.0)
     for period in (2, 3, 4):
-        several = solve_orbit(make_one_dof(), 26.0, period)
+        several = run_through(single, period)
         assert minimal_period(several) == 1
         expected = single.multipliers**period
         np.testing.assert_allclose(several.multipliers, expected, rtol=0, atol=1e-7)
