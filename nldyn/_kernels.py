@@ -60,6 +60,10 @@ NEAR = 3e-3
 # share of the speed at a stop that rounding of its penetration may cost in one contact
 WORST_ROUNDING = 1e-6
 
+# an orbit closes to this share of its size, or to this one times the largest entry of its segments'
+# Jacobians, which is what rounding costs; a short step of Newton's method does not tell
+OPEN, NOISE = 1e-7, 1e-12
+
 # the share of a slope in a Jacobian's error, kick (4 tail)², is less than rtol, (tail / 0.3)², as
 # long as KICK kick is less than one
 KICK = 1.5
@@ -2026,6 +2030,10 @@ def newton(
                 for j in range(size):
                     matrix[r, s * size + j] += jacobians[s, i, j]
                 matrix[r, unknowns - 1] = omega * d_omegas[s, i]
+        opening = 0.0
+        for i in range(unknowns - 1):
+            opening += corrector.state_weight * sides[i, 0] ** 2
+        closed = math.sqrt(opening) <= max(OPEN, NOISE * np.abs(jacobians).max())
         sides[unknowns - 1, 0] = corrector.level
         for j in range(unknowns):
             matrix[unknowns - 1, j] = row[j]
@@ -2051,7 +2059,7 @@ def newton(
             point[i] += sides[i, 0]
             along[i] = sides[i, 1]
         stagnant = last < 1e-8 and last > 0.5 * before  # the rounding level
-        if last <= corrector.rtol or stagnant:
+        if closed and (last <= corrector.rtol or stagnant):
             outcome = OK
             break
         if iteration == max_iterations:

@@ -56,7 +56,7 @@ from nldyn.system import numbers
 KINK = 1e-6  # step below which a branch may bend by any angle where the number of contacts changes
 MEETS_OPEN_END = "meets another branch where that was broken off"
 EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
-MEETING_STEP = 0.004  # longest step over which a doubled branch may meet the one it comes from
+MEETING_STEP = 0.001  # longest step over which a doubled branch may meet the one it comes from
 SHORTEST_CROSSING = 1e-4  # step over which a branch may cross another one
 SHORTEST_DETOUR = 1e-6  # first step of a walk that looks closely at what lies within a step
 MOST_DETOUR = 500  # points of such a walk
@@ -285,10 +285,11 @@ class Walk:
         # behind a grazing point the branch may turn on a very short length
         if step > self.options.grazing_step and orbit.impacts != here.orbit.impacts:
             return None
-        if step > MEETING_STEP and passed_flip(here.orbit, orbit):
+        meets = passed_flip(here.orbit, orbit)
+        if meets and step > MEETING_STEP:
             return None
         point = BranchPoint(orbit, tangent, here.arclength + step)
-        if step > SHORTEST_CROSSING and crosses(here, point):
+        if not meets and step > SHORTEST_CROSSING and crosses(here, point):
             return None
         return point, angle, miss
 
@@ -589,9 +590,10 @@ class Trail:
                     keep()
         self._search(len(self.nodes) - 1, closely=False)
         special = self.special_points
-        if self.walk.stop_reason.startswith(JOINS):  # the flip itself: a branch point of this one
+        if self.walk.stop_reason.startswith(JOINS):  # the flip itself: this branch turns there
             last = min(self.nodes[-2].arclength, self.nodes[-1].arclength - NEIGHBOUR)
-            special = [s for s in special if s.kind != "BP" or s.point.arclength < last]
+            turns = ("BP", "LP")
+            special = [s for s in special if s.kind not in turns or s.point.arclength < last]
         elif self.walk.stop_reason == CLOSED:  # the last step leads beyond the start
             special = [s for s in special if not self._is_repeated(s.point)]
         end = self._end(next(i for i, p in enumerate(self.nodes) if p is self._stride.here))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -26,6 +27,7 @@ from nldyn.multipliers import (
     spectrum,
     uncertainties,
 )
+from nldyn.preload import held_motion, rest
 from nldyn.shooting import ShootingProblem
 from nldyn.system import System, numbers
 
@@ -492,7 +494,8 @@ def solve_orbit(
     guess : (2n,) or (k, 2n) array, optional
         Modal displacements and velocities at phase zero, or at the k shooting phases. Without it
         the system is simulated from rest for 200 periods; where the motion does not settle,
-        Newton's method starts where it nearly repeats.
+        Newton's method starts where it nearly repeats, and from the small motion about a rest that
+        a stop holds.
     observe : str, optional
         Interface whose displacement is reported; the first unless given.
     segments : int, optional
@@ -527,7 +530,7 @@ def solve_orbit(
     check_bounded(flow.system, omega)
     starts: Iterator[Real]
     if guess is None:
-        start = np.zeros(problem.size)
+        start = flow.to_state(np.append(rest(flow.system), np.zeros(flow.system.size)))
         warm = np.linspace(0.0, 400.0 * np.pi, 201)
         found = flow.shoot(start[None], warm, omega, sensitivities=False, chained=True)
         if found.failure:
@@ -543,6 +546,9 @@ def solve_orbit(
         # at a sharp resonance the motion from rest takes too long to grow
         linear = [] if flow.system.grows(omega) else [flow.system.steady(omega).real]
         starts = (spread(problem, z, omega) for z in (strobe[-1], *near, *middles, *linear))
+        if np.any(start):
+            held = held_motion(flow.system, omega, problem.phases[:-1])
+            starts = itertools.chain(starts, [flow.to_state(held)])
     else:
         guess = np.atleast_2d(numbers("guess", guess))
         if guess.shape not in ((1, problem.size), (problem.segments, problem.size)):

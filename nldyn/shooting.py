@@ -15,6 +15,8 @@ import numpy as np
 from nldyn.flow import FlowMap, Solution
 from nldyn.linear import Real
 
+AT_REST = 1e-6  # size of an orbit, relative to the guess, that may be rounding
+
 
 @dataclass(frozen=True)
 class ShootingProblem:
@@ -101,10 +103,10 @@ class ShootingProblem:
         # steps count relative to the start, and may still be large beside a much smaller orbit;
         # motions at rest are not found any better
         while found.converged and self.scale(found.point) < 0.1 * self.scale(guess):
-            guess, finer = found.point, solved(found.point)
-            if not finer.converged:
+            finer = solved(found.point)
+            if not finer.converged and self.scale(found.point) < AT_REST * self.scale(guess):
                 break
-            found = finer
+            guess, found = found.point, finer
         return found
 
     def _weight(self, point: Real) -> float:

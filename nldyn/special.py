@@ -39,6 +39,7 @@ ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
 MOST_LOOKS = 6  # times that a step is cut at such points
 SHORTEST_LOOK = 1e-6  # arclength of a step, below which it is not cut there
+VANISHED = 1e-3  # an extreme at its root, relative to those beside it
 CLOSE = 0.01  # part of a step within which a point beside it does not help
 FAR_ALONE = 0.3  # the same of the only pair of a single mode
 DIVES = 8  # points at which to look for a change of sign between two others
@@ -398,16 +399,44 @@ def located_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[Spec
     if not clear and depth < 10:
         middle = chord.at(0.5)
         return located_between(a, middle, depth + 1) + located_between(middle, b, depth + 1)
-    found = [locate(k, chord, lambda point, k=k: tests(point)[k]) for k in kinds]  # type: ignore[misc]
-    found = [s for s in found if s.kind != "NS" or _on_unit_circle(s.orbit.multipliers)]
-    found = [_along(chord, _crossing_or_fold(s)) for s in found]
-    if contacts and touches:
-        found.append(locate("GR", chord, touches[0].depth))
+    found = [s for k in kinds for s in _located(k, chord)]
+    if touches:
+        touch = touches[0]
+        grazing = locate("GR", chord, touch.depth)
+        if contacts or _vanishes(touch, grazing.point, a, b):
+            found += [grazing, *_pairs_around(grazing, chord, kinds)]
     found.sort(key=lambda s: s.point.arclength, reverse=bool(b.arclength < a.arclength))
     if depth < 8 and not accounted(a.orbit, found, b.orbit):
         middle = chord.at(0.5)
         return located_between(a, middle, depth + 1) + located_between(middle, b, depth + 1)
     return found
+
+
+def _located(kind: str, chord: Chord) -> list[SpecialPoint]:
+    """Where a test changes its sign on a chord; nothing if that is no pair on the unit circle."""
+    special = locate(kind, chord, lambda point: tests(point)[kind])
+    if kind == "NS" and not _on_unit_circle(special.orbit.multipliers):
+        return []
+    return [_along(chord, _crossing_or_fold(special))]
+
+
+def _vanishes(touch: Touch, at: BranchPoint, a: BranchPoint, b: BranchPoint) -> bool:
+    """Whether an extreme is nearly zero at a point, not only of different signs beside it.
+
+    A touch that is too slight to count as a contact may begin at a distance from its grazing point.
+    """
+    return abs(touch.depth(at)) <= VANISHED * max(abs(touch.depth(a)), abs(touch.depth(b)))
+
+
+def _pairs_around(grazing: SpecialPoint, chord: Chord, known: list[str]) -> list[SpecialPoint]:
+    """Points on either side of a grazing point, where tests change their sign twice in a step.
+
+    They bend there, so that the step does not tell.
+    """
+    sides = Chord(chord.first, grazing.point), Chord(grazing.point, chord.last)
+    before, after = (changed(side.first, side.last) for side in sides)
+    hidden = [k for k in before if k in after and k not in known]
+    return [special for k in hidden for side in sides for special in _located(k, side)]
 
 
 def without_repeats(found: list[SpecialPoint]) -> list[SpecialPoint]:

@@ -135,3 +135,75 @@ def test_halves_of_a_broken_symmetry_do_not_depend_on_the_step(max_step):
 
 def special_points(branch):
     return [(s.kind, s.frequency_hz) for s in branch.special_points]
+
+
+def on_springs(ratio: float, force: float, *stops: Stop) -> System:
+    """A mass of 1 kg, 10 Hz."""
+    return System.from_modal(
+        [10.0], {"m": [1.0]}, modal_damping=ratio, stops=stops,
+        excitation=[HarmonicForce("m", force)],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("place", [2, 9, 20, 30])
+def test_flips_on_both_sides_of_a_grazing_point_within_a_step_are_found(place):
+    """Between 8.8543 and 8.8578 Hz two pairs of flips lie around the grazing points of a branch."""
+    system = on_springs(0.02, 5.0, *(Stop("m", 1e7, gap=1e-3, direction=side) for side in (1, -1)))
+    guess = np.array([0.00096285, -0.00178918])
+    start = solve_orbit(system, 8.856826796779755, 4, guess=guess)
+    fine = ContinuationOptions(max_step=0.0005, first_step=0.0005)
+    expected = special_points(continue_branch(start, (8.8, 8.9), options=fine))
+    assert [kind for kind, _ in expected].count("PD") == 4
+    usual = continue_branch(continue_branch(start, (8.8, 8.9)).points[place], (8.8, 8.9))
+    assert sorted(special_points(usual)) == [
+        (kind, pytest.approx(hz, rel=1e-9)) for kind, hz in sorted(expected)
+    ]
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_doubled_branch_of_a_doubled_branch_comes_to_its_flip(which):
+    """Its own determinant changes sign there, as where another branch is crossed."""
+    system = on_springs(0.01, 6.0, Stop("m", 1e8, gap=-1e-4))
+    first = continue_branch(solve_orbit(system, 14.0), (9.5, 16.0))
+    low = min((s for s in first.special_points if s.kind == "PD"), key=lambda s: s.frequency_hz)
+    second = continue_branch(switch_at_flip(low).orbit, (9.5, 16.0))
+    flips = sorted(s.frequency_hz for s in second.special_points if s.kind == "PD")
+    flip = next(s for s in second.special_points if s.frequency_hz == flips[which])
+    doubled = continue_branch(switch_at_flip(flip).orbit, (9.5, 16.0))
+    joined = [
+        doubled.nodes[end].orbit.frequency_hz
+        for end in (0, -1)
+        if doubled.stop_reasons[end].startswith("joins")
+    ]
+    assert any(hz == pytest.approx(flip.frequency_hz, rel=1e-6) for hz in joined)
+
+
+def test_grazing_point_beside_a_flip_is_found_where_the_contact_is_too_slight_to_count():
+    """At 10.10698 Hz a contact ends 4e-6 of the frequency beside a flip."""
+    system = System.from_modal(
+        [10.0, 22.0], {"a": [1.0, 0.8], "b": [0.6, -1.0]}, modal_damping=[0.005, 0.01],
+        stops=[Stop.linear("a", 1e5, gap=-1e-4), Stop.linear("b", 2e5, gap=7e-4, direction=-1)],
+        excitation=[HarmonicForce("b", 4.0)],
+    )  # fmt: skip
+    whole = continue_branch(solve_orbit(system, 12.0), (6.9, 13.0))
+    again = continue_branch(whole.at(7.0)[0], (6.9, 13.0))
+    for branch in (whole, again):
+        near = [s for s in special_points(branch) if 10.1068 < s[1] < 10.1073]
+        assert sorted(near) == [
+            ("GR", pytest.approx(10.106984343837, rel=1e-10)),
+            ("PD", pytest.approx(10.107024341771, rel=1e-10)),
+        ]
+
+
+def test_end_of_a_doubled_branch_is_told_as_no_fold():
+    """The branch turns at its flip; from this start rounding put two folds there."""
+    ratio, stop = 0.037775752970254865, Stop("m", 24402899.633555975, gap=0.00028860699650216725)
+    system = on_springs(ratio, 7.065386225652446, stop)
+    found = diagram(system, (6.5, 16.0), (1, 2), doublings=1, search_points=4)
+    branch = next(b for b in found.branches if b.period == 2 and b.frequency_hz.min() < 9.7)
+    expected = sorted(special_points(branch))
+    for start in branch.points[6:-6:6]:
+        again = continue_branch(start, (6.5, 16.0))
+        assert sorted(special_points(again)) == [
+            (kind, pytest.approx(hz, rel=1e-8)) for kind, hz in expected
+        ]
