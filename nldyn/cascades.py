@@ -25,7 +25,7 @@ from nldyn.continuation import (
     switch_at_flip,
 )
 from nldyn.critical import CoefficientError, Estimate, doubled_parameter, flip, loop_of
-from nldyn.errors import check_types, check_whole
+from nldyn.errors import SystemModelError, check_types, check_whole
 from nldyn.special import LocateError, special_points_between
 
 FEIGENBAUM = 4.669201609102991  # limit of the ratios, Feigenbaum (1978)
@@ -141,6 +141,10 @@ def cascade(
     check_whole("cascade: depth", depth, 1, 30)
     hz = first.frequency_hz
     window = check_range((0.5 * hz, 2.0 * hz) if range_hz is None else range_hz)
+    if not window[0] < hz < window[1]:
+        raise SystemModelError(
+            f"the flip at {hz:g} Hz lies outside range_hz = ({window[0]:g}, {window[1]:g})"
+        )
     flips, branches, reason = [first], list[Branch](), f"depth {depth} reached"
     for _ in range(depth):
         try:

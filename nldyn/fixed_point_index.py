@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -41,7 +42,8 @@ def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) 
     Raises
     ------
     SystemModelError
-        If the frequency or the period is none, or if a mode is not damped.
+        If the frequency or the period is none, the frequency lies outside the range that a branch
+        was followed in, there is no branch, or a mode is not damped.
 
     References
     ----------
@@ -64,6 +66,15 @@ def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) 
     check_branches("branches", branches)
     check_frequency("frequency_hz", frequency_hz)
     check_whole("period", period, 1)
+    if not branches:
+        raise SystemModelError("index_sum: branches must not be empty")
+    for branch in branches:
+        low, high = branch.course.range_hz if branch.course else (0.0, math.inf)
+        if not low * (1.0 - 1e-12) <= frequency_hz <= high * (1.0 + 1e-12):
+            raise SystemModelError(
+                f"index_sum: branch '{branch.name}' was followed from {low:g} to {high:g} Hz, "
+                f"which does not tell of {frequency_hz:g} Hz"
+            )
     counted = [branch for branch in branches if period % branch.period == 0]
     if not all(is_damped(branch.nodes[0].orbit.problem.flow.system) for branch in counted):
         raise SystemModelError(

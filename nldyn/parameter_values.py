@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from nldyn.elements import LARGEST_EXPONENT
 from nldyn.errors import LARGEST_FREQUENCY, SMALLEST_FREQUENCY, SystemModelError, is_finite, shown
 from nldyn.parameters import Parameter, parameter_tables
 from nldyn.system import System
@@ -32,6 +33,10 @@ UNITS = {
     "modal_damping": "1",
     "natural_frequency_hz": "Hz",
 }
+BOUNDS = {
+    name: (0.0, math.inf)
+    for name in ("stiffness", "dissipation", *_OF_EXCITATION, *_OF_DAMPERS, *_OF_MODES)
+} | {"exponent": (1.0, LARGEST_EXPONENT)}  # between which there are systems
 NAMES = (FREQUENCY, *_OF_STOPS, *_OF_EXCITATION, *_OF_DAMPERS, *_OF_MODES)
 
 
@@ -203,6 +208,12 @@ class Chart:
             raise SystemModelError(
                 f"the range of {name} must be positive, from {SMALLEST_FREQUENCY:g} to "
                 f"{LARGEST_FREQUENCY:g}, got {shown(limits)}"
+            )
+        if name in BOUNDS and not BOUNDS[name][0] <= low < high <= BOUNDS[name][1]:
+            least, most = BOUNDS[name]
+            upper = "" if most == math.inf else f" and {most:g} at most"
+            raise SystemModelError(
+                f"the range of {name} must be {least:g} at least{upper}, got {shown(limits)}"
             )
         return cls(parameter, float(low), float(high))
 

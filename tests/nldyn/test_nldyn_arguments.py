@@ -282,6 +282,20 @@ def test_other_arguments_of_a_wrong_kind_are_named(one_dof, orbit, harmonic_bran
     check_named(refused(lambda x: one_dof.with_elements(stops=x), 3, [3]), "stop")
 
 
+def test_ranges_in_which_there_are_no_systems_are_refused(orbit):
+    for name, limits in (
+        ("exponent", (0.5, 2.0)), ("stiffness", (-1.0, 1e10)), ("modal_damping", (-0.1, 0.1)),
+        ("mass_times_radius", (-1.0, 1e-5)), ("exponent", (1.0, 9.0)),
+    ):  # fmt: skip
+        check_named(refused(lambda x, n=name: continue_in(orbit, n, x), limits), f"range of {name}")
+
+
+def test_places_of_which_the_branches_do_not_tell_are_refused(harmonic_branch, flip):
+    check_named(refused(lambda x: index_sum([harmonic_branch], x), 2.0, 200.0), "was followed from")
+    check_named(refused(lambda x: index_sum(x, 26.0), []), "branches must not be empty")
+    check_named(refused(lambda x: cascade(flip, 2, range_hz=x), (1.0, 2.0)), "lies outside range")
+
+
 @pytest.mark.parametrize("name", ["period", "segments"])
 def test_sizes_beyond_any_use_are_refused_before_any_work(one_dof, name):
     said = refused(lambda x: solve_orbit(one_dof, 20.0, **{name: x}), 10**6, 10**12)
