@@ -270,6 +270,13 @@ class StopTable(Table):
     direction: Literal[1, -1] = 1
     against: str | None = None
 
+    @field_validator("direction", mode="before")
+    @classmethod
+    def _no_truth_value(cls, value: object) -> object:
+        if isinstance(value, bool):
+            raise ValueError("must be 1 or -1")
+        return value
+
     @model_validator(mode="after")
     def _complete(self) -> StopTable:
         if self.against == self.at:

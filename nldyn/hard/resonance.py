@@ -24,7 +24,8 @@ from nldyn.hard.multiprecision import (
     orbit_flow_error,
 )
 from nldyn.hard.stiffness import beam_with_stop
-from nldyn.normal_forms import normal_form
+from nldyn.linear import Real
+from nldyn.normal_forms import normal_form, switch_at_branch_point
 from nldyn.orbit import Orbit, solve_orbit
 from nldyn.search import find_orbits
 from nldyn.system import System
@@ -158,6 +159,58 @@ def pair_rate_error() -> Measured:
     return Measured(abs(rate - 0.5), note)
 
 
+def uncoupled(**sizes: float) -> System:
+    """Masses that do not know of each other; "y" has a stop on either side, "x" on one."""
+    stops = [Stop.linear(at, 3000.0, gap=0.01 * size) for at, size in sizes.items()]
+    if "y" in sizes:
+        stops.append(Stop.linear("y", 3000.0, gap=0.01 * sizes["y"], direction=-1))
+    return System.from_modal(
+        [5.0 / math.pi] * len(sizes),
+        dict(zip(sizes, np.eye(len(sizes)), strict=True)),
+        modal_damping=0.02,
+        stops=stops,
+        excitation=[HarmonicForce(at, size) for at, size in sizes.items()],
+    )
+
+
+def close_branches_error(scale: float) -> Measured:
+    """Motion of a small mass beside a large one, followed on one half of a broken symmetry.
+
+    The other half and the symmetric orbit are `scale` away; a jump there would change the small
+    motion by its own size.
+    """
+    symmetric = continue_branch(solve_orbit(uncoupled(y=1.0), 1.0), (0.5, 1.0))
+    breaking = [s for s in symmetric.special_points if s.kind == "BP"][-1]
+    alone = continue_branch(switch_at_branch_point(breaking)[0].orbit, (0.5, 1.0))
+    small, large = alone.at(0.6)[0], solve_orbit(uncoupled(x=1.0), 0.6)
+    start = np.column_stack([at_phase_zero(large), scale * at_phase_zero(small)]).ravel()
+    followed = continue_branch(
+        solve_orbit(uncoupled(x=1.0, y=scale), 0.6, guess=start), (0.55, 0.66)
+    )
+    off = 0.0
+    for orbit in followed.points:
+        found = at_phase_zero(orbit)[1::2] / scale
+        exact = [
+            at_phase_zero(o)
+            for o in alone.at(orbit.frequency_hz)
+            if leaning(o) * leaning(small) > 0.0
+        ]
+        if len(exact) != 1:
+            return Measured(math.inf, f"{len(exact)} halves at {orbit.frequency_hz:.6g} Hz")
+        off = max(off, float(np.linalg.norm(found - exact[0]) / np.linalg.norm(exact[0])))
+    return Measured(off, f"{len(followed.points)} points")
+
+
+def at_phase_zero(orbit: Orbit) -> Real:
+    """Modal displacements, then velocities."""
+    return np.asarray(orbit.states(np.array([0.0]))[0])
+
+
+def leaning(orbit: Orbit) -> float:
+    """Displacement plus that of half a period later: zero for the symmetric orbits."""
+    return float(orbit.states(np.array([0.0, math.pi]))[:, 0].sum())
+
+
 def fold_side(fold: SpecialPoint) -> Orbit:
     """An orbit of the harmonic branch beside a fold."""
     points = [o for o in beam_branch().points if abs(o.frequency_hz / fold.frequency_hz - 1) < 5e-3]
@@ -276,12 +329,21 @@ CASES = (
     ),
     Case(
         SUBJECT,
-        "two orbits 1e-6 apart",
+        "two orbits of a branch 2e-5 apart",
         "Newton's method may take one for the other",
         "theory: at a fold the distance goes with the root of the frequency's",
         0.01,
         "two digits of the rate",
         pair_rate_error,
+    ),
+    Case(
+        SUBJECT,
+        "three branches within 1e-6 of each other",
+        "a step of the continuation is longer than what lies between them",
+        "the small one of two uncoupled masses, alone and in its own size",
+        1e-5,
+        "accuracy of an orbit, 1e-11, over 1e-6",
+        partial(close_branches_error, 1e-6),
     ),
     Case(
         SUBJECT,

@@ -100,6 +100,11 @@ def test_what_is_given_twice_is_told_in_words_of_toml(tmp_path, text, fault):
         ),
         (
             "stiffness = 5e9",
+            "direction = true\nstiffness = 5e9",
+            "stops[0].direction must be 1 or -1",
+        ),
+        (
+            "stiffness = 5e9",
             "range_hz = [1, 2]\nstiffness = 5e9",
             "stops[0].range_hz is not a known key here; did you mean continuation.range_hz?",
         ),
