@@ -191,7 +191,9 @@ def plot_contact_force(orbit: Orbit, ax: Axes | None = None, *, samples: int = 4
     for row, stop in enumerate(system.stops):
         colour = PERIOD_COLOURS[(row + 1) % len(PERIOD_COLOURS)]
         style = STABLE if orbit.stable else UNSTABLE
-        label = f"stop at {stop.at}" + (f" against {stop.against}" if stop.against else "")
+        number = f" {row + 1}" if len(system.stops) > 1 else ""
+        against = f" against {stop.against}" if stop.against else ""
+        label = f"stop{number} at {stop.at}{against}"
         ax.plot(
             phases / orbit.omega,
             forces[row] / factor,
