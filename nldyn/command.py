@@ -40,3 +40,6 @@ def answering(work: Callable[[], None]) -> None:
         sys.exit(INTERRUPTED)
     finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is to end
+        # a Ctrl-C that left an exec of text, as in the making of a dataclass, lets ``python -m``
+        # end by the signal whatever the exit code; another exec makes it forget that
+        exec("")

@@ -36,6 +36,16 @@ def test_ctrl_c_while_the_package_is_loaded(monkeypatch, capsys, load):
     assert capsys.readouterr().err == "nldyn: stopped by Ctrl-C, nothing is written\n"
 
 
+def test_ctrl_c_in_executed_text_gives_the_exit_code_all_the_same(tmp_path):
+    """As in the making of a dataclass; with ``-m`` Python would end by the signal."""
+    (tmp_path / "work.py").write_text(
+        "from nldyn.command import answering\nanswering(lambda: exec('raise KeyboardInterrupt'))\n",
+        encoding="utf-8",
+    )
+    done = subprocess.run([sys.executable, "-m", "work"], cwd=tmp_path, check=False)
+    assert done.returncode == 130
+
+
 def test_other_errors_of_loading_are_not_hidden(monkeypatch):
     broken = type("Broken", (types.ModuleType,), {"main": property(lambda _: 1 / 0)})("nldyn.cli")
     monkeypatch.setitem(sys.modules, "nldyn.cli", broken)
