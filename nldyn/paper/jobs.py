@@ -11,8 +11,7 @@ import cms
 from nldyn.continuation import ContinuationOptions
 from nldyn.diagrams import Diagram, Progress, Seed, diagram
 from nldyn.elements import Stop
-from nldyn.orbit import Orbit
-from nldyn.paper.starts import follow_starts, read_starts
+from nldyn.paper.starts import follow_starts, forget_motions, read_starts
 from nldyn.paper.workers import Workers, tell
 from nldyn.progress import compilation_told
 from nldyn.resources import example
@@ -128,11 +127,12 @@ LISTED = (
 # followed again from the next orbit.
 LONG = ContinuationOptions(max_points=20000)
 
-# Flips are followed to period 8, branches longer in period than 3 with up to 25 points each way.
-DOUBLED = (8, 25)
+# Flips are followed to period 8, branches longer in period than 3 with up to 25 points each way;
+# of the model with several thousand flips with up to 10.
+DOUBLED, MANY_DOUBLED = (8, 25), (8, 10)
 
 JOBS = (
-    Job("four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (18.0, 90.0), doubled=DOUBLED),
+    Job("four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (18.0, 90.0), doubled=MANY_DOUBLED),
     Job("two_dof_xi_0.01", _scene("two_dof_xi_0.01"), (15.0, 90.0), doubled=DOUBLED),
     Job("two_dof_xi_0.001", _scene("two_dof_xi_0.001"), (18.0, 90.0), doubled=DOUBLED),
     Job("four_dof_xi_0.01", _scene("four_dof_xi_0.01"), (15.0, 90.0), doubled=DOUBLED),
@@ -162,18 +162,8 @@ def run_job(name: str) -> Diagram:
 
     with compilation_told(progress):
         result = job.run(progress)
-    for branch in result.branches:
-        for orbit in branch.points:
-            _ = orbit.max_abs_displacement, orbit.max_penetration, orbit.stable
-            _ = orbit.impacts, orbit.observed_extremes, orbit.liouville_error
-            _forget_motion(orbit)
+    forget_motions(result.branches)
     return result
-
-
-def _forget_motion(orbit: Orbit) -> None:
-    """Drop most of an orbit's size; where it is asked for, the motion is recorded again."""
-    vars(orbit)["motion"] = None
-    vars(orbit).pop("trajectory", None)
 
 
 def submit_diagrams(workers: Workers, jobs: Sequence[Job] = JOBS) -> dict[str, Future[Diagram]]:

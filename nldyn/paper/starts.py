@@ -112,10 +112,25 @@ def follow_starts(
         if orbit is None or orbit.period != start.period:
             lost += 1
             continue
+        count = len(box.branches)
         box.follow(orbit, longest, LONGEST, most)
+        forget_motions(box.branches[count:])
     notes = [f"from {len(starts)} starts, {lost} of which lead to no orbit"]
     notes.append(index_note(box.branches, range_hz))
     return Diagram(tuple(box.branches), range_hz, observe, (*notes, *box.notes))
+
+
+def forget_motions(branches: Sequence[Branch]) -> None:
+    """Keep what figures and tables need of the orbits, and drop the motions: most of their size.
+
+    Where it is asked for, a motion is recorded again.
+    """
+    for branch in branches:
+        for orbit in (*branch.points, *(special.orbit for special in branch.special_points)):
+            _ = orbit.max_abs_displacement, orbit.max_penetration, orbit.stable
+            _ = orbit.impacts, orbit.observed_extremes, orbit.liouville_error
+            vars(orbit)["motion"] = None
+            vars(orbit).pop("trajectory", None)
 
 
 def index_note(branches: Sequence[Branch], range_hz: tuple[float, float]) -> str:

@@ -42,6 +42,7 @@ def test_what_is_followed_from_starts_is_what_the_search_found(found, tmp_path):
     options = ContinuationOptions()
     system = scene_system("two_dof_xi_0.01")
     again = follow_starts(system, starts, found.range_hz, options, WITHOUT_DOUBLED)
+    assert all(orbit.motion is None for branch in again.branches for orbit in branch.points)
     assert len(again.branches) == len(found.branches) > 5
     for branch in found.branches:
         middle = branch.points[len(branch.points) // 2]
