@@ -72,9 +72,11 @@ class ContinuationOptions:
     first_step, max_step, min_step : float
         Arclength steps.
     max_angle : float
-        Largest angle between the tangents of two neighbouring points, in radians.
+        Largest angle between the tangents of two neighbouring points, in radians. With more than
+        0.3 a step may leave the branch unseen where another one crosses it.
     max_miss : float
-        Largest distance of a point from where it was predicted, relative to the step.
+        Largest distance of a point from where it was predicted, relative to the step; more than
+        0.2 is as doubtful.
     grazing_step : float
         Longest step over which the number of contacts may change.
     max_points : int
