@@ -40,7 +40,7 @@ from nldyn.errors import (
     shown,
 )
 from nldyn.linear import Real
-from nldyn.orbit import ConvergenceError, Orbit, check_minimal, refine
+from nldyn.orbit import ConvergenceError, Orbit, check_minimal, minimal_period, refine
 from nldyn.shooting import ShootingProblem
 from nldyn.special import (
     NEIGHBOUR,
@@ -996,6 +996,8 @@ def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoin
         found = problem.correct(doubled + size * direction, row / np.linalg.norm(row))
         if found.converged:
             twin = Orbit.of(problem, found, orbit.observe)
+            if minimal_period(twin) < problem.period:
+                continue
             first = BranchPoint(twin, problem.tangent(found, direction), 0.0)
             if twin.impacts == 2 * orbit.impacts and np.abs(twin.multipliers - 1.0).min() < 0.3:
                 break
@@ -1003,5 +1005,5 @@ def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoin
         return first
     raise LocateError(
         f"no orbit of period {problem.period} found beside the flip at "
-        f"{orbit.frequency_hz:.6g} Hz: {found.failure}"
+        f"{orbit.frequency_hz:.6g} Hz: {found.failure or 'only such of a shorter period'}"
     )
