@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from nldyn.errors import SystemModelError, check_types, shown
 from nldyn.linear import Real
-from nldyn.orbit import Orbit, same_orbit, stroboscopic
+from nldyn.orbit import Orbit, same_orbit, shifted_alike, stroboscopic
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -114,10 +114,10 @@ def check_branches(name: str, branches: object) -> None:
     SystemModelError
         As said.
     """
+    columns = ("period", "points", "special_points", "stop_reasons")
     if not isinstance(branches, list | tuple) or not all(
-        hasattr(branch, column)
+        isinstance(branch, Branch) or all(hasattr(branch, column) for column in columns)
         for branch in branches
-        for column in ("period", "points", "special_points", "stop_reasons")
     ):
         raise SystemModelError(f"{name} must be a list of branches, got {shown(branches)}")
 
@@ -437,10 +437,5 @@ def is_at(orbit: Orbit, special: SpecialPoint, multiple: int = 1) -> bool:
         return False
     if not math.isclose(orbit.frequency_hz, special.frequency_hz, rel_tol=1e-6):
         return False
-    first = stroboscopic(orbit)
-    second = np.tile(stroboscopic(other), (multiple, 1))
-    size = 1e-3 * float(np.abs(second).max())
-    return any(
-        float(np.abs(first - np.roll(second, shift, axis=0)).max()) <= size
-        for shift in range(other.period)
-    )
+    states = np.tile(stroboscopic(other), (multiple, 1))
+    return shifted_alike(stroboscopic(orbit), states, 1e-3 * float(np.abs(states).max()))

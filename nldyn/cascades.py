@@ -182,10 +182,10 @@ def cascades_in(branches: Sequence[Branch]) -> list[Cascade]:
         for _, flip in flips
         if is_at(branch.nodes[end].orbit, flip, 2)
     }
-    children = [branch for branch, _ in born.values()]
+    children = {id(branch) for branch, _ in born.values()}
     found = []
     for parent, first in flips:
-        if any(parent is child for child in children):
+        if id(parent) in children:
             continue
         passed, grown = [first], list[Branch]()
         while (following := born.get(id(passed[-1]))) is not None:

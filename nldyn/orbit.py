@@ -27,7 +27,7 @@ from nldyn.multipliers import (
     spectrum,
     uncertainties,
 )
-from nldyn.preload import held_motion, rest
+from nldyn.preload import at_rest, held_motion, rest
 from nldyn.shooting import ShootingProblem
 from nldyn.system import System, numbers
 
@@ -530,7 +530,8 @@ def solve_orbit(
     check_bounded(flow.system, omega)
     starts: Iterator[Real]
     if guess is None:
-        start = flow.to_state(np.append(rest(flow.system), np.zeros(flow.system.size)))
+        q = rest(flow.system)
+        start = flow.to_state(at_rest(q))
         warm = np.linspace(0.0, 400.0 * np.pi, 201)
         found = flow.shoot(start[None], warm, omega, sensitivities=False, chained=True)
         if found.failure:
@@ -546,8 +547,8 @@ def solve_orbit(
         # at a sharp resonance the motion from rest takes too long to grow
         linear = [] if flow.system.grows(omega) else [flow.system.steady(omega).real]
         starts = (spread(problem, z, omega) for z in (strobe[-1], *near, *middles, *linear))
-        if np.any(start):
-            held = held_motion(flow.system, omega, problem.phases[:-1])
+        if np.any(q):
+            held = held_motion(flow.system, q, omega, problem.phases[:-1])
             starts = itertools.chain(starts, [flow.to_state(held)])
     else:
         guess = np.atleast_2d(numbers("guess", guess))
@@ -658,11 +659,13 @@ def same_orbit(a: Orbit, b: Orbit, rtol: float = 1e-5) -> bool:
     """Whether two orbits at one frequency agree up to a shift by whole excitation periods."""
     if a.period != b.period or not math.isclose(a.omega, b.omega, rel_tol=1e-9):
         return False
-    first, second = stroboscopic(a), stroboscopic(b)
-    scale = a.problem.scale(a.point)
+    return shifted_alike(stroboscopic(a), stroboscopic(b), rtol * a.problem.scale(a.point))
+
+
+def shifted_alike(a: Real, b: Real, size: float) -> bool:
+    """Whether two cycles of states (n, 2n_modes) agree within a size up to a shift."""
     return any(
-        float(np.abs(first - np.roll(second, shift, axis=0)).max()) <= rtol * scale
-        for shift in range(a.period)
+        float(np.abs(a - np.roll(b, shift, axis=0)).max()) <= size for shift in range(len(a))
     )
 
 

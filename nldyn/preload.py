@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from nldyn.elements import Stop
 from nldyn.linear import Complex, Real
 from nldyn.system import System
 
@@ -58,9 +61,13 @@ def held_response(system: System, q: Real, omega: float) -> Complex:
     return np.asarray(found)
 
 
-def held_motion(system: System, omega: float, phases: Real) -> Real:
-    """Modal displacements and velocities (k, 2n) of `held_response` about the rest position."""
-    q = rest(system)
+def at_rest(q: Real) -> Real:
+    """Modal displacements and velocities (2n,) of a structure that rests at q."""
+    return np.append(q, np.zeros_like(q))
+
+
+def held_motion(system: System, q: Real, omega: float, phases: Real) -> Real:
+    """Modal displacements and velocities (k, 2n) of `held_response` at forcing phases (k,)."""
     turning = np.exp(1j * phases)[:, None] * held_response(system, q, omega)
     return np.hstack([q + turning.real, (1j * omega * turning).real])
 
@@ -68,21 +75,25 @@ def held_motion(system: System, omega: float, phases: Real) -> Real:
 def tangent_stiffness(system: System, q: Real) -> Real:
     """Stiffness (n, n) of the structure with its closed stops at modal displacements q."""
     matrix = np.diag(system.natural_frequencies**2)
+    for stop, c, depth in _closed(system, q):
+        slope = stop.stiffness * stop.exponent * depth ** (stop.exponent - 1.0)
+        matrix += slope * np.outer(c, c)
+    return matrix
+
+
+def _closed(system: System, q: Real) -> Iterator[tuple[Stop, Real, float]]:
+    """The stops that are closed at modal displacements q, with their vectors and penetrations."""
     for stop in system.stops:
         c = system.stop_vector(stop)
-        depth = max(float(c @ q) - stop.gap, 0.0)
-        if depth:
-            matrix += (
-                stop.stiffness * stop.exponent * depth ** (stop.exponent - 1.0) * np.outer(c, c)
-            )
-    return matrix
+        depth = float(c @ q) - stop.gap
+        if depth > 0.0:
+            yield stop, c, depth
 
 
 def _slope(system: System, q: Real) -> Real:
     slope = system.natural_frequencies**2 * q
-    for stop in system.stops:
-        c = system.stop_vector(stop)
-        slope = slope + stop.stiffness * max(float(c @ q) - stop.gap, 0.0) ** stop.exponent * c
+    for stop, c, depth in _closed(system, q):
+        slope = slope + stop.stiffness * depth**stop.exponent * c
     return np.asarray(slope)
 
 
@@ -92,7 +103,6 @@ def _steepness(system: System, q: Real) -> float:
 
 def _potential(system: System, q: Real) -> float:
     energy = 0.5 * float(system.natural_frequencies**2 @ q**2)
-    for stop in system.stops:
-        depth = max(float(system.stop_vector(stop) @ q) - stop.gap, 0.0)
+    for stop, _, depth in _closed(system, q):
         energy += stop.stiffness * depth ** (stop.exponent + 1.0) / (stop.exponent + 1.0)
     return energy

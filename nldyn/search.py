@@ -24,7 +24,7 @@ from nldyn.orbit import (
     spread,
     stroboscopic,
 )
-from nldyn.preload import rest
+from nldyn.preload import at_rest, rest
 from nldyn.shooting import ShootingProblem
 from nldyn.system import System
 
@@ -103,7 +103,7 @@ def random_states(flow: FlowMap, omega: float, count: int, seed: int | Sequence[
     for index in range(count):
         scale = 0.0 if index == 0 else size * 10.0 ** rng.uniform(-0.5, 1.0)
         states[index] = scale * rng.standard_normal(n) / math.sqrt(n)
-    states[0] = flow.to_state(np.append(rest(flow.system), np.zeros(flow.system.size)))
+    states[0] = flow.to_state(at_rest(rest(flow.system)))
     return states
 
 

@@ -404,7 +404,7 @@ def located_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[Spec
         touch = touches[0]
         grazing = locate("GR", chord, touch.depth)
         if contacts or _vanishes(touch, grazing.point, a, b):
-            found += [grazing, *_pairs_around(grazing, chord, kinds)]
+            found += [grazing, *_pairs_around(grazing, chord)]
     found.sort(key=lambda s: s.point.arclength, reverse=bool(b.arclength < a.arclength))
     if depth < 8 and not accounted(a.orbit, found, b.orbit):
         middle = chord.at(0.5)
@@ -428,15 +428,15 @@ def _vanishes(touch: Touch, at: BranchPoint, a: BranchPoint, b: BranchPoint) -> 
     return abs(touch.depth(at)) <= VANISHED * max(abs(touch.depth(a)), abs(touch.depth(b)))
 
 
-def _pairs_around(grazing: SpecialPoint, chord: Chord, known: list[str]) -> list[SpecialPoint]:
+def _pairs_around(grazing: SpecialPoint, chord: Chord) -> list[SpecialPoint]:
     """Points on either side of a grazing point, where tests change their sign twice in a step.
 
     They bend there, so that the step does not tell.
     """
     sides = Chord(chord.first, grazing.point), Chord(grazing.point, chord.last)
     before, after = (changed(side.first, side.last) for side in sides)
-    hidden = [k for k in before if k in after and k not in known]
-    return [special for k in hidden for side in sides for special in _located(k, side)]
+    hidden = [kind for kind in before if kind in after]
+    return [special for kind in hidden for side in sides for special in _located(kind, side)]
 
 
 def without_repeats(found: list[SpecialPoint]) -> list[SpecialPoint]:

@@ -65,7 +65,7 @@ class Job:
                 self.system(), starts, self.range_hz, LONG, self.doubled, progress
             )
             return replace(found, notes=tuple(_summed_up(found.notes)))
-        return diagram(
+        found = diagram(
             self.system(),
             self.range_hz,
             self.periods,
@@ -74,6 +74,8 @@ class Job:
             options=self.options,
             progress=progress,
         )
+        forget_motions(found.branches)
+        return found
 
 
 def _summed_up(notes: Sequence[str]) -> list[str]:
@@ -161,9 +163,7 @@ def run_job(name: str) -> Diagram:
         tell(f"{name}: {what}", frequency_hz)
 
     with compilation_told(progress):
-        result = job.run(progress)
-    forget_motions(result.branches)
-    return result
+        return job.run(progress)
 
 
 def submit_diagrams(workers: Workers, jobs: Sequence[Job] = JOBS) -> dict[str, Future[Diagram]]:
