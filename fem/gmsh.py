@@ -107,7 +107,9 @@ def read_gmsh(path: Path) -> meshio.Mesh:
     Raises
     ------
     ModelError
-        If the file is not one of Gmsh, is cut off or contradicts itself.
+        If the file is not one of Gmsh or is cut off.
+    ValueError, OverflowError
+        If it contradicts itself; the text says how.
 
     References
     ----------
@@ -123,10 +125,7 @@ def read_gmsh(path: Path) -> meshio.Mesh:
         raise ModelError(f"{path}: is not a Gmsh file (there is no $MeshFormat)")
     if b"$EndElements" not in content:
         raise ModelError(f"{path}: the Gmsh file is cut off (there is no $EndElements)")
-    try:
-        return _mesh(content)
-    except (ValueError, OverflowError) as error:
-        raise ModelError(f"{path}: cannot be read as Gmsh mesh ({error})") from error
+    return _mesh(content)
 
 
 def _mesh(content: bytes) -> meshio.Mesh:

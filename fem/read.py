@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TypeVar
@@ -21,6 +22,15 @@ Mesh = TypeVar("Mesh", FrameMesh, StructureMesh)
 
 SET_PREFIX = "set:"
 FARTHEST = 1e50
+
+# What Python's and numpy's errors say about the words of a file, for one who wrote the file.
+FAULTS = (
+    (r"invalid literal for int\(\) with base 10: (.*)", r"\1 is not a whole number"),
+    (r"could not convert string to float: (.*)", r"\1 is not a number"),
+    (r".* codec can't decode .*", "it holds characters that are not UTF-8"),
+    (r"(not enough values|cannot reshape|setting an array element).*", "numbers are missing"),
+    (r"No (closing quotation|escaped character)", "a quoted name has no end"),
+)
 
 
 def read_vtu(path: Path) -> meshio.Mesh:
@@ -132,10 +142,20 @@ def _read(
     except ModelError:
         raise
     except (Exception, SystemExit) as error:
-        reason = " ".join(str(error).split()) or "it is damaged or cut off"
+        reason = _reason(error)
         if "zero-size array" in reason:
             raise ModelError(f"{path}: the mesh is empty, it has no elements") from error
         raise ModelError(f"{path}: cannot be read as {kind} mesh ({reason})") from error
+
+
+def _reason(error: BaseException) -> str:
+    """What is wrong with a file, by the error of its reader."""
+    said = " ".join(str(error).split())
+    if isinstance(error, KeyError):
+        return f"{said} is missing"
+    for pattern, words in FAULTS:
+        said = re.sub(f"^{pattern}$", words, said)
+    return said or "it is damaged or cut off"
 
 
 def from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> FrameMesh:

@@ -427,15 +427,13 @@ def safe_step(h, h1, h2, bound):
 
 
 @inner
-def closing_time(fl, stop, w, phase, start, end):
+def closing_time(fl, stop, w, phase, start, end, shortest):
     """First time in [start, end] at which a stop closes, or inf; no contact is passed over.
 
     Every step is bounded by the third derivative, so that it cannot cross a contact; the steps
-    converge to the contact at order three. Only contacts shorter than 1.6e-11 periods of the
-    excitation or of the fastest mode can be stepped over, and only where the approach is so slow
-    that the acceleration stops it in that time.
+    converge to the contact at order three. Only contacts shorter than `shortest` can be stepped
+    over, and only where the approach is so slow that the acceleration stops it in that time.
     """
-    shortest = 1e-10 / max(fl.omega, fastest_rate(fl))
     longest = 2.0 * math.pi / fl.omega
     t = start
     while t <= end:
@@ -1713,7 +1711,8 @@ def run_pieces(
     h_even = fl.node_angle * m / fastest if fastest > 0.0 else np.inf
     h_mapped = 0.75 * h_even / tab.power
     panel = new_panel(fl, m, w.size, np.empty(0, dtype=np.int64))
-    shortest = 1e-10 / max(fastest, fl.omega)
+    # 1.6e-11 periods of the excitation or of the fastest mode, but more than rounding of the time
+    shortest = max(1e-10 / max(fastest, fl.omega), 1e-15 * duration)
     t = 0.0
     start_switch = 1 if duration < 0.0 else 0  # written so that one version is compiled, not two
     skip = 0.0
@@ -1737,7 +1736,7 @@ def run_pieces(
         if n_active == 0:
             first, stop = remain, none
             for s in range(n_stops):
-                at = closing_time(fl, s, w, here, skip, first)
+                at = closing_time(fl, s, w, here, skip, first, shortest)
                 if at < first:
                     first, stop = at, s
             if recording and record_piece(fl, rec, before, here, first, flight, stop, w) < 0:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Self, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from nldyn.branch import Branch, Course
     from nldyn.flow import FlowMap
     from nldyn.orbit import Orbit
+
+Kept = TypeVar("Kept")
 
 PAUSE = 5.0  # s, at least, between two writings
 SHARE = 20.0  # times as long as it took to write
@@ -164,7 +166,17 @@ def _file(place: str | Path) -> tuple[Callable[[Sequence[Branch]], None], None, 
     from nldyn.store import check_writable, load_branches, save_branches
 
     path = check_writable(place)
-    return partial(save_branches, path), None, load_branches(path) if path.exists() else []
+    earlier = begun_before(load_branches, path) if path.exists() else []
+    return partial(save_branches, path), None, earlier
+
+
+def begun_before(read: Callable[[Path], Kept], path: Path) -> Kept:
+    """Read what an earlier run kept; the error of a file that cannot be read says what helps."""
+    try:
+        return read(path)
+    except SystemModelError as error:
+        advice = "choose another file, or delete it to begin anew"
+        raise SystemModelError(f"{error}; {advice}") from error
 
 
 def _is_begun_at(branch: Branch, orbit: Orbit, course: Course) -> bool:

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from cms.threads import one_thread
 from nldyn.branch import Branch
-from nldyn.checkpoint import Checkpoint
+from nldyn.checkpoint import Checkpoint, begun_before
 from nldyn.continuation import MOST_POINTS, ContinuationOptions, check_range, shifts
 from nldyn.diagrams import Collector, Diagram, Progress
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
@@ -513,7 +514,7 @@ class _Survey:
         earlier: Sequence[Branch] = ()
         if place.exists():
             laws = {i: s.law for i, s in enumerate(self.question.flow.system.stops) if s.law}
-            known = load_exploration(place, laws=laws)
+            known = begun_before(partial(load_exploration, laws=laws), place)
             if not self.question.same(known.question):
                 raise SystemModelError(
                     f"{path}: holds another exploration (other system, range, periods, effort or "

@@ -14,7 +14,7 @@ from one_dof import make_one_dof
 from scipy.optimize import brentq
 from scipy.special import beta
 
-from nldyn import FlowMap, HarmonicForce, Stop, System, Unbalance, solve_orbit
+from nldyn import Damper, FlowMap, HarmonicForce, Stop, System, Unbalance, solve_orbit
 
 GAP = 1e-3
 NATURAL = 2 * np.pi * 20.0
@@ -204,6 +204,29 @@ def test_hundreds_of_whole_turns_before_the_start_change_nothing(exponent):
 def test_a_point_that_rests_at_its_stop_never_hits_it(force):
     orbit = solve_orbit(make_one_dof(excitation=force), 20.0)
     assert orbit.impacts == 0 and orbit.max_abs_displacement == 0.0
+
+
+def test_the_search_for_a_contact_ends_beside_a_decay_in_a_nanosecond():
+    """Its shortest step would be lost in the rounding of the time."""
+    modal = [20.0, 90.0], {"b": [0.5, 1.0]}
+    dampers = [Damper("b", 1e9)]
+    free = FlowMap(System.from_modal(*modal, dampers=dampers))
+    stop = Stop.linear("b", 1e3)
+    flow = FlowMap(System.from_modal(*modal, dampers=dampers, stops=[stop]))
+    rng = np.random.default_rng(1)
+    at_b, beside_b = np.array([0.5, 1.0]), np.array([1.0, -0.5])
+    phases = np.linspace(0.0, 0.7, 50)
+    touched = 0
+    for _ in range(30):
+        q = 1e-3 * rng.uniform(-1, 1) * beside_b - 1e-10 * rng.uniform(0, 1) * at_b
+        state = np.append(q, rng.uniform(-0.1, 0.1) * beside_b)
+        found = flow.shoot(flow.to_state(state)[None], phases[[0, -1]], OMEGA, sensitivities=False)
+        start = free.to_state(state)[None]
+        ends = free.shoot(start, phases, OMEGA, sensitivities=False, chained=True).ends
+        touches = max(at_b @ free.to_modal(end)[:2] for end in ends) > 0.0
+        assert found.closings[0] == touches
+        touched += touches
+    assert 5 < touched < 25
 
 
 def test_a_linear_stop_does_not_end_a_long_simulation():

@@ -230,6 +230,7 @@ def test_a_foreign_file_in_the_place_of_an_unfinished_run_is_named(tmp_path):
     result = invoke("run", ONE_DOF, "--out", tmp_path / "out", "--quiet")
     assert result.exit_code == 2
     assert result.stderr.count("\n") == 1 and "is not an HDF5 file" in result.stderr
+    assert "or delete it to begin anew" in result.stderr
     assert (tmp_path / "out.unfinished.h5").read_text() == "mine"
 
 
