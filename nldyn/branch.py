@@ -161,7 +161,7 @@ class Course:
         Frequencies between which to stay.
     options : ContinuationOptions
         Step control.
-    open_ends : tuple of (N + 1,) arrays
+    open_ends : (m, N + 1) array
         Where other branches were broken off.
     at : sequence of float
         Frequencies in Hz at which orbits were requested.
@@ -175,7 +175,7 @@ class Course:
 
     range_hz: tuple[float, float]
     options: ContinuationOptions
-    open_ends: tuple[Real, ...] = ()
+    open_ends: Real
     at: Sequence[float] = ()
     start: int = 0
     special_points_before: int = 0

@@ -192,8 +192,7 @@ def _is_begun_at(branch: Branch, orbit: Orbit, course: Course) -> bool:
         and start.observe == orbit.observe
         and mine.range_hz == course.range_hz
         and mine.options == course.options
-        and len(mine.open_ends) == len(course.open_ends)
-        and all(map(np.array_equal, mine.open_ends, course.open_ends))
+        and np.array_equal(mine.open_ends, course.open_ends)
         and start.problem.segments == orbit.problem.segments
         and same_flow(start.problem.flow, orbit.problem.flow)
     )

@@ -153,7 +153,7 @@ class Walk:
         Frequencies between which to stay.
     options : ContinuationOptions
         Step control.
-    open_ends : sequence of (N + 1,) arrays
+    open_ends : (m, N + 1) array, optional
         Where other branches were broken off: the walk stops at the first of these that it passes.
     stride : Stride, optional
         Where to go on, if not at the start.
@@ -162,7 +162,7 @@ class Walk:
     start: BranchPoint
     range_hz: tuple[float, float]
     options: ContinuationOptions
-    open_ends: Sequence[Real] = ()
+    open_ends: Real | None = None
     stop_reason: str = NOT_FINISHED
     stride: Stride | None = None
     _obstacle: str = field(default="", init=False, repr=False)
@@ -213,7 +213,7 @@ class Walk:
                 self.stop_reason = CLOSED
                 yield point
                 return
-            if _passed(here, point, self._ends).any():
+            if self.open_ends is not None and _passed(here, point, self.open_ends).any():
                 self.stop_reason = MEETS_OPEN_END
                 yield point
                 return
@@ -226,12 +226,6 @@ class Walk:
             self.stride = Stride(point, step, behind, self.stride.count + 1)
             yield point
         self.stop_reason = f"{self.options.max_points}{POINTS}"
-
-    @cached_property
-    def _ends(self) -> Real:
-        """Those of the open ends that are orbits of this period, (m, N + 1)."""
-        size = self.start.orbit.point.size
-        return np.array([end for end in self.open_ends if end.size == size]).reshape(-1, size)
 
     def _advance(
         self,
@@ -362,12 +356,21 @@ def _passed(a: BranchPoint, b: BranchPoint, places: Real) -> NDArray[np.bool_]:
 
 def open_ends(branch: Branch) -> list[Real]:
     """Shooting unknowns where a branch was broken off, shifted by all its excitation periods."""
+    return [
+        place for end in broken_off(branch) for place in shifts(end.orbit.problem, end.orbit.point)
+    ]
+
+
+def alike(orbit: Orbit, places: Sequence[Real]) -> Real:
+    """Those of some shooting unknowns that are as many as an orbit's, (m, N + 1)."""
+    size = orbit.point.size
+    return np.array([place for place in places if place.size == size]).reshape(-1, size)
+
+
+def broken_off(branch: Branch) -> list[BranchPoint]:
+    """The ends at which a branch was broken off."""
     ends = zip((branch.nodes[0], branch.nodes[-1]), branch.stop_reasons, strict=True)
-    found = []
-    for end, reason in ends:
-        if reason.endswith(POINTS) or reason.startswith(SHORT_STEP):
-            found += shifts(end.orbit.problem, end.orbit.point)
-    return found
+    return [end for end, why in ends if why.endswith(POINTS) or why.startswith(SHORT_STEP)]
 
 
 def _extrapolate(weights: Real, behind: Real, here: BranchPoint, step: float) -> Real:
@@ -485,13 +488,12 @@ def trace(
     range_hz: tuple[float, float],
     options: ContinuationOptions | None = None,
     progress: Callable[[float], None] | None = None,
-    open_ends: Sequence[Real] = (),
 ) -> tuple[list[BranchPoint], list[SpecialPoint], str, list[str]]:
     """Walk from a point in the direction of its tangent and collect special points.
 
     Returns the points, the special points, why the walk stopped, and notes on what may be missing.
     """
-    trail = Trail(Walk(start, range_hz, options or ContinuationOptions(), open_ends))
+    trail = Trail(Walk(start, range_hz, options or ContinuationOptions()))
     leg = trail.follow(progress)
     return leg.nodes, leg.special_points, leg.reason, leg.notes
 
@@ -548,7 +550,7 @@ class Trail:
         leg: Leg,
         range_hz: tuple[float, float],
         options: ContinuationOptions,
-        open_ends: Sequence[Real],
+        open_ends: Real,
     ) -> Trail:
         """The same walk with another end of its range or other options."""
         walk = Walk(leg.nodes[0], range_hz, options, open_ends)
@@ -686,7 +688,7 @@ def _detour(a: BranchPoint, b: BranchPoint, walk: Walk) -> list[BranchPoint] | N
     options = replace(
         walk.options, first_step=first_step, max_step=8.0 * first_step, max_points=MOST_DETOUR
     )
-    inner = Walk(a, walk.range_hz, options, [b.orbit.point])
+    inner = Walk(a, walk.range_hz, options, b.orbit.point[None])
     between = list(inner)[1:-1]
     if inner.stop_reason != MEETS_OPEN_END or not between:
         return None
@@ -793,7 +795,7 @@ def continue_branch(
     course = Course(
         (low, high),
         options or ContinuationOptions(),
-        tuple(numbers("open_ends", end) for end in open_ends),
+        alike(orbit, [numbers("open_ends", end) for end in open_ends]),
         check_requested(at, (low, high)),
     )
     with checkpoint_at(checkpoint) as kept:

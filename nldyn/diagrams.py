@@ -24,6 +24,7 @@ from nldyn.branch import (
 from nldyn.checkpoint import Checkpoint, checkpoint_of_several
 from nldyn.continuation import (
     ContinuationOptions,
+    broken_off,
     check_range,
     complete,
     open_ends,
@@ -102,6 +103,31 @@ class Diagram:
         save_diagram(path, self)
 
 
+class Rows:
+    """A growing array: what was given out of it keeps its length and shares its memory.
+
+    Parameters
+    ----------
+    width : int
+        Of each row.
+    """
+
+    def __init__(self, width: int) -> None:
+        self._rows = np.empty((16, width))
+        self._count = 0
+
+    def add(self, row: Real) -> None:
+        """Append a row (width,)."""
+        if self._count == len(self._rows):
+            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
+        self._rows[self._count] = row
+        self._count += 1
+
+    def so_far(self) -> Real:
+        """All rows, (m, width)."""
+        return self._rows[: self._count]
+
+
 @dataclass
 class Collector:
     """Branches found so far, with the tools to add more."""
@@ -114,6 +140,7 @@ class Collector:
     checkpoint: Checkpoint = field(default_factory=Checkpoint)
     branches: list[Branch] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    open_ends: dict[tuple[int, int], Rows] = field(default_factory=dict)
     flip_ends: list[Orbit] = field(default_factory=list)
     crossings: list[SpecialPoint] = field(default_factory=list)
 
@@ -122,10 +149,6 @@ class Collector:
 
     def of_period(self, period: int) -> list[Branch]:
         return [branch for branch in self.branches if branch.period == period]
-
-    def open_ends(self, period: int) -> list[Real]:
-        """Where branches of a period were broken off: what lies beyond is followed up to there."""
-        return [end for branch in self.of_period(period) for end in open_ends(branch)]
 
     def add(self, branch: Branch) -> None:
         count = len(self.branches) + 1
@@ -141,8 +164,18 @@ class Collector:
 
     def _keep(self, branch: Branch) -> None:
         self.branches.append(branch)
+        for end in open_ends(branch):
+            self._open_ends_like(branch.nodes[0].orbit).add(end)
         ends = zip(branch.stop_reasons, (branch.nodes[0], branch.nodes[-1]), strict=True)
         self.flip_ends += [node.orbit for reason, node in ends if reason.startswith(JOINS)]
+
+    def _open_ends_like(self, orbit: Orbit) -> Rows:
+        """Where branches were broken off at orbits of as many periods and unknowns as this one.
+
+        What lies beyond is followed up to there.
+        """
+        like = orbit.period, orbit.point.size
+        return self.open_ends.setdefault(like, Rows(orbit.point.size))
 
     def take_back(self, branches: Iterable[Branch], notes: Iterable[str]) -> None:
         """Take branches that an earlier run had found, named and followed up, in its order."""
@@ -201,7 +234,7 @@ class Collector:
         return self.known(middle_orbit(branch)) or any(
             branch.contains(middle_orbit(other))
             for other in self.of_period(branch.period)
-            if not open_ends(other)
+            if not broken_off(other)
         )
 
     def from_flip(self, special: SpecialPoint, options: ContinuationOptions | None = None) -> None:
@@ -235,7 +268,7 @@ class Collector:
         if not low <= start.orbit.frequency_hz <= high or self.known(start.orbit):
             return
         progress = partial(self.progress, f"1/{start.orbit.period}")
-        open_ends = tuple(self.open_ends(start.orbit.period))
+        open_ends = self._open_ends_like(start.orbit).so_far()
         course = Course(self.range_hz, options or self.options, open_ends)
         branch = self.checkpoint.branch_from(start.orbit, course)
         if branch is not None:

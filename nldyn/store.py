@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from nldyn._kernels import Record
 from nldyn.branch import Branch, BranchPoint, Course, SpecialPoint, WalkEnd
 from nldyn.contact_law import ContactLaw
-from nldyn.continuation import ContinuationOptions
+from nldyn.continuation import ContinuationOptions, alike
 from nldyn.diagrams import Diagram
 from nldyn.elements import Damper, Excitation, HarmonicForce, Stop, Unbalance
 from nldyn.errors import SystemModelError, check_types, shown
@@ -41,7 +41,7 @@ from nldyn.tables import UNITS, orbit_columns
 from nldyn.version import software_version
 
 FORMAT = "nldyn branches"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 STATE_UNIT = "m kg^0.5"
 RECORD_UNITS = {"phase": "rad", "duration": "s", "w": STATE_UNIT, "force": "N", "depth": "m"}
 TRIALS = ((0.1, 0.0), (1.0, 0.1), (1.0, -0.1))  # penetration over its unit, speed in m/s
@@ -380,9 +380,7 @@ def _write_course(group: Any, course: Course) -> None:
     _set_attribute(group, "notes_before", course.notes_before)
     _write_options(group, course.options)
     _put(group, "at", np.array(course.at, dtype=float), "Hz")
-    ends = group.create_group("open_ends")
-    for number, end in enumerate(course.open_ends):
-        _put(ends, f"{number:04d}", end, f"{STATE_UNIT}; the last: logarithm of rad/s")
+    _put(group, "open_ends", course.open_ends, f"{STATE_UNIT}; the last: logarithm of rad/s")
     for name, end_ in zip(("backward", "forward"), course.ends, strict=True):
         if end_ is not None:
             part = group.create_group(name)
@@ -504,6 +502,9 @@ class _Group:
         if not isinstance(inner, h5py.Group):
             raise self.fault("group", name, "is missing")
         return _Group(self.path, inner)
+
+    def has_group(self, name: str) -> bool:
+        return isinstance(self._group.get(name), h5py.Group)
 
     def groups(self) -> list[_Group]:
         return [self.group(name) for name in sorted(self._group)]
@@ -667,7 +668,7 @@ def _read_branch(group: _Group, flows: Sequence[FlowMap]) -> Branch:
         (reasons[0], reasons[1]),
         tuple(group.texts("notes")),
         tuple(_read_points(group.group("requested"), problem, observe)),
-        _read_course(group.group("course"), len(nodes)) if "course" in group else None,
+        _read_course(group.group("course"), nodes) if "course" in group else None,
     )
 
 
@@ -710,25 +711,32 @@ def _read_motions(group: _Group, count: int, flow: FlowMap) -> list[Trajectory |
     return motions
 
 
-def _read_course(group: _Group, nodes: int) -> Course:
+def _read_course(group: _Group, nodes: Sequence[BranchPoint]) -> Course:
     low, high = group.pair("range_hz")
     start = group.whole("start")
-    if not 0 <= start < nodes:
-        raise group.fault("attribute", "start", f"is {start}, but there are {nodes} points")
+    if not 0 <= start < len(nodes):
+        raise group.fault("attribute", "start", f"is {start}, but there are {len(nodes)} points")
     backward, forward = (
         _read_end(group.group(name), count) if name in group else None
-        for name, count in (("backward", start + 1), ("forward", nodes - start))
+        for name, count in (("backward", start + 1), ("forward", len(nodes) - start))
     )
     return Course(
         (low, high),
         _read_options(group),
-        tuple(group.group("open_ends").arrays()),
+        _read_open_ends(group, nodes[0].orbit),
         tuple(group.array("at", -1).tolist()),
         start,
         group.whole("special_points_before"),
         group.whole("notes_before"),
         (backward, forward),
     )
+
+
+def _read_open_ends(group: _Group, orbit: Orbit) -> Real:
+    """Where other branches were broken off; version 1 has a dataset for each end."""
+    if group.has_group("open_ends"):
+        return alike(orbit, group.group("open_ends").arrays())
+    return group.array("open_ends", -1, orbit.point.size)
 
 
 def _read_options(group: _Group) -> ContinuationOptions:

@@ -11,7 +11,7 @@ import cms
 from nldyn.continuation import ContinuationOptions
 from nldyn.diagrams import Diagram, Progress, Seed, diagram
 from nldyn.elements import Stop
-from nldyn.paper.starts import follow_starts, forget_motions, read_starts
+from nldyn.paper.starts import follow_starts, keep_numbers, read_starts
 from nldyn.paper.workers import Workers, tell
 from nldyn.progress import compilation_told
 from nldyn.resources import example
@@ -74,7 +74,7 @@ class Job:
             options=self.options,
             progress=progress,
         )
-        forget_motions(found.branches)
+        keep_numbers(found.branches)
         return found
 
 

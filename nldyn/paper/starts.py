@@ -114,23 +114,28 @@ def follow_starts(
             continue
         count = len(box.branches)
         box.follow(orbit, longest, LONGEST, most)
-        forget_motions(box.branches[count:])
+        keep_numbers(box.branches[count:])
     notes = [f"from {len(starts)} starts, {lost} of which lead to no orbit"]
     notes.append(index_note(box.branches, range_hz))
     return Diagram(tuple(box.branches), range_hz, observe, (*notes, *box.notes))
 
 
-def forget_motions(branches: Sequence[Branch]) -> None:
-    """Keep what figures and tables need of the orbits, and drop the motions: most of their size.
+def keep_numbers(branches: Sequence[Branch]) -> None:
+    """Keep the states of the orbits and the numbers in figures and tables: a tenth of their size.
 
-    Where it is asked for, a motion is recorded again.
+    A motion is recorded again where it is asked for. Without their Jacobians the orbits cannot be
+    followed any further.
     """
+    none = np.empty((0, 0, 0))
     for branch in branches:
+        vars(branch)["course"] = None
         for orbit in (*branch.points, *(special.orbit for special in branch.special_points)):
-            _ = orbit.max_abs_displacement, orbit.max_penetration, orbit.stable
-            _ = orbit.impacts, orbit.observed_extremes, orbit.liouville_error
-            vars(orbit)["motion"] = None
-            vars(orbit).pop("trajectory", None)
+            _ = orbit.max_abs_displacement, orbit.max_penetration, orbit.impacts
+            _ = orbit.liouville_error
+            known = vars(orbit)
+            known.update(motion=None, jacobians=none, _spectrum=(orbit._spectrum[0], none))
+            for name in ("trajectory", "_extremes", "observed_extremes", "penetration_peaks"):
+                known.pop(name, None)
 
 
 def index_note(branches: Sequence[Branch], range_hz: tuple[float, float]) -> str:

@@ -223,6 +223,16 @@ def test_newer_version_is_named(copy):
     refused(copy, f"format version {store.FORMAT_VERSION + 1}", f"up to {store.FORMAT_VERSION}")
 
 
+def test_a_file_of_version_1_has_a_dataset_for_each_open_end(branch, copy):
+    with h5py.File(copy, "r+") as file:
+        file.attrs["format_version"] = 1
+        course = file["branches/0000/course"]
+        del course["open_ends"]
+        course["open_ends/0000"] = branch.points[3].point
+        course["open_ends/0001"] = np.zeros(3)
+    assert np.array_equal(load_branch(copy).course.open_ends, [branch.points[3].point])
+
+
 def test_foreign_files_are_refused(tmp_path):
     refused(tmp_path / "none.h5", "no such file")
     refused(tmp_path, "is a directory")
