@@ -61,6 +61,7 @@ SHORTEST_CROSSING = 1e-4  # step over which a branch may cross another one
 SHORTEST_DETOUR = 1e-6  # first step of a walk that looks closely at what lies within a step
 MOST_DETOUR = 500  # points of such a walk
 MOST_POINTS = 10**8  # in one direction
+MET_AGAIN = 1e-6  # longest Newton step by which a solved orbit is met again across its branch
 
 
 @dataclass(frozen=True)
@@ -473,11 +474,18 @@ def _jumped(problem: ShootingProblem, here: Real, guess: Real, there: Real) -> b
 
 
 def start_point(orbit: Orbit, direction: float) -> BranchPoint:
-    """Branch point at an orbit, heading up (+1) or down (-1) in frequency."""
+    """Branch point at an orbit, heading up (+1) or down (-1) in frequency.
+
+    Beside a flip or a fold, where the frequency hardly tells the orbits of a branch apart, the
+    orbit is met again on the plane across the branch.
+    """
     problem = orbit.problem
     towards = np.zeros(orbit.point.size)
     towards[-1] = direction
     found = problem.correct(orbit.point, towards)
+    if not found.converged and np.isfinite(found.along).all() and found.along.any():
+        across = problem.metric(orbit.point) * problem.tangent(found, towards)
+        found = problem.correct(orbit.point, across, longest=MET_AGAIN)
     if not found.converged:
         raise ConvergenceError(f"no orbit at {orbit.frequency_hz:g} Hz: {found.failure}")
     return BranchPoint(orbit, problem.tangent(found, towards), 0.0)

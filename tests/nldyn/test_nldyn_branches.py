@@ -86,6 +86,26 @@ def test_doubled_branch_joins_two_flips(harmonic_branch):
         assert minimal_period(end) == 1
 
 
+@pytest.mark.parametrize("amplitude", [1e-2, 1e-4, 1e-6])
+def test_a_doubled_branch_can_be_started_right_beside_its_flip(harmonic_branch, amplitude):
+    """Down to 1e-10 of the frequency beside it, which tells its orbits apart no longer."""
+    low, high = (f for f in flips(harmonic_branch) if 8.0 < f.frequency_hz < 11.0)
+    orbit = switch_at_flip(high, amplitude).orbit
+    assert abs(orbit.frequency_hz / high.frequency_hz - 1.0) < 1e-5
+    branch = continue_branch(orbit, RANGE_HZ)
+    assert all(reason.startswith("joins the branch") for reason in branch.stop_reasons)
+    ends = sorted(node.orbit.frequency_hz for node in (branch.nodes[0], branch.nodes[-1]))
+    assert ends == pytest.approx([low.frequency_hz, high.frequency_hz], rel=1e-9)
+
+
+def test_a_branch_can_be_started_at_its_folds(harmonic_branch):
+    for fold in (s for s in harmonic_branch.special_points if s.kind == "LP"):
+        hz = fold.frequency_hz
+        branch = continue_branch(fold.orbit, (0.999 * hz, 1.001 * hz))
+        met = [s.frequency_hz for s in branch.special_points if s.kind == "LP"]
+        assert min(abs(other - hz) for other in met) < 1e-9 * hz
+
+
 def test_flip_that_is_not_found_leaves_no_point_twice(harmonic_branch, monkeypatch):
     def fails(*_, **__):
         raise ConvergenceError("no orbit")
