@@ -49,7 +49,8 @@ inlined = njit(cache=True, error_model="numpy", inline="always")
 
 (
     OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_FULL, ROUNDED,
-) = range(8)  # fmt: skip
+    TOO_MANY_STEPS,
+) = range(9)  # fmt: skip
 FLIGHT = -1
 # |λ - iω| below this share of ω makes an eigenvalue λ near: a steady response is at most 1/NEAR
 # times as large as what the excitation brings about in 1/ω, and so are its rounding errors; in the
@@ -59,6 +60,8 @@ NEAR = 3e-3
 
 # share of the speed at a stop that rounding of its penetration may cost in one contact
 WORST_ROUNDING = 1e-6
+
+MOST_STEPS = 10_000_000  # in the search for one contact: a second
 
 # an orbit closes to this share of its size, or to this one times the largest entry of its segments'
 # Jacobians, which is what rounding costs; a short step of Newton's method does not tell
@@ -431,12 +434,16 @@ def closing_time(fl, stop, w, phase, start, end, shortest):
     """First time in [start, end] at which a stop closes, or inf; no contact is passed over.
 
     Every step is bounded by the third derivative, so that it cannot cross a contact; the steps
-    converge to the contact at order three. Only contacts shorter than `shortest` can be stepped
-    over, and only where the approach is so slow that the acceleration stops it in that time.
+    converge to the contact at order three. Only contacts that are shorter than `shortest` or no
+    deeper than rounding can be stepped over, and only where the approach is so slow that the
+    acceleration stops it in that time. Negative if it takes too many steps.
     """
     longest = 2.0 * math.pi / fl.omega
+    noise = output_noise(fl, stop, w)
     t = start
-    while t <= end:
+    for _ in range(MOST_STEPS):
+        if t > end:
+            return np.inf
         value, h1, h2, bound = output_derivatives(fl, stop, w, phase, t)
         h = value - fl.stops[stop, GAP]
         if h >= 0.0 and h1 > 0.0:
@@ -445,9 +452,9 @@ def closing_time(fl, stop, w, phase, start, end, shortest):
         if tau < shortest:
             if h1 > 0.0 and h + h1 * shortest >= 0.0:
                 return min(t + max(tau, 0.0), end)
-            tau = shortest
+            tau = max(shortest, safe_step(min(h, 0.0) - noise, h1, h2, bound))
         t += min(tau, longest)
-    return np.inf
+    return -1.0
 
 
 @inner
@@ -1737,6 +1744,8 @@ def run_pieces(
             first, stop = remain, none
             for s in range(n_stops):
                 at = closing_time(fl, s, w, here, skip, first, shortest)
+                if at < 0.0:
+                    return TOO_MANY_STEPS
                 if at < first:
                     first, stop = at, s
             if recording and record_piece(fl, rec, before, here, first, flight, stop, w) < 0:

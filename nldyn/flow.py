@@ -25,6 +25,7 @@ from nldyn._kernels import (
     ROUNDED,
     SINGULAR,
     TOO_MANY_PIECES,
+    TOO_MANY_STEPS,
     Corrector,
     Record,
     SystemData,
@@ -55,6 +56,7 @@ _REASONS = {
     OK: "",
     TOO_MANY_PIECES: "more than 20000 flights and contact panels in one segment: too many contacts "
     "or too fast a mode (more segments help)",
+    TOO_MANY_STEPS: "a stop stays so close to a touch that the search for it takes too many steps",
     CONTACT_FAILED: "a contact phase could not be resolved",
     ROUNDED: "a contact is hidden by rounding: the displacements are too large beside its depth",
     DIVERGED: "Newton's method diverged",

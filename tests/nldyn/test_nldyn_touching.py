@@ -206,6 +206,19 @@ def test_a_point_that_rests_at_its_stop_never_hits_it(force):
     assert orbit.impacts == 0 and orbit.max_abs_displacement == 0.0
 
 
+@pytest.mark.parametrize("apart", [0.0, 1e-15, 1e-12])
+def test_modes_that_cancel_at_a_stop_without_gap_leave_it_alone(apart):
+    """The displacement there is rounding for ever, beside modes that move."""
+    modal = [20.0, 20.0 * (1.0 + apart)], {"m": [1.0, 1.0]}
+    flow = FlowMap(System.from_modal(*modal, stops=[Stop("m", stiffness=1e9)]))
+    free = FlowMap(System.from_modal(*modal))
+    state = flow.to_state(np.array([1e-3, -1e-3, 0.05, -0.05]))[None]
+    phases = np.array([0.0, 2.0 * np.pi])
+    found = flow.shoot(state, phases, OMEGA, sensitivities=False)
+    assert not found.failure
+    assert found.ends == pytest.approx(free.shoot(state, phases, OMEGA).ends, abs=1e-12)
+
+
 def test_the_search_for_a_contact_ends_beside_a_decay_in_a_nanosecond():
     """Its shortest step would be lost in the rounding of the time."""
     modal = [20.0, 90.0], {"b": [0.5, 1.0]}
