@@ -19,6 +19,9 @@ from nldyn.kernel_cache import resting_on
 inner = resting_on(_kernels.inner, _kernels.__file__)
 compiled = resting_on(njit(cache=True, error_model="numpy"), _kernels.__file__)
 
+UNSEEN = 1e-14  # share of a displacement that rounding may be
+MOST_SAMPLES = 3_000_000  # of a piece, a tenth of a second, in which no more extremes are told
+
 
 @inner
 def stretched_time(tab, kind, x):
@@ -171,6 +174,28 @@ def output_rate(row, row1, near, forced, omega, phase, t, w):
     return value, rate
 
 
+@inner
+def leave_unseen(blocks, row, forced, w):
+    """Set to zero what an output ``row @ w`` shows by rounding alone; fastest vibration in rad/s.
+
+    That are vibrations that ended long ago, of modes that may be very fast.
+    """
+    sizes = np.empty(blocks.shape[0])
+    for b in range(sizes.size):
+        j = 2 * b
+        sizes[b] = np.hypot(row[j], row[j + 1]) * np.hypot(w[j], w[j + 1])
+    least = UNSEEN * (np.abs(forced).sum() + sizes.sum())
+    fastest = 0.0
+    for b in range(sizes.size):
+        if sizes[b] <= least:
+            w[2 * b], w[2 * b + 1] = 0.0, 0.0
+        else:
+            half = 0.5 * (blocks[b, 0, 0] - blocks[b, 1, 1])
+            square = half * half + blocks[b, 0, 1] * blocks[b, 1, 0]
+            fastest = max(fastest, np.sqrt(max(-square, 0.0)))
+    return fastest
+
+
 @compiled
 def local_extremes(
     blocks, force, omega, tab,
@@ -179,12 +204,12 @@ def local_extremes(
 ):  # fmt: skip
     """Phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output.
 
-    The rate is sampled sixteen times per period of the fastest mode (rad/s), its sign changes are
-    refined. In flight, where a parabola through three samples of one sign comes near zero, it is
-    looked for a change of sign there: two extremes closer than the samples. The motion is taken as
-    periodic: an extreme at its start counts once.
+    The rate is sampled sixteen times per period of the fastest mode (rad/s), in flight of the
+    fastest one that `leave_unseen` leaves; its sign changes are refined. In flight, where a
+    parabola through three samples of one sign comes near zero, it is looked for a change of sign
+    there: two extremes closer than the samples. The motion is taken as periodic: an extreme at its
+    start counts once.
     """
-    spacing = 2.0 * np.pi / (16.0 * fastest)
     found = np.empty((64, 3))
     n = 0
     w, v, start = np.empty(force.shape[0]), np.empty(force.shape[0]), np.empty(force.shape[0])
@@ -201,7 +226,8 @@ def local_extremes(
         h = rec_duration[piece]
         kind = rec_kind[piece]
         without_steady(response, rec_phase[piece], rec_start[piece], start)
-        pieces = int(np.ceil(h / spacing)) + 1
+        seen = max(omega, leave_unseen(blocks, row, forced, start)) if kind == FLIGHT else fastest
+        pieces = int(min(np.ceil(h * seen * (8.0 / np.pi)), MOST_SAMPLES)) + 1
         if kind != FLIGHT:
             pieces += tab.nodes.size
             impulses(blocks, force, tab, kind, h, rec_force[piece], shares)
@@ -238,7 +264,7 @@ def local_extremes(
                 if i > 0:
                     middle, value = turning_point(
                         blocks, tab, kind, h, start, shares, row, row1, near, forced, omega,
-                        rec_phase[piece], spacing, sign, t_old, t, rate_old, rate, v,
+                        rec_phase[piece], h / pieces, sign, t_old, t, rate_old, rate, v,
                     )  # fmt: skip
                 found, n = append_extreme(found, n, rec_phase[piece] + omega * middle, value, sign)
                 sign = new_sign
@@ -262,12 +288,12 @@ def local_extremes(
                         phase = rec_phase[piece]
                         first, value = turning_point(
                             blocks, tab, kind, h, start, shares, row, row1, near, forced, omega,
-                            phase, spacing, sign, lo, where, rate_lo, rate_where, v,
+                            phase, h / pieces, sign, lo, where, rate_lo, rate_where, v,
                         )  # fmt: skip
                         found, n = append_extreme(found, n, phase + omega * first, value, sign)
                         last, value = turning_point(
                             blocks, tab, kind, h, start, shares, row, row1, near, forced, omega,
-                            phase, spacing, -sign, where, hi, rate_where, rate_hi, v,
+                            phase, h / pieces, -sign, where, hi, rate_where, rate_hi, v,
                         )  # fmt: skip
                         found, n = append_extreme(found, n, phase + omega * last, value, -sign)
                         rate_old = 0.0  # the next three samples would show the same pair

@@ -206,6 +206,20 @@ def test_a_point_that_rests_at_its_stop_never_hits_it(force):
     assert orbit.impacts == 0 and orbit.max_abs_displacement == 0.0
 
 
+@pytest.mark.parametrize("fast_hz", [1e5, 1e7, 1e9])
+def test_a_mode_that_rests_does_not_make_extremes_dear(fast_hz):
+    """Two extremes in a period, of the closed form's amplitude, whatever else might vibrate."""
+    force = HarmonicForce("m", 1.0)
+    system = System.from_modal(
+        [20.0, fast_hz], {"m": [1.0, 1.0]}, modal_damping=0.02, excitation=[force]
+    )
+    orbit = solve_orbit(system, 15.0)
+    omega, natural = 2 * np.pi * 15.0, 2 * np.pi * np.array([20.0, fast_hz])
+    amplitude = abs((1.0 / (natural**2 - omega**2 + 0.04j * natural * omega)).sum())
+    assert orbit.max_abs_displacement == pytest.approx(amplitude, rel=1e-9)
+    assert orbit.observed_extremes.values.size == 2
+
+
 @pytest.mark.parametrize("apart", [0.0, 1e-15, 1e-12])
 def test_modes_that_cancel_at_a_stop_without_gap_leave_it_alone(apart):
     """The displacement there is rounding for ever, beside modes that move."""
