@@ -2004,9 +2004,10 @@ def newton(
     k = phases.size - 1
     size = 2 * system.blocks.shape[0]
     unknowns = point.size
-    matrix = np.empty((unknowns, unknowns))
-    sides = np.empty((unknowns, 2))
-    order = np.empty(unknowns, dtype=np.int64)
+    equations = unknowns if max_iterations > 0 else 0
+    matrix = np.empty((equations, equations))
+    sides = np.empty((equations, 2))
+    order = np.empty(equations, dtype=np.int64)
     nodes = np.empty((unknowns // size, size))
     along = np.zeros(unknowns)
     first, last = np.inf, np.inf

@@ -559,6 +559,13 @@ class FlowMap:
                 )
             capacity *= 4
 
+    def solve(self, nodes: Real, phases: Real, omega: float) -> Real | None:
+        """States where each of some nodes (k, 2n) comes to at the next phase (k + 1,), or None."""
+        status, *_, ends, _, _, _, _ = self._unchecked(
+            self._no_record, False, nodes, phases, omega, False, False, ()
+        )
+        return ends if status == OK else None
+
     def _fly(
         self,
         record: Record,
@@ -573,6 +580,21 @@ class FlowMap:
         """The flow map alone; see `_kernels.newton` for what comes back."""
         nodes, phases = _floats("nodes", nodes), np.ascontiguousarray(_floats("phases", phases))
         self._check_segments(nodes, phases, omega, chained)
+        return self._unchecked(
+            record, recording, nodes, phases, omega, chained, sensitivities, parameters
+        )
+
+    def _unchecked(
+        self,
+        record: Record,
+        recording: bool,
+        nodes: Real,
+        phases: Real,
+        omega: float,
+        chained: bool,
+        sensitivities: bool,
+        parameters: Sequence[Parameter],
+    ) -> tuple[Any, ...]:
         point = np.empty(nodes.size + 1)
         point[:-1], point[-1] = nodes.ravel(), 0.0
         corrector = Corrector(point, 0.0, 0.0, 0.0, 0.0, 0)
@@ -711,7 +733,31 @@ class Trajectory:
                 f"phases must lie within the motion, {first:g} to {last:g}, got "
                 f"{phases[0]:g} to {phases[-1]:g}"
             )
-        return self._evaluate(sample_states, phases)
+        states = self._evaluate(sample_states, phases)
+        self._solve_in_contact(phases, states)
+        return states
+
+    def _solve_in_contact(self, phases: Real, states: Real) -> None:
+        """Replace the polynomial's states (k, 2n) within contact panels by those of the flow map.
+
+        Each is solved for anew from the start of its panel, or from before the contact where the
+        panel begins it. The map also runs from each phase to where the next one begins, which lies
+        before: that takes no time.
+        """
+        rec, flow = self.record, self.flow
+        if not phases.size or not (rec.kind >= 0).any():
+            return
+        piece = np.maximum(np.searchsorted(rec.phase, phases, side="right") - 1, 0)
+        inside = np.flatnonzero(rec.kind[piece] >= 0)[::-1]
+        begins = rec.kind // 2 == 1
+        start = np.maximum.accumulate(np.where(begins, 0, np.arange(begins.size)))[piece[inside]]
+        if not inside.size:
+            return
+        legs = np.stack([rec.phase[start], phases[inside]], axis=1).ravel()
+        nodes = np.repeat(rec.start[start], 2, axis=0)[:-1]
+        found = flow.solve(nodes, legs, self.omega)
+        if found is not None:
+            states[inside] = found[::2]
 
     @cached_property
     def _span(self) -> tuple[float, float]:
@@ -734,8 +780,15 @@ class Trajectory:
         """
         flow = self.flow
         check_whole("output", output, 0, len(flow.rows) - 1)
+        row, rate_row = flow.rows[output], flow.rate_rows[output]
         fastest = max(self.omega, flow.system.linear.fastest)
-        return self._evaluate(local_extremes, flow.rows[output], flow.rate_rows[output], fastest)
+        found = self._evaluate(local_extremes, row, rate_row, fastest)
+        order = np.argsort(found[:, 0], kind="stable")
+        states = np.full((order.size, row.size), np.nan)
+        self._solve_in_contact(found[order, 0], states)
+        solved = ~np.isnan(states[:, 0])
+        found[order[solved], 1] = states[solved] @ row
+        return found
 
     def contact_quadrature(self) -> tuple[Real, Real]:
         """Forcing phases (k,) of all nodes of contact panels, and their weights in s (k,)."""

@@ -34,6 +34,11 @@ from nldyn.system import System, numbers
 SEGMENTS_PER_PERIOD = 2
 LONGEST_PERIOD = 10**4  # excitation periods of an orbit
 MOST_SEGMENTS = 10**5
+TOUCH = 1e-7  # contact force over the excitation: up to this a free body counts as untouched
+NO_PLACE = (
+    "the structure is free to move as a whole, and where the motion touches no stop, nothing tells "
+    "its place; give a guess that touches one"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -606,6 +611,12 @@ def near_returns(states: Real, period: int, count: int) -> list[int]:
     return chosen
 
 
+def _touches_only(system: System, motion: Trajectory, omega: float) -> bool:
+    """Whether contacts push, but by no more than rounding of what drives the structure."""
+    drive = sum(abs(source.phasor) * omega**source.order for source in system.excitation)
+    return 0.0 < float(motion.record.force.max(initial=0.0)) <= TOUCH * drive
+
+
 def refine(
     problem: ShootingProblem,
     nodes: Real,
@@ -618,19 +629,19 @@ def refine(
     row = np.zeros(guess.size)
     row[-1] = 1.0
     found = problem.correct(guess, row, max_iterations=max_iterations)
+    where = f"no orbit of period {problem.period} found at {omega / (2 * math.pi):g} Hz"
+    drifts = bool(np.any(problem.flow.system.natural_frequencies == 0.0))
+    if drifts and _touches_only(problem.flow.system, found.motion, omega):
+        raise ConvergenceError(f"{where}: {NO_PLACE}")
     if not found.converged:
-        where = f"no orbit of period {problem.period} found at {omega / (2 * math.pi):g} Hz"
         contact = np.any(found.motion.record.kind >= 0)
         if not contact and problem.flow.system.grows(omega):
             raise ConvergenceError(
                 f"{where}: an undamped mode is excited at its own frequency, and its motion grows "
                 "without bound where it touches no stop"
             )
-        if not contact and np.any(problem.flow.system.natural_frequencies == 0.0):
-            raise ConvergenceError(
-                f"{where}: the structure is free to move as a whole, and where the motion touches "
-                "no stop, nothing tells its place; give a guess that touches one"
-            )
+        if not contact and drifts:
+            raise ConvergenceError(f"{where}: {NO_PLACE}")
         step = f", last relative step {found.last_step:.1e}" if found.last_step < math.inf else ""
         raise ConvergenceError(
             f"{where}: {found.failure}{step} after {found.iterations} "

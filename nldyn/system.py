@@ -17,6 +17,7 @@ from nldyn.errors import SystemModelError, shown
 from nldyn.linear import Complex, LinearPart, Real, at_resonance, linear_part
 
 Element = TypeVar("Element")
+LARGEST_PARTICIPATION = 1e50  # its square is the mobility of a stop, and its fourth power occurs
 
 
 class ReducedModelLike(Protocol):
@@ -371,6 +372,11 @@ class System:
                     f"participation of '{name}' has {phi.size} entries but there are {n} modes"
                     if phi.ndim == 1
                     else f"participation of '{name}' must be a list, got shape {phi.shape}"
+                )
+            if np.abs(phi).max() > LARGEST_PARTICIPATION:
+                raise SystemModelError(
+                    f"participation of '{name}' must be at most {LARGEST_PARTICIPATION:g} "
+                    f"1/kg^0.5, got {np.abs(phi).max():g}"
                 )
 
     def _check_interfaces(self) -> None:

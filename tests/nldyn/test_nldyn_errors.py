@@ -161,6 +161,7 @@ def test_participation(value):
 
 def test_shapes_of_modal_data():
     sentence(modal(participation={"m": [1.0]}), "participation of 'm'", "1 entries", "2 modes")
+    sentence(modal(participation={"m": [1.0, 1e200]}), "participation of 'm'", "at most 1e+50")
     sentence(modal(modal_damping=[0.1, 0.1, 0.1]), "modal_damping", "3")
     sentence(modal(frequencies_hz=[]), "at least one mode")
     sentence(modal(frequencies_hz=[[10.0, 20.0]]), "frequencies_hz", "shape (1, 2)")

@@ -128,6 +128,34 @@ def test_reported_extremes_are_those_of_a_dense_history(make, frequency):
     assert min(times) >= 0.0 and max(times) <= orbit.duration
 
 
+@pytest.mark.parametrize("elastic", [[], [13.0]])
+def test_a_free_body_that_touches_by_rounding_has_no_place(elastic):
+    """A push would have to be balanced: only orbits that do not touch, anywhere below the stop."""
+    system = System.from_modal(
+        [0.0, *elastic],
+        {"a": [0.6] * (1 + len(elastic))},
+        modal_damping=0.01,
+        stops=[Stop("a", 1e9)],
+        excitation=[Unbalance("a", 1e-5)],
+    )
+    with pytest.raises(ConvergenceError, match="nothing tells its place"):
+        solve_orbit(system, 20.0)
+
+
+@CASES
+def test_states_within_contacts_are_those_of_a_fine_integration(make, frequency):
+    system = make()
+    orbit = solve_orbit(system, frequency)
+    deepest = max(orbit.impact_list, key=lambda impact: impact.penetration)
+    phases = orbit.omega * deepest.time + np.linspace(-3e-3, 3e-3, 13)
+    states = orbit.states(phases)
+    assert (orbit.penetration(0, phases) > 0.0).any()
+    size = np.abs(states).max(axis=0)
+    for start, first, last, end in zip(states, phases, phases[1:], states[1:], strict=False):
+        found, _ = Motion(system).run(start, (first, last), orbit.omega)
+        assert np.abs((end - found) / size).max() < 2e-9
+
+
 def test_history_is_periodic_and_starts_at_the_shooting_point():
     orbit = solve_orbit(two_modes(), 26.0)
     history = orbit.history(64)
