@@ -1788,9 +1788,9 @@ def run_pieces(
         )
         if status != OK:
             return status
-        if not np.isfinite(w_end.sum()):
-            return CONTACT_FAILED
         if h > 0.0:
+            if not np.isfinite(w_end.sum()):
+                return CONTACT_FAILED
             if recording:
                 n = record_piece(fl, rec, before, here, h, kind, event, w)
                 if n < 0:

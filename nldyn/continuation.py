@@ -91,7 +91,7 @@ class ContinuationOptions:
 
     first_step: float = 0.01
     max_step: float = 0.05
-    min_step: float = 1e-8
+    min_step: float = 1e-10
     max_angle: float = 0.25
     max_miss: float = 0.1
     grazing_step: float = 0.004

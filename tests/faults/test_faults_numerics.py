@@ -80,7 +80,7 @@ def test_an_undamped_resonance_ends_the_branch_with_residual_and_last_point(tmp_
     broken = [end for end in tables["ends"] if end["broken_off"] == "1"]
     assert broken
     for end in broken:
-        assert end["reason"].startswith("step below 1e-08: ")
+        assert end["reason"].startswith("step below 1e-10: ")
         last = [row for row in tables["branches"] if row["branch"] == end["branch"]]
         row = last[0 if end["end"] == "first" else -1]
         assert end["frequency_hz"] == row["frequency_hz"]
