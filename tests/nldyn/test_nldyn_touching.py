@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import itertools
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -204,6 +206,33 @@ def test_hundreds_of_whole_turns_before_the_start_change_nothing(exponent):
 def test_a_point_that_rests_at_its_stop_never_hits_it(force):
     orbit = solve_orbit(make_one_dof(excitation=force), 20.0)
     assert orbit.impacts == 0 and orbit.max_abs_displacement == 0.0
+
+
+def fill_freed_memory_with_nan() -> None:
+    """Leave NaN in small freed blocks, from which the next ones are taken."""
+    libc = ctypes.CDLL(None)
+    libc.malloc.restype, libc.malloc.argtypes = ctypes.c_void_p, [ctypes.c_size_t]
+    libc.free.argtypes = [ctypes.c_void_p]
+    for size in range(16, 520, 8):
+        blocks = [libc.malloc(size) for _ in range(12)]
+        for block in blocks:
+            ctypes.memmove(block, np.full(size // 8, np.nan).tobytes(), size)
+        for block in blocks:
+            libc.free(block)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="takes memory from the C library")
+def test_a_contact_that_begins_at_the_start_does_not_depend_on_what_memory_holds():
+    """Its first panel has no length, and an end that nobody has computed."""
+    flow = FlowMap(make_one_dof())
+    state, phases = (
+        np.array([[0.0, -2.9250430670353065e-06]]),
+        [262.8990431862277, 263.839970938368],
+    )
+    for _ in range(5):
+        fill_freed_memory_with_nan()
+        found = flow.shoot(state, np.array(phases), 2 * np.pi * 36.0, sensitivities=False)
+        assert not found.failure
 
 
 @pytest.mark.parametrize("fast_hz", [1e5, 1e7, 1e9])
