@@ -135,7 +135,12 @@ CASES = (
             "of the rate; the next term is of the size of the contact's share of the period",
             partial(rate_error, (low, high)),
         )
-        for low, high, bound in ((1e8, 1e10, 2e-2), (1e10, 1e12, 5e-3))
+        for low, high, bound in (
+            (1e6, 1e8, 1.2e-1),
+            (1e8, 1e10, 2e-2),
+            (1e10, 1e12, 5e-3),
+            (1e12, 1e15, 8e-4),
+        )
     ),
     Case(
         SUBJECT,
