@@ -315,7 +315,7 @@ def test_range_that_is_empty_or_elsewhere(orbit):
         {"first_step": math.nan}, {"max_angle": 0.0}, {"max_angle": math.nan}, {"max_points": 1},
         {"max_points": math.nan}, {"max_step": math.inf}, {"max_miss": 0.0},
         {"max_miss": math.nan}, {"grazing_step": math.nan}, {"grazing_step": -1.0},
-        {"grazing_step": 1e-9}, {"max_step": "a"}, {"max_miss": None}, {"max_angle": 1.5},
+        {"grazing_step": 1e-11}, {"max_step": "a"}, {"max_miss": None}, {"max_angle": 1.5},
     ],
 )  # fmt: skip
 def test_continuation_options(options):
