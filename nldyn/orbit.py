@@ -34,7 +34,9 @@ from nldyn.system import System, numbers
 SEGMENTS_PER_PERIOD = 2
 LONGEST_PERIOD = 10**4  # excitation periods of an orbit
 MOST_SEGMENTS = 10**5
-TOUCH = 1e-7  # contact force over the excitation: up to this a free body counts as untouched
+# contact force over the excitation, and penetration over displacement, up to which a free body
+# counts as untouched
+TOUCH = 1e-7
 NO_PLACE = (
     "the structure is free to move as a whole, and where the motion touches no stop, nothing tells "
     "its place; give a guess that touches one"
@@ -612,9 +614,12 @@ def near_returns(states: Real, period: int, count: int) -> list[int]:
 
 
 def _touches_only(system: System, motion: Trajectory, omega: float) -> bool:
-    """Whether contacts push, but by no more than rounding of what drives the structure."""
+    """Whether contacts push, but by no more than rounding of the drive and of the motion."""
+    force = float(motion.record.force.max(initial=0.0))
+    depth = float(motion.record.depth.max(initial=0.0))
     drive = sum(abs(source.phasor) * omega**source.order for source in system.excitation)
-    return 0.0 < float(motion.record.force.max(initial=0.0)) <= TOUCH * drive
+    reach = np.abs(motion.record.start @ motion.flow.rows[: len(system.stops)].T).max(initial=0.0)
+    return 0.0 < force <= TOUCH * drive and depth <= TOUCH * reach
 
 
 def refine(

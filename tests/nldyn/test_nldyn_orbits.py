@@ -142,6 +142,20 @@ def test_a_free_body_that_touches_by_rounding_has_no_place(elastic):
         solve_orbit(system, 20.0)
 
 
+def test_a_free_body_held_softly_between_two_stops_has_its_place():
+    stops = [Stop("a", 1.0, 1.0, -2.5e-8), Stop("a", 1.0, 1.0, -2.5e-8, direction=-1)]
+    system = System.from_modal(
+        [0.0],
+        {"a": [1.0]},
+        stops=stops,
+        dampers=[Damper("a", 1.0)],
+        excitation=[HarmonicForce("a", 1.0)],
+    )
+    orbit = solve_orbit(system, 1000.0)
+    omega = 2.0 * np.pi * 1000.0  # both springs are held nearly always: a linear oscillator
+    assert orbit.max_abs_displacement == pytest.approx(1.0 / omega**2, rel=1e-3)
+
+
 @CASES
 def test_states_within_contacts_are_those_of_a_fine_integration(make, frequency):
     system = make()
