@@ -178,7 +178,7 @@ def output_rate(row, row1, near, forced, omega, phase, t, w):
 def leave_unseen(blocks, row, forced, w):
     """Set to zero what an output ``row @ w`` shows by rounding alone; fastest vibration in rad/s.
 
-    That are vibrations that ended long ago, of modes that may be very fast.
+    Such are vibrations that ended long ago, of modes that may be very fast.
     """
     sizes = np.empty(blocks.shape[0])
     for b in range(sizes.size):

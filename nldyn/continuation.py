@@ -357,9 +357,8 @@ def _passed(a: BranchPoint, b: BranchPoint, places: Real) -> NDArray[np.bool_]:
 
 def open_ends(branch: Branch) -> list[Real]:
     """Shooting unknowns where a branch was broken off, shifted by all its excitation periods."""
-    return [
-        place for end in broken_off(branch) for place in shifts(end.orbit.problem, end.orbit.point)
-    ]
+    ends = [end.orbit for end, _ in broken_off(branch)]
+    return [place for orbit in ends for place in shifts(orbit.problem, orbit.point)]
 
 
 def alike(orbit: Orbit, places: Sequence[Real]) -> Real:
@@ -368,10 +367,10 @@ def alike(orbit: Orbit, places: Sequence[Real]) -> Real:
     return np.array([place for place in places if place.size == size]).reshape(-1, size)
 
 
-def broken_off(branch: Branch) -> list[BranchPoint]:
-    """The ends at which a branch was broken off."""
+def broken_off(branch: Branch) -> list[tuple[BranchPoint, str]]:
+    """The ends at which a branch was broken off, and why."""
     ends = zip((branch.nodes[0], branch.nodes[-1]), branch.stop_reasons, strict=True)
-    return [end for end, why in ends if why.endswith(POINTS) or why.startswith(SHORT_STEP)]
+    return [(end, why) for end, why in ends if why.endswith(POINTS) or why.startswith(SHORT_STEP)]
 
 
 def _extrapolate(weights: Real, behind: Real, here: BranchPoint, step: float) -> Real:

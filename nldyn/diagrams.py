@@ -13,8 +13,6 @@ import numpy as np
 from cms.threads import one_thread
 from nldyn.branch import (
     JOINS,
-    POINTS,
-    SHORT_STEP,
     Branch,
     BranchPoint,
     Course,
@@ -157,10 +155,9 @@ class Collector:
         self.checkpoint.work = None
         self._keep(named)
         self.notes += [f"branch {named.name}: {note}" for note in named.notes]
-        for reason, node in zip(named.stop_reasons, (named.nodes[0], named.nodes[-1]), strict=True):
-            if reason.startswith(SHORT_STEP) or reason.endswith(POINTS):
-                hz = node.orbit.frequency_hz
-                self.notes.append(f"branch {named.name} was broken off at {hz:.6g} Hz: {reason}")
+        for end, reason in broken_off(named):
+            hz = end.orbit.frequency_hz
+            self.notes.append(f"branch {named.name} was broken off at {hz:.6g} Hz: {reason}")
 
     def _keep(self, branch: Branch) -> None:
         self.branches.append(branch)
@@ -268,8 +265,8 @@ class Collector:
         if not low <= start.orbit.frequency_hz <= high or self.known(start.orbit):
             return
         progress = partial(self.progress, f"1/{start.orbit.period}")
-        open_ends = self._open_ends_like(start.orbit).so_far()
-        course = Course(self.range_hz, options or self.options, open_ends)
+        ends = self._open_ends_like(start.orbit).so_far()
+        course = Course(self.range_hz, options or self.options, ends)
         branch = self.checkpoint.branch_from(start.orbit, course)
         if branch is not None:
             branch = branch.extend(progress=progress, checkpoint=self.checkpoint)

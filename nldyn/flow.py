@@ -559,13 +559,6 @@ class FlowMap:
                 )
             capacity *= 4
 
-    def solve(self, nodes: Real, phases: Real, omega: float) -> Real | None:
-        """States where each of some nodes (k, 2n) comes to at the next phase (k + 1,), or None."""
-        status, *_, ends, _, _, _, _ = self._unchecked(
-            self._no_record, False, nodes, phases, omega, False, False, ()
-        )
-        return ends if status == OK else None
-
     def _fly(
         self,
         record: Record,
@@ -580,27 +573,9 @@ class FlowMap:
         """The flow map alone; see `_kernels.newton` for what comes back."""
         nodes, phases = _floats("nodes", nodes), np.ascontiguousarray(_floats("phases", phases))
         self._check_segments(nodes, phases, omega, chained)
-        return self._unchecked(
-            record, recording, nodes, phases, omega, chained, sensitivities, parameters
-        )
-
-    def _unchecked(
-        self,
-        record: Record,
-        recording: bool,
-        nodes: Real,
-        phases: Real,
-        omega: float,
-        chained: bool,
-        sensitivities: bool,
-        parameters: Sequence[Parameter],
-    ) -> tuple[Any, ...]:
-        point = np.empty(nodes.size + 1)
-        point[:-1], point[-1] = nodes.ravel(), 0.0
-        corrector = Corrector(point, 0.0, 0.0, 0.0, 0.0, 0)
         return self._call(
-            record, recording, float(omega), point, phases, chained, sensitivities, parameters,
-            corrector,
+            record, recording, float(omega), np.append(nodes, 0.0), phases, chained, sensitivities,
+            parameters,
         )  # fmt: skip
 
     def _call(
@@ -613,8 +588,10 @@ class FlowMap:
         chained: bool,
         sensitivities: bool,
         parameters: Sequence[Parameter],
-        corrector: Corrector,
+        corrector: Corrector | None = None,
     ) -> tuple[Any, ...]:
+        """The kernel, which corrects the point (N + 1,) or, without corrector, only flies."""
+        corrector = corrector or Corrector(point, 0.0, 0.0, 0.0, 0.0, 0)
         table, drive_by = (
             parameter_tables(self.system, parameters) if parameters else self._no_parameters
         )
@@ -734,30 +711,34 @@ class Trajectory:
                 f"{phases[0]:g} to {phases[-1]:g}"
             )
         states = self._evaluate(sample_states, phases)
-        self._solve_in_contact(phases, states)
+        inside, solved = self._solved_in_contact(phases)
+        states[inside] = solved
         return states
 
-    def _solve_in_contact(self, phases: Real, states: Real) -> None:
-        """Replace the polynomial's states (k, 2n) within contact panels by those of the flow map.
+    def _solved_in_contact(self, phases: Real) -> tuple[NDArray[np.intp], Real]:
+        """Which of some ascending phases lie in contact panels, and the flow map's states (k, 2n).
 
-        Each is solved for anew from the start of its panel, or from before the contact where the
-        panel begins it. The map also runs from each phase to where the next one begins, which lies
-        before: that takes no time.
+        Between the ends of a panel its polynomial is less accurate. Each state is solved for anew
+        from the start of its panel, or from before the contact where the panel begins it. The map
+        also runs from each phase to where the next one begins, which lies before: that takes no
+        time. None are told if it fails.
         """
         rec, flow = self.record, self.flow
-        if not phases.size or not (rec.kind >= 0).any():
-            return
+        none = np.empty(0, dtype=np.intp), np.empty((0, rec.start.shape[1]))
+        if not (rec.kind >= 0).any():
+            return none
         piece = np.maximum(np.searchsorted(rec.phase, phases, side="right") - 1, 0)
         inside = np.flatnonzero(rec.kind[piece] >= 0)[::-1]
+        if not inside.size:
+            return none
         begins = rec.kind // 2 == 1
         start = np.maximum.accumulate(np.where(begins, 0, np.arange(begins.size)))[piece[inside]]
-        if not inside.size:
-            return
         legs = np.stack([rec.phase[start], phases[inside]], axis=1).ravel()
         nodes = np.repeat(rec.start[start], 2, axis=0)[:-1]
-        found = flow.solve(nodes, legs, self.omega)
-        if found is not None:
-            states[inside] = found[::2]
+        status, *_, ends, _, _, _, _ = flow._call(
+            flow._no_record, False, self.omega, np.append(nodes, 0.0), legs, False, False, ()
+        )
+        return (inside, ends[::2]) if status == OK else none
 
     @cached_property
     def _span(self) -> tuple[float, float]:
@@ -784,10 +765,8 @@ class Trajectory:
         fastest = max(self.omega, flow.system.linear.fastest)
         found = self._evaluate(local_extremes, row, rate_row, fastest)
         order = np.argsort(found[:, 0], kind="stable")
-        states = np.full((order.size, row.size), np.nan)
-        self._solve_in_contact(found[order, 0], states)
-        solved = ~np.isnan(states[:, 0])
-        found[order[solved], 1] = states[solved] @ row
+        inside, solved = self._solved_in_contact(found[order, 0])
+        found[order[inside], 1] = solved @ row
         return found
 
     def contact_quadrature(self) -> tuple[Real, Real]:

@@ -121,7 +121,7 @@ def follow_starts(
 
 
 def keep_numbers(branches: Sequence[Branch]) -> None:
-    """Keep the states of the orbits and the numbers in figures and tables: a tenth of their size.
+    """Keep of the orbits their states and the numbers in figures and tables, and drop the rest.
 
     A motion is recorded again where it is asked for. Without their Jacobians the orbits cannot be
     followed any further.
