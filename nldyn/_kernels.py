@@ -62,6 +62,7 @@ NEAR = 3e-3
 WORST_ROUNDING = 1e-6
 
 MOST_STEPS = 10_000_000  # in the search for one contact: a second
+MOST_FAILURES = 1000  # of Newton's method for a panel, in a segment: a tenth of a second
 
 # an orbit closes to this share of its size, or to this one times the largest entry of its segments'
 # Jacobians, which is what rounding costs; a short step of Newton's method does not tell
@@ -1501,8 +1502,12 @@ def graded_length(fl, active, w, phase, h, sign, switched, event):
 
 
 @inner
-def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec):
+def contact_panel(
+    fl, tab, phase, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec, failures
+):
     """Solve one panel and choose its length, at most h_max, and h_mapped to aim at an event.
+
+    `failures` (1,) counts those of Newton's method.
 
     Returns (status, kind, h, event): a panel that ends where stop `event` opens or closes, or
     (event = -1) one short enough to be resolved.
@@ -1533,6 +1538,7 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
             panel.depth[3, a] = panel.depth[1, a] + more
             noise[a] = min(panel.depth[3, a], rounding[a])
         if not solve_panel(fl, tab, kind, phase, w, h, noise, panel):
+            failures[0] += 1
             limit = 0.4 * min(h, tried)
             aim = -1
             kind, h = guess_panel(fl, tab, phase, w, limit, h_mapped, start_switch, panel)
@@ -1727,6 +1733,7 @@ def run_pieces(
     w_end = np.empty(w.size)
     # penetrations that are carried from panel to panel, and their rounding errors
     depth, doubt = np.zeros(n_stops), np.full(n_stops, np.inf)
+    failures = np.zeros(1, dtype=np.int64)
     for _ in range(20000):
         remain = duration - t
         if remain <= 0.0:
@@ -1784,10 +1791,12 @@ def run_pieces(
                 doubt[active[a]] = 0.0 if begins else noise
             panel.depth[0, a], panel.depth[1, a] = depth[active[a]], doubt[active[a]]
         status, kind, h, event = contact_panel(
-            fl, tab, here, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec
+            fl, tab, here, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec, failures
         )
         if status != OK:
             return status
+        if failures[0] > MOST_FAILURES:
+            return CONTACT_FAILED
         if h > 0.0:
             if not np.isfinite(w_end.sum()):
                 return CONTACT_FAILED

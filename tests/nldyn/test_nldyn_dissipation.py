@@ -287,6 +287,21 @@ def test_a_slope_by_speed_that_is_nothing_but_rounding_does_not_shorten_panels()
     assert max(pieces) < 20
 
 
+@pytest.mark.parametrize("depth", [1e-4, 1e-2])
+def test_creep_out_of_a_stiff_stop_is_refused_once_its_panels_keep_failing(depth):
+    """Not after all of the 20 000 panels allowed, for most of which Newton's method fails."""
+    stop = Stop("a", 1e12, dissipation=100.0)
+    drive = [HarmonicForce("a", 1.0)]
+    parts = {"a": [1.0, 0.5]}
+    system = System.from_modal(
+        [10.0, 40.0], parts, modal_damping=0.01, stops=[stop], excitation=drive
+    )
+    flow = FlowMap(system)
+    start = flow.to_state(np.array([[depth, 0.0, 0.0, 0.0]]))
+    failure = flow.shoot(start, np.array([0.0, 2.0 * np.pi]), 60.0).failure
+    assert failure == "a contact phase could not be resolved"
+
+
 def test_an_orbit_is_as_exact_from_a_guess_that_is_far_too_large():
     system = make_one_dof(stops=[])
     exact = solve_orbit(system, frequency_hz=20.0)
