@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +45,7 @@ NEAR = 0.1  # a return within this share of the motion is worth a Newton iterati
 ARRIVED = 0.01  # a motion this near to a known orbit, relative, has settled on it or passes it
 CANDIDATES = 5  # near returns of each motion and period from which Newton's method starts
 TRANSIENT = 5  # periods of a motion beside which no orbits are looked for
+PASSING, PASSED = 60, 10  # periods of a short motion, and candidates as above
 PIECE = 16  # periods simulated between two looks at the known orbits; later a quarter of all
 LONGEST = 0.5  # step of a deflated iteration, relative to the orbit
 ITERATIONS = 20  # of a deflated iteration
@@ -77,6 +78,9 @@ class ExploreOptions:
     doubled_points : int, optional
         Most points in one direction of a branch that is longer in period than those looked for;
         as on the others unless given. A note names each branch that is broken off.
+    passing : int
+        Further random initial states at each frequency on the way up, whose motions are followed
+        for 60 periods only, beside which unstable orbits are looked for.
     seed : int
         Seed of the random initial states: results are repeatable.
 
@@ -93,6 +97,7 @@ class ExploreOptions:
     unstable_period: int = 3
     doubled_period: int = 1
     doubled_points: int | None = None
+    passing: int = 0
     seed: int = 20
 
     def __post_init__(self) -> None:
@@ -108,6 +113,7 @@ class ExploreOptions:
         check_whole("explore: doubled_period", self.doubled_period, 1, LONGEST_PERIOD)
         if self.doubled_points is not None:
             check_whole("explore: doubled_points", self.doubled_points, 2, MOST_POINTS)
+        check_whole("explore: passing", self.passing, 0, MOST_COUNT)
         check_whole("explore: seed", self.seed, 0)
 
 
@@ -223,6 +229,8 @@ class Stage:
         nearly returned beside.
     ends : tuple of int
         Number of branches at the end of each round that is done.
+    given : int
+        How many of the branches were known before.
     """
 
     steps: int
@@ -232,6 +240,7 @@ class Stage:
     coverage: tuple[Coverage, ...]
     met: NDArray[np.bool_]
     ends: tuple[int, ...]
+    given: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +277,7 @@ class Exploration:
     @property
     def new_branches(self) -> tuple[int, ...]:
         """How many branches of the periods looked for each round found, the one at work too."""
-        ends = [0, *self.stage.ends]
+        ends = [self.stage.given, *self.stage.ends]
         if len(ends) <= len(self.stage.met):
             ends.append(self.stage.branches)
         periods = [branch.period for branch in self.diagram.branches]
@@ -402,6 +411,7 @@ def explore(
     observe: str | None = None,
     effort: ExploreOptions | None = None,
     options: ContinuationOptions | None = None,
+    known: Diagram | None = None,
     progress: Progress | None = None,
     checkpoint: str | Path | None = None,
 ) -> Exploration:
@@ -431,6 +441,9 @@ def explore(
         How much to simulate.
     options : ContinuationOptions, optional
         Step control.
+    known : Diagram, optional
+        Of this system in this range, from `diagram` or an exploration with less effort. Its
+        branches are taken over as they are, and others looked for.
     progress : callable, optional
         Called as ``progress(what, frequency_hz)``.
     checkpoint : str or Path, optional
@@ -445,7 +458,7 @@ def explore(
     Raises
     ------
     SystemModelError
-        For input that makes no sense, or if `checkpoint` holds something else.
+        For input that makes no sense, or if `known` or `checkpoint` is of something else.
     OutputError
         If `checkpoint` cannot be written.
 
@@ -463,6 +476,7 @@ def explore(
     check_types(
         effort=(effort, ExploreOptions, None),
         options=(options, ContinuationOptions, None),
+        known=(known, Diagram, None),
         progress=(progress, Callable, None),
     )
     low, high = check_range(range_hz)
@@ -482,6 +496,9 @@ def explore(
         question.options,
         progress or (lambda what, frequency_hz: None),
     )
+    if known is not None:
+        check_known(known, question)
+        box.take_back(known.branches, known.notes)
     survey = _Survey(box, question)
     if checkpoint is not None:
         survey.keep_in(checkpoint)
@@ -491,6 +508,31 @@ def explore(
     return survey.so_far(box.branches)
 
 
+def check_known(known: Diagram, question: Question) -> None:
+    """Raise unless branches that are known belong to the question."""
+    from nldyn.store import same_flow
+
+    if known.range_hz != question.range_hz:
+        (a, b), (low, high) = known.range_hz, question.range_hz
+        raise SystemModelError(
+            f"known: is of {a:g} to {b:g} Hz, but {low:g} to {high:g} Hz are to be explored"
+        )
+    if known.observe != question.observe:
+        raise SystemModelError(
+            f"known: observes {shown(known.observe)}, not {shown(question.observe)}"
+        )
+    for branch in known.branches:
+        if not same_flow(branch.points[0].problem.flow, question.flow):
+            raise SystemModelError(f"known: branch {branch.name} is of another system or accuracy")
+
+
+def _alike(some: Sequence[Branch], others: Sequence[Branch]) -> bool:
+    """Whether branches have the same frequencies, in the same order."""
+    return len(some) == len(others) and all(
+        np.array_equal(a.frequency_hz, b.frequency_hz) for a, b in zip(some, others, strict=True)
+    )
+
+
 class _Survey:
     """Simulations over frequencies that fill a box of branches."""
 
@@ -498,7 +540,9 @@ class _Survey:
         self.box, self.question = box, question
         self.max_period, self.effort = question.max_period, question.effort
         nothing = np.empty((0, 2 * question.flow.system.size))
-        self.stage = Stage(0, 0, 0, nothing, (), np.zeros((0, 0), dtype=bool), ())
+        given = len(box.branches)
+        met = np.zeros((0, given), dtype=bool)
+        self.stage = Stage(0, given, len(box.notes), nothing, (), met, (), given)
 
     def keep_in(self, path: str | Path) -> None:
         """Keep everything in a file, and begin where the exploration in it ended, if there is one.
@@ -515,15 +559,16 @@ class _Survey:
         if place.exists():
             laws = {i: s.law for i, s in enumerate(self.question.flow.system.stops) if s.law}
             known = begun_before(partial(load_exploration, laws=laws), place)
-            if not self.question.same(known.question):
+            given = known.diagram.branches[: known.stage.given]
+            if not (self.question.same(known.question) and _alike(given, self.box.branches)):
                 raise SystemModelError(
-                    f"{path}: holds another exploration (other system, range, periods, effort or "
-                    "options); choose another file, or delete it"
+                    f"{path}: holds another exploration (other system, range, periods, effort, "
+                    "options or known branches); choose another file, or delete it"
                 )
-            self.stage = known.stage
+            before, self.stage = self.stage, known.stage
             self.box.take_back(
-                known.diagram.branches[: known.stage.branches],
-                known.diagram.notes[: known.stage.notes],
+                known.diagram.branches[before.branches : known.stage.branches],
+                known.diagram.notes[before.notes : known.stage.notes],
             )
             earlier = known.diagram.branches[known.stage.branches :]
         self.box.checkpoint = Checkpoint(
@@ -552,6 +597,10 @@ class _Survey:
             starts = np.vstack([starts, random_states(flow, omega, self.effort.starts, seed)])
         known = _Known(box, frequency)
         here, carried = self._search(starts, known, also_unstable=up)
+        if up and self.effort.passing:
+            count = self.effort.passing + 1  # the first is rest
+            states = random_states(flow, omega, count, (self.effort.seed, turn, place, 0, 0))
+            self._pass_by(states[1:], known)
         for again in range(AGAIN if up else 0):
             if not known.incomplete(min(self.effort.unstable_period, self.max_period)):
                 break
@@ -572,6 +621,7 @@ class _Survey:
             tuple(both[hz] for hz in sorted(both)),
             met,
             (*stage.ends, len(box.branches)) if last else stage.ends,
+            stage.given,
         )
         if box.checkpoint.work is None:
             box.checkpoint.work = lambda: None  # the coverage is worth keeping without a branch too
@@ -594,8 +644,11 @@ class _Survey:
             elif not any(same_orbit(orbit, other) for other in attractors):
                 attractors.append(orbit)
                 self._meet(orbit, known)
+        adrift = [run[-1] for run in wandering]
+        settled = [stroboscopic(orbit)[0] for orbit in attractors]
         if also_unstable:
-            self._unstable(runs, wandering, attractors, known)
+            self._beside(runs, known, CANDIDATES)
+            self._deflate(adrift + settled, known)
         coverage = Coverage(
             known.frequency_hz,
             tuple(sorted({orbit.period for orbit in attractors})),
@@ -603,8 +656,7 @@ class _Survey:
             len(wandering),
             len(starts) - len(runs),
         )
-        ends = [stroboscopic(orbit)[0] for orbit in attractors]
-        return coverage, ends + [run[-1] for run in wandering[:1]]
+        return coverage, settled + adrift[:1]
 
     def _motion(self, start: Real, known: _Known) -> tuple[Real | None, Orbit | None]:
         """States after each period, and the known stable orbit on which the motion has settled.
@@ -649,34 +701,38 @@ class _Survey:
     def _orbit_near(self, start: Real, period: int, omega: float) -> Orbit | None:
         return orbit_near(self.box.flow, start, period, omega, self.box.observe)
 
-    def _unstable(
-        self,
-        runs: Sequence[Real],
-        wandering: Sequence[Real],
-        stable: Sequence[Orbit],
-        known: _Known,
-    ) -> None:
-        """Look for unstable orbits of short periods beside all motions, and by deflation."""
+    def _pass_by(self, starts: Real, known: _Known) -> None:
+        """Look for unstable orbits that short motions pass by."""
+        flow = self.box.flow
+        motions = [flow.strobe(start, known.omega, PASSING) for start in starts]
+        self._beside([found.ends for found in motions if not found.failure], known, PASSED)
+
+    def _unstable_periods(self) -> range:
+        return range(1, min(self.effort.unstable_period, self.max_period) + 1)
+
+    def _beside(self, runs: Sequence[Real], known: _Known, candidates: int) -> None:
+        """Look for unstable orbits of short periods beside motions."""
         box, omega = self.box, known.omega
         low, high = box.range_hz
-        for period in range(1, min(self.effort.unstable_period, self.max_period) + 1):
-            for run in runs:
-                for start in near_returns(run[TRANSIENT:], period, CANDIDATES):
-                    state = run[TRANSIENT + start]
-                    number = known.beside(state, period)
-                    if number is not None:
-                        known.met.append(number)
-                        continue
-                    orbit = orbit_beside(box.flow, state, period, omega, box.observe)
-                    if orbit is not None and low <= orbit.frequency_hz <= high:
-                        self._meet(orbit, known)
-            starts = [run[-1] for run in wandering] + [stroboscopic(o)[0] for o in stable]
-            for start in starts:
-                others = known.of_period(period)
-                other = deflated_orbit(self.box, start, period, omega, others)
-                if other is not None:
-                    self._follow(other)
-                    known.take()
+        for period, run in product(self._unstable_periods(), runs):
+            for start in near_returns(run[TRANSIENT:], period, candidates):
+                state = run[TRANSIENT + start]
+                number = known.beside(state, period)
+                if number is not None:
+                    known.met.append(number)
+                    continue
+                orbit = orbit_beside(box.flow, state, period, omega, box.observe)
+                if orbit is not None and low <= orbit.frequency_hz <= high:
+                    self._meet(orbit, known)
+
+    def _deflate(self, starts: Sequence[Real], known: _Known) -> None:
+        """Look for unstable orbits of short periods with the known ones divided out."""
+        for period, start in product(self._unstable_periods(), starts):
+            others = known.of_period(period)
+            other = deflated_orbit(self.box, start, period, known.omega, others)
+            if other is not None:
+                self._follow(other)
+                known.take()
 
     def _meet(self, orbit: Orbit, known: _Known) -> None:
         """Follow the branch of an orbit that a motion came to, unless it is known."""

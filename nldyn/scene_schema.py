@@ -374,6 +374,7 @@ class ExploreTable(Table):
     unstable_period: Annotated[int, Field(ge=0, le=100)] = 3
     doubled_period: Period = 1
     doubled_points: Annotated[int, Field(ge=2, le=1_000_000)] | None = None
+    passing: Annotated[int, Field(ge=0, le=1000)] = 0
     seed: Annotated[int, Field(ge=0, le=2**32)] = 20
 
 

@@ -314,7 +314,7 @@ def _write_exploration(group: Any, found: Exploration, flows: list[FlowMap]) -> 
         if value is not None:
             _set_attribute(group, f"effort {name}", value)
     _write_options(group, question.options)
-    for name in ("steps", "branches", "notes"):
+    for name in ("steps", "branches", "notes", "given"):
         _set_attribute(group, name, getattr(stage, name))
     _put(group, "carried", stage.carried, STATE_UNIT)
     _put(group, "met", np.asarray(stage.met, dtype=np.int64), "1 where motions came to a branch")
@@ -765,6 +765,7 @@ def _read_exploration(
         _read_options(group),
     )
     steps, branches, notes = (group.whole(name) for name in ("steps", "branches", "notes"))
+    given = group.whole("given") if group.has_attribute("given") else 0
     carried = group.array("carried", -1, 2 * question.flow.system.size)
     coverage = _read_coverage(group.group("coverage"))
     ends = tuple(group.array("ends", -1, kind=np.int64).tolist())
@@ -776,10 +777,11 @@ def _read_exploration(
     for name, value, most in (
         ("branches", branches, len(diagram.branches)),
         ("notes", notes, len(diagram.notes)),
+        ("given", given, branches),
     ):
         if not 0 <= value <= most:
             raise group.fault("attribute", name, f"is {value}, but there are {most}")
-    return question, Stage(steps, branches, notes, carried, coverage, met, ends)
+    return question, Stage(steps, branches, notes, carried, coverage, met, ends, given)
 
 
 def _read_coverage(group: _Group) -> tuple[Coverage, ...]:

@@ -1,21 +1,25 @@
 """``python -m nldyn.paper.search DIRECTORY [MODEL ...]``: look for branches of the larger models.
 
-It writes the starts that `nldyn.paper.starts` reads, and reports how many branches may be missing.
-The directory keeps what is found, and the same command goes on where it was interrupted.
+Beside the branches of the starts that are kept, it finds others, writes the starts of all, which
+`nldyn.paper.starts` reads, and reports how many may be missing. The directory keeps what is found,
+and the same command goes on where it was interrupted.
 """
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 from nldyn.command import answering
+from nldyn.diagrams import Diagram, Progress
 from nldyn.exploration import Exploration, ExploreOptions, explore
-from nldyn.paper.jobs import JOBS, LONG
-from nldyn.paper.starts import LONGEST, starts_path, write_starts
+from nldyn.paper.jobs import JOBS, LONG, Job
+from nldyn.paper.starts import LONGEST, follow_starts, read_starts, starts_path, write_starts
 from nldyn.progress import progress_line
+from nldyn.store import load_diagram
 
-EFFORT = ExploreOptions(spacing=0.01, starts=6, rounds=24)
+EFFORT = ExploreOptions(spacing=0.01, starts=1, settling=200, rounds=24, passing=24)
 MODELS = tuple(job.name for job in JOBS if job.doubled)
 
 
@@ -25,10 +29,22 @@ def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Explorat
     with progress_line() as report:
         found = explore(
             job.system(), job.range_hz, LONGEST, effort=effort, options=LONG,
+            known=known_branches(job, folder / f"{name}.known.h5", report),
             progress=report, checkpoint=folder / f"{name}.h5",
         )  # fmt: skip
     write_starts(starts_path(name, folder), found.diagram.branches)
     return found
+
+
+def known_branches(job: Job, path: Path, progress: Progress) -> Diagram:
+    """Branches up to the longest period looked for that the kept starts lead to, kept in a file."""
+    if not path.exists():
+        starts, doubled = read_starts(job.name), (LONGEST, LONG.max_points)
+        found = follow_starts(
+            job.system(), starts, job.range_hz, LONG, doubled, progress, whole=True
+        )
+        replace(found, notes=()).save(path)
+    return load_diagram(path)
 
 
 def main() -> None:

@@ -82,6 +82,8 @@ def follow_starts(
     options: ContinuationOptions,
     doubled: tuple[int, int],
     progress: Progress | None = None,
+    *,
+    whole: bool = False,
 ) -> Diagram:
     """Follow the branches through some orbits, and those that they lead to.
 
@@ -100,6 +102,8 @@ def follow_starts(
         that are longer in period than `LONGEST`.
     progress : callable, optional
         Called as ``progress(what, frequency_hz)``.
+    whole : bool
+        Whether the branches are to be followed any further; if not, see `keep_numbers`.
     """
     flow = flow_of(system)
     observe = check_observe(system, None)
@@ -114,7 +118,8 @@ def follow_starts(
             continue
         count = len(box.branches)
         box.follow(orbit, longest, LONGEST, most)
-        keep_numbers(box.branches[count:])
+        if not whole:
+            keep_numbers(box.branches[count:])
     notes = [f"from {len(starts)} starts, {lost} of which lead to no orbit"]
     notes.append(index_note(box.branches, range_hz))
     return Diagram(tuple(box.branches), range_hz, observe, (*notes, *box.notes))

@@ -92,6 +92,7 @@ settling = 1000
 unstable_period = 2
 doubled_period = 4
 doubled_points = 30
+passing = 2
 seed = 1
 """
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 
 import h5py
@@ -13,12 +14,14 @@ from nldyn import (
     ContinuationOptions,
     ExploreOptions,
     FlowMap,
+    FlowOptions,
     HarmonicForce,
     Stop,
     System,
     SystemModelError,
     Unbalance,
     checkpoint,
+    diagram,
     exploration,
     explore,
     find_orbits,
@@ -98,6 +101,17 @@ def test_a_frequency_is_searched_until_the_indices_of_its_orbits_add_up(monkeypa
         sums.append([index_sum(branches, hz, n) for hz in (36.2, 36.8) for n in (1, 2, 3)])
     assert set(sums[0]) != {1}
     assert set(sums[1]) == {1}
+
+
+def test_short_motions_pass_unstable_orbits_of_further_branches():
+    """Two modes from 29 to 29.3 Hz, where one motion of 30 periods comes to few of them."""
+    system, few = system_of("two_dof_xi_0.01"), ExploreOptions(spacing=0.1, starts=1, settling=30)
+    without, found = (
+        explore(system, (29.0, 29.3), 2, effort=replace(few, passing=n)) for n in (0, 12)
+    )
+    branches = found.diagram.branches
+    assert len(branches) > len(without.diagram.branches)
+    assert [index_sum(branches, 29.15, n) for n in (1, 2)] == [1, 1]
 
 
 def test_report_tells_what_was_tried(around_37):
@@ -327,6 +341,46 @@ def test_frequencies_that_are_done_are_not_simulated_again(whole, tmp_path):
     assert len(steps) == 2 * len(whole.coverage) - 5
 
 
+# --- with branches that are known ----------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def harmonic():
+    """The harmonic branch alone."""
+    return diagram(system_of("one_dof"), (36.0, 38.0), (1,))
+
+
+def test_known_branches_are_taken_over_and_others_found(whole, harmonic):
+    found = explore(system_of("one_dof"), **QUESTION, effort=EFFORT, known=harmonic)
+    assert found.diagram.branches[0] is harmonic.branches[0]
+    assert sum(found.new_branches) == sum(whole.new_branches) - 1
+    assert [b.period for b in found.diagram.branches].count(1) == 1
+    for branch in whole.diagram.branches:
+        middle = branch.points[len(branch.points) // 2]
+        assert sum(other.contains(middle) for other in found.diagram.branches) == 1
+
+
+def test_exploration_beside_known_branches_goes_on_to_the_last_digit(harmonic, tmp_path):
+    path = tmp_path / "found.h5"
+    ask = partial(explore, system_of("one_dof"), **QUESTION, effort=EFFORT, known=harmonic)
+    with pytest.raises(KeyboardInterrupt):
+        ask(progress=stopped_at(3), checkpoint=path)
+    assert load_exploration(path).stage.given == 1
+    assert_same_exploration(ask(checkpoint=path), ask())
+    with pytest.raises(SystemModelError, match=r"holds another .* or known branches"):
+        explore(system_of("one_dof"), **QUESTION, effort=EFFORT, checkpoint=path)
+
+
+def test_known_branches_of_something_else_are_refused(harmonic):
+    with pytest.raises(SystemModelError, match="known: is of 36 to 38 Hz, but 36 to 39 Hz"):
+        explore(system_of("one_dof"), (36.0, 39.0), 3, known=harmonic)
+    finer = FlowMap(system_of("one_dof"), FlowOptions(rtol=1e-12))
+    with pytest.raises(SystemModelError, match="known: branch 01 harmonic is of another system"):
+        explore(finer, **QUESTION, known=harmonic)
+    with pytest.raises(SystemModelError, match="known must be"):
+        explore(system_of("one_dof"), **QUESTION, known=harmonic.branches)
+
+
 def test_coverage_is_kept_where_no_branch_is_found(tmp_path, monkeypatch):
     """Undamped free flight between impacts settles on nothing."""
     monkeypatch.setattr(checkpoint, "PAUSE", 0.0)
@@ -407,6 +461,7 @@ def test_long_doubled_branches_are_broken_off_where_told(whole):
         ({"settling": 0}, "explore: settling"),
         ({"doubled_period": 0}, "explore: doubled_period"),
         ({"doubled_points": 1}, "explore: doubled_points"),
+        ({"passing": -1}, "explore: passing"),
     ],
 )
 def test_bad_efforts_are_refused_by_name(given, says):

@@ -72,10 +72,14 @@ def test_a_start_that_leads_nowhere_is_counted(found, tmp_path):
     assert again.notes[0] == "from 2 starts, 1 of which lead to no orbit"
 
 
-def test_a_search_is_kept_and_gives_starts(tmp_path):
+def test_a_search_is_kept_and_gives_starts(tmp_path, monkeypatch):
+    """It begins with the branches of the starts that there are."""
+    known = read_starts("two_dof_xi_0.01")[:2]
+    monkeypatch.setattr("nldyn.paper.search.read_starts", lambda name: known)
     effort = ExploreOptions(spacing=0.3, starts=2, unstable_period=0)
     done = search("two_dof_xi_0.01", tmp_path, effort)
     assert (tmp_path / "two_dof_xi_0.01.h5").exists()
-    assert len(read_starts("two_dof_xi_0.01", tmp_path)) == len(done.diagram.branches) > 0
+    assert len(read_starts("two_dof_xi_0.01", tmp_path)) == len(done.diagram.branches)
+    assert 2 <= done.stage.given < len(done.diagram.branches)
     again = search("two_dof_xi_0.01", tmp_path, effort)
     assert again.stage.steps == done.stage.steps
