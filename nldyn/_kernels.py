@@ -58,11 +58,15 @@ FLIGHT = -1
 NEAR = 3e-3
 
 
-# share of the speed at a stop that rounding of its penetration may cost in one contact
+# share of the speed at a stop that rounding may cost: that of the penetration in one contact, or
+# that of the speed in a panel in which the stop's damping decides it
 WORST_ROUNDING = 1e-6
 
 MOST_STEPS = 10_000_000  # in the search for one contact: a second
-MOST_FAILURES = 1000  # of Newton's method for a panel, in a segment: a tenth of a second
+
+# what a stop damps: a panel shows decay by e^-8 to 14 digits, and nothing is left of e^-40 of it
+DECAY, FADED = 8.0, 40.0
+CREEP = 100.0  # such an exponent over an elastic contact: the damping alone decides the speed
 
 # an orbit closes to this share of its size, or to this one times the largest entry of its segments'
 # Jacobians, which is what rounding costs; a short step of Newton's method does not tell
@@ -367,6 +371,17 @@ def output_noise(fl, out, w):
 
 
 @inner
+def rate_noise(fl, out, w):
+    """The same in the output's rate."""
+    total = abs(fl.forced[0, 0, out]) * fl.omega
+    for k in range(fl.near.size):
+        total += abs(fl.forced[1 + k, 0, out]) * (2.0 * math.pi)
+    for j in range(w.size):
+        total += abs(fl.rows[1, out, j] * w[j])
+    return 1e-15 * total
+
+
+@inner
 def carried_noise(fl, stop, w, depth, h):
     """The same in a penetration that is carried on from a depth over a time h."""
     if fl.near.size > 0:  # a difference of values
@@ -632,6 +647,7 @@ class Panel(NamedTuple):
     # (4, na) penetration at the start and its rounding error, the same at the end: carried apart
     # from the state, in which rounding is a share of the displacement
     depth: Real
+    decay: Real  # (1,) exponent by which the stops have damped fast motion since they closed
 
 
 @inner
@@ -656,6 +672,7 @@ def new_panel(fl, m, n_states, active):
         np.zeros(2),
         np.empty((na, m, n_states)),
         np.empty((4, na)),
+        np.zeros(1),
     )
 
 
@@ -866,7 +883,9 @@ def consistent(panel, force, noise):
     """Whether the forces (na m,) are those of the penetrations that they lead to."""
     na, m = panel.F.shape
     for a in range(na):
-        allowed = 1e-10 * largest(panel.F, a) + 10.0 * noise[a] * largest(panel.slope, a)
+        allowed = 1e-10 * largest(panel.F, a)
+        for o in range(a, noise.size, na):
+            allowed += 10.0 * noise[o] * largest(panel.slope, o)
         for i in range(m):
             if abs(panel.F[a, i] - force[a * m + i]) > allowed:
                 return False
@@ -877,9 +896,9 @@ def consistent(panel, force, noise):
 def solve_panel(fl, tab, kind, phase, w, h, noise, panel):
     """Newton's method for the forces at the nodes; the penetrations in `output` are the guess.
 
-    noise (na,) is the rounding error to expect in each. Returns whether it converged, with the
-    panel filled. The factors of its matrix serve as long as they bring an error down tenfold per
-    step, also those that the call before has left.
+    noise (n_outputs,) is the rounding error to expect in each output. Returns whether it converged,
+    with the panel filled. The factors of its matrix serve as long as they bring an error down
+    tenfold per step, also those that the call before has left.
     """
     na, m = panel.F.shape
     size = na * m
@@ -1073,9 +1092,10 @@ def singular_slope(fl, stop):
 def resolved(fl, tab, kind, h, noise, panel):
     """Whether the Legendre tails of each force and of its slopes are small beside their largest.
 
-    A slope counts as it does in the sensitivities: times dχ/ds. Where contacts are short against
-    the period, it kicks them to many times their final size, and its error, the square of the
-    tail, with them.
+    Where the rate of penetration comes close to one without force, its rounding is all there is to
+    see. A slope counts as it does in the sensitivities: times dχ/ds. Where contacts are short
+    against the period, it kicks them to many times their final size, and its error, the square of
+    the tail, with them.
     """
     na = panel.active.size
     slopes = np.empty(panel.slope.shape)
@@ -1091,17 +1111,33 @@ def resolved(fl, tab, kind, h, noise, panel):
         if singular and nearly_opens(tab, kind, panel.output, a, 10.0 * noise[a]):
             return False
         tail = max(fl.tail, 20.0 * noise[a] / deepest)
-        if o < na and legendre_tail(tab, panel.F, a) > tail * largest(panel.F, a):
+        shake = 0.0  # of the force by the rounding of the rate
+        if o < na < slopes.shape[0]:
+            shake = 20.0 * noise[na + a] * largest(panel.slope, na + a)
+        if o < na and legendre_tail(tab, panel.F, a) > tail * largest(panel.F, a) + shake:
             return False
+        shake *= fl.stops[panel.active[a], EXPONENT] / deepest * largest(tab.slope, kind)
         size = largest(slopes, o)
         if o >= na and largest(panel.output, o) > 0.0:  # by speed: its share in the force counts
             size = max(size, largest(panel.F, a) / largest(panel.output, o))
         if o < na:
             kick = fl.stops[panel.active[a], MOBILITY] * largest(panel.slope, o) * h / fl.omega
             tail = max(tail / math.sqrt(max(KICK * kick, 1.0)), 20.0 * noise[a] / deepest)
-        if legendre_tail(tab, slopes, o) > 4.0 * tail * size:
+        if legendre_tail(tab, slopes, o) > 4.0 * (tail * size + shake):
             return False
     return True
+
+
+@inner
+def damped(fl, tab, kind, h, panel):
+    """Exponent by which the stops damp fast motion over a panel."""
+    na, m = panel.F.shape
+    total = 0.0
+    for o in range(na, panel.slope.shape[0]):
+        for i in range(m):
+            rate = fl.stops[panel.active[o - na], MOBILITY] * panel.slope[o, i]
+            total += h * tab.weights[kind, i] * rate
+    return total
 
 
 @inner
@@ -1351,6 +1387,22 @@ def free_output(fl, out, w, t):
 
 
 @inner
+def creep(fl, stop, w, phase, duration):
+    """Depth and speed of a body that creeps out of a stop, its speed held by the damping, or zeros.
+
+    So it does where an elastic contact would take much longer than the damping to act.
+    """
+    value, speed, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
+    depth = value - fl.stops[stop, GAP]
+    if fl.laws[stop] != 0 or speed >= 0.0 or depth <= 0.0:
+        return 0.0, 0.0
+    _, _, viscosity = law(fl, stop, depth, speed)
+    if viscosity * fl.stops[stop, MOBILITY] * duration < CREEP:
+        return 0.0, 0.0
+    return depth, speed
+
+
+@inner
 def guess_panel(fl, tab, phase, w, h, h_mapped, start_switch, panel):
     """Choose the kind and length of a panel and guess its penetrations.
 
@@ -1363,6 +1415,9 @@ def guess_panel(fl, tab, phase, w, h, h_mapped, start_switch, panel):
     length = h
     for a in range(active.size):
         _, duration, left = expected_contact(fl, active[a], w, phase)
+        depth, speed = creep(fl, active[a], w, phase, duration)
+        if depth > 0.0:
+            duration = left = -depth / speed
         if left > min(0.6 * duration, h_mapped):
             if 0.5 * left < length:
                 ends = False
@@ -1373,7 +1428,12 @@ def guess_panel(fl, tab, phase, w, h, h_mapped, start_switch, panel):
     kind = 2 * start_switch + (1 if ends else 0)
     for a in range(active.size):
         peak, duration, left = expected_contact(fl, active[a], w, phase)
-        if duration > 0.0:
+        depth, speed = creep(fl, active[a], w, phase, duration)
+        if depth > 0.0:
+            for i in range(tab.nodes.size):
+                later = depth + speed * length * tab.chi[kind, i]
+                delta[a, i] = max(later, 1e-3 * depth)
+        elif duration > 0.0:
             profile_guess(tab, kind, length, peak, duration, left, delta[a])
         else:
             for i in range(tab.nodes.size):
@@ -1502,12 +1562,8 @@ def graded_length(fl, active, w, phase, h, sign, switched, event):
 
 
 @inner
-def contact_panel(
-    fl, tab, phase, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec, failures
-):
+def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec):
     """Solve one panel and choose its length, at most h_max, and h_mapped to aim at an event.
-
-    `failures` (1,) counts those of Newton's method.
 
     Returns (status, kind, h, event): a panel that ends where stop `event` opens or closes, or
     (event = -1) one short enough to be resolved.
@@ -1515,9 +1571,12 @@ def contact_panel(
     active = panel.active
     panel.kept[0] = False
     guess = np.empty(tab.nodes.size)
-    noise, rounding = np.empty(active.size), np.empty(active.size)
+    rounding = np.empty(panel.output.shape[0])
     for a in range(active.size):
         rounding[a] = output_noise(fl, active[a], w)  # events are found in the state
+    for o in range(active.size, rounding.size):
+        rounding[o] = rate_noise(fl, active[o - active.size], w)
+    noise = rounding.copy()
     smooth, switch = 2 * start_switch, 2 * start_switch + 1
     limit = h_max
     kind, h, aim = remembered_panel(rec, start_switch, h_max, panel)
@@ -1538,7 +1597,6 @@ def contact_panel(
             panel.depth[3, a] = panel.depth[1, a] + more
             noise[a] = min(panel.depth[3, a], rounding[a])
         if not solve_panel(fl, tab, kind, phase, w, h, noise, panel):
-            failures[0] += 1
             limit = 0.4 * min(h, tried)
             aim = -1
             kind, h = guess_panel(fl, tab, phase, w, limit, h_mapped, start_switch, panel)
@@ -1546,7 +1604,8 @@ def contact_panel(
             continue
         panel_end(fl, tab, kind, phase, w, h, panel, w_end)
         end_phase = phase + fl.omega * h
-        fine = resolved(fl, tab, kind, h, rounding, panel)
+        fine = panel.decay[0] > FADED or damped(fl, tab, kind, h, panel) <= DECAY
+        fine = fine and resolved(fl, tab, kind, h, rounding, panel)
         if fine:
             to_switch = kind % 2 == 1
             fine = h <= 1.5 * graded_length(
@@ -1733,7 +1792,6 @@ def run_pieces(
     w_end = np.empty(w.size)
     # penetrations that are carried from panel to panel, and their rounding errors
     depth, doubt = np.zeros(n_stops), np.full(n_stops, np.inf)
-    failures = np.zeros(1, dtype=np.int64)
     for _ in range(20000):
         remain = duration - t
         if remain <= 0.0:
@@ -1791,12 +1849,10 @@ def run_pieces(
                 doubt[active[a]] = 0.0 if begins else noise
             panel.depth[0, a], panel.depth[1, a] = depth[active[a]], doubt[active[a]]
         status, kind, h, event = contact_panel(
-            fl, tab, here, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec, failures
+            fl, tab, here, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec
         )
         if status != OK:
             return status
-        if failures[0] > MOST_FAILURES:
-            return CONTACT_FAILED
         if h > 0.0:
             if not np.isfinite(w_end.sum()):
                 return CONTACT_FAILED
@@ -1808,6 +1864,10 @@ def run_pieces(
                     for i in range(m):
                         rec.force[n, active[a], i] = panel.F[a, i]
                         rec.depth[n, active[a], i] = panel.output[a, i]
+            decay = damped(fl, tab, kind, h, panel)
+            if 1e-16 * decay > WORST_ROUNDING:
+                return ROUNDED
+            panel.decay[0] += decay
             if with_columns:
                 panel_columns(fl, tab, kind, here, t, h, panel, columns)
             for k in range(w.size):
@@ -1817,6 +1877,7 @@ def run_pieces(
                 depth[active[a]], doubt[active[a]] = panel.depth[2, a], panel.depth[3, a]
         start_switch = 0
         if event >= 0:
+            panel.decay[0] = 0.0
             closed[event] = not closed[event]
             start_switch = 1
             if closed[event]:

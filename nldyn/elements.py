@@ -14,6 +14,7 @@ from nldyn.errors import SystemModelError, check_types, is_finite, shown
 from nldyn.linear import Real
 
 LARGEST_EXPONENT = 4.0
+LARGEST_PHASE = 1e6  # in degrees
 
 
 def _finite(owner: str, name: str, value: float) -> None:
@@ -407,6 +408,11 @@ def _check_excitation(at: str, name: str, value: float, phase_deg: float) -> Non
     if value < 0.0:
         raise SystemModelError(f"{owner}: {name} must not be negative, got {value:g}")
     _finite(owner, "phase_deg", phase_deg)
+    if abs(phase_deg) > LARGEST_PHASE:  # of which double precision has ten digits left
+        raise SystemModelError(
+            f"{owner}: phase_deg must lie between -{LARGEST_PHASE:g} and {LARGEST_PHASE:g}, "
+            f"got {phase_deg:g}"
+        )
 
 
 def turn(phase_deg: float) -> complex:

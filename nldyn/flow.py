@@ -58,7 +58,8 @@ _REASONS = {
     "or too fast a mode (more segments help)",
     TOO_MANY_STEPS: "a stop stays so close to a touch that the search for it takes too many steps",
     CONTACT_FAILED: "a contact phase could not be resolved",
-    ROUNDED: "a contact is hidden by rounding: the displacements are too large beside its depth",
+    ROUNDED: "a contact is hidden by rounding: the displacements are too large beside its depth, "
+    "or the damping of a stop beside its force",
     DIVERGED: "Newton's method diverged",
     SINGULAR: "singular Jacobian",
     NOT_CONVERGED: "Newton's method did not converge",

@@ -37,6 +37,7 @@ MOST_SEGMENTS = 10**5
 # contact force over the excitation, and penetration over displacement, up to which a free body
 # counts as untouched
 TOUCH = 1e-7
+NOT_HELD = "the structure is free to move in a way that no stop limits, and nothing tells its place"
 NO_PLACE = (
     "the structure is free to move as a whole, and where the motion touches no stop, nothing tells "
     "its place; give a guess that touches one"
@@ -613,6 +614,13 @@ def near_returns(states: Real, period: int, count: int) -> list[int]:
     return chosen
 
 
+def _is_left_free(system: System) -> bool:
+    """Whether the stops leave a mode of zero frequency, or a combination of such modes, free."""
+    free = system.natural_frequencies == 0.0
+    held = np.array([system.stop_vector(stop)[free] for stop in system.stops])
+    return int(np.linalg.matrix_rank(held)) < int(free.sum())
+
+
 def _touches_only(system: System, motion: Trajectory, omega: float) -> bool:
     """Whether contacts push, but by no more than rounding of the drive and of the motion."""
     force = float(motion.record.force.max(initial=0.0))
@@ -645,6 +653,8 @@ def refine(
                 f"{where}: an undamped mode is excited at its own frequency, and its motion grows "
                 "without bound where it touches no stop"
             )
+        if drifts and _is_left_free(problem.flow.system):
+            raise ConvergenceError(f"{where}: {NOT_HELD}")
         if not contact and drifts:
             raise ConvergenceError(f"{where}: {NO_PLACE}")
         step = f", last relative step {found.last_step:.1e}" if found.last_step < math.inf else ""

@@ -748,6 +748,8 @@ def _unreadable(error: OSError | ValueError | RuntimeError) -> str:
 def _toml_fault(text: str) -> str:
     """What the TOML reader says, told in the words of TOML where it uses Python's."""
     text = _lower_first(text).replace("cannot overwrite a value", "a key or table is given twice")
+    if "set_int_max_str_digits" in text:
+        return "a whole number has thousands of digits"
     declared = re.match(r"cannot declare \((.*?),?\) twice", text)
     if declared is None:
         return text

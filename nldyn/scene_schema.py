@@ -19,7 +19,7 @@ from pydantic import (
     model_validator,
 )
 
-from nldyn.elements import LARGEST_EXPONENT
+from nldyn.elements import LARGEST_EXPONENT, LARGEST_PHASE
 from nldyn.errors import LARGEST_FREQUENCY
 from nldyn.scene_messages import quoted, show
 
@@ -308,7 +308,7 @@ class ExcitationTable(Table):
     kind: Literal["unbalance", "harmonic"]
     mass_times_radius: Positive | None = None
     amplitude: Positive | None = None
-    phase_deg: Number = 0.0
+    phase_deg: Annotated[Number, Field(ge=-LARGEST_PHASE, le=LARGEST_PHASE)] = 0.0
 
     @model_validator(mode="after")
     def _complete(self) -> ExcitationTable:

@@ -161,6 +161,27 @@ def duration_error(stiffness: float, speed: float) -> Measured:
     return Measured(float(off), f"{exact:.3g} s, rebound {found.rebound_speed[0] / speed:.12f}")
 
 
+def dissipation_error(loss: float) -> Measured:
+    """Depth and rebound of a free body of 1 kg at 1 m/s on a stop with a dissipation in s/m."""
+    stiffness = 1e9
+    with mp.workdps(60):
+
+        def spent(v: mpmath.mpf) -> mpmath.mpf:
+            return v / loss - mp.log1p(loss * v) / mp.mpf(loss) ** 2
+
+        deepest = float((mp.mpf(2.5) * spent(mp.mpf(1)) / stiffness) ** mp.mpf(0.4))
+        start = 1 + mp.mpf(loss)  # u = 1 + a v at the end has the same u e^-u: Lambert's function
+        rebound = float((1 + mp.lambertw(-start * mp.exp(-start))) / loss)
+    system = System.from_modal([0.0], {"m": [1.0]}, stops=[Stop("m", stiffness, dissipation=loss)])
+    flow, lasting = FlowMap(system), 10.0 * deepest * (1.0 + loss)
+    before = flow.to_state(np.array([[-deepest, 1.0]]))
+    motion = (before, np.array([0.0, 2.0 * np.pi]), 2.0 * np.pi / lasting)
+    speed = -flow.to_modal(flow.shoot(*motion).ends)[0, 1]
+    depth = flow.trajectory(*motion).extremes(0)[:, 1].max()
+    off = max(abs(speed / rebound - 1.0), abs(depth / deepest - 1.0))
+    return Measured(float(off), f"rebound {rebound:.6g} m/s")
+
+
 CASES = (
     *(
         Case(
@@ -248,5 +269,23 @@ CASES = (
             partial(duration_error, stiffness, speed),
         )
         for stiffness, speed in ((1e6, 1e-3), (1e9, 1.0), (1e12, 1e-6), (1e15, 10.0), (1e15, 1e-9))
+    ),
+    *(
+        Case(
+            SUBJECT,
+            f"impact at 1 m/s on a Hertz stop with a dissipation of {loss:g} s/m",
+            hard,
+            "closed form: first integral of m v dv = -k δ^p (1 + a v) dδ [Hunt and Crossley 1975]",
+            STATE,
+            PROMISE,
+            partial(dissipation_error, loss),
+        )
+        for loss, hard in (
+            (1e-3, "next to no loss"),
+            (1.0, "an ordinary case"),
+            (40.0, "1 + a v falls to a rounding error: the body creeps out"),
+            (1e4, "the damping acts within a millionth of the contact"),
+            (1e8, "the body all but sticks"),
+        )
     ),
 )

@@ -287,19 +287,60 @@ def test_a_slope_by_speed_that_is_nothing_but_rounding_does_not_shorten_panels()
     assert max(pieces) < 20
 
 
-@pytest.mark.parametrize("depth", [1e-4, 1e-2])
-def test_creep_out_of_a_stiff_stop_is_refused_once_its_panels_keep_failing(depth):
-    """Not after all of the 20 000 panels allowed, for most of which Newton's method fails."""
-    stop = Stop("a", 1e12, dissipation=100.0)
-    drive = [HarmonicForce("a", 1.0)]
-    parts = {"a": [1.0, 0.5]}
-    system = System.from_modal(
-        [10.0, 40.0], parts, modal_damping=0.01, stops=[stop], excitation=drive
-    )
-    flow = FlowMap(system)
-    start = flow.to_state(np.array([[depth, 0.0, 0.0, 0.0]]))
-    failure = flow.shoot(start, np.array([0.0, 2.0 * np.pi]), 60.0).failure
-    assert failure == "a contact phase could not be resolved"
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 3.0])
+@pytest.mark.parametrize("loss", [35.0, 1e3, 1e5, 1e8])
+def test_an_impact_that_all_but_sticks_leaves_at_the_speed_of_the_dashpot(loss, exponent):
+    """At 1 m/s. By the first integral 1 + a v' is e^-a at the end, so that it leaves at -1/a to
+    rounding; and v/a - ln(1 + a v)/a² = k d^(p + 1)/((p + 1) m) at the depth d where it turns.
+    """
+    stiffness = 1e9
+    flow = free_mass(Stop("m", stiffness, exponent, dissipation=loss))
+    spent = 1.0 / loss - math.log1p(loss) / loss**2
+    deepest = ((exponent + 1.0) * spent * MASS / stiffness) ** (1.0 / (exponent + 1.0))
+    omega = 2.0 * np.pi / (1.5 * loss * deepest)
+    found = flow.shoot(moving(flow, 1.0)[None], np.array([0.0, 2.0 * np.pi]), omega)
+    assert not found.failure
+    depth, speed = flow.to_modal(found.ends)[0] / math.sqrt(MASS)
+    assert depth < 0.0  # it has left
+    assert speed == pytest.approx(-1.0 / loss, rel=1e-8)
+
+
+@pytest.mark.parametrize("depth", [1e-5, 1e-4])
+@pytest.mark.parametrize("loss", [5.0, 100.0])
+def test_creep_in_a_stop_forgets_its_initial_speed(loss, depth):
+    """A linear stop, left alone at depth d: δ' = -1/a, and δ'' + (k/m)(1 + a δ') δ = 0 says that
+    a change of the speed at the start ends within m/(k a d), and leaves so much of the depth.
+    """
+    stiffness, speed, some = 1e12, -1.0 / loss, 0.2
+    flow = free_mass(Stop("m", stiffness, 1.0, dissipation=loss))
+    start = flow.to_state(np.array([depth, speed]) * math.sqrt(MASS))[None]
+    omega = 2.0 * np.pi / (some * depth * loss)
+    found = flow.shoot(start, np.array([0.0, 2.0 * np.pi]), omega)
+    assert not found.failure
+    end = flow.to_modal(found.ends)[0] / math.sqrt(MASS)
+    assert end[0] == pytest.approx((1.0 - some) * depth, rel=1e-10)
+    assert end[1] == pytest.approx(speed, rel=1e-6)
+    right, left = flow.to_modal(np.eye(2)).T, flow.to_state(np.eye(2)).T
+    jacobian = right @ found.jacobians[0] @ left
+    assert jacobian[0, 0] == pytest.approx(1.0, rel=1e-8)
+    assert jacobian[0, 1] == pytest.approx(MASS / (stiffness * loss * depth), rel=0.01)
+    assert np.abs(jacobian[1]).max() < 1e-6 / (some * depth * loss)
+
+
+def test_a_stop_that_all_but_holds_has_no_error_of_liouvilles_formula_to_tell():
+    """What the damping leaves of an area, e^-70000, is far below rounding."""
+    system = make_one_dof(stops=[Stop("middle", 5.17e9, gap=-1e-3, dissipation=1e4)])
+    orbit = solve_orbit(system, 20.0)
+    assert math.isnan(orbit.liouville_error)
+    assert abs(orbit.multipliers[1]) < 1e-15 < abs(orbit.multipliers[0]) < 1.0
+
+
+def test_creep_that_rounding_hides_is_refused():
+    """The rounding of a speed, 1e-16, times what the stop damps meanwhile, 1e11 times it."""
+    flow = free_mass(Stop("m", 1e12, 1.0, dissipation=1e4))
+    start = flow.to_state(np.array([1e-4, -1e-4]) * math.sqrt(MASS))[None]
+    found = flow.shoot(start, np.array([0.0, 2.0 * np.pi]), 10.0 * np.pi)
+    assert "hidden by rounding" in found.failure
 
 
 def test_an_orbit_is_as_exact_from_a_guess_that_is_far_too_large():

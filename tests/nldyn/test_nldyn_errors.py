@@ -132,6 +132,13 @@ def test_phase_of_the_excitation(value):
     sentence(lambda: Unbalance("middle", 1.0, value), "excitation at 'middle'", "phase_deg")
 
 
+def test_a_phase_of_many_turns_is_refused():
+    """Beyond 1e6 degrees its digits are used up by whole turns."""
+    says = "phase_deg must lie between -1e\\+06 and 1e\\+06, got 1e\\+50"
+    with pytest.raises(SystemModelError, match=says):
+        HarmonicForce("a", 1.0, 1e50)
+
+
 # --- systems -------------------------------------------------------------------------------------
 
 

@@ -142,6 +142,18 @@ def test_a_free_body_that_touches_by_rounding_has_no_place(elastic):
         solve_orbit(system, 20.0)
 
 
+@pytest.mark.parametrize("against", [None, "b"])
+def test_free_bodies_that_no_stop_holds_have_no_place(against):
+    """Two bodies, the second free of all stops, or both free but for stops between them."""
+    gap = 1e-4 if against else -1e-4
+    stops = [Stop("a", 1e6, gap=gap, against=against, direction=side) for side in (1, -1)]
+    parts = {"a": [1.0, 0.0], "b": [0.0, 1.0]}
+    drive = [HarmonicForce("a", 1.0)]
+    system = System.from_modal([0.0, 0.0], parts, stops=stops, excitation=drive)
+    with pytest.raises(ConvergenceError, match="no stop limits, and nothing tells its place"):
+        solve_orbit(system, 10.0)
+
+
 def test_a_free_body_held_softly_between_two_stops_has_its_place():
     stops = [Stop("a", 1.0, 1.0, -2.5e-8), Stop("a", 1.0, 1.0, -2.5e-8, direction=-1)]
     system = System.from_modal(

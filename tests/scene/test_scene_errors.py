@@ -421,6 +421,11 @@ def test_parts_that_only_touch(tmp_path):
     )
 
 
+def test_a_whole_number_of_thousands_of_digits_is_told_without_words_of_python(tmp_path):
+    said = check(tmp_path, "title = " + "9" * 5000)
+    assert said == "scene.toml: is not valid TOML: a whole number has thousands of digits"
+
+
 def test_deep_nesting_and_long_numbers_are_not_toml(tmp_path):
     for value in ("[" * 5000, "9" * 5000):
         assert check(tmp_path, f"title = {value}").startswith("scene.toml: is not valid TOML: ")
