@@ -58,8 +58,8 @@ FLIGHT = -1
 NEAR = 3e-3
 
 
-# share of the speed at a stop that rounding may cost: that of the penetration in one contact, or
-# that of the speed in a panel in which the stop's damping decides it
+# share of the speed at a stop that rounding of the penetration may cost in one contact, and share
+# of the modes' speeds there that their rounding may cost where a stop's damping decides them
 WORST_ROUNDING = 1e-6
 
 MOST_STEPS = 10_000_000  # in the search for one contact: a second
@@ -647,7 +647,9 @@ class Panel(NamedTuple):
     # (4, na) penetration at the start and its rounding error, the same at the end: carried apart
     # from the state, in which rounding is a share of the displacement
     depth: Real
-    decay: Real  # (1,) exponent by which the stops have damped fast motion since they closed
+    # (2, na) exponent by which each stop has damped fast motion, before this panel and in it, since
+    # the segment began, the last event, or another stop began to count
+    decay: Real
 
 
 @inner
@@ -672,7 +674,7 @@ def new_panel(fl, m, n_states, active):
         np.zeros(2),
         np.empty((na, m, n_states)),
         np.empty((4, na)),
-        np.zeros(1),
+        np.zeros((2, na)),
     )
 
 
@@ -1129,15 +1131,19 @@ def resolved(fl, tab, kind, h, noise, panel):
 
 
 @inner
-def damped(fl, tab, kind, h, panel):
-    """Exponent by which the stops damp fast motion over a panel."""
+def shows_decay(fl, tab, kind, h, panel):
+    """Whether a panel shows what each stop damps, or nothing is left of it; fills `decay`."""
     na, m = panel.F.shape
-    total = 0.0
+    shown = True
     for o in range(na, panel.slope.shape[0]):
+        a = o - na
+        total = 0.0
         for i in range(m):
-            rate = fl.stops[panel.active[o - na], MOBILITY] * panel.slope[o, i]
+            rate = fl.stops[panel.active[a], MOBILITY] * panel.slope[o, i]
             total += h * tab.weights[kind, i] * rate
-    return total
+        panel.decay[1, a] = total
+        shown = shown and (total <= DECAY or panel.decay[0, a] > FADED)
+    return shown
 
 
 @inner
@@ -1417,8 +1423,10 @@ def guess_panel(fl, tab, phase, w, h, h_mapped, start_switch, panel):
         _, duration, left = expected_contact(fl, active[a], w, phase)
         depth, speed = creep(fl, active[a], w, phase, duration)
         if depth > 0.0:
-            duration = left = -depth / speed
-        if left > min(0.6 * duration, h_mapped):
+            if -0.5 * depth / speed < length:
+                ends = False
+                length = -0.5 * depth / speed
+        elif left > min(0.6 * duration, h_mapped):
             if 0.5 * left < length:
                 ends = False
                 length = 0.5 * left
@@ -1604,8 +1612,9 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
             continue
         panel_end(fl, tab, kind, phase, w, h, panel, w_end)
         end_phase = phase + fl.omega * h
-        fine = panel.decay[0] > FADED or damped(fl, tab, kind, h, panel) <= DECAY
-        fine = fine and resolved(fl, tab, kind, h, rounding, panel)
+        fine = shows_decay(fl, tab, kind, h, panel) and resolved(
+            fl, tab, kind, h, rounding, panel
+        )
         if fine:
             to_switch = kind % 2 == 1
             fine = h <= 1.5 * graded_length(
@@ -1864,10 +1873,10 @@ def run_pieces(
                     for i in range(m):
                         rec.force[n, active[a], i] = panel.F[a, i]
                         rec.depth[n, active[a], i] = panel.output[a, i]
-            decay = damped(fl, tab, kind, h, panel)
-            if 1e-16 * decay > WORST_ROUNDING:
-                return ROUNDED
-            panel.decay[0] += decay
+            for a in range(n_active):
+                if 1e-16 * panel.decay[1, a] > WORST_ROUNDING:
+                    return ROUNDED
+                panel.decay[0, a] += panel.decay[1, a]
             if with_columns:
                 panel_columns(fl, tab, kind, here, t, h, panel, columns)
             for k in range(w.size):
@@ -1877,7 +1886,7 @@ def run_pieces(
                 depth[active[a]], doubt[active[a]] = panel.depth[2, a], panel.depth[3, a]
         start_switch = 0
         if event >= 0:
-            panel.decay[0] = 0.0
+            panel.decay[:] = 0.0
             closed[event] = not closed[event]
             start_switch = 1
             if closed[event]:

@@ -174,11 +174,17 @@ class Collector:
         like = orbit.period, orbit.point.size
         return self.open_ends.setdefault(like, Rows(orbit.point.size))
 
-    def take_back(self, branches: Iterable[Branch], notes: Iterable[str]) -> None:
-        """Take branches that an earlier run had found, named and followed up, in its order."""
+    def take(self, branches: Iterable[Branch], notes: Iterable[str]) -> None:
+        """Take branches that are known, with their names; see `follow_up`."""
         self.notes += notes
         for branch in branches:
             self._keep(branch)
+
+    def take_back(self, branches: Iterable[Branch], notes: Iterable[str]) -> None:
+        """Take branches that an earlier run had found, named and followed up, in its order."""
+        branches = tuple(branches)
+        self.take(branches, notes)
+        for branch in branches:
             for special in branch.special_points:
                 if special.kind == "BP":
                     self._is_new_crossing(special)
@@ -203,14 +209,18 @@ class Collector:
                 self.from_start(start)
 
     def follow(self, orbit: Orbit, longest: int, wanted: int, most: int | None) -> None:
-        """Follow an orbit's branch unless it is known, and those that it leads to.
+        """Follow an orbit's branch unless it is known, and those that it leads to; see below."""
+        count = len(self.branches)
+        self.from_orbits([orbit])
+        self.follow_up(count, longest, wanted, most)
+
+    def follow_up(self, count: int, longest: int, wanted: int, most: int | None) -> None:
+        """Follow what the branches after the first `count` lead to.
 
         Doubled branches are followed up to the longest period. Those that are longer in period than
         wanted end after `most` points in one direction, if that is given.
         """
         shorter = self.options if most is None else replace(self.options, max_points=most)
-        count = len(self.branches)
-        self.from_orbits([orbit])
         while count < len(self.branches):
             branch = self.branches[count]
             count += 1

@@ -14,7 +14,7 @@ from nldyn.errors import SystemModelError, check_types, is_finite, shown
 from nldyn.linear import Real
 
 LARGEST_EXPONENT = 4.0
-LARGEST_PHASE = 1e6  # in degrees
+LARGEST_PHASE = 1e6  # in degrees: rounded to 1e-10 degrees
 
 
 def _finite(owner: str, name: str, value: float) -> None:
@@ -408,10 +408,10 @@ def _check_excitation(at: str, name: str, value: float, phase_deg: float) -> Non
     if value < 0.0:
         raise SystemModelError(f"{owner}: {name} must not be negative, got {value:g}")
     _finite(owner, "phase_deg", phase_deg)
-    if abs(phase_deg) > LARGEST_PHASE:  # of which double precision has ten digits left
+    if abs(phase_deg) > LARGEST_PHASE:
         raise SystemModelError(
             f"{owner}: phase_deg must lie between -{LARGEST_PHASE:g} and {LARGEST_PHASE:g}, "
-            f"got {phase_deg:g}"
+            f"got {phase_deg!r}"
         )
 
 

@@ -45,7 +45,7 @@ NEAR = 0.1  # a return within this share of the motion is worth a Newton iterati
 ARRIVED = 0.01  # a motion this near to a known orbit, relative, has settled on it or passes it
 CANDIDATES = 5  # near returns of each motion and period from which Newton's method starts
 TRANSIENT = 5  # periods of a motion beside which no orbits are looked for
-PASSING, PASSED = 60, 10  # periods of a short motion, and candidates as above
+PASSING, BESIDE_PASSING = 60, 10  # periods of a short motion, and candidates as above
 PIECE = 16  # periods simulated between two looks at the known orbits; later a quarter of all
 LONGEST = 0.5  # step of a deflated iteration, relative to the orbit
 ITERATIONS = 20  # of a deflated iteration
@@ -374,7 +374,8 @@ class Exploration:
             f"branches up to period {longest} that the rounds added: {found}",
             f"of them motions came to {len(self.meetings) - never}, {once} in one round only and "
             f"{twice} in two: at least about {self.unmet_branches:.0f} more are to be expected "
-            f"that motions would come to (Chao 1987); {never} were reached otherwise",
+            f"that motions would come to (Chao 1987); {never} were reached otherwise"
+            + (f" or known before, as {self.stage.given} were" if self.stage.given else ""),
         ]
 
     def _cut(self) -> list[str]:
@@ -443,7 +444,7 @@ def explore(
         Step control.
     known : Diagram, optional
         Of this system in this range, from `diagram` or an exploration with less effort. Its
-        branches are taken over as they are, and others looked for.
+        branches are taken over, what they lead to is followed, and others are looked for.
     progress : callable, optional
         Called as ``progress(what, frequency_hz)``.
     checkpoint : str or Path, optional
@@ -498,7 +499,7 @@ def explore(
     )
     if known is not None:
         check_known(known, question)
-        box.take_back(known.branches, known.notes)
+        box.take(known.branches, known.notes)
     survey = _Survey(box, question)
     if checkpoint is not None:
         survey.keep_in(checkpoint)
@@ -526,13 +527,6 @@ def check_known(known: Diagram, question: Question) -> None:
             raise SystemModelError(f"known: branch {branch.name} is of another system or accuracy")
 
 
-def _alike(some: Sequence[Branch], others: Sequence[Branch]) -> bool:
-    """Whether branches have the same frequencies, in the same order."""
-    return len(some) == len(others) and all(
-        np.array_equal(a.frequency_hz, b.frequency_hz) for a, b in zip(some, others, strict=True)
-    )
-
-
 class _Survey:
     """Simulations over frequencies that fill a box of branches."""
 
@@ -558,23 +552,40 @@ class _Survey:
         earlier: Sequence[Branch] = ()
         if place.exists():
             laws = {i: s.law for i, s in enumerate(self.question.flow.system.stops) if s.law}
-            known = begun_before(partial(load_exploration, laws=laws), place)
-            given = known.diagram.branches[: known.stage.given]
-            if not (self.question.same(known.question) and _alike(given, self.box.branches)):
+            kept = begun_before(partial(load_exploration, laws=laws), place)
+            given = replace(
+                kept.diagram,
+                branches=kept.diagram.branches[: kept.stage.given],
+                notes=kept.diagram.notes[: self.stage.notes],
+            )
+            if not (self.question.same(kept.question) and self._was_given(given)):
                 raise SystemModelError(
                     f"{path}: holds another exploration (other system, range, periods, effort, "
                     "options or known branches); choose another file, or delete it"
                 )
-            before, self.stage = self.stage, known.stage
+            before, self.stage = self.stage, kept.stage
             self.box.take_back(
-                known.diagram.branches[before.branches : known.stage.branches],
-                known.diagram.notes[before.notes : known.stage.notes],
+                kept.diagram.branches[before.branches : kept.stage.branches],
+                kept.diagram.notes[before.notes : kept.stage.notes],
             )
-            earlier = known.diagram.branches[known.stage.branches :]
+            earlier = kept.diagram.branches[kept.stage.branches :]
         self.box.checkpoint = Checkpoint(
             lambda branches: save_exploration(place, self.so_far(branches)),
             self.box.branches,
             earlier,
+        )
+
+    def _was_given(self, known: Diagram) -> bool:
+        """Whether the box holds the branches and notes of a diagram, and no others."""
+        pairs = zip(known.branches, self.box.branches, strict=False)
+        return (
+            len(known.branches) == len(self.box.branches)
+            and list(known.notes) == self.box.notes
+            and all(
+                np.array_equal(a.frequency_hz, b.frequency_hz)
+                and np.array_equal(a.nodes[0].orbit.point, b.nodes[0].orbit.point)
+                for a, b in pairs
+            )
         )
 
     def so_far(self, branches: Sequence[Branch]) -> Exploration:
@@ -591,6 +602,8 @@ class _Survey:
         frequency = self.question.frequencies(turn)[place if up else length - 1 - place]
         box.progress("explore", frequency)
         omega = 2.0 * math.pi * frequency
+        if stage.steps == 0:
+            box.follow_up(0, *self._depth)
         starts = stage.carried
         if up:
             seed = (self.effort.seed, turn, place)
@@ -599,7 +612,8 @@ class _Survey:
         here, carried = self._search(starts, known, also_unstable=up)
         if up and self.effort.passing:
             count = self.effort.passing + 1  # the first is rest
-            states = random_states(flow, omega, count, (self.effort.seed, turn, place, 0, 0))
+            number = AGAIN + 1  # of the seed, after those of the searches again
+            states = random_states(flow, omega, count, (self.effort.seed, turn, place, number))
             self._pass_by(states[1:], known)
         for again in range(AGAIN if up else 0):
             if not known.incomplete(min(self.effort.unstable_period, self.max_period)):
@@ -705,7 +719,8 @@ class _Survey:
         """Look for unstable orbits that short motions pass by."""
         flow = self.box.flow
         motions = [flow.strobe(start, known.omega, PASSING) for start in starts]
-        self._beside([found.ends for found in motions if not found.failure], known, PASSED)
+        runs = [found.ends for found in motions if not found.failure]
+        self._beside(runs, known, BESIDE_PASSING)
 
     def _unstable_periods(self) -> range:
         return range(1, min(self.effort.unstable_period, self.max_period) + 1)
@@ -745,8 +760,13 @@ class _Survey:
 
     def _follow(self, orbit: Orbit) -> None:
         """Follow an orbit's branch unless it is known, and those that it leads to."""
+        self.box.follow(orbit, *self._depth)
+
+    @property
+    def _depth(self) -> tuple[int, int, int | None]:
+        """How far doubled branches are followed, see `Collector.follow_up`."""
         longest = max(self.max_period, self.effort.doubled_period)
-        self.box.follow(orbit, longest, self.max_period, self.effort.doubled_points)
+        return longest, self.max_period, self.effort.doubled_points
 
 
 class _Known:

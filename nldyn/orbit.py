@@ -618,7 +618,8 @@ def _is_left_free(system: System) -> bool:
     """Whether the stops leave a mode of zero frequency, or a combination of such modes, free."""
     free = system.natural_frequencies == 0.0
     held = np.array([system.stop_vector(stop)[free] for stop in system.stops])
-    return int(np.linalg.matrix_rank(held)) < int(free.sum())
+    held = held.reshape(-1, int(free.sum()))  # without stops, too
+    return int(np.linalg.matrix_rank(held)) < held.shape[1]
 
 
 def _touches_only(system: System, motion: Trajectory, omega: float) -> bool:

@@ -2,13 +2,13 @@
 
 Beside the branches of the starts that are kept, it finds others, writes the starts of all, which
 `nldyn.paper.starts` reads, and reports how many may be missing. The directory keeps what is found,
-and the same command goes on where it was interrupted.
+and the same command goes on where it was interrupted (but for following the starts).
 """
 
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
+import hashlib
 from pathlib import Path
 
 from nldyn.command import answering
@@ -29,21 +29,22 @@ def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Explorat
     with progress_line() as report:
         found = explore(
             job.system(), job.range_hz, LONGEST, effort=effort, options=LONG,
-            known=known_branches(job, folder / f"{name}.known.h5", report),
+            known=known_branches(job, folder, report),
             progress=report, checkpoint=folder / f"{name}.h5",
         )  # fmt: skip
     write_starts(starts_path(name, folder), found.diagram.branches)
     return found
 
 
-def known_branches(job: Job, path: Path, progress: Progress) -> Diagram:
-    """Branches up to the longest period looked for that the kept starts lead to, kept in a file."""
+def known_branches(job: Job, folder: Path, progress: Progress) -> Diagram:
+    """Branches that the kept starts lead to, in a file named after these starts."""
+    starts, doubled = read_starts(job.name), (LONGEST, LONG.max_points)
+    digest = hashlib.sha256(b"".join(start.state.tobytes() for start in starts)).hexdigest()
+    path = folder / f"{job.name}.known.{digest[:12]}.h5"
     if not path.exists():
-        starts, doubled = read_starts(job.name), (LONGEST, LONG.max_points)
-        found = follow_starts(
+        follow_starts(
             job.system(), starts, job.range_hz, LONG, doubled, progress, whole=True
-        )
-        replace(found, notes=()).save(path)
+        ).save(path)
     return load_diagram(path)
 
 

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from independent import Motion
 from one_dof import make_one_dof
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from nldyn import (
@@ -290,45 +291,87 @@ def test_a_slope_by_speed_that_is_nothing_but_rounding_does_not_shorten_panels()
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 3.0])
 @pytest.mark.parametrize("loss", [35.0, 1e3, 1e5, 1e8])
 def test_an_impact_that_all_but_sticks_leaves_at_the_speed_of_the_dashpot(loss, exponent):
-    """At 1 m/s. By the first integral 1 + a v' is e^-a at the end, so that it leaves at -1/a to
-    rounding; and v/a - ln(1 + a v)/a² = k d^(p + 1)/((p + 1) m) at the depth d where it turns.
+    """At 1 m/s. By the first integral u = 1 + a v has the same u e^-u before and after, so that
+    the body leaves at -1/a to rounding; and v/a - ln(1 + a v)/a² = k d^(p + 1)/((p + 1) m) where
+    it turns, at the depth d.
     """
     stiffness = 1e9
     flow = free_mass(Stop("m", stiffness, exponent, dissipation=loss))
     spent = 1.0 / loss - math.log1p(loss) / loss**2
     deepest = ((exponent + 1.0) * spent * MASS / stiffness) ** (1.0 / (exponent + 1.0))
     omega = 2.0 * np.pi / (1.5 * loss * deepest)
-    found = flow.shoot(moving(flow, 1.0)[None], np.array([0.0, 2.0 * np.pi]), omega)
-    assert not found.failure
-    depth, speed = flow.to_modal(found.ends)[0] / math.sqrt(MASS)
+    motion = flow.trajectory(moving(flow, 1.0)[None], np.array([0.0, 2.0 * np.pi]), omega)
+    assert not motion.failure
+    assert motion.record.kind.size < 200
+    end = motion.states(np.array([2.0 * np.pi]))
+    depth, speed = flow.to_modal(end)[0] / math.sqrt(MASS)
     assert depth < 0.0  # it has left
     assert speed == pytest.approx(-1.0 / loss, rel=1e-8)
+    assert motion.extremes(0)[:, 1].max() == pytest.approx(deepest, rel=1e-8)
 
 
 @pytest.mark.parametrize("depth", [1e-5, 1e-4])
 @pytest.mark.parametrize("loss", [5.0, 100.0])
-def test_creep_in_a_stop_forgets_its_initial_speed(loss, depth):
-    """A linear stop, left alone at depth d: δ' = -1/a, and δ'' + (k/m)(1 + a δ') δ = 0 says that
-    a change of the speed at the start ends within m/(k a d), and leaves so much of the depth.
+@pytest.mark.parametrize("speed", [0.0, -0.5, -2.0])
+def test_creep_in_a_stop_forgets_its_initial_speed(loss, depth, speed):
+    """A linear stop: u = 1 + a δ' falls with the rate k a d/m, so that it ends at δ' = -1/a; what
+    the initial speed has added to the depth until then is m/(k a d) of it.
     """
-    stiffness, speed, some = 1e12, -1.0 / loss, 0.2
+    stiffness, some = 1e12, 0.2
     flow = free_mass(Stop("m", stiffness, 1.0, dissipation=loss))
-    start = flow.to_state(np.array([depth, speed]) * math.sqrt(MASS))[None]
-    omega = 2.0 * np.pi / (some * depth * loss)
-    found = flow.shoot(start, np.array([0.0, 2.0 * np.pi]), omega)
+    start = flow.to_state(np.array([depth, speed / loss]) * math.sqrt(MASS))[None]
+    duration = some * depth * loss
+    found = flow.shoot(start, np.array([0.0, 2.0 * np.pi]), 2.0 * np.pi / duration)
     assert not found.failure
     end = flow.to_modal(found.ends)[0] / math.sqrt(MASS)
-    assert end[0] == pytest.approx((1.0 - some) * depth, rel=1e-10)
-    assert end[1] == pytest.approx(speed, rel=1e-6)
+    assert end[1] == pytest.approx(-1.0 / loss, rel=1e-6)
+    sooner = MASS / (stiffness * loss * depth)
+    expected = (1.0 - some) * depth + (1.0 + speed) / loss * sooner
+    assert end[0] == pytest.approx(expected, abs=0.1 * sooner / loss + 1e-9 * depth)
     right, left = flow.to_modal(np.eye(2)).T, flow.to_state(np.eye(2)).T
     jacobian = right @ found.jacobians[0] @ left
-    assert jacobian[0, 0] == pytest.approx(1.0, rel=1e-8)
-    assert jacobian[0, 1] == pytest.approx(MASS / (stiffness * loss * depth), rel=0.01)
-    assert np.abs(jacobian[1]).max() < 1e-6 / (some * depth * loss)
+    slope = sooner / (loss * depth)  # of what is added, by the depth
+    assert jacobian[0, 0] == pytest.approx(1.0 - (1.0 + speed) * slope, abs=0.2 * slope)
+    assert jacobian[0, 1] == pytest.approx(sooner, rel=0.05)
+    assert abs(jacobian[1, 0]) * duration < 1e-6
+    assert abs(jacobian[1, 1]) < 1e-6
+
+
+@pytest.mark.parametrize("depth", [1e-4, 1e-2])
+def test_creep_of_two_modes_against_a_stiff_integrator(depth):
+    """Pressed in, and left alone for a quarter of the time that it takes to creep out."""
+    stiffness, loss = 1e12, 100.0
+    stop = Stop("a", stiffness, dissipation=loss)
+    system = System.from_modal([10.0, 40.0], {"a": [1.0, 0.5]}, modal_damping=0.01, stops=[stop])
+    flow = FlowMap(system)
+    duration = 0.25 * depth * loss
+    motion = flow.trajectory(
+        flow.to_state(np.array([[depth, 0.0, 0.0, 0.0]])),
+        np.array([0.0, 2.0 * np.pi]),
+        2.0 * np.pi / duration,
+    )
+    assert not motion.failure
+    assert motion.record.kind.size < 200
+    shape, omegas = np.array([1.0, 0.5]), 2.0 * np.pi * np.array([10.0, 40.0])
+
+    def rates(_, y):
+        q, v = y[:2], y[2:]
+        gap, rate = shape @ q, shape @ v
+        force = stiffness * max(gap, 0.0) ** 1.5 * (1.0 + loss * rate)
+        return np.concatenate([v, -(omegas**2) * q - 0.02 * omegas * v - force * shape])
+
+    exact = solve_ivp(
+        rates, (0.0, duration), [depth, 0.0, 0.0, 0.0], method="Radau", rtol=1e-10, atol=1e-14
+    ).y[:, -1]
+    found = flow.to_modal(motion.states(np.array([2.0 * np.pi])))[0]
+    damped = 1.25 * stiffness * depth**1.5 * loss * duration  # times rounding: what a speed loses
+    for part in (slice(2), slice(2, 4)):
+        off = np.abs(found[part] - exact[part]).max() / np.abs(exact[part]).max()
+        assert off < 1e-9 + 1e-15 * damped
 
 
 def test_a_stop_that_all_but_holds_has_no_error_of_liouvilles_formula_to_tell():
-    """What the damping leaves of an area, e^-70000, is far below rounding."""
+    """The weight on its dashpot, 17 N, damps at a F/m = 7e4/s: e^-3400 of an area in a period."""
     system = make_one_dof(stops=[Stop("middle", 5.17e9, gap=-1e-3, dissipation=1e4)])
     orbit = solve_orbit(system, 20.0)
     assert math.isnan(orbit.liouville_error)

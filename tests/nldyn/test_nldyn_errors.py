@@ -134,9 +134,10 @@ def test_phase_of_the_excitation(value):
 
 def test_a_phase_of_many_turns_is_refused():
     """Beyond 1e6 degrees its digits are used up by whole turns."""
-    says = "phase_deg must lie between -1e\\+06 and 1e\\+06, got 1e\\+50"
-    with pytest.raises(SystemModelError, match=says):
-        HarmonicForce("a", 1.0, 1e50)
+    for phase in (1e50, -1000000.5):
+        with pytest.raises(SystemModelError, match="phase_deg must lie between -1e\\+06 and 1e"):
+            HarmonicForce("a", 1.0, phase)
+    assert HarmonicForce("a", 1.0, -1e6).phase_deg == -1e6
 
 
 # --- systems -------------------------------------------------------------------------------------

@@ -103,15 +103,19 @@ def test_a_frequency_is_searched_until_the_indices_of_its_orbits_add_up(monkeypa
     assert set(sums[1]) == {1}
 
 
-def test_short_motions_pass_unstable_orbits_of_further_branches():
+def test_short_motions_pass_unstable_orbits_of_further_branches(monkeypatch):
     """Two modes from 29 to 29.3 Hz, where one motion of 30 periods comes to few of them."""
+    monkeypatch.setattr(exploration, "AGAIN", 0)
     system, few = system_of("two_dof_xi_0.01"), ExploreOptions(spacing=0.1, starts=1, settling=30)
     without, found = (
         explore(system, (29.0, 29.3), 2, effort=replace(few, passing=n)) for n in (0, 12)
     )
-    branches = found.diagram.branches
-    assert len(branches) > len(without.diagram.branches)
-    assert [index_sum(branches, 29.15, n) for n in (1, 2)] == [1, 1]
+    sums = [
+        [index_sum(some.diagram.branches, hz, n) for hz in (29.1, 29.2) for n in (1, 2)]
+        for some in (without, found)
+    ]
+    assert sums[0] != [1] * 4
+    assert sums[1] == [1] * 4
 
 
 def test_report_tells_what_was_tried(around_37):
@@ -360,6 +364,19 @@ def test_known_branches_are_taken_over_and_others_found(whole, harmonic):
         assert sum(other.contains(middle) for other in found.diagram.branches) == 1
 
 
+def test_what_known_branches_lead_to_is_followed(monkeypatch):
+    """The harmonic branch of the 1-DOF model flips at 10.434 Hz; no motion is simulated."""
+    monkeypatch.setattr(exploration._Survey, "_motion", lambda *_: (None, None))
+    system, effort = system_of("one_dof"), ExploreOptions(spacing=0.1, unstable_period=0)
+    known = diagram(system, (10.3, 10.6), (1,))
+    found = explore(system, (10.3, 10.6), 2, effort=effort, known=known).diagram
+    (flip,) = [s for branch in known.branches for s in branch.special_points if s.kind == "PD"]
+    assert flip.frequency_hz == pytest.approx(10.434049887, abs=1e-8)
+    assert len(found.of_period(2)) == 1
+    ends = found.of_period(2)[0].frequency_hz[[0, -1]]
+    assert np.abs(ends - flip.frequency_hz).min() < 1e-6
+
+
 def test_exploration_beside_known_branches_goes_on_to_the_last_digit(harmonic, tmp_path):
     path = tmp_path / "found.h5"
     ask = partial(explore, system_of("one_dof"), **QUESTION, effort=EFFORT, known=harmonic)
@@ -369,6 +386,8 @@ def test_exploration_beside_known_branches_goes_on_to_the_last_digit(harmonic, t
     assert_same_exploration(ask(checkpoint=path), ask())
     with pytest.raises(SystemModelError, match=r"holds another .* or known branches"):
         explore(system_of("one_dof"), **QUESTION, effort=EFFORT, checkpoint=path)
+    with pytest.raises(SystemModelError, match=r"holds another .* or known branches"):
+        ask(known=replace(harmonic, notes=("some note",)), checkpoint=path)
 
 
 def test_known_branches_of_something_else_are_refused(harmonic):
