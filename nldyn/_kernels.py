@@ -1055,6 +1055,16 @@ def legendre_tail(tab, values, a):
 
 
 @inner
+def at_end(tab, values, a):
+    """Value at the end of the panel of the polynomial through row a of values."""
+    total = 0.0  # each Legendre polynomial is 1 there
+    for row in range(tab.nodes.size):
+        for j in range(tab.nodes.size):
+            total += tab.to_legendre[row, j] * values[a, j]
+    return total
+
+
+@inner
 def largest(values, a):
     """Largest absolute value in row a."""
     found = 0.0
@@ -1735,9 +1745,10 @@ def propagate(
     for s in range(n_stops):
         value, _, _, _ = output_derivatives(fl, s, w, phase, 0.0)
         closed[s] = value - fl.stops[s, GAP] > 0.0
+    pushes = np.full(n_stops, np.nan)
     status = run_pieces(
         fl, tab, w, columns, phase, before, duration, closed, closings, with_columns, rec,
-        recording,
+        recording, pushes,
     )  # fmt: skip
     end_phase = phase + fl.omega * duration
     turn = turned(end_phase)
@@ -1749,6 +1760,8 @@ def propagate(
     for s in range(n_stops):
         value, speed, _, _ = output_derivatives(fl, s, w, end_phase, 0.0)
         force, _, _ = law(fl, s, value - fl.stops[s, GAP], speed)
+        if not np.isnan(pushes[s]):
+            force = pushes[s]
         for i in range(size):
             rate[i] -= fl.force[i, s] * force
     add_growth(fl.near, fl.response, fl.omega, end_phase, 1.0, w, columns)
@@ -1779,11 +1792,14 @@ def switch_with(fl, w, phase, h, closed, closings):
 
 @inlined
 def run_pieces(
-    fl, tab, w, columns, phase, before, duration, closed, closings, with_columns, rec, recording
-):
+    fl, tab, w, columns, phase, before, duration, closed, closings, with_columns, rec, recording,
+    pushes,
+):  # fmt: skip
     """Advance w and its sensitivities in place over a segment, piece by piece.
 
-    `before` is the phase of the whole turns before it, which only the record shows.
+    `before` is the phase of the whole turns before it, which only the record shows. `pushes`
+    (n_stops,) is filled with the forces at the end of stops that damp so strongly that they cannot
+    be told from the state there.
     """
     m = tab.nodes.size
     n_stops = closed.size
@@ -1806,6 +1822,7 @@ def run_pieces(
         if remain <= 0.0:
             return OK
         here = phase + fl.omega * t
+        pushes[:] = np.nan
         active = np.empty(n_stops, dtype=np.int64)
         n_active = 0
         for s in range(n_stops):
@@ -1877,6 +1894,8 @@ def run_pieces(
                 if 1e-16 * panel.decay[1, a] > WORST_ROUNDING:
                     return ROUNDED
                 panel.decay[0, a] += panel.decay[1, a]
+                if panel.decay[1, a] > DECAY:
+                    pushes[active[a]] = at_end(tab, panel.F, a)
             if with_columns:
                 panel_columns(fl, tab, kind, here, t, h, panel, columns)
             for k in range(w.size):

@@ -337,6 +337,33 @@ def test_creep_in_a_stop_forgets_its_initial_speed(loss, depth, speed):
     assert abs(jacobian[1, 1]) < 1e-6
 
 
+def test_the_derivative_by_the_frequency_holds_while_a_stop_holds_the_body():
+    """Where the segment ends, 1 + a δ' is rounding: the force is told by the panel before it."""
+    system = System.from_modal(
+        [50.0], {"a": [0.5]}, modal_damping=0.01, stops=[Stop("a", 2.4e8, 1.0, dissipation=4e5)],
+        excitation=[HarmonicForce("a", 8.6)],
+    )  # fmt: skip
+    flow, omega, phases = FlowMap(system), 39.0, np.array([0.0, 8.0 * np.pi])
+    start = flow.to_state(np.array([[5e-6, 9e-4]]))
+    found = flow.to_modal(flow.shoot(start, phases, omega).d_omega)[0]
+    pace = system.natural_frequencies[0] ** 2, float(system.total_damping[0, 0])
+
+    def end(speed):
+        def rates(t, y):
+            depth, rate = 0.5 * y
+            force = 2.4e8 * max(depth, 0.0) * (1.0 + 4e5 * rate) - 8.6 * math.cos(speed * t)
+            return [y[1], -pace[0] * y[0] - pace[1] * y[1] - 0.5 * force]
+
+        span, some = (0.0, phases[-1] / speed), {"method": "Radau", "rtol": 1e-11, "atol": 1e-19}
+        return solve_ivp(rates, span, [5e-6, 9e-4], **some).y[:, -1]
+
+    step = 1e-3 * omega
+    exact = (end(omega + step) - end(omega - step)) / (2.0 * step)
+    off = np.abs(found - exact)
+    assert off[0] < 1e-4 * abs(exact[0])
+    assert off[1] < 0.01 * omega * abs(exact[0])
+
+
 @pytest.mark.parametrize("depth", [1e-4, 1e-2])
 def test_creep_of_two_modes_against_a_stiff_integrator(depth):
     """Pressed in, and left alone for a quarter of the time that it takes to creep out."""
