@@ -354,31 +354,27 @@ def distance(fl, stop, w, phase):
 
 
 @inner
-def output_size(fl, out, w):
-    """Sum of the sizes of an output's terms."""
-    total = abs(fl.forced[0, 0, out])
+def output_size(fl, out, w, order):
+    """Sum of the sizes of an output's terms (order 0), or of those of its rate (order 1)."""
+    pace = fl.omega if order == 1 else 1.0
+    total = abs(fl.forced[0, 0, out]) * pace
     for k in range(fl.near.size):
-        total += abs(fl.forced[1 + k, 0, out]) * (2.0 * math.pi / fl.omega)
+        total += abs(fl.forced[1 + k, 0, out]) * (2.0 * math.pi / fl.omega) * pace
     for j in range(w.size):
-        total += abs(fl.rows[0, out, j] * w[j])
+        total += abs(fl.rows[order, out, j] * w[j])
     return total
 
 
 @inner
 def output_noise(fl, out, w):
     """Rounding error to expect in an output: 4 units in the last place of its terms."""
-    return 1e-15 * output_size(fl, out, w)
+    return 1e-15 * output_size(fl, out, w, 0)
 
 
 @inner
 def rate_noise(fl, out, w):
     """The same in the output's rate."""
-    total = abs(fl.forced[0, 0, out]) * fl.omega
-    for k in range(fl.near.size):
-        total += abs(fl.forced[1 + k, 0, out]) * (2.0 * math.pi)
-    for j in range(w.size):
-        total += abs(fl.rows[1, out, j] * w[j])
-    return 1e-15 * total
+    return 1e-15 * output_size(fl, out, w, 1)
 
 
 @inner
@@ -1042,25 +1038,30 @@ def panel_columns(fl, tab, kind, phase, t0, h, panel, columns):
 
 
 @inner
+def legendre_coefficient(tab, values, a, degree):
+    """Legendre coefficient of the polynomial through row a of values."""
+    total = 0.0
+    for j in range(tab.nodes.size):
+        total += tab.to_legendre[degree, j] * values[a, j]
+    return total
+
+
+@inner
 def legendre_tail(tab, values, a):
-    """Larger of the last two Legendre coefficients of the polynomial through row a of values."""
+    """Larger of the last two of these coefficients."""
     m = tab.nodes.size
-    worst = 0.0
-    for row in range(m - 2, m):
-        total = 0.0
-        for j in range(m):
-            total += tab.to_legendre[row, j] * values[a, j]
-        worst = max(worst, abs(total))
-    return worst
+    return max(
+        abs(legendre_coefficient(tab, values, a, m - 2)),
+        abs(legendre_coefficient(tab, values, a, m - 1)),
+    )
 
 
 @inner
 def at_end(tab, values, a):
-    """Value at the end of the panel of the polynomial through row a of values."""
-    total = 0.0  # each Legendre polynomial is 1 there
-    for row in range(tab.nodes.size):
-        for j in range(tab.nodes.size):
-            total += tab.to_legendre[row, j] * values[a, j]
+    """Value at the end of the panel of the same polynomial: each of Legendre's is 1 there."""
+    total = 0.0
+    for degree in range(tab.nodes.size):
+        total += legendre_coefficient(tab, values, a, degree)
     return total
 
 
@@ -1408,9 +1409,11 @@ def creep(fl, stop, w, phase, duration):
 
     So it does where an elastic contact would take much longer than the damping to act.
     """
+    if fl.laws[stop] != 0 or fl.stops[stop, DISSIPATION] == 0.0:
+        return 0.0, 0.0
     value, speed, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
     depth = value - fl.stops[stop, GAP]
-    if fl.laws[stop] != 0 or speed >= 0.0 or depth <= 0.0:
+    if speed >= 0.0 or depth <= 0.0:
         return 0.0, 0.0
     _, _, viscosity = law(fl, stop, depth, speed)
     if viscosity * fl.stops[stop, MOBILITY] * duration < CREEP:
@@ -1681,7 +1684,7 @@ def lost_to_rounding(fl, stop, w, peak, noise):
     p = fl.stops[stop, EXPONENT]
     rate = fl.stops[stop, STIFFNESS] * fl.stops[stop, MOBILITY]
     impact_speed = math.sqrt(2.0 * rate * peak ** (p + 1.0) / (p + 1.0))
-    speed = impact_speed + output_size(fl, stop, w) * fl.omega
+    speed = impact_speed + output_size(fl, stop, w, 0) * fl.omega
     for j in range(w.size):
         speed += abs(fl.rows[1, stop, j] * w[j])
     return noise / peak * impact_speed / speed

@@ -209,7 +209,7 @@ class Collector:
                 self.from_start(start)
 
     def follow(self, orbit: Orbit, longest: int, wanted: int, most: int | None) -> None:
-        """Follow an orbit's branch unless it is known, and those that it leads to; see below."""
+        """Follow an orbit's branch unless it is known, and what it leads to; see `follow_up`."""
         count = len(self.branches)
         self.from_orbits([orbit])
         self.follow_up(count, longest, wanted, most)

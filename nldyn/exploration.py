@@ -497,19 +497,19 @@ def explore(
         question.options,
         progress or (lambda what, frequency_hz: None),
     )
-    if known is not None:
-        check_known(known, question)
+    if known is None:
+        known = Diagram((), question.range_hz, question.observe, ())
+    _check_known(known, question)
+    survey = _Survey(box, question, known)
+    if checkpoint is None or not survey.goes_on_in(checkpoint):
         box.take(known.branches, known.notes)
-    survey = _Survey(box, question)
-    if checkpoint is not None:
-        survey.keep_in(checkpoint)
     with box.checkpoint:
         while not survey.so_far(box.branches).finished:
             survey.step()
     return survey.so_far(box.branches)
 
 
-def check_known(known: Diagram, question: Question) -> None:
+def _check_known(known: Diagram, question: Question) -> None:
     """Raise unless branches that are known belong to the question."""
     from nldyn.store import same_flow
 
@@ -527,18 +527,31 @@ def check_known(known: Diagram, question: Question) -> None:
             raise SystemModelError(f"known: branch {branch.name} is of another system or accuracy")
 
 
+def _same_branches(a: Diagram, b: Diagram) -> bool:
+    """Whether two diagrams hold the same branches, in the same order, and notes."""
+    return (
+        a.notes == b.notes
+        and len(a.branches) == len(b.branches)
+        and all(
+            np.array_equal(one.frequency_hz, other.frequency_hz)
+            and np.array_equal(one.nodes[0].orbit.point, other.nodes[0].orbit.point)
+            for one, other in zip(a.branches, b.branches, strict=True)
+        )
+    )
+
+
 class _Survey:
     """Simulations over frequencies that fill a box of branches."""
 
-    def __init__(self, box: Collector, question: Question) -> None:
-        self.box, self.question = box, question
+    def __init__(self, box: Collector, question: Question, known: Diagram) -> None:
+        self.box, self.question, self.known = box, question, known
         self.max_period, self.effort = question.max_period, question.effort
         nothing = np.empty((0, 2 * question.flow.system.size))
-        given = len(box.branches)
+        given = len(known.branches)
         met = np.zeros((0, given), dtype=bool)
-        self.stage = Stage(0, given, len(box.notes), nothing, (), met, (), given)
+        self.stage = Stage(0, given, len(known.notes), nothing, (), met, (), given)
 
-    def keep_in(self, path: str | Path) -> None:
+    def goes_on_in(self, path: str | Path) -> bool:
         """Keep everything in a file, and begin where the exploration in it ended, if there is one.
 
         Raises
@@ -550,23 +563,25 @@ class _Survey:
 
         place = check_writable(path)
         earlier: Sequence[Branch] = ()
-        if place.exists():
+        begun = place.exists()
+        if begun:
             laws = {i: s.law for i, s in enumerate(self.question.flow.system.stops) if s.law}
             kept = begun_before(partial(load_exploration, laws=laws), place)
             given = replace(
                 kept.diagram,
                 branches=kept.diagram.branches[: kept.stage.given],
-                notes=kept.diagram.notes[: self.stage.notes],
+                notes=kept.diagram.notes[: len(self.known.notes)],
             )
-            if not (self.question.same(kept.question) and self._was_given(given)):
+            if not (self.question.same(kept.question) and _same_branches(given, self.known)):
                 raise SystemModelError(
                     f"{path}: holds another exploration (other system, range, periods, effort, "
                     "options or known branches); choose another file, or delete it"
                 )
-            before, self.stage = self.stage, kept.stage
-            self.box.take_back(
-                kept.diagram.branches[before.branches : kept.stage.branches],
-                kept.diagram.notes[before.notes : kept.stage.notes],
+            self.stage = kept.stage
+            take = self.box.take_back if kept.stage.steps else self.box.take
+            take(
+                kept.diagram.branches[: kept.stage.branches],
+                kept.diagram.notes[: kept.stage.notes],
             )
             earlier = kept.diagram.branches[kept.stage.branches :]
         self.box.checkpoint = Checkpoint(
@@ -574,19 +589,7 @@ class _Survey:
             self.box.branches,
             earlier,
         )
-
-    def _was_given(self, known: Diagram) -> bool:
-        """Whether the box holds the branches and notes of a diagram, and no others."""
-        pairs = zip(known.branches, self.box.branches, strict=False)
-        return (
-            len(known.branches) == len(self.box.branches)
-            and list(known.notes) == self.box.notes
-            and all(
-                np.array_equal(a.frequency_hz, b.frequency_hz)
-                and np.array_equal(a.nodes[0].orbit.point, b.nodes[0].orbit.point)
-                for a, b in pairs
-            )
-        )
+        return begun
 
     def so_far(self, branches: Sequence[Branch]) -> Exploration:
         """What the steps that are done have come to, with branches found since then too."""

@@ -175,9 +175,10 @@ def dissipation_error(loss: float) -> Measured:
     system = System.from_modal([0.0], {"m": [1.0]}, stops=[Stop("m", stiffness, dissipation=loss)])
     flow, lasting = FlowMap(system), 10.0 * deepest * (1.0 + loss)
     before = flow.to_state(np.array([[-deepest, 1.0]]))
-    motion = (before, np.array([0.0, 2.0 * np.pi]), 2.0 * np.pi / lasting)
-    speed = -flow.to_modal(flow.shoot(*motion).ends)[0, 1]
-    depth = flow.trajectory(*motion).extremes(0)[:, 1].max()
+    phases = np.array([0.0, 2.0 * np.pi])
+    motion = flow.trajectory(before, phases, 2.0 * np.pi / lasting)
+    speed = -flow.to_modal(motion.states(phases))[1, 1]
+    depth = motion.extremes(0)[:, 1].max()
     off = max(abs(speed / rebound - 1.0), abs(depth / deepest - 1.0))
     return Measured(float(off), f"rebound {rebound:.6g} m/s")
 

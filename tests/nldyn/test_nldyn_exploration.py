@@ -377,11 +377,12 @@ def test_what_known_branches_lead_to_is_followed(monkeypatch):
     assert np.abs(ends - flip.frequency_hz).min() < 1e-6
 
 
-def test_exploration_beside_known_branches_goes_on_to_the_last_digit(harmonic, tmp_path):
+@pytest.mark.parametrize("place", [(1, 30), (3,)])
+def test_exploration_beside_known_branches_goes_on_to_the_last_digit(harmonic, tmp_path, place):
     path = tmp_path / "found.h5"
     ask = partial(explore, system_of("one_dof"), **QUESTION, effort=EFFORT, known=harmonic)
     with pytest.raises(KeyboardInterrupt):
-        ask(progress=stopped_at(3), checkpoint=path)
+        ask(progress=stopped_at(*place), checkpoint=path)
     assert load_exploration(path).stage.given == 1
     assert_same_exploration(ask(checkpoint=path), ask())
     with pytest.raises(SystemModelError, match=r"holds another .* or known branches"):
