@@ -967,7 +967,10 @@ def solve_panel(fl, tab, kind, phase, w, h, noise, panel):
 
 @inner
 def panel_end(fl, tab, kind, phase, w, h, panel, w_end):
-    """State w_end and penetrations at the end of a panel from the forces at its nodes."""
+    """State w_end and penetrations at the end of a panel from the forces at its nodes.
+
+    `decay` has been filled.
+    """
     for a in range(panel.active.size):
         panel.depth[2, a] = panel.depth[0, a]
     for k in range(w.size):
@@ -981,6 +984,70 @@ def panel_end(fl, tab, kind, phase, w, h, panel, w_end):
     for a in range(panel.active.size):
         panel.depth[2, a] += flown(fl, panel.active[a], phase, w_end, h)
     fly_state(fl.blocks, w_end, h)
+    hold(fl, tab, kind, phase + fl.omega * h, h, panel, w_end)
+
+
+@inner
+def hold(fl, tab, kind, end_phase, h, panel, w_end):
+    """Correct the end of a panel by the speeds of the stops that damp strongly.
+
+    An error of such a force is a much smaller one of the speed, by its slope. So the nodes' speeds,
+    and the one at which the law gives the force of the end, are known better than what the forces
+    integrate to. Where several stops damp, they count by how strongly they do.
+    """
+    if largest(panel.decay, 1) <= DECAY:
+        return
+    na = panel.active.size
+    viscosity, off, order = np.zeros(na), np.zeros(na), np.empty(na, dtype=np.int64)
+    for a in range(na):
+        if panel.decay[1, a] > DECAY:
+            _, speed, _, _ = output_derivatives(fl, panel.active[a], w_end, end_phase, 0.0)
+            _, _, viscosity[a] = law(fl, panel.active[a], panel.depth[2, a], speed)
+            gained = 0.0
+            for i in range(tab.nodes.size):
+                gained += h * tab.weights[kind, i] * panel.output[na + a, i]
+            off[a] = h * viscosity[a] * (panel.depth[0, a] + gained - panel.depth[2, a])
+    matrix = np.empty((na, na))  # 1 + h viscosity mobility
+    for a in range(na):
+        for b in range(na):
+            mobility = 0.0
+            for k in range(w_end.size):
+                mobility += fl.rows[1, panel.active[a], k] * fl.force[k, panel.active[b]]
+            matrix[a, b] = (a == b) + h * viscosity[a] * mobility
+    lu_factor(matrix, order)
+    shift, kick = np.zeros(w_end.size), np.zeros(w_end.size)
+    lu_apply_vector(matrix, order, off)
+    add_kicks(fl, panel.active, off, kick)
+    add_rates(fl.blocks, kick, shift)  # without the end of a kick in time: displacements
+    for k in range(w_end.size):
+        w_end[k] += shift[k]
+        for a in range(na):
+            panel.depth[2, a] += fl.rows[0, panel.active[a], k] * shift[k]
+    for a in range(na):
+        off[a] = 0.0
+        if viscosity[a] > 0.0:
+            _, speed, _, _ = output_derivatives(fl, panel.active[a], w_end, end_phase, 0.0)
+            force, _, _ = law(fl, panel.active[a], panel.depth[2, a], speed)
+            off[a] = h * (at_end(tab, panel.F, a) - force)
+    lu_apply_vector(matrix, order, off)
+    add_kicks(fl, panel.active, off, w_end)
+
+
+@inner
+def add_kicks(fl, stops, kicks, w):
+    """Add to w (2n,) what impulses (n_stops,) in the sense of the gaps change."""
+    for a in range(stops.size):
+        for k in range(w.size):
+            w[k] += fl.force[k, stops[a]] * kicks[a]
+
+
+@inner
+def add_rates(blocks, w, rate):
+    """Add the rates of change of w (2n,) in free vibration."""
+    for b in range(blocks.shape[0]):
+        for i in range(2):
+            for j in range(2):
+                rate[2 * b + i] += blocks[b, i, j] * w[2 * b + j]
 
 
 @inner
@@ -1623,11 +1690,10 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
             kind, h = guess_panel(fl, tab, phase, w, limit, h_mapped, start_switch, panel)
             tried = h
             continue
+        decays = shows_decay(fl, tab, kind, h, panel)
         panel_end(fl, tab, kind, phase, w, h, panel, w_end)
         end_phase = phase + fl.omega * h
-        fine = shows_decay(fl, tab, kind, h, panel) and resolved(
-            fl, tab, kind, h, rounding, panel
-        )
+        fine = decays and resolved(fl, tab, kind, h, rounding, panel)
         if fine:
             to_switch = kind % 2 == 1
             fine = h <= 1.5 * graded_length(
@@ -1638,7 +1704,7 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
         if event >= 0 and event != aim:  # so near that `switch_with` will find it
             near_end = max(min(5.0 * fl.stops[event, INSTANT], 1e-7), 1e-12)
         at_end = where > 1.0 - near_end
-        lost = attempt % 12 == 11  # the instant that is aimed at goes to and fro
+        lost = attempt % 20 == 19  # the instant that is aimed at goes to and fro
         if event >= 0 and (aim < 0 or not at_end) and not lost:
             goal = switch
             aim = event
@@ -1756,10 +1822,7 @@ def propagate(
     end_phase = phase + fl.omega * duration
     turn = turned(end_phase)
     rate = np.zeros(size)
-    for b in range(fl.blocks.shape[0]):
-        for i in range(2):
-            for j in range(2):
-                rate[2 * b + i] += fl.blocks[b, i, j] * w[2 * b + j]
+    add_rates(fl.blocks, w, rate)
     for s in range(n_stops):
         value, speed, _, _ = output_derivatives(fl, s, w, end_phase, 0.0)
         force, _, _ = law(fl, s, value - fl.stops[s, GAP], speed)
