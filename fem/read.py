@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import meshio
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fem.abaqus import read_abaqus
 from fem.cells import KINDS
@@ -57,8 +58,8 @@ def read_mesh(path: str | Path, include_folders: Iterable[str | Path] = ()) -> F
         - ``.msh``: Gmsh 2.2 or 4.1, ASCII or binary. Physical curves are the parts, physical
           points the points; a group without a name goes by its number.
         - ``.vtu``: VTK unstructured grid. Neither cell sets nor point sets exist in VTK, so a
-          cell array ``set:NAME`` that is not zero on the elements of a part names the part, and
-          a point array ``set:NAME`` that is not zero at one node names a point.
+          cell array ``set:NAME`` that is 1 on the elements of a part, else 0, names the part, and
+          a point array ``set:NAME`` that is 1 at one node names a point.
         - ``.inp``: Abaqus input. ELSET and NSET, also those given on ``*ELEMENT`` and ``*NODE``.
 
     include_folders
@@ -209,7 +210,7 @@ def structure_from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> 
             continue
         blocks = cells.setdefault(block.type, [])
         first = sum(len(data) for data in blocks)
-        for name, found in _groups(content, index, KINDS[block.type].dimension):
+        for name, found in _groups(content, index, KINDS[block.type].dimension, source):
             groups.setdefault(name, {}).setdefault(block.type, []).append(found + first)
         blocks.append(np.asarray(block.data, dtype=np.int64))
     if not cells:
@@ -267,7 +268,7 @@ def _lines_and_parts(content: meshio.Mesh, source: str) -> tuple[IntArray, dict[
     first = 0
     for index, block in enumerate(content.cells):
         if block.type == "line" and len(block.data):
-            for name, elements in _groups(content, index, 1):
+            for name, elements in _groups(content, index, 1, source):
                 parts.setdefault(name, []).append(elements + first)
             lines.append(np.asarray(block.data, dtype=np.int64))
             first += len(block.data)
@@ -283,10 +284,10 @@ def _point_sets(content: meshio.Mesh, source: str) -> dict[str, IntArray]:
         sets.setdefault(str(name), []).append(np.asarray(nodes, dtype=np.int64))
     for name, values in content.point_data.items():
         if name.startswith(SET_PREFIX):
-            sets.setdefault(_set_name(name), []).append(np.flatnonzero(values))
+            sets.setdefault(_set_name(name), []).append(_marked(name, values, source))
     for index, block in enumerate(content.cells):
         if block.type == "vertex":
-            for name, vertices in _groups(content, index, 0):
+            for name, vertices in _groups(content, index, 0, source):
                 sets.setdefault(name, []).append(block.data[vertices].ravel())
     found = {name: np.unique(np.concatenate(nodes)) for name, nodes in sets.items()}
     for name, nodes in found.items():
@@ -294,14 +295,25 @@ def _point_sets(content: meshio.Mesh, source: str) -> dict[str, IntArray]:
     return found
 
 
-def _groups(content: meshio.Mesh, index: int, dimension: int) -> Iterator[tuple[str, IntArray]]:
+def _marked(array: str, values: ArrayLike, source: str) -> IntArray:
+    """Indices where an array ``set:NAME`` is 1; elsewhere it is 0."""
+    marks = np.asarray(values).ravel()
+    bad = np.flatnonzero((marks != 0) & (marks != 1))
+    if len(bad):
+        raise ModelError(f"{source}: array {array!r} holds {marks[bad[0]]}, but 0 or 1 is expected")
+    return np.flatnonzero(marks)
+
+
+def _groups(
+    content: meshio.Mesh, index: int, dimension: int, source: str
+) -> Iterator[tuple[str, IntArray]]:
     """Names and cell indices of all groups in one block of cells."""
     for name, blocks in content.cell_sets.items():
         if not name.startswith("gmsh:") and index < len(blocks) and len(blocks[index]):
             yield str(name), np.asarray(blocks[index], dtype=np.int64)
     for name, blocks in content.cell_data.items():
         if name.startswith(SET_PREFIX):
-            yield _set_name(name), np.flatnonzero(blocks[index])
+            yield _set_name(name), _marked(name, blocks[index], source)
     tags = np.asarray(content.cell_data.get("gmsh:physical", {index: []})[index])
     for tag in np.unique(tags[tags != 0]):
         yield _physical_name(content, int(tag), dimension), np.flatnonzero(tags == tag)

@@ -143,6 +143,16 @@ def test_nodes_and_cells_off_the_frame_are_left_out():
         mesh.node("outside")
 
 
+@pytest.mark.parametrize("mark", [-1, 2, 0.5, float("nan")])
+def test_a_mark_of_a_set_that_is_neither_0_nor_1_is_refused(mark):
+    points, line = [[0.0, 0.0], [1.0, 0.0]], [("line", [[0, 1]])]
+    said = r"array 'set:end' holds .*, but 0 or 1 is expected"
+    with pytest.raises(fem.ModelError, match=said):
+        fem.from_meshio(meshio.Mesh(points, line, point_data={"set:end": [0, mark]}))
+    with pytest.raises(fem.ModelError, match=said):
+        fem.from_meshio(meshio.Mesh(points, line, cell_data={"set:end": [[mark]]}))
+
+
 ABAQUS = """*HEADING
 ** a frame with everything that is ordinary in such files
 *node, nset=all
