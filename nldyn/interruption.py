@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import _thread
+import signal
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 SOON = 0.2
@@ -24,6 +27,35 @@ def interrupted(error: BaseException | None) -> bool:
     if error is None or isinstance(error, KeyboardInterrupt):
         return error is not None
     return _swallowed.is_set() or interrupted(error.__cause__ or error.__context__)
+
+
+@contextmanager
+def deferred_interruption() -> Iterator[None]:
+    """Let Ctrl-C wait until the block is done, in the main thread, which alone it interrupts.
+
+    Examples
+    --------
+    >>> try:
+    ...     with deferred_interruption():
+    ...         signal.raise_signal(signal.SIGINT)
+    ...         print("to its end")
+    ... except KeyboardInterrupt:
+    ...     print("interrupted")
+    to its end
+    interrupted
+    """
+    usual = signal.getsignal(signal.SIGINT)
+    if usual is None or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
+        if came:
+            signal.raise_signal(signal.SIGINT)
 
 
 def heed_swallowed() -> None:

@@ -15,6 +15,8 @@ from typing import Any
 import numba
 from numba.core.caching import FunctionCache
 
+from nldyn.interruption import deferred_interruption
+
 ADVICE = (
     "nldyn: no folder to keep compiled code in, so each start compiles for up to a minute; "
     "set NUMBA_CACHE_DIR to a folder to write in"
@@ -81,15 +83,18 @@ def first_call(kernel: Any, *arguments: object) -> Any:
     """Call a kernel that may have to be compiled for it, without Python's collector of cycles.
 
     The compiler makes millions of objects that stay; to search them again and again for cycles
-    takes a sixth of its time.
+    takes a sixth of its time. The call comes after it, and a Ctrl-C after the call: numba takes an
+    interruption of what it prepares for a kernel's first results for a result, and that crashes.
     """
-    if not gc.isenabled():
-        return kernel(*arguments)
+    enabled = gc.isenabled()
     gc.disable()
     try:
-        return kernel(*arguments)
+        kernel.compile(tuple(kernel.typeof_pyval(argument) for argument in arguments))
     finally:
-        gc.enable()
+        if enabled:
+            gc.enable()
+    with deferred_interruption():
+        return kernel(*arguments)
 
 
 def _probe() -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import gc
+import subprocess
+import sys
 
 import numba
 import pytest
@@ -15,6 +17,10 @@ from nldyn.kernel_cache import first_call, resting_on
 
 def double(x):
     return 2 * x
+
+
+def whole_share(x):
+    return 1 // x
 
 
 def test_kept_code_is_outdated_when_a_file_it_rests_on_changes(tmp_path):
@@ -37,13 +43,44 @@ def test_the_collector_rests_during_a_first_call_and_is_as_before_afterwards(col
     was = gc.isenabled()
     try:
         (gc.enable if collecting else gc.disable)()
-        assert first_call(gc.isenabled) is False
+        kernel = numba.njit(double)
+        compile_it, seen = kernel.compile, []
+        kernel.compile = lambda signature: (seen.append(gc.isenabled()), compile_it(signature))
+        assert first_call(kernel, 21) == 42
+        assert seen == [False]
         assert gc.isenabled() is collecting
         with pytest.raises(ZeroDivisionError):
-            first_call(divmod, 1, 0)
+            first_call(numba.njit(whole_share), 0)
         assert gc.isenabled() is collecting
     finally:
         (gc.enable if was else gc.disable)()
+
+
+INTERRUPTED = """
+import _thread, signal, threading
+import numpy as np
+import nldyn.kernel_cache
+from nldyn import FlowMap, Stop, System
+
+usual = nldyn.kernel_cache.deferred_interruption
+def deferred_interruption():
+    threading.Timer(0.2, _thread.interrupt_main).start()
+    return usual()
+nldyn.kernel_cache.deferred_interruption = deferred_interruption
+signal.signal(signal.SIGINT, signal.default_int_handler)
+flow = FlowMap(System.from_modal([13.0], {"a": [1.0]}, stops=[Stop("a", 1e9)]))
+try:
+    flow.shoot(np.ones((1, 2)), np.arange(0.0, 60001.0), 100.0, sensitivities=False, chained=True)
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+def test_ctrl_c_during_the_first_call_of_the_kernel_is_no_crash():
+    found = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, timeout=300
+    )
+    assert (found.returncode, found.stdout) == (0, "interrupted\n"), found.stderr
 
 
 def test_code_that_cannot_be_kept_is_used_and_told_of_once(monkeypatch, capsys):
