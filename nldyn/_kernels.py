@@ -885,9 +885,23 @@ def consistent(panel, force, noise):
         for o in range(a, noise.size, na):
             allowed += 10.0 * noise[o] * largest(panel.slope, o)
         for i in range(m):
-            if abs(panel.F[a, i] - force[a * m + i]) > allowed:
+            off = abs(panel.F[a, i] - force[a * m + i])
+            if off > allowed and off > allowed + rounded_force(panel, force, a, i):
                 return False
     return True
+
+
+@inner
+def rounded_force(panel, force, a, i):
+    """Rounding error of stop a's force at node i by what all forces (na m,) have moved so far."""
+    na, m = panel.F.shape
+    error = 0.0
+    for o in range(a, panel.output.shape[0], na):
+        moved = 0.0
+        for p in range(na * m):
+            moved += abs(panel.G[o * m + i, p] * force[p])
+        error += 1e-15 * moved * abs(panel.slope[o, i])
+    return error
 
 
 @inner
@@ -1023,14 +1037,15 @@ def hold(fl, tab, kind, end_phase, h, panel, w_end):
         w_end[k] += shift[k]
         for a in range(na):
             panel.depth[2, a] += fl.rows[0, panel.active[a], k] * shift[k]
-    for a in range(na):
-        off[a] = 0.0
-        if viscosity[a] > 0.0:
-            _, speed, _, _ = output_derivatives(fl, panel.active[a], w_end, end_phase, 0.0)
-            force, _, _ = law(fl, panel.active[a], panel.depth[2, a], speed)
-            off[a] = h * (at_end(tab, panel.F, a) - force)
-    lu_apply_vector(matrix, order, off)
-    add_kicks(fl, panel.active, off, w_end)
+    for _ in range(2):  # the slopes are those before the shift
+        for a in range(na):
+            off[a] = 0.0
+            if viscosity[a] > 0.0:
+                _, speed, _, _ = output_derivatives(fl, panel.active[a], w_end, end_phase, 0.0)
+                force, _, _ = law(fl, panel.active[a], panel.depth[2, a], speed)
+                off[a] = h * (at_end(tab, panel.F, a) - force)
+        lu_apply_vector(matrix, order, off)
+        add_kicks(fl, panel.active, off, w_end)
 
 
 @inner
@@ -1190,7 +1205,8 @@ def resolved(fl, tab, kind, h, noise, panel):
         singular = o < na and singular_slope(fl, panel.active[a])
         if singular and nearly_opens(tab, kind, panel.output, a, 10.0 * noise[a]):
             return False
-        tail = max(fl.tail, 20.0 * noise[a] / deepest)
+        tail = fl.tail if panel.decay[1, a] <= DECAY else 0.01 * fl.tail  # see `hold`
+        tail = max(tail, 20.0 * noise[a] / deepest)
         shake = 0.0  # of the force by the rounding of the rate
         if o < na < slopes.shape[0]:
             shake = 20.0 * noise[na + a] * largest(panel.slope, na + a)
@@ -1676,7 +1692,7 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
         kind, h = guess_panel(fl, tab, phase, w, graded, h_mapped, start_switch, panel)
     tried = h
     for attempt in range(100):
-        if h <= 0.0 or phase + fl.omega * h == phase:
+        if h <= 1e-16 * tried or phase + fl.omega * h == phase:
             if aim < 0:
                 aim = stop_at_switch(fl, w, phase, tried, closed)
             return OK if aim >= 0 else CONTACT_FAILED, kind, 0.0, aim

@@ -437,6 +437,34 @@ def test_speeds_of_driven_creep_against_a_stiff_integrator(
         assert off < 1e-8
 
 
+def test_creep_of_one_mode_out_of_two_stops_takes_few_panels():
+    """The stops' forces, 5e5 N and -5e5 N, cancel to a ten-thousandth; 8000 panels at first."""
+    row, omega = np.array([-1.2265, -1.2152]), 2.0 * np.pi * 4.918
+    stops = [
+        Stop("a", 1.379e6, 1.0, direction=-1, dissipation=2.4526),
+        Stop("b", 3.0264e10, 2.0, gap=0.040326, direction=-1, dissipation=529.95),
+    ]
+    system = System.from_modal(
+        [4.918], {"a": row[:1], "b": row[1:]}, modal_damping=0.05, stops=stops
+    )
+    flow, start, duration = FlowMap(system), np.array([0.321805, 3.46]), 0.01
+    phases = np.array([0.0, 2.0 * np.pi])
+    motion = flow.trajectory(flow.to_state(start[None]), phases, 2.0 * np.pi / duration)
+    assert not motion.failure
+    assert motion.record.kind.size < 400
+
+    def rates(_, y):
+        gaps, speeds = -row * y[0] - np.array([0.0, 0.040326]), -row * y[1]
+        forces = np.array([1.379e6, 3.0264e10]) * np.maximum(gaps, 0.0) ** np.array([1.0, 2.0])
+        forces *= 1.0 + np.array([2.4526, 529.95]) * speeds
+        return [y[1], -(omega**2) * y[0] - 0.1 * omega * y[1] + row @ forces]
+
+    some = {"method": "Radau", "rtol": 1e-11, "atol": 1e-16}
+    exact = solve_ivp(rates, (0.0, duration), start, **some).y[:, -1]
+    found = flow.to_modal(motion.states(phases))[1]
+    assert np.abs(found / exact - 1.0).max() < 1e-7
+
+
 def test_a_stop_that_all_but_holds_has_no_error_of_liouvilles_formula_to_tell():
     """The weight on its dashpot, 17 N, damps at a F/m = 7e4/s: e^-3400 of an area in a period."""
     system = make_one_dof(stops=[Stop("middle", 5.17e9, gap=-1e-3, dissipation=1e4)])

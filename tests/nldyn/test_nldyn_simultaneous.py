@@ -89,6 +89,18 @@ def test_stops_a_picometre_apart_are_resolved_at_every_tolerance(rtol, apart):
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-6 * np.abs(ends[1]).max())
 
 
+@pytest.mark.parametrize(("one", "other"), [(1.0, 1.0), (1.5, 1.0), (1.5, 1.5)])
+def test_a_motion_may_begin_on_a_stop_while_another_one_is_closed(one, other):
+    """As the motions that begin a picometre before or behind."""
+    stops = [Stop("x", 1e6, one), Stop("x", 1e6, other, gap=-1e-3, direction=-1)]
+    flow = FlowMap(System.from_modal([10.0], {"x": [1.0]}, stops=stops))
+    starts = flow.to_state(np.array([[-1e-12, 1.0], [0.0, 1.0], [1e-12, 1.0]]))
+    found = [flow.shoot(start[None], PERIOD, 100.0) for start in starts]
+    assert not any(each.failure for each in found)
+    before, here, behind = (each.ends[0] for each in found)
+    assert np.abs(here - 0.5 * (before + behind)).max() < 1e-11
+
+
 def test_a_search_that_finds_nothing_says_so():
     effort = SearchOptions(starts=1, transient=5, recorded=6)
     found = diagram(make_one_dof(), (20.0, 21.0), (7,), search_points=1, search=effort)
