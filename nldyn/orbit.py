@@ -194,7 +194,11 @@ class Orbit:
 
     @property
     def log_moduli(self) -> Real:
-        """Natural logarithms of the moduli of the multipliers, (2n,), however small these are."""
+        """Natural logarithms of the moduli of the multipliers, (2n,), however small these are.
+
+        Minus infinity where a segment's Jacobian shows nothing of a direction, as where a stop
+        damps it to less than rounding.
+        """
         return self._spectrum[0].log_moduli
 
     @cached_property
