@@ -64,8 +64,8 @@ def compare(scene):
     rounding = 1e-14 * (wanted / max(wanted[0], 1e-12 * wanted[-1])) ** 2  # of the check itself
     values = np.sort(found)[:kept]
     close = np.abs(values - wanted) <= (1e-6 + rounding) * wanted + 1e-6 * wanted[-1]
-    floats = (values == 0.0) & (wanted <= zero)
-    assert (close | floats).all()
+    hidden = (values <= zero) & (wanted <= zero)  # neither is told by the stiffness matrix
+    assert (close | hidden).all()
 
 
 def kept_modes(scene, count):

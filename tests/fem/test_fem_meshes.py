@@ -153,6 +153,17 @@ def test_a_mark_of_a_set_that_is_neither_0_nor_1_is_refused(mark):
         fem.from_meshio(meshio.Mesh(points, line, cell_data={"set:end": [[mark]]}))
 
 
+def test_cells_that_the_reader_would_leave_out_are_an_error(tmp_path):
+    points, lines = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [("line", [[0, 1]])]
+    path, marks = tmp_path / "bar.vtu", {"set:bar": [[1]]}
+    meshio.write(path, meshio.Mesh(points, lines, cell_data=marks), binary=False)
+    text = path.read_text()
+    types = text.index('Name="types"')
+    path.write_text(text[:types] + text[types:].replace("\n3\n", "\n37\n", 1))
+    with pytest.raises(fem.ModelError, match=r"contains cells that meshio cannot handle .type 37"):
+        fem.read_mesh(path)
+
+
 ABAQUS = """*HEADING
 ** a frame with everything that is ordinary in such files
 *node, nset=all
