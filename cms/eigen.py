@@ -347,7 +347,9 @@ def ritz(
     K, M = pencil.energies(basis), basis.T @ times(pencil.mass, basis)
     M = (M + M.T) / 2
     if shift is None:
-        shift = 0.0 if definite(K) else np.sqrt(EPS) * fastest
+        rounding = RIGID_TOLERANCE if pencil.natural is None else RIGID_TOLERANCE**2
+        strained = np.diag(K) > rounding * fastest * np.diag(M)
+        shift = 0.0 if np.all(strained) and definite(K) else np.sqrt(EPS) * fastest
     nu, directions = linalg.eigh(M, K + shift * M)
     nu, directions = nu[::-1], directions[:, ::-1]
     if nu[-1] <= 0.0:

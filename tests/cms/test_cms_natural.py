@@ -10,7 +10,7 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from scipy import sparse
+from scipy import linalg, sparse
 
 import cms
 import fem
@@ -169,3 +169,27 @@ def test_natural_form_may_be_typed_in(kind):
     object.__setattr__(component, "natural_form", Form(kind([[1.0, 0.0], [-1.0, 1.0]]), [1.0, 4.0]))
     reduced = cms.reduce(component, modes=1)
     assert reduced.static_flexibility("x") == pytest.approx(1.0, rel=1e-14)
+
+
+@pytest.mark.parametrize("modes", [5, 9, 19])
+def test_a_loose_piece_moves_rigidly_beside_a_held_one(modes):
+    """Craig-Bampton with interfaces on the held piece: the loose one's modes carry no energy."""
+    points = {"foot": (0, 0), "tip": (0.3, 0.4), "from": (1, 0), "to": (1.5, 0.2)}
+    mesh = fem.frame_mesh(points, [("held", "foot", "tip", 3), ("loose", "from", "to", 3)])
+    part = fem.BeamPart(fem.Material(E, RHO, 0.3), fem.RectangularSection(WIDTH, HEIGHT))
+    component = fem.assemble(
+        fem.FrameModel(
+            mesh,
+            parts={"held": part, "loose": part},
+            supports=[fem.Support("foot", ("x", "y", "rotation"))],
+            interfaces={name: fem.Interface("tip", name) for name in ("x", "y")},
+        )
+    )
+    reduced = cms.reduce(component, modes=modes, method="craig-bampton")
+    assert np.array_equal(reduced.frequencies_hz[:3], np.zeros(3))
+    K, M = component.stiffness.toarray(), component.mass.toarray()
+    exact = np.sqrt(linalg.eigh(K, M, eigvals_only=True)[3:]) / (2.0 * np.pi)
+    found = reduced.frequencies_hz[3:]
+    assert np.all(found >= exact[: found.size] * (1.0 - 1e-9))
+    if modes == 19:  # all there are
+        assert found == pytest.approx(exact, rel=1e-9)

@@ -1,4 +1,4 @@
-"""Motions computed without the flow map: adaptive Runge-Kutta, and the matrix exponential."""
+"""Motions computed without the flow map: Runge-Kutta methods, and the matrix exponential."""
 
 from __future__ import annotations
 
@@ -71,6 +71,20 @@ class Motion:
         size = 2 * self.n
         y = self._integrated(state, phases, omega, tangent, max_step)[:, -1]
         return y[:size], y[size:].reshape(size, -1)
+
+    def stiff_end(
+        self, state: np.ndarray, phases: tuple[float, float], omega: float, atol: float = 1e-19
+    ) -> np.ndarray:
+        """End state where a stop damps fast, by Radau's method of order 5."""
+        return solve_ivp(
+            lambda time, x: self.rate(omega * time, x, omega),
+            np.array(phases) / omega,
+            state,
+            method="Radau",
+            rtol=1e-12,
+            atol=atol,
+            jac=lambda _, x: self.tangent_matrix(x),
+        ).y[:, -1]
 
     def closings(
         self, state: np.ndarray, phases: tuple[float, float], omega: float, max_step: float = 0.05

@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from independent import Motion
 from one_dof import make_one_dof
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from nldyn import (
@@ -344,21 +343,11 @@ def test_the_derivative_by_the_frequency_holds_while_a_stop_holds_the_body():
         excitation=[HarmonicForce("a", 8.6)],
     )  # fmt: skip
     flow, omega, phases = FlowMap(system), 39.0, np.array([0.0, 8.0 * np.pi])
-    start = flow.to_state(np.array([[5e-6, 9e-4]]))
-    found = flow.to_modal(flow.shoot(start, phases, omega).d_omega)[0]
-    pace = system.natural_frequencies[0] ** 2, float(system.total_damping[0, 0])
-
-    def end(speed):
-        def rates(t, y):
-            depth, rate = 0.5 * y
-            force = 2.4e8 * max(depth, 0.0) * (1.0 + 4e5 * rate) - 8.6 * math.cos(speed * t)
-            return [y[1], -pace[0] * y[0] - pace[1] * y[1] - 0.5 * force]
-
-        span, some = (0.0, phases[-1] / speed), {"method": "Radau", "rtol": 1e-11, "atol": 1e-19}
-        return solve_ivp(rates, span, [5e-6, 9e-4], **some).y[:, -1]
-
+    start = np.array([5e-6, 9e-4])
+    found = flow.to_modal(flow.shoot(flow.to_state(start)[None], phases, omega).d_omega)[0]
     step = 1e-3 * omega
-    exact = (end(omega + step) - end(omega - step)) / (2.0 * step)
+    ends = [Motion(system).stiff_end(start, phases, omega + by) for by in (step, -step)]
+    exact = (ends[0] - ends[1]) / (2.0 * step)
     off = np.abs(found - exact)
     assert off[0] < 1e-4 * abs(exact[0])
     assert off[1] < 0.01 * omega * abs(exact[0])
@@ -370,27 +359,13 @@ def test_creep_of_two_modes_against_a_stiff_integrator(depth):
     stiffness, loss = 1e12, 100.0
     stop = Stop("a", stiffness, dissipation=loss)
     system = System.from_modal([10.0, 40.0], {"a": [1.0, 0.5]}, modal_damping=0.01, stops=[stop])
-    flow = FlowMap(system)
-    duration = 0.25 * depth * loss
-    motion = flow.trajectory(
-        flow.to_state(np.array([[depth, 0.0, 0.0, 0.0]])),
-        np.array([0.0, 2.0 * np.pi]),
-        2.0 * np.pi / duration,
-    )
+    flow, phases = FlowMap(system), np.array([0.0, 2.0 * np.pi])
+    duration, start = 0.25 * depth * loss, np.array([depth, 0.0, 0.0, 0.0])
+    motion = flow.trajectory(flow.to_state(start)[None], phases, phases[1] / duration)
     assert not motion.failure
     assert motion.record.kind.size < 200
-    shape, omegas = np.array([1.0, 0.5]), 2.0 * np.pi * np.array([10.0, 40.0])
-
-    def rates(_, y):
-        q, v = y[:2], y[2:]
-        gap, rate = shape @ q, shape @ v
-        force = stiffness * max(gap, 0.0) ** 1.5 * (1.0 + loss * rate)
-        return np.concatenate([v, -(omegas**2) * q - 0.02 * omegas * v - force * shape])
-
-    exact = solve_ivp(
-        rates, (0.0, duration), [depth, 0.0, 0.0, 0.0], method="Radau", rtol=1e-10, atol=1e-14
-    ).y[:, -1]
-    found = flow.to_modal(motion.states(np.array([2.0 * np.pi])))[0]
+    exact = Motion(system).stiff_end(start, phases, phases[1] / duration, atol=1e-14)
+    found = flow.to_modal(motion.states(phases))[1]
     damped = 1.25 * stiffness * depth**1.5 * loss * duration  # times rounding: what a speed loses
     for part in (slice(2), slice(2, 4)):
         off = np.abs(found[part] - exact[part]).max() / np.abs(exact[part]).max()
@@ -419,19 +394,9 @@ def test_speeds_of_driven_creep_against_a_stiff_integrator(
         excitation=[HarmonicForce("a", 7.5)],
     )  # fmt: skip
     flow, start = FlowMap(system), np.concatenate([row / (row @ row) * depth, np.zeros(n)])
-    duration = 0.1
-    ends = flow.shoot(flow.to_state(start[None]), np.array([0.0, omega * duration]), omega).ends
-    omegas = 2.0 * np.pi * np.array(frequencies)
-
-    def rates(t, y):
-        q, v = y[:n], y[n:]
-        force = stiffness * max(row @ q, 0.0) ** exponent * (1.0 + loss * (row @ v))
-        push = 7.5 * math.cos(omega * t) - force
-        return np.concatenate([v, -(omegas**2) * q - 0.04 * omegas * v + push * row])
-
-    some = {"method": "Radau", "rtol": 1e-12, "atol": 1e-19}
-    exact = solve_ivp(rates, (0.0, duration), start, **some).y[:, -1]
-    found = flow.to_modal(ends)[0]
+    phases = np.array([0.0, 0.1 * omega])
+    exact = Motion(system).stiff_end(start, phases, omega)
+    found = flow.to_modal(flow.shoot(flow.to_state(start)[None], phases, omega).ends)[0]
     for part in (slice(n), slice(n, 2 * n)):
         off = np.abs(found[part] - exact[part]).max() / np.abs(exact[part]).max()
         assert off < 1e-8
@@ -439,28 +404,18 @@ def test_speeds_of_driven_creep_against_a_stiff_integrator(
 
 def test_creep_of_one_mode_out_of_two_stops_takes_few_panels():
     """The stops' forces, 5e5 N and -5e5 N, cancel to a ten-thousandth; 8000 panels at first."""
-    row, omega = np.array([-1.2265, -1.2152]), 2.0 * np.pi * 4.918
     stops = [
         Stop("a", 1.379e6, 1.0, direction=-1, dissipation=2.4526),
         Stop("b", 3.0264e10, 2.0, gap=0.040326, direction=-1, dissipation=529.95),
     ]
-    system = System.from_modal(
-        [4.918], {"a": row[:1], "b": row[1:]}, modal_damping=0.05, stops=stops
-    )
-    flow, start, duration = FlowMap(system), np.array([0.321805, 3.46]), 0.01
-    phases = np.array([0.0, 2.0 * np.pi])
-    motion = flow.trajectory(flow.to_state(start[None]), phases, 2.0 * np.pi / duration)
+    participation = {"a": [-1.2265], "b": [-1.2152]}
+    system = System.from_modal([4.918], participation, modal_damping=0.05, stops=stops)
+    flow, start = FlowMap(system), np.array([0.321805, 3.46])
+    phases, omega = np.array([0.0, 2.0 * np.pi]), 200.0 * np.pi
+    motion = flow.trajectory(flow.to_state(start)[None], phases, omega)
     assert not motion.failure
     assert motion.record.kind.size < 400
-
-    def rates(_, y):
-        gaps, speeds = -row * y[0] - np.array([0.0, 0.040326]), -row * y[1]
-        forces = np.array([1.379e6, 3.0264e10]) * np.maximum(gaps, 0.0) ** np.array([1.0, 2.0])
-        forces *= 1.0 + np.array([2.4526, 529.95]) * speeds
-        return [y[1], -(omega**2) * y[0] - 0.1 * omega * y[1] + row @ forces]
-
-    some = {"method": "Radau", "rtol": 1e-11, "atol": 1e-16}
-    exact = solve_ivp(rates, (0.0, duration), start, **some).y[:, -1]
+    exact = Motion(system).stiff_end(start, phases, omega)
     found = flow.to_modal(motion.states(phases))[1]
     assert np.abs(found / exact - 1.0).max() < 1e-7
 

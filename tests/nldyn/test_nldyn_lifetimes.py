@@ -39,7 +39,7 @@ def test_transient_chaos_ends_and_says_when(passing):
     found = chaos_lifetime(passing, states=6, periods=8000)
     assert found.settled >= 3
     for ended, state in zip(found.ended, _states(passing, 6), strict=True):
-        if 0 < ended < 8000:  # an independent verdict: from there on the motion is periodic
+        if ended > 0:  # an independent verdict: from there on the motion is periodic
             later = state
             for _ in range(int(ended) // LOOK):  # in the same pieces: chaos shows their rounding
                 later = passing.flow.strobe(later, 2.0 * np.pi * 35.38, LOOK).ends[-1]
