@@ -340,7 +340,7 @@ def ritz(
     Raises
     ------
     ReductionError
-        If a direction of the basis has no mass.
+        If a direction of the basis has no mass, or none beside rounding.
     """
     if basis.shape[1] == 0:
         return np.zeros(0), basis
@@ -350,12 +350,15 @@ def ritz(
         rounding = RIGID_TOLERANCE if pencil.natural is None else RIGID_TOLERANCE**2
         strained = np.diag(K) > rounding * fastest * np.diag(M)
         shift = 0.0 if np.all(strained) and definite(K) else np.sqrt(EPS) * fastest
+    try:
+        direct, direct_directions = linalg.eigh(K, M)
+    except linalg.LinAlgError as error:
+        raise ReductionError(
+            "an interface has no mass to move, or one that rounding hides beside the others'"
+        ) from error
     nu, directions = linalg.eigh(M, K + shift * M)
-    nu, directions = nu[::-1], directions[:, ::-1]
-    if nu[-1] <= 0.0:
-        raise ReductionError("an interface has no mass to move: give it some")
+    nu, directions = np.maximum(nu[::-1], EPS * nu[-1]), directions[:, ::-1]
     squares, directions = 1.0 / nu - shift, directions / np.sqrt(nu)
-    direct, direct_directions = linalg.eigh(K, M)
     slow = direct + shift <= np.sqrt(1.0 / (nu[0] * nu[-1]))
     squares = np.where(slow, squares, direct)
     directions = np.where(slow, directions, direct_directions)
