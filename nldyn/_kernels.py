@@ -274,6 +274,19 @@ def swelling(near, forced, omega, out, phase):
 
 
 @inner
+def swollen(near, forced, omega, out, phase, t):
+    """Change of an output's growth in a time t from a phase on, to its own precision."""
+    never_inline()
+    change = 0.0
+    for k in range(near.size):
+        rate = near[k]
+        e, turn = growth(rate, omega, phase)
+        fresh = turn * turned(omega * t) * from_rest(rate - 1j * omega, t)
+        change += (forced[1 + k, 0, out] * (e * rate * from_rest(rate, t) + fresh)).real
+    return change
+
+
+@inner
 def add_swelling_by(near, forced, omega, out, phase, t, rate, factor, sums):
     """Add the derivatives of an output's growth, or its rate's, at time t after a fixed phase.
 
@@ -378,11 +391,12 @@ def rate_noise(fl, out, w):
 
 
 @inner
-def carried_noise(fl, stop, w, depth, h):
+def carried_noise(fl, stop, w, phase, depth, h):
     """The same in a penetration that is carried on from a depth over a time h."""
-    if fl.near.size > 0:  # a difference of values
-        return np.inf
     change = abs(fl.forced[0, 0, stop]) * fl.omega * h
+    for k in range(fl.near.size):
+        e, _ = growth(fl.near[k], fl.omega, phase)
+        change += h * abs(fl.forced[1 + k, 0, stop]) * (abs(fl.near[k] * e) + 1.0)
     for j in range(w.size):
         change += h * (abs(fl.rows[1, stop, j]) + h * abs(fl.rows[2, stop, j])) * abs(w[j])
     return 1e-15 * (abs(depth) + change)
@@ -487,11 +501,9 @@ def swung(turn, angle):
 
 @inner
 def flown(fl, stop, phase, w, t):
-    """Change of a penetration in a flight of duration t from the state w, to its own precision.
-
-    The growth of near eigenvalues is left out.
-    """
+    """Change of a penetration in a flight of duration t from the state w, to its own precision."""
     value = (fl.forced[0, 0, stop] * swung(turned(phase), fl.omega * t)).real
+    value += swollen(fl.near, fl.forced, fl.omega, stop, phase, t)
     for b in range(fl.blocks.shape[0]):
         j = 2 * b
         _, e01, e10, _, _, _, _, _, d00, d11 = there_and_back(fl.blocks[b], t)
@@ -813,11 +825,14 @@ def free_outputs(fl, tab, kind, phase, w, h, panel, free):
     if fl.near.size > 0:
         for o in range(panel.to.shape[0]):
             stop = panel.active[o % na]
-            before, _, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, phase)
             for i in range(m):
-                here = phase + fl.omega * h * tab.chi[kind, i]
-                s, s1, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, here)
-                free[o * m + i] += s - before if o < na else s1
+                t = h * tab.chi[kind, i]
+                if o < na:
+                    more = swollen(fl.near, fl.forced, fl.omega, stop, phase, t)
+                else:
+                    here = phase + fl.omega * t
+                    _, more, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, here)
+                free[o * m + i] += more
 
 
 @inner
@@ -1190,7 +1205,8 @@ def resolved(fl, tab, kind, h, noise, panel):
     Where the rate of penetration comes close to one without force, its rounding is all there is to
     see. A slope counts as it does in the sensitivities: times dχ/ds. Where contacts are short
     against the period, it kicks them to many times their final size, and its error, the square of
-    the tail, with them.
+    the tail, with them. What a force or a slope does over a panel is off by the product of its
+    tail and that of the response to it, or of the response's square.
     """
     na = panel.active.size
     slopes = np.empty(panel.slope.shape)
@@ -1205,8 +1221,10 @@ def resolved(fl, tab, kind, h, noise, panel):
         singular = o < na and singular_slope(fl, panel.active[a])
         if singular and nearly_opens(tab, kind, panel.output, a, 10.0 * noise[a]):
             return False
-        tail = fl.tail if panel.decay[1, a] <= DECAY else 0.01 * fl.tail  # see `hold`
-        tail = max(tail, 20.0 * noise[a] / deepest)
+        goal = fl.tail if panel.decay[1, a] <= DECAY else 0.01 * fl.tail  # see `hold`
+        floor = 20.0 * noise[a] / deepest
+        coarse = max(response_tail(fl, tab, panel, a, 1), fl.tail)
+        tail = max(goal * fl.tail / coarse, floor)
         shake = 0.0  # of the force by the rounding of the rate
         if o < na < slopes.shape[0]:
             shake = 20.0 * noise[na + a] * largest(panel.slope, na + a)
@@ -1216,12 +1234,36 @@ def resolved(fl, tab, kind, h, noise, panel):
         size = largest(slopes, o)
         if o >= na and largest(panel.output, o) > 0.0:  # by speed: its share in the force counts
             size = max(size, largest(panel.F, a) / largest(panel.output, o))
+        if coarse > fl.tail:  # what the slope acts on sways like what it leads to
+            coarse = max(coarse, response_tail(fl, tab, panel, a, 2))
+        kick = 1.0
         if o < na:
-            kick = fl.stops[panel.active[a], MOBILITY] * largest(panel.slope, o) * h / fl.omega
-            tail = max(tail / math.sqrt(max(KICK * kick, 1.0)), 20.0 * noise[a] / deepest)
+            kick = KICK * fl.stops[panel.active[a], MOBILITY] * largest(panel.slope, o)
+            kick = max(kick * h / fl.omega, 1.0)
+        tail = max(goal * fl.tail / (coarse * math.sqrt(kick)), floor)
         if legendre_tail(tab, slopes, o) > 4.0 * (tail * size + shake):
             return False
     return True
+
+
+@inner
+def response_tail(fl, tab, panel, a, power):
+    """Legendre tail, beside its largest, of a power of the response of the modes to a stop.
+
+    Each mode counts by its share in the mobility.
+    """
+    stop, back = panel.active[a], panel.back[a] ** power
+    worst, mobility = 0.0, 0.0
+    for b in range(fl.blocks.shape[0]):
+        tail, size, share = 0.0, 1e-300, 0.0
+        for k in (2 * b, 2 * b + 1):
+            row = abs(fl.rows[1, stop, k])
+            tail = max(tail, row * legendre_tail(tab, back, k))
+            size = max(size, row * largest(back, k))
+            share += row * abs(fl.force[k, stop])
+        worst = max(worst, share * tail / size)
+        mobility += share
+    return worst / mobility
 
 
 @inner
@@ -1697,7 +1739,7 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
                 aim = stop_at_switch(fl, w, phase, tried, closed)
             return OK if aim >= 0 else CONTACT_FAILED, kind, 0.0, aim
         for a in range(active.size):
-            more = carried_noise(fl, active[a], w, panel.depth[0, a], h)
+            more = carried_noise(fl, active[a], w, phase, panel.depth[0, a], h)
             panel.depth[3, a] = panel.depth[1, a] + more
             noise[a] = min(panel.depth[3, a], rounding[a])
         if not solve_panel(fl, tab, kind, phase, w, h, noise, panel):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from independent import Motion
 
 from nldyn import (
     FlowMap,
@@ -136,6 +137,23 @@ def one_dof(dissipation):
         stops=[Stop("middle", stiffness=5.17e9, dissipation=dissipation)],
         excitation=[Unbalance("middle", 4.92e-6)],
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("duration", [0.02, 0.024, 0.03])
+def test_a_soft_contact_resolves_the_fast_mode_that_it_starts(duration):
+    """The force is smooth until the mode that it shakes shows in it: 3e-7 off at first."""
+    stop = Stop("a", 5.2e6, exponent=2.0)
+    modes = {"a": [0.5, -1.33]}
+    system = System.from_modal([5.65, 108.6], modes, modal_damping=0.05, stops=[stop])
+    flow, omega, phases = FlowMap(system), 100.0, np.array([0.0, 100.0 * duration])
+    start = np.array([6.3e-4, 0.0, 0.081, 0.0])
+    shot = flow.shoot(flow.to_state(start)[None], phases, omega)
+    end, tangent = Motion(system).run(start, (0.0, phases[1]), omega)
+    basis = system.linear
+    own = np.array([1e-3, 1e-3, 0.1, 0.1])  # m and m/s
+    assert np.abs((flow.to_modal(shot.ends)[0] - end) / own).max() < 1e-9
+    found = basis.right @ shot.jacobians[0] @ basis.left
+    assert np.abs((found - tangent) * own / own[:, None]).max() < 3e-9
 
 
 @pytest.mark.parametrize(
