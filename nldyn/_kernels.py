@@ -1870,8 +1870,9 @@ def propagate(
     add_growth(fl.near, fl.response, fl.omega, phase, -1.0, w, columns)
     closed = np.zeros(n_stops, dtype=np.bool_)
     for s in range(n_stops):
-        value, _, _, _ = output_derivatives(fl, s, w, phase, 0.0)
-        closed[s] = value - fl.stops[s, GAP] > 0.0
+        value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
+        left = output_noise(fl, s, w) if speed < 0.0 else 0.0  # it opens at this instant
+        closed[s] = value - fl.stops[s, GAP] > left
     pushes = np.full(n_stops, np.nan)
     status = run_pieces(
         fl, tab, w, columns, phase, before, duration, closed, closings, with_columns, rec,
