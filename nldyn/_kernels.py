@@ -1645,11 +1645,18 @@ def coarsest_instant(fl):
 
 
 @inner
-def with_event(fl, stop, w, phase, allowed, closed):
-    """Whether a stop is to open or close now, to within a time allowed or rounding."""
+def at_switch(fl, stop, w, phase, allowed):
+    """Whether a stop is just at its surface, to within a time allowed or rounding."""
     value, speed, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
     reach = allowed * abs(speed) + 10.0 * output_noise(fl, stop, w)
-    return abs(value - fl.stops[stop, GAP]) <= reach and closed[stop] != (speed > 0.0)
+    return abs(value - fl.stops[stop, GAP]) <= reach
+
+
+@inner
+def with_event(fl, stop, w, phase, allowed, closed):
+    """Whether a stop is to open or close now, to within a time allowed or rounding."""
+    _, speed, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
+    return at_switch(fl, stop, w, phase, allowed) and closed[stop] != (speed > 0.0)
 
 
 @inner
@@ -1737,19 +1744,29 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
         if h <= 1e-16 * tried or phase + fl.omega * h == phase:
             if aim < 0:
                 aim = stop_at_switch(fl, w, phase, tried, closed)
+            elif not at_switch(fl, aim, w, phase, 10.0 * coarsest_instant(fl) * tried):
+                aim = -1
             return OK if aim >= 0 else CONTACT_FAILED, kind, 0.0, aim
         for a in range(active.size):
             more = carried_noise(fl, active[a], w, phase, panel.depth[0, a], h)
             panel.depth[3, a] = panel.depth[1, a] + more
             noise[a] = min(panel.depth[3, a], rounding[a])
-        if not solve_panel(fl, tab, kind, phase, w, h, noise, panel):
+        found = solve_panel(fl, tab, kind, phase, w, h, noise, panel)
+        if found:
+            decays = shows_decay(fl, tab, kind, h, panel)
+            panel_end(fl, tab, kind, phase, w, h, panel, w_end)
+            event, where = first_event(fl, tab, kind, phase, w, h, closed, panel, w_end)
+            if event >= 0:  # else it is another solution of the law, far off
+                allowed = 10.0 * coarsest_instant(fl) * h
+                found = where > 0.0 or at_switch(fl, event, w, phase, allowed)
+            else:
+                found = panel.decay[1].min() >= 0.0
+        if not found:
             limit = 0.4 * min(h, tried)
             aim = -1
             kind, h = guess_panel(fl, tab, phase, w, limit, h_mapped, start_switch, panel)
             tried = h
             continue
-        decays = shows_decay(fl, tab, kind, h, panel)
-        panel_end(fl, tab, kind, phase, w, h, panel, w_end)
         end_phase = phase + fl.omega * h
         fine = decays and resolved(fl, tab, kind, h, rounding, panel)
         if fine:
@@ -1757,7 +1774,6 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
             fine = h <= 1.5 * graded_length(
                 fl, active, w_end, end_phase, h, -1.0, to_switch, aim if to_switch else -1
             )
-        event, where = first_event(fl, tab, kind, phase, w, h, closed, panel, w_end)
         near_end = 1e-3
         if event >= 0 and event != aim:  # so near that `switch_with` will find it
             near_end = max(min(5.0 * fl.stops[event, INSTANT], 1e-7), 1e-12)
