@@ -1253,7 +1253,7 @@ def response_tail(fl, tab, panel, a, power):
     Each mode counts by its share in the mobility.
     """
     stop, back = panel.active[a], panel.back[a] ** power
-    worst, mobility = 0.0, 0.0
+    worst, mobility = 0.0, 1e-300
     for b in range(fl.blocks.shape[0]):
         tail, size, share = 0.0, 1e-300, 0.0
         for k in (2 * b, 2 * b + 1):
@@ -1760,7 +1760,7 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
                 allowed = 10.0 * coarsest_instant(fl) * h
                 found = where > 0.0 or at_switch(fl, event, w, phase, allowed)
             else:
-                found = panel.decay[1].min() >= 0.0
+                found = panel.decay[1].min() > -DECAY
         if not found:
             limit = 0.4 * min(h, tried)
             aim = -1
