@@ -1758,7 +1758,7 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
             event, where = first_event(fl, tab, kind, phase, w, h, closed, panel, w_end)
             if event >= 0:  # else it is another solution of the law, far off
                 allowed = 10.0 * coarsest_instant(fl) * h
-                found = where > 0.0 or at_switch(fl, event, w, phase, allowed)
+                found = h * where > 1e-12 * tried or at_switch(fl, event, w, phase, allowed)
             else:
                 found = panel.decay[1].min() > -DECAY
         if not found:

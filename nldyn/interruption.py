@@ -35,6 +35,7 @@ def deferred_interruption() -> Iterator[None]:
 
     Examples
     --------
+    >>> own = signal.signal(signal.SIGINT, signal.default_int_handler)  # may be ignored
     >>> try:
     ...     with deferred_interruption():
     ...         signal.raise_signal(signal.SIGINT)
@@ -43,6 +44,7 @@ def deferred_interruption() -> Iterator[None]:
     ...     print("interrupted")
     to its end
     interrupted
+    >>> _ = signal.signal(signal.SIGINT, own)
     """
     usual = signal.getsignal(signal.SIGINT)
     if usual is None or threading.current_thread() is not threading.main_thread():
