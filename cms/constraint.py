@@ -10,6 +10,7 @@ from scipy import linalg, sparse
 
 from cms.component import FloatArray, Pencil, SparseMatrix, times
 from cms.eigen import Shifted, shifted_factor
+from cms.errors import ReductionError
 from cms.inertia import elastic_solutions
 
 IntArray = NDArray[np.intp]
@@ -55,9 +56,19 @@ def fixed_interface(pencil: Pencil) -> FixedInterface:
     One dof of every interface vector gives way to the displacement ``y = b^T u``; for an
     interface of a single dof nothing changes but the order. Interfaces that depend on the others
     are left out.
+
+    Raises
+    ------
+    ReductionError
+        If no degree of freedom is left between them.
     """
     interfaces, pivots = independent_interfaces(pencil.loads)
     inner = np.setdiff1d(np.arange(pencil.size), pivots)
+    if not inner.size:
+        raise ReductionError(
+            f"the interfaces take all {pencil.size} degrees of freedom of the component: nothing "
+            "is left between them to reduce; use method 'rubin'"
+        )
     B = pencil.loads[:, interfaces]
     inverse = linalg.inv(B[pivots].T) if pivots.size else np.zeros((0, 0))
     follow = sparse.coo_array(-inverse @ B[inner].T)

@@ -347,9 +347,13 @@ def ritz(
     K, M = pencil.energies(basis), basis.T @ times(pencil.mass, basis)
     M = (M + M.T) / 2
     if shift is None:
-        rounding = RIGID_TOLERANCE if pencil.natural is None else RIGID_TOLERANCE**2
-        strained = np.diag(K) > rounding * fastest * np.diag(M)
-        shift = 0.0 if np.all(strained) and definite(K) else np.sqrt(EPS) * fastest
+        if pencil.natural is None:
+            sizes = abs(basis) * times(abs(pencil.stiffness), abs(basis))
+            rounding = 8 * EPS * np.sum(sizes, axis=0)
+        else:
+            rounding = RIGID_TOLERANCE**2 * fastest * np.diag(M)
+        held = np.all(np.diag(K) > rounding) and definite(K)
+        shift = 0.0 if held else np.sqrt(EPS) * fastest
     try:
         direct, direct_directions = linalg.eigh(K, M)
     except linalg.LinAlgError as error:

@@ -487,3 +487,29 @@ def test_half_of_all_modes_of_a_large_component_are_those_of_the_closed_form(lef
     reduced = cms.reduce(chain(1520, left=left), modes=760)
     expected = exact(1520)[:760]
     np.testing.assert_allclose(reduced.frequencies_hz[:760], expected, rtol=1e-9, atol=0.0)
+
+
+@pytest.mark.parametrize("ratio", [1e8, 1e13, 1e16])
+@pytest.mark.parametrize(("method", "modes"), [("craig-bampton", 5), ("guyan", None)])
+def test_a_soft_chain_beside_a_stiff_one_stays_held(method, modes, ratio):
+    """Two separate chains, held at their ends: the soft one's energies are not rounding."""
+    n = 6
+    chain = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    chain[0, 0] = 1.0
+    both = np.zeros((2 * n, 2 * n))
+    both[:n, :n], both[n:, n:] = chain, ratio * chain
+    ends = {"soft": np.eye(2 * n)[0], "stiff": np.eye(2 * n)[n]}
+    component = cms.Matrices(both, np.eye(2 * n), ends)
+    found = cms.reduce(component, modes=modes, method=method).frequencies_hz[0]
+    lowest = 2.0 * np.sin(np.pi / (4 * n + 2)) / (2.0 * np.pi)  # of a chain free at one end
+    if method == "guyan":  # all move in a straight line: k/m of it
+        shape = 1.0 - np.arange(n) / n
+        lowest = np.sqrt(1.0 / n / (shape @ shape)) / (2.0 * np.pi)
+    assert found == pytest.approx(lowest, rel=1e-9)
+
+
+@pytest.mark.parametrize("method", ["guyan", "craig-bampton"])
+def test_interfaces_that_leave_nothing_between_them_are_told(method):
+    component = cms.Matrices([[2.0]], [[1.0]], {"a": [1.0]})
+    with pytest.raises(cms.ReductionError, match="the interfaces take all 1 degrees of freedom"):
+        cms.reduce(component, modes=None if method == "guyan" else 1, method=method)
