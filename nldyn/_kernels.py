@@ -404,9 +404,11 @@ def carried_noise(fl, stop, w, phase, depth, h):
 
 @inner
 def fastest_rate(fl):
-    """Largest |eigenvalue| of the blocks, in 1/s."""
+    """Largest |eigenvalue|, in 1/s, of the blocks that a stop moves."""
     fastest = 0.0
     for b in range(fl.blocks.shape[0]):
+        if np.abs(fl.force[2 * b : 2 * b + 2]).sum() == 0.0:
+            continue
         block = fl.blocks[b]
         mean = 0.5 * (block[0, 0] + block[1, 1])
         square = 0.25 * (block[0, 0] - block[1, 1]) ** 2 + block[0, 1] * block[1, 0]

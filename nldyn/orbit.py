@@ -511,7 +511,7 @@ def solve_orbit(
     observe : str, optional
         Interface whose displacement is reported; the first unless given.
     segments : int, optional
-        Number k of shooting segments.
+        Number k of shooting segments; the simulation from rest is cut as finely.
 
     Returns
     -------
@@ -544,14 +544,15 @@ def solve_orbit(
     if guess is None:
         q = rest(flow.system)
         start = flow.to_state(at_rest(q))
-        warm = np.linspace(0.0, 400.0 * np.pi, 201)
+        pieces = -(-(segments or period) // period)  # of one excitation period
+        warm = np.linspace(0.0, 400.0 * np.pi, 200 * pieces + 1)
         found = flow.shoot(start[None], warm, omega, sensitivities=False, chained=True)
         if found.failure:
             raise ConvergenceError(
                 f"the simulation from rest at {frequency_hz:g} Hz failed: {found.failure}; "
                 "give a guess"
             )
-        strobe = found.ends[20:]
+        strobe = found.ends[pieces - 1 :: pieces][20:]
         # beside a subharmonic attractor lies, in its middle, the orbit that it branched from
         counts = (2, 3, 4, len(strobe)) if period == 1 else ()
         middles = [strobe[-count:].mean(axis=0) for count in counts]

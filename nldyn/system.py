@@ -172,7 +172,7 @@ class System:
             raise SystemModelError("mass must be positive definite") from None
         if not np.all(np.isfinite(squared)):
             raise SystemModelError("mass is too small beside the stiffness to compute with")
-        if squared[0] < -1e-10 * abs(squared[-1]):
+        if squared[0] < 0.0 and _negative(K):
             raise SystemModelError("stiffness must not be negative in any direction")
         omega = np.sqrt(np.maximum(squared, 0.0))
         D = _modal_damping(omega, modal_damping)
@@ -445,6 +445,13 @@ def numbers(name: str, values: ArrayLike) -> Real:
     if not np.all(np.isfinite(array)):
         raise SystemModelError(f"{name} has an entry that is not finite")
     return array
+
+
+def _negative(K: Real) -> bool:
+    """Whether a stiffness, scaled to a unit diagonal, is negative in a direction."""
+    diagonal = np.abs(np.diag(K))
+    scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, max(diagonal.max(), 1e-300)))
+    return bool(sla.eigvalsh(scale[:, None] * K * scale)[0] < -1e-10)
 
 
 def _symmetric(name: str, values: ArrayLike) -> Real:

@@ -222,6 +222,19 @@ def test_number_of_segments_changes_nothing():
         np.testing.assert_allclose(orbit.multipliers, base.multipliers, rtol=0, atol=1e-7)
 
 
+def test_segments_cut_the_simulation_from_rest_too():
+    """The drive presses the mass on its stop for half a period: 20000 oscillations there."""
+    system = System.from_modal(
+        [0.5 / math.pi], {"m": [1.0]}, modal_damping=0.05, stops=[Stop("m", 1e15)],
+        excitation=[HarmonicForce("m", 1.0)],
+    )  # fmt: skip
+    with pytest.raises(ConvergenceError, match="more segments help"):
+        solve_orbit(system, 0.45)
+    orbit = solve_orbit(system, 0.45, segments=16)
+    again = solve_orbit(system, 0.45, guess=orbit.states([0.0])[0], segments=8)
+    assert orbit.max_abs_displacement == pytest.approx(again.max_abs_displacement, rel=1e-9)
+
+
 def test_finer_collocation_changes_multipliers_by_less_than_1e_7():
     base = solve_orbit(two_modes(), 26.0)
     fine = solve_orbit(FlowMap(two_modes(), FlowOptions(nodes=20, tail=1e-7)), 26.0)

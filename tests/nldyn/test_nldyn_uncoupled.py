@@ -14,6 +14,7 @@ from nldyn import (
     Parameter,
     Stop,
     System,
+    SystemModelError,
     continue_branch,
     continue_special,
     solve_orbit,
@@ -34,6 +35,26 @@ def oscillator(scale: float = 1.0, sides: tuple[int, ...] = (1, -1)) -> System:
         [[MASS]], [[STIFFNESS]], {"y": [1.0]}, damping=[[DAMPING]],
         stops=stops("y", scale, sides), excitation=[HarmonicForce("y", scale)],
     )  # fmt: skip
+
+
+def test_a_fast_mode_that_no_stop_moves_costs_no_contact_panels():
+    """1 rad/s beside 1e6 rad/s; too many panels at first."""
+    found = []
+    for fast in (1e2, 1e12):
+        system = System.from_matrices(
+            np.eye(2), np.diag([fast, 1.0]), {"m": [0.0, 1.0]}, modal_damping=0.05,
+            stops=[Stop.linear("m", 1.5, gap=-1e-2)], excitation=[HarmonicForce("m", 1e-3)],
+        )  # fmt: skip
+        found.append(solve_orbit(system, 0.1).max_abs_displacement)
+    assert found[1] == pytest.approx(found[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("largest", [1e2, 1e10, 1e16])
+def test_a_stiffness_that_is_negative_in_a_direction_is_refused(largest):
+    with pytest.raises(SystemModelError, match="stiffness must not be negative in any direction"):
+        System.from_matrices(np.eye(2), np.diag([largest, -1.0]), {"m": [0.0, 1.0]})
+    free = [[largest, -largest], [-largest, largest]]
+    assert System.from_matrices(np.eye(2), free, {"m": [0.0, 1.0]}).frequencies_hz[0] == 0.0
 
 
 def both(scale: float, sides: tuple[int, ...] = (1, -1), force: float = 1.0) -> System:
