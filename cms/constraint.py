@@ -66,7 +66,7 @@ def fixed_interface(pencil: Pencil) -> FixedInterface:
     inner = np.setdiff1d(np.arange(pencil.size), pivots)
     if not inner.size:
         raise ReductionError(
-            f"the interfaces take all {pencil.size} degrees of freedom of the component: nothing "
+            f"the interfaces take all degrees of freedom of the component ({pencil.size}): nothing "
             "is left between them to reduce; use method 'rubin'"
         )
     B = pencil.loads[:, interfaces]

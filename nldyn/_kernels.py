@@ -403,13 +403,15 @@ def carried_noise(fl, stop, w, phase, depth, h):
 
 
 @inner
-def fastest_rate(fl):
-    """Largest |eigenvalue|, in 1/s, of the blocks that a stop moves."""
-    fastest = 0.0
-    for b in range(fl.blocks.shape[0]):
-        if np.abs(fl.force[2 * b : 2 * b + 2]).sum() == 0.0:
+def fastest_moved(blocks, force):
+    """Largest |eigenvalue|, in 1/s, of the blocks that stops move by more than rounding."""
+    fastest, least = 0.0, 0.0
+    if force.size > 0:
+        least = 1e-14 * np.abs(force).max()
+    for b in range(blocks.shape[0]):
+        if not np.abs(force[2 * b : 2 * b + 2]).sum() > least:
             continue
-        block = fl.blocks[b]
+        block = blocks[b]
         mean = 0.5 * (block[0, 0] + block[1, 1])
         square = 0.25 * (block[0, 0] - block[1, 1]) ** 2 + block[0, 1] * block[1, 0]
         rate = math.sqrt(abs(square))
@@ -1657,8 +1659,10 @@ def at_switch(fl, stop, w, phase, allowed):
 @inner
 def with_event(fl, stop, w, phase, allowed, closed):
     """Whether a stop is to open or close now, to within a time allowed or rounding."""
+    if not at_switch(fl, stop, w, phase, allowed):
+        return False
     _, speed, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
-    return at_switch(fl, stop, w, phase, allowed) and closed[stop] != (speed > 0.0)
+    return closed[stop] != (speed > 0.0)
 
 
 @inner
@@ -1744,10 +1748,8 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
     tried = h
     for attempt in range(100):
         if h <= 1e-16 * tried or phase + fl.omega * h == phase:
-            if aim < 0:
+            if aim < 0 or not at_switch(fl, aim, w, phase, 10.0 * coarsest_instant(fl) * tried):
                 aim = stop_at_switch(fl, w, phase, tried, closed)
-            elif not at_switch(fl, aim, w, phase, 10.0 * coarsest_instant(fl) * tried):
-                aim = -1
             return OK if aim >= 0 else CONTACT_FAILED, kind, 0.0, aim
         for a in range(active.size):
             more = carried_noise(fl, active[a], w, phase, panel.depth[0, a], h)
@@ -1758,7 +1760,9 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
             decays = shows_decay(fl, tab, kind, h, panel)
             panel_end(fl, tab, kind, phase, w, h, panel, w_end)
             event, where = first_event(fl, tab, kind, phase, w, h, closed, panel, w_end)
-            if event >= 0:  # else it is another solution of the law, far off
+            # a quadratic law has other solutions, far off: they open a stop at once, or the force
+            # goes against its sign, so that the stop feeds as much as it should damp
+            if event >= 0:
                 allowed = 10.0 * coarsest_instant(fl) * h
                 found = h * where > 1e-12 * tried or at_switch(fl, event, w, phase, allowed)
             else:
@@ -1946,7 +1950,7 @@ def run_pieces(
     """
     m = tab.nodes.size
     n_stops = closed.size
-    fastest = fastest_rate(fl)
+    fastest = fastest_moved(fl.blocks, fl.force)
     # lengths of panels that resolve the fastest mode: the maps spread the nodes at one end
     h_even = fl.node_angle * m / fastest if fastest > 0.0 else np.inf
     h_mapped = 0.75 * h_even / tab.power

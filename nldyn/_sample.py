@@ -8,6 +8,7 @@ from nldyn import _kernels
 from nldyn._kernels import (
     FLIGHT,
     block_exponential,
+    fastest_moved,
     fly_state,
     from_rest,
     map_fraction,
@@ -200,12 +201,12 @@ def leave_unseen(blocks, row, forced, w):
 def local_extremes(
     blocks, force, omega, tab,
     rec_phase, rec_duration, rec_kind, rec_start, rec_force, count, near, response,
-    row, row1, fastest,
+    row, row1,
 ):  # fmt: skip
     """Phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output.
 
-    The rate is sampled sixteen times per period of the fastest mode (rad/s), in flight of the
-    fastest one that `leave_unseen` leaves; its sign changes are refined. In flight, where a
+    The rate is sampled sixteen times per period of the fastest mode that `leave_unseen` leaves, or
+    that stops move in contact; its sign changes are refined. In flight, where a
     parabola through three samples of one sign comes near zero, it is looked for a change of sign
     there: two extremes closer than the samples. The motion is taken as periodic: an extreme at its
     start counts once.
@@ -220,13 +221,16 @@ def local_extremes(
     shares = np.empty((tab.nodes.size, force.shape[0]))
     steps = np.empty((blocks.shape[0], 4))
     weights = np.empty((0, tab.nodes.size))
+    moved = fastest_moved(blocks, force)
     first_value, first_sign, sign, t_old, rate_old = 0.0, 0, 0, 0.0, 0.0
     t_older, rate_older = 0.0, 0.0
     for piece in range(count):
         h = rec_duration[piece]
         kind = rec_kind[piece]
         without_steady(response, rec_phase[piece], rec_start[piece], start)
-        seen = max(omega, leave_unseen(blocks, row, forced, start)) if kind == FLIGHT else fastest
+        seen = max(omega, leave_unseen(blocks, row, forced, start))
+        if kind != FLIGHT:
+            seen = max(seen, moved)
         pieces = int(min(np.ceil(h * seen * (8.0 / np.pi)), MOST_SAMPLES)) + 1
         if kind != FLIGHT:
             pieces += tab.nodes.size

@@ -763,8 +763,7 @@ class Trajectory:
         flow = self.flow
         check_whole("output", output, 0, len(flow.rows) - 1)
         row, rate_row = flow.rows[output], flow.rate_rows[output]
-        fastest = max(self.omega, flow.system.linear.fastest)
-        found = self._evaluate(local_extremes, row, rate_row, fastest)
+        found = self._evaluate(local_extremes, row, rate_row)
         order = np.argsort(found[:, 0], kind="stable")
         inside, solved = self._solved_in_contact(found[order, 0])
         found[order[inside], 1] = solved @ row

@@ -511,7 +511,7 @@ def solve_orbit(
     observe : str, optional
         Interface whose displacement is reported; the first unless given.
     segments : int, optional
-        Number k of shooting segments; the simulation from rest is cut as finely.
+        Number k of shooting segments; where given, the simulation from rest is cut as finely.
 
     Returns
     -------
@@ -544,7 +544,7 @@ def solve_orbit(
     if guess is None:
         q = rest(flow.system)
         start = flow.to_state(at_rest(q))
-        pieces = -(-(segments or period) // period)  # of one excitation period
+        pieces = (segments or period) // period  # of one excitation period
         warm = np.linspace(0.0, 400.0 * np.pi, 200 * pieces + 1)
         found = flow.shoot(start[None], warm, omega, sensitivities=False, chained=True)
         if found.failure:

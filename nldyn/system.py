@@ -172,7 +172,8 @@ class System:
             raise SystemModelError("mass must be positive definite") from None
         if not np.all(np.isfinite(squared)):
             raise SystemModelError("mass is too small beside the stiffness to compute with")
-        if squared[0] < 0.0 and _negative(K):
+        rounding = 8.0 * squared.size * np.finfo(float).eps * squared[-1]
+        if squared[0] < -rounding and _negative(K):
             raise SystemModelError("stiffness must not be negative in any direction")
         omega = np.sqrt(np.maximum(squared, 0.0))
         D = _modal_damping(omega, modal_damping)

@@ -511,5 +511,5 @@ def test_a_soft_chain_beside_a_stiff_one_stays_held(method, modes, ratio):
 @pytest.mark.parametrize("method", ["guyan", "craig-bampton"])
 def test_interfaces_that_leave_nothing_between_them_are_told(method):
     component = cms.Matrices([[2.0]], [[1.0]], {"a": [1.0]})
-    with pytest.raises(cms.ReductionError, match="the interfaces take all 1 degrees of freedom"):
+    with pytest.raises(cms.ReductionError, match="the interfaces take all degrees of freedom"):
         cms.reduce(component, modes=None if method == "guyan" else 1, method=method)

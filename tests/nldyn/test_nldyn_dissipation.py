@@ -445,13 +445,13 @@ def test_a_stop_that_all_but_holds_has_no_error_of_liouvilles_formula_to_tell():
     assert abs(orbit.multipliers[1]) < 1e-15 < abs(orbit.multipliers[0]) < 1.0
 
 
-@pytest.mark.parametrize("stiffness", [1e10, 1e12, 1e14])
+@pytest.mark.parametrize("stiffness", [1e10, 1e12, 1e16])
 def test_creep_that_rounding_hides_is_refused_or_right(stiffness):
     """The rounding of a speed, 1e-16, times what the stop damps meanwhile: 1e11 times at 1e12."""
     flow = free_mass(Stop("m", stiffness, 1.0, dissipation=1e4))
     start = flow.to_state(np.array([1e-4, -1e-4]) * math.sqrt(MASS))[None]
     found = flow.shoot(start, np.array([0.0, 2.0 * np.pi]), 10.0 * np.pi)
-    if found.failure:
+    if found.failure or stiffness > 1e14:
         assert "hidden by rounding" in found.failure
     else:  # it moves on at -1/a
         end = flow.to_modal(found.ends)[0] / math.sqrt(MASS)
