@@ -335,8 +335,8 @@ def ritz(
 
     Where the projected stiffness is singular, which is found out unless its shift is given (a
     direction whose energy is rounding, or a small pivot), w^2 at rounding level of the fastest w^2
-    of the component are exactly zero. Slow modes come from the
-    inverse problem, fast ones from the direct one, as in `with_fast_modes`.
+    of the component are exactly zero. Slow modes come from the inverse problem, fast ones from the
+    direct one, as in `with_fast_modes`.
 
     Raises
     ------

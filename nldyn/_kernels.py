@@ -1217,6 +1217,12 @@ def resolved(fl, tab, kind, h, noise, panel):
     for o in range(slopes.shape[0]):
         for i in range(slopes.shape[1]):
             slopes[o, i] = panel.slope[o, i] * tab.slope[kind, i]
+    forced, swayed = np.empty(na), np.empty(na)  # tails of the response and of its square
+    for a in range(na):
+        back = panel.back[a]
+        forced[a] = swayed[a] = max(response_tail(fl, tab, panel.active[a], back), fl.tail)
+        if forced[a] > fl.tail:  # what a slope acts on sways like what it leads to
+            swayed[a] = max(forced[a], response_tail(fl, tab, panel.active[a], back * back))
     for o in range(slopes.shape[0]):
         a = o % na
         deepest = largest(panel.output, a)
@@ -1227,8 +1233,7 @@ def resolved(fl, tab, kind, h, noise, panel):
             return False
         goal = fl.tail if panel.decay[1, a] <= DECAY else 0.01 * fl.tail  # see `hold`
         floor = 20.0 * noise[a] / deepest
-        coarse = max(response_tail(fl, tab, panel, a, 1), fl.tail)
-        tail = max(goal * fl.tail / coarse, floor)
+        tail = max(goal * fl.tail / forced[a], floor)
         shake = 0.0  # of the force by the rounding of the rate
         if o < na < slopes.shape[0]:
             shake = 20.0 * noise[na + a] * largest(panel.slope, na + a)
@@ -1238,25 +1243,22 @@ def resolved(fl, tab, kind, h, noise, panel):
         size = largest(slopes, o)
         if o >= na and largest(panel.output, o) > 0.0:  # by speed: its share in the force counts
             size = max(size, largest(panel.F, a) / largest(panel.output, o))
-        if coarse > fl.tail:  # what the slope acts on sways like what it leads to
-            coarse = max(coarse, response_tail(fl, tab, panel, a, 2))
         kick = 1.0
         if o < na:
             kick = KICK * fl.stops[panel.active[a], MOBILITY] * largest(panel.slope, o)
             kick = max(kick * h / fl.omega, 1.0)
-        tail = max(goal * fl.tail / (coarse * math.sqrt(kick)), floor)
+        tail = max(goal * fl.tail / (swayed[a] * math.sqrt(kick)), floor)
         if legendre_tail(tab, slopes, o) > 4.0 * (tail * size + shake):
             return False
     return True
 
 
 @inner
-def response_tail(fl, tab, panel, a, power):
-    """Legendre tail, beside its largest, of a power of the response of the modes to a stop.
+def response_tail(fl, tab, stop, back):
+    """Legendre tail, beside its largest, of the response (2n, m) of the modes to a stop.
 
     Each mode counts by its share in the mobility.
     """
-    stop, back = panel.active[a], panel.back[a] ** power
     worst, mobility = 0.0, 1e-300
     for b in range(fl.blocks.shape[0]):
         tail, size, share = 0.0, 1e-300, 0.0
@@ -1721,6 +1723,18 @@ def graded_length(fl, active, w, phase, h, sign, switched, event):
 
 
 @inner
+def far_off(fl, phase, w, h, tried, panel, event, where):
+    """Whether a panel holds another solution of the force laws than the motion.
+
+    It opens a stop at once that is not about to, or lets one feed as much as it should damp.
+    """
+    if event < 0:
+        return not panel.decay[1].min() > -DECAY
+    allowed = 10.0 * coarsest_instant(fl) * h
+    return not (h * where > 1e-12 * tried or at_switch(fl, event, w, phase, allowed))
+
+
+@inner
 def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec):
     """Solve one panel and choose its length, at most h_max, and h_mapped to aim at an event.
 
@@ -1760,13 +1774,7 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
             decays = shows_decay(fl, tab, kind, h, panel)
             panel_end(fl, tab, kind, phase, w, h, panel, w_end)
             event, where = first_event(fl, tab, kind, phase, w, h, closed, panel, w_end)
-            # a quadratic law has other solutions, far off: they open a stop at once, or the force
-            # goes against its sign, so that the stop feeds as much as it should damp
-            if event >= 0:
-                allowed = 10.0 * coarsest_instant(fl) * h
-                found = h * where > 1e-12 * tried or at_switch(fl, event, w, phase, allowed)
-            else:
-                found = panel.decay[1].min() > -DECAY
+            found = not far_off(fl, phase, w, h, tried, panel, event, where)
         if not found:
             limit = 0.4 * min(h, tried)
             aim = -1

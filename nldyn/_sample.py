@@ -206,10 +206,9 @@ def local_extremes(
     """Phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output.
 
     The rate is sampled sixteen times per period of the fastest mode that `leave_unseen` leaves, or
-    that stops move in contact; its sign changes are refined. In flight, where a
-    parabola through three samples of one sign comes near zero, it is looked for a change of sign
-    there: two extremes closer than the samples. The motion is taken as periodic: an extreme at its
-    start counts once.
+    that stops move in contact; its sign changes are refined. In flight, where a parabola through
+    three samples of one sign comes near zero, it is looked for a change of sign there: two extremes
+    closer than the samples. The motion is taken as periodic: an extreme at its start counts once.
     """
     found = np.empty((64, 3))
     n = 0

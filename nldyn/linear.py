@@ -54,11 +54,6 @@ class LinearPart:
     growth: Real
     condition: float
 
-    @cached_property
-    def fastest(self) -> float:
-        """Largest imaginary part of an eigenvalue: the fastest vibration in rad/s."""
-        return float(np.abs(np.linalg.eigvals(self.blocks).imag).max())
-
     def times_block(self, rows: Real) -> Real:
         """Rows (..., 2n) times the block-diagonal matrix A."""
         pairs = rows.reshape(*rows.shape[:-1], -1, 2)

@@ -17,6 +17,7 @@ from nldyn import (
     FlowOptions,
     Parameter,
     Stop,
+    System,
     SystemModelError,
     Unbalance,
     Walk,
@@ -319,3 +320,20 @@ def test_an_orbit_run_through_twice_is_not_continued(flip):
     ):
         with pytest.raises(SystemModelError, match="is one of period 1, run through 2 times"):
             call()
+
+
+@pytest.mark.parametrize("largest", [1e2, 1e10, 1e13])
+def test_a_stiffness_that_is_negative_in_a_direction_is_refused(largest):
+    with pytest.raises(SystemModelError, match="stiffness must not be negative in any direction"):
+        System.from_matrices(np.eye(2), np.diag([largest, -1.0]), {"m": [0.0, 1.0]})
+
+
+def test_a_free_body_in_its_own_modes_is_not_taken_for_a_negative_stiffness():
+    """The rigid mode's entry of Phi^T K Phi is rounding, of either sign."""
+    for n in range(3, 40):
+        chain = 1e7 * (2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+        chain[0, 0] = chain[-1, -1] = 1e7
+        modes = np.linalg.eigh(chain)[1]
+        modal = modes.T @ chain @ modes
+        system = System.from_matrices(np.eye(n), 0.5 * (modal + modal.T), {"m": modes[0]})
+        assert system.frequencies_hz[0] < 1e-3
