@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -15,7 +13,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from nldyn.errors import check_types
-from nldyn.interruption import interrupted
+from nldyn.interruption import ignored_interruption, interrupted
 
 Item = TypeVar("Item")
 Value = TypeVar("Value")
@@ -225,14 +223,9 @@ def _end_processes(executor: Executor | None) -> None:
     A terminal sends that to all of them. One that gets a second one while it waits for work ends
     with the lock of the pool's queue, and all others wait for that without end.
     """
-    alone = threading.current_thread() is threading.main_thread()
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN) if alone else None
-    try:
+    with ignored_interruption():
         for process in list((getattr(executor, "_processes", None) or {}).values()):
             process.terminate()
-    finally:
-        if alone:
-            signal.signal(signal.SIGINT, before)
 
 
 def _broken(future: Future[Value]) -> bool:

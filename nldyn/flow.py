@@ -55,7 +55,7 @@ BUNCH = 20  # excitation periods in one compiled call, where many follow each ot
 _REASONS = {
     OK: "",
     TOO_MANY_PIECES: "more than 20000 flights and contact panels in one segment: too many contacts "
-    "or too fast a mode (more segments help)",
+    "or too fast a mode (more `segments` of solve_orbit help)",
     TOO_MANY_STEPS: "a stop stays so close to a touch that the search for it takes too many steps",
     CONTACT_FAILED: "a contact phase could not be resolved",
     ROUNDED: "a contact is hidden by rounding: the displacements are too large beside its depth, "

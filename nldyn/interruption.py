@@ -60,6 +60,26 @@ def deferred_interruption() -> Iterator[None]:
             signal.raise_signal(signal.SIGINT)
 
 
+@contextmanager
+def ignored_interruption() -> Iterator[None]:
+    """Let Ctrl-C have no effect in the block, nor on the processes that are started in it.
+
+    Examples
+    --------
+    >>> with ignored_interruption():
+    ...     signal.raise_signal(signal.SIGINT)
+    """
+    usual = signal.getsignal(signal.SIGINT)
+    if usual is None or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
+
+
 def heed_swallowed() -> None:
     """Let no Ctrl-C be lost that falls into a callback or destructor, whose errors Python drops.
 

@@ -30,20 +30,21 @@ def main(out: str | Path, workers: int = 2) -> None:
     --------
     >>> main("results/paper")        # doctest: +SKIP
     """
+    from nldyn.interruption import ignored_interruption
     from nldyn.paper.chaos import chaos_of, submit_sweeps, write_chaos_figure
     from nldyn.paper.claims import evaluate, verdict_counts, write_claims
     from nldyn.paper.figures import write_figures
     from nldyn.paper.jobs import submit_diagrams
     from nldyn.paper.kept import kept_folder
     from nldyn.paper.page import write_page
-    from nldyn.paper.workers import ctrl_c_for_parent_only, worker_processes
+    from nldyn.paper.workers import worker_processes
     from nldyn.result_directory import check_directory, result_directory
 
     check_directory(out)
     folder_kept = kept_folder(out)
     start = time.perf_counter()
     with worker_processes(workers, folder_kept) as processes:
-        with ctrl_c_for_parent_only():  # as they start with what is submitted
+        with ignored_interruption():  # sent to all by a terminal
             diagrams = submit_diagrams(processes)
             sweeps = submit_sweeps(processes)
         chaos = chaos_of(processes.values(sweeps, "sweeps"), processes)

@@ -228,7 +228,7 @@ def test_segments_cut_the_simulation_from_rest_too():
         [0.5 / math.pi], {"m": [1.0]}, modal_damping=0.05, stops=[Stop("m", 1e15)],
         excitation=[HarmonicForce("m", 1.0)],
     )  # fmt: skip
-    with pytest.raises(ConvergenceError, match="more segments help"):
+    with pytest.raises(ConvergenceError, match="more `segments` of solve_orbit help"):
         solve_orbit(system, 0.45)
     orbit = solve_orbit(system, 0.45, segments=16)
     again = solve_orbit(system, 0.45, guess=orbit.states([0.0])[0], segments=8)
