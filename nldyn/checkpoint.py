@@ -141,24 +141,31 @@ def checkpoint_at(
 
 
 def checkpoint_of_several(
-    place: str | Path | None, finished: list[Branch], flow: FlowMap
+    place: str | Path | None,
+    finished: list[Branch],
+    flow: FlowMap,
+    range_hz: tuple[float, float],
 ) -> Checkpoint:
     """The checkpoint of a computation of several branches of a system, added to a list.
-
-    Branches of other systems in the file are dropped.
 
     Raises
     ------
     SystemModelError, OutputError
-        As `checkpoint_at`.
+        As `checkpoint_at`; also for branches of another system or range in the file.
     """
     if place is None:
         return Checkpoint()
     from nldyn.store import same_flow
 
     write, _, earlier = _file(place)
-    mine = [b for b in earlier if same_flow(b.points[0].problem.flow, flow)]
-    return Checkpoint(write, finished, mine)
+    for branch in earlier:
+        same_range = branch.course is not None and branch.course.range_hz == range_hz
+        if not (same_range and same_flow(branch.points[0].problem.flow, flow)):
+            raise SystemModelError(
+                f"{place}: holds branches of another system, accuracy or range; choose another "
+                "file, or delete it"
+            )
+    return Checkpoint(write, finished, earlier)
 
 
 def _file(place: str | Path) -> tuple[Callable[[Sequence[Branch]], None], None, list[Branch]]:

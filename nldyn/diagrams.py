@@ -337,7 +337,8 @@ def diagram(
         Called as ``progress(what, frequency_hz)``.
     checkpoint : str or Path, optional
         File that keeps the branches computed so far, as for `continue_branch`. If it exists, the
-        simulations are repeated, but of the branches only what is not in it is computed.
+        simulations are repeated, but of the branches only what is not in it is computed; one of
+        another system, accuracy or range is refused.
 
     Returns
     -------
@@ -380,7 +381,7 @@ def diagram(
         options or ContinuationOptions(),
         progress or (lambda what, frequency_hz: None),
     )
-    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flow)
+    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flow, (low, high))
     with box.checkpoint:
         effort = search or SearchOptions()
         edges = np.geomspace(low, high, search_points + 1)

@@ -1,5 +1,6 @@
 """A continuation that goes on gives the points of one that was never interrupted."""
 
+import dataclasses
 import os
 import signal
 import subprocess
@@ -315,6 +316,21 @@ def test_branches_of_an_earlier_run_are_kept_until_they_are_reached(one_dof, pic
         assert sum(len(branch.nodes) for branch in found) > 0.7 * total
         starts = {branch.points[branch.course.start].point.tobytes() for branch in found}
         assert len(starts) == len(found)
+
+
+def test_a_file_of_another_diagram_is_refused_and_kept(one_dof, tmp_path):
+    path = tmp_path / "diagram.h5"
+    with pytest.raises(RuntimeError):
+        diagram(one_dof, **WANTED, progress=stopper(8), checkpoint=path)
+    kept = path.read_bytes()
+    stop = dataclasses.replace(one_dof.stops[0], gap=1e-5)
+    for system, wanted in (
+        (dataclasses.replace(one_dof, stops=(stop,)), WANTED),
+        (one_dof, {**WANTED, "range_hz": (20.0, 21.0)}),
+    ):
+        with pytest.raises(SystemModelError, match="another system, accuracy or range"):
+            diagram(system, **wanted, checkpoint=path)
+        assert path.read_bytes() == kept
 
 
 @pytest.mark.parametrize("share", [0.2, 0.8])
