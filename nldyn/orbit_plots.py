@@ -11,7 +11,15 @@ from nldyn.errors import check_types, check_whole
 from nldyn.fourier import spectrum
 from nldyn.linear import Real
 from nldyn.orbit import Orbit, check_observe
-from nldyn.plot import PERIOD_COLOURS, STABLE, UNSTABLE, length_unit, new_axes, period_name
+from nldyn.plot import (
+    PERIOD_COLOURS,
+    STABLE,
+    UNSTABLE,
+    length_unit,
+    new_axes,
+    period_name,
+    stop_places,
+)
 
 FORCE_PREFIXES = ((1e6, "MN"), (1e3, "kN"), (1.0, "N"), (1e-3, "mN"), (1e-6, "µN"))
 FLOOR = 1e-7  # amplitudes below this share of the largest are not shown
@@ -101,12 +109,7 @@ def plot_phase_portrait(
     y, speed = _motion(orbit, name, strobe)
     label = "start of an excitation period"
     ax.plot(y / factor, speed / pace, "o", color="black", markersize=5.0, label=label, zorder=4)
-    gaps = {
-        stop.direction * stop.gap
-        for stop in orbit.system.stops
-        if stop.at == name and stop.against is None
-    }
-    for number, gap in enumerate(sorted(gaps)):
+    for number, gap in enumerate(stop_places(orbit.system, name)):
         name_once = "stop" if number == 0 else None
         ax.axvline(gap / factor, color=PERIOD_COLOURS[1], linestyle="--", label=name_once)
     _draw_legend(ax)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from nldyn.branch import Branch
     from nldyn.diagrams import Diagram
     from nldyn.orbit import Orbit
+    from nldyn.system import System
 
 STABLE: Literal["-"] = "-"
 UNSTABLE = (0.0, (1.0, 1.4))
@@ -256,8 +257,9 @@ def plot_orbit(
     Returns
     -------
     pair of matplotlib.axes.Axes
-        Those for the displacement and for the contact force. The instants of `Orbit.impact_list`
-        are marked in both, also those of contacts too short for the samples.
+        Those for the displacement and for the contact force. The instants of `Orbit.impact_list`,
+        when contacts are deepest, are marked in both, also those of contacts too short for the
+        samples; and where stops against the ground are that the orbit comes near.
 
     Examples
     --------
@@ -270,13 +272,28 @@ def plot_orbit(
     """
     history = orbit.history(samples)
     upper, lower = axes if axes is not None else new_axes_pair()
-    _draw_displacement(upper, history.time, history.displacement[orbit.observe])
+    places = stop_places(orbit.system, orbit.observe)
+    _draw_displacement(upper, history.time, history.displacement[orbit.observe], places)
     _draw_forces(lower, history.time, history.force, [s.at for s in orbit.system.stops])
-    _mark_impacts((upper, lower), [impact.time for impact in orbit.impact_list])
+    _mark_deepest((upper, lower), [impact.time for impact in orbit.impact_list])
     name = period_name(orbit.period)
     upper.set_title(f"{name} orbit at {orbit.frequency_hz:.6g} Hz")
     lower.set_xlabel("time (s)")
     return upper, lower
+
+
+def stop_places(system: System, interface: str) -> list[float]:
+    """Displacements in m at which an interface meets its stops against the ground.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System
+    >>> stops = [Stop("m", 1e9, gap=2e-3, direction=d) for d in (1, -1)]
+    >>> stop_places(System.from_modal([13.1], {"m": [0.635]}, stops=stops), "m")
+    [-0.002, 0.002]
+    """
+    ours = [stop for stop in system.stops if stop.at == interface and stop.against is None]
+    return sorted({stop.direction * stop.gap for stop in ours})
 
 
 def save_diagram(
@@ -406,10 +423,18 @@ def draw_legend(
     ax.legend(handles=entries, fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
 
 
-def _draw_displacement(ax: Axes, time: NDArray[np.float64], y: NDArray[np.float64]) -> None:
-    factor, unit = length_unit(float(np.abs(y).max()))
+def _draw_displacement(
+    ax: Axes, time: NDArray[np.float64], y: NDArray[np.float64], places: Sequence[float]
+) -> None:
+    """Draw it with those of the stops that are neither at zero, where a line is, nor far off."""
+    reach = float(np.abs(y).max())
+    factor, unit = length_unit(reach)
     ax.axhline(0.0, color="0.6", linewidth=0.6)
     ax.plot(time, y / factor, color=PERIOD_COLOURS[0], linewidth=1.4)
+    shown = [place for place in places if 0.0 < abs(place) <= 1.5 * reach]
+    for number, place in enumerate(shown):
+        label = "stop" if number == 0 else None
+        ax.axhline(place / factor, color=PERIOD_COLOURS[1], linestyle="-.", label=label)
     ax.set_ylabel(f"displacement ({unit})")
 
 
@@ -418,19 +443,20 @@ def _draw_forces(
 ) -> None:
     for number, name in enumerate(names):
         colour = PERIOD_COLOURS[(number + 1) % len(PERIOD_COLOURS)]
-        ax.plot(time, forces[:, number], color=colour, linewidth=1.2, label=f"stop at {name}")
+        label = f"stop at {name}" if names.count(name) == 1 else f"stop {number} at {name}"
+        ax.plot(time, forces[:, number], color=colour, linewidth=1.2, label=label)
     ax.set_ylabel("contact force (N)")
     ax.set_ylim(bottom=0.0)
     if len(names) > 1:
         ax.legend(fontsize="small", loc="upper right")
 
 
-def _mark_impacts(axes: Sequence[Axes], times: Sequence[float]) -> None:
+def _mark_deepest(axes: Sequence[Axes], times: Sequence[float]) -> None:
     for ax in axes:
         for number, instant in enumerate(times):
-            label = "impact" if number == 0 else None
+            label = "deepest contact" if number == 0 else None
             ax.axvline(instant, color="0.35", linewidth=0.8, linestyle="--", label=label)
-    if times:
+    if axes[0].get_legend_handles_labels()[0]:
         axes[0].legend(fontsize="small", loc="upper right")
 
 

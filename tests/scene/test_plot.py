@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nldyn.continuation import continue_branch
-from nldyn.elements import Unbalance
+from nldyn.elements import Stop, Unbalance
 from nldyn.orbit import solve_orbit
 from nldyn.plot import branch_curve, length_unit, plot_diagram, plot_orbit, stability_runs
 from nldyn.resources import example
@@ -110,7 +110,7 @@ def test_orbit_shows_displacement_impacts_and_force():
     assert upper.get_ylabel() == "displacement (µm)"
     assert upper.get_title() == "harmonic orbit at 25.3 Hz"
     assert lower.get_ylabel() == "contact force (N)"
-    assert upper.get_legend().get_texts()[0].get_text() == "impact"
+    assert upper.get_legend().get_texts()[0].get_text() == "deepest contact"
     y = upper.lines[1].get_ydata()
     assert np.abs(y).max() == pytest.approx(1e6 * orbit.max_abs_displacement, rel=1e-4)
     force = lower.lines[0]
@@ -118,6 +118,21 @@ def test_orbit_shows_displacement_impacts_and_force():
     assert len(impacts) == orbit.impacts == 1
     hardest = force.get_xdata()[np.argmax(force.get_ydata())]
     assert impacts[0].get_xdata()[0] == pytest.approx(hardest, abs=2e-5)
+
+
+def test_orbit_shows_the_stops_that_it_comes_near():
+    stops = [Stop("a", 1e9, gap=gap, direction=d) for gap, d in ((1.0, 1), (1e-5, -1), (0.0, 1))]
+    system = System.from_modal(
+        [13.1], {"a": [0.6]}, modal_damping=0.02, stops=stops, excitation=[Unbalance("a", 5e-6)]
+    )
+    orbit = solve_orbit(system, frequency_hz=20.0)
+    upper, _ = plot_orbit(orbit)
+    (stop,) = [line for line in upper.lines if line.get_linestyle() == "-."]
+    assert stop.get_ydata()[0] == pytest.approx(-10.0)  # µm
+    assert [text.get_text() for text in upper.get_legend().get_texts()] == [
+        "stop",
+        "deepest contact",
+    ]
 
 
 def test_impacts_shorter_than_a_sample_are_marked():
