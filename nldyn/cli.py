@@ -161,7 +161,7 @@ def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
     with plain_errors():
         from nldyn.progress import messages_shown
         from nldyn.scene import build_reduced, build_system, load_scene
-        from nldyn.scene_checks import check_computable
+        from nldyn.scene_checks import check_computable, range_remark
 
         loaded = load_scene(scene, mesh_folders)
         with messages_shown():
@@ -169,6 +169,8 @@ def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
             system = build_system(loaded, reduced)
         click.echo(describe_system(system, 0 if reduced is None else reduced.residual_modes))
         check_computable(loaded, scene)
+        if remark := range_remark(loaded, float(system.frequencies_hz.max())):
+            click.echo(f"note: {remark}")
         click.echo(f"{scene}: no fault found")
 
 
@@ -424,10 +426,11 @@ def describe_system(system: System, residual: int = 0) -> str:
 def describe_stop(stop: Stop) -> str:
     """Say in a line where a stop is and what it does."""
     unit = "N/m" if stop.exponent == 1.0 else f"N/m^{stop.exponent:g}"
+    loss = f", dissipation {stop.dissipation:g} s/m" if stop.dissipation else ""
     where = f"at '{stop.at}'" + (f" against '{stop.against}'" if stop.against else "")
     return (
         f"stop {where}: {stop.stiffness:.6g} {unit}, gap {stop.gap:g} m, "
-        f"direction {stop.direction:+d}"
+        f"direction {stop.direction:+d}{loss}"
     )
 
 

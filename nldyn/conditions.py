@@ -14,15 +14,19 @@ from nldyn.bordered import (
     Condition,
     Evaluation,
     OrbitFamily,
+    correct,
     length_unit,
     reach_of_grazing,
 )
 from nldyn.errors import SystemModelError, is_finite, shown
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit
+from nldyn.parameter_values import FREQUENCY, Chart
+from nldyn.parameters import Parameter
 
 KINDS = ("LP", "PD", "NS", "BP", "GR")
 
+BESIDE = 1e-2  # of an orbit's size: a crossing within it belongs to a turn
 SMALLEST_OVERLAP = 1e-3  # of null vectors: it vanishes where a multiplier is double
 
 Monitor = str | Callable[[Orbit], float]
@@ -396,6 +400,32 @@ class Held:
     def renewed(self, at: Evaluation) -> Held:
         """The same."""
         return self
+
+
+def nearest_crossing(orbit: Orbit) -> tuple[Orbit, float] | None:
+    """The crossing of branches beside an orbit, and its unfolding relative to the orbit.
+
+    The unfolding is what must be added to the shooting equations for branches to cross: zero, but
+    for rounding, where they do. None where no crossing is found.
+
+    References
+    ----------
+    G. Moore (1980), *Numer. Funct. Anal. Optim.* 2, 441-472.
+    """
+    hz = orbit.frequency_hz
+    family = OrbitFamily.around(orbit, (Chart(Parameter(FREQUENCY), 0.5 * hz, 2.0 * hz),))
+    try:
+        family, condition = defined_by("BP", family, orbit)
+        guess = family.unknowns(orbit)
+        found = correct(family, guess, condition, max_iterations=12)
+    except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
+        return None
+    moved = found.at.point - guess
+    apart = math.sqrt(float(moved @ (family.metric(guess) * moved)))
+    if not found.converged or apart > BESIDE:
+        return None
+    crossing = replace(found.orbit, problem=orbit.problem)
+    return crossing, abs(float(found.at.point[-1]))
 
 
 def defined_by(kind: str, family: OrbitFamily, orbit: Orbit) -> tuple[OrbitFamily, Condition]:

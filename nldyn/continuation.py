@@ -57,7 +57,7 @@ KINK = 1e-6  # step below which a branch may bend by any angle where the number 
 MEETS_OPEN_END = "meets another branch where that was broken off"
 EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
 MEETING_STEP = 0.001  # longest step over which a doubled branch may meet the one it comes from
-SHORTEST_CROSSING = 1e-4  # step over which a branch may cross another one
+SHORTEST_CROSSING = 3e-6  # step over which a branch may cross another one
 SHORTEST_DETOUR = 1e-6  # first step of a walk that looks closely at what lies within a step
 MOST_DETOUR = 500  # points of such a walk
 MOST_POINTS = 10**8  # in one direction
@@ -186,9 +186,11 @@ class Walk:
                 if attempt is None:
                     step *= 0.5
                     if step < self.options.min_step:
-                        shortest = f"{SHORT_STEP}{self.options.min_step:g}"
-                        self.stop_reason = f"{shortest}: {self._obstacle}"
-                        return
+                        step, attempt = SHORTEST_CROSSING, self._past_crossing(here, behind)
+                        if attempt is None:
+                            shortest = f"{SHORT_STEP}{self.options.min_step:g}"
+                            self.stop_reason = f"{shortest}: {self._obstacle}"
+                            return
             point, angle, miss = attempt
             low, high = self.range_hz
             if not low <= point.orbit.frequency_hz <= high:
@@ -290,6 +292,21 @@ class Walk:
             return None
         return point, angle, miss
 
+    def _past_crossing(
+        self, here: BranchPoint, behind: Real
+    ) -> tuple[BranchPoint, float, float] | None:
+        """Next point from one on which branches cross, or None.
+
+        Its tangent is some mixture of theirs: the last step tells where this one leads.
+        """
+        if not behind.size or self.options.min_step > SHORTEST_CROSSING:
+            return None
+        led = BranchPoint(here.orbit, here.orbit.point - behind[0], here.arclength)
+        obstacle = self._obstacle
+        attempt = self._advance(here.orbit.problem, behind[:0], led, SHORTEST_CROSSING)
+        self._obstacle = obstacle
+        return attempt
+
     def _range_end(self, a: BranchPoint, b: BranchPoint, end_hz: float) -> BranchPoint | None:
         """Point of the branch exactly at an end of the range."""
         p = math.log(2.0 * math.pi * end_hz)
@@ -316,7 +333,7 @@ class Walk:
         The orbit may have come back shifted by some of its excitation periods.
         """
         start = self.start
-        if b.arclength - start.arclength < 10.0 * (b.arclength - a.arclength):
+        if b.arclength - start.arclength < 3.0 * (b.arclength - a.arclength):
             return False
         places, tangents = self._shifts
         step = start.orbit.problem.metric(start.orbit.point) * (b.orbit.point - a.orbit.point)

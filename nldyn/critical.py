@@ -24,6 +24,7 @@ from nldyn.shooting import ShootingProblem
 LARGEST_STEP = 0.1  # in ξ, of the differences
 SMALLEST_STEP = 1e-7
 LOCATED = 1e-4  # of an orbit's size: branch points are located no better where branches turn
+NEAR_CROSSING = 5e-3  # of an orbit's size: a turn within it may be a crossing
 RATIO = 1.6  # of successive steps
 STEPS = 8
 ENOUGH = 1e-6  # relative error of a coefficient that needs no more steps
@@ -302,20 +303,21 @@ def correct_across(
     return None
 
 
-def turns_at_crossing(orbit: Orbit) -> bool:
-    """Whether a branch that turns at an orbit crosses another one there, and is not folded.
+def turns_near_crossing(orbit: Orbit) -> bool:
+    """Whether a branch that turns at an orbit may cross another one there, and not be folded.
 
     At a fold the equations' derivative with respect to P has a part that no change of the states
-    balances; where branches cross it has none. The part changes along the branch: it must vanish
-    within `LOCATED` of the orbit's size. An orbit for which this cannot be computed is a fold.
+    balances; where branches cross it has none. The part changes along the branch: here it vanishes
+    within `NEAR_CROSSING` of the orbit's size. An orbit for which this cannot be computed is a
+    fold.
     """
     try:
         loop = loop_of(orbit)
         q, y = loop.critical(1.0)
         part = abs(float(np.sum(y * loop.by_parameter)))
-        if part > 1e-3 * float(np.linalg.norm(y) * np.linalg.norm(loop.by_parameter)):
+        if part > 1e-2 * float(np.linalg.norm(y) * np.linalg.norm(loop.by_parameter)):
             return False  # a plain fold, at no further cost
-        return part < LOCATED * abs(mixed_derivative(loop, q, y).value)
+        return part < NEAR_CROSSING * abs(mixed_derivative(loop, q, y).value)
     except CoefficientError:
         return False
 

@@ -220,6 +220,9 @@ class CurveWalk:
         here, step = self.start, self.options.first_step
         curvature = np.zeros(here.tangent.size)
         yield here
+        if left := self._left_at_once():
+            self.stop_reason = f"{RANGE_END}{left}"
+            return
         for _ in range(self.options.max_points):
             attempt = None
             seen = bool(here.corner)
@@ -295,6 +298,16 @@ class CurveWalk:
             return None
         return there, angle, miss
 
+    def _left_at_once(self) -> str:
+        """Name of a parameter at the end of its range, beyond which the curve would begin."""
+        charts, start = self.start.found.at.family.charts, self.start
+        for which, chart in enumerate(charts):
+            value = float(start.values[which])
+            slope = float(start.tangent[start.found.at.family.n_states + which])
+            if (slope < 0.0 and value <= chart.low) or (slope > 0.0 and value >= chart.high):
+                return str(chart.parameter.name)
+        return ""
+
     def _limit_ahead(self, here: CurvePoint, step: float) -> CurvePoint | None:
         """Point at the end of a range, if a failed step would have passed it.
 
@@ -354,7 +367,7 @@ class CurveWalk:
     def _closed(self, a: CurvePoint, b: CurvePoint) -> bool:
         """Whether the walk from a to b passes the start again, in the same direction."""
         start = self.start
-        if b.arclength - start.arclength < 10.0 * (b.arclength - a.arclength):
+        if b.arclength - start.arclength < 3.0 * (b.arclength - a.arclength):
             return False
         weights = start.found.at.family.metric(start.point)
         step, way = b.point - a.point, start.point - a.point

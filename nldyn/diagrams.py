@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -33,7 +34,7 @@ from nldyn.errors import SystemModelError, check_frequency, check_types, check_w
 from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.normal_forms import switch_at_branch_point
-from nldyn.orbit import ConvergenceError, Orbit, check_observe
+from nldyn.orbit import ConvergenceError, Orbit, check_observe, solve_orbit
 from nldyn.search import SearchOptions, Strobe, orbits_from_strobe, reach, simulate_strobe
 from nldyn.special import LocateError
 from nldyn.system import System
@@ -231,6 +232,27 @@ class Collector:
                     self.from_flip(special, options)
                 elif special.kind == "BP":
                     self.from_branch_point(special, options)
+            if self.flow.system.symmetric:
+                self.from_mirror(branch, self.options if branch.period <= wanted else shorter)
+
+    def from_mirror(self, branch: Branch, options: ContinuationOptions) -> None:
+        """Follow the mirror image of a branch of a symmetric system, unless it is known."""
+        orbit = middle_orbit(branch)
+        half_later = -orbit.states(orbit.problem.phases[:-1] + math.pi)
+        try:
+            image = solve_orbit(
+                orbit.problem.flow,
+                orbit.frequency_hz,
+                orbit.period,
+                guess=half_later,
+                observe=orbit.observe,
+                segments=orbit.problem.segments,
+            )
+            start = start_point(image, 1.0)
+        except ConvergenceError as error:
+            self.notes.append(f"the mirror image of branch {branch.name} was not found: {error}")
+        else:
+            self.from_start(start, options)
 
     def _repeats(self, branch: Branch) -> bool:
         """Whether a branch is a known one after all: beside folds and flips that may not be seen.

@@ -666,7 +666,8 @@ def refine(
         step = f", last relative step {found.last_step:.1e}" if found.last_step < math.inf else ""
         raise ConvergenceError(
             f"{where}: {found.failure}{step} after {found.iterations} "
-            f"iteration{'' if found.iterations == 1 else 's'}"
+            f"iteration{'' if found.iterations == 1 else 's'}; another guess, "
+            "or find_orbits, may find one"
         )
     return Orbit.of(problem, found, observe)
 

@@ -82,7 +82,8 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
 def _check_index(parameter: Parameter, kind: str, count: int) -> None:
     if not 0 <= parameter.index < count:
         raise SystemModelError(
-            f"parameter '{parameter.name}': there is no {kind} {parameter.index}, only {count}"
+            f"parameter '{parameter.name}': there is no {kind} {parameter.index}, only "
+            f"{count}, counted from 0"
         )
 
 

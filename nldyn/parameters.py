@@ -106,5 +106,6 @@ def parameter_tables(
 def _check_index(parameter: Parameter, kind: str, count: int) -> None:
     if not 0 <= parameter.index < count:
         raise SystemModelError(
-            f"parameter '{parameter.name}': there is no {kind} {parameter.index}, only {count}"
+            f"parameter '{parameter.name}': there is no {kind} {parameter.index}, only "
+            f"{count}, counted from 0"
         )

@@ -26,6 +26,7 @@ from nldyn.scene_checks import (
     check_ratio_count,
     check_scene,
     check_structure_names,
+    range_remark,
 )
 from nldyn.scene_messages import KeyPath, from_validation, scene_error, table_at
 from nldyn.scene_schema import ContinuationTable, ExcitationTable, PartTable, Scene, StopTable
@@ -428,7 +429,7 @@ def compute(
     from nldyn.diagrams import Seed, diagram
 
     with _told_as(scene, ("continuation",), SystemModelError):
-        return diagram(
+        found = diagram(
             flow,
             (table.range_hz[0], table.range_hz[1]),
             table.periods,
@@ -439,6 +440,13 @@ def compute(
             progress=progress,
             checkpoint=checkpoint,
         )
+    return _remarked(scene, flow, found)
+
+
+def _remarked(scene: Scene, flow: FlowMap, found: Diagram) -> Diagram:
+    """A diagram with a note on what the model of the structure is not good for."""
+    remark = range_remark(scene, float(flow.system.frequencies_hz.max()))
+    return replace(found, notes=(*found.notes, remark)) if remark else found
 
 
 def explore_scene(
@@ -491,7 +499,7 @@ def explore_scene(
         raise scene_error(scene.file, ("explore",), "is missing")
     efforts = scene.explore.model_dump()
     with _told_as(scene, ("explore",), SystemModelError):
-        return explore(
+        found = explore(
             flow,
             (table.range_hz[0], table.range_hz[1]),
             efforts.pop("max_period"),
@@ -500,6 +508,7 @@ def explore_scene(
             progress=progress,
             checkpoint=checkpoint,
         )
+    return replace(found, diagram=_remarked(scene, flow, found.diagram))
 
 
 def _to_follow(scene: Scene) -> tuple[FlowMap, ContinuationTable]:
@@ -710,11 +719,11 @@ def _mesh_path(scene: Scene, name: str) -> Path:
     try:
         real = path.resolve()
         if not any(real.is_relative_to(place) for place in _mesh_places(scene)):
-            fault = (
-                f"leads to {real}, outside the folder of the scene and the current one; if that is "
-                f"meant, allow it with --mesh-folder {real.parent}"
-            )
-            raise scene_error(scene.file, ("mesh", "file"), fault)
+            advice = f"if that is meant, allow it with --mesh-folder {real.parent}"
+            if not real.is_file():
+                advice = "there is no such file: copy the mesh beside the scene"
+            fault = f"leads to {real}, outside the folder of the scene and the current one"
+            raise scene_error(scene.file, ("mesh", "file"), f"{fault}; {advice}")
         check_regular(path)
         path.open("rb").close()
     except SceneError:

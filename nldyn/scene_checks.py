@@ -15,6 +15,9 @@ from nldyn.scene_schema import Matrix, Scene
 
 Report = Callable[[KeyPath, str], SceneError]
 LONGEST_NAME, LONGEST_TITLE = 100, 1000
+NAMED_BY = (
+    "names are physical groups in .msh, arrays 'set:NAME' in .vtu, ELSET and NSET in .inp files"
+)
 STRUCTURE_ONLY = ("couplings", "foundations")
 MESH_ONLY = (
     *("parts", "supports", "point_masses", "springs", "hinges"),
@@ -87,7 +90,8 @@ def _check_parts_known(scene: Scene, known: Mapping[str, object], file: Path) ->
     for name in scene.parts:
         if name not in known:
             fault = unknown_name(name, known, f"a part of the mesh {scene.mesh.file}")
-            raise scene_error(file, ("parts", name), fault.removeprefix(f"'{name}' "))
+            hint = "" if known else f" ({NAMED_BY})"
+            raise scene_error(file, ("parts", name), fault.removeprefix(f"'{name}' ") + hint)
 
 
 def check_structure_names(scene: Scene, mesh: TaggedStructure, file: Path) -> None:
@@ -109,6 +113,19 @@ def check_computable(scene: Scene, file: Path) -> None:
     if scene.continuation is None:
         fault = "is missing: give the frequency range, range_hz = [lowest, highest]"
         raise scene_error(file, ("continuation",), fault)
+
+
+def range_remark(scene: Scene, highest_hz: float) -> str:
+    """Say that the range goes beyond the modes that are kept of a mesh; empty if it does not."""
+    if scene.mesh is None or scene.continuation is None:
+        return ""
+    top = max(scene.continuation.range_hz)
+    if top <= highest_hz:
+        return ""
+    return (
+        f"range_hz goes up to {top:g} Hz, but the model of the structure to {highest_hz:.4g} Hz "
+        "only: keep more modes, or check the units"
+    )
 
 
 def check_ratio_count(scene: Scene, count: int, file: Path) -> None:
@@ -305,4 +322,5 @@ def _faces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
 
 def _require(name: str, known: Mapping[str, object], what: str, file: Path, key: KeyPath) -> None:
     if name not in known:
-        raise scene_error(file, key, unknown_name(name, known, what))
+        hint = "" if known else f" ({NAMED_BY})"
+        raise scene_error(file, key, unknown_name(name, known, what) + hint)

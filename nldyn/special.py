@@ -25,7 +25,8 @@ from nldyn._events import (
 )
 from nldyn.between import Between
 from nldyn.branch import BranchPoint, SpecialPoint
-from nldyn.critical import correct_across, turns_at_crossing
+from nldyn.conditions import nearest_crossing
+from nldyn.critical import correct_across, turns_near_crossing
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
 
@@ -38,6 +39,7 @@ ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
 MOST_LOOKS = 6  # times that a step is cut at such points
+UNFOLDED = 1e-11  # least unfolding of a crossing, relative to the orbit, that is not rounding
 SHORTEST_LOOK = 1e-6  # arclength of a step, below which it is not cut there
 VANISHED = 1e-3  # an extreme at its root, relative to those beside it
 CLOSE = 0.01  # part of a step within which a point beside it does not help
@@ -471,11 +473,20 @@ def _pace(special: SpecialPoint) -> float:
 def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
     """What looks like a fold may be where this branch crosses another one.
 
-    So a branch of broken symmetry turns at the branch point that its two halves share.
+    So a branch of broken symmetry turns at the branch point that its two halves share. Where the
+    symmetry is not perfect it is folded beside it: then the crossing has an unfolding.
     """
-    if special.kind == "LP" and turns_at_crossing(special.orbit):
-        return SpecialPoint("BP", special.point, special.frequency_error)
-    return special
+    if special.kind != "LP" or not turns_near_crossing(special.orbit):
+        return special
+    crossing = nearest_crossing(special.orbit)
+    if crossing is None or crossing[1] > UNFOLDED:
+        return special
+    at, (orbit, _) = special.point, crossing
+    weights = orbit.problem.metric(orbit.point)
+    ahead = float((orbit.point - at.orbit.point) @ (weights * at.tangent))
+    ahead /= math.sqrt(float(at.tangent @ (weights * at.tangent)))
+    point = BranchPoint(orbit, at.tangent, at.arclength + ahead)
+    return SpecialPoint("BP", point, special.frequency_error)
 
 
 def _along(chord: Chord, special: SpecialPoint) -> SpecialPoint:

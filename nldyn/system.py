@@ -286,6 +286,19 @@ class System:
         return not np.any(self.total_damping) and not any(s.depends_on_speed for s in self.stops)
 
     @cached_property
+    def symmetric(self) -> bool:
+        """Whether -x(t + T/2) is a motion if x(t) is one: each stop has one opposite to it."""
+        stops = [
+            (self.stop_vector(s), (s.stiffness, s.exponent, s.gap, s.dissipation, s.law))
+            for s in self.stops
+        ]
+        return all(
+            sum(same == law and np.array_equal(c, vector) for c, same in stops)
+            == sum(same == law and np.array_equal(-c, vector) for c, same in stops)
+            for vector, law in stops
+        )
+
+    @cached_property
     def linear(self) -> LinearPart:
         """Independent pairs of coordinates of the linear part."""
         return linear_part(self.natural_frequencies, self.total_damping)

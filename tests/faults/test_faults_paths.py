@@ -51,6 +51,14 @@ def test_a_mesh_in_another_folder_is_read_if_asked_for(project, absolute, monkey
     assert refusal(command("check", file)) is None
 
 
+def test_a_mesh_that_is_not_there_is_not_asked_for_in_another_folder(project):
+    file = scene_with(project, "../meshes/frime.vtu")
+    assert refusal(command("check", file)) == (
+        f"{file}: mesh.file leads to {project / 'meshes' / 'frime.vtu'}, {IN_FOLDER}; there is no "
+        "such file: copy the mesh beside the scene"
+    )
+
+
 def test_a_link_counts_where_it_leads(project):
     (project / "scenes" / "frame.vtu").symlink_to(project / "meshes" / "frame.vtu")
     (project / "scenes" / "more").symlink_to(project / "meshes")

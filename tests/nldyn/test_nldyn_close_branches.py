@@ -13,6 +13,7 @@ from nldyn import (
     HarmonicForce,
     Stop,
     System,
+    Unbalance,
     continue_branch,
     diagram,
     solve_orbit,
@@ -85,6 +86,39 @@ def test_doubled_branch_does_not_go_on_along_the_one_that_it_comes_from():
     flips = [s.frequency_hz for s in parent.special_points if s.kind == "PD"]
     assert [end.frequency_hz for end in ends] == pytest.approx(flips, rel=1e-10)
     assert all(reason.startswith("joins the branch of period 1") for reason in branch.stop_reasons)
+
+
+def unequal_gaps(mismatch: float) -> System:
+    """A mode between two linear stops, one of them farther off by a share of the gap."""
+    stops = [
+        Stop("m", 1e6, 1.0, gap=5e-6),
+        Stop("m", 1e6, 1.0, gap=5e-6 * (1.0 + mismatch), direction=-1),
+    ]
+    unbalance = [Unbalance("m", 4.92e-6)]
+    return System.from_modal(
+        [13.13], {"m": [0.635]}, modal_damping=0.02, stops=stops, excitation=unbalance
+    )
+
+
+def test_branches_of_an_imperfect_pitchfork_are_told_apart():
+    """Two pitchforks become one branch, and a closed one with two folds.
+
+    The distance of the two grows with the cube root of the mismatch: 3e-4 of the states at 1e-9.
+    """
+    perfect = continue_branch(solve_orbit(unequal_gaps(0.0), 11.0), (11.0, 11.8))
+    pitchforks = [s.frequency_hz for s in perfect.special_points if s.kind == "BP"]
+    for mismatch in (1e-7, 1e-9, 1e-11):
+        system = unequal_gaps(mismatch)
+        main = continue_branch(solve_orbit(system, 11.0), (11.0, 11.8))
+        half_later = -main.at(11.3)[0].states(np.array([np.pi]))[0]
+        isola = continue_branch(solve_orbit(system, 11.3, guess=half_later), (11.0, 11.8))
+        assert main.stop_reasons == ("end of the frequency range",) * 2
+        assert {s.kind for s in main.special_points} == {"PD", "GR"}
+        assert isola.closed
+        turns = sorted(s.frequency_hz for s in isola.special_points if s.kind in ("LP", "BP"))
+        assert [s.kind for s in isola.special_points].count("LP") == 2
+        # a fold leaves the pitchfork with the power 2/3 of the mismatch
+        assert turns == pytest.approx(sorted(pitchforks), rel=2.0 * mismatch ** (2 / 3) + 1e-9)
 
 
 def test_special_points_where_a_closed_branch_closes_are_told_once():

@@ -45,6 +45,14 @@ from nldyn.scene import build_system, load_scene
 MASS, NATURAL, RATIO = 2.0, 2.0 * math.pi * 10.0, 0.03
 
 
+def test_a_curve_that_begins_at_the_end_of_a_range_ends_there():
+    """A stop without dissipation: beyond the end there are no systems."""
+    orbit = solve_orbit(make_one_dof(), 25.3)
+    curve = continue_in(orbit, "dissipation", (0.0, 1.0))
+    assert curve.stop_reasons == ("end of the range of dissipation",) * 2
+    assert curve.values[[0, -1], 0].tolist() == [0.0, 1.0]
+
+
 def linear_stop(gap=1e-3, stiffness=2e4, unbalance=2e-4) -> System:
     return System.from_matrices(
         [[MASS]], [[MASS * NATURAL**2]], {"m": [1.0]}, modal_damping=RATIO,
@@ -676,7 +684,7 @@ WINDOW = ((20.0, 30.0), (-1e-6, 1e-6))
     ("call", "words"),
     [
         (lambda o: continue_in(o, "mass", (1.0, 2.0)), "unknown parameter 'mass'; there are"),
-        (lambda o: continue_in(o, Parameter("gap", 3), (0.0, 1.0)), "there is no stop 3, only 1"),
+        (lambda o: continue_in(o, Parameter("gap", 3), (0.0, 1.0)), "no stop 3, only 1"),
         (lambda o: continue_in(o, Parameter("modal_damping", 4), (0, 1)), "no mode 4, only 1"),
         (lambda o: continue_in(o, "coefficient", (0.0, 1.0)), "no damper 0, only 0"),
         (lambda o: continue_in(o, "amplitude", (0.0, 1.0)), "excitation 0 has no amplitude"),

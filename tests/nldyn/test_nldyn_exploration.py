@@ -32,7 +32,7 @@ from nldyn import (
     solve_orbit,
     switch_at_flip,
 )
-from nldyn.diagrams import Collector
+from nldyn.diagrams import Collector, middle_orbit
 from nldyn.exploration import chao_lower_bound, deflated_orbit, settling_periods
 from nldyn.orbit import stroboscopic
 from nldyn.resources import example
@@ -528,3 +528,38 @@ def test_orbits_beside_the_ends_of_a_doubled_branch_are_known():
     assert len(beside) == 4
     box.from_orbits(beside)
     assert len(box.branches) == 2
+
+
+def test_mirror_image_of_a_branch_of_a_symmetric_system_is_followed_too():
+    """A closed 1/3 branch between two equal stops, which is not symmetric itself."""
+    stops = [Stop("m", 1e6, 1.0, gap=5e-6, direction=side) for side in (1, -1)]
+    system = System.from_modal(
+        [13.13],
+        {"m": [0.635]},
+        modal_damping=0.02,
+        stops=stops,
+        excitation=[Unbalance("m", 4.92e-6)],
+    )
+    orbit = solve_orbit(system, 11.26, 3, guess=[7.9058e-06, 9.9213e-05])
+    box = Collector(orbit.problem.flow, (11.0, 12.0), "m", ContinuationOptions(), lambda *at: None)
+    box.follow(orbit, 3, 3, None)
+    one, image = box.branches
+    assert one.closed and image.closed and not one.contains(middle_orbit(image))
+    folds = [
+        sorted(s.frequency_hz for s in branch.special_points if s.kind == "LP")
+        for branch in (one, image)
+    ]
+    assert len(folds[0]) == 2 and folds[0] == pytest.approx(folds[1], rel=1e-9)
+
+
+def test_a_system_is_symmetric_if_each_stop_has_one_opposite_to_it():
+    def system(*stops):
+        return System.from_modal([13.0, 50.0], {"a": [0.6, 0.2], "b": [0.1, 0.3]}, stops=stops)
+
+    pair = Stop("a", 1e6, gap=1e-3), Stop("a", 1e6, gap=1e-3, direction=-1)
+    assert system().symmetric and system(*pair).symmetric
+    assert not system(pair[0]).symmetric
+    assert not system(pair[0], pair[0], pair[1]).symmetric
+    assert not system(pair[0], replace(pair[1], gap=2e-3)).symmetric
+    assert not system(pair[0], replace(pair[1], at="b")).symmetric
+    assert system(*pair, replace(pair[0], against="b"), replace(pair[1], against="b")).symmetric

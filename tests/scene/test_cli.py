@@ -214,15 +214,16 @@ def test_places_to_look_at_are_refused_beside_explore(tmp_path):
     assert "continuation.search_points is of no use beside [explore]" in result.stderr
 
 
-def test_another_scene_does_not_go_on_from_an_unfinished_one(tmp_path, monkeypatch):
+def test_an_unfinished_run_of_another_scene_is_refused_and_kept(tmp_path):
     scene, out = short_scene(tmp_path), tmp_path / "out"
     assert invoke("run", scene, "--out", tmp_path / "whole", "--quiet").exit_code == 0
     scene.write_text(scene.read_text().replace("4.92e-6", "4.93e-6"))
-    assert invoke("run", scene, "--out", tmp_path / "other", "--quiet").exit_code == 0
-    shutil.copy(tmp_path / "whole" / "branches.h5", tmp_path / "out.unfinished.h5")
-    assert invoke("run", scene, "--out", out, "--quiet").exit_code == 0
-    results = [(tmp_path / name / "branches.h5").read_bytes() for name in ("out", "other", "whole")]
-    assert results[0] == results[1] != results[2]
+    unfinished = tmp_path / "out.unfinished.h5"
+    shutil.copy(tmp_path / "whole" / "branches.h5", unfinished)
+    result = invoke("run", scene, "--out", out, "--quiet")
+    assert result.exit_code == 2 and not out.exists()
+    assert "another system, accuracy or range; choose another file, or delete" in result.stderr
+    assert unfinished.read_bytes() == (tmp_path / "whole" / "branches.h5").read_bytes()
 
 
 def test_a_foreign_file_in_the_place_of_an_unfinished_run_is_named(tmp_path):
@@ -239,6 +240,18 @@ def test_check_prints_the_model():
     assert result.exit_code == 0
     for text in ("13.129310", "0.635001", "5.92522e-05", "5.17e+09 N/m^1.5", "no fault found"):
         assert text in result.stdout
+
+
+def test_a_range_above_the_modes_of_a_mesh_is_remarked(tmp_path):
+    """The two-DOF model ends with its residual mode, at 125.3 Hz."""
+    text = example("two_dof_xi_0.01.toml").read_text().replace("../../meshes/", "")
+    (tmp_path / "half_beam.msh").write_bytes(mesh("half_beam.msh").read_bytes())
+    for top, remarked in ((125.0, False), (126.0, True)):
+        scene = tmp_path / "scene.toml"
+        scene.write_text(text.replace("range_hz = [15.0, 90.0]", f"range_hz = [120.0, {top}]"))
+        said = invoke("check", scene).stdout
+        assert ("note: range_hz goes up to 126 Hz, but the model" in said) is remarked
+        assert "no fault found" in said
 
 
 def test_check_tells_the_residual_mode_from_the_others():
