@@ -182,12 +182,15 @@ class Grazing:
         Forcing phase: the extreme nearest to it is meant.
     unit : float
         Length by which the depth is divided, in m.
+    depth : float
+        Value of the extreme in that unit, if it is not to be zero.
     """
 
     stop: int
     is_maximum: bool
     phase: float
     unit: float
+    depth: float = 0.0
 
     @classmethod
     def of(cls, orbit: Orbit) -> Grazing:
@@ -214,7 +217,7 @@ class Grazing:
 
     def value(self, at: Evaluation) -> Real:
         """Depth of the extreme, shape (1,)."""
-        return np.array([self.extreme(at.orbit)[1] / self.unit])
+        return np.array([self.extreme(at.orbit)[1] / self.unit - self.depth])
 
     def reach(self, at: Evaluation) -> float:
         """The depth of an extreme has a continuous derivative also where it is zero."""

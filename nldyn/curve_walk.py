@@ -33,6 +33,9 @@ RESONANCE_END = "becomes a curve of neutral saddles at a resonance"
 CLOSED_CURVE = "closed curve"
 DISSOLVED = "the branch point dissolves, as the symmetry does that brings it about"
 UNFOLDED = 1e-6  # unfolding number from which a branch point has dissolved
+MEETING = 1e-9  # arclength within which a curve and a grazing meet
+MOST_SECANTS = 20
+BEHIND = (1e-5, 1e-6, 1e-7)  # extremes, relative to the orbit, of a first point behind a corner
 CORNER_STEP = 1e-3  # a step shorter than this may have met a corner
 
 
@@ -153,31 +156,105 @@ def _on_plane(
     return curve_point(found, a.condition, way, a.arclength + length) if found.converged else None
 
 
-def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> CurvePoint | None:
+def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> list[CurvePoint]:
     """The grazing point close ahead at which a curve has a corner, with its tangent behind it.
 
     The derivative of the monodromy matrix jumps at a grazing, and with it the direction of a
-    curve on which a condition of that matrix holds.
+    curve on which a condition of that matrix holds. At a linear stop it is that of a root: the
+    curve leaves along the grazings, and a point behind the corner comes with it.
     """
     if not isinstance(here.condition, Singular):
-        return None
+        return []
     try:
         grazing = Grazing.of(here.orbit)
         family = here.found.at.family
-        found = correct(family, here.point, Both(here.condition, grazing), max_iterations=25)
+        linear = here.orbit.system.stops[grazing.stop].exponent == 1.0
+        if linear:
+            found = _meeting(here.found.at, here.condition, grazing, 10.0 * CORNER_STEP)
+        else:
+            found = correct(family, here.point, Both(here.condition, grazing), max_iterations=25)
+        if found is None or not found.converged:
+            return []
         weights = family.metric(here.point)
         way = found.at.point - here.point
         length = _length(weights, way)
         ahead = float(way @ (weights * here.tangent)) > 0.9 * length
-        if not (found.converged and ahead and length < 10.0 * options.grazing_step):
-            return None
+        if not (ahead and length < 10.0 * options.grazing_step):
+            return []
         before = float(grazing.value(here.found.at)[0])
         tangent = _tangent_behind(found.at, here.condition, grazing, before < 0.0)
+        condition = here.condition.renewed(found.at)
+        kind = f"GR{here.condition.kind}"
+        corner = CurvePoint(found, condition, tangent, here.arclength + length, kind)
+        behind = None
+        if linear:
+            side = -math.copysign(1.0, before)
+            behind = _behind(corner, grazing, side, 2.0 * options.max_step)
     except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
+        return []
+    if behind is None:
+        return [corner]
+    chord = behind.point - corner.point
+    return [replace(corner, tangent=chord / _length(family.metric(corner.point), chord)), behind]
+
+
+def _behind(
+    corner: CurvePoint, grazing: Grazing, side: float, farthest: float
+) -> CurvePoint | None:
+    """A point of a curve a little behind a grazing of a linear stop, or None."""
+    at, condition = corner.found.at, corner.condition
+    family = at.family
+    for depth in BEHIND:
+        met = _meeting(at, condition, replace(grazing, depth=side * depth), farthest)
+        if met is None:
+            continue
+        chord = met.at.point - at.point
+        weights = family.metric(at.point)
+        length = _length(weights, chord)
+        row = weights * chord / np.linalg.norm(weights * chord)
+        found = correct(family, met.at.point, condition, row, float(row @ met.at.point))
+        moved = _length(weights, found.at.point - met.at.point)
+        if found.converged and moved < CORNER_STEP * length and length < farthest:
+            return curve_point(found, condition, chord, corner.arclength + length)
+    return None
+
+
+def _meeting(
+    start: Evaluation, condition: Condition, grazing: Grazing, farthest: float
+) -> Corrected | None:
+    """The orbit on a curve of special points with a given extreme of a linear stop, or None.
+
+    The condition of the curve has the slope of a root where an extreme is zero, over which Newton's
+    method steps to and fro. So it is followed along the orbits with that extreme, where it is
+    smooth, by the secant method.
+    """
+    family = start.family
+    _, surface = tangent_surface(start)
+    along = surface @ np.linalg.svd(gradient(start, surface, grazing))[2][-1]
+    row = family.metric(start.point) * along
+    row /= np.linalg.norm(row)
+    level, pace = float(row @ start.point), float(row @ along)
+    here = correct(family, start.point, grazing, row, level)
+    if not here.converged:
         return None
-    condition = here.condition.renewed(found.at)
-    kind = f"GR{here.condition.kind}"
-    return CurvePoint(found, condition, tangent, here.arclength + length, kind)
+    reach = max(_length(family.metric(start.point), here.at.point - start.point), 10.0 * MEETING)
+    place, value, step = 0.0, float(condition.value(here.at)[0]), reach
+    for _ in range(MOST_SECANTS):
+        there = correct(
+            family, here.at.point + step * along, grazing, row, level + pace * (place + step)
+        )
+        if not there.converged:
+            return None
+        before, value = value, float(condition.value(there.at)[0])
+        here, place = there, place + step
+        if value == before:
+            return None
+        step *= -value / (value - before)
+        if abs(step) < MEETING:
+            return here
+        if abs(place + step) > farthest:
+            return None
+    return None
 
 
 def _tangent_behind(at: Evaluation, condition: Condition, grazing: Grazing, deep: bool) -> Real:
@@ -223,9 +300,13 @@ class CurveWalk:
         if left := self._left_at_once():
             self.stop_reason = f"{RANGE_END}{left}"
             return
+        behind: CurvePoint | None = None  # a corner
         for _ in range(self.options.max_points):
             attempt = None
             seen = bool(here.corner)
+            if behind is not None:
+                attempt = behind, self.options.max_angle, self.options.max_miss
+                step, behind = behind.arclength - here.arclength, None
             while attempt is None:
                 attempt = self._advance(here, curvature, step)
                 if attempt is None:
@@ -236,7 +317,7 @@ class CurveWalk:
                     step *= 0.5
                     if step < CORNER_STEP and not seen:
                         seen = True
-                        corner = corner_ahead(here, self.options)
+                        corner, behind, *_ = *corner_ahead(here, self.options), None, None
                         if corner is not None:
                             attempt = corner, self.options.max_angle, self.options.max_miss
                     if step < self.options.min_step:
@@ -294,8 +375,12 @@ class CurveWalk:
             return None
         touched = there.orbit.impacts != here.orbit.impacts
         grazes = isinstance(here.condition, Grazing)
-        if step > self.options.grazing_step and touched and not grazes:
-            return None
+        if touched and not grazes:
+            # beside a grazing of a linear stop another piece of the curve may lie straight ahead
+            linear = any(stop.exponent == 1.0 for stop in here.orbit.system.stops)
+            root = linear and isinstance(here.condition, Singular)
+            if root or step > self.options.grazing_step:
+                return None
         return there, angle, miss
 
     def _left_at_once(self) -> str:

@@ -778,3 +778,26 @@ def test_a_curve_has_no_other_parameters_than_its_own(one_dof):
     assert curve.stop_reasons == ("2 points", "2 points")
     with pytest.raises(SystemModelError, match="no parameter 'gap'; there are: frequency_hz"):
         curve.at("gap", 0.0)
+
+
+def test_a_curve_of_folds_goes_on_behind_a_grazing_of_a_linear_stop():
+    """Two folds of a 1/2 branch, with a grazing between them, are ends of one curve.
+
+    At a damping of 0.056 it turns at a grazing, where its condition has the slope of a root.
+    """
+    stops = [Stop("m", 1e6, 1.0, gap=5e-6, direction=side) for side in (1, -1)]
+    system = System.from_modal(
+        [13.13], {"m": [0.635]}, modal_damping=0.02, stops=stops,
+        excitation=[Unbalance("m", 4.92e-6)],
+    )  # fmt: skip
+    orbit = solve_orbit(system, 11.51992, 2, guess=[7.93079e-06, 1.42423e-04])
+    branch = continue_branch(orbit, (11.519, 11.521))
+    folds = [s for s in branch.special_points if s.kind == "LP"]
+    assert len(folds) == 2
+    curve = continue_special(
+        folds[0], ("frequency_hz", "modal_damping"), ((5.0, 60.0), (0.0199, 0.06))
+    )
+    assert curve.stop_reasons == ("end of the range of modal_damping",) * 2
+    assert "GRLP" in [mark.kind for mark in curve.marks]
+    found = sorted(orbit.frequency_hz for orbit in curve.at("modal_damping", 0.02))
+    assert found == pytest.approx(sorted(fold.frequency_hz for fold in folds), rel=1e-11)
