@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Self, TypeVar
+from typing import TYPE_CHECKING, Generic, Self, TypeVar
 
 import numpy as np
 
@@ -26,45 +26,42 @@ if TYPE_CHECKING:
     from nldyn.orbit import Orbit
 
 Kept = TypeVar("Kept")
+Item = TypeVar("Item")
 
 PAUSE = 5.0  # s, at least, between two writings
 SHARE = 20.0  # times as long as it took to write
 
 
-class Checkpoint:
-    """A file with the finished branches of a computation and the one at work.
+class Keeper(Generic[Item]):
+    """A file with the finished parts of a computation and the one at work.
 
     As a context it writes the file at the end, also when an exception such as Ctrl-C ends the work.
 
     Parameters
     ----------
-    write_branches : callable, optional
-        Writes a list of branches; nothing is kept without it.
-    finished : list of Branch
-        Branches to be kept besides; the caller may add more.
-    earlier : sequence of Branch
+    write : callable, optional
+        Writes a list of parts; nothing is kept without it.
+    finished : list, optional
+        Parts to be kept besides; the caller may add more.
+    earlier : sequence
         What the file held before.
-    strict : str
-        Name of the file, if it shall hold nothing but the computation asked for.
 
     Attributes
     ----------
     work : callable or None
-        Gives the branch at work, as far as it is known.
+        Gives the part at work, as far as it is known.
     """
 
     def __init__(
         self,
-        write_branches: Callable[[Sequence[Branch]], None] | None = None,
-        finished: list[Branch] | None = None,
-        earlier: Sequence[Branch] = (),
-        strict: str = "",
+        write: Callable[[Sequence[Item]], None] | None = None,
+        finished: list[Item] | None = None,
+        earlier: Sequence[Item] = (),
     ) -> None:
-        self.work: Callable[[], Branch | None] | None = None
-        self._write = write_branches
+        self.work: Callable[[], Item | None] | None = None
+        self._write = write
         self._finished = [] if finished is None else finished
         self._earlier = list(earlier)
-        self._strict = strict
         self._due = time.monotonic() + PAUSE
         self._failed = False
 
@@ -76,6 +73,48 @@ class Checkpoint:
             self._earlier.clear()
         if self.work or self._finished:
             self.write()
+
+    def offer(self) -> None:
+        """Write, if it is time."""
+        if self._write is not None and time.monotonic() >= self._due:
+            self.write()
+
+    def write(self) -> None:
+        """Write what is finished, what is at work, and what the file held and is not yet used."""
+        if self._write is None:
+            return
+        start = time.monotonic()
+        part = self.work() if self.work else None
+        try:
+            self._write([*self._finished, *([part] if part else []), *self._earlier])
+        except OutputError as error:
+            if not self._failed:
+                warnings.warn(f"{error}; the computation goes on without it", stacklevel=2)
+            self._failed = True
+        end = time.monotonic()
+        self._due = end + max(PAUSE, SHARE * (end - start))
+
+
+class Checkpoint(Keeper["Branch"]):
+    """Keeps branches.
+
+    Parameters
+    ----------
+    write, finished, earlier
+        As for `Keeper`.
+    strict : str
+        Name of the file, if it shall hold nothing but the computation asked for.
+    """
+
+    def __init__(
+        self,
+        write: Callable[[Sequence[Branch]], None] | None = None,
+        finished: list[Branch] | None = None,
+        earlier: Sequence[Branch] = (),
+        strict: str = "",
+    ) -> None:
+        super().__init__(write, finished, earlier)
+        self._strict = strict
 
     def branch_from(self, orbit: Orbit, *courses: Course) -> Branch | None:
         """Take from the file the branch that was begun at an orbit with one of some courses.
@@ -97,26 +136,6 @@ class Checkpoint:
                 "options); choose another file, or delete it"
             )
         return None
-
-    def offer(self) -> None:
-        """Write, if it is time."""
-        if self._write is not None and time.monotonic() >= self._due:
-            self.write()
-
-    def write(self) -> None:
-        """Write what is finished, what is at work, and what the file held and is not yet used."""
-        if self._write is None:
-            return
-        start = time.monotonic()
-        branch = self.work() if self.work else None
-        try:
-            self._write([*self._finished, *([branch] if branch else []), *self._earlier])
-        except OutputError as error:
-            if not self._failed:
-                warnings.warn(f"{error}; the computation goes on without it", stacklevel=2)
-            self._failed = True
-        end = time.monotonic()
-        self._due = end + max(PAUSE, SHARE * (end - start))
 
 
 def checkpoint_at(

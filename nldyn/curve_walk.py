@@ -19,7 +19,7 @@ from nldyn.bordered import (
     gradient,
     tangent_surface,
 )
-from nldyn.branch import SHORT_STEP
+from nldyn.branch import NOT_FINISHED, SHORT_STEP
 from nldyn.codimension import codimension_tests, is_torus
 from nldyn.conditions import Both, BranchPoint, Grazing, Singular
 from nldyn.continuation import ContinuationOptions, passed_flip
@@ -285,11 +285,14 @@ class CurveWalk:
         First point, yielded first; its tangent gives the direction.
     options : ContinuationOptions
         Step control.
+    origin : CurvePoint, optional
+        Where the curve closes, in its direction; the start unless given.
     """
 
     start: CurvePoint
     options: ContinuationOptions
-    stop_reason: str = "not finished"
+    origin: CurvePoint | None = None
+    stop_reason: str = NOT_FINISHED
     _obstacle: str = field(default="", init=False, repr=False)
 
     def __iter__(self) -> Iterator[CurvePoint]:
@@ -450,8 +453,8 @@ class CurveWalk:
         return None
 
     def _closed(self, a: CurvePoint, b: CurvePoint) -> bool:
-        """Whether the walk from a to b passes the start again, in the same direction."""
-        start = self.start
+        """Whether the walk from a to b passes the origin, in its direction."""
+        start = self.origin or self.start
         if b.arclength - start.arclength < 3.0 * (b.arclength - a.arclength):
             return False
         weights = start.found.at.family.metric(start.point)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise, zip_longest
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -12,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.bordered import Condition, Free, OrbitFamily, correct, gradient, tangent_surface
-from nldyn.branch import check_special
+from nldyn.branch import NOT_FINISHED, check_special
+from nldyn.checkpoint import Keeper, begun_before
 from nldyn.conditions import Held, Monitor, defined_by
 from nldyn.continuation import ContinuationOptions
 from nldyn.curve_marks import CurveChord, Located, LocatedPoint, marks_between
@@ -142,8 +144,9 @@ class Curve:
         *,
         options: ContinuationOptions | None = None,
         progress: Callable[[Real], None] | None = None,
+        checkpoint: str | Path | None = None,
     ) -> Curve:
-        """Follow the curve beyond its ends; the points that it has are kept.
+        """Follow the curve beyond its ends, or finish it; the points that it has are kept.
 
         Parameters
         ----------
@@ -151,6 +154,8 @@ class Curve:
             Values between which to stay, which contain those of the curve.
         options, progress
             As for `continue_special`.
+        checkpoint : str or Path, optional
+            As for `continue_special`, but the file may be the one that holds this curve.
 
         Returns
         -------
@@ -159,7 +164,7 @@ class Curve:
         Raises
         ------
         SystemModelError
-            For ranges that do not contain the curve.
+            For ranges that do not contain the curve, or a file that holds something else.
         """
         charts = _charts(
             self.orbits[0], self.parameters, ranges, options, progress, len(self.parameters)
@@ -167,29 +172,10 @@ class Curve:
         for chart, column in zip(charts, self.values.T, strict=True):
             chart.check_start(float(column.min()))
             chart.check_start(float(column.max()))
-        points = [point.on_charts(charts) for point in self.points]
-        marks, notes, reasons = list(self.marks), list(self.notes), list(self.stop_reasons)
-        if CLOSED_CURVE in reasons:
+        if CLOSED_CURVE in self.stop_reasons:
             return self
-        for side in (1, 0):
-            end = points[-1] if side else points[0].reversed()
-            walk = CurveWalk(end, options or ContinuationOptions())
-            more = _collected(walk, progress)
-            reasons[side] = walk.stop_reason
-            found, lost = _marked(more)
-            notes += lost
-            if side:
-                points, marks = points + more[1:], marks + found
-            else:
-                points = [point.reversed() for point in more[:0:-1]] + points
-                marks = found[::-1] + marks
-        return replace(
-            self,
-            points=tuple(points),
-            marks=tuple(marks),
-            stop_reasons=(reasons[0], reasons[1]),
-            notes=tuple(notes),
-        )
+        whole = replace(self, points=tuple(point.on_charts(charts) for point in self.points))
+        return _followed(whole, options, progress, _keeper(checkpoint, self))
 
     def at(self, name: str, value: float) -> list[Orbit]:
         """All orbits of the curve at which a parameter has a value, corrected there.
@@ -230,6 +216,7 @@ def continue_in(
     *,
     options: ContinuationOptions | None = None,
     progress: Callable[[Real], None] | None = None,
+    checkpoint: str | Path | None = None,
 ) -> Curve:
     """Continue an orbit in one parameter, all others held.
 
@@ -245,6 +232,9 @@ def continue_in(
         Step control.
     progress : callable, optional
         Called with the parameter's value at every point.
+    checkpoint : str or Path, optional
+        A new HDF5 file that keeps the curve, written now and then, at the end, and when an
+        exception such as Ctrl-C ends the computation: `nldyn.load_curve` and `Curve.extend` go on.
 
     Returns
     -------
@@ -270,7 +260,7 @@ def continue_in(
     """
     charts = _charts(orbit, [parameter], [limits], options, progress)
     start = _start(OrbitFamily.around(orbit, charts), orbit, Free())
-    return _curve("orbit", start, options, progress)
+    return _curve("orbit", start, options, progress, checkpoint)
 
 
 def continue_special(
@@ -280,6 +270,7 @@ def continue_special(
     *,
     options: ContinuationOptions | None = None,
     progress: Callable[[Real], None] | None = None,
+    checkpoint: str | Path | None = None,
 ) -> Curve:
     """Continue a fold, flip, Neimark-Sacker, branch or grazing point in two parameters.
 
@@ -298,6 +289,9 @@ def continue_special(
         Step control.
     progress : callable, optional
         Called with the parameters' values at every point.
+    checkpoint : str or Path, optional
+        A new HDF5 file that keeps the curve, written now and then, at the end, and when an
+        exception such as Ctrl-C ends the computation: `nldyn.load_curve` and `Curve.extend` go on.
 
     Returns
     -------
@@ -321,7 +315,8 @@ def continue_special(
     charts = _charts(orbit, parameters, ranges, options, progress, 2)
     family, condition = defined_by(special.kind, OrbitFamily.around(orbit, charts), orbit)
     _check_special(special.kind, family, orbit, condition)
-    curve = _curve(special.kind, _start(family, orbit, condition), options, progress)
+    start = _start(family, orbit, condition)
+    curve = _curve(special.kind, start, options, progress, checkpoint)
     if len(curve.points) == 1 and DISSOLVED in curve.stop_reasons:
         names = " or ".join(chart.parameter.name for chart in charts)
         raise SystemModelError(
@@ -340,6 +335,7 @@ def continue_constant(
     value: float | None = None,
     options: ContinuationOptions | None = None,
     progress: Callable[[Real], None] | None = None,
+    checkpoint: str | Path | None = None,
 ) -> Curve:
     """Continue an orbit in two parameters so that a monitored quantity stays constant.
 
@@ -354,7 +350,7 @@ def continue_constant(
     value : float, optional
         Value to hold; the orbit's own unless given. The orbit is first followed in the first
         parameter alone, both ways within its range, up to where it has the value.
-    options, progress
+    options, progress, checkpoint
         As for `continue_special`.
 
     Returns
@@ -373,7 +369,7 @@ def continue_constant(
     condition = Held.of(monitor, value, orbit)
     orbit = _with_value(orbit, condition, charts[0], options or ContinuationOptions())
     start = _start(OrbitFamily.around(orbit, charts), orbit, condition)
-    return _curve(condition.name, start, options, progress)
+    return _curve(condition.name, start, options, progress, checkpoint)
 
 
 def _with_value(orbit: Orbit, condition: Held, chart: Chart, options: ContinuationOptions) -> Orbit:
@@ -460,26 +456,88 @@ def _curve(
     start: CurvePoint,
     options: ContinuationOptions | None,
     progress: Callable[[Real], None] | None,
+    checkpoint: str | Path | None,
 ) -> Curve:
     """Walk both ways from the start and mark what is met."""
-    options = options or ContinuationOptions()
-    up = CurveWalk(start, options)
-    points = _collected(up, progress)
-    reasons = (up.stop_reason, up.stop_reason)
-    if up.stop_reason != CLOSED_CURVE:
-        down = CurveWalk(start.reversed(), options)
-        before = _collected(down, progress)
-        points = [point.reversed() for point in before[:0:-1]] + points
-        reasons = (down.stop_reason, up.stop_reason)
-    marks, notes = _marked(points)
-    return Curve(
-        kind,
-        tuple(chart.parameter for chart in start.found.at.family.charts),
-        tuple(points),
-        tuple(marks),
-        reasons,
-        tuple(notes),
-    )
+    parameters = tuple(chart.parameter for chart in start.found.at.family.charts)
+    begun = Curve(kind, parameters, (start,), (), (NOT_FINISHED, NOT_FINISHED))
+    return _followed(begun, options, progress, _keeper(checkpoint, None))
+
+
+def _keeper(place: str | Path | None, known: Curve | None) -> Keeper[Curve]:
+    """What keeps a curve in a file, which must be new or hold a known curve."""
+    if place is None:
+        return Keeper()
+    from nldyn.curve_store import load_curves, save_curves
+    from nldyn.store import check_writable
+
+    path = check_writable(place)
+    if path.exists():
+        if known is None:
+            raise SystemModelError(
+                f"{path}: exists already; load_curve and Curve.extend go on from a curve that it "
+                "holds, or choose another file, or delete it"
+            )
+        condition = known.points[0].condition
+        laws = {i: s.law for i, s in enumerate(known.orbits[0].system.stops) if s.law}
+        monitor = condition.monitor if isinstance(condition, Held) else None
+        held = begun_before(partial(load_curves, laws=laws, monitor=monitor), path)
+        if [(c.kind, c.parameters) for c in held] != [(known.kind, known.parameters)]:
+            raise SystemModelError(f"{path}: holds other curves; choose another file, or delete it")
+    return Keeper(partial(save_curves, path))
+
+
+def _followed(
+    curve: Curve,
+    options: ContinuationOptions | None,
+    progress: Callable[[Real], None] | None,
+    keeper: Keeper[Curve],
+) -> Curve:
+    """A curve followed beyond its ends, forward first, with what is met on the new points.
+
+    Of one that was not finished all points are searched.
+    """
+    forward: list[CurvePoint] = []
+    backward: list[CurvePoint] = []
+    first, last = curve.stop_reasons
+
+    def whole() -> Curve:
+        points = [point.reversed() for point in backward[:0:-1]]
+        points += [*curve.points, *forward[1:]]
+        return replace(curve, points=tuple(points), stop_reasons=(NOT_FINISHED, NOT_FINISHED))
+
+    with keeper:
+        keeper.work = whole
+        for leg in (forward, backward):
+            points = whole().points
+            end, origin = points[-1], points[0]
+            if leg is backward:
+                end, origin = origin.reversed(), end.reversed()
+            walk = CurveWalk(end, options or ContinuationOptions(), origin)
+            for point in walk:
+                leg.append(point)
+                if progress is not None:
+                    progress(point.values)
+                keeper.offer()
+            if leg is forward:
+                last = walk.stop_reason
+            if leg is backward or walk.stop_reason == CLOSED_CURVE:
+                first = walk.stop_reason
+                break
+        if first == CLOSED_CURVE:
+            last = first
+        points = whole().points
+        if NOT_FINISHED in curve.stop_reasons:
+            marks, notes = _marked(points)
+        else:
+            (ahead, notes), (before, lost) = _marked(forward), _marked(backward)
+            marks = [*before[::-1], *curve.marks, *ahead]
+            notes = [*curve.notes, *notes, *lost]
+        done = replace(
+            curve, points=points, marks=tuple(marks), stop_reasons=(first, last), notes=tuple(notes)
+        )
+        keeper.work = lambda: done
+    return done
 
 
 def _marked(points: Sequence[CurvePoint]) -> tuple[list[LocatedPoint], list[str]]:
@@ -491,15 +549,6 @@ def _marked(points: Sequence[CurvePoint]) -> tuple[list[LocatedPoint], list[str]
         marks += more
         notes += lost
     return marks, notes
-
-
-def _collected(walk: CurveWalk, progress: Callable[[Real], None] | None) -> list[CurvePoint]:
-    points = []
-    for point in walk:
-        points.append(point)
-        if progress is not None:
-            progress(point.values)
-    return points
 
 
 def _start(family: OrbitFamily, orbit: Orbit, condition: Condition) -> CurvePoint:

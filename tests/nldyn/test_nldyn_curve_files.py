@@ -15,6 +15,7 @@ from nldyn import (
     Stop,
     System,
     SystemModelError,
+    Unbalance,
     continue_branch,
     continue_constant,
     continue_in,
@@ -143,6 +144,70 @@ def test_a_loaded_curve_goes_on(tmp_path):
     longer = load_curve(tmp_path / "short.h5").extend([(1e9, 2e10)])
     assert longer.values[[0, -1], 0] == pytest.approx([1e9, 2e10], rel=1e-14)
     assert longer.stop_reasons == ("end of the range of stiffness",) * 2
+
+
+@pytest.mark.parametrize("share", [0.2, 0.7])
+def test_an_interrupted_curve_is_kept_and_finished(tmp_path, share):
+    """In the leg forward, and in the one backward."""
+    path = tmp_path / "curve.h5"
+    found = special(make_one_dof(), "PD", (33.0, 34.0), 33.0)
+    pair, ranges = ("frequency_hz", "gap"), ((5.0, 60.0), (-1e-7, 2e-7))
+    whole = continue_special(found, pair, ranges)
+    seen = []
+
+    def stop(values):
+        seen.append(values)
+        if len(seen) > share * len(whole.points):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        continue_special(found, pair, ranges, progress=stop, checkpoint=path)
+    kept = load_curve(path)
+    assert kept.stop_reasons == ("not finished", "not finished") and not kept.marks
+    assert len(kept.points) >= len(seen) - 1
+    with pytest.raises(SystemModelError, match="exists already; load_curve and"):
+        continue_special(found, pair, ranges, checkpoint=path)
+    done = kept.extend(ranges, checkpoint=path)
+    assert done.stop_reasons == whole.stop_reasons
+    assert done.values[[0, -1]] == pytest.approx(whole.values[[0, -1]], rel=1e-9)
+    assert [mark.kind for mark in done.marks] == [mark.kind for mark in whole.marks]
+    again = load_curve(path)
+    assert np.array_equal(again.values, done.values) and again.stop_reasons == done.stop_reasons
+    other = continue_in(solve_orbit(make_one_dof(), 26.0), "gap", (0.0, 1e-7))
+    with pytest.raises(SystemModelError, match="holds other curves"):
+        other.extend([(0.0, 2e-7)], checkpoint=path)
+
+
+def test_an_interrupted_closed_curve_closes_where_it_began(tmp_path):
+    """A closed 1/3 branch between two equal stops."""
+    orbit = solve_orbit(symmetric_stops(), 11.26, 3, guess=[7.9058e-06, 9.9213e-05])
+    whole = continue_in(orbit, "frequency_hz", (11.0, 12.0))
+    assert whole.stop_reasons == ("closed curve", "closed curve")
+    seen = []
+
+    def stop(values):
+        seen.append(values)
+        if len(seen) == len(whole.points) // 2:
+            raise KeyboardInterrupt
+
+    path = tmp_path / "curve.h5"
+    with pytest.raises(KeyboardInterrupt):
+        continue_in(orbit, "frequency_hz", (11.0, 12.0), progress=stop, checkpoint=path)
+    done = load_curve(path).extend([(11.0, 12.0)])
+    assert done.stop_reasons == whole.stop_reasons
+    found, expected = (
+        sorted((m.kind, m.frequency_hz) for m in curve.marks) for curve in (done, whole)
+    )
+    assert [kind for kind, _ in found] == [kind for kind, _ in expected]
+    assert [hz for _, hz in found] == pytest.approx([hz for _, hz in expected], rel=1e-9)
+
+
+def symmetric_stops() -> System:
+    stops = [Stop("m", 1e6, 1.0, gap=5e-6, direction=side) for side in (1, -1)]
+    return System.from_modal(
+        [13.13], {"m": [0.635]}, modal_damping=0.02, stops=stops,
+        excitation=[Unbalance("m", 4.92e-6)],
+    )  # fmt: skip
 
 
 def test_several_curves_in_one_file_and_what_is_refused(tmp_path):
