@@ -26,7 +26,7 @@ from nldyn.parameters import Parameter
 
 KINDS = ("LP", "PD", "NS", "BP", "GR")
 
-BESIDE = 1e-2  # of an orbit's size: a crossing within it belongs to a turn
+BESIDE = 3e-3  # of an orbit's size: a crossing within it belongs to a turn
 SMALLEST_OVERLAP = 1e-3  # of null vectors: it vanishes where a multiplier is double
 
 Monitor = str | Callable[[Orbit], float]

@@ -301,7 +301,10 @@ class Walk:
         """
         if not behind.size or self.options.min_step > SHORTEST_CROSSING:
             return None
-        led = BranchPoint(here.orbit, here.orbit.point - behind[0], here.arclength)
+        secant = here.orbit.point - behind[0]
+        if _length(here.orbit.problem.metric(here.orbit.point), secant) < 1.1 * SHORTEST_CROSSING:
+            return None  # it was such a step already
+        led = BranchPoint(here.orbit, secant, here.arclength)
         obstacle = self._obstacle
         attempt = self._advance(here.orbit.problem, behind[:0], led, SHORTEST_CROSSING)
         self._obstacle = obstacle

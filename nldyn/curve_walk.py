@@ -36,6 +36,7 @@ UNFOLDED = 1e-6  # unfolding number from which a branch point has dissolved
 MEETING = 1e-9  # arclength within which a curve and a grazing meet
 MOST_SECANTS = 20
 BEHIND = (1e-5, 1e-6, 1e-7)  # extremes, relative to the orbit, of a first point behind a corner
+ALONG = 1e-12  # part of a unit tangent that is rounding
 CORNER_STEP = 1e-3  # a step shorter than this may have met a corner
 
 
@@ -182,20 +183,20 @@ def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> list[CurvePo
         if not (ahead and length < 10.0 * options.grazing_step):
             return []
         before = float(grazing.value(here.found.at)[0])
-        tangent = _tangent_behind(found.at, here.condition, grazing, before < 0.0)
         condition = here.condition.renewed(found.at)
         kind = f"GR{here.condition.kind}"
-        corner = CurvePoint(found, condition, tangent, here.arclength + length, kind)
-        behind = None
+        corner = CurvePoint(found, condition, here.tangent, here.arclength + length, kind)
         if linear:
             side = -math.copysign(1.0, before)
             behind = _behind(corner, grazing, side, 2.0 * options.max_step)
+            if behind is not None:
+                chord = behind.point - corner.point
+                tangent = chord / _length(family.metric(corner.point), chord)
+                return [replace(corner, tangent=tangent), behind]
+        tangent = _tangent_behind(found.at, here.condition, grazing, before < 0.0)
+        return [replace(corner, tangent=tangent)]
     except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
         return []
-    if behind is None:
-        return [corner]
-    chord = behind.point - corner.point
-    return [replace(corner, tangent=chord / _length(family.metric(corner.point), chord)), behind]
 
 
 def _behind(
@@ -205,7 +206,10 @@ def _behind(
     at, condition = corner.found.at, corner.condition
     family = at.family
     for depth in BEHIND:
-        met = _meeting(at, condition, replace(grazing, depth=side * depth), farthest)
+        try:
+            met = _meeting(at, condition, replace(grazing, depth=side * depth), farthest)
+        except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
+            continue
         if met is None:
             continue
         chord = met.at.point - at.point
@@ -257,6 +261,14 @@ def _meeting(
     return None
 
 
+def _grazes_linear(orbit: Orbit) -> bool:
+    """Whether the extreme nearest to zero is one of a linear stop."""
+    try:
+        return orbit.system.stops[Grazing.of(orbit).stop].exponent == 1.0
+    except SystemModelError:
+        return False
+
+
 def _tangent_behind(at: Evaluation, condition: Condition, grazing: Grazing, deep: bool) -> Real:
     """Unit tangent of a curve on the side of a grazing where the extreme is positive, or not."""
     _, surface = tangent_surface(at)
@@ -303,15 +315,15 @@ class CurveWalk:
         if left := self._left_at_once():
             self.stop_reason = f"{RANGE_END}{left}"
             return
-        behind: CurvePoint | None = None  # a corner
+        ahead: list[CurvePoint] = []  # a corner, and what is behind it
         for _ in range(self.options.max_points):
             attempt = None
             seen = bool(here.corner)
-            if behind is not None:
-                attempt = behind, self.options.max_angle, self.options.max_miss
-                step, behind = behind.arclength - here.arclength, None
+            if ahead:
+                step = ahead[0].arclength - here.arclength
+                attempt = ahead.pop(0), self.options.max_angle, self.options.max_miss
             while attempt is None:
-                attempt = self._advance(here, curvature, step)
+                attempt = self._advance(here, curvature, step, seen)
                 if attempt is None:
                     limit = self._limit_ahead(here, step)
                     if limit is not None:
@@ -320,9 +332,9 @@ class CurveWalk:
                     step *= 0.5
                     if step < CORNER_STEP and not seen:
                         seen = True
-                        corner, behind, *_ = *corner_ahead(here, self.options), None, None
-                        if corner is not None:
-                            attempt = corner, self.options.max_angle, self.options.max_miss
+                        ahead = corner_ahead(here, self.options)
+                        if ahead:
+                            attempt = ahead.pop(0), self.options.max_angle, self.options.max_miss
                     if step < self.options.min_step:
                         self.stop_reason = (
                             f"{SHORT_STEP}{self.options.min_step:g}: {self._obstacle}"
@@ -344,11 +356,12 @@ class CurveWalk:
         self.stop_reason = f"{self.options.max_points} points"
 
     def _advance(
-        self, here: CurvePoint, curvature: Real, step: float
+        self, here: CurvePoint, curvature: Real, step: float, seen: bool
     ) -> tuple[CurvePoint, float, float] | None:
         """Next point, its angle to this one and its relative distance from the predictor.
 
-        None when the step must be shorter.
+        None when the step must be shorter. Where no corner was seen yet, none of a linear stop is
+        stepped over: beside it another piece of the curve may lie straight ahead.
         """
         family = here.found.at.family
         weights = family.metric(here.point)
@@ -379,9 +392,8 @@ class CurveWalk:
         touched = there.orbit.impacts != here.orbit.impacts
         grazes = isinstance(here.condition, Grazing)
         if touched and not grazes:
-            # beside a grazing of a linear stop another piece of the curve may lie straight ahead
-            linear = any(stop.exponent == 1.0 for stop in here.orbit.system.stops)
-            root = linear and isinstance(here.condition, Singular)
+            self._obstacle = "the number of contacts changes"
+            root = isinstance(here.condition, Singular) and not seen and _grazes_linear(here.orbit)
             if root or step > self.options.grazing_step:
                 return None
         return there, angle, miss
@@ -392,7 +404,7 @@ class CurveWalk:
         for which, chart in enumerate(charts):
             value = float(start.values[which])
             slope = float(start.tangent[start.found.at.family.n_states + which])
-            if (slope < 0.0 and value <= chart.low) or (slope > 0.0 and value >= chart.high):
+            if (slope < -ALONG and value <= chart.low) or (slope > ALONG and value >= chart.high):
                 return str(chart.parameter.name)
         return ""
 

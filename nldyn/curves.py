@@ -27,6 +27,7 @@ from nldyn.curve_walk import (
     on_chart_plane,
 )
 from nldyn.errors import SystemModelError, check_choice, check_types, is_finite, shown
+from nldyn.flow import FlowMap
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, check_minimal
 from nldyn.parameter_values import Chart, checked_parameter, value_of
@@ -172,10 +173,9 @@ class Curve:
         for chart, column in zip(charts, self.values.T, strict=True):
             chart.check_start(float(column.min()))
             chart.check_start(float(column.max()))
-        if CLOSED_CURVE in self.stop_reasons:
-            return self
+        keeper = _keeper(checkpoint, self)
         whole = replace(self, points=tuple(point.on_charts(charts) for point in self.points))
-        return _followed(whole, options, progress, _keeper(checkpoint, self))
+        return _followed(whole, options, progress, keeper)
 
     def at(self, name: str, value: float) -> list[Orbit]:
         """All orbits of the curve at which a parameter has a value, corrected there.
@@ -259,8 +259,9 @@ def continue_in(
     ['1e-06', '1e-05']
     """
     charts = _charts(orbit, [parameter], [limits], options, progress)
+    keeper = _keeper(checkpoint)
     start = _start(OrbitFamily.around(orbit, charts), orbit, Free())
-    return _curve("orbit", start, options, progress, checkpoint)
+    return _curve("orbit", start, options, progress, keeper)
 
 
 def continue_special(
@@ -313,11 +314,14 @@ def continue_special(
     check_special("continue_special", special, of_branch=False)
     orbit = special.orbit
     charts = _charts(orbit, parameters, ranges, options, progress, 2)
+    keeper = _keeper(checkpoint)
     family, condition = defined_by(special.kind, OrbitFamily.around(orbit, charts), orbit)
     _check_special(special.kind, family, orbit, condition)
     start = _start(family, orbit, condition)
-    curve = _curve(special.kind, start, options, progress, checkpoint)
+    curve = _curve(special.kind, start, options, progress, keeper)
     if len(curve.points) == 1 and DISSOLVED in curve.stop_reasons:
+        if checkpoint is not None:
+            Path(checkpoint).unlink(missing_ok=True)
         names = " or ".join(chart.parameter.name for chart in charts)
         raise SystemModelError(
             f"the BP at {orbit.frequency_hz:g} Hz is a single point: it dissolves when {names} "
@@ -351,7 +355,7 @@ def continue_constant(
         Value to hold; the orbit's own unless given. The orbit is first followed in the first
         parameter alone, both ways within its range, up to where it has the value.
     options, progress, checkpoint
-        As for `continue_special`.
+        As for `continue_special`; the way to the value is not kept.
 
     Returns
     -------
@@ -366,10 +370,11 @@ def continue_constant(
         If no orbit with the value is found on the way; the text says which values are.
     """
     charts = _charts(orbit, parameters, ranges, options, progress, 2)
+    keeper = _keeper(checkpoint)
     condition = Held.of(monitor, value, orbit)
     orbit = _with_value(orbit, condition, charts[0], options or ContinuationOptions())
     start = _start(OrbitFamily.around(orbit, charts), orbit, condition)
-    return _curve(condition.name, start, options, progress, checkpoint)
+    return _curve(condition.name, start, options, progress, keeper)
 
 
 def _with_value(orbit: Orbit, condition: Held, chart: Chart, options: ContinuationOptions) -> Orbit:
@@ -456,16 +461,16 @@ def _curve(
     start: CurvePoint,
     options: ContinuationOptions | None,
     progress: Callable[[Real], None] | None,
-    checkpoint: str | Path | None,
+    keeper: Keeper[Curve],
 ) -> Curve:
     """Walk both ways from the start and mark what is met."""
     parameters = tuple(chart.parameter for chart in start.found.at.family.charts)
     begun = Curve(kind, parameters, (start,), (), (NOT_FINISHED, NOT_FINISHED))
-    return _followed(begun, options, progress, _keeper(checkpoint, None))
+    return _followed(begun, options, progress, keeper)
 
 
-def _keeper(place: str | Path | None, known: Curve | None) -> Keeper[Curve]:
-    """What keeps a curve in a file, which must be new or hold a known curve."""
+def _keeper(place: str | Path | None, known: Curve | None = None) -> Keeper[Curve]:
+    """What keeps a curve in a file, which must be new or hold a piece of a known curve."""
     if place is None:
         return Keeper()
     from nldyn.curve_store import load_curves, save_curves
@@ -482,9 +487,27 @@ def _keeper(place: str | Path | None, known: Curve | None) -> Keeper[Curve]:
         laws = {i: s.law for i, s in enumerate(known.orbits[0].system.stops) if s.law}
         monitor = condition.monitor if isinstance(condition, Held) else None
         held = begun_before(partial(load_curves, laws=laws, monitor=monitor), path)
-        if [(c.kind, c.parameters) for c in held] != [(known.kind, known.parameters)]:
-            raise SystemModelError(f"{path}: holds other curves; choose another file, or delete it")
+        if not (len(held) == 1 and _is_piece(held[0], known)):
+            raise SystemModelError(
+                f"{path}: holds another curve, or more of this one; choose another file, or "
+                "delete it"
+            )
     return Keeper(partial(save_curves, path))
+
+
+def _is_piece(held: Curve, known: Curve) -> bool:
+    """Whether a curve has no points but those of another one."""
+    from nldyn.store import same_flow
+
+    if (held.kind, held.parameters) != (known.kind, known.parameters):
+        return False
+    a, b = held.points[0].found.at.family, known.points[0].found.at.family
+    rows = {tuple(row) for row in known.values.tolist()}
+    return (
+        (a.period, a.segments) == (b.period, b.segments)
+        and same_flow(FlowMap(a.system, a.options), FlowMap(b.system, b.options))
+        and all(tuple(row) in rows for row in held.values.tolist())
+    )
 
 
 def _followed(
@@ -502,13 +525,18 @@ def _followed(
     first, last = curve.stop_reasons
 
     def whole() -> Curve:
+        """What there is, not finished before it is searched."""
         points = [point.reversed() for point in backward[:0:-1]]
         points += [*curve.points, *forward[1:]]
-        return replace(curve, points=tuple(points), stop_reasons=(NOT_FINISHED, NOT_FINISHED))
+        closed = CLOSED_CURVE in (first, last)
+        reasons = NOT_FINISHED, CLOSED_CURVE if closed else NOT_FINISHED
+        return replace(curve, points=tuple(points), stop_reasons=reasons)
 
     with keeper:
         keeper.work = whole
         for leg in (forward, backward):
+            if CLOSED_CURVE in (first, last):
+                break
             points = whole().points
             end, origin = points[-1], points[0]
             if leg is backward:
@@ -521,11 +549,10 @@ def _followed(
                 keeper.offer()
             if leg is forward:
                 last = walk.stop_reason
-            if leg is backward or walk.stop_reason == CLOSED_CURVE:
+            else:
                 first = walk.stop_reason
-                break
-        if first == CLOSED_CURVE:
-            last = first
+        if CLOSED_CURVE in (first, last):
+            first = last = CLOSED_CURVE
         points = whole().points
         if NOT_FINISHED in curve.stop_reasons:
             marks, notes = _marked(points)

@@ -417,6 +417,7 @@ def diagram(
         _follow_branch_points(box)
         _follow_flips_of_new(box, wanted, doublings)
         _follow_branch_points(box)
+        _follow_mirror_images(box)
     for period in wanted:
         if not any(branch.period == period for branch in box.branches):
             tried = f"{search_points} frequenc{'y' if search_points == 1 else 'ies'}"
@@ -488,6 +489,13 @@ def _follow_branch_points(box: Collector) -> None:
         for special in branch.special_points:
             if special.kind == "BP":
                 box.from_branch_point(special)
+
+
+def _follow_mirror_images(box: Collector) -> None:
+    """Follow the other halves of what breaks a symmetry of the system."""
+    if box.flow.system.symmetric:
+        for branch in box.branches:  # which become more
+            box.from_mirror(branch, box.options)
 
 
 def _follow_flips_of_new(box: Collector, wanted: Sequence[int], doublings: int) -> None:

@@ -111,7 +111,7 @@ def plot_phase_portrait(
     ax.plot(y / factor, speed / pace, "o", color="black", markersize=5.0, label=label, zorder=4)
     for number, gap in enumerate(stop_places(orbit.system, name)):
         name_once = "stop" if number == 0 else None
-        ax.axvline(gap / factor, color=PERIOD_COLOURS[1], linestyle="--", label=name_once)
+        ax.axvline(gap / factor, color=PERIOD_COLOURS[1], linestyle="-.", label=name_once)
     _draw_legend(ax)
     ax.set_xlabel(f"displacement of {name} ({unit})")
     ax.set_ylabel(f"velocity ({pace_unit}/s)")

@@ -39,7 +39,7 @@ ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
 MOST_LOOKS = 6  # times that a step is cut at such points
-UNFOLDED = 1e-11  # least unfolding of a crossing, relative to the orbit, that is not rounding
+CROSSES = 1e-11  # least unfolding of a crossing, relative to the orbit, that is not rounding
 SHORTEST_LOOK = 1e-6  # arclength of a step, below which it is not cut there
 VANISHED = 1e-3  # an extreme at its root, relative to those beside it
 CLOSE = 0.01  # part of a step within which a point beside it does not help
@@ -479,7 +479,7 @@ def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
     if special.kind != "LP" or not turns_near_crossing(special.orbit):
         return special
     crossing = nearest_crossing(special.orbit)
-    if crossing is None or crossing[1] > UNFOLDED:
+    if crossing is None or crossing[1] > CROSSES:
         return special
     at, (orbit, _) = special.point, crossing
     weights = orbit.problem.metric(orbit.point)

@@ -287,7 +287,10 @@ class System:
 
     @cached_property
     def symmetric(self) -> bool:
-        """Whether -x(t + T/2) is a motion if x(t) is one: each stop has one opposite to it."""
+        """Whether -x(t + T/2) is a motion if x(t) is one: each stop has one opposite to it.
+
+        All excitation is harmonic, of the period T, and so changes its sign after half of that.
+        """
         stops = [
             (self.stop_vector(s), (s.stiffness, s.exponent, s.gap, s.dissipation, s.law))
             for s in self.stops

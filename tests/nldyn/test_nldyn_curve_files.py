@@ -20,6 +20,7 @@ from nldyn import (
     continue_constant,
     continue_in,
     continue_special,
+    curves,
     load_branch,
     load_curve,
     load_curves,
@@ -165,20 +166,29 @@ def test_an_interrupted_curve_is_kept_and_finished(tmp_path, share):
     kept = load_curve(path)
     assert kept.stop_reasons == ("not finished", "not finished") and not kept.marks
     assert len(kept.points) >= len(seen) - 1
+    assert (kept.points[0].arclength < 0.0) is (share > 0.5)
     with pytest.raises(SystemModelError, match="exists already; load_curve and"):
         continue_special(found, pair, ranges, checkpoint=path)
     done = kept.extend(ranges, checkpoint=path)
     assert done.stop_reasons == whole.stop_reasons
     assert done.values[[0, -1]] == pytest.approx(whole.values[[0, -1]], rel=1e-9)
     assert [mark.kind for mark in done.marks] == [mark.kind for mark in whole.marks]
+    for mark, other in zip(done.marks, whole.marks, strict=True):
+        assert mark.values == pytest.approx(other.values, rel=1e-8)
     again = load_curve(path)
     assert np.array_equal(again.values, done.values) and again.stop_reasons == done.stop_reasons
-    other = continue_in(solve_orbit(make_one_dof(), 26.0), "gap", (0.0, 1e-7))
-    with pytest.raises(SystemModelError, match="holds other curves"):
-        other.extend([(0.0, 2e-7)], checkpoint=path)
+    few = ContinuationOptions(max_points=2)
+    next_flip = special(make_one_dof(), "PD", (12.0, 20.0), 20.0)
+    for other in (
+        continue_special(next_flip, pair, ranges, options=few),
+        continue_in(solve_orbit(make_one_dof(), 26.0), "gap", (0.0, 1e-7), options=few),
+    ):
+        with pytest.raises(SystemModelError, match="holds another curve, or more of this one"):
+            other.extend([(5.0, 60.0), (-1e-7, 2e-7)][-len(other.parameters) :], checkpoint=path)
 
 
-def test_an_interrupted_closed_curve_closes_where_it_began(tmp_path):
+@pytest.mark.parametrize("searched", [False, True])
+def test_an_interrupted_closed_curve_closes_where_it_began(tmp_path, monkeypatch, searched):
     """A closed 1/3 branch between two equal stops."""
     orbit = solve_orbit(symmetric_stops(), 11.26, 3, guess=[7.9058e-06, 9.9213e-05])
     whole = continue_in(orbit, "frequency_hz", (11.0, 12.0))
@@ -187,14 +197,21 @@ def test_an_interrupted_closed_curve_closes_where_it_began(tmp_path):
 
     def stop(values):
         seen.append(values)
-        if len(seen) == len(whole.points) // 2:
+        if not searched and len(seen) == len(whole.points) // 2:
             raise KeyboardInterrupt
 
+    def stop_search(points):
+        raise KeyboardInterrupt
+
     path = tmp_path / "curve.h5"
-    with pytest.raises(KeyboardInterrupt):
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        if searched:
+            patched.setattr(curves, "_marked", stop_search)
         continue_in(orbit, "frequency_hz", (11.0, 12.0), progress=stop, checkpoint=path)
     done = load_curve(path).extend([(11.0, 12.0)])
     assert done.stop_reasons == whole.stop_reasons
+    length = [curve.points[-1].arclength for curve in (done, whole)]
+    assert length[0] == pytest.approx(length[1], rel=0.2)
     found, expected = (
         sorted((m.kind, m.frequency_hz) for m in curve.marks) for curve in (done, whole)
     )
