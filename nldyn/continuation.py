@@ -48,6 +48,7 @@ from nldyn.special import (
     LocateError,
     crosses,
     insert_dip,
+    is_crossing,
     special_points_between,
     without_repeats,
 )
@@ -58,6 +59,10 @@ MEETS_OPEN_END = "meets another branch where that was broken off"
 EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
 MEETING_STEP = 0.001  # longest step over which a doubled branch may meet the one it comes from
 SHORTEST_CROSSING = 3e-6  # step over which a branch may cross another one
+RECENT = 10  # points behind a walk that it does not come back to
+SAME_PLACE = 1e-8  # distance of points that are one, relative to the orbit
+COMES_BACK = "comes back to where it had been"
+TOO_NEAR = "on the way it left the branch for another one that lies too near"
 SHORTEST_DETOUR = 1e-6  # first step of a walk that looks closely at what lies within a step
 MOST_DETOUR = 500  # points of such a walk
 MOST_POINTS = 10**8  # in one direction
@@ -158,6 +163,8 @@ class Walk:
         Where other branches were broken off: the walk stops at the first of these that it passes.
     stride : Stride, optional
         Where to go on, if not at the start.
+    visited : list of BranchPoint
+        The points so far.
     """
 
     start: BranchPoint
@@ -166,6 +173,7 @@ class Walk:
     open_ends: Real | None = None
     stop_reason: str = NOT_FINISHED
     stride: Stride | None = None
+    visited: list[BranchPoint] = field(default_factory=list, repr=False)
     _obstacle: str = field(default="", init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -216,6 +224,9 @@ class Walk:
                 self.stop_reason = CLOSED
                 yield point
                 return
+            if self._comes_back(here, point):
+                self.stop_reason = f"{COMES_BACK} at {here.orbit.frequency_hz:.6g} Hz: {TOO_NEAR}"
+                return
             if self.open_ends is not None and _passed(here, point, self.open_ends).any():
                 self.stop_reason = MEETS_OPEN_END
                 yield point
@@ -227,6 +238,7 @@ class Walk:
             behind = np.array([] if bent else [here.orbit.point, here.tangent])
             behind = behind.reshape(-1, here.tangent.size)
             self.stride = Stride(point, step, behind, self.stride.count + 1)
+            self.visited.append(point)
             yield point
         self.stop_reason = f"{self.options.max_points}{POINTS}"
 
@@ -288,7 +300,8 @@ class Walk:
         if meets and step > MEETING_STEP:
             return None
         point = BranchPoint(orbit, tangent, here.arclength + step)
-        if not meets and step > SHORTEST_CROSSING and crosses(here, point):
+        long = step > SHORTEST_CROSSING
+        if not meets and crosses(here, point) and (long or not is_crossing(orbit)):
             return None
         return point, angle, miss
 
@@ -341,6 +354,27 @@ class Walk:
         places, tangents = self._shifts
         step = start.orbit.problem.metric(start.orbit.point) * (b.orbit.point - a.orbit.point)
         return bool((_passed(a, b, places) & (tangents @ step > 0.0)).any())
+
+    def _comes_back(self, a: BranchPoint, b: BranchPoint) -> bool:
+        """Whether the walk from a to b passes a point that it has passed before, not the start.
+
+        It can, in the same direction, only where it has left its branch for another one on the way.
+        """
+        problem, before = a.orbit.problem, self.visited[:-RECENT]
+        weights, step = problem.metric(a.orbit.point), b.orbit.point - a.orbit.point
+        logs = np.array([point.orbit.point[-1] for point in before])
+        length2 = float(step @ (weights * step))
+        for index in np.flatnonzero(np.abs(logs - a.orbit.point[-1]) <= 1.1 * math.sqrt(length2)):
+            place, tangent = before[index].orbit.point, before[index].tangent
+            if tangent @ (weights * step) <= 0.0 or not _passed(a, b, place[None]).any():
+                continue
+            row = weights * tangent / np.linalg.norm(weights * tangent)
+            share = float((place - a.orbit.point) @ (weights * step)) / length2
+            guess = a.orbit.point + share * step
+            found = problem.correct(guess, row, offset=float(row @ place))
+            if found.converged and _length(weights, found.point - place) < SAME_PLACE:
+                return True
+        return False
 
     @cached_property
     def _shifts(self) -> tuple[Real, Real]:
@@ -586,6 +620,7 @@ class Trail:
             return cls(walk)
         here = leg.nodes[end.node]
         walk.stride = Stride(here, end.step, end.behind, end.count)
+        walk.visited = list(leg.nodes[: end.kept])
         return cls(
             walk,
             [*leg.nodes[: end.kept], here],
@@ -620,6 +655,8 @@ class Trail:
                 if keep is not None:
                     keep()
         self._search(len(self.nodes) - 1, closely=False)
+        if self.walk.stop_reason.startswith(COMES_BACK):
+            self.notes.append(self.walk.stop_reason)
         special = self.special_points
         if self.walk.stop_reason.startswith(JOINS):  # the flip itself: this branch turns there
             last = min(self.nodes[-2].arclength, self.nodes[-1].arclength - NEIGHBOUR)

@@ -237,7 +237,8 @@ class Collector:
 
     def from_mirror(self, branch: Branch, options: ContinuationOptions) -> None:
         """Follow the mirror image of a branch of a symmetric system, unless it is known."""
-        orbit = middle_orbit(branch)
+        quarters = [branch.nodes[i * len(branch.nodes) // 4].orbit for i in (1, 2, 3)]
+        orbit = max(quarters, key=lambda orbit: float(np.abs(orbit.multipliers - 1.0).min()))
         half_later = -orbit.states(orbit.problem.phases[:-1] + math.pi)
         try:
             image = solve_orbit(

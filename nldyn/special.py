@@ -39,7 +39,7 @@ ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
 MOST_LOOKS = 6  # times that a step is cut at such points
-CROSSES = 1e-11  # least unfolding of a crossing, relative to the orbit, that is not rounding
+CROSSES = 1e-12  # least unfolding of a crossing, relative to the orbit, that is not rounding
 SHORTEST_LOOK = 1e-6  # arclength of a step, below which it is not cut there
 VANISHED = 1e-3  # an extreme at its root, relative to those beside it
 CLOSE = 0.01  # part of a step within which a point beside it does not help
@@ -468,6 +468,12 @@ def _turns_twice(a: SpecialPoint, b: SpecialPoint) -> bool:
 def _pace(special: SpecialPoint) -> float:
     """How fast the frequency changes along the branch."""
     return abs(float(special.point.tangent[-1]))
+
+
+def is_crossing(orbit: Orbit) -> bool:
+    """Whether branches cross beside an orbit, and do not only come close; if it can be told."""
+    crossing = nearest_crossing(orbit)
+    return crossing is None or crossing[1] <= CROSSES
 
 
 def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:

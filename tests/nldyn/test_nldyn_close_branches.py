@@ -14,6 +14,7 @@ from nldyn import (
     Stop,
     System,
     Unbalance,
+    continuation,
     continue_branch,
     diagram,
     solve_orbit,
@@ -241,3 +242,16 @@ def test_end_of_a_doubled_branch_is_told_as_no_fold():
         assert sorted(special_points(again)) == [
             (kind, pytest.approx(hz, rel=1e-8)) for kind, hz in expected
         ]
+
+
+def test_a_walk_that_comes_back_to_where_it_was_says_so(monkeypatch):
+    """Made to jump at a nearly perfect pitchfork, it would go round the closed branch for ever."""
+    monkeypatch.setattr(continuation, "SHORTEST_CROSSING", 1e-4)
+    monkeypatch.setattr(continuation, "is_crossing", lambda orbit: True)
+    branch = continue_branch(
+        solve_orbit(unequal_gaps(1e-9), 11.0),
+        (11.0, 11.8),
+        options=ContinuationOptions(first_step=0.05),
+    )
+    for texts in (branch.stop_reasons, branch.notes):
+        assert any(text.startswith("comes back to where it had been") for text in texts)
