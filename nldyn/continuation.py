@@ -59,6 +59,7 @@ MEETS_OPEN_END = "meets another branch where that was broken off"
 EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
 MEETING_STEP = 0.001  # longest step over which a doubled branch may meet the one it comes from
 SHORTEST_CROSSING = 3e-6  # step over which a branch may cross another one
+LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
 RECENT = 10  # points behind a walk that it does not come back to
 SAME_PLACE = 1e-8  # distance of points that are one, relative to the orbit
 COMES_BACK = "comes back to where it had been"
@@ -144,6 +145,31 @@ class Stride:
     count: int
 
 
+class Rows:
+    """A growing array: what was given out of it keeps its length and shares its memory.
+
+    Parameters
+    ----------
+    width : int
+        Of each row.
+    """
+
+    def __init__(self, width: int) -> None:
+        self._rows = np.empty((16, width))
+        self._count = 0
+
+    def add(self, row: Real) -> None:
+        """Append a row (width,)."""
+        if self._count == len(self._rows):
+            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
+        self._rows[self._count] = row
+        self._count += 1
+
+    def so_far(self) -> Real:
+        """All rows, (m, width)."""
+        return self._rows[: self._count]
+
+
 @dataclass
 class Walk:
     """Iterator over the points of a branch in one direction.
@@ -174,6 +200,7 @@ class Walk:
     stop_reason: str = NOT_FINISHED
     stride: Stride | None = None
     visited: list[BranchPoint] = field(default_factory=list, repr=False)
+    _places: Rows | None = field(default=None, init=False, repr=False)  # unknowns of these
     _obstacle: str = field(default="", init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -224,7 +251,7 @@ class Walk:
                 self.stop_reason = CLOSED
                 yield point
                 return
-            if self._comes_back(here, point):
+            if self.stride.count % LOOKS_BACK == 0 and self._comes_back(here, point):
                 self.stop_reason = f"{COMES_BACK} at {here.orbit.frequency_hz:.6g} Hz: {TOO_NEAR}"
                 return
             if self.open_ends is not None and _passed(here, point, self.open_ends).any():
@@ -360,13 +387,19 @@ class Walk:
 
         It can, in the same direction, only where it has left its branch for another one on the way.
         """
-        problem, before = a.orbit.problem, self.visited[:-RECENT]
+        if self._places is None:
+            self._places = Rows(a.orbit.point.size)
+        for point in self.visited[len(self._places.so_far()) :]:
+            self._places.add(point.orbit.point)
+        passed = _passed(a, b, self._places.so_far()[:-RECENT])
+        if not passed.any():
+            return False
+        problem = a.orbit.problem
         weights, step = problem.metric(a.orbit.point), b.orbit.point - a.orbit.point
-        logs = np.array([point.orbit.point[-1] for point in before])
         length2 = float(step @ (weights * step))
-        for index in np.flatnonzero(np.abs(logs - a.orbit.point[-1]) <= 1.1 * math.sqrt(length2)):
-            place, tangent = before[index].orbit.point, before[index].tangent
-            if tangent @ (weights * step) <= 0.0 or not _passed(a, b, place[None]).any():
+        for index in np.flatnonzero(passed):
+            place, tangent = self.visited[index].orbit.point, self.visited[index].tangent
+            if tangent @ (weights * step) <= 0.0:
                 continue
             row = weights * tangent / np.linalg.norm(weights * tangent)
             share = float((place - a.orbit.point) @ (weights * step)) / length2

@@ -23,6 +23,7 @@ from nldyn.branch import (
 from nldyn.checkpoint import Checkpoint, checkpoint_of_several
 from nldyn.continuation import (
     ContinuationOptions,
+    Rows,
     broken_off,
     check_range,
     complete,
@@ -32,7 +33,6 @@ from nldyn.continuation import (
 )
 from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
 from nldyn.flow import FlowMap, flow_of
-from nldyn.linear import Real
 from nldyn.normal_forms import switch_at_branch_point
 from nldyn.orbit import ConvergenceError, Orbit, check_observe, solve_orbit
 from nldyn.search import SearchOptions, Strobe, orbits_from_strobe, reach, simulate_strobe
@@ -100,31 +100,6 @@ class Diagram:
         from nldyn.store import save_diagram
 
         save_diagram(path, self)
-
-
-class Rows:
-    """A growing array: what was given out of it keeps its length and shares its memory.
-
-    Parameters
-    ----------
-    width : int
-        Of each row.
-    """
-
-    def __init__(self, width: int) -> None:
-        self._rows = np.empty((16, width))
-        self._count = 0
-
-    def add(self, row: Real) -> None:
-        """Append a row (width,)."""
-        if self._count == len(self._rows):
-            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
-        self._rows[self._count] = row
-        self._count += 1
-
-    def so_far(self) -> Real:
-        """All rows, (m, width)."""
-        return self._rows[: self._count]
 
 
 @dataclass
