@@ -16,6 +16,7 @@ from nldyn.orbit import Orbit, same_orbit, stroboscopic
 from nldyn.special import Chord, LocateError, root
 
 SAME = 4e-15  # difference of two logarithms of a frequency that is rounding
+NEARLY_SAME = 1e-12  # the same, of an orbit solved for and not held there
 BESIDE = 2.0  # an orbit further from a chord, in its lengths, is not on the branch between its ends
 
 
@@ -136,7 +137,8 @@ def _crossing(a: BranchPoint, b: BranchPoint, p: float) -> BranchPoint:
     """Point between two neighbours with ln ω = p.
 
     Beside a fold Newton's method at a fixed frequency may miss; then the point is first located
-    along the branch.
+    along the branch. So near to the end of a doubled branch that steps at a fixed frequency do not
+    get shorter than rounding makes them, it is that point.
 
     Raises
     ------
@@ -149,7 +151,13 @@ def _crossing(a: BranchPoint, b: BranchPoint, p: float) -> BranchPoint:
         return _held(chord, sigma, chord.between(sigma), p)
     except LocateError:
         sigma, _ = root(lambda x: _log_frequency(chord.at(x)) - p)
-        return _held(chord, sigma, chord.at(sigma).orbit.point, p)
+        point = chord.at(sigma)
+        try:
+            return _held(chord, sigma, point.orbit.point, p)
+        except LocateError:
+            if abs(_log_frequency(point) - p) > NEARLY_SAME:
+                raise
+            return point
 
 
 def _held(chord: Chord, sigma: float, guess: Real, p: float) -> BranchPoint:

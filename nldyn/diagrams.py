@@ -207,13 +207,13 @@ class Collector:
                     self.from_flip(special, options)
                 elif special.kind == "BP":
                     self.from_branch_point(special, options)
-            if self.flow.system.symmetric:
-                self.from_mirror(branch, self.options if branch.period <= wanted else shorter)
+            self.from_mirror(branch, self.options if branch.period <= wanted else shorter)
 
     def from_mirror(self, branch: Branch, options: ContinuationOptions) -> None:
-        """Follow the mirror image of a branch of a symmetric system, unless it is known."""
-        quarters = [branch.nodes[i * len(branch.nodes) // 4].orbit for i in (1, 2, 3)]
-        orbit = max(quarters, key=lambda orbit: float(np.abs(orbit.multipliers - 1.0).min()))
+        """Follow the mirror image of a branch, if the system is symmetric and it is not known."""
+        if not self.flow.system.symmetric:
+            return
+        orbit = middle_orbit(branch)
         half_later = -orbit.states(orbit.problem.phases[:-1] + math.pi)
         try:
             image = solve_orbit(
@@ -285,8 +285,13 @@ class Collector:
 
 
 def middle_orbit(branch: Branch) -> Orbit:
-    """Orbit halfway along a branch, by the number of its points: away from where it ends."""
-    return branch.nodes[len(branch.nodes) // 2].orbit
+    """Orbit of a branch away from where it ends and from where it turns or crosses another one.
+
+    Of those after a quarter, half and three quarters of its points the one whose multipliers keep
+    farthest from 1: halves of a broken symmetry cross the symmetric branch halfway.
+    """
+    quarters = [branch.nodes[i * len(branch.nodes) // 4].orbit for i in (2, 1, 3)]
+    return max(quarters, key=lambda orbit: float(np.abs(orbit.multipliers - 1.0).min()))
 
 
 @one_thread()
@@ -393,7 +398,8 @@ def diagram(
         _follow_branch_points(box)
         _follow_flips_of_new(box, wanted, doublings)
         _follow_branch_points(box)
-        _follow_mirror_images(box)
+        for branch in box.branches:  # which become more
+            box.from_mirror(branch, box.options)
     for period in wanted:
         if not any(branch.period == period for branch in box.branches):
             tried = f"{search_points} frequenc{'y' if search_points == 1 else 'ies'}"
@@ -465,13 +471,6 @@ def _follow_branch_points(box: Collector) -> None:
         for special in branch.special_points:
             if special.kind == "BP":
                 box.from_branch_point(special)
-
-
-def _follow_mirror_images(box: Collector) -> None:
-    """Follow the other halves of what breaks a symmetry of the system."""
-    if box.flow.system.symmetric:
-        for branch in box.branches:  # which become more
-            box.from_mirror(branch, box.options)
 
 
 def _follow_flips_of_new(box: Collector, wanted: Sequence[int], doublings: int) -> None:

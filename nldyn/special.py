@@ -34,12 +34,14 @@ PRECISION = 1e-9  # in σ, to which a special point is located
 BESIDE = 1e-3  # in σ: the least distance of points that tell the direction of a branch
 CROSSING_ERROR = 1e-8  # relative, of an orbit where branches cross
 NEIGHBOUR = 1e-3  # arclength between two branch points at one turn, and dP/ds there
-SAME = 1e-7  # arclength between two branch points that cannot be told apart
+SAME = 1e-5  # arclength between two branch points that cannot be told apart
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
 MOST_LOOKS = 6  # times that a step is cut at such points
 CROSSES = 1e-12  # least unfolding of a crossing, relative to the orbit, that is not rounding
+ON_CROSSING = 3e-7  # distance from it, relative to the orbit, at which a branch cannot be told
+NEAR_ONE = 1e-4  # a multiplier no nearer to 1 is not that of an orbit where branches cross
 SHORTEST_LOOK = 1e-6  # arclength of a step, below which it is not cut there
 VANISHED = 1e-3  # an extreme at its root, relative to those beside it
 CLOSE = 0.01  # part of a step within which a point beside it does not help
@@ -371,7 +373,7 @@ def turned_over(
         except LocateError:
             return None
         if differs(a, extra):
-            return extra
+            return None if lies_on_crossing(extra.orbit, ON_CROSSING) else extra
         triples = ((a, extra, b), (z, a, extra)) if ahead else ((z, extra, a), (extra, a, b))
         for triple in triples:
             where = next(islice(hidden_dips(*triple), number, None), math.nan)
@@ -474,6 +476,20 @@ def is_crossing(orbit: Orbit) -> bool:
     """Whether branches cross beside an orbit, and do not only come close; if it can be told."""
     crossing = nearest_crossing(orbit)
     return crossing is None or crossing[1] <= CROSSES
+
+
+def lies_on_crossing(orbit: Orbit, within: float) -> bool:
+    """Whether branches cross within a distance of an orbit, relative to it.
+
+    On a plane across a branch that meets another one there Newton's method finds any orbit of that.
+    """
+    if float(np.abs(orbit.multipliers - 1.0).min()) > NEAR_ONE:
+        return False
+    crossing = nearest_crossing(orbit)
+    if crossing is None or crossing[1] > CROSSES:
+        return False
+    away = crossing[0].point - orbit.point
+    return math.sqrt(float(away @ (orbit.problem.metric(orbit.point) * away))) < within
 
 
 def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from one_dof import between_stops
 from test_nldyn_uncoupled import oscillator
 
 from nldyn import (
@@ -13,7 +15,6 @@ from nldyn import (
     HarmonicForce,
     Stop,
     System,
-    Unbalance,
     continuation,
     continue_branch,
     diagram,
@@ -89,27 +90,15 @@ def test_doubled_branch_does_not_go_on_along_the_one_that_it_comes_from():
     assert all(reason.startswith("joins the branch of period 1") for reason in branch.stop_reasons)
 
 
-def unequal_gaps(mismatch: float) -> System:
-    """A mode between two linear stops, one of them farther off by a share of the gap."""
-    stops = [
-        Stop("m", 1e6, 1.0, gap=5e-6),
-        Stop("m", 1e6, 1.0, gap=5e-6 * (1.0 + mismatch), direction=-1),
-    ]
-    unbalance = [Unbalance("m", 4.92e-6)]
-    return System.from_modal(
-        [13.13], {"m": [0.635]}, modal_damping=0.02, stops=stops, excitation=unbalance
-    )
-
-
 def test_branches_of_an_imperfect_pitchfork_are_told_apart():
     """Two pitchforks become one branch, and a closed one with two folds.
 
     The distance of the two grows with the cube root of the mismatch: 3e-4 of the states at 1e-9.
     """
-    perfect = continue_branch(solve_orbit(unequal_gaps(0.0), 11.0), (11.0, 11.8))
+    perfect = continue_branch(solve_orbit(between_stops(), 11.0), (11.0, 11.8))
     pitchforks = [s.frequency_hz for s in perfect.special_points if s.kind == "BP"]
     for mismatch in (1e-7, 1e-9, 1e-11):
-        system = unequal_gaps(mismatch)
+        system = between_stops(mismatch)
         main = continue_branch(solve_orbit(system, 11.0), (11.0, 11.8))
         half_later = -main.at(11.3)[0].states(np.array([np.pi]))[0]
         isola = continue_branch(solve_orbit(system, 11.3, guess=half_later), (11.0, 11.8))
@@ -249,9 +238,24 @@ def test_a_walk_that_comes_back_to_where_it_was_says_so(monkeypatch):
     monkeypatch.setattr(continuation, "SHORTEST_CROSSING", 1e-4)
     monkeypatch.setattr(continuation, "is_crossing", lambda orbit: True)
     branch = continue_branch(
-        solve_orbit(unequal_gaps(1e-9), 11.0),
+        solve_orbit(between_stops(1e-9), 11.0),
         (11.0, 11.8),
         options=ContinuationOptions(first_step=0.05),
     )
     for texts in (branch.stop_reasons, branch.notes):
         assert any(text.startswith("comes back to where it had been") for text in texts)
+
+
+@pytest.mark.parametrize("first_step", [0.02728, 0.01, 0.0012160756, 0.0011177628])
+def test_halves_of_a_broken_symmetry_are_the_same_from_any_step(first_step):
+    """Some steps end so near to a pitchfork that Newton's method cannot tell the branches there."""
+    system = between_stops()
+    symmetric = continue_branch(solve_orbit(system, 11.0), (11.0, 11.8))
+    pitchforks = [s for s in symmetric.special_points if s.kind == "BP"]
+    half = switch_at_branch_point(pitchforks[0])[0].orbit
+    options = ContinuationOptions(first_step=first_step)
+    halves = continue_branch(half, (11.0, 11.8), options=options)
+    assert halves.stop_reasons == ("closed branch", "closed branch")
+    assert Counter(s.kind for s in halves.special_points) == {"BP": 2, "PD": 4, "GR": 4}
+    met = sorted(s.frequency_hz for s in halves.special_points if s.kind == "BP")
+    assert met == pytest.approx(sorted(s.frequency_hz for s in pitchforks), rel=1e-9)
