@@ -156,7 +156,8 @@ def checkpoint_at(
         return nullcontext(place)
     if place is None:
         return Checkpoint()
-    return Checkpoint(*_file(place), strict=str(place))
+    write, earlier = _file(place)
+    return Checkpoint(write, earlier=earlier, strict=str(place))
 
 
 def checkpoint_of_several(
@@ -176,7 +177,7 @@ def checkpoint_of_several(
         return Checkpoint()
     from nldyn.store import same_flow
 
-    write, _, earlier = _file(place)
+    write, earlier = _file(place)
     for branch in earlier:
         same_range = branch.course is not None and branch.course.range_hz == range_hz
         if not (same_range and same_flow(branch.points[0].problem.flow, flow)):
@@ -187,13 +188,13 @@ def checkpoint_of_several(
     return Checkpoint(write, finished, earlier)
 
 
-def _file(place: str | Path) -> tuple[Callable[[Sequence[Branch]], None], None, list[Branch]]:
-    """What writes a file, no branches finished, and the branches in it."""
+def _file(place: str | Path) -> tuple[Callable[[Sequence[Branch]], None], list[Branch]]:
+    """What writes a file, and the branches in it."""
     from nldyn.store import check_writable, load_branches, save_branches
 
     path = check_writable(place)
     earlier = begun_before(load_branches, path) if path.exists() else []
-    return partial(save_branches, path), None, earlier
+    return partial(save_branches, path), earlier
 
 
 def begun_before(read: Callable[[Path], Kept], path: Path) -> Kept:

@@ -466,14 +466,14 @@ class CurveWalk:
 
     def _closed(self, a: CurvePoint, b: CurvePoint) -> bool:
         """Whether the walk from a to b passes the origin, in its direction."""
-        start = self.origin or self.start
-        if b.arclength - start.arclength < 3.0 * (b.arclength - a.arclength):
+        origin = self.origin or self.start
+        if b.arclength - origin.arclength < 3.0 * (b.arclength - a.arclength):
             return False
-        weights = start.found.at.family.metric(start.point)
-        step, way = b.point - a.point, start.point - a.point
+        weights = origin.found.at.family.metric(origin.point)
+        step, way = b.point - a.point, origin.point - a.point
         length2 = float(step @ (weights * step))
         along = float(step @ (weights * way))
-        if float(step @ (weights * start.tangent)) <= 0.0 or not 0.0 <= along <= length2:
+        if float(step @ (weights * origin.tangent)) <= 0.0 or not 0.0 <= along <= length2:
             return False
         off = way - along / length2 * step
         return float(off @ (weights * off)) < 0.01 * length2

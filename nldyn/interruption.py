@@ -6,7 +6,7 @@ import _thread
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -46,16 +46,11 @@ def deferred_interruption() -> Iterator[None]:
     interrupted
     >>> _ = signal.signal(signal.SIGINT, own)
     """
-    usual = signal.getsignal(signal.SIGINT)
-    if usual is None or threading.current_thread() is not threading.main_thread():
-        yield
-        return
     came: list[int] = []
-    signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
     try:
-        yield
+        with _answered_by(lambda number, frame: came.append(number)):
+            yield
     finally:
-        signal.signal(signal.SIGINT, usual)
         if came:
             signal.raise_signal(signal.SIGINT)
 
@@ -69,11 +64,18 @@ def ignored_interruption() -> Iterator[None]:
     >>> with ignored_interruption():
     ...     signal.raise_signal(signal.SIGINT)
     """
+    with _answered_by(signal.SIG_IGN):
+        yield
+
+
+@contextmanager
+def _answered_by(handler: Callable[[int, Any], object] | signal.Handlers) -> Iterator[None]:
+    """Give Ctrl-C to a handler in the block, in the main thread and if Python sets its handler."""
     usual = signal.getsignal(signal.SIGINT)
     if usual is None or threading.current_thread() is not threading.main_thread():
         yield
         return
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGINT, handler)
     try:
         yield
     finally:

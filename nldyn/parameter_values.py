@@ -11,7 +11,7 @@ import numpy as np
 
 from nldyn.elements import LARGEST_EXPONENT
 from nldyn.errors import LARGEST_FREQUENCY, SMALLEST_FREQUENCY, SystemModelError, is_finite, shown
-from nldyn.parameters import Parameter, parameter_tables
+from nldyn.parameters import Parameter, check_index, parameter_tables
 from nldyn.system import System
 
 FREQUENCY = "frequency_hz"
@@ -71,20 +71,12 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
     if has_exact_derivatives(parameter):
         parameter_tables(system, [parameter])
     elif parameter.name in _OF_DAMPERS:
-        _check_index(parameter, "damper", len(system.dampers))
+        check_index(parameter, "damper", len(system.dampers))
     elif parameter.name in _OF_MODES and parameter != Parameter("modal_damping", EVERY_MODE):
-        _check_index(parameter, "mode", system.size)
+        check_index(parameter, "mode", system.size)
     if parameter.name == "modal_damping":
         _damping_ratio(system, parameter.index)
     return parameter
-
-
-def _check_index(parameter: Parameter, kind: str, count: int) -> None:
-    if not 0 <= parameter.index < count:
-        raise SystemModelError(
-            f"parameter '{parameter.name}': there is no {kind} {parameter.index}, only "
-            f"{count}, counted from 0"
-        )
 
 
 def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float:

@@ -83,14 +83,14 @@ def parameter_tables(
     for row, parameter in enumerate(parameters):
         name, index = parameter.name, parameter.index
         if name in _COLUMNS:
-            _check_index(parameter, "stop", len(system.stops))
+            check_index(parameter, "stop", len(system.stops))
             if name != "gap" and system.stops[index].law is not None:
                 raise SystemModelError(
                     f"parameter '{name}': stop {index} has a law of its own, which knows no {name}"
                 )
             table[row] = _COLUMNS[name], index
         elif name in _SOURCES:
-            _check_index(parameter, "excitation", len(system.excitation))
+            check_index(parameter, "excitation", len(system.excitation))
             source = system.excitation[index]
             if not hasattr(source, name):
                 raise SystemModelError(f"parameter '{name}': excitation {index} has no {name}")
@@ -103,7 +103,8 @@ def parameter_tables(
     return table, drive_by
 
 
-def _check_index(parameter: Parameter, kind: str, count: int) -> None:
+def check_index(parameter: Parameter, kind: str, count: int) -> None:
+    """Refuse the number of an element that there is not."""
     if not 0 <= parameter.index < count:
         raise SystemModelError(
             f"parameter '{parameter.name}': there is no {kind} {parameter.index}, only "

@@ -89,9 +89,8 @@ def _check_parts_known(scene: Scene, known: Mapping[str, object], file: Path) ->
     assert scene.mesh is not None
     for name in scene.parts:
         if name not in known:
-            fault = unknown_name(name, known, f"a part of the mesh {scene.mesh.file}")
-            hint = "" if known else f" ({NAMED_BY})"
-            raise scene_error(file, ("parts", name), fault.removeprefix(f"'{name}' ") + hint)
+            fault = _not_in_mesh(name, known, f"a part of the mesh {scene.mesh.file}")
+            raise scene_error(file, ("parts", name), fault.removeprefix(f"'{name}' "))
 
 
 def check_structure_names(scene: Scene, mesh: TaggedStructure, file: Path) -> None:
@@ -322,5 +321,10 @@ def _faces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
 
 def _require(name: str, known: Mapping[str, object], what: str, file: Path, key: KeyPath) -> None:
     if name not in known:
-        hint = "" if known else f" ({NAMED_BY})"
-        raise scene_error(file, key, unknown_name(name, known, what) + hint)
+        raise scene_error(file, key, _not_in_mesh(name, known, what))
+
+
+def _not_in_mesh(name: str, known: Mapping[str, object], what: str) -> str:
+    """Say that a name is not among those of a mesh and, if that has none, what gives it names."""
+    fault = unknown_name(name, known, what)
+    return fault if known else f"{fault} ({NAMED_BY})"

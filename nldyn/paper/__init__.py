@@ -44,7 +44,7 @@ def main(out: str | Path, workers: int = 2) -> None:
     folder_kept = kept_folder(out)
     start = time.perf_counter()
     with worker_processes(workers, folder_kept) as processes:
-        with ignored_interruption():  # sent to all by a terminal
+        with ignored_interruption():  # a terminal sends it to all processes
             diagrams = submit_diagrams(processes)
             sweeps = submit_sweeps(processes)
         chaos = chaos_of(processes.values(sweeps, "sweeps"), processes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import h5py
 import numpy as np
 import pytest
-from one_dof import make_one_dof
+from one_dof import between_stops, make_one_dof
 
 from nldyn import (
     ContinuationOptions,
@@ -15,7 +15,6 @@ from nldyn import (
     Stop,
     System,
     SystemModelError,
-    Unbalance,
     continue_branch,
     continue_constant,
     continue_in,
@@ -190,7 +189,7 @@ def test_an_interrupted_curve_is_kept_and_finished(tmp_path, share):
 @pytest.mark.parametrize("searched", [False, True])
 def test_an_interrupted_closed_curve_closes_where_it_began(tmp_path, monkeypatch, searched):
     """A closed 1/3 branch between two equal stops."""
-    orbit = solve_orbit(symmetric_stops(), 11.26, 3, guess=[7.9058e-06, 9.9213e-05])
+    orbit = solve_orbit(between_stops(), 11.26, 3, guess=[7.9058e-06, 9.9213e-05])
     whole = continue_in(orbit, "frequency_hz", (11.0, 12.0))
     assert whole.stop_reasons == ("closed curve", "closed curve")
     seen = []
@@ -217,14 +216,6 @@ def test_an_interrupted_closed_curve_closes_where_it_began(tmp_path, monkeypatch
     )
     assert [kind for kind, _ in found] == [kind for kind, _ in expected]
     assert [hz for _, hz in found] == pytest.approx([hz for _, hz in expected], rel=1e-9)
-
-
-def symmetric_stops() -> System:
-    stops = [Stop("m", 1e6, 1.0, gap=5e-6, direction=side) for side in (1, -1)]
-    return System.from_modal(
-        [13.13], {"m": [0.635]}, modal_damping=0.02, stops=stops,
-        excitation=[Unbalance("m", 4.92e-6)],
-    )  # fmt: skip
 
 
 def test_several_curves_in_one_file_and_what_is_refused(tmp_path):

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from one_dof import RANGE_HZ, make_one_dof
+from one_dof import RANGE_HZ, between_stops, make_one_dof
 
 from nldyn import (
     ContinuationOptions,
@@ -785,12 +785,7 @@ def test_a_curve_of_folds_goes_on_behind_a_grazing_of_a_linear_stop():
 
     At a damping of 0.056 it turns at a grazing, where its condition has the slope of a root.
     """
-    stops = [Stop("m", 1e6, 1.0, gap=5e-6, direction=side) for side in (1, -1)]
-    system = System.from_modal(
-        [13.13], {"m": [0.635]}, modal_damping=0.02, stops=stops,
-        excitation=[Unbalance("m", 4.92e-6)],
-    )  # fmt: skip
-    orbit = solve_orbit(system, 11.51992, 2, guess=[7.93079e-06, 1.42423e-04])
+    orbit = solve_orbit(between_stops(), 11.51992, 2, guess=[7.93079e-06, 1.42423e-04])
     branch = continue_branch(orbit, (11.519, 11.521))
     folds = [s for s in branch.special_points if s.kind == "LP"]
     assert len(folds) == 2
