@@ -292,8 +292,9 @@ CASES = (
             f"bar of cells with aspect ratio {aspect:g}",
             "stiffness along and across differ by its square",
             "closed form L/EA",
-            100.0 * aspect**2 * 2.0**-52,
-            "rounding of sums of two cells, times the squares of aspect ratio and number of cells",
+            4.0 * 100.0 * aspect**2 * 2.0**-52,
+            "rounding of sums over 8 points in each of 2 cells, √16, times the squares of aspect "
+            "ratio and number of cells",
             partial(slender_error, aspect),
         )
         for aspect in (1e3, 1e4)

@@ -85,8 +85,10 @@ def test_convergence_table_is_what_is_computed(elements):
     block = TEXT.split("<!-- convergence -->")[1].split("<!-- end of convergence -->")[0]
     row = next(line for line in block.splitlines() if line.startswith(f"| {elements} |"))
     printed = [float(word) for word in row.strip("| ").split("|")[1:]]
-    # the last digit, and what rounding in the eigenvalues can do
-    assert first_errors(elements) == pytest.approx(printed, rel=6e-3, abs=5e-10)
+    # the last digit, and what rounding in K does to the eigenvalues, most where bars are thin
+    rounding = (5e-10, 5e-10, 2e-9, 5e-10)
+    for error, number, off in zip(first_errors(elements), printed, rounding, strict=True):
+        assert error == pytest.approx(number, rel=6e-3, abs=off)
 
 
 @pytest.mark.skipif(os.sep != "/", reason="the example paths are those of a checkout")
