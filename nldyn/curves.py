@@ -312,22 +312,32 @@ def continue_special(
     Yu. A. Kuznetsov (2004), *Elements of Applied Bifurcation Theory*, section 10.3.
     """
     check_special("continue_special", special, of_branch=False)
-    orbit = special.orbit
-    charts = _charts(orbit, parameters, ranges, options, progress, 2)
+    charts = _charts(special.orbit, parameters, ranges, options, progress, 2)
     keeper = _keeper(checkpoint)
-    family, condition = defined_by(special.kind, OrbitFamily.around(orbit, charts), orbit)
-    _check_special(special.kind, family, orbit, condition)
-    start = _start(family, orbit, condition)
-    curve = _curve(special.kind, start, options, progress, keeper)
+    curve = _curve(special.kind, special_start(special, charts), options, progress, keeper)
     if len(curve.points) == 1 and DISSOLVED in curve.stop_reasons:
         if checkpoint is not None:
             Path(checkpoint).unlink(missing_ok=True)
         names = " or ".join(chart.parameter.name for chart in charts)
         raise SystemModelError(
-            f"the BP at {orbit.frequency_hz:g} Hz is a single point: it dissolves when {names} "
-            "changes, as the symmetry does that brings it about"
+            f"the BP at {special.orbit.frequency_hz:g} Hz is a single point: it dissolves when "
+            f"{names} changes, as the symmetry does that brings it about"
         )
     return curve
+
+
+def special_start(special: Located, charts: tuple[Chart, ...]) -> CurvePoint:
+    """First point of a curve of special points of a kind, heading up in its first parameter.
+
+    Raises
+    ------
+    ConvergenceError, SystemModelError
+        As `continue_special`.
+    """
+    orbit = special.orbit
+    family, condition = defined_by(special.kind, OrbitFamily.around(orbit, charts), orbit)
+    _check_special(special.kind, family, orbit, condition)
+    return _start(family, orbit, condition)
 
 
 def continue_constant(

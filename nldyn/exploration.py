@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cms.threads import one_thread
-from nldyn.branch import Branch
+from nldyn.branch import Branch, is_at
 from nldyn.checkpoint import Checkpoint, begun_before
 from nldyn.continuation import MOST_POINTS, ContinuationOptions, check_range, shifts
 from nldyn.diagrams import Collector, Diagram, Progress
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.fixed_point_index import is_damped, sum_of_indices
 from nldyn.flow import FlowMap, flow_of
+from nldyn.fold_search import connected_folds, leading_parameter
 from nldyn.linear import Real
 from nldyn.orbit import (
     LONGEST_PERIOD,
@@ -35,6 +36,7 @@ from nldyn.orbit import (
     spread,
     stroboscopic,
 )
+from nldyn.parameters import Parameter
 from nldyn.search import MOST_COUNT, orbit_beside, orbit_near, random_states
 from nldyn.system import System
 
@@ -50,6 +52,7 @@ PIECE = 16  # periods simulated between two looks at the known orbits; later a q
 LONGEST = 0.5  # step of a deflated iteration, relative to the orbit
 ITERATIONS = 20  # of a deflated iteration
 FINEST_SPACING = 1e-6
+LARGEST_FACTOR = 100.0  # by which a parameter is changed in search of folds
 AGAIN = 12  # times that a frequency is searched again while its indices say that orbits are missing
 
 
@@ -81,6 +84,11 @@ class ExploreOptions:
     passing : int
         Further random initial states at each frequency on the way up, whose motions are followed
         for 60 periods only, beside which unstable orbits are looked for.
+    fold_factor : float
+        After each round the folds found are followed in frequency and damping, or where the modes
+        share no damping ratio in frequency and excitation, which are divided and multiplied by up
+        to this factor. Where such a curve comes back to the system's own value, another branch may
+        begin. 1 means that they are not followed.
     seed : int
         Seed of the random initial states: results are repeatable.
 
@@ -98,6 +106,7 @@ class ExploreOptions:
     doubled_period: int = 1
     doubled_points: int | None = None
     passing: int = 0
+    fold_factor: float = 1.0
     seed: int = 20
 
     def __post_init__(self) -> None:
@@ -114,6 +123,11 @@ class ExploreOptions:
         if self.doubled_points is not None:
             check_whole("explore: doubled_points", self.doubled_points, 2, MOST_POINTS)
         check_whole("explore: passing", self.passing, 0, MOST_COUNT)
+        if not (is_finite(self.fold_factor) and 1.0 <= self.fold_factor <= LARGEST_FACTOR):
+            raise SystemModelError(
+                f"explore: fold_factor must lie between 1 and {LARGEST_FACTOR:g}, "
+                f"got {shown(self.fold_factor)}"
+            )
         check_whole("explore: seed", self.seed, 0)
 
 
@@ -231,6 +245,8 @@ class Stage:
         Number of branches at the end of each round that is done.
     given : int
         How many of the branches were known before.
+    folded : int
+        How many of the branches had their folds followed.
     """
 
     steps: int
@@ -241,6 +257,7 @@ class Stage:
     met: NDArray[np.bool_]
     ends: tuple[int, ...]
     given: int = 0
+    folded: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,9 +287,17 @@ class Exploration:
     def finished(self) -> bool:
         """Whether all rounds were done, or one that found nothing new."""
         done = len(self.stage.ends)
-        return done > 0 and (
-            done >= self.question.effort.rounds or self.new_branches[done - 1] == 0
-        )
+        if done == 0 or self.follows_folds:
+            return False
+        return done >= self.question.effort.rounds or self.new_branches[done - 1] == 0
+
+    @property
+    def follows_folds(self) -> bool:
+        """Whether a round has done its simulations, and goes on with the folds found."""
+        stage = self.stage
+        between = stage.steps > 0 and self.question.place(stage.steps)[1] == 0
+        wanted = self.question.effort.fold_factor > 1.0
+        return wanted and between and stage.folded < stage.branches
 
     @property
     def new_branches(self) -> tuple[int, ...]:
@@ -352,7 +377,11 @@ class Exploration:
         if not self.finished:
             turn, steps, length = self.question.place(self.stage.steps)
             lines.append(
-                f"not finished: {steps} of {length} steps up and down of round {turn + 1} are done"
+                f"not finished: of round {turn} the folds of {self.stage.folded} of "
+                f"{self.stage.branches} branches are followed"
+                if self.follows_folds
+                else f"not finished: {steps} of {length} steps up and down of round {turn + 1} are "
+                "done"
             )
         lines += self._rounds()
         open_ranges = ", ".join(f"{a:.4g}-{b:.4g}" for a, b in self.unsettled_ranges())
@@ -423,7 +452,8 @@ def explore(
     an orbit, and its branch continued in both directions unless it is known. Unstable orbits come
     from near returns of motions that wander, from Newton's method deflated by the known orbits
     [Farrell, Birkisson and Funke 2015], and from flips, at each of which the doubled branch is
-    followed as long as its period is within `max_period`, and from branch points.
+    followed as long as its period is within `max_period`, and from branch points. The folds of
+    all of these may be followed in damping to further ones (`ExploreOptions.fold_factor`).
 
     Isolas of unstable orbits that no motion passes, attractors with small basins that exist
     between two of the frequencies only, and orbits of longer periods can still be missing.
@@ -504,8 +534,11 @@ def explore(
     if checkpoint is None or not survey.goes_on_in(checkpoint):
         box.take(known.branches, known.notes)
     with box.checkpoint:
-        while not survey.so_far(box.branches).finished:
-            survey.step()
+        while not (found := survey.so_far(box.branches)).finished:
+            if found.follows_folds:
+                survey.follow_folds()
+            else:
+                survey.step()
     return survey.so_far(box.branches)
 
 
@@ -627,8 +660,7 @@ class _Survey:
             here = here.with_more(self._search(starts, known, also_unstable=True)[0])
         both = {c.frequency_hz: c for c in stage.coverage}
         both[frequency] = both[frequency].with_more(here) if frequency in both else here
-        met = np.zeros((turn + 1, len(box.branches)), dtype=bool)
-        met[: len(stage.met), : stage.branches] = stage.met
+        met = self._met(turn + 1)
         met[turn, known.met] = True
         self.stage = Stage(
             stage.steps + 1,
@@ -639,10 +671,61 @@ class _Survey:
             met,
             (*stage.ends, len(box.branches)) if last else stage.ends,
             stage.given,
+            stage.folded,
         )
         if box.checkpoint.work is None:
             box.checkpoint.work = lambda: None  # the coverage is worth keeping without a branch too
         box.checkpoint.offer()
+
+    def _met(self, rounds: int) -> NDArray[np.bool_]:
+        """Which branches each round came to, with those found since the last step."""
+        met = np.zeros((rounds, len(self.box.branches)), dtype=bool)
+        met[: len(self.stage.met), : self.stage.branches] = self.stage.met
+        return met
+
+    def follow_folds(self) -> None:
+        """Follow the folds of the next branch in a second parameter, and what they lead to."""
+        box, stage = self.box, self.stage
+        branch = box.branches[stage.folded]
+        parameter = leading_parameter(box.flow.system)
+        if branch.period <= self.max_period and parameter is not None:
+            self._beyond_folds(branch, parameter)
+        self.stage = replace(
+            stage,
+            branches=len(box.branches),
+            notes=len(box.notes),
+            met=self._met(len(stage.met)),
+            ends=(*stage.ends[:-1], len(box.branches)),
+            folded=stage.folded + 1,
+        )
+        box.checkpoint.offer()
+
+    def _beyond_folds(self, branch: Branch, parameter: Parameter) -> None:
+        """Follow the branches to which curves of a branch's folds come back."""
+        box, factor = self.box, self.effort.fold_factor
+        passed: list[Orbit] = []
+        for fold in branch.special_points:
+            if fold.kind != "LP" or any(is_at(orbit, fold) for orbit in passed):
+                continue
+            box.progress("folds", fold.frequency_hz)
+            try:
+                for orbit in connected_folds(fold, parameter, factor, box.range_hz, box.options):
+                    passed.append(orbit)
+                    if not self._is_known_fold(orbit):
+                        self._follow(orbit)
+            except (ConvergenceError, SystemModelError) as error:
+                box.notes.append(
+                    f"the fold of branch {branch.name} at {fold.frequency_hz:.6g} Hz was not "
+                    f"followed in {parameter.name}: {error}"
+                )
+
+    def _is_known_fold(self, orbit: Orbit) -> bool:
+        return any(
+            is_at(orbit, special)
+            for branch in self.box.of_period(orbit.period)
+            for special in branch.special_points
+            if special.kind == "LP"
+        )
 
     def _search(
         self, starts: Real, known: _Known, *, also_unstable: bool

@@ -13,7 +13,7 @@ import io
 import math
 import os
 import secrets
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -314,7 +314,7 @@ def _write_exploration(group: Any, found: Exploration, flows: list[FlowMap]) -> 
         if value is not None:
             _set_attribute(group, f"effort {name}", value)
     _write_options(group, question.options)
-    for name in ("steps", "branches", "notes", "given"):
+    for name in ("steps", "branches", "notes", "given", "folded"):
         _set_attribute(group, name, getattr(stage, name))
     _put(group, "carried", stage.carried, STATE_UNIT)
     _put(group, "met", np.asarray(stage.met, dtype=np.int64), "1 where motions came to a branch")
@@ -751,21 +751,25 @@ def _read_options(group: _Group) -> ContinuationOptions:
 def _read_exploration(
     group: _Group, flows: Sequence[FlowMap], diagram: Diagram
 ) -> tuple[Question, Stage]:
+    number_of: dict[str, Callable[[str], Any]]
+    number_of = {"spacing": group.number, "fold_factor": group.number}
     efforts = {
-        item.name: group.whole(f"effort {item.name}")
+        item.name: number_of.get(item.name, group.whole)(f"effort {item.name}")
         for item in fields(ExploreOptions)
-        if item.name != "spacing" and group.has_attribute(f"effort {item.name}")
+        if item.name == "spacing" or group.has_attribute(f"effort {item.name}")
     }
     question = Question(
         _flow_of(group, flows),
         diagram.range_hz,
         group.whole("max_period"),
         diagram.observe,
-        ExploreOptions(spacing=group.number("effort spacing"), **efforts),
+        ExploreOptions(**efforts),
         _read_options(group),
     )
     steps, branches, notes = (group.whole(name) for name in ("steps", "branches", "notes"))
-    given = group.whole("given") if group.has_attribute("given") else 0
+    given, folded = (
+        group.whole(name) if group.has_attribute(name) else 0 for name in ("given", "folded")
+    )
     carried = group.array("carried", -1, 2 * question.flow.system.size)
     coverage = _read_coverage(group.group("coverage"))
     ends = tuple(group.array("ends", -1, kind=np.int64).tolist())
@@ -778,10 +782,11 @@ def _read_exploration(
         ("branches", branches, len(diagram.branches)),
         ("notes", notes, len(diagram.notes)),
         ("given", given, branches),
+        ("folded", folded, branches),
     ):
         if not 0 <= value <= most:
             raise group.fault("attribute", name, f"is {value}, but there are {most}")
-    return question, Stage(steps, branches, notes, carried, coverage, met, ends, given)
+    return question, Stage(steps, branches, notes, carried, coverage, met, ends, given, folded)
 
 
 def _read_coverage(group: _Group) -> tuple[Coverage, ...]:
