@@ -276,7 +276,8 @@ class Branch:
         Parameters
         ----------
         frequency_hz : float
-            In Hz; that of the orbits differs from it by the rounding error of its logarithm only.
+            In Hz; that of the orbits differs from it by the rounding error of its logarithm only,
+            very near to the end of a doubled branch by up to 1e-12 of it.
 
         Returns
         -------

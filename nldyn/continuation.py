@@ -44,6 +44,8 @@ from nldyn.orbit import ConvergenceError, Orbit, check_minimal, minimal_period, 
 from nldyn.shooting import ShootingProblem
 from nldyn.special import (
     NEIGHBOUR,
+    ON_CROSSING,
+    SHORTEST_CROSSING,
     Chord,
     LocateError,
     crosses,
@@ -59,8 +61,6 @@ KINK = 1e-6  # step below which a branch may bend by any angle where the number 
 MEETS_OPEN_END = "meets another branch where that was broken off"
 EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
 MEETING_STEP = 0.001  # longest step over which a doubled branch may meet the one it comes from
-SHORTEST_CROSSING = 3e-6  # step over which a branch may cross another one
-NO_LANDING = 0.1  # of a step: no nearer to where branches cross does it end
 LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
 RECENT = 10  # points behind a walk that it does not come back to
 SAME_PLACE = 1e-8  # distance of points that are one, relative to the orbit
@@ -332,7 +332,7 @@ class Walk:
         long = step > SHORTEST_CROSSING
         if not meets and crosses(here, point) and (long or not is_crossing(orbit)):
             return None
-        if lies_on_crossing(orbit, NO_LANDING * min(step, SHORTEST_CROSSING)):
+        if lies_on_crossing(orbit, min(0.1 * step, ON_CROSSING)):
             return None
         return point, angle, miss
 

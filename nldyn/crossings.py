@@ -137,8 +137,8 @@ def _crossing(a: BranchPoint, b: BranchPoint, p: float) -> BranchPoint:
     """Point between two neighbours with ln ω = p.
 
     Beside a fold Newton's method at a fixed frequency may miss; then the point is first located
-    along the branch. So near to the end of a doubled branch that steps at a fixed frequency do not
-    get shorter than rounding makes them, it is that point.
+    along the branch. Very near to the end of a doubled branch it misses from there too, as rounding
+    makes its steps; then the point located is the answer, whose ln ω is p to 1e-12.
 
     Raises
     ------

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -37,6 +38,7 @@ MEETING = 1e-9  # arclength within which a curve and a grazing meet
 MOST_SECANTS = 20
 BEHIND = (1e-5, 1e-6, 1e-7)  # extremes, relative to the orbit, of a first point behind a corner
 ALONG = 1e-12  # part of a unit tangent that is rounding
+AT_POINT = 1e-6  # share of a step within which two points are one
 CORNER_STEP = 1e-3  # a step shorter than this may have met a corner
 
 
@@ -133,6 +135,32 @@ def on_chart_plane(a: CurvePoint, b: CurvePoint, which: int, value: float) -> Cu
     share = (target - float(a.point[place])) / float(b.point[place] - a.point[place])
     way = between(a, b, share) - a.point
     return _on_plane(a, way, share * (b.arclength - a.arclength), which, target)
+
+
+def passages(points: Iterable[CurvePoint], which: int, value: float) -> Iterator[CurvePoint]:
+    """Points behind the first at which a curve has a value of a parameter, two in a step or three.
+
+    A step has them where the cubic through its ends, with their tangents, says.
+    """
+    for a, b in pairwise(points):
+        family = a.found.at.family
+        place, span = family.n_states + which, b.arclength - a.arclength
+        target = family.charts[which].coordinate(value)
+        y, end = float(a.point[place]) - target, float(b.point[place]) - target
+        slope, last = span * float(a.tangent[place]), span * float(b.tangent[place])
+        cubic = [2.0 * (y - end) + slope + last, 3.0 * (end - y) - 2.0 * slope - last, slope, y]
+        shares = np.roots(cubic)
+        shares = np.sort(shares.real[np.abs(shares.imag) < AT_POINT])
+        met: list[CurvePoint] = []
+        for share in shares[(shares > AT_POINT) & (shares <= 1.0 + AT_POINT)].tolist():
+            way = between(a, b, share) - a.point
+            there = _on_plane(a, way, share * span, which, target)
+            if there is None:
+                continue
+            away = [_length(family.metric(a.point), there.point - other.point) for other in met]
+            if min(away, default=math.inf) > AT_POINT * span:
+                met.append(there)
+                yield there
 
 
 def between(a: CurvePoint, b: CurvePoint, x: float) -> Real:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,7 +25,7 @@ from nldyn.curve_walk import (
     CurvePoint,
     CurveWalk,
     curve_point,
-    on_chart_plane,
+    passages,
 )
 from nldyn.errors import SystemModelError, check_choice, check_types, is_finite, shown
 from nldyn.flow import FlowMap
@@ -200,13 +201,8 @@ class Curve:
                 f"the curve has no parameter {shown(name)}; there are: {', '.join(names)}"
             )
         which = names.index(name)
-        found: list[Orbit] = []
-        for a, b in pairwise(self.points):
-            if (a.values[which] - value) * (b.values[which] - value) <= 0.0:
-                end = on_chart_plane(a, b, which, value)
-                if end is not None and (b is self.points[-1] or b.values[which] != value):
-                    found.append(end.orbit)
-        return found
+        first = self.points[:1] if math.isclose(self.values[0, which], value) else ()
+        return [point.orbit for point in (*first, *passages(self.points, which, value))]
 
 
 def continue_in(

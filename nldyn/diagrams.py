@@ -290,7 +290,8 @@ def middle_orbit(branch: Branch) -> Orbit:
     Of those after a quarter, half and three quarters of its points the one whose multipliers keep
     farthest from 1: halves of a broken symmetry cross the symmetric branch halfway.
     """
-    quarters = [branch.nodes[i * len(branch.nodes) // 4].orbit for i in (2, 1, 3)]
+    inner = branch.nodes[1:-1] or branch.nodes
+    quarters = [inner[i * len(inner) // 4].orbit for i in (2, 1, 3)]
     return max(quarters, key=lambda orbit: float(np.abs(orbit.multipliers - 1.0).min()))
 
 

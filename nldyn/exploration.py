@@ -245,7 +245,7 @@ class Stage:
         Number of branches at the end of each round that is done.
     given : int
         How many of the branches were known before.
-    folded : int
+    folds_followed : int
         How many of the branches had their folds followed.
     """
 
@@ -257,7 +257,7 @@ class Stage:
     met: NDArray[np.bool_]
     ends: tuple[int, ...]
     given: int = 0
-    folded: int = 0
+    folds_followed: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,19 +285,19 @@ class Exploration:
 
     @property
     def finished(self) -> bool:
-        """Whether all rounds were done, or one that found nothing new."""
+        """Whether all rounds were done, or one that found nothing new, and all folds followed."""
         done = len(self.stage.ends)
-        if done == 0 or self.follows_folds:
+        if done == 0 or self.folds_due:
             return False
         return done >= self.question.effort.rounds or self.new_branches[done - 1] == 0
 
     @property
-    def follows_folds(self) -> bool:
-        """Whether a round has done its simulations, and goes on with the folds found."""
+    def folds_due(self) -> bool:
+        """Whether a round has done its simulations, and folds of branches are to be followed."""
         stage = self.stage
         between = stage.steps > 0 and self.question.place(stage.steps)[1] == 0
         wanted = self.question.effort.fold_factor > 1.0
-        return wanted and between and stage.folded < stage.branches
+        return wanted and between and stage.folds_followed < stage.branches
 
     @property
     def new_branches(self) -> tuple[int, ...]:
@@ -377,9 +377,9 @@ class Exploration:
         if not self.finished:
             turn, steps, length = self.question.place(self.stage.steps)
             lines.append(
-                f"not finished: of round {turn} the folds of {self.stage.folded} of "
+                f"not finished: of round {turn} the folds of {self.stage.folds_followed} of "
                 f"{self.stage.branches} branches are followed"
-                if self.follows_folds
+                if self.folds_due
                 else f"not finished: {steps} of {length} steps up and down of round {turn + 1} are "
                 "done"
             )
@@ -390,7 +390,7 @@ class Exploration:
                 f"motions that did not settle (chaos, longer periods or slow decay): "
                 f"{open_ranges} Hz"
             )
-        return lines + self._cut()
+        return lines + self._folds() + self._cut()
 
     def _rounds(self) -> list[str]:
         """What each round found, and how many branches are still to be expected."""
@@ -405,6 +405,19 @@ class Exploration:
             f"{twice} in two: at least about {self.unmet_branches:.0f} more are to be expected "
             f"that motions would come to (Chao 1987); {never} were reached otherwise"
             + (f" or known before, as {self.stage.given} were" if self.stage.given else ""),
+        ]
+
+    def _folds(self) -> list[str]:
+        """Whose folds were followed, and in what."""
+        factor, count = self.question.effort.fold_factor, self.stage.folds_followed
+        if factor == 1.0 or count == 0:
+            return []
+        parameter = leading_parameter(self.question.flow.system)
+        if parameter is None:
+            return ["no folds were followed: there is neither damping nor excitation to change"]
+        return [
+            f"the folds of the first {count} branches, up to period {self.question.max_period}, "
+            f"were followed in {parameter.name}, from 1/{factor:g} of it to {factor:g} times"
         ]
 
     def _cut(self) -> list[str]:
@@ -453,7 +466,8 @@ def explore(
     from near returns of motions that wander, from Newton's method deflated by the known orbits
     [Farrell, Birkisson and Funke 2015], and from flips, at each of which the doubled branch is
     followed as long as its period is within `max_period`, and from branch points. The folds of
-    all of these may be followed in damping to further ones (`ExploreOptions.fold_factor`).
+    all of these may be followed in damping or excitation to further ones
+    (`ExploreOptions.fold_factor`).
 
     Isolas of unstable orbits that no motion passes, attractors with small basins that exist
     between two of the frequencies only, and orbits of longer periods can still be missing.
@@ -535,7 +549,7 @@ def explore(
         box.take(known.branches, known.notes)
     with box.checkpoint:
         while not (found := survey.so_far(box.branches)).finished:
-            if found.follows_folds:
+            if found.folds_due:
                 survey.follow_folds()
             else:
                 survey.step()
@@ -671,7 +685,7 @@ class _Survey:
             met,
             (*stage.ends, len(box.branches)) if last else stage.ends,
             stage.given,
-            stage.folded,
+            stage.folds_followed,
         )
         if box.checkpoint.work is None:
             box.checkpoint.work = lambda: None  # the coverage is worth keeping without a branch too
@@ -686,7 +700,7 @@ class _Survey:
     def follow_folds(self) -> None:
         """Follow the folds of the next branch in a second parameter, and what they lead to."""
         box, stage = self.box, self.stage
-        branch = box.branches[stage.folded]
+        branch = box.branches[stage.folds_followed]
         parameter = leading_parameter(box.flow.system)
         if branch.period <= self.max_period and parameter is not None:
             self._beyond_folds(branch, parameter)
@@ -696,7 +710,7 @@ class _Survey:
             notes=len(box.notes),
             met=self._met(len(stage.met)),
             ends=(*stage.ends[:-1], len(box.branches)),
-            folded=stage.folded + 1,
+            folds_followed=stage.folds_followed + 1,
         )
         box.checkpoint.offer()
 
@@ -708,16 +722,18 @@ class _Survey:
             if fold.kind != "LP" or any(is_at(orbit, fold) for orbit in passed):
                 continue
             box.progress("folds", fold.frequency_hz)
+            which = f"the fold of branch {branch.name} at {fold.frequency_hz:.6g} Hz"
             try:
-                for orbit in connected_folds(fold, parameter, factor, box.range_hz, box.options):
-                    passed.append(orbit)
-                    if not self._is_known_fold(orbit):
-                        self._follow(orbit)
+                found, broken = connected_folds(fold, parameter, factor, box.range_hz, box.options)
             except (ConvergenceError, SystemModelError) as error:
-                box.notes.append(
-                    f"the fold of branch {branch.name} at {fold.frequency_hz:.6g} Hz was not "
-                    f"followed in {parameter.name}: {error}"
-                )
+                box.notes.append(f"{which} was not followed in {parameter.name}: {error}")
+                continue
+            for reason in broken:
+                box.notes.append(f"the curve in {parameter.name} of {which} broke off: {reason}")
+            passed += found
+            for orbit in found:
+                if not self._is_known_fold(orbit):
+                    self._follow(orbit)
 
     def _is_known_fold(self, orbit: Orbit) -> bool:
         return any(

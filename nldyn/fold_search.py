@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
 
 from nldyn.branch import SpecialPoint
 from nldyn.continuation import ContinuationOptions
-from nldyn.curve_walk import CLOSED_CURVE, CurvePoint, CurveWalk, on_chart_plane
+from nldyn.curve_walk import CLOSED_CURVE, RANGE_END, CurveWalk, passages
 from nldyn.curves import special_start
 from nldyn.errors import SystemModelError
 from nldyn.orbit import Orbit
 from nldyn.parameter_values import EVERY_MODE, FREQUENCY, Chart, checked_parameter, value_of
 from nldyn.parameters import Parameter
 from nldyn.system import System
-
-MOST_POINTS = 400  # of a curve in one direction
-MOST_DAMPING = 0.5  # ratio up to which modes stay oscillators
 
 
 def leading_parameter(system: System) -> Parameter | None:
@@ -33,9 +28,14 @@ def leading_parameter(system: System) -> Parameter | None:
             checked_parameter(system, parameter)
         except SystemModelError:
             continue
-        if value_of(system, 1.0, parameter) > 0.0:
+        if 0.0 < value_of(system, 1.0, parameter) < _highest(parameter):
             return parameter
     return None
+
+
+def _highest(parameter: Parameter) -> float:
+    """Value up to which a system stays of its kind: modes with more damping do not oscillate."""
+    return 1.0 if parameter.name == "modal_damping" else float("inf")
 
 
 def connected_folds(
@@ -44,10 +44,11 @@ def connected_folds(
     factor: float,
     range_hz: tuple[float, float],
     options: ContinuationOptions,
-) -> Iterator[Orbit]:
+) -> tuple[list[Orbit], list[str]]:
     """Orbits of the same system to which the curve of folds through one comes back.
 
     It is followed in frequency and a parameter, which is divided and multiplied by up to a factor.
+    With why it was broken off, if it was.
 
     Raises
     ------
@@ -56,23 +57,17 @@ def connected_folds(
     """
     orbit = fold.orbit
     value = value_of(orbit.system, orbit.frequency_hz, parameter)
-    most = factor * value
-    if parameter.name == "modal_damping":
-        most = max(min(most, MOST_DAMPING), 1.001 * value)
-    limits = value / factor, most
+    limits = value / factor, min(factor * value, _highest(parameter))
     charts = Chart.of(Parameter(FREQUENCY), range_hz), Chart.of(parameter, limits)
-    options = replace(options, max_points=min(options.max_points, MOST_POINTS))
     start = special_start(fold, charts)
+    found: list[Orbit] = []
+    broken: list[str] = []
     for end in (start, start.reversed()):
         walk = CurveWalk(end, options)
-        for a, b in pairwise(walk):
-            if a is not end and _passes(a, b, value):
-                there = on_chart_plane(a, b, 1, value)
-                if there is not None:
-                    yield replace(there.orbit, problem=orbit.problem)
+        met = passages(walk, 1, value)
+        found += [replace(point.orbit, problem=orbit.problem) for point in met]
         if walk.stop_reason == CLOSED_CURVE:
-            return
-
-
-def _passes(a: CurvePoint, b: CurvePoint, value: float) -> bool:
-    return float(a.values[1] - value) * float(b.values[1] - value) <= 0.0
+            break
+        if not walk.stop_reason.startswith(RANGE_END):
+            broken.append(walk.stop_reason)
+    return found, broken

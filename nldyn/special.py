@@ -34,14 +34,15 @@ PRECISION = 1e-9  # in σ, to which a special point is located
 BESIDE = 1e-3  # in σ: the least distance of points that tell the direction of a branch
 CROSSING_ERROR = 1e-8  # relative, of an orbit where branches cross
 NEIGHBOUR = 1e-3  # arclength between two branch points at one turn, and dP/ds there
-SAME = 1e-5  # arclength between two branch points that cannot be told apart
+SHORTEST_CROSSING = 3e-6  # step over which a branch may cross another one
+SAME = 2.0 * SHORTEST_CROSSING  # arclength between branch points that two such steps locate as one
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
 MOST_LOOKS = 6  # times that a step is cut at such points
 CROSSES = 1e-12  # least unfolding of a crossing, relative to the orbit, that is not rounding
 ON_CROSSING = 3e-7  # distance from it, relative to the orbit, at which a branch cannot be told
-NEAR_ONE = 1e-4  # a multiplier no nearer to 1 is not that of an orbit where branches cross
+NEAR_ONE = 1e-3  # a multiplier no nearer to 1 is not that of an orbit where branches cross
 SHORTEST_LOOK = 1e-6  # arclength of a step, below which it is not cut there
 VANISHED = 1e-3  # an extreme at its root, relative to those beside it
 CLOSE = 0.01  # part of a step within which a point beside it does not help
@@ -481,15 +482,21 @@ def is_crossing(orbit: Orbit) -> bool:
 def lies_on_crossing(orbit: Orbit, within: float) -> bool:
     """Whether branches cross within a distance of an orbit, relative to it.
 
-    On a plane across a branch that meets another one there Newton's method finds any orbit of that.
+    On a plane across a branch Newton's method may find any orbit of the other one there.
     """
     if float(np.abs(orbit.multipliers - 1.0).min()) > NEAR_ONE:
         return False
-    crossing = nearest_crossing(orbit)
-    if crossing is None or crossing[1] > CROSSES:
+    crossing = _true_crossing(orbit)
+    if crossing is None:
         return False
-    away = crossing[0].point - orbit.point
+    away = crossing.point - orbit.point
     return math.sqrt(float(away @ (orbit.problem.metric(orbit.point) * away))) < within
+
+
+def _true_crossing(orbit: Orbit) -> Orbit | None:
+    """Where branches cross beside an orbit, if they do."""
+    crossing = nearest_crossing(orbit)
+    return crossing[0] if crossing is not None and crossing[1] <= CROSSES else None
 
 
 def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
@@ -500,10 +507,10 @@ def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
     """
     if special.kind != "LP" or not turns_near_crossing(special.orbit):
         return special
-    crossing = nearest_crossing(special.orbit)
-    if crossing is None or crossing[1] > CROSSES:
+    orbit = _true_crossing(special.orbit)
+    if orbit is None:
         return special
-    at, (orbit, _) = special.point, crossing
+    at = special.point
     weights = orbit.problem.metric(orbit.point)
     ahead = float((orbit.point - at.orbit.point) @ (weights * at.tangent))
     ahead /= math.sqrt(float(at.tangent @ (weights * at.tangent)))

@@ -13,7 +13,7 @@ import io
 import math
 import os
 import secrets
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -314,7 +314,7 @@ def _write_exploration(group: Any, found: Exploration, flows: list[FlowMap]) -> 
         if value is not None:
             _set_attribute(group, f"effort {name}", value)
     _write_options(group, question.options)
-    for name in ("steps", "branches", "notes", "given", "folded"):
+    for name in ("steps", "branches", "notes", "given", "folds_followed"):
         _set_attribute(group, name, getattr(stage, name))
     _put(group, "carried", stage.carried, STATE_UNIT)
     _put(group, "met", np.asarray(stage.met, dtype=np.int64), "1 where motions came to a branch")
@@ -751,10 +751,10 @@ def _read_options(group: _Group) -> ContinuationOptions:
 def _read_exploration(
     group: _Group, flows: Sequence[FlowMap], diagram: Diagram
 ) -> tuple[Question, Stage]:
-    number_of: dict[str, Callable[[str], Any]]
-    number_of = {"spacing": group.number, "fold_factor": group.number}
-    efforts = {
-        item.name: number_of.get(item.name, group.whole)(f"effort {item.name}")
+    efforts: dict[str, Any] = {
+        item.name: (group.number if item.name in ("spacing", "fold_factor") else group.whole)(
+            f"effort {item.name}"
+        )
         for item in fields(ExploreOptions)
         if item.name == "spacing" or group.has_attribute(f"effort {item.name}")
     }
@@ -768,7 +768,8 @@ def _read_exploration(
     )
     steps, branches, notes = (group.whole(name) for name in ("steps", "branches", "notes"))
     given, folded = (
-        group.whole(name) if group.has_attribute(name) else 0 for name in ("given", "folded")
+        group.whole(name) if group.has_attribute(name) else 0
+        for name in ("given", "folds_followed")
     )
     carried = group.array("carried", -1, 2 * question.flow.system.size)
     coverage = _read_coverage(group.group("coverage"))
@@ -782,7 +783,7 @@ def _read_exploration(
         ("branches", branches, len(diagram.branches)),
         ("notes", notes, len(diagram.notes)),
         ("given", given, branches),
-        ("folded", folded, branches),
+        ("folds_followed", folded, branches),
     ):
         if not 0 <= value <= most:
             raise group.fault("attribute", name, f"is {value}, but there are {most}")

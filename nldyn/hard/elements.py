@@ -293,8 +293,8 @@ CASES = (
             "stiffness along and across differ by its square",
             "closed form L/EA",
             4.0 * 100.0 * aspect**2 * 2.0**-52,
-            "rounding of sums over 8 points in each of 2 cells, √16, times the squares of aspect "
-            "ratio and number of cells",
+            "estimate: rounding of sums over 8 points in each of 2 cells, √16, times the squares "
+            "of aspect ratio and number of cells",
             partial(slender_error, aspect),
         )
         for aspect in (1e3, 1e4)

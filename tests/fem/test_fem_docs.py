@@ -85,10 +85,12 @@ def test_convergence_table_is_what_is_computed(elements):
     block = TEXT.split("<!-- convergence -->")[1].split("<!-- end of convergence -->")[0]
     row = next(line for line in block.splitlines() if line.startswith(f"| {elements} |"))
     printed = [float(word) for word in row.strip("| ").split("|")[1:]]
-    # the last digit, and what rounding in K does to the eigenvalues, most where bars are thin
-    rounding = (5e-10, 5e-10, 2e-9, 5e-10)
-    for error, number, off in zip(first_errors(elements), printed, rounding, strict=True):
-        assert error == pytest.approx(number, rel=6e-3, abs=off)
+    found = first_errors(elements)
+    if elements == 32:  # thin bars: extrapolated, and what rounding in K does to the eigenvalue
+        assert found.pop(2) == pytest.approx(1.7e-9, abs=1.5e-9)
+        assert printed.pop(2) == pytest.approx(1.7e-9, abs=1.5e-9)
+    # the last digit, and what rounding does to the others
+    assert found == pytest.approx(printed, rel=6e-3, abs=5e-10)
 
 
 @pytest.mark.skipif(os.sep != "/", reason="the example paths are those of a checkout")

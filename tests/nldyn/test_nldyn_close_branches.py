@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from one_dof import between_stops
+from one_dof import between_stops, make_one_dof
 from test_nldyn_uncoupled import oscillator
 
 from nldyn import (
@@ -26,6 +26,7 @@ from nldyn.hard.continuation import beam as four_modes
 from nldyn.normal_forms import is_symmetric
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
+from nldyn.special import lies_on_crossing
 
 SHORT = ContinuationOptions(first_step=0.005, max_step=0.005)
 LONG = ContinuationOptions(first_step=0.05)
@@ -259,3 +260,41 @@ def test_halves_of_a_broken_symmetry_are_the_same_from_any_step(first_step):
     assert Counter(s.kind for s in halves.special_points) == {"BP": 2, "PD": 4, "GR": 4}
     met = sorted(s.frequency_hz for s in halves.special_points if s.kind == "BP")
     assert met == pytest.approx(sorted(s.frequency_hz for s in pitchforks), rel=1e-9)
+
+
+def test_only_orbits_beside_a_crossing_lie_on_it():
+    """Not beside a fold, and not where the branches of an imperfect pitchfork come close."""
+    symmetric = continue_branch(solve_orbit(between_stops(), 11.0), (11.0, 11.8))
+    pitchfork = next(s for s in symmetric.special_points if s.kind == "BP")
+    assert lies_on_crossing(pitchfork.orbit, 1e-8)
+    (beside,) = symmetric.at(pitchfork.frequency_hz * (1.0 + 1e-7))
+    assert lies_on_crossing(beside, 3e-7)
+    assert not lies_on_crossing(beside, 1e-7)
+    (near,) = continue_branch(solve_orbit(between_stops(1e-6), 11.0), (11.0, 11.4)).at(
+        pitchfork.frequency_hz
+    )
+    assert not lies_on_crossing(near, 1.0)
+    bent = make_one_dof(stops=[Stop("middle", stiffness=5.17e9, gap=2e-6)])
+    resonance = continue_branch(solve_orbit(bent, 15.0), (15.0, 30.0))
+    fold = next(s for s in resonance.special_points if s.kind == "LP")
+    assert not lies_on_crossing(fold.orbit, 1.0)
+
+
+@pytest.mark.parametrize("beyond", [0.0, 2e-8, -2e-8])
+def test_no_step_ends_where_branches_cross(beyond):
+    """The first step would."""
+    symmetric = continue_branch(solve_orbit(between_stops(), 11.0), (11.0, 11.8))
+    pitchfork = next(s for s in symmetric.special_points if s.kind == "BP")
+    (before,) = symmetric.at(pitchfork.frequency_hz * (1.0 - 1e-5))
+    weights = before.problem.metric(before.point)
+    way = pitchfork.orbit.point - before.point
+    reach = np.sqrt(way @ (weights * way)) + beyond
+    walk = continue_branch(
+        before, (11.0, 11.4), options=ContinuationOptions(first_step=float(reach))
+    )
+    nearest = min(
+        np.sqrt(way @ (weights * way))
+        for way in (p.point - pitchfork.orbit.point for p in walk.points)
+    )
+    assert 2.9e-7 < nearest < reach
+    assert [s.kind for s in walk.special_points].count("BP") == 1

@@ -22,6 +22,8 @@ from nldyn import (
     SystemModelError,
     Unbalance,
     checkpoint,
+    continue_branch,
+    crossings,
     diagram,
     exploration,
     explore,
@@ -39,6 +41,7 @@ from nldyn.orbit import stroboscopic
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
 from nldyn.search import random_states
+from nldyn.special import LocateError
 
 
 def system_of(name):
@@ -513,6 +516,20 @@ def test_a_doubled_branch_begins_at_its_flip():
     )
     for amplitude in (1e-2, 1e-3):
         assert box.branches[1].contains(switch_at_flip(flip, amplitude).orbit)
+
+
+def test_orbits_of_a_branch_are_known_where_newtons_method_at_their_frequency_fails(monkeypatch):
+    """So near to a flip its steps end in rounding."""
+
+    def fail(*given):
+        raise LocateError("no orbit")
+
+    flow = FlowMap(system_of("one_dof"))
+    branch = continue_branch(solve_orbit(flow, 50.0), (45.0, 60.0))
+    orbit = branch.at(48.7)[0]
+    monkeypatch.setattr(crossings, "_held", fail)
+    assert branch.contains(orbit)
+    assert branch.at(48.7)[0].frequency_hz == pytest.approx(48.7, rel=1e-12)
 
 
 def test_orbits_beside_the_ends_of_a_doubled_branch_are_known():

@@ -65,7 +65,8 @@ def test_curve_of_folds_of_an_isola_leads_to_another_branch(isola):
     fold = min(isola.special_points, key=lambda special: special.frequency_hz)
     assert fold.kind == "LP"
     damping = leading_parameter(two_modes())
-    found = connected_folds(fold, damping, 1.2, (29.2, 29.6), ContinuationOptions())
+    found, broken = connected_folds(fold, damping, 1.2, (29.2, 29.6), ContinuationOptions())
+    assert not broken
     (orbit,) = [orbit for orbit in found if not isola.contains(orbit)]
     assert np.abs(orbit.multipliers - 1.0).min() < 1e-5
     other = continue_branch(start_near(29.65, 3), (28.0, 32.0))
@@ -77,8 +78,17 @@ def test_curve_of_folds_that_only_turns_leads_back(isola):
     branch = continue_branch(solve_orbit(one_mode(), 15.0), (10.0, 40.0))
     upper, lower = (special for special in branch.special_points if special.kind == "LP")
     unbalance = Parameter("mass_times_radius")
-    found = connected_folds(upper, unbalance, 3.0, (5.0, 60.0), ContinuationOptions())
+    found, broken = connected_folds(upper, unbalance, 3.0, (5.0, 60.0), ContinuationOptions())
     assert [is_at(orbit, lower) for orbit in found] == [True]
+    assert not broken
+
+
+def test_curve_that_breaks_off_says_why():
+    branch = continue_branch(solve_orbit(one_mode(), 15.0), (10.0, 40.0))
+    fold = next(special for special in branch.special_points if special.kind == "LP")
+    short = ContinuationOptions(max_points=2)
+    _, broken = connected_folds(fold, Parameter("mass_times_radius"), 3.0, (5.0, 60.0), short)
+    assert broken == ["2 points", "2 points"]
 
 
 def one_mode(**changes) -> System:
@@ -120,7 +130,7 @@ def looked_at(monkeypatch) -> list[float]:
     def lead(fold, parameter, factor, range_hz, options):
         assert (parameter.name, factor, range_hz) == ("modal_damping", 2.0, RANGE_HZ)
         frequencies.append(fold.frequency_hz)
-        yield orbit
+        return [orbit], ["2 points"]
 
     monkeypatch.setattr(exploration, "connected_folds", lead)
     return frequencies
@@ -144,6 +154,9 @@ def test_branches_that_folds_lead_to_are_followed_and_their_folds_too(looked_at,
     assert found.finished
     assert found.new_branches == (len(found.diagram.branches) - 1,)
     assert len(found.diagram.branches) > len(without.diagram.branches)
+    assert "the fold of branch  at 25.2404 Hz broke off: 2 points" in found.report()
+    assert f"the folds of the first {len(found.diagram.branches)} branches" in found.report()
+    assert "folds" not in without.report()
     isola = next(b for b in found.diagram.branches if b.stop_reasons[0] == "closed branch")
     folds = [
         special.frequency_hz
@@ -171,7 +184,7 @@ def test_interrupted_among_the_folds_it_goes_on_and_gives_the_same(
     with pytest.raises(KeyboardInterrupt):
         explored(harmonic, checkpoint=place)
     kept = load_exploration(place)
-    assert kept.follows_folds and not kept.finished
+    assert kept.folds_due and not kept.finished
     assert "not finished: of round 1 the folds of 1 of" in kept.report()
     monkeypatch.setattr(_Survey, "follow_folds", follow)
     resumed = explored(harmonic, checkpoint=place)
