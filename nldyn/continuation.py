@@ -61,6 +61,7 @@ KINK = 1e-6  # step below which a branch may bend by any angle where the number 
 MEETS_OPEN_END = "meets another branch where that was broken off"
 EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
 MEETING_STEP = 0.001  # longest step over which a doubled branch may meet the one it comes from
+LONGER_CROSSINGS = (1.0, 10.0, 100.0)  # times that, where no shorter step succeeds
 LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
 RECENT = 10  # points behind a walk that it does not come back to
 SAME_PLACE = 1e-8  # distance of points that are one, relative to the orbit
@@ -223,11 +224,12 @@ class Walk:
                 if attempt is None:
                     step *= 0.5
                     if step < self.options.min_step:
-                        step, attempt = SHORTEST_CROSSING, self._past_crossing(here, behind)
+                        attempt = self._past_crossing(here)
                         if attempt is None:
                             shortest = f"{SHORT_STEP}{self.options.min_step:g}"
                             self.stop_reason = f"{shortest}: {self._obstacle}"
                             return
+                        step = attempt[0].arclength - here.arclength
             point, angle, miss = attempt
             low, high = self.range_hz
             if not low <= point.orbit.frequency_hz <= high:
@@ -277,10 +279,11 @@ class Walk:
         behind: Real,
         here: BranchPoint,
         step: float,
+        crossing: float | None = None,
     ) -> tuple[BranchPoint, float, float] | None:
         """Next point, its angle to this one and its relative distance from the predictor.
 
-        None when the step must be shorter.
+        None when the step must be shorter, as it must be to cross another branch.
         """
         weights = problem.metric(here.orbit.point)
         direction = here.tangent / _length(weights, here.tangent)
@@ -329,30 +332,36 @@ class Walk:
         if meets and step > MEETING_STEP:
             return None
         point = BranchPoint(orbit, tangent, here.arclength + step)
-        long = step > SHORTEST_CROSSING
-        if not meets and crosses(here, point) and (long or not is_crossing(orbit)):
+        if not meets and crosses(here, point) and (
+            step > (crossing or SHORTEST_CROSSING) or not is_crossing(orbit)
+        ):
             return None
         if lies_on_crossing(orbit, min(0.1 * step, ON_CROSSING)):
             return None
         return point, angle, miss
 
-    def _past_crossing(
-        self, here: BranchPoint, behind: Real
-    ) -> tuple[BranchPoint, float, float] | None:
-        """Next point from one on which branches cross, or None.
+    def _past_crossing(self, here: BranchPoint) -> tuple[BranchPoint, float, float] | None:
+        """Next point from one beside which branches cross, or None.
 
-        Its tangent is some mixture of theirs: the last step tells where this one leads.
+        Its tangent is some mixture of theirs, and the next orbits may be so ill conditioned that
+        Newton's method does not find them: the way to here tells where longer steps lead.
         """
-        if not behind.size or self.options.min_step > SHORTEST_CROSSING:
+        problem, obstacle = here.orbit.problem, self._obstacle
+        if self.options.min_step > SHORTEST_CROSSING:
             return None
-        secant = here.orbit.point - behind[0]
-        if _length(here.orbit.problem.metric(here.orbit.point), secant) < 1.1 * SHORTEST_CROSSING:
-            return None  # it was such a step already
-        led = BranchPoint(here.orbit, secant, here.arclength)
-        obstacle = self._obstacle
-        attempt = self._advance(here.orbit.problem, behind[:0], led, SHORTEST_CROSSING)
+        weights = problem.metric(here.orbit.point)
+        for factor in LONGER_CROSSINGS:
+            length = factor * SHORTEST_CROSSING
+            ways = (here.orbit.point - point.orbit.point for point in reversed(self.visited))
+            way = next((way for way in ways if _length(weights, way) > 3.0 * length), None)
+            if way is None:
+                break
+            led = BranchPoint(here.orbit, way, here.arclength)
+            attempt = self._advance(problem, np.empty((0, way.size)), led, length, length)
+            if attempt is not None:
+                return attempt
         self._obstacle = obstacle
-        return attempt
+        return None
 
     def _range_end(self, a: BranchPoint, b: BranchPoint, end_hz: float) -> BranchPoint | None:
         """Point of the branch exactly at an end of the range."""
@@ -770,7 +779,7 @@ class Trail:
             after = next(iter(self.nodes[self._searched + 2 :]), None)
             try:
                 self.special_points += special_points_between(a, b, before, after)
-            except LocateError as error:
+            except (LocateError, ConvergenceError) as error:
                 if closely and self._walk_closely():
                     continue
                 found, lost = _by_halves(a, b, error)
@@ -800,7 +809,7 @@ def _detour(a: BranchPoint, b: BranchPoint, walk: Walk) -> list[BranchPoint] | N
 
 
 def _by_halves(
-    a: BranchPoint, b: BranchPoint, reason: LocateError, depth: int = 0
+    a: BranchPoint, b: BranchPoint, reason: Exception, depth: int = 0
 ) -> tuple[list[SpecialPoint], list[str]]:
     """Special points of a chord on which a correction failed: try again on its halves.
 
@@ -810,7 +819,7 @@ def _by_halves(
         if depth > 3:
             raise reason
         middle = Chord(a, b).at(0.5)
-    except LocateError as error:
+    except (LocateError, ConvergenceError) as error:
         hz = sorted(point.orbit.frequency_hz for point in (a, b))
         return [], [
             f"special points between {hz[0]:.8g} and {hz[1]:.8g} Hz may be missing: {error}"
@@ -820,7 +829,7 @@ def _by_halves(
     for first, last in ((a, middle), (middle, b)):
         try:
             found += special_points_between(first, last)
-        except LocateError as error:
+        except (LocateError, ConvergenceError) as error:
             more, lost = _by_halves(first, last, error, depth + 1)
             found += more
             notes += lost

@@ -35,7 +35,7 @@ BESIDE = 1e-3  # in σ: the least distance of points that tell the direction of 
 CROSSING_ERROR = 1e-8  # relative, of an orbit where branches cross
 NEIGHBOUR = 1e-3  # arclength between two branch points at one turn, and dP/ds there
 SHORTEST_CROSSING = 3e-6  # step over which a branch may cross another one
-SAME = 2.0 * SHORTEST_CROSSING  # arclength between branch points that two such steps locate as one
+SAME = 2.0 * SHORTEST_CROSSING  # distance of branch points that two such steps locate as one
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
@@ -465,7 +465,8 @@ def _turns_twice(a: SpecialPoint, b: SpecialPoint) -> bool:
     apart = abs(a.point.arclength - b.point.arclength)
     turning = apart < NEIGHBOUR and max(_pace(a), _pace(b)) < NEIGHBOUR
     kinds = {a.kind, b.kind}
-    return (kinds == {"BP"} and (turning or apart < SAME)) or (kinds == {"BP", "LP"} and turning)
+    one = apart < NEIGHBOUR and _distance(a.orbit, b.orbit) < SAME
+    return (kinds == {"BP"} and (turning or one)) or (kinds == {"BP", "LP"} and turning)
 
 
 def _pace(special: SpecialPoint) -> float:
@@ -487,10 +488,13 @@ def lies_on_crossing(orbit: Orbit, within: float) -> bool:
     if float(np.abs(orbit.multipliers - 1.0).min()) > NEAR_ONE:
         return False
     crossing = _true_crossing(orbit)
-    if crossing is None:
-        return False
-    away = crossing.point - orbit.point
-    return math.sqrt(float(away @ (orbit.problem.metric(orbit.point) * away))) < within
+    return crossing is not None and _distance(orbit, crossing) < within
+
+
+def _distance(a: Orbit, b: Orbit) -> float:
+    """Distance of two orbits of one problem, relative to the first."""
+    away = b.point - a.point
+    return math.sqrt(float(away @ (a.problem.metric(a.point) * away)))
 
 
 def _true_crossing(orbit: Orbit) -> Orbit | None:
@@ -503,12 +507,14 @@ def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
     """What looks like a fold may be where this branch crosses another one.
 
     So a branch of broken symmetry turns at the branch point that its two halves share. Where the
-    symmetry is not perfect it is folded beside it: then the crossing has an unfolding.
+    symmetry is not perfect it is folded beside it: then the crossing has an unfolding. A branch
+    point is solved for by its own system, whose digits do not depend on the branch.
     """
-    if special.kind != "LP" or not turns_near_crossing(special.orbit):
+    crosses = special.kind == "BP"
+    if not crosses and not (special.kind == "LP" and turns_near_crossing(special.orbit)):
         return special
     orbit = _true_crossing(special.orbit)
-    if orbit is None:
+    if orbit is None or (crosses and _distance(special.orbit, orbit) > NEIGHBOUR):
         return special
     at = special.point
     weights = orbit.problem.metric(orbit.point)
