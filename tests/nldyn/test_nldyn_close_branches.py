@@ -298,3 +298,21 @@ def test_no_step_ends_where_branches_cross(beyond):
     )
     assert 2.9e-7 < nearest < reach
     assert [s.kind for s in walk.special_points].count("BP") == 1
+
+
+@pytest.mark.parametrize("first_step", [0.01, 0.02])
+def test_ill_conditioned_pitchforks_are_crossed_and_located_from_any_step(first_step):
+    """Between equal Hertz stops without gaps: beside a pitchfork Newton's method ends at 1e-8."""
+    system = System.from_modal(
+        [10.0], {"a": [1.0]}, modal_damping=0.03,
+        stops=[Stop("a", stiffness=1.2e8, direction=side) for side in (1, -1)],
+        excitation=[HarmonicForce("a", 0.15)],
+    )  # fmt: skip
+    options = ContinuationOptions(first_step=first_step)
+    symmetric = continue_branch(solve_orbit(system, 12.0), (10.0, 17.0), options=options)
+    assert symmetric.stop_reasons == ("end of the frequency range",) * 2
+    crossings = [s for s in symmetric.special_points if s.kind == "BP"]
+    assert len(crossings) == 4
+    half = continue_branch(switch_at_branch_point(crossings[-1])[0].orbit, (10.0, 17.0))
+    met = sorted(s.frequency_hz for s in half.special_points if s.kind == "BP")
+    assert met == pytest.approx([s.frequency_hz for s in crossings[-2:]], rel=1e-10)

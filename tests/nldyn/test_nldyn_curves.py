@@ -796,3 +796,20 @@ def test_a_curve_of_folds_goes_on_behind_a_grazing_of_a_linear_stop():
     assert "GRLP" in [mark.kind for mark in curve.marks]
     found = sorted(orbit.frequency_hz for orbit in curve.at("modal_damping", 0.02))
     assert found == pytest.approx(sorted(fold.frequency_hz for fold in folds), rel=1e-11)
+
+
+def test_pole_of_a_flips_coefficient_at_a_fold_flip_is_no_generalised_flip():
+    """The coefficient changes its sign through infinity where another multiplier passes 1."""
+    gap = 2.55e-4
+    system = System.from_modal(
+        [10.0, 35.70456605487722], {"a": [1.0, 1.030839148656023]},
+        modal_damping=0.013704142864357437,
+        stops=[Stop("a", stiffness=16275079.11928816, gap=0.0002550118966991442)],
+        excitation=[HarmonicForce("a", 0.18513265822659616)],
+    )  # fmt: skip
+    branch = continue_branch(solve_orbit(system, 10.5), (10.0, 11.5))
+    flips = [special for special in branch.special_points if special.kind == "PD"]
+    flip = min(flips, key=lambda special: abs(special.frequency_hz - 11.19497))
+    ranges = (11.1, 11.35), (gap / 1.7, gap * 1.7)
+    curve = continue_special(flip, ("frequency_hz", "gap"), ranges)
+    assert [mark.kind for mark in curve.marks] == ["LPPD"]

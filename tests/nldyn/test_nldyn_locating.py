@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nldyn import Stop, System, Unbalance, continue_branch, solve_orbit
 from nldyn.special import LocateError, root
 
 
@@ -69,3 +70,21 @@ def test_root_at_an_end():
 def test_a_function_without_numbers_has_no_root():
     with pytest.raises(LocateError, match="no root"):
         root(lambda x: math.nan)
+
+
+def test_an_orbit_that_cannot_be_recorded_does_not_cost_the_branch():
+    """Two preloaded linear stops just let go: rounding makes countless flights of it."""
+    stops = [
+        Stop("a", 143142.76459195476, 1.0, gap=-2.4424100187720894e-05, direction=side)
+        for side in (1, -1)
+    ]
+    system = System.from_modal(
+        [10.0, 52.217790140028356], {"a": [1.0, 1.0880950293220755]},
+        modal_damping=0.028925669976244014, stops=stops, excitation=[Unbalance("a", 1e-4)],
+    )  # fmt: skip
+    branch = continue_branch(solve_orbit(system, 30.0), (28.0, 36.0))
+    assert branch.stop_reasons == ("end of the frequency range",) * 2
+    assert [s.kind for s in branch.special_points if s.kind == "BP"] == ["BP", "BP"]
+    grazings = [s.frequency_hz for s in branch.special_points if s.kind == "GR"]
+    noted = any("32.60" in note and "may be missing" in note for note in branch.notes)
+    assert noted or min(abs(hz - 32.60348) for hz in grazings) < 1e-5
