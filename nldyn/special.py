@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice, pairwise
@@ -284,7 +285,18 @@ def special_points_between(
     """All special points between two neighbouring points, in order.
 
     The points before and after them help to tell where two may hide.
+
+    Raises
+    ------
+    LocateError
+        If an orbit is not found where it should be.
     """
+    for z, here, c in ((before, a, b), (a, b, after)):
+        if z is not None and c is not None:
+            for where in hidden_dips(z, here, c):
+                share = (where - a.arclength) / (b.arclength - a.arclength)
+                if 0.0 < share < 1.0:
+                    Chord(a, b).at(share)
     several = a.orbit.multipliers.size > 2
     if several and smooth(a, b):
         points = [a, *looked_into(before, a, b, after), b]
@@ -292,7 +304,8 @@ def special_points_between(
         least = 2 if several and changed(a, b) else 0  # beside one change two others may hide
         points = [a, *resolved(a, b, least, 5 if several else 3, FAR if several else FAR_ALONE), b]
     for i in range(len(points) - 2, 0, -1):
-        insert_dip(points, i)
+        with suppress(LocateError):
+            insert_dip(points, i)
     return [special for pair in pairwise(points) for special in located_between(*pair)]
 
 
@@ -342,7 +355,13 @@ def resolved(
 
 
 def insert_dip(points: list[BranchPoint], index: int) -> None:
-    """Add a point beside one where a test or an extreme may have changed sign twice unseen."""
+    """Add a point beside one where a test or an extreme may have changed sign twice unseen.
+
+    Raises
+    ------
+    LocateError
+        If the branch cannot be looked at there.
+    """
     z, a, b = points[index - 1 : index + 2]
     for number, where in enumerate(hidden_dips(z, a, b)):
         extra = turned_over(z, a, b, number, where)
@@ -369,10 +388,7 @@ def turned_over(
         if abs(span) < 1e-6:
             return None
         sigma = min(max((where - first.arclength) / span, 0.02), 0.98)
-        try:
-            extra = Chord(first, last).at(sigma)
-        except LocateError:
-            return None
+        extra = Chord(first, last).at(sigma)
         if differs(a, extra):
             return None if lies_on_crossing(extra.orbit, ON_CROSSING) else extra
         triples = ((a, extra, b), (z, a, extra)) if ahead else ((z, extra, a), (extra, a, b))

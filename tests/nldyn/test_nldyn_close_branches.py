@@ -316,3 +316,23 @@ def test_ill_conditioned_pitchforks_are_crossed_and_located_from_any_step(first_
     half = continue_branch(switch_at_branch_point(crossings[-1])[0].orbit, (10.0, 17.0))
     met = sorted(s.frequency_hz for s in half.special_points if s.kind == "BP")
     assert met == pytest.approx([s.frequency_hz for s in crossings[-2:]], rel=1e-10)
+
+
+@pytest.mark.parametrize("first_step", [0.01, 0.02, 0.00144])
+def test_two_pitchforks_within_a_step_are_found(first_step):
+    """The look between two points of the symmetric branch meets its halves."""
+    stops = [Stop("a", stiffness=4e6, gap=-5.66e-6, direction=side) for side in (1, -1)]
+    system = System.from_modal(
+        [10.0], {"a": [1.0]}, modal_damping=0.0077, stops=stops,
+        excitation=[HarmonicForce("a", 0.29256)],
+    )  # fmt: skip
+    options = ContinuationOptions(first_step=first_step)
+    branch = continue_branch(solve_orbit(system, 6.4), (6.4, 7.5), options=options)
+    crossings = [s.frequency_hz for s in branch.special_points if s.kind == "BP"]
+    fine = ContinuationOptions(first_step=0.005, max_step=0.005)
+    again = continue_branch(solve_orbit(system, 6.6), (6.6, 6.8), options=fine)
+    expected = [s.frequency_hz for s in again.special_points if s.kind == "BP"]
+    assert len(expected) == 2
+    assert sorted(crossings) == pytest.approx(sorted(expected), rel=1e-9)
+    short = continue_branch(solve_orbit(system, 6.4), (6.4, 7.0), options=options)
+    assert short.notes or [s.kind for s in short.special_points].count("BP") == 2
