@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -694,8 +693,7 @@ class Trail:
             if progress is not None:
                 progress(point.orbit.frequency_hz)
             if len(self.nodes) > 2:
-                with suppress(LocateError):  # met again when the step is searched
-                    insert_dip(self.nodes, len(self.nodes) - 2)
+                insert_dip(self.nodes, len(self.nodes) - 2)
             regular = self.walk.stride is not None and self.walk.stride.here is point
             self._search(len(self.nodes) - 2, closely=regular)
             if regular:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice, pairwise
@@ -304,8 +303,7 @@ def special_points_between(
         least = 2 if several and changed(a, b) else 0  # beside one change two others may hide
         points = [a, *resolved(a, b, least, 5 if several else 3, FAR if several else FAR_ALONE), b]
     for i in range(len(points) - 2, 0, -1):
-        with suppress(LocateError):
-            insert_dip(points, i)
+        insert_dip(points, i)
     return [special for pair in pairwise(points) for special in located_between(*pair)]
 
 
@@ -355,16 +353,13 @@ def resolved(
 
 
 def insert_dip(points: list[BranchPoint], index: int) -> None:
-    """Add a point beside one where a test or an extreme may have changed sign twice unseen.
-
-    Raises
-    ------
-    LocateError
-        If the branch cannot be looked at there.
-    """
+    """Add a point beside one where a test or an extreme may have changed sign twice unseen."""
     z, a, b = points[index - 1 : index + 2]
     for number, where in enumerate(hidden_dips(z, a, b)):
-        extra = turned_over(z, a, b, number, where)
+        try:
+            extra = turned_over(z, a, b, number, where)
+        except LocateError:  # met again when the step is searched
+            continue
         if extra is not None:
             ahead = (extra.arclength - a.arclength) * (b.arclength - a.arclength) > 0.0
             points.insert(index + 1 if ahead else index, extra)
