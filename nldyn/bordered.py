@@ -29,7 +29,7 @@ from nldyn.parameter_values import (
     with_value,
 )
 from nldyn.parameters import Parameter
-from nldyn.shooting import ShootingProblem
+from nldyn.shooting import ShootingProblem, metric_length
 from nldyn.system import System
 
 # A central difference of a function g with the error ε errs by ε/h + h² g(3)/6. Monodromy matrices
@@ -409,7 +409,7 @@ def correct(
                 slopes = None
             before = step
             change, along, slopes = _newton_step(family.at(point), condition, slopes, row, level)
-            step = math.sqrt(float(change @ (family.metric(point) * change)))
+            step = metric_length(family.metric(point), change)
             point = point + change
             if not step < 2.0:
                 raise ConvergenceError("Newton's method diverged")

@@ -23,6 +23,7 @@ from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit
 from nldyn.parameter_values import FREQUENCY, Chart
 from nldyn.parameters import Parameter
+from nldyn.shooting import metric_length
 
 KINDS = ("LP", "PD", "NS", "BP", "GR")
 
@@ -424,7 +425,7 @@ def nearest_crossing(orbit: Orbit) -> tuple[Orbit, float] | None:
     except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
         return None
     moved = found.at.point - guess
-    apart = math.sqrt(float(moved @ (family.metric(guess) * moved)))
+    apart = metric_length(family.metric(guess), moved)
     if not found.converged or apart > BESIDE:
         return None
     crossing = replace(found.orbit, problem=orbit.problem)

@@ -41,7 +41,7 @@ from nldyn.errors import (
 )
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, check_minimal, minimal_period, refine
-from nldyn.shooting import ShootingProblem
+from nldyn.shooting import ShootingProblem, metric_length
 from nldyn.special import (
     NEIGHBOUR,
     ON_CROSSING,
@@ -279,14 +279,15 @@ class Walk:
         behind: Real,
         here: BranchPoint,
         step: float,
-        crossing: float | None = None,
+        crossing: float = 0.0,
     ) -> tuple[BranchPoint, float, float] | None:
         """Next point, its angle to this one and its relative distance from the predictor.
 
-        None when the step must be shorter, as it must be to cross another branch.
+        None when the step must be shorter, as it must be to cross another branch: up to
+        `SHORTEST_CROSSING`, or `crossing` if that is longer.
         """
         weights = problem.metric(here.orbit.point)
-        direction = here.tangent / _length(weights, here.tangent)
+        direction = here.tangent / metric_length(weights, here.tangent)
         straight = here.orbit.point + step * direction
         row = weights * direction
         row /= math.sqrt(float(row @ row))
@@ -304,7 +305,7 @@ class Walk:
                 self._obstacle += f", last relative step {found.last_step:.1e}"
             return None
         self._obstacle = "what Newton's method finds is not the next point of the branch"
-        miss = _length(weights, found.point - predicted) / step
+        miss = metric_length(weights, found.point - predicted) / step
         if step <= KINK and miss < 1.0:  # a linear stop that is touched bends the branch
             orbit = Orbit.of(problem, found, here.orbit.observe)
             if orbit.impacts != here.orbit.impacts:
@@ -314,13 +315,13 @@ class Walk:
             return None
         # a curve that turns by max_angle leaves its tangent by half of that: a longer correction
         # has landed on another branch
-        off = _length(weights, found.point - straight)
+        off = metric_length(weights, found.point - straight)
         if off > 0.75 * self.options.max_angle * step:
             return None
         if _jumped(problem, here.orbit.point, straight, found.point):
             return None
         tangent = problem.tangent(found, direction)
-        cosine = float(direction @ (weights * tangent)) / _length(weights, tangent)
+        cosine = float(direction @ (weights * tangent)) / metric_length(weights, tangent)
         angle = math.acos(min(max(cosine, -1.0), 1.0))
         if angle > self.options.max_angle:
             return None
@@ -333,7 +334,7 @@ class Walk:
             return None
         point = BranchPoint(orbit, tangent, here.arclength + step)
         if not meets and crosses(here, point) and (
-            step > (crossing or SHORTEST_CROSSING) or not is_crossing(orbit)
+            step > max(crossing, SHORTEST_CROSSING) or not is_crossing(orbit)
         ):
             return None
         if lies_on_crossing(orbit, min(0.1 * step, ON_CROSSING)):
@@ -353,7 +354,7 @@ class Walk:
         for factor in LONGER_CROSSINGS:
             length = factor * SHORTEST_CROSSING
             ways = (here.orbit.point - point.orbit.point for point in reversed(self.visited))
-            way = next((way for way in ways if _length(weights, way) > 3.0 * length), None)
+            way = next((way for way in ways if metric_length(weights, way) > 3.0 * length), None)
             if way is None:
                 break
             led = BranchPoint(here.orbit, way, here.arclength)
@@ -418,7 +419,7 @@ class Walk:
             share = float((place - a.orbit.point) @ (weights * step)) / length2
             guess = a.orbit.point + share * step
             found = problem.correct(guess, row, offset=float(row @ place))
-            if found.converged and _length(weights, found.point - place) < SAME_PLACE:
+            if found.converged and metric_length(weights, found.point - place) < SAME_PLACE:
                 return True
         return False
 
@@ -476,7 +477,7 @@ def broken_off(branch: Branch) -> list[tuple[BranchPoint, str]]:
 def _extrapolate(weights: Real, behind: Real, here: BranchPoint, step: float) -> Real:
     """Point at a distance along the tangent on the cubic through two points and their tangents."""
     (a, tangent), b = behind, here.orbit.point
-    direction = here.tangent / _length(weights, here.tangent)
+    direction = here.tangent / metric_length(weights, here.tangent)
     row = weights * direction
     back = float(row @ (a - b))
     slope_a, slope_b = tangent / float(row @ tangent), direction
@@ -487,11 +488,6 @@ def _extrapolate(weights: Real, behind: Real, here: BranchPoint, step: float) ->
         + x * x * (3.0 - 2.0 * x) * a
         + x * x * (x - 1.0) * back * slope_a
     )
-
-
-def _length(weights: Real, vector: Real) -> float:
-    """Length of a vector in the metric of the arclength."""
-    return math.sqrt(float(vector @ (weights * vector)))
 
 
 def passed_flip(a: Orbit, b: Orbit) -> bool:
@@ -758,7 +754,7 @@ class Trail:
             return False
         last = between[-1]
         weights = last.orbit.problem.metric(last.orbit.point)
-        end = last.arclength + _length(weights, b.orbit.point - last.orbit.point)
+        end = last.arclength + metric_length(weights, b.orbit.point - last.orbit.point)
         behind = self.nodes[self._searched + 1 :]
         moved = [replace(p, arclength=p.arclength + (end - b.arclength)) for p in behind]
         self.nodes[self._searched + 1 :] = [*between, *moved]
@@ -1100,7 +1096,7 @@ def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoin
     nodes = base.nodes(orbit.point)
     doubled = np.append(np.concatenate([nodes, nodes]).ravel(), orbit.point[-1])
     weights = problem.metric(doubled)
-    direction /= _length(weights, direction)
+    direction /= metric_length(weights, direction)
     row = weights * direction
     first: BranchPoint | None = None
     for share in (1.0, 0.25, 0.05, 0.01, 2e-3, 4e-4):

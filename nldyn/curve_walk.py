@@ -28,6 +28,7 @@ from nldyn.errors import SystemModelError
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit
 from nldyn.parameter_values import Chart
+from nldyn.shooting import metric_length
 
 RANGE_END = "end of the range of "
 RESONANCE_END = "becomes a curve of neutral saddles at a resonance"
@@ -105,7 +106,7 @@ class CurvePoint:
             point[place] = new.coordinate(value)
             tangent[place] /= new.slope(float(point[place]))
         family = replace(at.family, charts=charts)
-        tangent /= _length(family.metric(point), tangent)
+        tangent /= metric_length(family.metric(point), tangent)
         found = replace(self.found, at=Evaluation(family, point), along=tangent)
         return replace(self, found=found, tangent=tangent)
 
@@ -157,7 +158,9 @@ def passages(points: Iterable[CurvePoint], which: int, value: float) -> Iterator
             there = _on_plane(a, way, share * span, which, target)
             if there is None:
                 continue
-            away = [_length(family.metric(a.point), there.point - other.point) for other in met]
+            away = [
+                metric_length(family.metric(a.point), there.point - other.point) for other in met
+            ]
             if min(away, default=math.inf) > AT_POINT * span:
                 met.append(there)
                 yield there
@@ -206,7 +209,7 @@ def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> list[CurvePo
             return []
         weights = family.metric(here.point)
         way = found.at.point - here.point
-        length = _length(weights, way)
+        length = metric_length(weights, way)
         ahead = float(way @ (weights * here.tangent)) > 0.9 * length
         if not (ahead and length < 10.0 * options.grazing_step):
             return []
@@ -219,7 +222,7 @@ def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> list[CurvePo
             behind = _behind(corner, grazing, side, 2.0 * options.max_step)
             if behind is not None:
                 chord = behind.point - corner.point
-                tangent = chord / _length(family.metric(corner.point), chord)
+                tangent = chord / metric_length(family.metric(corner.point), chord)
                 return [replace(corner, tangent=tangent), behind]
         tangent = _tangent_behind(found.at, here.condition, grazing, before < 0.0)
         return [replace(corner, tangent=tangent)]
@@ -242,10 +245,10 @@ def _behind(
             continue
         chord = met.at.point - at.point
         weights = family.metric(at.point)
-        length = _length(weights, chord)
+        length = metric_length(weights, chord)
         row = weights * chord / np.linalg.norm(weights * chord)
         found = correct(family, met.at.point, condition, row, float(row @ met.at.point))
-        moved = _length(weights, found.at.point - met.at.point)
+        moved = metric_length(weights, found.at.point - met.at.point)
         if found.converged and moved < CORNER_STEP * length and length < farthest:
             return curve_point(found, condition, chord, corner.arclength + length)
     return None
@@ -269,7 +272,9 @@ def _meeting(
     here = correct(family, start.point, grazing, row, level)
     if not here.converged:
         return None
-    reach = max(_length(family.metric(start.point), here.at.point - start.point), 10.0 * MEETING)
+    reach = max(
+        metric_length(family.metric(start.point), here.at.point - start.point), 10.0 * MEETING
+    )
     place, value, step = 0.0, float(condition.value(here.at)[0]), reach
     for _ in range(MOST_SECANTS):
         there = correct(
@@ -405,15 +410,17 @@ class CurveWalk:
             self._obstacle = found.failure
             return None
         self._obstacle = "what Newton's method finds is not the next point of the curve"
-        miss = _length(weights, found.at.point - predicted) / step
-        off = _length(weights, found.at.point - straight)
+        miss = metric_length(weights, found.at.point - predicted) / step
+        off = metric_length(weights, found.at.point - straight)
         if miss > self.options.max_miss or off > 0.75 * self.options.max_angle * step:
             return None
         try:
             there = curve_point(found, here.condition, direction, here.arclength + step)
         except ConvergenceError:
             return None
-        cosine = float(direction @ (weights * there.tangent)) / _length(weights, there.tangent)
+        cosine = float(direction @ (weights * there.tangent)) / metric_length(
+            weights, there.tangent
+        )
         angle = math.acos(min(max(cosine, -1.0), 1.0))
         if angle > self.options.max_angle:
             return None
@@ -452,7 +459,7 @@ class CurveWalk:
             end = _on_plane(here, ahead * here.tangent, ahead, which, chart.coordinate(limit))
             if end is not None:
                 weights = here.found.at.family.metric(here.point)
-                off = _length(weights, end.point - here.point - ahead * here.tangent)
+                off = metric_length(weights, end.point - here.point - ahead * here.tangent)
                 if off <= self.options.max_angle * ahead:
                     self.stop_reason = f"{RANGE_END}{chart.parameter.name}"
                     return end
@@ -509,8 +516,3 @@ class CurveWalk:
 
 def is_torus_curve(condition: Condition) -> bool:
     return isinstance(condition, Singular) and condition.kind == "NS"
-
-
-def _length(weights: Real, vector: Real) -> float:
-    """Length of a vector in the metric of the arclength."""
-    return math.sqrt(float(vector @ (weights * vector)))

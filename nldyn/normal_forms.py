@@ -28,6 +28,7 @@ from nldyn.critical import (
 from nldyn.errors import SystemModelError, check_positive, check_types
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
+from nldyn.shooting import metric_length
 from nldyn.special import LocateError
 
 CLOSE = 1e-3  # relative distance in frequency of a special point that counts as close
@@ -372,7 +373,7 @@ def other_tangent(special: SpecialPoint) -> Real:
     tangents = []
     for alpha, beta in found.roots:
         tangent = np.append((alpha * found.q + beta * found.v).ravel(), beta)
-        tangents.append(tangent / math.sqrt(float(tangent @ (weights * tangent))))
+        tangents.append(tangent / metric_length(weights, tangent))
     along = [abs(float(special.point.tangent @ (weights * t))) for t in tangents]
     return np.asarray(tangents[int(np.argmin(along))])
 

@@ -25,7 +25,7 @@ from nldyn.orbit import (
     stroboscopic,
 )
 from nldyn.preload import at_rest, rest
-from nldyn.shooting import ShootingProblem
+from nldyn.shooting import ShootingProblem, metric_length
 from nldyn.system import System
 
 MOST_COUNT = 10**7  # of starts, periods and candidates
@@ -215,7 +215,7 @@ def orbit_beside(
             row = metric * found.along
             step = found.point - point
             step -= found.along * float(row @ step) / float(row @ found.along)
-            length = math.sqrt(float(step @ (metric * step)))
+            length = metric_length(metric, step)
             point = point + step * min(1.0, LONGEST_STEP / length if length else 1.0)
             if not abs(point[-1] - math.log(omega)) < FREQUENCY_SHIFT:
                 return None

@@ -119,3 +119,8 @@ class ShootingProblem:
         weighted = self.metric(found.point) * along
         length = math.sqrt(float(along @ weighted))
         return along / (length if float(towards @ weighted) >= 0.0 else -length)
+
+
+def metric_length(weights: Real, vector: Real) -> float:
+    """Length of a vector (N + 1,) in a metric, see `ShootingProblem.metric`."""
+    return math.sqrt(float(vector @ (weights * vector)))

@@ -29,6 +29,7 @@ from nldyn.conditions import nearest_crossing
 from nldyn.critical import correct_across, turns_near_crossing
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
+from nldyn.shooting import metric_length
 
 PRECISION = 1e-9  # in σ, to which a special point is located
 BESIDE = 1e-3  # in σ: the least distance of points that tell the direction of a branch
@@ -186,15 +187,15 @@ class Chord:
 
     def _unit(self, vector: Real) -> Real:
         weights = self.first.orbit.problem.metric(self.first.orbit.point)
-        return np.asarray(vector / math.sqrt(float(vector @ (weights * vector))))
+        return np.asarray(vector / metric_length(weights, vector))
 
     def _across(self, tangent: Real) -> bool:
         """Whether a tangent departs from the chord by more than a branch may within a step."""
         weights = self.first.orbit.problem.metric(self.first.orbit.point)
         length, along, pace = (
-            math.sqrt(float(self._secant @ (weights * self._secant))),
+            metric_length(weights, self._secant),
             float(self._secant @ (weights * tangent)),
-            math.sqrt(float(tangent @ (weights * tangent))),
+            metric_length(weights, tangent),
         )
         return length > BEND and along < STEEPEST * length * pace
 
@@ -290,12 +291,7 @@ def special_points_between(
     LocateError
         If an orbit is not found where it should be.
     """
-    for z, here, c in ((before, a, b), (a, b, after)):
-        if z is not None and c is not None:
-            for where in hidden_dips(z, here, c):
-                share = (where - a.arclength) / (b.arclength - a.arclength)
-                if 0.0 < share < 1.0:
-                    Chord(a, b).at(share)
+    _check_dips(before, a, b, after)
     several = a.orbit.multipliers.size > 2
     if several and smooth(a, b):
         points = [a, *looked_into(before, a, b, after), b]
@@ -305,6 +301,19 @@ def special_points_between(
     for i in range(len(points) - 2, 0, -1):
         insert_dip(points, i)
     return [special for pair in pairwise(points) for special in located_between(*pair)]
+
+
+def _check_dips(
+    before: BranchPoint | None, a: BranchPoint, b: BranchPoint, after: BranchPoint | None
+) -> None:
+    """Raise a LocateError unless a branch is found where two special points may hide on a chord."""
+    for z, here, c in ((before, a, b), (a, b, after)):
+        if z is None or c is None:
+            continue
+        for where in hidden_dips(z, here, c):
+            share = (where - a.arclength) / (b.arclength - a.arclength)
+            if 0.0 < share < 1.0:
+                Chord(a, b).at(share)
 
 
 def smooth(a: BranchPoint, b: BranchPoint) -> bool:
@@ -373,6 +382,11 @@ def turned_over(
 
     It is looked for at an arclength, then where the parabola through the points nearest to that
     dips; `number` counts the values of `hidden_dips`.
+
+    Raises
+    ------
+    LocateError
+        If no orbit of the branch is found there.
     """
     for _ in range(DIVES):
         if math.isnan(where):
@@ -504,8 +518,7 @@ def lies_on_crossing(orbit: Orbit, within: float) -> bool:
 
 def _distance(a: Orbit, b: Orbit) -> float:
     """Distance of two orbits of one problem, relative to the first."""
-    away = b.point - a.point
-    return math.sqrt(float(away @ (a.problem.metric(a.point) * away)))
+    return metric_length(a.problem.metric(a.point), b.point - a.point)
 
 
 def _true_crossing(orbit: Orbit) -> Orbit | None:
@@ -530,7 +543,7 @@ def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
     at = special.point
     weights = orbit.problem.metric(orbit.point)
     ahead = float((orbit.point - at.orbit.point) @ (weights * at.tangent))
-    ahead /= math.sqrt(float(at.tangent @ (weights * at.tangent)))
+    ahead /= metric_length(weights, at.tangent)
     point = BranchPoint(orbit, at.tangent, at.arclength + ahead)
     return SpecialPoint("BP", point, special.frequency_error)
 

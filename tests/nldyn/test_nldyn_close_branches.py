@@ -26,6 +26,7 @@ from nldyn.hard.continuation import beam as four_modes
 from nldyn.normal_forms import is_symmetric
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
+from nldyn.shooting import metric_length
 from nldyn.special import lies_on_crossing
 
 SHORT = ContinuationOptions(first_step=0.005, max_step=0.005)
@@ -287,15 +288,9 @@ def test_no_step_ends_where_branches_cross(beyond):
     pitchfork = next(s for s in symmetric.special_points if s.kind == "BP")
     (before,) = symmetric.at(pitchfork.frequency_hz * (1.0 - 1e-5))
     weights = before.problem.metric(before.point)
-    way = pitchfork.orbit.point - before.point
-    reach = np.sqrt(way @ (weights * way)) + beyond
-    walk = continue_branch(
-        before, (11.0, 11.4), options=ContinuationOptions(first_step=float(reach))
-    )
-    nearest = min(
-        np.sqrt(way @ (weights * way))
-        for way in (p.point - pitchfork.orbit.point for p in walk.points)
-    )
+    reach = metric_length(weights, pitchfork.orbit.point - before.point) + beyond
+    walk = continue_branch(before, (11.0, 11.4), options=ContinuationOptions(first_step=reach))
+    nearest = min(metric_length(weights, p.point - pitchfork.orbit.point) for p in walk.points)
     assert 2.9e-7 < nearest < reach
     assert [s.kind for s in walk.special_points].count("BP") == 1
 

@@ -32,14 +32,13 @@ from nldyn.branch import is_at
 from nldyn.exploration import _Survey
 from nldyn.flow import flow_of
 from nldyn.fold_search import connected_folds, leading_parameter
+from nldyn.paper.jobs import scene_system
 from nldyn.paper.starts import read_starts
-from nldyn.resources import example
-from nldyn.scene import build_system, load_scene
 from nldyn.search import orbit_near
 
 
 def two_modes() -> System:
-    return build_system(load_scene(example("two_dof_xi_0.01.toml")))
+    return scene_system("two_dof_xi_0.01")
 
 
 def start_near(frequency_hz: float, period: int) -> Orbit:
@@ -73,7 +72,7 @@ def test_curve_of_folds_of_an_isola_leads_to_another_branch(isola):
     assert any(is_at(orbit, special) for special in other.special_points if special.kind == "LP")
 
 
-def test_curve_of_folds_that_only_turns_leads_back(isola):
+def test_curve_of_folds_that_only_turns_leads_back():
     """Both folds of a resonance vanish in each other when the excitation becomes weaker."""
     branch = continue_branch(solve_orbit(one_mode(), 15.0), (10.0, 40.0))
     upper, lower = (special for special in branch.special_points if special.kind == "LP")
