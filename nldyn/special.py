@@ -40,7 +40,7 @@ SAME = 2.0 * SHORTEST_CROSSING  # distance of branch points that two such steps 
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
-MOST_LOOKS = 6  # times that a step is cut at such points
+MOST_LOOKS = 12  # times that a step is cut at such points
 CROSSES = 1e-12  # least unfolding of a crossing, relative to the orbit, that is not rounding
 ON_CROSSING = 3e-7  # distance from it, relative to the orbit, at which a branch cannot be told
 NEAR_ONE = 1e-3  # a multiplier no nearer to 1 is not that of an orbit where branches cross
@@ -333,8 +333,13 @@ def looked_into(
     """Points between a and b, so that between neighbours no multiplier crosses the circle twice.
 
     The points z before and c after them count where the number of contacts is the same.
+
+    Raises
+    ------
+    LocateError
+        If they may still do so when the step has been cut `most` times.
     """
-    if most == 0 or abs(b.arclength - a.arclength) < SHORTEST_LOOK:
+    if abs(b.arclength - a.arclength) < SHORTEST_LOOK:
         return []
     chord = Chord(a, b)
     beside = [p for p in (z, c) if p is not None and p.orbit.impacts == a.orbit.impacts]
@@ -344,6 +349,8 @@ def looked_into(
     where = Between([p.orbit for _, p in near], [x for x, _ in near]).where_to_look()
     if where is None:
         return []
+    if most == 0:
+        raise LocateError("two special points may lie within one step")
     middle = chord.at(where)
     first = looked_into(z, a, middle, b, most - 1)
     return [*first, middle, *looked_into(a, middle, b, c, most - 1)]

@@ -22,12 +22,13 @@ from nldyn import (
     switch_at_branch_point,
     switch_at_flip,
 )
+from nldyn.continuation import start_point
 from nldyn.hard.continuation import beam as four_modes
 from nldyn.normal_forms import is_symmetric
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
 from nldyn.shooting import metric_length
-from nldyn.special import lies_on_crossing
+from nldyn.special import lies_on_crossing, special_points_between
 
 SHORT = ContinuationOptions(first_step=0.005, max_step=0.005)
 LONG = ContinuationOptions(first_step=0.05)
@@ -331,3 +332,28 @@ def test_two_pitchforks_within_a_step_are_found(first_step):
     assert sorted(crossings) == pytest.approx(sorted(expected), rel=1e-9)
     short = continue_branch(solve_orbit(system, 6.4), (6.4, 7.0), options=options)
     assert short.notes or [s.kind for s in short.special_points].count("BP") == 2
+
+
+@pytest.mark.parametrize("before_hz", [54.71, 54.713, 54.716, 54.72])
+def test_neimark_sacker_points_in_a_small_part_of_a_step_are_found(before_hz):
+    """One pair enters the unit circle and another one leaves it within 0.5 % of a step."""
+    displacements = [-5.915547e-06, 5.06379e-07, -2.0477e-07, 1.48661e-08]
+    velocities = [1.960015e-05, 1.296549e-04, -7.218754e-04, 1.250489e-04]
+    guess = np.array([*displacements, *velocities])
+    branch = continue_branch(
+        solve_orbit(four_modes(0.001), 54.6987555, guess=guess), (54.6826, 54.73), options=SHORT
+    )
+    points = []
+    for hz in (before_hz, 54.6987555, 54.6851172, 54.6826535):
+        orbit = branch.at(hz)[0]
+        way = orbit.point - points[-1].orbit.point if points else np.zeros(orbit.point.size)
+        length = metric_length(orbit.problem.metric(orbit.point), way)
+        arclength = points[-1].arclength + length if points else 0.0
+        points.append(replace(start_point(orbit, -1.0), arclength=arclength))
+    z, a, b, c = points
+    found = special_points_between(a, b, z, c)
+    walked = [s for s in branch.special_points if 54.6851172 < s.frequency_hz < 54.6987555]
+    assert [s.kind for s in found] == ["NS", "NS", "PD"]
+    assert [s.frequency_hz for s in found] == [
+        pytest.approx(s.frequency_hz, rel=1e-9) for s in reversed(walked)
+    ]
