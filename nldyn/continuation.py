@@ -41,7 +41,7 @@ from nldyn.errors import (
 )
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, check_minimal, minimal_period, refine
-from nldyn.shooting import ShootingProblem, metric_length
+from nldyn.shooting import ShootingProblem, asymmetry, metric_length
 from nldyn.special import (
     NEIGHBOUR,
     ON_CROSSING,
@@ -59,6 +59,7 @@ from nldyn.system import numbers
 
 KINK = 1e-6  # step below which a branch may bend by any angle where the number of contacts changes
 MEETS_OPEN_END = "meets another branch where that was broken off"
+BROKEN = 1e-8  # asymmetry of an orbit that is more than rounding
 EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
 MEETING_STEP = 0.001  # longest step over which a doubled branch may meet the one it comes from
 LONGER_CROSSINGS = (1.0, 10.0, 100.0)  # times that, where no shorter step succeeds
@@ -305,6 +306,8 @@ class Walk:
                 self._obstacle += f", last relative step {found.last_step:.1e}"
             return None
         self._obstacle = "what Newton's method finds is not the next point of the branch"
+        if _jumped(problem, here.orbit.point, straight, found.point):
+            return None
         miss = metric_length(weights, found.point - predicted) / step
         if step <= KINK and miss < 1.0:  # a linear stop that is touched bends the branch
             orbit = Orbit.of(problem, found, here.orbit.observe)
@@ -317,8 +320,6 @@ class Walk:
         # has landed on another branch
         off = metric_length(weights, found.point - straight)
         if off > 0.75 * self.options.max_angle * step:
-            return None
-        if _jumped(problem, here.orbit.point, straight, found.point):
             return None
         tangent = problem.tangent(found, direction)
         cosine = float(direction @ (weights * tangent)) / metric_length(weights, tangent)
@@ -552,8 +553,12 @@ def _jumped(problem: ShootingProblem, here: Real, guess: Real, there: Real) -> b
 
     Where it is shifted, some other shift of it lies nearer to where the step began. Only through a
     flip the halves change places steadily, as the tangent foretells; not in a jump. Nor does a
-    doubled branch go on along the one that it comes from.
+    doubled branch go on along the one that it comes from, nor one of broken symmetry along the
+    symmetric one.
     """
+    broken = asymmetry(problem, here)
+    if broken > BROKEN and asymmetry(problem, there) < EQUAL_HALVES * broken:
+        return True
     apart, *others = (float(np.linalg.norm((p - here)[:-1])) for p in shifts(problem, there))
     if problem.period % 2 == 0:  # half its period: a flip, below
         del others[problem.period // 2 - 1]

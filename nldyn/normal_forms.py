@@ -28,7 +28,7 @@ from nldyn.critical import (
 from nldyn.errors import SystemModelError, check_positive, check_types
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
-from nldyn.shooting import metric_length
+from nldyn.shooting import asymmetry, metric_length
 from nldyn.special import LocateError
 
 CLOSE = 1e-3  # relative distance in frequency of a special point that counts as close
@@ -313,12 +313,7 @@ def _transcritical(special: SpecialPoint, found: Crossing) -> NormalForm:
 
 def is_symmetric(orbit: Orbit, rtol: float = 1e-4) -> bool:
     """Whether half a period turns the orbit into its mirror image, x(t + T/2) = -x(t)."""
-    problem = orbit.problem
-    if problem.period % 2 == 0 or problem.segments % 2:
-        return False
-    nodes = problem.nodes(orbit.point)
-    sum_ = nodes + np.roll(nodes, problem.segments // 2, axis=0)
-    return bool(np.abs(sum_).max() <= rtol * problem.scale(orbit.point))
+    return asymmetry(orbit.problem, orbit.point) <= rtol
 
 
 def switch_at_branch_point(
@@ -379,12 +374,17 @@ def other_tangent(special: SpecialPoint) -> Real:
 
 
 def _step_off(special: SpecialPoint, direction: Real, amplitude: float) -> BranchPoint:
-    """Point of the branch with a tangent at a distance from the branch point."""
+    """Point of the branch with a tangent at a distance from the branch point.
+
+    The distance must be short where a linear stop is just touched beside the branch point: the
+    other branch bends there and has another tangent behind.
+    """
     orbit = special.orbit
     problem = orbit.problem
     row = problem.metric(orbit.point) * direction
     row /= np.linalg.norm(row)
-    for size in (amplitude, 0.25 * amplitude, 0.05 * amplitude, 0.01 * amplitude):
+    for share in (1.0, 0.25, 0.05, 0.01, 1e-3, 1e-4):
+        size = share * amplitude
         found = problem.correct(orbit.point + size * direction, row, longest=size)
         if found.converged:
             tangent = problem.tangent(found, direction)

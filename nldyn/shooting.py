@@ -124,3 +124,15 @@ class ShootingProblem:
 def metric_length(weights: Real, vector: Real) -> float:
     """Length of a vector (N + 1,) in a metric, see `ShootingProblem.metric`."""
     return math.sqrt(float(vector @ (weights * vector)))
+
+
+def asymmetry(problem: ShootingProblem, point: Real) -> float:
+    """How far half a period is from mirroring an orbit, x(t + T/2) = -x(t), relative to it.
+
+    Infinite where it cannot, for an even period, or its nodes do not tell, for odd segments.
+    """
+    if problem.period % 2 == 0 or problem.segments % 2:
+        return math.inf
+    nodes = problem.nodes(point)
+    sum_ = nodes + np.roll(nodes, problem.segments // 2, axis=0)
+    return float(np.abs(sum_).max()) / problem.scale(point)

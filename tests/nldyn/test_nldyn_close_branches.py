@@ -15,6 +15,7 @@ from nldyn import (
     HarmonicForce,
     Stop,
     System,
+    Unbalance,
     continuation,
     continue_branch,
     diagram,
@@ -27,7 +28,7 @@ from nldyn.hard.continuation import beam as four_modes
 from nldyn.normal_forms import is_symmetric
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
-from nldyn.shooting import metric_length
+from nldyn.shooting import asymmetry, metric_length
 from nldyn.special import lies_on_crossing, special_points_between
 
 SHORT = ContinuationOptions(first_step=0.005, max_step=0.005)
@@ -357,3 +358,48 @@ def test_neimark_sacker_points_in_a_small_part_of_a_step_are_found(before_hz):
     assert [s.frequency_hz for s in found] == [
         pytest.approx(s.frequency_hz, rel=1e-9) for s in reversed(walked)
     ]
+
+
+def two_modes_between_stops(
+    frequencies: list[float], shape: list[float], damping: float, stiffness: float, gap: float
+) -> System:
+    stops = [Stop("m", stiffness, 1.0, gap=gap, direction=side) for side in (1, -1)]
+    return System.from_modal(
+        frequencies, {"m": shape}, modal_damping=damping, stops=stops,
+        excitation=[Unbalance("m", 4.92e-6)],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("first_step", [0.01, 0.003])
+def test_halves_of_a_broken_symmetry_are_not_left_beside_a_grazing_point(first_step):
+    """A step with a new contact may bend by any angle: towards the symmetric branch, too."""
+    system = two_modes_between_stops([8.77, 33.98], [0.721, 0.32], 0.0286, 1.38e5, 7.57e-6)
+    symmetric = continue_branch(solve_orbit(system, 9.0), (9.0, 14.0))
+    pitchforks = [s for s in symmetric.special_points if s.kind == "BP"]
+    ends = [pytest.approx(s.frequency_hz, rel=1e-9) for s in pitchforks]
+    options = ContinuationOptions(first_step=first_step)
+    for pitchfork in pitchforks:
+        half = switch_at_branch_point(pitchfork)[0].orbit
+        branch = continue_branch(half, (7.0, 16.0), options=options)
+        assert branch.stop_reasons == ("closed branch", "closed branch")
+        assert min(asymmetry(orbit.problem, orbit.point) for orbit in branch.points) > 1e-7
+        assert sorted(s.frequency_hz for s in branch.special_points if s.kind == "BP") == ends
+
+
+def test_branches_are_switched_at_a_pitchfork_beside_a_grazing_point():
+    """The halves bend within 1e-6 of the pitchforks, where they touch one stop more or less."""
+    system = two_modes_between_stops([9.5, 48.3], [0.4325, -0.4255], 0.0272, 2.19e6, 3.38e-6)
+    symmetric = continue_branch(solve_orbit(system, 9.0), (9.0, 14.1))
+    found = symmetric.special_points
+    grazing = np.array([s.frequency_hz for s in found if s.kind == "GR"])
+    beside = [
+        s for s in found if s.kind == "BP" and np.abs(grazing / s.frequency_hz - 1.0).min() < 2e-5
+    ]
+    assert len(beside) == 3
+    for pitchfork in beside:
+        start, other = switch_at_branch_point(pitchfork)
+        branch = continue_branch(start.orbit, (6.0, 40.0))
+        assert branch.contains(other.orbit)
+        assert branch.stop_reasons == ("closed branch", "closed branch")
+        turns = [s.frequency_hz for s in branch.special_points if s.kind == "BP"]
+        assert len(turns) == 2 and pytest.approx(pitchfork.frequency_hz, rel=1e-9) in turns
