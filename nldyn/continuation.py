@@ -43,7 +43,6 @@ from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, check_minimal, minimal_period, refine
 from nldyn.shooting import ShootingProblem, asymmetry, metric_length
 from nldyn.special import (
-    NEIGHBOUR,
     ON_CROSSING,
     SHORTEST_CROSSING,
     Chord,
@@ -61,7 +60,9 @@ KINK = 1e-6  # step below which a branch may bend by any angle where the number 
 MEETS_OPEN_END = "meets another branch where that was broken off"
 BROKEN = 1e-8  # asymmetry of an orbit that is more than rounding
 EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
-MEETING_STEP = 0.001  # longest step over which a doubled branch may meet the one it comes from
+MEETING_STEP = 1e-4  # longest step over which a doubled branch may meet the one it comes from
+AT_FLIP = 1e-5  # distance of a turn of a doubled branch from its end that may be the flip itself
+FLAT = 1e-4  # frequency part of tangents beside such a turn, below which it is
 LONGER_CROSSINGS = (1.0, 10.0, 100.0)  # times that, where no shorter step succeeds
 LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
 RECENT = 10  # points behind a walk that it does not come back to
@@ -705,10 +706,8 @@ class Trail:
         if self.walk.stop_reason.startswith(COMES_BACK):
             self.notes.append(self.walk.stop_reason)
         special = self.special_points
-        if self.walk.stop_reason.startswith(JOINS):  # the flip itself: this branch turns there
-            last = min(self.nodes[-2].arclength, self.nodes[-1].arclength - NEIGHBOUR)
-            turns = ("BP", "LP")
-            special = [s for s in special if s.kind not in turns or s.point.arclength < last]
+        if self.walk.stop_reason.startswith(JOINS):
+            special = [s for s in special if not self._is_flip_at_end(s)]
         elif self.walk.stop_reason == CLOSED:  # the last step leads beyond the start
             special = [s for s in special if not self._is_repeated(s.point)]
         end = self._end(next(i for i, p in enumerate(self.nodes) if p is self._stride.here))
@@ -726,6 +725,18 @@ class Trail:
             NOT_FINISHED,
             self._end(kept),
         )
+
+    def _is_flip_at_end(self, special: SpecialPoint) -> bool:
+        """Whether a turn of a doubled branch is where it joins the one that it comes from."""
+        last, way = self.nodes[-1].orbit, special.orbit.point - self.nodes[-1].orbit.point
+        if special.kind not in ("BP", "LP"):
+            return False
+        if metric_length(last.problem.metric(last.point), way) > AT_FLIP:
+            return False
+        along = special.point.arclength
+        after = next((i for i, p in enumerate(self.nodes) if p.arclength > along), -1)
+        beside = self.nodes[after - 1], self.nodes[after]
+        return special.kind == "BP" or min(abs(float(p.tangent[-1])) for p in beside) < FLAT
 
     def _is_repeated(self, point: BranchPoint) -> bool:
         """Whether a point of a closed branch lies where the walk has begun again."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -403,3 +404,44 @@ def test_branches_are_switched_at_a_pitchfork_beside_a_grazing_point():
         assert branch.stop_reasons == ("closed branch", "closed branch")
         turns = [s.frequency_hz for s in branch.special_points if s.kind == "BP"]
         assert len(turns) == 2 and pytest.approx(pitchfork.frequency_hz, rel=1e-9) in turns
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "shapes", "damping", "stiffnesses", "gaps", "flip_hz"),
+    [
+        ([9.96, 49.6], [[0.523, 0.852], [-0.218, -0.124]], 0.00799, [9.08e5, 3.04e5],
+         [4.24e-6, 2.64e-6], 11.234673865),
+        ([10.5, 47.6], [[-0.492, -0.342], [0.436, 0.562]], 0.0141, [6.8e6, 7.18e6],
+         [5.23e-6, 3.87e-6], 11.186347125),
+    ],
+)  # fmt: skip
+def test_folds_of_a_doubled_branch_beside_its_flip_are_told(
+    frequencies, shapes, damping, stiffnesses, gaps, flip_hz
+):
+    """A grazing point beside the flip turns the branch: its fold is not the flip itself."""
+    stops = [
+        Stop(at, stiffness, 1.0, gap=gap, direction=side)
+        for at, stiffness, gap, side in zip("mn", stiffnesses, gaps, (1, -1), strict=True)
+    ]
+    system = System.from_modal(
+        frequencies, dict(zip("mn", shapes, strict=True)), modal_damping=damping, stops=stops,
+        excitation=[Unbalance("m", 4.92e-6)],
+    )  # fmt: skip
+    parent = continue_branch(solve_orbit(system, 9.0), (9.0, 14.0))
+    flip = min(
+        (s for s in parent.special_points if s.kind == "PD"),
+        key=lambda s: abs(s.frequency_hz - flip_hz),
+    )
+    branch = continue_branch(switch_at_flip(flip).orbit, (9.0, 14.0))
+    fold = next(
+        s for s in branch.special_points
+        if s.kind == "LP" and abs(s.frequency_hz / flip_hz - 1.0) < 1e-5
+    )  # fmt: skip
+    first, second = fold.orbit.problem.nodes(fold.orbit.point).reshape(2, -1)
+    assert np.linalg.norm(first - second) > 1e-5 * np.linalg.norm(first)
+    assert np.abs(fold.orbit.multipliers - 1.0).min() < 1e-6
+    told = [s.point.arclength for s in branch.special_points if s.kind != "GR"]
+    for a, b in pairwise(branch.nodes[1:-1]):
+        before, after = (int((np.abs(p.orbit.multipliers) > 1.0).sum()) for p in (a, b))
+        if before != after:
+            assert any(a.arclength <= place <= b.arclength for place in told)
