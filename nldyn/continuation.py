@@ -52,6 +52,7 @@ from nldyn.special import (
     is_crossing,
     lies_on_crossing,
     special_points_between,
+    true_crossing,
     without_repeats,
 )
 from nldyn.system import numbers
@@ -347,7 +348,8 @@ class Walk:
         """Next point from one beside which branches cross, or None.
 
         Its tangent is some mixture of theirs, and the next orbits may be so ill conditioned that
-        Newton's method does not find them: the way to here tells where longer steps lead.
+        Newton's method does not find them: the way to here tells where longer steps lead, or, if
+        that is too short, the way between here and the crossing.
         """
         problem, obstacle = here.orbit.problem, self._obstacle
         if self.options.min_step > SHORTEST_CROSSING:
@@ -356,7 +358,10 @@ class Walk:
         for factor in LONGER_CROSSINGS:
             length = factor * SHORTEST_CROSSING
             ways = (here.orbit.point - point.orbit.point for point in reversed(self.visited))
-            way = next((way for way in ways if metric_length(weights, way) > 3.0 * length), None)
+            far = (way for way in ways if metric_length(weights, way) > 3.0 * length)
+            way = next(far, None)
+            if way is None:
+                way = _way_of_crossing(here)
             if way is None:
                 break
             led = BranchPoint(here.orbit, way, here.arclength)
@@ -433,6 +438,17 @@ class Walk:
             np.array(shifts(problem, self.start.orbit.point)),
             np.array(shifts(problem, self.start.tangent)),
         )
+
+
+def _way_of_crossing(here: BranchPoint) -> Real | None:
+    """Difference of a point and one where branches cross beside it, ahead along its branch."""
+    crossing = true_crossing(here.orbit)
+    if crossing is None:
+        return None
+    weights, way = here.orbit.problem.metric(here.orbit.point), crossing.point - here.orbit.point
+    if metric_length(weights, way) < ON_CROSSING:
+        return None
+    return way if float(way @ (weights * here.tangent)) > 0.0 else -way
 
 
 def shifts(problem: ShootingProblem, point: Real) -> list[Real]:

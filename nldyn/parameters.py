@@ -106,7 +106,7 @@ def parameter_tables(
 def check_index(parameter: Parameter, kind: str, count: int) -> None:
     """Refuse the number of an element that there is not."""
     if not 0 <= parameter.index < count:
+        known = f"there are {count}, counted from 0" if count else "the system has none"
         raise SystemModelError(
-            f"parameter '{parameter.name}': there is no {kind} {parameter.index}, only "
-            f"{count}, counted from 0"
+            f"parameter '{parameter.name}': there is no {kind} {parameter.index}; {known}"
         )

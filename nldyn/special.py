@@ -519,7 +519,7 @@ def lies_on_crossing(orbit: Orbit, within: float) -> bool:
     """
     if float(np.abs(orbit.multipliers - 1.0).min()) > NEAR_ONE:
         return False
-    crossing = _true_crossing(orbit)
+    crossing = true_crossing(orbit)
     return crossing is not None and _distance(orbit, crossing) < within
 
 
@@ -528,7 +528,7 @@ def _distance(a: Orbit, b: Orbit) -> float:
     return metric_length(a.problem.metric(a.point), b.point - a.point)
 
 
-def _true_crossing(orbit: Orbit) -> Orbit | None:
+def true_crossing(orbit: Orbit) -> Orbit | None:
     """Where branches cross beside an orbit, if they do."""
     crossing = nearest_crossing(orbit)
     return crossing[0] if crossing is not None and crossing[1] <= CROSSES else None
@@ -544,7 +544,7 @@ def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
     crosses = special.kind == "BP"
     if not crosses and not (special.kind == "LP" and turns_near_crossing(special.orbit)):
         return special
-    orbit = _true_crossing(special.orbit)
+    orbit = true_crossing(special.orbit)
     if orbit is None or (crosses and _distance(special.orbit, orbit) > NEIGHBOUR):
         return special
     at = special.point

@@ -454,7 +454,7 @@ def same_system(a: System, b: System) -> bool:
 def numbers(name: str, values: ArrayLike) -> Real:
     """An array of finite floats, or a SystemModelError under the name."""
     try:
-        if np.iscomplexobj(values):
+        if values is None or np.iscomplexobj(values):
             raise TypeError
         array = np.array(values, dtype=float)  # a copy: the caller may change the original
     except (TypeError, ValueError, OverflowError):

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from one_dof import make_one_dof
 
 from nldyn import (
     ContinuationOptions,
@@ -337,3 +338,15 @@ def test_a_free_body_in_its_own_modes_is_not_taken_for_a_negative_stiffness():
         modal = modes.T @ chain @ modes
         system = System.from_matrices(np.eye(n), 0.5 * (modal + modal.T), {"m": modes[0]})
         assert system.frequencies_hz[0] < 1e-3
+
+
+def test_element_that_a_system_does_not_have_is_told_apart_from_none_at_all():
+    orbit = solve_orbit(make_one_dof(), 40.0)
+    for name, index, told in (
+        ("coefficient", 0, "there is no damper 0; the system has none"),
+        ("gap", 3, "there is no stop 3; there are 1, counted from 0"),
+    ):
+        with pytest.raises(SystemModelError, match=told):
+            continue_in(orbit, Parameter(name, index), (1.0, 2.0))
+    with pytest.raises(SystemModelError, match="range_hz must hold numbers only"):
+        continue_branch(orbit, None)

@@ -316,6 +316,25 @@ def test_ill_conditioned_pitchforks_are_crossed_and_located_from_any_step(first_
     assert met == pytest.approx([s.frequency_hz for s in crossings[-2:]], rel=1e-10)
 
 
+@pytest.mark.parametrize("first_step", [0.01, 0.002])
+@pytest.mark.parametrize("beside", [-1e-5, -3e-6, -1e-6, 1e-6, 3e-6, 1e-5])
+def test_walk_that_begins_beside_a_pitchfork_crosses_it(beside, first_step):
+    """The way from its start to where Newton's method ends is too short to tell where to go on."""
+    stops = [Stop("a", stiffness=1.07e9, direction=side) for side in (1, -1)]
+    system = System.from_modal(
+        [18.98], {"a": [0.597]}, modal_damping=0.00647, stops=stops,
+        excitation=[Unbalance("a", 2.49e-5)],
+    )  # fmt: skip
+    whole = continue_branch(solve_orbit(system, 20.0), (20.0, 26.8))
+    pitchfork = [s for s in whole.special_points if s.kind == "BP"][-1]
+    start = whole.at(pitchfork.frequency_hz * (1.0 + beside))[0]
+    options = ContinuationOptions(first_step=first_step)
+    branch = continue_branch(start, (25.0, 26.8), options=options)
+    assert branch.stop_reasons == ("end of the frequency range",) * 2
+    assert special_points(branch) == [("BP", pytest.approx(pitchfork.frequency_hz, rel=1e-10))]
+    assert all(is_symmetric(orbit) for orbit in branch.points)
+
+
 @pytest.mark.parametrize("first_step", [0.01, 0.02, 0.00144])
 def test_two_pitchforks_within_a_step_are_found(first_step):
     """The look between two points of the symmetric branch meets its halves."""
