@@ -684,9 +684,9 @@ WINDOW = ((20.0, 30.0), (-1e-6, 1e-6))
     ("call", "words"),
     [
         (lambda o: continue_in(o, "mass", (1.0, 2.0)), "unknown parameter 'mass'; there are"),
-        (lambda o: continue_in(o, Parameter("gap", 3), (0.0, 1.0)), "no stop 3, only 1"),
-        (lambda o: continue_in(o, Parameter("modal_damping", 4), (0, 1)), "no mode 4, only 1"),
-        (lambda o: continue_in(o, "coefficient", (0.0, 1.0)), "no damper 0, only 0"),
+        (lambda o: continue_in(o, Parameter("gap", 3), (0.0, 1.0)), "no stop 3; there are 1"),
+        (lambda o: continue_in(o, Parameter("modal_damping", 4), (0, 1)), "no mode 4; there are 1"),
+        (lambda o: continue_in(o, "coefficient", (0.0, 1.0)), "no damper 0; the system has none"),
         (lambda o: continue_in(o, "amplitude", (0.0, 1.0)), "excitation 0 has no amplitude"),
         (lambda o: continue_in(o, "gap", (1e-6, 2e-6)), "the start has gap = 0, outside"),
         (lambda o: continue_in(o, "gap", (1e-6, math.nan)), "two finite numbers, ascending"),
