@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +50,7 @@ from nldyn.special import (
     Chord,
     LocateError,
     crosses,
+    distance,
     insert_dip,
     is_crossing,
     lies_on_crossing,
@@ -355,13 +358,12 @@ class Walk:
         if self.options.min_step > SHORTEST_CROSSING:
             return None
         weights = problem.metric(here.orbit.point)
+        beside = _way_of_crossing(here)
         for factor in LONGER_CROSSINGS:
             length = factor * SHORTEST_CROSSING
             ways = (here.orbit.point - point.orbit.point for point in reversed(self.visited))
             far = (way for way in ways if metric_length(weights, way) > 3.0 * length)
-            way = next(far, None)
-            if way is None:
-                way = _way_of_crossing(here)
+            way = next(far, beside)
             if way is None:
                 break
             led = BranchPoint(here.orbit, way, here.arclength)
@@ -744,14 +746,12 @@ class Trail:
 
     def _is_flip_at_end(self, special: SpecialPoint) -> bool:
         """Whether a turn of a doubled branch is where it joins the one that it comes from."""
-        last, way = self.nodes[-1].orbit, special.orbit.point - self.nodes[-1].orbit.point
         if special.kind not in ("BP", "LP"):
             return False
-        if metric_length(last.problem.metric(last.point), way) > AT_FLIP:
+        if distance(self.nodes[-1].orbit, special.orbit) > AT_FLIP:
             return False
-        along = special.point.arclength
-        after = next((i for i, p in enumerate(self.nodes) if p.arclength > along), -1)
-        beside = self.nodes[after - 1], self.nodes[after]
+        after = bisect(self.nodes, special.point.arclength, key=attrgetter("arclength"))
+        beside = self.nodes[max(after - 1, 0) : after + 1]
         return special.kind == "BP" or min(abs(float(p.tangent[-1])) for p in beside) < FLAT
 
     def _is_repeated(self, point: BranchPoint) -> bool:

@@ -497,7 +497,7 @@ def _turns_twice(a: SpecialPoint, b: SpecialPoint) -> bool:
     apart = abs(a.point.arclength - b.point.arclength)
     turning = apart < NEIGHBOUR and max(_pace(a), _pace(b)) < NEIGHBOUR
     kinds = {a.kind, b.kind}
-    one = apart < NEIGHBOUR and _distance(a.orbit, b.orbit) < SAME
+    one = apart < NEIGHBOUR and distance(a.orbit, b.orbit) < SAME
     return (kinds == {"BP"} and (turning or one)) or (kinds == {"BP", "LP"} and turning)
 
 
@@ -520,10 +520,10 @@ def lies_on_crossing(orbit: Orbit, within: float) -> bool:
     if float(np.abs(orbit.multipliers - 1.0).min()) > NEAR_ONE:
         return False
     crossing = true_crossing(orbit)
-    return crossing is not None and _distance(orbit, crossing) < within
+    return crossing is not None and distance(orbit, crossing) < within
 
 
-def _distance(a: Orbit, b: Orbit) -> float:
+def distance(a: Orbit, b: Orbit) -> float:
     """Distance of two orbits of one problem, relative to the first."""
     return metric_length(a.problem.metric(a.point), b.point - a.point)
 
@@ -545,7 +545,7 @@ def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
     if not crosses and not (special.kind == "LP" and turns_near_crossing(special.orbit)):
         return special
     orbit = true_crossing(special.orbit)
-    if orbit is None or (crosses and _distance(special.orbit, orbit) > NEIGHBOUR):
+    if orbit is None or (crosses and distance(special.orbit, orbit) > NEIGHBOUR):
         return special
     at = special.point
     weights = orbit.problem.metric(orbit.point)
