@@ -50,12 +50,12 @@ from nldyn.special import (
     Chord,
     LocateError,
     crosses,
+    crossing_beside,
     distance,
     insert_dip,
     is_crossing,
     lies_on_crossing,
     special_points_between,
-    true_crossing,
     without_repeats,
 )
 from nldyn.system import numbers
@@ -444,7 +444,7 @@ class Walk:
 
 def _way_of_crossing(here: BranchPoint) -> Real | None:
     """Difference of a point and one where branches cross beside it, ahead along its branch."""
-    crossing = true_crossing(here.orbit)
+    crossing = crossing_beside(here.orbit)
     if crossing is None:
         return None
     weights, way = here.orbit.problem.metric(here.orbit.point), crossing.point - here.orbit.point

@@ -517,10 +517,15 @@ def lies_on_crossing(orbit: Orbit, within: float) -> bool:
 
     On a plane across a branch Newton's method may find any orbit of the other one there.
     """
-    if float(np.abs(orbit.multipliers - 1.0).min()) > NEAR_ONE:
-        return False
-    crossing = true_crossing(orbit)
+    crossing = crossing_beside(orbit)
     return crossing is not None and distance(orbit, crossing) < within
+
+
+def crossing_beside(orbit: Orbit) -> Orbit | None:
+    """Where branches cross beside an orbit that has a multiplier near 1, if they do."""
+    if float(np.abs(orbit.multipliers - 1.0).min()) > NEAR_ONE:
+        return None
+    return _true_crossing(orbit)
 
 
 def distance(a: Orbit, b: Orbit) -> float:
@@ -528,7 +533,7 @@ def distance(a: Orbit, b: Orbit) -> float:
     return metric_length(a.problem.metric(a.point), b.point - a.point)
 
 
-def true_crossing(orbit: Orbit) -> Orbit | None:
+def _true_crossing(orbit: Orbit) -> Orbit | None:
     """Where branches cross beside an orbit, if they do."""
     crossing = nearest_crossing(orbit)
     return crossing[0] if crossing is not None and crossing[1] <= CROSSES else None
@@ -544,7 +549,7 @@ def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
     crosses = special.kind == "BP"
     if not crosses and not (special.kind == "LP" and turns_near_crossing(special.orbit)):
         return special
-    orbit = true_crossing(special.orbit)
+    orbit = _true_crossing(special.orbit)
     if orbit is None or (crosses and distance(special.orbit, orbit) > NEIGHBOUR):
         return special
     at = special.point
