@@ -70,7 +70,7 @@ CREEP = 100.0  # such an exponent over an elastic contact: the damping alone dec
 
 # an orbit closes to this share of its size, or to this one times the largest entry of its segments'
 # Jacobians, which is what rounding costs; a short step of Newton's method does not tell
-OPEN, NOISE = 1e-7, 1e-12
+OPEN, STALLED, NOISE = 1e-7, 1e-10, 1e-12
 
 # the share of a slope in a Jacobian's error, kick (4 tail)², is less than rtol, (tail / 0.3)², as
 # long as KICK kick is less than one
@@ -1415,6 +1415,26 @@ def parabola(left, right, below, here, above):
 
 
 @inner
+def minimum_beside(tab, values, places, heights):
+    """Where the polynomial through `values` is lowest between three places, and how low."""
+    here, here_value = places[1], heights[1]
+    left, right = places[0], places[2]
+    below, above = heights[0], heights[2]
+    for _ in range(3):
+        if not left < here < right:
+            break
+        slope, curvature = parabola(left - here, right - here, below, here_value, above)
+        if not curvature > 0.0:
+            break
+        reach = 0.05 * (right - left)
+        here = min(max(here - 0.5 * slope / curvature, left), right)
+        left, right = max(here - reach, places[0]), min(here + reach, places[2])
+        here_value = interpolate(tab, values, here)
+        below, above = interpolate(tab, values, left), interpolate(tab, values, right)
+    return here, here_value
+
+
+@inner
 def first_root(tab, values, noise, edge):
     """First s at which the polynomial through `values` falls below -noise, at its end edge, or 2.
 
@@ -1432,13 +1452,14 @@ def first_root(tab, values, noise, edge):
         below = -1.0
         if fine[i] < (-noise if i < n - 1 else edge):
             below = grid[i]
-        elif i < n - 1 and fine[i - 1] >= fine[i] <= fine[i + 1]:
-            left, right = grid[i - 1] - grid[i], grid[i + 1] - grid[i]
-            slope, curvature = parabola(left, right, fine[i - 1], fine[i], fine[i + 1])
-            if curvature > 0.0 and fine[i] - 0.25 * slope * slope / curvature < -0.5 * noise:
-                bottom = grid[i] - 0.5 * slope / curvature
-                if interpolate(tab, values, bottom) < -noise:
-                    below = bottom
+        elif (
+            i < n - 1
+            and fine[i - 1] >= fine[i] <= fine[i + 1]
+            and fine[i] < 0.5 * max(fine[i - 1], fine[i + 1])  # near zero between the places
+        ):
+            bottom, value = minimum_beside(tab, values, grid[i - 1 : i + 2], fine[i - 1 : i + 2])
+            if value < -noise:
+                below = bottom
         if below < 0.0:
             continue
         last = i - 1
@@ -1464,10 +1485,32 @@ def first_root(tab, values, noise, edge):
 
 
 @inner
+def lowest_inside(tab, values, noise):
+    """Where the polynomial through `values` has its lowest minimum within ±noise, or 2."""
+    lowest, where = noise, 2.0
+    if values.min() > 0.1 * values.max():  # not near zero between the nodes either
+        return where
+    grid = tab.fine_grid
+    left, here = np.inf, values[0]
+    for i in range(1, grid.size):
+        right = interpolate(tab, values, grid[i])
+        if left > here <= right and i > 1:
+            heights = np.array([left, here, right])
+            bottom, value = minimum_beside(tab, values, grid[i - 2 : i + 1], heights)
+            if -noise <= value < lowest:
+                lowest, where = value, bottom
+        left, here = here, right
+    return where
+
+
+@inner
 def first_event(fl, tab, kind, phase, w, h, closed, panel, w_end):
-    """Stop that first opens or closes within a panel and the fraction of the panel, or (-1, 2)."""
+    """Stop that first opens or closes within a panel and the fraction of the panel, or (-1, 2).
+
+    With the fraction at which one first comes so near to it that only the state can tell, or 2.
+    """
     m = tab.nodes.size
-    event, where = -1, 2.0
+    event, where, doubtful = -1, 2.0, 2.0
     position = -1
     inner = np.empty((1, m))
     values = np.empty(m + 2)
@@ -1490,7 +1533,9 @@ def first_event(fl, tab, kind, phase, w, h, closed, panel, w_end):
         )
         for i in range(m):
             values[i + 1] = inner[0, i]
-        noise += 4.0 * legendre_tail(tab, inner, 0)
+        tail = 4.0 * legendre_tail(tab, inner, 0)
+        low = lowest_inside(tab, values, max(tail, noise)) if tail > 10.0 * noise else 2.0
+        noise += tail
         edge = 0.0
         if sign * speed > 0.0:  # the panel may begin a little before the event that it begins with
             noise += 2.0 * max(-values[0], 0.0)
@@ -1500,7 +1545,9 @@ def first_event(fl, tab, kind, phase, w, h, closed, panel, w_end):
             fraction = map_fraction(tab, kind, root)
             if fraction < where:
                 event, where = s, fraction
-    return event, where
+        elif low < 1.0:
+            doubtful = min(doubtful, map_fraction(tab, kind, low))
+    return event, where, doubtful if doubtful < where else 2.0
 
 
 @inner
@@ -1760,6 +1807,7 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
         aim = -1
         kind, h = guess_panel(fl, tab, phase, w, graded, h_mapped, start_switch, panel)
     tried = h
+    looked = False
     for attempt in range(100):
         if h <= 1e-16 * tried or phase + fl.omega * h == phase:
             if aim < 0 or not at_switch(fl, aim, w, phase, 10.0 * coarsest_instant(fl) * tried):
@@ -1773,7 +1821,9 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
         if found:
             decays = shows_decay(fl, tab, kind, h, panel)
             panel_end(fl, tab, kind, phase, w, h, panel, w_end)
-            event, where = first_event(fl, tab, kind, phase, w, h, closed, panel, w_end)
+            event, where, doubtful = first_event(
+                fl, tab, kind, phase, w, h, closed, panel, w_end
+            )
             found = not far_off(fl, phase, w, h, tried, panel, event, where)
         if not found:
             limit = 0.4 * min(h, tried)
@@ -1788,6 +1838,12 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
             fine = h <= 1.5 * graded_length(
                 fl, active, w_end, end_phase, h, -1.0, to_switch, aim if to_switch else -1
             )
+        if 0.01 < doubtful < 0.99 and not looked:  # the state at the end of a panel is exact
+            looked = True
+            keep_profile(tab, kind, smooth, doubtful, panel, guess)
+            kind, aim = smooth, -1
+            h *= doubtful
+            continue
         near_end = 1e-3
         if event >= 0 and event != aim:  # so near that `switch_with` will find it
             near_end = max(min(5.0 * fl.stops[event, INSTANT], 1e-7), 1e-12)
@@ -2295,7 +2351,8 @@ def newton(
         opening = 0.0
         for i in range(unknowns - 1):
             opening += corrector.state_weight * sides[i, 0] ** 2
-        closed = math.sqrt(opening) <= max(OPEN, NOISE * np.abs(jacobians).max())
+        opening = math.sqrt(opening)
+        noise = NOISE * np.abs(jacobians).max()
         sides[unknowns - 1, 0] = corrector.level
         for j in range(unknowns):
             matrix[unknowns - 1, j] = row[j]
@@ -2320,8 +2377,10 @@ def newton(
         for i in range(unknowns):
             point[i] += sides[i, 0]
             along[i] = sides[i, 1]
-        stagnant = last < 1e-8 and last > 0.5 * before  # the rounding level
-        if closed and (last <= corrector.rtol or stagnant):
+        converged = last <= corrector.rtol and opening <= max(OPEN, noise)
+        # the rounding level; steps to and fro where there is no orbit, beside a touch, leave more
+        stagnant = last < 1e-8 and last > 0.5 * before and opening <= max(STALLED, noise)
+        if converged or stagnant:
             outcome = OK
             break
         if iteration == max_iterations:

@@ -19,6 +19,7 @@ from nldyn.bordered import (
     reach_of_grazing,
 )
 from nldyn.errors import SystemModelError, is_finite, shown
+from nldyn.flow import Segments
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit
 from nldyn.parameter_values import FREQUENCY, Chart
@@ -28,6 +29,7 @@ from nldyn.shooting import metric_length
 KINDS = ("LP", "PD", "NS", "BP", "GR")
 
 BESIDE = 3e-3  # of an orbit's size: a crossing within it belongs to a turn
+TOUCH = 1e-6  # of an orbit's size: depth of a touch beside its grazing point
 SMALLEST_OVERLAP = 1e-3  # of null vectors: it vanishes where a multiplier is double
 
 Monitor = str | Callable[[Orbit], float]
@@ -245,6 +247,27 @@ class Grazing:
         phase = float(found.phases[index])
         return phase, exact_output(orbit, self.stop, phase) - orbit.system.stops[self.stop].gap
 
+    def slope(self, orbit: Orbit) -> Real:
+        """Derivative (N + 1,) of the depth with respect to the shooting unknowns."""
+        row = orbit.problem.flow.rows[self.stop]
+        slope = np.zeros(orbit.point.size)
+        states = slope[:-1].reshape(orbit.problem.segments, -1)
+        segment, found = _flown_to(orbit, self.extreme(orbit)[0], sensitivities=True)
+        states[segment] = row if found is None else row @ found.jacobians[0]
+        slope[-1] = 0.0 if found is None else orbit.omega * float(row @ found.d_omega[0])
+        return slope
+
+
+def depth_row(orbit: Orbit) -> Real | None:
+    """Derivative (N + 1,) of the depth of a touch beside its grazing point, None without one."""
+    try:
+        touch = Grazing.of(orbit)
+        if abs(touch.extreme(orbit)[1]) > TOUCH * touch.unit:
+            return None
+        return touch.slope(orbit)
+    except (SystemModelError, ConvergenceError):
+        return None
+
 
 def exact_output(orbit: Orbit, output: int, phase: float) -> float:
     """An output of `FlowMap.rows` at a phase, by the flow map from the segment's start.
@@ -252,19 +275,26 @@ def exact_output(orbit: Orbit, output: int, phase: float) -> float:
     The recorded motion is a polynomial inside a contact, good to 1e-6; at an extreme, whose phase
     it gives, an error of the phase matters to second order only.
     """
+    segment, found = _flown_to(orbit, phase, sensitivities=False)
+    state = orbit.problem.nodes(orbit.point)[segment] if found is None else found.ends[0]
+    return float(orbit.problem.flow.rows[output] @ state)
+
+
+def _flown_to(orbit: Orbit, phase: float, sensitivities: bool) -> tuple[int, Segments | None]:
+    """Segment of a phase, and the flow from its start to there; None if that is its start."""
     problem = orbit.problem
     phases = problem.phases
     phase = phase % phases[-1]
     j = min(int(np.searchsorted(phases, phase, side="right")) - 1, problem.segments - 1)
-    state = problem.nodes(orbit.point)[j]
-    if phase - phases[j] > 1e-12:
-        found = problem.flow.shoot(
-            state[None], np.array([phases[j], phase]), orbit.omega, sensitivities=False
-        )
-        if found.failure:
-            raise ConvergenceError(found.failure)
-        state = found.ends[0]
-    return float(problem.flow.rows[output] @ state)
+    if phase - phases[j] <= 1e-12:
+        return j, None
+    node = problem.nodes(orbit.point)[j]
+    found = problem.flow.shoot(
+        node[None], np.array([phases[j], phase]), orbit.omega, sensitivities=sensitivities
+    )
+    if found.failure:
+        raise ConvergenceError(found.failure)
+    return j, found
 
 
 def max_penetration(orbit: Orbit) -> float:

@@ -30,6 +30,7 @@ from nldyn.branch import (
     check_special,
 )
 from nldyn.checkpoint import Checkpoint, checkpoint_at
+from nldyn.conditions import TOUCH, depth_row
 from nldyn.crossings import check_requested, requested
 from nldyn.errors import (
     LARGEST_FREQUENCY,
@@ -60,7 +61,7 @@ from nldyn.special import (
 )
 from nldyn.system import numbers
 
-KINK = 1e-6  # step below which a branch may bend by any angle where the number of contacts changes
+KINK = TOUCH  # step below which a branch may bend by any angle where the number of contacts changes
 MEETS_OPEN_END = "meets another branch where that was broken off"
 BROKEN = 1e-8  # asymmetry of an orbit that is more than rounding
 EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
@@ -211,6 +212,8 @@ class Walk:
     visited: list[BranchPoint] = field(default_factory=list, repr=False)
     _places: Rows | None = field(default=None, init=False, repr=False)  # unknowns of these
     _obstacle: str = field(default="", init=False, repr=False)
+    _depth_row: tuple[BranchPoint, Real | None] | None = field(default=None, init=False, repr=False)
+    _met: float = field(default=0.0, init=False, repr=False)  # last step too long to meet a flip
 
     def __post_init__(self) -> None:
         check_types(start=(self.start, BranchPoint), options=(self.options, ContinuationOptions))
@@ -227,6 +230,11 @@ class Walk:
             attempt = None
             while attempt is None:
                 attempt = self._advance(problem, behind, here, step)
+                if attempt is None and step <= KINK:
+                    attempt = self._across_touch(problem, here, step)
+                if attempt is None and step <= MEETING_STEP and self._met == 2.0 * step:
+                    step, self._met = self._met, 0.0  # shorter, it ends too near to the flip
+                    attempt = self._advance(problem, behind, here, step, step)
                 if attempt is None:
                     step *= 0.5
                     if step < self.options.min_step:
@@ -289,8 +297,8 @@ class Walk:
     ) -> tuple[BranchPoint, float, float] | None:
         """Next point, its angle to this one and its relative distance from the predictor.
 
-        None when the step must be shorter, as it must be to cross another branch: up to
-        `SHORTEST_CROSSING`, or `crossing` if that is longer.
+        None when the step must be shorter, as it must be to cross another branch or to meet it:
+        up to `SHORTEST_CROSSING` or `MEETING_STEP`, or `crossing` if that is longer.
         """
         weights = problem.metric(here.orbit.point)
         direction = here.tangent / metric_length(weights, here.tangent)
@@ -336,7 +344,8 @@ class Walk:
         if step > self.options.grazing_step and orbit.impacts != here.orbit.impacts:
             return None
         meets = passed_flip(here.orbit, orbit)
-        if meets and step > MEETING_STEP:
+        if meets and step > max(MEETING_STEP, crossing):
+            self._met = step
             return None
         point = BranchPoint(orbit, tangent, here.arclength + step)
         if not meets and crosses(here, point) and (
@@ -346,6 +355,34 @@ class Walk:
         if lies_on_crossing(orbit, min(0.1 * step, ON_CROSSING)):
             return None
         return point, angle, miss
+
+    def _across_touch(
+        self, problem: ShootingProblem, here: BranchPoint, step: float
+    ) -> tuple[BranchPoint, float, float] | None:
+        """Next point on the other side of a grazing point, as `_advance` gives it, or None.
+
+        A stiff stop may bend the branch by more than a right angle within 1e-8, back from every
+        plane across its tangent. The depth of the touch rises or falls all the way, and where it is
+        held the stop's force hardly depends on the orbit.
+        """
+        if self._depth_row is None or self._depth_row[0] is not here:
+            self._depth_row = here, depth_row(here.orbit)
+        row = self._depth_row[1]
+        if row is None:
+            return None
+        weights = problem.metric(here.orbit.point)
+        guess = here.orbit.point + step * here.tangent / metric_length(weights, here.tangent)
+        found = problem.correct(guess, row, longest=2.0 * KINK, max_iterations=8)
+        if not found.converged or _jumped(problem, here.orbit.point, guess, found.point):
+            return None
+        orbit = Orbit.of(problem, found, here.orbit.observe)
+        length = metric_length(weights, found.point - here.orbit.point)
+        if length > KINK or orbit.impacts == here.orbit.impacts:
+            return None
+        tangent = problem.tangent(found, here.tangent)
+        if float(row @ tangent) * float(row @ here.tangent) < 0.0:
+            tangent = -tangent
+        return BranchPoint(orbit, tangent, here.arclength + length), 0.0, 0.0
 
     def _past_crossing(self, here: BranchPoint) -> tuple[BranchPoint, float, float] | None:
         """Next point from one beside which branches cross, or None.
@@ -597,7 +634,18 @@ def start_point(orbit: Orbit, direction: float) -> BranchPoint:
 
     Beside a flip or a fold, where the frequency hardly tells the orbits of a branch apart, the
     orbit is met again on the plane across the branch.
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton's method does not meet the orbit again, or branches cross so near to it that it
+        may be of either.
     """
+    if lies_on_crossing(orbit, ON_CROSSING):
+        raise ConvergenceError(
+            f"branches cross at the orbit at {orbit.frequency_hz:g} Hz: begin farther from there, "
+            "or with one of switch_at_branch_point"
+        )
     problem = orbit.problem
     towards = np.zeros(orbit.point.size)
     towards[-1] = direction
@@ -911,7 +959,8 @@ def continue_branch(
     OutputError
         If `checkpoint` cannot be written.
     ConvergenceError
-        If Newton's method does not meet the orbit again at its own frequency.
+        If Newton's method does not meet the orbit again at its own frequency, or branches cross
+        there.
 
     References
     ----------

@@ -25,7 +25,7 @@ from nldyn._events import (
 )
 from nldyn.between import Between
 from nldyn.branch import BranchPoint, SpecialPoint
-from nldyn.conditions import nearest_crossing
+from nldyn.conditions import TOUCH, depth_row, nearest_crossing
 from nldyn.critical import correct_across, turns_near_crossing
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
@@ -39,6 +39,7 @@ SHORTEST_CROSSING = 3e-6  # step over which a branch may cross another one
 SAME = 2.0 * SHORTEST_CROSSING  # distance of branch points that two such steps locate as one
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
+PASSED = 1e-6  # least of a branch point's test on both sides of a fold that is no crossing
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
 MOST_LOOKS = 12  # times that a step is cut at such points
 CROSSES = 1e-12  # least unfolding of a crossing, relative to the orbit, that is not rounding
@@ -106,7 +107,14 @@ class Chord:
 
     @cached_property
     def _row(self) -> Real:
-        row = self.first.orbit.problem.metric(self.first.orbit.point) * self._secant
+        """Along the secant, or the slope of a touch's depth if that rises or falls all the way."""
+        a = self.first.orbit
+        row = a.problem.metric(a.point) * self._secant
+        if abs(self.last.arclength - self.first.arclength) < TOUCH:
+            depth = depth_row(a)
+            ways = self._secant, self.first.tangent, self.last.tangent
+            if depth is not None and abs(sum(np.sign(depth @ way) for way in ways)) == len(ways):
+                row = depth
         return np.asarray(row / np.linalg.norm(row))
 
     def at(self, sigma: float) -> BranchPoint:
@@ -133,6 +141,8 @@ class Chord:
         if found.converged:
             orbit = Orbit.of(problem, found, a.orbit.observe)
             tangent = problem.tangent(found, self._secant)
+            if float(row @ tangent) * float(row @ self._secant) < 0.0:
+                tangent = -tangent
             if self._across(tangent):
                 raise LocateError("the branch turns within one step")
         else:
@@ -454,6 +464,8 @@ def _located(kind: str, chord: Chord) -> list[SpecialPoint]:
     special = locate(kind, chord, lambda point: tests(point)[kind])
     if kind == "NS" and not _on_unit_circle(special.orbit.multipliers):
         return []
+    if kind == "LP" and _is_plain_fold(chord):
+        return [special]
     return [_along(chord, _crossing_or_fold(special))]
 
 
@@ -539,6 +551,12 @@ def _true_crossing(orbit: Orbit) -> Orbit | None:
     return crossing[0] if crossing is not None and crossing[1] <= CROSSES else None
 
 
+def _is_plain_fold(chord: Chord) -> bool:
+    """Whether a multiplier passes 1 clearly where a branch turns, as it does not at a crossing."""
+    before, after = tests(chord.first)["BP"], tests(chord.last)["BP"]
+    return before * after < 0.0 and min(abs(before), abs(after)) > PASSED
+
+
 def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
     """What looks like a fold may be where this branch crosses another one.
 
@@ -550,7 +568,7 @@ def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
     if not crosses and not (special.kind == "LP" and turns_near_crossing(special.orbit)):
         return special
     orbit = _true_crossing(special.orbit)
-    if orbit is None or (crosses and distance(special.orbit, orbit) > NEIGHBOUR):
+    if orbit is None or distance(special.orbit, orbit) > NEIGHBOUR:
         return special
     at = special.point
     weights = orbit.problem.metric(orbit.point)

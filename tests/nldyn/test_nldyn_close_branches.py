@@ -13,6 +13,7 @@ from test_nldyn_uncoupled import oscillator
 
 from nldyn import (
     ContinuationOptions,
+    ConvergenceError,
     HarmonicForce,
     Stop,
     System,
@@ -160,6 +161,17 @@ def test_halves_of_a_broken_symmetry_do_not_depend_on_the_step(max_step):
     branch = continue_branch(halves[0], (9.0, 9.5), options=options)
     turns = [s for s in branch.special_points if abs(s.frequency_hz - 9.4031911) < 1e-6]
     assert [s.kind for s in turns] == ["BP"]
+
+
+def test_walk_from_a_branch_point_says_that_branches_cross_there():
+    system = System.from_modal(
+        [10.0], {"m": [1.0]}, modal_damping=0.02, excitation=[HarmonicForce("m", 2.0)],
+        stops=[Stop("m", 1e7, direction=side) for side in (1, -1)],
+    )  # fmt: skip
+    branch = continue_branch(solve_orbit(system, 8.0), (6.5, 8.5))
+    point = next(s for s in branch.special_points if s.kind == "BP")
+    with pytest.raises(ConvergenceError, match=r"branches cross at the orbit at 7\.\d+ Hz"):
+        continue_branch(point.orbit, (6.5, 8.5))
 
 
 def special_points(branch):
