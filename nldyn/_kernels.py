@@ -70,7 +70,8 @@ CREEP = 100.0  # such an exponent over an elastic contact: the damping alone dec
 
 # an orbit closes to this share of its size, or to this one times the largest entry of its segments'
 # Jacobians, which is what rounding costs; a short step of Newton's method does not tell
-OPEN, STALLED, NOISE = 1e-7, 1e-10, 1e-12
+OPEN, NOISE = 1e-7, 1e-12
+STEADY = 1e-3  # share by which the Jacobians may change in a step that only shows rounding
 
 # the share of a slope in a Jacobian's error, kick (4 tail)², is less than rtol, (tail / 0.3)², as
 # long as KICK kick is less than one
@@ -2322,6 +2323,7 @@ def newton(
     first, last = np.inf, np.inf
     outcome = NOT_CONVERGED
     iteration = 0
+    known = np.full((k, size, size), np.inf)
     while True:
         iteration += 1
         if max_iterations > 0:
@@ -2378,8 +2380,11 @@ def newton(
             point[i] += sides[i, 0]
             along[i] = sides[i, 1]
         converged = last <= corrector.rtol and opening <= max(OPEN, noise)
-        # the rounding level; steps to and fro where there is no orbit, beside a touch, leave more
-        stagnant = last < 1e-8 and last > 0.5 * before and opening <= max(STALLED, noise)
+        # the rounding level, or steps to and fro where there is no orbit, across a sharp touch
+        stagnant = last < 1e-8 and last > 0.5 * before and opening <= max(OPEN, noise)
+        if stagnant and opening > max(NOISE, noise):
+            stagnant = np.abs(jacobians - known).max() <= STEADY * np.abs(jacobians).max()
+        known = jacobians
         if converged or stagnant:
             outcome = OK
             break
