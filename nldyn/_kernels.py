@@ -1486,22 +1486,30 @@ def first_root(tab, values, noise, edge):
 
 
 @inner
-def lowest_inside(tab, values, noise):
-    """Where the polynomial through `values` has its lowest minimum within ±noise, or 2."""
-    lowest, where = noise, 2.0
+def first_doubt(tab, values, rounding, error):
+    """Where the polynomial through `values` first dips to zero within an error, or 2.
+
+    Beside a switch at an end of the panel, where the value is rounding, it must have left that band
+    before and leave it behind.
+    """
     if values.min() > 0.1 * values.max():  # not near zero between the nodes either
-        return where
+        return 2.0
     grid = tab.fine_grid
-    left, here = np.inf, values[0]
+    last = grid.size - 1
+    left, here, where = values[0], values[0], 2.0
+    came = values[0] > 100.0 * rounding
     for i in range(1, grid.size):
-        right = interpolate(tab, values, grid[i])
-        if left > here <= right and i > 1:
+        right = values[values.size - 1] if i == last else interpolate(tab, values, grid[i])
+        came = came or here > 10.0 * error
+        if came and where > 1.0 and i > 1 and left > here <= right:
             heights = np.array([left, here, right])
             bottom, value = minimum_beside(tab, values, grid[i - 2 : i + 1], heights)
-            if -noise <= value < lowest:
-                lowest, where = value, bottom
+            if abs(value) <= error:
+                where = bottom
+        if where <= 1.0 and (right > 10.0 * error or (i == last and right > 100.0 * rounding)):
+            return where
         left, here = here, right
-    return where
+    return 2.0
 
 
 @inner
@@ -1535,7 +1543,7 @@ def first_event(fl, tab, kind, phase, w, h, closed, panel, w_end):
         for i in range(m):
             values[i + 1] = inner[0, i]
         tail = 4.0 * legendre_tail(tab, inner, 0)
-        low = lowest_inside(tab, values, max(tail, noise)) if tail > 10.0 * noise else 2.0
+        low = first_doubt(tab, values, noise, tail) if tail > 10.0 * noise else 2.0
         noise += tail
         edge = 0.0
         if sign * speed > 0.0:  # the panel may begin a little before the event that it begins with
@@ -1839,7 +1847,7 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
             fine = h <= 1.5 * graded_length(
                 fl, active, w_end, end_phase, h, -1.0, to_switch, aim if to_switch else -1
             )
-        if 0.01 < doubtful < 0.99 and not looked:  # the state at the end of a panel is exact
+        if 1e-6 < doubtful < 1.0 - 1e-6 and not looked:  # the state at the end of a panel is exact
             looked = True
             keep_profile(tab, kind, smooth, doubtful, panel, guess)
             kind, aim = smooth, -1
