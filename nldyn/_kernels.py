@@ -1212,8 +1212,17 @@ def resolved(fl, tab, kind, h, noise, panel):
     against the period, it kicks them to many times their final size, and its error, the square of
     the tail, with them. What a force or a slope does over a panel is off by the product of its
     tail and that of the response to it, or of the response's square.
+
+    A force that hardly changes tells nothing of how a change of the motion sways on the closed
+    stops: their stiffness is held to the bound of the structure's fastest mode.
     """
     na = panel.active.size
+    stiffness = 0.0
+    for a in range(na):
+        stiffness += fl.stops[panel.active[a], MOBILITY] * largest(panel.slope, a)
+    longest = fl.node_angle * tab.nodes.size * (1.0 if kind == 0 else 0.75 / tab.power)
+    if h * math.sqrt(stiffness) > longest:
+        return False
     slopes = np.empty(panel.slope.shape)
     for o in range(slopes.shape[0]):
         for i in range(slopes.shape[1]):

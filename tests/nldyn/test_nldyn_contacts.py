@@ -18,6 +18,7 @@ from nldyn import (
     Stop,
     System,
     Unbalance,
+    solve_orbit,
 )
 
 THREE = ([13.1, 117.5, 326.5], {"middle": [0.63, 0.8, -0.5], "end": [-0.4, 0.9, 0.7]})
@@ -568,3 +569,23 @@ def test_linear_stop_is_as_exact_beside_one_of_another_law():
         found = flow.shoot(flow.to_state([[0.0, 0.1]]), np.array([0.0, 1.0]), 50.0 * math.pi)
         jacobians.append(found.jacobians[0])
     assert np.abs(jacobians[1] - jacobians[0]).max() < 1e-10 * np.abs(jacobians[0]).max()
+
+
+def held_between_stops() -> System:
+    """Pressed into two stiff Hertz stops, which swing eight times in half a period of 5 Hz."""
+    return System.from_modal(
+        [11.54], {"a": [-0.4131], "b": [-2.4415]}, modal_damping=0.0052,
+        stops=[
+            Stop("a", 1.578e7, gap=-1.295e-4), Stop("b", 6.851e5, direction=-1),
+        ],
+        excitation=[HarmonicForce("b", 2.205)],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("hz", [4.8, 5.0, 5.03, 5.3])
+def test_slow_motion_held_between_stops_against_runge_kutta(hz):
+    """The forces are smooth over a panel that is far too long for what a change of them does."""
+    system = held_between_stops()
+    phases = (0.0, 2.0 * np.pi)
+    start = solve_orbit(system, hz).states(np.zeros(1))[0]
+    assert_agrees(system, start, phases, 2.0 * np.pi * hz, closings=[0, 0])
