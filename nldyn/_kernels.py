@@ -71,6 +71,7 @@ CREEP = 100.0  # such an exponent over an elastic contact: the damping alone dec
 # an orbit closes to this share of its size, or to this one times the largest entry of its segments'
 # Jacobians, which is what rounding costs; a short step of Newton's method does not tell
 OPEN, NOISE = 1e-7, 1e-12
+HALF_CONTACT = 2.5  # phase of the stiffness of a stop in half a contact, at most, in rad
 STEADY = 1e-3  # share by which the Jacobians may change in a step that only shows rounding
 
 # the share of a slope in a Jacobian's error, kick (4 tail)², is less than rtol, (tail / 0.3)², as
@@ -1221,7 +1222,7 @@ def resolved(fl, tab, kind, h, noise, panel):
     for a in range(na):
         stiffness += fl.stops[panel.active[a], MOBILITY] * largest(panel.slope, a)
     longest = fl.node_angle * tab.nodes.size * (1.0 if kind == 0 else 0.75 / tab.power)
-    if h * math.sqrt(stiffness) > longest:
+    if h * math.sqrt(stiffness) > max(longest, HALF_CONTACT):
         return False
     slopes = np.empty(panel.slope.shape)
     for o in range(slopes.shape[0]):
