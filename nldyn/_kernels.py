@@ -71,8 +71,9 @@ CREEP = 100.0  # such an exponent over an elastic contact: the damping alone dec
 # an orbit closes to this share of its size, or to this one times the largest entry of its segments'
 # Jacobians, which is what rounding costs; a short step of Newton's method does not tell
 OPEN, NOISE = 1e-7, 1e-12
-HALF_CONTACT = 2.5  # phase of the stiffness of a stop in half a contact, at most, in rad
 STEADY = 1e-3  # share by which the Jacobians may change in a step that only shows rounding
+
+HALF_CONTACT = 2.5  # phase of the stiffness of a stop in half a contact, at most, in rad
 
 # the share of a slope in a Jacobian's error, kick (4 tail)², is less than rtol, (tail / 0.3)², as
 # long as KICK kick is less than one
@@ -1446,19 +1447,25 @@ def minimum_beside(tab, values, places, heights):
 
 
 @inner
-def first_root(tab, values, noise, edge):
-    """First s at which the polynomial through `values` falls below -noise, at its end edge, or 2.
-
-    It is looked at on a grid four times as fine as the nodes, and at the minima between.
-    """
-    grid = tab.fine_grid
-    n = grid.size
-    fine = np.empty(n)
-    for i in range(n):
+def refined(tab, values):
+    """Polynomial through `values` on a grid four times as fine as the nodes."""
+    fine = np.empty(tab.fine_grid.size)
+    for i in range(fine.size):
         total = 0.0
         for j in range(values.size):
             total += tab.to_fine[i, j] * values[j]
         fine[i] = total
+    return fine
+
+
+@inner
+def first_root(tab, values, fine, noise, edge):
+    """First s at which the polynomial through `values` falls below -noise, at its end edge, or 2.
+
+    It is looked at on the fine grid, and at the minima between.
+    """
+    grid = tab.fine_grid
+    n = grid.size
     for i in range(1, n):
         below = -1.0
         if fine[i] < (-noise if i < n - 1 else edge):
@@ -1496,29 +1503,26 @@ def first_root(tab, values, noise, edge):
 
 
 @inner
-def first_doubt(tab, values, rounding, error):
+def first_doubt(tab, values, fine, rounding, error):
     """Where the polynomial through `values` first dips to zero within an error, or 2.
 
     Beside a switch at an end of the panel, where the value is rounding, it must have left that band
     before and leave it behind.
     """
-    if values.min() > 0.1 * values.max():  # not near zero between the nodes either
+    if fine.min() > 0.1 * fine.max():  # not near zero between the places either
         return 2.0
-    grid = tab.fine_grid
-    last = grid.size - 1
-    left, here, where = values[0], values[0], 2.0
-    came = values[0] > 100.0 * rounding
-    for i in range(1, grid.size):
-        right = values[values.size - 1] if i == last else interpolate(tab, values, grid[i])
-        came = came or here > 10.0 * error
-        if came and where > 1.0 and i > 1 and left > here <= right:
-            heights = np.array([left, here, right])
-            bottom, value = minimum_beside(tab, values, grid[i - 2 : i + 1], heights)
+    last, where = fine.size - 1, 2.0
+    came = fine[0] > 100.0 * rounding
+    for i in range(1, fine.size):
+        came = came or fine[i - 1] > 10.0 * error
+        if came and where > 1.0 and i > 1 and fine[i - 2] > fine[i - 1] <= fine[i]:
+            heights = fine[i - 2 : i + 1]
+            bottom, value = minimum_beside(tab, values, tab.fine_grid[i - 2 : i + 1], heights)
             if abs(value) <= error:
                 where = bottom
-        if where <= 1.0 and (right > 10.0 * error or (i == last and right > 100.0 * rounding)):
+        left_behind = fine[i] > 10.0 * error or (i == last and fine[i] > 100.0 * rounding)
+        if where <= 1.0 and left_behind:
             return where
-        left, here = here, right
     return 2.0
 
 
@@ -1552,20 +1556,21 @@ def first_event(fl, tab, kind, phase, w, h, closed, panel, w_end):
         )
         for i in range(m):
             values[i + 1] = inner[0, i]
+        fine = refined(tab, values)
         tail = 4.0 * legendre_tail(tab, inner, 0)
-        low = first_doubt(tab, values, noise, tail) if tail > 10.0 * noise else 2.0
-        noise += tail
-        edge = 0.0
+        below, edge = noise + tail, 0.0
         if sign * speed > 0.0:  # the panel may begin a little before the event that it begins with
-            noise += 2.0 * max(-values[0], 0.0)
+            below += 2.0 * max(-values[0], 0.0)
             edge = min(2.0 * values[0], 0.0)
-        root = first_root(tab, values, noise, edge)
+        root = first_root(tab, values, fine, below, edge)
         if root <= 1.0:
             fraction = map_fraction(tab, kind, root)
             if fraction < where:
                 event, where = s, fraction
-        elif low < 1.0:
-            doubtful = min(doubtful, map_fraction(tab, kind, low))
+        elif tail > 10.0 * noise:
+            low = first_doubt(tab, values, fine, noise, tail)
+            if low < 1.0:
+                doubtful = min(doubtful, map_fraction(tab, kind, low))
     return event, where, doubtful if doubtful < where else 2.0
 
 

@@ -247,12 +247,12 @@ class Grazing:
         phase = float(found.phases[index])
         return phase, exact_output(orbit, self.stop, phase) - orbit.system.stops[self.stop].gap
 
-    def slope(self, orbit: Orbit) -> Real:
-        """Derivative (N + 1,) of the depth with respect to the shooting unknowns."""
+    def slope(self, orbit: Orbit, phase: float) -> Real:
+        """Derivative (N + 1,) of the depth at a phase with respect to the shooting unknowns."""
         row = orbit.problem.flow.rows[self.stop]
         slope = np.zeros(orbit.point.size)
         states = slope[:-1].reshape(orbit.problem.segments, -1)
-        segment, found = _flown_to(orbit, self.extreme(orbit)[0], sensitivities=True)
+        segment, found = _flown_to(orbit, phase, sensitivities=True)
         states[segment] = row if found is None else row @ found.jacobians[0]
         slope[-1] = 0.0 if found is None else orbit.omega * float(row @ found.d_omega[0])
         return slope
@@ -262,9 +262,8 @@ def depth_row(orbit: Orbit) -> Real | None:
     """Derivative (N + 1,) of the depth of a touch beside its grazing point, None without one."""
     try:
         touch = Grazing.of(orbit)
-        if abs(touch.extreme(orbit)[1]) > TOUCH * touch.unit:
-            return None
-        return touch.slope(orbit)
+        phase, depth = touch.extreme(orbit)
+        return touch.slope(orbit, phase) if abs(depth) <= TOUCH * touch.unit else None
     except (SystemModelError, ConvergenceError):
         return None
 

@@ -227,24 +227,11 @@ class Walk:
             yield self.start
         while self.stride.count < self.options.max_points:
             here, step, behind = self.stride.here, self.stride.step, self.stride.behind
-            attempt = None
-            while attempt is None:
-                attempt = self._advance(problem, behind, here, step)
-                if attempt is None and step <= KINK:
-                    attempt = self._across_touch(problem, here, step)
-                if attempt is None and step <= MEETING_STEP and self._met == 2.0 * step:
-                    step, self._met = self._met, 0.0  # shorter, it ends too near to the flip
-                    attempt = self._advance(problem, behind, here, step, step)
-                if attempt is None:
-                    step *= 0.5
-                    if step < self.options.min_step:
-                        attempt = self._past_crossing(here)
-                        if attempt is None:
-                            shortest = f"{SHORT_STEP}{self.options.min_step:g}"
-                            self.stop_reason = f"{shortest}: {self._obstacle}"
-                            return
-                        step = attempt[0].arclength - here.arclength
-            point, angle, miss = attempt
+            attempt = self._shortened(problem, behind, here, step)
+            if attempt is None:
+                self.stop_reason = f"{SHORT_STEP}{self.options.min_step:g}: {self._obstacle}"
+                return
+            step, point, angle, miss = attempt
             low, high = self.range_hz
             if not low <= point.orbit.frequency_hz <= high:
                 end = self._range_end(here, point, low if point.orbit.frequency_hz < low else high)
@@ -286,6 +273,25 @@ class Walk:
             self.visited.append(point)
             yield point
         self.stop_reason = f"{self.options.max_points}{POINTS}"
+
+    def _shortened(
+        self, problem: ShootingProblem, behind: Real, here: BranchPoint, step: float
+    ) -> tuple[float, BranchPoint, float, float] | None:
+        """The longest step up to `step` that leads to a next point, with what `_advance` gives."""
+        while True:
+            attempt = self._advance(problem, behind, here, step)
+            if attempt is None and step <= KINK:
+                attempt = self._across_touch(problem, here, step)
+            if attempt is None and step <= MEETING_STEP and self._met == 2.0 * step:
+                step, self._met = self._met, 0.0  # shorter, it ends too near to the flip
+                attempt = self._advance(problem, behind, here, step, step)
+            if attempt is not None:
+                return step, *attempt
+            step *= 0.5
+            if step < self.options.min_step:
+                break
+        attempt = self._past_crossing(here)
+        return None if attempt is None else (attempt[0].arclength - here.arclength, *attempt)
 
     def _advance(
         self,
