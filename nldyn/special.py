@@ -437,7 +437,7 @@ def located_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[Spec
     signs = changed(a, b)
     if "NS" in signs and not leaves_circle(a.orbit.multipliers, b.orbit.multipliers):
         signs.remove("NS")
-    kinds = [k for k in signs if not (k == "BP" and "LP" in signs)]
+    kinds = _told_apart(signs)
     lonely_fold = "LP" in signs and "BP" not in signs
     contacts = abs(a.orbit.impacts - b.orbit.impacts)
     touches = touching_extremes(a.orbit, b.orbit)
@@ -484,8 +484,13 @@ def _pairs_around(grazing: SpecialPoint, chord: Chord) -> list[SpecialPoint]:
     """
     sides = Chord(chord.first, grazing.point), Chord(grazing.point, chord.last)
     before, after = (changed(side.first, side.last) for side in sides)
-    hidden = [kind for kind in before if kind in after]
+    hidden = _told_apart([kind for kind in before if kind in after])
     return [special for kind in hidden for side in sides for special in _located(kind, side)]
+
+
+def _told_apart(signs: list[str]) -> list[str]:
+    """What to look for where tests change signs: at a fold that of a branch point does too."""
+    return [kind for kind in signs if not (kind == "BP" and "LP" in signs)]
 
 
 def without_repeats(found: list[SpecialPoint]) -> list[SpecialPoint]:

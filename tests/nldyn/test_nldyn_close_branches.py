@@ -476,3 +476,23 @@ def test_folds_of_a_doubled_branch_beside_its_flip_are_told(
         before, after = (int((np.abs(p.orbit.multipliers) > 1.0).sum()) for p in (a, b))
         if before != after:
             assert any(a.arclength <= place <= b.arclength for place in told)
+
+
+def test_folds_on_both_sides_of_a_grazing_point_beside_a_flip_are_no_branch_points():
+    """A doubled branch turns twice within 5e-4 of its flip, with a grazing point between."""
+    displacements = [-7.020505e-06, 8.182906e-07, 2.297047e-08, 1.579987e-08]
+    velocities = [3.705808e-05, -1.086527e-04, -4.737369e-05, -2.274158e-05]
+    guess = np.array([*displacements, *velocities])
+    range_hz = 38.4535, 38.454
+    parent = continue_branch(solve_orbit(four_modes(0.01), 38.4538, 3, guess=guess), range_hz)
+    (flip,) = parent.special_points
+    start = switch_at_flip(flip).orbit
+    branch = continue_branch(start, range_hz)
+    assert [s.kind for s in branch.special_points] == ["LP", "GR", "LP"]
+    fine = ContinuationOptions(first_step=2e-6, max_step=1e-5, max_points=60)
+    walked = continue_branch(start, range_hz, options=fine).frequency_hz
+    inner = walked[1:-1]
+    turns = inner[(inner - walked[:-2]) * (inner - walked[2:]) > 0.0]
+    folds = [s.frequency_hz for s in branch.special_points if s.kind == "LP"]
+    assert sorted(folds) == pytest.approx(sorted(turns), abs=1e-8)
+    assert abs(folds[0] - folds[1]) > 1e-6
