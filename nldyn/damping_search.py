@@ -1,0 +1,245 @@
+"""Further branches by way of less damping, where they are joined to others."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from nldyn.branch import Branch
+from nldyn.checkpoint import checkpoint_of_several
+from nldyn.continuation import ContinuationOptions
+from nldyn.diagrams import Collector, Diagram, Progress
+from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
+from nldyn.flow import FlowMap
+from nldyn.linear import Real
+from nldyn.orbit import ConvergenceError, Orbit, minimal_period, same_orbit, solve_orbit
+
+FINEST_SPACING = 1e-5
+PLACES = 3  # orbits of each branch that are carried to less damping
+FIRST_STEP, SHORTEST_STEP = 0.25, 1e-3  # in the logarithm of the damping
+LONGER, SHORTER = 1.5, 0.4  # the next step, after one that led on and one that did not
+MISS = 0.3  # of an orbit: distance from where it was expected
+
+
+@dataclass
+class DampedFlows:
+    """The flow map of a system at multiples of its modal damping.
+
+    Parameters
+    ----------
+    own : FlowMap
+        At its own damping, a factor of 1.
+    """
+
+    own: FlowMap
+    _others: dict[float, FlowMap] = field(default_factory=dict)
+
+    def at(self, log_factor: float) -> FlowMap:
+        """The flow map where the modal damping is multiplied by e^log_factor."""
+        if log_factor == 0.0:
+            return self.own
+        if log_factor not in self._others:
+            system = self.own.system
+            damped = replace(system, damping=math.exp(log_factor) * system.damping)
+            self._others[log_factor] = FlowMap(damped, self.own.options)
+        return self._others[log_factor]
+
+    def carried(self, orbit: Orbit, start: float, end: float) -> Orbit | None:
+        """The orbit of the same frequency at another damping, or None where a fold comes first.
+
+        Newton's method starts from the line through the two orbits before.
+        """
+        x, step = start, math.copysign(FIRST_STEP, end - start)
+        here = _states(orbit)
+        slope = np.zeros_like(here)
+        while x != end:
+            y = x + step if abs(step) < abs(end - x) else end
+            guess = here + slope * (y - x)
+            found = self._near(orbit, guess, y)
+            if found is None:
+                step *= SHORTER
+                if abs(step) < SHORTEST_STEP:
+                    return None
+                continue
+            states = _states(found)
+            slope = (states - here) / (y - x)
+            orbit, here, x = found, states, y
+            step *= LONGER
+        return orbit
+
+    def _near(self, orbit: Orbit, guess: Real, log_factor: float) -> Orbit | None:
+        try:
+            found = solve_orbit(
+                self.at(log_factor),
+                orbit.frequency_hz,
+                orbit.period,
+                guess=guess,
+                observe=orbit.observe,
+                segments=orbit.problem.segments,
+            )
+        except ConvergenceError:
+            return None
+        states = _states(found)
+        far = float(np.linalg.norm(states - guess)) > MISS * float(np.linalg.norm(states))
+        return None if far or minimal_period(found) != orbit.period else found
+
+
+def _states(orbit: Orbit) -> Real:
+    """States (k, 2n) at the shooting phases, in coordinates that do not depend on the damping."""
+    return orbit.states(orbit.problem.phases[:-1])
+
+
+def by_less_damping(
+    known: Diagram,
+    factor: float = 0.5,
+    *,
+    max_period: int = 3,
+    spacing: float = 0.002,
+    options: ContinuationOptions | None = None,
+    progress: Progress | None = None,
+    checkpoint: str | Path | None = None,
+) -> Diagram:
+    """Find further branches where the modal damping is less and the branches known lead to them.
+
+    Closed branches (isolas) grow when the damping falls, and join others. So the branches known are
+    followed at a share of the damping; the orbits of these, at frequencies next to each other, are
+    carried back to the damping of the system, and what lies on no known branch is on a new one.
+    Isolas that join none of the branches known are not found; another factor may find more, as may
+    another call with the branches found.
+
+    Parameters
+    ----------
+    known : Diagram
+        Branches of a system, from `diagram` or `explore`, with their orbits.
+    factor : float
+        Of the modal damping, between 0 and 1. Point dampers stay as they are.
+    max_period : int
+        Longest orbits carried, and wanted.
+    spacing : float
+        Largest relative distance of the frequencies at which orbits are carried back.
+    options : ContinuationOptions, optional
+        Step control.
+    progress : callable, optional
+        Called as ``progress(what, frequency_hz)``.
+    checkpoint : str or Path, optional
+        File that keeps the branches computed so far, as for `diagram`.
+
+    Returns
+    -------
+    Diagram
+        The branches known, then those found, with a note on what was tried.
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense, and for a system without modal damping.
+    OutputError
+        If `checkpoint` cannot be written.
+
+    Examples
+    --------
+    >>> from nldyn import ExploreOptions, Stop, System, Unbalance, explore
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> found = explore(system, (48.0, 52.0), 2, effort=ExploreOptions(spacing=0.05, starts=4))
+    >>> more = by_less_damping(found.diagram, max_period=2, spacing=0.02)
+    >>> len(more.branches) >= len(found.diagram.branches)
+    True
+    """
+    _check(known, factor, max_period, spacing, options, progress)
+    flows = DampedFlows(known.branches[0].points[0].problem.flow)
+    low, high = known.range_hz
+    options, progress = options or ContinuationOptions(), progress or (lambda what, hz: None)
+    box = Collector(flows.own, known.range_hz, known.observe, options, progress)
+    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flows.own, known.range_hz)
+    box.take(known.branches, known.notes)
+    with box.checkpoint:
+        less = _followed(known, flows, math.log(factor), max_period, options, progress)
+        count = math.ceil(math.log(high / low) / math.log1p(spacing))
+        tried = came = 0
+        for frequency in np.geomspace(low, high, count + 1)[1:-1].tolist():
+            progress("back", frequency)
+            orbits = [orbit for branch in less for orbit in branch.at(frequency)]
+            back = [flows.carried(orbit, math.log(factor), 0.0) for orbit in orbits]
+            tried, came = tried + len(back), came + sum(orbit is not None for orbit in back)
+            _follow_new(box, [orbit for orbit in back if orbit is not None], max_period)
+    new = len(box.branches) - len(known.branches)
+    box.notes.append(
+        f"at {factor:g} of the damping: {_counted(len(less))}, {came} of {tried} orbits carried "
+        f"back, {_counted(new)} found so"
+    )
+    return Diagram(tuple(box.branches), known.range_hz, known.observe, tuple(box.notes))
+
+
+def _counted(number: int) -> str:
+    return f"{number} branch" if number == 1 else f"{number} branches"
+
+
+def _check(
+    known: Diagram,
+    factor: float,
+    max_period: int,
+    spacing: float,
+    options: ContinuationOptions | None,
+    progress: Progress | None,
+) -> None:
+    check_types(
+        known=(known, Diagram),
+        options=(options, ContinuationOptions, None),
+        progress=(progress, Callable, None),
+    )
+    check_whole("max_period", max_period, 1)
+    if not (is_finite(factor) and 0.0 < factor < 1.0):
+        raise SystemModelError(f"factor must lie between 0 and 1, got {shown(factor)}")
+    if not (is_finite(spacing) and FINEST_SPACING <= spacing < 1.0):
+        raise SystemModelError(
+            f"spacing must lie between {FINEST_SPACING:g} and 1, got {shown(spacing)}"
+        )
+    if not known.branches:
+        raise SystemModelError("known: has no branches to begin with")
+    if not np.any(known.branches[0].points[0].system.damping):
+        raise SystemModelError("known: is of a system without modal damping")
+
+
+def _followed(
+    known: Diagram,
+    flows: DampedFlows,
+    log_factor: float,
+    max_period: int,
+    options: ContinuationOptions,
+    progress: Progress,
+) -> list[Branch]:
+    """Branches at another damping to which those known lead."""
+    box = Collector(flows.at(log_factor), known.range_hz, known.observe, options, progress)
+    for branch in known.branches:
+        if branch.period > max_period:
+            continue
+        for orbit in _spread(branch.points):
+            progress("less damping", orbit.frequency_hz)
+            other = flows.carried(orbit, 0.0, log_factor)
+            if other is not None:
+                box.follow(other, max_period, max_period, None)
+    return box.branches
+
+
+def _spread(orbits: Sequence[Orbit]) -> list[Orbit]:
+    """A few of some orbits, from the inside."""
+    places = np.linspace(0.0, len(orbits) - 1.0, PLACES + 2)[1:-1]
+    return [orbits[i] for i in sorted({round(place) for place in places.tolist()})]
+
+
+def _follow_new(box: Collector, orbits: Sequence[Orbit], max_period: int) -> None:
+    """Follow the orbits, all of one frequency, that lie on no branch of the box."""
+    here: list[Orbit] = []
+    seen = 0
+    for orbit in orbits:
+        for branch in box.branches[seen:]:
+            here += branch.at(orbit.frequency_hz)
+        seen = len(box.branches)
+        if not any(same_orbit(orbit, other) for other in here):
+            box.follow(orbit, max_period, max_period, None)
