@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import pairwise, product
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from nldyn.checkpoint import Checkpoint, begun_before
 from nldyn.continuation import MOST_POINTS, ContinuationOptions, check_range, shifts
 from nldyn.diagrams import Collector, Diagram, Progress
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
-from nldyn.fixed_point_index import is_damped, sum_of_indices
+from nldyn.fixed_point_index import index_note, is_damped, sum_of_indices
 from nldyn.flow import FlowMap, flow_of
 from nldyn.fold_search import connected_folds, leading_parameter
 from nldyn.linear import Real
@@ -390,7 +390,7 @@ class Exploration:
                 f"motions that did not settle (chaos, longer periods or slow decay): "
                 f"{open_ranges} Hz"
             )
-        return lines + self._folds() + self._cut()
+        return lines + self._folds() + self._cut() + self._indices
 
     def _rounds(self) -> list[str]:
         """What each round found, and how many branches are still to be expected."""
@@ -431,6 +431,14 @@ class Exploration:
             f"settling was cut at {limit} periods from {cut[0]:.4g} to {cut[-1]:.4g} Hz; the "
             f"slowest motion takes up to {max(needed)[0]} there"
         ]
+
+    @cached_property
+    def _indices(self) -> list[str]:
+        """Whether orbits are missing for certain, where unstable ones were looked for as well."""
+        longest = min(self.question.effort.unstable_period, self.question.max_period)
+        if not (longest and self.coverage and is_damped(self.question.flow.system)):
+            return []
+        return [index_note(self.diagram.branches, self.diagram.range_hz, longest)]
 
     def unsettled_ranges(self) -> list[tuple[float, float]]:
         """Ranges of neighbouring frequencies in Hz at which some simulations did not settle."""
@@ -785,6 +793,7 @@ class _Survey:
         left = settling + math.ceil(RETURNS * self.max_period) + 1
         states = np.array([start])
         while left > 0:
+            self.box.progress("search", known.frequency_hz)
             count = min(left, max(PIECE, len(states) // 4))
             found = flow.strobe(states[-1], known.omega, count)
             if found.failure:

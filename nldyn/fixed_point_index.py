@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from nldyn.branch import Branch, check_branches
 from nldyn.errors import SystemModelError, check_frequency, check_whole
 from nldyn.orbit import Orbit
 from nldyn.system import System
+
+FREQUENCIES = 60  # at which the indices are added up
 
 
 def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) -> int:
@@ -81,6 +83,26 @@ def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) 
             "index_sum: the indices add up to one only where every mode is damped, but one is not"
         )
     return sum_of_indices([o for branch in counted for o in branch.at(frequency_hz)], period)
+
+
+def index_note(branches: Sequence[Branch], range_hz: tuple[float, float], longest: int) -> str:
+    """Whether the indices of the fixed points of P to P^longest add up to one, in a sentence.
+
+    They are added up at `FREQUENCIES` frequencies within the range.
+    """
+    low, high = range_hz
+    inside = np.geomspace(low, high, FREQUENCIES + 2)[1:-1].tolist()
+    powers = "P" if longest == 1 else f"P to P^{longest}"
+    told = f"indices of the fixed points of {powers} at {len(inside)} frequencies add up to one"
+    wrong = []
+    for hz in inside:
+        orbits = [
+            orbit for branch in branches if branch.period <= longest for orbit in branch.at(hz)
+        ]
+        wrong += [
+            f"P^{n} at {hz:.4g} Hz" for n in range(1, longest + 1) if sum_of_indices(orbits, n) != 1
+        ]
+    return f"{told} but for {', '.join(wrong)}: orbits are missing there" if wrong else told
 
 
 def sum_of_indices(orbits: Iterable[Orbit], period: int) -> int:

@@ -667,7 +667,7 @@ def refine(
         raise ConvergenceError(
             f"{where}: {found.failure}{step} after {found.iterations} "
             f"iteration{'' if found.iterations == 1 else 's'}; another guess, "
-            "or find_orbits, may find one"
+            "find_orbits, or continue_branch from a frequency of calm motion may find one"
         )
     return Orbit.of(problem, found, observe)
 

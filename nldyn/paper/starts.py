@@ -18,7 +18,7 @@ import numpy as np
 from nldyn.branch import Branch
 from nldyn.continuation import ContinuationOptions
 from nldyn.diagrams import Collector, Diagram, Progress, middle_orbit
-from nldyn.fixed_point_index import index_sum
+from nldyn.fixed_point_index import index_note
 from nldyn.flow import flow_of
 from nldyn.linear import Real
 from nldyn.orbit import check_observe, stroboscopic
@@ -27,7 +27,6 @@ from nldyn.system import System
 
 DATA = Path(__file__).parent / "data"
 LONGEST = 3  # period of the orbits looked for
-INDEX_FREQUENCIES = 60  # at which the indices are added up
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +120,7 @@ def follow_starts(
         if not whole:
             keep_numbers(box.branches[count:])
     notes = [f"from {len(starts)} starts, {lost} of which lead to no orbit"]
-    notes.append(index_note(box.branches, range_hz))
+    notes.append(index_note(box.branches, range_hz, LONGEST))
     return Diagram(tuple(box.branches), range_hz, observe, (*notes, *box.notes))
 
 
@@ -141,19 +140,3 @@ def keep_numbers(branches: Sequence[Branch]) -> None:
             known.update(motion=None, jacobians=none, _spectrum=(orbit._spectrum[0], none))
             for name in ("trajectory", "_extremes", "observed_extremes", "penetration_peaks"):
                 known.pop(name, None)
-
-
-def index_note(branches: Sequence[Branch], range_hz: tuple[float, float]) -> str:
-    """Whether the indices of all fixed points of P, P² and P³ add up to one, in a sentence."""
-    low, high = range_hz
-    inside = np.geomspace(low, high, INDEX_FREQUENCIES + 2)[1:-1].tolist()
-    wrong = [
-        f"P^{n} at {hz:.4g} Hz"
-        for n in range(1, LONGEST + 1)
-        for hz in inside
-        if index_sum(branches, hz, n) != 1
-    ]
-    where = f"P to P^{LONGEST} at {len(inside)} frequencies"
-    if not wrong:
-        return f"indices of the fixed points of {where} add up to one"
-    return f"indices of the fixed points of {where} add up to one but for {', '.join(wrong)}"

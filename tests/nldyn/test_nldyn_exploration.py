@@ -98,13 +98,17 @@ def test_every_simulation_is_accounted_for(around_37):
 def test_a_frequency_is_searched_until_the_indices_of_its_orbits_add_up(monkeypatch):
     """Branches that pass a short range may be missed; their indices are missed, too."""
     system, effort = system_of("two_dof_xi_0.01"), ExploreOptions(spacing=0.01, starts=6)
-    sums = []
+    sums, reports = [], []
     for again in (0, exploration.AGAIN):
         monkeypatch.setattr(exploration, "AGAIN", again)
-        branches = explore(system, (36.0, 37.0), 3, effort=effort).diagram.branches
+        found = explore(system, (36.0, 37.0), 3, effort=effort)
+        branches = found.diagram.branches
         sums.append([index_sum(branches, hz, n) for hz in (36.2, 36.8) for n in (1, 2, 3)])
+        reports.append(found.report())
     assert set(sums[0]) != {1}
+    assert "orbits are missing there" in reports[0]
     assert set(sums[1]) == {1}
+    assert "P to P^3 at 60 frequencies add up to one\n" in reports[1] + "\n"
 
 
 def test_short_motions_pass_unstable_orbits_of_further_branches(monkeypatch):

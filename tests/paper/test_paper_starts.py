@@ -6,10 +6,11 @@ from dataclasses import replace
 import pytest
 
 from nldyn import ContinuationOptions, ExploreOptions, explore, index_sum
+from nldyn.fixed_point_index import index_note
 from nldyn.flow import FlowMap
 from nldyn.paper.jobs import JOBS, scene_system
 from nldyn.paper.search import MODELS, search
-from nldyn.paper.starts import follow_starts, index_note, read_starts, starts_path, write_starts
+from nldyn.paper.starts import follow_starts, read_starts, starts_path, write_starts
 from nldyn.search import orbit_near
 
 WITHOUT_DOUBLED = (1, 50)
@@ -57,7 +58,7 @@ def test_what_is_followed_from_starts_is_what_the_search_found(found, tmp_path):
 def test_a_missing_branch_is_told_by_its_indices(found):
     through = next(b for b in found.branches if index_sum([b], 36.0, b.period) not in (0, 1))
     others = [branch for branch in found.branches if branch is not through]
-    assert f"but for P^{through.period} at" in index_note(others, found.range_hz)
+    assert f"but for P^{through.period} at" in index_note(others, found.range_hz, 3)
 
 
 def test_a_start_that_leads_nowhere_is_counted(found, tmp_path):
