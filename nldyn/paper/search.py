@@ -1,8 +1,9 @@
 """``python -m nldyn.paper.search DIRECTORY [MODEL ...]``: look for branches of the larger models.
 
 Beside the branches of the starts that are kept, it finds others, writes the starts of all, which
-`nldyn.paper.starts` reads, and reports how many may be missing. The directory keeps what is found,
-and the same command goes on where it was interrupted (but for following the starts).
+`nldyn.paper.starts` reads, and reports how many may be missing. With ``--less-damping FACTOR`` it
+does not simulate, but goes by way of less damping. The directory keeps what is found, and the same
+command goes on where it was interrupted (but for following the starts).
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import hashlib
 from pathlib import Path
 
 from nldyn.command import answering
+from nldyn.damping_search import by_less_damping
 from nldyn.diagrams import Diagram, Progress
 from nldyn.exploration import Exploration, ExploreOptions, explore
 from nldyn.paper.jobs import JOBS, LONG, Job
@@ -36,6 +38,21 @@ def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Explorat
     return found
 
 
+def search_by_less_damping(name: str, folder: Path, factor: float) -> Diagram:
+    """Look for branches of a model by way of a share of its damping, and write the starts of all.
+
+    See `by_less_damping`.
+    """
+    job = next(job for job in JOBS if job.name == name)
+    with progress_line() as report:
+        found = by_less_damping(
+            known_branches(job, folder, report), factor, max_period=LONGEST, options=LONG,
+            progress=report, checkpoint=folder / f"{name}.less.h5",
+        )  # fmt: skip
+    write_starts(starts_path(name, folder), found.branches)
+    return found
+
+
 def known_branches(job: Job, folder: Path, progress: Progress) -> Diagram:
     """Branches that the kept starts lead to, in a file named after these starts."""
     starts, doubled = read_starts(job.name), (LONGEST, LONG.max_points)
@@ -53,13 +70,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("directory", type=Path)
     parser.add_argument("models", nargs="*", metavar="MODEL", help=f"of {', '.join(MODELS)}")
+    parser.add_argument(
+        "--less-damping", type=float, metavar="FACTOR", help="of the damping, between 0 and 1"
+    )
     given = parser.parse_args()
     unknown = set(given.models) - set(MODELS)
     if unknown:
         parser.error(f"unknown model {sorted(unknown)[0]!r} (there are: {', '.join(MODELS)})")
     given.directory.mkdir(parents=True, exist_ok=True)
     for name in given.models or MODELS:
-        print(f"{name}: {search(name, given.directory).report()}", flush=True)
+        if given.less_damping is None:
+            said = search(name, given.directory).report()
+        else:
+            said = search_by_less_damping(name, given.directory, given.less_damping).notes[-1]
+        print(f"{name}: {said}", flush=True)
 
 
 if __name__ == "__main__":

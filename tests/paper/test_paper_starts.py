@@ -9,7 +9,7 @@ from nldyn import ContinuationOptions, ExploreOptions, explore, index_sum
 from nldyn.fixed_point_index import index_note
 from nldyn.flow import FlowMap
 from nldyn.paper.jobs import JOBS, scene_system
-from nldyn.paper.search import MODELS, search
+from nldyn.paper.search import MODELS, search, search_by_less_damping
 from nldyn.paper.starts import follow_starts, read_starts, starts_path, write_starts
 from nldyn.search import orbit_near
 
@@ -74,13 +74,24 @@ def test_a_start_that_leads_nowhere_is_counted(found, tmp_path):
     assert again.notes[0] == "from 2 starts, 1 of which lead to no orbit"
 
 
-def test_a_search_is_kept_and_gives_starts(tmp_path, monkeypatch):
-    """It begins with the branches of the starts that there are."""
+@pytest.fixture
+def two_known(monkeypatch):
+    """A short range of the 2-DOF model with two starts only."""
     job = next(job for job in JOBS if job.name == "two_dof_xi_0.01")
     low, high = 35.5, 36.5
     known = [start for start in read_starts(job.name) if low < start.frequency_hz < high][:2]
     monkeypatch.setattr("nldyn.paper.search.JOBS", (replace(job, range_hz=(low, high)),))
     monkeypatch.setattr("nldyn.paper.search.read_starts", lambda name: known)
+
+
+def test_less_damping_gives_starts(two_known, tmp_path):
+    done = search_by_less_damping("two_dof_xi_0.01", tmp_path, 0.5)
+    assert done.notes[-1].startswith("at 0.5 of the damping: ")
+    assert len(read_starts("two_dof_xi_0.01", tmp_path)) == len(done.branches) >= 2
+
+
+def test_a_search_is_kept_and_gives_starts(two_known, tmp_path):
+    """It begins with the branches of the starts that there are."""
     effort = ExploreOptions(spacing=0.02, starts=2, settling=100)
     done = search("two_dof_xi_0.01", tmp_path, effort)
     assert (tmp_path / "two_dof_xi_0.01.h5").exists()
