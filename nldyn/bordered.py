@@ -36,10 +36,13 @@ from nldyn.system import System
 # are good to about 1e-10 and conditions of them bend where they change by one: a difference over
 # which g changes by 1e-4 to 1e-3 is good to about five digits, and a Newton step gains as many.
 # Where an extreme of a penetration comes near to zero, the second derivative of the motion jumps
-# there: a difference then reaches only a fifth of the way, but not below the shortest.
+# there: a difference then reaches only a fifth of the way, but not below the shortest. Where g
+# bends on a shorter length, its second difference against the first tells: h g''/g' is 2 BENT at
+# most, so that h² g(3)/6 is about 1e-4 of the slope.
 DIFFERENCE = 1e-4
 LARGEST_CHANGE = 1e-3
 SHORTEST_DIFFERENCE = 1e-7
+BENT, SHORTEST_BEND = 0.02, 3e-6
 ROUNDING = 1e-7  # a Newton step below this that is no shorter than the last has met rounding
 KEEP_SLOPES = 1e-3  # after a Newton step shorter than this the slopes of g still serve
 SATISFIED = 1e-7  # residual of a condition up to which a solution counts
@@ -470,18 +473,23 @@ def tangent_surface(at: Evaluation) -> tuple[Real, Real]:
 
 def gradient(at: Evaluation, directions: Real, condition: Condition) -> Real:
     """Derivatives of g along unit directions (N + m, d), shape (n_conditions, d)."""
-    return np.array([_slope(at, direction, condition) for direction in directions.T]).T
+    here = condition.value(at)
+    return np.array([_slope(at, direction, condition, here) for direction in directions.T]).T
 
 
-def _slope(at: Evaluation, direction: Real, condition: Condition) -> Real:
-    """Derivatives of g along a unit direction, over a length on which g changes little."""
+def _slope(at: Evaluation, direction: Real, condition: Condition, here: Real) -> Real:
+    """Derivatives of g along a unit direction, over a length on which it hardly bends."""
     h = condition.reach(at)
     while True:
         first, last, length = _pair(at, h * direction, condition.value)
         change = float(np.abs(last - first).max(initial=0.0))
-        if not change > LARGEST_CHANGE or h <= SHORTEST_DIFFERENCE:
+        bend = float(np.abs(last - 2.0 * here + first).max(initial=0.0))
+        if change > LARGEST_CHANGE and h > SHORTEST_DIFFERENCE:
+            h = max(0.2 * LARGEST_CHANGE / change * h, SHORTEST_DIFFERENCE)
+        elif bend > BENT * change and h > SHORTEST_BEND:
+            h = max(0.5 * BENT * change / bend * h, SHORTEST_BEND)
+        else:
             return (last - first) / (h * length)
-        h = max(0.2 * LARGEST_CHANGE / change * h, SHORTEST_DIFFERENCE)
 
 
 def _pair(

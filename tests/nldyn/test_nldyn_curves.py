@@ -405,6 +405,27 @@ def four_modes() -> System:
     return build_system(load_scene(example("four_dof_xi_0.01.toml")))
 
 
+def test_neimark_sacker_curve_is_followed_round_a_narrow_tip():
+    """A slight contact bends it within 1e-6 of the frequency; branches at three dampings agree."""
+    points = {}
+    for ratio in (0.0308, 0.031, 0.0311):
+        system = System.from_modal(
+            [13.1, 31.0], {"m": [0.6, 0.4], "b": [0.3, -0.7]}, modal_damping=ratio,
+            stops=[Stop("m", 5.17e9, gap=5e-6), Stop.linear("b", 3e5, gap=4e-5, direction=-1)],
+            excitation=[Unbalance("m", 4.92e-6)],
+        )  # fmt: skip
+        branch = continue_branch(solve_orbit(system, 11.0), (10.99, 11.26))
+        points[ratio] = [s for s in branch.special_points if s.kind == "NS"]
+    assert not points[0.0311]
+    damping, ranges = Parameter("modal_damping", EVERY_MODE), ((11.2, 11.3), (0.0307, 0.0311))
+    curve = continue_special(points[0.0308][0], ("frequency_hz", damping), ranges)
+    assert curve.stop_reasons == ("end of the range of modal_damping",) * 2
+    assert max(curve.values[:, 1]) < 0.0311
+    for ratio in (0.0308, 0.031):
+        met = sorted(orbit.frequency_hz for orbit in curve.at("modal_damping", ratio))
+        assert met == pytest.approx([s.frequency_hz for s in points[ratio]], rel=1e-9)
+
+
 def test_symmetry_breaks_on_a_curve_where_both_parameters_keep_it():
     """Branches at other forces have their branch points on it, and λ stays zero."""
     branch = continue_branch(solve_orbit(between_two_stops(), 1.0), (0.5, 1.0))
