@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,67 +25,55 @@ LONGER, SHORTER = 1.5, 0.4  # the next step, after one that led on and one that 
 MISS = 0.3  # of an orbit: distance from where it was expected
 
 
-@dataclass
-class DampedFlows:
-    """The flow map of a system at multiples of its modal damping.
+def damped(own: FlowMap, log_factor: float) -> FlowMap:
+    """The flow map of a system where its modal damping is multiplied by e^log_factor."""
+    if log_factor == 0.0:
+        return own
+    system = replace(own.system, damping=math.exp(log_factor) * own.system.damping)
+    return FlowMap(system, own.options)
 
-    Parameters
-    ----------
-    own : FlowMap
-        At its own damping, a factor of 1.
+
+def carried(own: FlowMap, orbit: Orbit, start: float, end: float) -> Orbit | None:
+    """The orbit of the same frequency at another damping, or None where a fold comes first.
+
+    Start and end are logarithms of the factor of the damping of a flow map. Newton's method starts
+    from the line through the two orbits before.
     """
-
-    own: FlowMap
-    _others: dict[float, FlowMap] = field(default_factory=dict)
-
-    def at(self, log_factor: float) -> FlowMap:
-        """The flow map where the modal damping is multiplied by e^log_factor."""
-        if log_factor == 0.0:
-            return self.own
-        if log_factor not in self._others:
-            system = self.own.system
-            damped = replace(system, damping=math.exp(log_factor) * system.damping)
-            self._others[log_factor] = FlowMap(damped, self.own.options)
-        return self._others[log_factor]
-
-    def carried(self, orbit: Orbit, start: float, end: float) -> Orbit | None:
-        """The orbit of the same frequency at another damping, or None where a fold comes first.
-
-        Newton's method starts from the line through the two orbits before.
-        """
-        x, step = start, math.copysign(FIRST_STEP, end - start)
-        here = _states(orbit)
-        slope = np.zeros_like(here)
-        while x != end:
-            y = x + step if abs(step) < abs(end - x) else end
-            guess = here + slope * (y - x)
-            found = self._near(orbit, guess, y)
-            if found is None:
-                step *= SHORTER
-                if abs(step) < SHORTEST_STEP:
-                    return None
-                continue
-            states = _states(found)
-            slope = (states - here) / (y - x)
-            orbit, here, x = found, states, y
-            step *= LONGER
-        return orbit
-
-    def _near(self, orbit: Orbit, guess: Real, log_factor: float) -> Orbit | None:
-        try:
-            found = solve_orbit(
-                self.at(log_factor),
-                orbit.frequency_hz,
-                orbit.period,
-                guess=guess,
-                observe=orbit.observe,
-                segments=orbit.problem.segments,
-            )
-        except ConvergenceError:
-            return None
+    x, step = start, math.copysign(FIRST_STEP, end - start)
+    here = _states(orbit)
+    slope = np.zeros_like(here)
+    while x != end:
+        y = x + step if abs(step) < abs(end - x) else end
+        guess = here + slope * (y - x)
+        found = _near(damped(own, y), orbit, guess)
+        if found is None:
+            step *= SHORTER
+            if abs(step) < SHORTEST_STEP:
+                return None
+            continue
         states = _states(found)
-        far = float(np.linalg.norm(states - guess)) > MISS * float(np.linalg.norm(states))
-        return None if far or minimal_period(found) != orbit.period else found
+        slope = (states - here) / (y - x)
+        orbit, here, x = found, states, y
+        step *= LONGER
+    return orbit
+
+
+def _near(flow: FlowMap, orbit: Orbit, guess: Real) -> Orbit | None:
+    """The orbit of a flow map near a guess, if it is as another one in frequency and period."""
+    try:
+        found = solve_orbit(
+            flow,
+            orbit.frequency_hz,
+            orbit.period,
+            guess=guess,
+            observe=orbit.observe,
+            segments=orbit.problem.segments,
+        )
+    except ConvergenceError:
+        return None
+    states = _states(found)
+    far = float(np.linalg.norm(states - guess)) > MISS * float(np.linalg.norm(states))
+    return None if far or minimal_period(found) != orbit.period else found
 
 
 def _states(orbit: Orbit) -> Real:
@@ -152,20 +140,20 @@ def by_less_damping(
     True
     """
     _check(known, factor, max_period, spacing, options, progress)
-    flows = DampedFlows(known.branches[0].points[0].problem.flow)
+    own = known.branches[0].points[0].problem.flow
     low, high = known.range_hz
     options, progress = options or ContinuationOptions(), progress or (lambda what, hz: None)
-    box = Collector(flows.own, known.range_hz, known.observe, options, progress)
-    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flows.own, known.range_hz)
+    box = Collector(own, known.range_hz, known.observe, options, progress)
+    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, own, known.range_hz)
     box.take(known.branches, known.notes)
     with box.checkpoint:
-        less = _followed(known, flows, math.log(factor), max_period, options, progress)
+        less = _followed(known, own, math.log(factor), max_period, options, progress)
         count = math.ceil(math.log(high / low) / math.log1p(spacing))
         tried = came = 0
         for frequency in np.geomspace(low, high, count + 1)[1:-1].tolist():
             progress("back", frequency)
             orbits = [orbit for branch in less for orbit in branch.at(frequency)]
-            back = [flows.carried(orbit, math.log(factor), 0.0) for orbit in orbits]
+            back = [carried(own, orbit, math.log(factor), 0.0) for orbit in orbits]
             tried, came = tried + len(back), came + sum(orbit is not None for orbit in back)
             _follow_new(box, [orbit for orbit in back if orbit is not None], max_period)
     new = len(box.branches) - len(known.branches)
@@ -208,20 +196,20 @@ def _check(
 
 def _followed(
     known: Diagram,
-    flows: DampedFlows,
+    own: FlowMap,
     log_factor: float,
     max_period: int,
     options: ContinuationOptions,
     progress: Progress,
 ) -> list[Branch]:
     """Branches at another damping to which those known lead."""
-    box = Collector(flows.at(log_factor), known.range_hz, known.observe, options, progress)
+    box = Collector(damped(own, log_factor), known.range_hz, known.observe, options, progress)
     for branch in known.branches:
         if branch.period > max_period:
             continue
         for orbit in _spread(branch.points):
             progress("less damping", orbit.frequency_hz)
-            other = flows.carried(orbit, 0.0, log_factor)
+            other = carried(own, orbit, 0.0, log_factor)
             if other is not None:
                 box.follow(other, max_period, max_period, None)
     return box.branches

@@ -19,6 +19,7 @@ from nldyn import (
     index_sum,
     solve_orbit,
 )
+from nldyn.damping_search import carried
 
 RANGE_HZ = (7.2, 11.0)
 
@@ -67,6 +68,16 @@ def test_orbits_of_the_isola_close_under_runge_kutta(found):
 def test_the_indices_add_up_to_one_with_the_isola_and_without(harmonic, found):
     for hz in (7.5, 8.0, 8.9, 10.0):
         assert index_sum(harmonic.branches, hz) == index_sum(found.branches, hz) == 1
+
+
+@pytest.mark.parametrize("factor", [0.2, 0.9, 3.0])
+def test_carried_to_another_damping_and_back_an_orbit_is_the_same(harmonic, factor):
+    orbit = harmonic.branches[0].at(10.0)[0]
+    other = carried(orbit.problem.flow, orbit, 0.0, np.log(factor))
+    assert np.allclose(other.system.damping, factor * orbit.system.damping, rtol=1e-12)
+    assert other.frequency_hz == pytest.approx(10.0, rel=1e-14)
+    back = carried(orbit.problem.flow, other, np.log(factor), 0.0)
+    assert np.abs(back.point - orbit.point).max() < 1e-9 * np.abs(orbit.point[:-1]).max()
 
 
 def test_what_is_known_is_not_found_again(found):
