@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +37,7 @@ MOST_SEGMENTS = 10**5
 # contact force over the excitation, and penetration over displacement, up to which a free body
 # counts as untouched
 TOUCH = 1e-7
+MORE_DAMPING = 2.0, 3.0, 4.0  # logarithms of factors that may leave one orbit only
 NOT_HELD = "the structure is free to move in a way that no stop limits, and nothing tells its place"
 NO_PLACE = (
     "the structure is free to move as a whole, and where the motion touches no stop, nothing tells "
@@ -507,7 +508,8 @@ def solve_orbit(
         Modal displacements and velocities at phase zero, or at the k shooting phases. Without it
         the system is simulated from rest for 200 periods; where the motion does not settle,
         Newton's method starts where it nearly repeats, and from the small motion about a rest that
-        a stop holds.
+        a stop holds. Where all that fails, an orbit of period 1 is carried here from up to 55 times
+        the modal damping.
     observe : str, optional
         Interface whose displacement is reported; the first unless given.
     segments : int, optional
@@ -540,40 +542,65 @@ def solve_orbit(
     problem = shooting_problem(flow, period, segments)
     omega = 2.0 * math.pi * frequency_hz
     check_bounded(flow.system, omega)
-    starts: Iterator[Real]
-    if guess is None:
-        q = rest(flow.system)
-        start = flow.to_state(at_rest(q))
-        pieces = (segments or period) // period  # of one excitation period
-        warm = np.linspace(0.0, 400.0 * np.pi, 200 * pieces + 1)
-        found = flow.shoot(start[None], warm, omega, sensitivities=False, chained=True)
-        if found.failure:
-            raise ConvergenceError(
-                f"the simulation from rest at {frequency_hz:g} Hz failed: {found.failure}; "
-                "give a guess"
-            )
-        strobe = found.ends[pieces - 1 :: pieces][20:]
-        # beside a subharmonic attractor lies, in its middle, the orbit that it branched from
-        counts = (2, 3, 4, len(strobe)) if period == 1 else ()
-        middles = [strobe[-count:].mean(axis=0) for count in counts]
-        near = strobe[near_returns(strobe, period, 8)]
-        # at a sharp resonance the motion from rest takes too long to grow
-        linear = [] if flow.system.grows(omega) else [flow.system.steady(omega).real]
-        starts = (spread(problem, z, omega) for z in (strobe[-1], *near, *middles, *linear))
-        if np.any(q):
-            held = held_motion(flow.system, q, omega, problem.phases[:-1])
-            starts = itertools.chain(starts, [flow.to_state(held)])
-    else:
-        guess = np.atleast_2d(numbers("guess", guess))
-        if guess.shape not in ((1, problem.size), (problem.segments, problem.size)):
-            raise SystemModelError(
-                f"guess must have {problem.size} entries (or {problem.segments} such rows), "
-                f"got shape {guess.shape}"
-            )
-        if guess.shape[0] == problem.segments:
-            starts = iter([flow.to_state(guess)])
-        else:
-            starts = iter([spread(problem, flow.to_state(guess[0]), omega)])
+    if guess is not None:
+        return _first_orbit(problem, [_guessed(problem, guess, omega)], omega, observe)
+    pieces = (segments or period) // period  # of one excitation period
+    starts = _simulated(problem, omega, pieces)
+    try:
+        return _first_orbit(problem, starts, omega, observe)
+    except ConvergenceError:
+        orbit = _by_more_damping(problem, omega, observe, pieces) if period == 1 else None
+        if orbit is None:
+            raise
+        return orbit
+
+
+def _guessed(problem: ShootingProblem, guess: Real, omega: float) -> Real:
+    """States (k, 2n) at the shooting phases from a guess, checked."""
+    guess = np.atleast_2d(numbers("guess", guess))
+    if guess.shape not in ((1, problem.size), (problem.segments, problem.size)):
+        raise SystemModelError(
+            f"guess must have {problem.size} entries (or {problem.segments} such rows), "
+            f"got shape {guess.shape}"
+        )
+    if guess.shape[0] == problem.segments:
+        return problem.flow.to_state(guess)
+    return spread(problem, problem.flow.to_state(guess[0]), omega)
+
+
+def _simulated(problem: ShootingProblem, omega: float, pieces: int) -> Iterator[Real]:
+    """States at the shooting phases that a motion from rest comes near, the likeliest first.
+
+    It is simulated in pieces of the excitation period.
+    """
+    flow, period = problem.flow, problem.period
+    q = rest(flow.system)
+    start = flow.to_state(at_rest(q))
+    warm = np.linspace(0.0, 400.0 * np.pi, 200 * pieces + 1)
+    found = flow.shoot(start[None], warm, omega, sensitivities=False, chained=True)
+    if found.failure:
+        raise ConvergenceError(
+            f"the simulation from rest at {omega / (2.0 * math.pi):g} Hz failed: {found.failure}; "
+            "give a guess"
+        )
+    strobe = found.ends[pieces - 1 :: pieces][20:]
+    # beside a subharmonic attractor lies, in its middle, the orbit that it branched from
+    counts = (2, 3, 4, len(strobe)) if period == 1 else ()
+    middles = [strobe[-count:].mean(axis=0) for count in counts]
+    near = strobe[near_returns(strobe, period, 8)]
+    # at a sharp resonance the motion from rest takes too long to grow
+    linear = [] if flow.system.grows(omega) else [flow.system.steady(omega).real]
+    starts = (spread(problem, z, omega) for z in (strobe[-1], *near, *middles, *linear))
+    if not np.any(q):
+        return starts
+    held = held_motion(flow.system, q, omega, problem.phases[:-1])
+    return itertools.chain(starts, [flow.to_state(held)])
+
+
+def _first_orbit(
+    problem: ShootingProblem, starts: Iterable[Real], omega: float, observe: str
+) -> Orbit:
+    """The first orbit of the problem's own period that Newton's method finds from some states."""
     failure = ConvergenceError()
     for nodes in starts:
         try:
@@ -582,13 +609,35 @@ def solve_orbit(
             failure = error
             continue
         shortest = minimal_period(orbit)
-        if shortest == period:
+        if shortest == problem.period:
             return orbit
         failure = ConvergenceError(
-            f"no orbit of period {period} found at {frequency_hz:g} Hz: Newton's method came to "
-            f"one of period {shortest}; give a guess beside the orbit, or try find_orbits"
+            f"no orbit of period {problem.period} found at {omega / (2.0 * math.pi):g} Hz: "
+            f"Newton's method came to one of period {shortest}; give a guess beside the orbit, or "
+            "try find_orbits"
         )
     raise failure
+
+
+def _by_more_damping(
+    problem: ShootingProblem, omega: float, observe: str, pieces: int
+) -> Orbit | None:
+    """Orbit carried to the damping of the system from where more of it leaves no other, or None."""
+    from nldyn.damping import carried, damped
+
+    own = problem.flow
+    if not np.any(own.system.damping):
+        return None
+    for log_factor in MORE_DAMPING:
+        more = replace(problem, flow=damped(own, log_factor))
+        try:
+            orbit = _first_orbit(more, _simulated(more, omega, pieces), omega, observe)
+        except ConvergenceError:
+            continue
+        found = carried(own, orbit, log_factor, 0.0)
+        if found is not None:
+            return found
+    return None
 
 
 def check_bounded(system: System, omega: float) -> None:

@@ -19,7 +19,7 @@ from nldyn import (
     index_sum,
     solve_orbit,
 )
-from nldyn.damping_search import carried
+from nldyn.damping import carried
 
 RANGE_HZ = (7.2, 11.0)
 

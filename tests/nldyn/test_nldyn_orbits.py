@@ -19,6 +19,7 @@ from nldyn import (
     Stop,
     System,
     Unbalance,
+    continue_branch,
     solve_orbit,
 )
 from nldyn.orbit import minimal_period, same_orbit
@@ -286,6 +287,19 @@ def test_orbits_shifted_by_a_period_are_the_same():
 def test_no_orbit_is_an_error_that_says_how_far_newton_came():
     with pytest.raises(ConvergenceError, match=r"^no orbit of period 1 found at 45 Hz: .+ step"):
         solve_orbit(make_one_dof(), 45.0, guess=np.array([1.0, -300.0]))
+
+
+@pytest.mark.parametrize("hz", [17.0, 18.0, 19.0, 20.0])
+def test_orbit_that_no_motion_from_rest_comes_near_is_found_by_more_damping(hz):
+    """A preloaded stop on which the motion goes astray; the branch from 50 Hz has one orbit."""
+    system = System.from_matrices(
+        [[2.48]], [[16877.0]], {"m": [1.0]}, modal_damping=0.0142,
+        stops=[Stop("m", 5.17e9, gap=-2e-6)], excitation=[Unbalance("m", 4.92e-6)],
+    )  # fmt: skip
+    (expected,) = continue_branch(solve_orbit(system, 50.0), (hz, 50.5)).at(hz)
+    found = solve_orbit(system, hz)
+    assert found.multipliers == pytest.approx(expected.multipliers, rel=1e-7)
+    assert found.point == pytest.approx(expected.point, rel=1e-9, abs=1e-16)
 
 
 def test_system_without_excitation_rests_at_its_preload():
