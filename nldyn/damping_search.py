@@ -93,9 +93,10 @@ def by_less_damping(
         for frequency in np.geomspace(low, high, count + 1)[1:-1].tolist():
             progress("back", frequency)
             orbits = [orbit for branch in less for orbit in branch.at(frequency)]
-            back = [carried(own, orbit, math.log(factor), 0.0) for orbit in orbits]
-            tried, came = tried + len(back), came + sum(orbit is not None for orbit in back)
-            _follow_new(box, [orbit for orbit in back if orbit is not None], max_period)
+            carriages = (carried(own, orbit, math.log(factor), 0.0) for orbit in orbits)
+            back = [orbit for orbit in carriages if orbit is not None]
+            tried, came = tried + len(orbits), came + len(back)
+            _follow_new(box, back, max_period)
     new = len(box.branches) - len(known.branches)
     box.notes.append(
         f"at {factor:g} of the damping: {_counted(len(less))}, {came} of {tried} orbits carried "
