@@ -86,6 +86,9 @@ def by_less_damping(
     box = Collector(own, known.range_hz, known.observe, options, progress)
     box.checkpoint = checkpoint_of_several(checkpoint, box.branches, own, known.range_hz)
     box.take(known.branches, known.notes)
+    for branch in known.branches:  # an interrupted run kept them, too
+        if branch.course is not None:
+            box.checkpoint.branch_from(branch.nodes[branch.course.start].orbit, branch.course)
     with box.checkpoint:
         less = _followed(known, own, math.log(factor), max_period, options, progress)
         count = math.ceil(math.log(high / low) / math.log1p(spacing))

@@ -17,6 +17,7 @@ from nldyn import (
     by_less_damping,
     continue_branch,
     index_sum,
+    load_branches,
     solve_orbit,
 )
 from nldyn.damping import carried
@@ -91,12 +92,16 @@ def test_interrupted_it_goes_on_with_what_it_has_found(harmonic, found, tmp_path
 
     def interrupt(what: str, frequency_hz: float) -> None:
         seen.append(what)
-        if seen.count("back") == 3:
+        if seen.count("back") in (3, 4):
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
-        by_less_damping(harmonic, max_period=1, spacing=0.1, progress=interrupt, checkpoint=place)
-    assert place.exists()
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            by_less_damping(
+                harmonic, max_period=1, spacing=0.1, progress=interrupt, checkpoint=place
+            )
+        kept = load_branches(place)
+        assert len(kept) == len({branch.frequency_hz.tobytes() for branch in kept}) <= 2
     resumed = by_less_damping(harmonic, max_period=1, spacing=0.1, checkpoint=place)
     assert [len(b.nodes) for b in resumed.branches] == [len(b.nodes) for b in found.branches]
     assert np.array_equal(resumed.branches[1].frequency_hz, found.branches[1].frequency_hz)
