@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -148,6 +148,7 @@ def _floats(name: str, values: Real) -> Real:
     return values if known else numbers(name, values)
 
 
+@lru_cache
 def _nodes_for_switch(exponent: float, power: int, viscous: bool, nodes: int, tail: float) -> int:
     """Nodes, not fewer than asked for, with which the force after a switch can be resolved.
 
