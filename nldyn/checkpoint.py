@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
@@ -137,6 +137,11 @@ class Checkpoint(Keeper["Branch"]):
             )
         return None
 
+    def branches(self) -> Iterator[Branch]:
+        """Take from the file one branch after the other."""
+        while self._earlier:
+            yield self._earlier.pop(0)
+
 
 def checkpoint_at(
     place: str | Path | Checkpoint | None,
@@ -168,6 +173,8 @@ def checkpoint_of_several(
 ) -> Checkpoint:
     """The checkpoint of a computation of several branches of a system, added to a list.
 
+    Those that are in the list already are not kept.
+
     Raises
     ------
     SystemModelError, OutputError
@@ -185,7 +192,13 @@ def checkpoint_of_several(
                 f"{place}: holds branches of another system, accuracy or range; choose another "
                 "file, or delete it"
             )
-    return Checkpoint(write, finished, earlier)
+    known = len(finished)
+
+    def write_new(branches: Sequence[Branch]) -> None:
+        if len(branches) > known:
+            write(branches[known:])
+
+    return Checkpoint(write_new, finished, earlier)
 
 
 def _file(place: str | Path) -> tuple[Callable[[Sequence[Branch]], None], list[Branch]]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from nldyn.errors import SystemModelError
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, minimal_period, solve_orbit
@@ -25,10 +26,10 @@ def damped(own: FlowMap, log_factor: float) -> FlowMap:
 
 
 def carried(own: FlowMap, orbit: Orbit, start: float, end: float) -> Orbit | None:
-    """The orbit of the same frequency at another damping, or None where a fold comes first.
+    """The orbit of the same frequency at another damping, or None where the way there ends.
 
-    Start and end are logarithms of the factor of the damping of a flow map. Newton's method starts
-    from the line through the two orbits before.
+    It ends at a fold, as a rule. Start and end are logarithms of the factor of the damping of a
+    flow map. Newton's method starts from the line through the two orbits before.
     """
     x, step = start, math.copysign(FIRST_STEP, end - start)
     here = _states(orbit)
@@ -36,7 +37,7 @@ def carried(own: FlowMap, orbit: Orbit, start: float, end: float) -> Orbit | Non
     while x != end:
         y = x + step if abs(step) < abs(end - x) else end
         guess = here + slope * (y - x)
-        found = _near(damped(own, y), orbit, guess)
+        found = _near(own, y, orbit, guess)
         if found is None:
             step *= SHORTER
             if abs(step) < SHORTEST_STEP:
@@ -49,20 +50,20 @@ def carried(own: FlowMap, orbit: Orbit, start: float, end: float) -> Orbit | Non
     return orbit
 
 
-def _near(flow: FlowMap, orbit: Orbit, guess: Real) -> Orbit | None:
-    """The orbit of a flow map near a guess, if it is as another one in frequency and period."""
+def _near(own: FlowMap, log_factor: float, orbit: Orbit, guess: Real) -> Orbit | None:
+    """The orbit near a guess at another damping, if it is of the same period."""
     try:
         found = solve_orbit(
-            flow,
+            damped(own, log_factor),
             orbit.frequency_hz,
             orbit.period,
             guess=guess,
             observe=orbit.observe,
             segments=orbit.problem.segments,
         )
-    except ConvergenceError:
+        states = _states(found)
+    except (ConvergenceError, SystemModelError):
         return None
-    states = _states(found)
     far = float(np.linalg.norm(states - guess)) > MISS * float(np.linalg.norm(states))
     return None if far or minimal_period(found) != orbit.period else found
 

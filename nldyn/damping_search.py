@@ -8,19 +8,20 @@ from pathlib import Path
 
 import numpy as np
 
+from cms.threads import one_thread
 from nldyn.branch import Branch
 from nldyn.checkpoint import checkpoint_of_several
 from nldyn.continuation import ContinuationOptions
 from nldyn.damping import carried, damped
-from nldyn.diagrams import Collector, Diagram, Progress
+from nldyn.diagrams import Collector, Diagram, Progress, check_flow, middle_orbit
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
-from nldyn.flow import FlowMap
+from nldyn.exploration import FINEST_SPACING
 from nldyn.orbit import Orbit, same_orbit
 
-FINEST_SPACING = 1e-5
-PLACES = 3  # orbits of each branch that are carried to less damping
+PLACES = 3  # orbits of each branch that are carried to less damping, in case some get lost
 
 
+@one_thread()
 def by_less_damping(
     known: Diagram,
     factor: float = 0.5,
@@ -36,8 +37,9 @@ def by_less_damping(
     Closed branches (isolas) grow when the damping falls, and join others. So the branches known are
     followed at a share of the damping; the orbits of these, at frequencies next to each other, are
     carried back to the damping of the system, and what lies on no known branch is on a new one.
-    Isolas that join none of the branches known are not found; another factor may find more, as may
-    another call with the branches found.
+    Isolas that join none of the branches known there are not found, nor, but by chance, those that
+    are narrower than the spacing of the frequencies. Another factor may find more, as may another
+    call with the branches found.
 
     Parameters
     ----------
@@ -54,12 +56,13 @@ def by_less_damping(
     progress : callable, optional
         Called as ``progress(what, frequency_hz)``.
     checkpoint : str or Path, optional
-        File that keeps the branches computed so far, as for `diagram`.
+        File that keeps the branches found, also those of an earlier call, whatever its factor: they
+        count as known. Those at less damping are not kept, and followed anew.
 
     Returns
     -------
     Diagram
-        The branches known, then those found, with a note on what was tried.
+        The branches known, then those found; the last note tells what was tried.
 
     Raises
     ------
@@ -70,33 +73,31 @@ def by_less_damping(
 
     Examples
     --------
-    >>> from nldyn import ExploreOptions, Stop, System, Unbalance, explore
-    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
-    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
-    ...     excitation=[Unbalance("middle", 4.92e-6)])
-    >>> found = explore(system, (48.0, 52.0), 2, effort=ExploreOptions(spacing=0.05, starts=4))
-    >>> more = by_less_damping(found.diagram, max_period=2, spacing=0.02)
-    >>> len(more.branches) >= len(found.diagram.branches)
-    True
+    >>> from nldyn import HarmonicForce, Stop, System, diagram
+    >>> system = System.from_modal([10.0, 30.3], {"tip": [1.0, -1.22], "force": [1.0, 1.03]},
+    ...     modal_damping=0.0135, stops=[Stop("tip", stiffness=3.58e7)],
+    ...     excitation=[HarmonicForce("force", 7.49)])
+    >>> known = diagram(system, (7.2, 11.0))
+    >>> more = by_less_damping(known, max_period=1, spacing=0.1)
+    >>> len(known.branches), len(more.branches), more.branches[1].closed
+    (1, 2, True)
     """
     _check(known, factor, max_period, spacing, options, progress)
-    own = known.branches[0].points[0].problem.flow
+    own, log_factor = known.branches[0].points[0].problem.flow, math.log(factor)
     low, high = known.range_hz
     options, progress = options or ContinuationOptions(), progress or (lambda what, hz: None)
-    box = Collector(own, known.range_hz, known.observe, options, progress)
-    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, own, known.range_hz)
+    box = Collector(own, (low, high), known.observe, options, progress)
     box.take(known.branches, known.notes)
-    for branch in known.branches:  # an interrupted run kept them, too
-        if branch.course is not None:
-            box.checkpoint.branch_from(branch.nodes[branch.course.start].orbit, branch.course)
+    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, own, (low, high))
     with box.checkpoint:
-        less = _followed(known, own, math.log(factor), max_period, options, progress)
+        _go_on(box, max_period)
+        less = _followed(box, log_factor, max_period)
         count = math.ceil(math.log(high / low) / math.log1p(spacing))
         tried = came = 0
-        for frequency in np.geomspace(low, high, count + 1)[1:-1].tolist():
+        for frequency in np.geomspace(low, high, count + 2)[1:-1].tolist():
             progress("back", frequency)
             orbits = [orbit for branch in less for orbit in branch.at(frequency)]
-            carriages = (carried(own, orbit, math.log(factor), 0.0) for orbit in orbits)
+            carriages = (carried(own, orbit, log_factor, 0.0) for orbit in orbits)
             back = [orbit for orbit in carriages if orbit is not None]
             tried, came = tried + len(orbits), came + len(back)
             _follow_new(box, back, max_period)
@@ -134,24 +135,29 @@ def _check(
         )
     if not known.branches:
         raise SystemModelError("known: has no branches to begin with")
+    check_flow(known, known.branches[0].points[0].problem.flow)
     if not np.any(known.branches[0].points[0].system.damping):
         raise SystemModelError("known: is of a system without modal damping")
 
 
-def _followed(
-    known: Diagram,
-    own: FlowMap,
-    log_factor: float,
-    max_period: int,
-    options: ContinuationOptions,
-    progress: Progress,
-) -> list[Branch]:
+def _go_on(box: Collector, max_period: int) -> None:
+    """Finish the branches that the file holds, and follow what they lead to."""
+    count = len(box.branches)
+    for branch in box.checkpoint.branches():
+        if not box.known(middle_orbit(branch)):
+            box.add(branch.extend(checkpoint=box.checkpoint))
+    box.follow_up(count, max_period, max_period, None)
+
+
+def _followed(known: Collector, log_factor: float, max_period: int) -> list[Branch]:
     """Branches at another damping to which those known lead."""
-    box = Collector(damped(own, log_factor), known.range_hz, known.observe, options, progress)
+    own, progress = known.flow, known.progress
+    less = damped(own, log_factor)
+    box = Collector(less, known.range_hz, known.observe, known.options, progress)
     for branch in known.branches:
         if branch.period > max_period:
             continue
-        for orbit in _spread(branch.points):
+        for orbit in _spread(branch.points, known.range_hz):
             progress("less damping", orbit.frequency_hz)
             other = carried(own, orbit, 0.0, log_factor)
             if other is not None:
@@ -159,10 +165,12 @@ def _followed(
     return box.branches
 
 
-def _spread(orbits: Sequence[Orbit]) -> list[Orbit]:
-    """A few of some orbits, from the inside."""
-    places = np.linspace(0.0, len(orbits) - 1.0, PLACES + 2)[1:-1]
-    return [orbits[i] for i in sorted({round(place) for place in places.tolist()})]
+def _spread(orbits: Sequence[Orbit], range_hz: tuple[float, float]) -> list[Orbit]:
+    """A few of some orbits within a range, from the inside."""
+    low, high = range_hz
+    within = [orbit for orbit in orbits if low <= orbit.frequency_hz <= high]
+    places = np.linspace(0.0, len(within) - 1.0, PLACES + 2)[1:-1] if within else np.empty(0)
+    return [within[i] for i in sorted({round(place) for place in places.tolist()})]
 
 
 def _follow_new(box: Collector, orbits: Sequence[Orbit], max_period: int) -> None:

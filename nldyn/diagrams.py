@@ -102,6 +102,15 @@ class Diagram:
         save_diagram(path, self)
 
 
+def check_flow(known: Diagram, flow: FlowMap) -> None:
+    """Raise unless all branches that are known are of this flow map."""
+    from nldyn.store import same_flow
+
+    for branch in known.branches:
+        if not same_flow(branch.points[0].problem.flow, flow):
+            raise SystemModelError(f"known: branch {branch.name} is of another system or accuracy")
+
+
 @dataclass
 class Collector:
     """Branches found so far, with the tools to add more."""

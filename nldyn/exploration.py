@@ -17,7 +17,7 @@ from cms.threads import one_thread
 from nldyn.branch import Branch, is_at
 from nldyn.checkpoint import Checkpoint, begun_before
 from nldyn.continuation import MOST_POINTS, ContinuationOptions, check_range, shifts
-from nldyn.diagrams import Collector, Diagram, Progress
+from nldyn.diagrams import Collector, Diagram, Progress, check_flow
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.fixed_point_index import index_note, is_damped, sum_of_indices
 from nldyn.flow import FlowMap, flow_of
@@ -436,7 +436,8 @@ class Exploration:
     def _indices(self) -> list[str]:
         """Whether orbits are missing for certain, where unstable ones were looked for as well."""
         longest = min(self.question.effort.unstable_period, self.question.max_period)
-        if not (longest and self.coverage and is_damped(self.question.flow.system)):
+        told = longest and self.finished and self.coverage
+        if not (told and is_damped(self.question.flow.system)):
             return []
         return [index_note(self.diagram.branches, self.diagram.range_hz, longest)]
 
@@ -566,8 +567,6 @@ def explore(
 
 def _check_known(known: Diagram, question: Question) -> None:
     """Raise unless branches that are known belong to the question."""
-    from nldyn.store import same_flow
-
     if known.range_hz != question.range_hz:
         (a, b), (low, high) = known.range_hz, question.range_hz
         raise SystemModelError(
@@ -577,9 +576,7 @@ def _check_known(known: Diagram, question: Question) -> None:
         raise SystemModelError(
             f"known: observes {shown(known.observe)}, not {shown(question.observe)}"
         )
-    for branch in known.branches:
-        if not same_flow(branch.points[0].problem.flow, question.flow):
-            raise SystemModelError(f"known: branch {branch.name} is of another system or accuracy")
+    check_flow(known, question.flow)
 
 
 def _same_branches(a: Diagram, b: Diagram) -> bool:

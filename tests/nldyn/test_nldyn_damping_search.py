@@ -100,11 +100,38 @@ def test_interrupted_it_goes_on_with_what_it_has_found(harmonic, found, tmp_path
             by_less_damping(
                 harmonic, max_period=1, spacing=0.1, progress=interrupt, checkpoint=place
             )
-        kept = load_branches(place)
-        assert len(kept) == len({branch.frequency_hz.tobytes() for branch in kept}) <= 2
+        assert len(load_branches(place)) == 1  # what is known is not kept
     resumed = by_less_damping(harmonic, max_period=1, spacing=0.1, checkpoint=place)
     assert [len(b.nodes) for b in resumed.branches] == [len(b.nodes) for b in found.branches]
     assert np.array_equal(resumed.branches[1].frequency_hz, found.branches[1].frequency_hz)
+
+
+def test_some_orbits_are_carried_back_however_wide_the_spacing(found):
+    short = replace(found, range_hz=(7.95, 8.05))
+    done = by_less_damping(short, max_period=1, spacing=0.5)
+    assert " 0 of 0 orbits" not in done.notes[-1]
+
+
+def test_another_factor_loses_nothing_that_the_file_has(harmonic, found, tmp_path):
+    place = tmp_path / "found.h5"
+    by_less_damping(harmonic, max_period=1, spacing=0.1, checkpoint=place)
+    again = by_less_damping(harmonic, 0.95, max_period=1, spacing=0.5, checkpoint=place)
+    for branches in (again.branches[1:], load_branches(place)):
+        (isola,) = branches
+        assert np.array_equal(isola.frequency_hz, found.branches[1].frequency_hz)
+
+
+def test_a_branch_of_a_wider_range_and_one_without_its_course_may_be_known(harmonic, tmp_path):
+    whole = harmonic.branches[0]
+    low, high = 7.3, 10.9
+    inside = [i for i, point in enumerate(whole.nodes) if low < point.orbit.frequency_hz < high]
+    stripped = replace(whole, nodes=whole.nodes[inside[0] : inside[-1] + 1], course=None)
+    for branch in (whole, stripped):
+        known = Diagram((branch,), [low, high], "tip")
+        place = tmp_path / "found.h5"
+        for _ in range(2):
+            done = by_less_damping(known, max_period=1, spacing=0.1, checkpoint=place)
+            assert len(done.branches) == 2
 
 
 @pytest.mark.parametrize(
@@ -112,7 +139,7 @@ def test_interrupted_it_goes_on_with_what_it_has_found(harmonic, found, tmp_path
     [
         ({"factor": 1.0}, "factor must lie between 0 and 1, got 1"),
         ({"factor": float("nan")}, "factor must lie between 0 and 1, got nan"),
-        ({"spacing": 0.0}, "spacing must lie between 1e-05 and 1, got 0"),
+        ({"spacing": 0.0}, "spacing must lie between 1e-06 and 1, got 0"),
         ({"max_period": 0}, "max_period must be"),
         ({"known": Diagram((), RANGE_HZ, "tip")}, "known: has no branches to begin with"),
     ],
@@ -120,6 +147,13 @@ def test_interrupted_it_goes_on_with_what_it_has_found(harmonic, found, tmp_path
 def test_bad_input_is_refused(harmonic, change, message):
     with pytest.raises(SystemModelError, match=message):
         by_less_damping(**{"known": harmonic, **change})
+
+
+def test_branches_of_two_systems_are_refused(harmonic):
+    other = continue_branch(solve_orbit(two_modes(0.02), 10.99), (10.9, 11.0))
+    known = replace(harmonic, branches=(*harmonic.branches, replace(other, name="of another")))
+    with pytest.raises(SystemModelError, match="branch of another is of another system"):
+        by_less_damping(known)
 
 
 def test_a_system_without_modal_damping_is_refused():
