@@ -38,11 +38,13 @@ from nldyn.system import System
 # Where an extreme of a penetration comes near to zero, the second derivative of the motion jumps
 # there: a difference then reaches only a fifth of the way, but not below the shortest. Where g
 # bends on a shorter length, its second difference against the first tells: h g''/g' is 2 BENT at
-# most, so that h² g(3)/6 is about 1e-4 of the slope.
+# most, so that h² g(3)/6 is about 1e-4 of the slope if g(3)/g' is about the square of g''/g'. No
+# bend is seen in rounding. A difference to one side is wrong by h g''/2, so it is always short.
 DIFFERENCE = 1e-4
 LARGEST_CHANGE = 1e-3
 SHORTEST_DIFFERENCE = 1e-7
 BENT, SHORTEST_BEND = 0.02, 3e-6
+ROUNDING_BEND = 1e-9  # second difference that four values good to 1e-10 may have
 ROUNDING = 1e-7  # a Newton step below this that is no shorter than the last has met rounding
 KEEP_SLOPES = 1e-3  # after a Newton step shorter than this the slopes of g still serve
 SATISFIED = 1e-7  # residual of a condition up to which a solution counts
@@ -486,7 +488,7 @@ def _slope(at: Evaluation, direction: Real, condition: Condition, here: Real) ->
         bend = float(np.abs(last - 2.0 * here + first).max(initial=0.0))
         if change > LARGEST_CHANGE and h > SHORTEST_DIFFERENCE:
             h = max(0.2 * LARGEST_CHANGE / change * h, SHORTEST_DIFFERENCE)
-        elif bend > BENT * change and h > SHORTEST_BEND:
+        elif bend > max(BENT * change, ROUNDING_BEND) and h > SHORTEST_BEND:
             h = max(0.5 * BENT * change / bend * h, SHORTEST_BEND)
         else:
             return (last - first) / (h * length)
