@@ -545,9 +545,8 @@ def solve_orbit(
     if guess is not None:
         return _first_orbit(problem, [_guessed(problem, guess, omega)], omega, observe)
     pieces = (segments or period) // period  # of one excitation period
-    starts = _simulated(problem, omega, pieces)
     try:
-        return _first_orbit(problem, starts, omega, observe)
+        return _first_orbit(problem, _simulated(problem, omega, pieces), omega, observe)
     except ConvergenceError:
         orbit = _by_more_damping(problem, omega, observe, pieces) if period == 1 else None
         if orbit is None:
@@ -622,17 +621,17 @@ def _first_orbit(
 def _by_more_damping(
     problem: ShootingProblem, omega: float, observe: str, pieces: int
 ) -> Orbit | None:
-    """Orbit carried to the damping of the system from where more of it leaves no other, or None."""
+    """Orbit at more damping, which a motion from rest comes near, carried back, or None."""
     from nldyn.damping import carried, damped
 
     own = problem.flow
     if not np.any(own.system.damping):
         return None
     for log_factor in MORE_DAMPING:
-        more = replace(problem, flow=damped(own, log_factor))
         try:
+            more = replace(problem, flow=damped(own, log_factor))
             orbit = _first_orbit(more, _simulated(more, omega, pieces), omega, observe)
-        except ConvergenceError:
+        except (ConvergenceError, SystemModelError):
             continue
         found = carried(own, orbit, log_factor, 0.0)
         if found is not None:
@@ -715,8 +714,8 @@ def refine(
         step = f", last relative step {found.last_step:.1e}" if found.last_step < math.inf else ""
         raise ConvergenceError(
             f"{where}: {found.failure}{step} after {found.iterations} "
-            f"iteration{'' if found.iterations == 1 else 's'}; another guess, "
-            "find_orbits, or continue_branch from a frequency of calm motion may find one"
+            f"iteration{'' if found.iterations == 1 else 's'}; another guess or find_orbits may "
+            f"find one{', or continue_branch from calm motion' if problem.period == 1 else ''}"
         )
     return Orbit.of(problem, found, observe)
 
