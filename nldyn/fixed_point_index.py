@@ -94,15 +94,18 @@ def index_note(branches: Sequence[Branch], range_hz: tuple[float, float], longes
     inside = np.geomspace(low, high, FREQUENCIES + 2)[1:-1].tolist()
     powers = "P" if longest == 1 else f"P to P^{longest}"
     told = f"indices of the fixed points of {powers} at {len(inside)} frequencies add up to one"
+    counted = [branch for branch in branches if branch.period <= longest]
+    orbits = [[orbit for branch in counted for orbit in branch.at(hz)] for hz in inside]
     wrong = []
-    for hz in inside:
-        orbits = [
-            orbit for branch in branches if branch.period <= longest for orbit in branch.at(hz)
-        ]
-        wrong += [
-            f"P^{n} at {hz:.4g} Hz" for n in range(1, longest + 1) if sum_of_indices(orbits, n) != 1
-        ]
-    return f"{told} but for {', '.join(wrong)}: orbits are missing there" if wrong else told
+    for n in range(1, longest + 1):
+        at = [hz for hz, here in zip(inside, orbits, strict=True) if sum_of_indices(here, n) != 1]
+        if len(at) > 1:
+            wrong.append(f"P^{n} at {len(at)} of them from {at[0]:.5g} to {at[-1]:.5g} Hz")
+        elif at:
+            wrong.append(f"P^{n} at {at[0]:.5g} Hz")
+    if not wrong:
+        return told
+    return f"{told} but for {', '.join(wrong)}: orbits are missing, or a branch was broken off"
 
 
 def sum_of_indices(orbits: Iterable[Orbit], period: int) -> int:

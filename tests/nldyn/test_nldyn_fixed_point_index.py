@@ -22,7 +22,7 @@ from nldyn import (
     index_sum,
     solve_orbit,
 )
-from nldyn.fixed_point_index import index
+from nldyn.fixed_point_index import FREQUENCIES, index, index_note
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +74,19 @@ def test_a_missing_doubled_branch_shows_between_its_flips(doubled):
     assert orbit.multipliers[0].real < -1.0
     assert index_sum(harmonic, 50.0, 1) == 1
     assert index_sum(harmonic, 50.0, 2) == -1
+
+
+def test_the_note_tells_for_each_power_where_orbits_are_missing(doubled):
+    """Above the flip of the harmonic branch, without the doubled orbits."""
+    low, high = doubled.range_hz
+    harmonic = [branch for branch in doubled.branches if branch.period == 1]
+    (flip,) = [s.frequency_hz for s in harmonic[0].special_points if s.kind == "PD"]
+    inside = np.geomspace(low, high, FREQUENCIES + 2)[1:-1]
+    above = inside[inside > flip]
+    where = f"P^2 at {above.size} of them from {above[0]:.5g} to {above[-1]:.5g} Hz"
+    told = index_note(harmonic, (low, high), 3)
+    assert f" add up to one but for {where}: orbits are missing" in told
+    assert index_note(harmonic, (low, flip), 3).endswith(" add up to one")
 
 
 def test_a_branch_that_is_broken_off_shows(harmonic_branch, one_dof):
