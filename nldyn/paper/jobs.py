@@ -129,8 +129,8 @@ LISTED = (
 # followed again from the next orbit.
 LONG = ContinuationOptions(max_points=20000)
 
-# Flips are followed to period 8, branches longer in period than 3 with up to 25 points each way;
-# of the model with several thousand flips with up to 10.
+# Flips are followed to period 8. Branches of period 6 and 8, whose own flips are not, have up to 25
+# points each way; those of the model with several thousand flips up to 10.
 DOUBLED, MANY_DOUBLED = (8, 25), (8, 10)
 
 JOBS = (

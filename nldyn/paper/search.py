@@ -1,9 +1,10 @@
 """``python -m nldyn.paper.search DIRECTORY [MODEL ...]``: look for branches of the larger models.
 
-Beside the branches of the starts that are kept, it finds others, writes the starts of all, which
-`nldyn.paper.starts` reads, and reports how many may be missing. With ``--less-damping FACTOR`` it
-does not simulate, but goes by way of less damping. The directory keeps what is found, and the same
-command goes on where it was interrupted (but for following the starts).
+Beside the branches of the starts that are known, those in the directory or else the ones that are
+kept with the package, it finds others, writes the starts of all into the directory, and reports how
+many may be missing. With ``--less-damping FACTOR`` it does not simulate, but goes by way of less
+damping. The directory keeps what is found, and the same command goes on where it was interrupted
+(but for following the starts); once it has ended, it looks for more beside what it has found.
 """
 
 from __future__ import annotations
@@ -29,10 +30,10 @@ def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Explorat
     """Explore a model, and write the starts that it gives."""
     job = next(job for job in JOBS if job.name == name)
     with progress_line() as report:
+        known, place = known_branches(job, folder, report)
         found = explore(
-            job.system(), job.range_hz, LONGEST, effort=effort, options=LONG,
-            known=known_branches(job, folder, report),
-            progress=report, checkpoint=folder / f"{name}.h5",
+            job.system(), job.range_hz, LONGEST, effort=effort, options=LONG, known=known,
+            progress=report, checkpoint=place.with_suffix(".searched.h5"),
         )  # fmt: skip
     write_starts(starts_path(name, folder), found.diagram.branches)
     return found
@@ -45,24 +46,27 @@ def search_by_less_damping(name: str, folder: Path, factor: float) -> Diagram:
     """
     job = next(job for job in JOBS if job.name == name)
     with progress_line() as report:
+        known, place = known_branches(job, folder, report)
         found = by_less_damping(
-            known_branches(job, folder, report), factor, max_period=LONGEST, options=LONG,
-            progress=report, checkpoint=folder / f"{name}.less.h5",
+            known, factor, max_period=LONGEST, options=LONG,
+            progress=report, checkpoint=place.with_suffix(".less.h5"),
         )  # fmt: skip
     write_starts(starts_path(name, folder), found.branches)
     return found
 
 
-def known_branches(job: Job, folder: Path, progress: Progress) -> Diagram:
-    """Branches that the kept starts lead to, in a file named after these starts."""
-    starts, doubled = read_starts(job.name), (LONGEST, LONG.max_points)
+def known_branches(job: Job, folder: Path, progress: Progress) -> tuple[Diagram, Path]:
+    """Branches that the starts known lead to, and their file, which is named after these starts."""
+    path = starts_path(job.name, folder)
+    starts = read_starts(job.name, folder) if path.exists() else read_starts(job.name)
     digest = hashlib.sha256(b"".join(start.state.tobytes() for start in starts)).hexdigest()
-    path = folder / f"{job.name}.known.{digest[:12]}.h5"
+    path = folder / f"{job.name}.{digest[:12]}.h5"
     if not path.exists():
+        doubled = (LONGEST, LONG.max_points)
         follow_starts(
             job.system(), starts, job.range_hz, LONG, doubled, progress, whole=True
         ).save(path)
-    return load_diagram(path)
+    return load_diagram(path), path
 
 
 def main() -> None:

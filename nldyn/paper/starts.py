@@ -8,6 +8,7 @@ orbits are kept, one of each branch; every one is solved for again before its br
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ from nldyn.flow import flow_of
 from nldyn.linear import Real
 from nldyn.orbit import check_observe, stroboscopic
 from nldyn.search import orbit_near
+from nldyn.store import write_whole
 from nldyn.system import System
 
 DATA = Path(__file__).parent / "data"
@@ -66,12 +68,13 @@ def starts_path(name: str, folder: Path = DATA) -> Path:
 def write_starts(path: Path, branches: Sequence[Branch]) -> None:
     """Write one orbit of each branch, to the last digit, by period and frequency."""
     orbits = sorted(map(middle_orbit, branches), key=lambda o: (o.period, o.frequency_hz))
-    with path.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        size = orbits[0].problem.size if orbits else 0
-        table.writerow(["period", "frequency_hz", *(f"state_{i}" for i in range(size))])
-        for orbit in orbits:
-            table.writerow([orbit.period, orbit.frequency_hz, *stroboscopic(orbit)[0].tolist()])
+    text = io.StringIO(newline="")
+    table = csv.writer(text, lineterminator="\n")
+    size = orbits[0].problem.size if orbits else 0
+    table.writerow(["period", "frequency_hz", *(f"state_{i}" for i in range(size))])
+    for orbit in orbits:
+        table.writerow([orbit.period, orbit.frequency_hz, *stroboscopic(orbit)[0].tolist()])
+    write_whole(path, text.getvalue().encode())
 
 
 def follow_starts(
@@ -98,7 +101,7 @@ def follow_starts(
         Step control.
     doubled : (int, int)
         Longest period to which flips are followed, and most points in one direction of branches
-        that are longer in period than `LONGEST`.
+        that are longer in period than `LONGEST` and whose own flips would lead beyond.
     progress : callable, optional
         Called as ``progress(what, frequency_hz)``.
     whole : bool
@@ -108,6 +111,7 @@ def follow_starts(
     observe = check_observe(system, None)
     box = Collector(flow, range_hz, observe, options, progress or (lambda what, hz: None))
     longest, most = doubled
+    wanted = max(LONGEST, longest // 2)
     lost = 0
     for start in starts:
         omega = 2.0 * math.pi * start.frequency_hz
@@ -116,11 +120,11 @@ def follow_starts(
             lost += 1
             continue
         count = len(box.branches)
-        box.follow(orbit, longest, LONGEST, most)
+        box.follow(orbit, longest, wanted, most)
         if not whole:
             keep_numbers(box.branches[count:])
     notes = [f"from {len(starts)} starts, {lost} of which lead to no orbit"]
-    notes.append(index_note(box.branches, range_hz, LONGEST))
+    notes.append(index_note(box.branches, range_hz, wanted))
     return Diagram(tuple(box.branches), range_hz, observe, (*notes, *box.notes))
 
 

@@ -75,27 +75,35 @@ def test_a_start_that_leads_nowhere_is_counted(found, tmp_path):
 
 
 @pytest.fixture
-def two_known(monkeypatch):
-    """A short range of the 2-DOF model with two starts only."""
+def two_known(monkeypatch, tmp_path):
+    """A short range of the 2-DOF model, and a directory with two starts."""
     job = next(job for job in JOBS if job.name == "two_dof_xi_0.01")
     low, high = 35.5, 36.5
-    known = [start for start in read_starts(job.name) if low < start.frequency_hz < high][:2]
     monkeypatch.setattr("nldyn.paper.search.JOBS", (replace(job, range_hz=(low, high)),))
-    monkeypatch.setattr("nldyn.paper.search.read_starts", lambda name: known)
+    head, *rows = starts_path(job.name).read_text(encoding="utf-8").splitlines(keepends=True)
+    within = [row for row in rows if low < float(row.split(",")[1]) < high]
+    starts_path(job.name, tmp_path).write_text("".join([head, *within[:2]]), encoding="utf-8")
+    return job.name, tmp_path
 
 
-def test_less_damping_gives_starts(two_known, tmp_path):
-    done = search_by_less_damping("two_dof_xi_0.01", tmp_path, 0.5)
+def test_less_damping_gives_starts(two_known):
+    name, folder = two_known
+    known = read_starts(name, folder)
+    done = search_by_less_damping(name, folder, 0.5)
     assert done.notes[-1].startswith("at 0.5 of the damping: ")
-    assert len(read_starts("two_dof_xi_0.01", tmp_path)) == len(done.branches) >= 2
+    assert len(read_starts(name, folder)) == len(done.branches) >= len(known) == 2
 
 
-def test_a_search_is_kept_and_gives_starts(two_known, tmp_path):
-    """It begins with the branches of the starts that there are."""
-    effort = ExploreOptions(spacing=0.02, starts=2, settling=100)
-    done = search("two_dof_xi_0.01", tmp_path, effort)
-    assert (tmp_path / "two_dof_xi_0.01.h5").exists()
-    assert len(read_starts("two_dof_xi_0.01", tmp_path)) == len(done.diagram.branches)
-    assert 2 <= done.stage.given < len(done.diagram.branches)
-    again = search("two_dof_xi_0.01", tmp_path, effort)
+def test_a_search_is_kept_and_gives_starts_from_which_the_next_one_begins(two_known):
+    name, folder = two_known
+    first = starts_path(name, folder).read_bytes()
+    effort = ExploreOptions(spacing=0.02, starts=1, settling=100)
+    done = search(name, folder, effort)
+    found = read_starts(name, folder)
+    assert len(found) == len(done.diagram.branches) > done.stage.given == 2
+    more = search_by_less_damping(name, folder, 0.5)
+    assert len(read_starts(name, folder)) == len(more.branches) >= len(found)
+    starts_path(name, folder).write_bytes(first)
+    again = search(name, folder, effort)
     assert again.stage.steps == done.stage.steps
+    assert len(again.diagram.branches) == len(done.diagram.branches)
