@@ -73,14 +73,15 @@ def by_less_damping(
 
     Examples
     --------
-    >>> from nldyn import HarmonicForce, Stop, System, diagram
-    >>> system = System.from_modal([10.0, 30.3], {"tip": [1.0, -1.22], "force": [1.0, 1.03]},
-    ...     modal_damping=0.0135, stops=[Stop("tip", stiffness=3.58e7)],
-    ...     excitation=[HarmonicForce("force", 7.49)])
-    >>> known = diagram(system, (7.2, 11.0))
+    >>> from nldyn import Diagram, HarmonicForce, Stop, System, continue_branch, solve_orbit
+    >>> system = System.from_modal([10.0, 30.307], {"tip": [1, -1.2178], "force": [1, 1.0309]},
+    ...     modal_damping=0.013513, stops=[Stop("tip", stiffness=3.5791e7)],
+    ...     excitation=[HarmonicForce("force", 7.4926)])
+    >>> branch = continue_branch(solve_orbit(system, 11.0), (7.2, 11.0))
+    >>> known = Diagram((branch,), (7.2, 11.0), "tip")
     >>> more = by_less_damping(known, max_period=1, spacing=0.1)
-    >>> len(known.branches), len(more.branches), more.branches[1].closed
-    (1, 2, True)
+    >>> len(more.branches), more.branches[1].closed
+    (2, True)
     """
     _check(known, factor, max_period, spacing, options, progress)
     own, log_factor = known.branches[0].points[0].problem.flow, math.log(factor)
