@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from nldyn.curve_plots import plot_curves
     from nldyn.curve_store import load_curve, load_curves, save_curves
     from nldyn.curves import Curve, continue_constant, continue_in, continue_special
-    from nldyn.damping_search import by_less_damping
+    from nldyn.detour_search import by_detour
     from nldyn.diagrams import Diagram, Seed, diagram
     from nldyn.elements import (
         Damper,
@@ -86,7 +86,7 @@ _HOMES = {
     "curve_plots": "plot_curves",
     "curve_store": "load_curve load_curves save_curves",
     "curves": "Curve continue_constant continue_in continue_special",
-    "damping_search": "by_less_damping",
+    "detour_search": "by_detour",
     "diagrams": "Diagram Seed diagram",
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
     "errors": "SceneError SystemModelError",
@@ -171,7 +171,7 @@ __all__ = [
     "basin_edge",
     "basins",
     "brute_force",
-    "by_less_damping",
+    "by_detour",
     "cascade",
     "cascades_in",
     "chaos_lifetime",

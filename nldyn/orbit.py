@@ -37,7 +37,7 @@ MOST_SEGMENTS = 10**5
 # contact force over the excitation, and penetration over displacement, up to which a free body
 # counts as untouched
 TOUCH = 1e-7
-MORE_DAMPING = 2.0, 3.0, 4.0  # logarithms of factors that may leave one orbit only
+MORE_DAMPING = 7.0, 20.0, 55.0  # factors that may leave one orbit only
 NOT_HELD = "the structure is free to move in a way that no stop limits, and nothing tells its place"
 NO_PLACE = (
     "the structure is free to move as a whole, and where the motion touches no stop, nothing tells "
@@ -622,18 +622,18 @@ def _by_more_damping(
     problem: ShootingProblem, omega: float, observe: str, pieces: int
 ) -> Orbit | None:
     """Orbit at more damping, which a motion from rest comes near, carried back, or None."""
-    from nldyn.damping import carried, damped
+    from nldyn.detour import Detour
 
-    own = problem.flow
-    if not np.any(own.system.damping):
+    if not np.any(problem.flow.system.damping):
         return None
-    for log_factor in MORE_DAMPING:
+    for factor in MORE_DAMPING:
+        detour = Detour(problem.flow, damping=factor)
         try:
-            more = replace(problem, flow=damped(own, log_factor))
+            more = replace(problem, flow=detour.flow(1.0))
             orbit = _first_orbit(more, _simulated(more, omega, pieces), omega, observe)
         except (ConvergenceError, SystemModelError):
             continue
-        found = carried(own, orbit, log_factor, 0.0)
+        found = detour.carried(orbit, 1.0, 0.0)
         if found is not None:
             return found
     return None

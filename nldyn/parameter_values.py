@@ -11,14 +11,13 @@ import numpy as np
 
 from nldyn.elements import LARGEST_EXPONENT
 from nldyn.errors import LARGEST_FREQUENCY, SMALLEST_FREQUENCY, SystemModelError, is_finite, shown
-from nldyn.parameters import Parameter, check_index, parameter_tables
+from nldyn.parameters import SOURCES, Parameter, check_index, parameter_tables
 from nldyn.system import System
 
 FREQUENCY = "frequency_hz"
 EVERY_MODE = -1
 
 _OF_STOPS = ("gap", "stiffness", "exponent", "dissipation")
-_OF_EXCITATION = ("amplitude", "mass_times_radius")
 _OF_DAMPERS = ("coefficient",)
 _OF_MODES = ("modal_damping", "natural_frequency_hz")
 UNITS = {
@@ -35,14 +34,14 @@ UNITS = {
 }
 BOUNDS = {
     name: (0.0, math.inf)
-    for name in ("stiffness", "dissipation", *_OF_EXCITATION, *_OF_DAMPERS, *_OF_MODES)
+    for name in ("stiffness", "dissipation", *SOURCES, *_OF_DAMPERS, *_OF_MODES)
 } | {"exponent": (1.0, LARGEST_EXPONENT)}  # between which there are systems
-NAMES = (FREQUENCY, *_OF_STOPS, *_OF_EXCITATION, *_OF_DAMPERS, *_OF_MODES)
+NAMES = (FREQUENCY, *_OF_STOPS, *SOURCES, *_OF_DAMPERS, *_OF_MODES)
 
 
 def has_exact_derivatives(parameter: Parameter) -> bool:
     """Whether the flow map differentiates by the parameter itself."""
-    return parameter.name in (*_OF_STOPS, *_OF_EXCITATION)
+    return parameter.name in (*_OF_STOPS, *SOURCES)
 
 
 def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
@@ -97,7 +96,7 @@ def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float
     if name == "natural_frequency_hz":
         return float(system.frequencies_hz[index])
     elements: Sequence[Any] = system.stops
-    if name in _OF_EXCITATION:
+    if name in SOURCES:
         elements = system.excitation
     elif name in _OF_DAMPERS:
         elements = system.dampers
@@ -117,7 +116,7 @@ def with_value(system: System, parameter: Parameter, value: float) -> System:
         return system
     if name in _OF_STOPS:
         return system.with_elements(stops=_replaced(system.stops, index, name, value))
-    if name in _OF_EXCITATION:
+    if name in SOURCES:
         return system.with_elements(excitation=_replaced(system.excitation, index, name, value))
     if name in _OF_DAMPERS:
         return replace(system, dampers=_replaced(system.dampers, index, name, value))

@@ -20,7 +20,7 @@ _COLUMNS = {
     "exponent": EXPONENT,
     "dissipation": DISSIPATION,
 }
-_SOURCES = ("amplitude", "mass_times_radius")
+SOURCES = ("amplitude", "mass_times_radius")
 _EXCITATION = -1
 
 
@@ -89,7 +89,7 @@ def parameter_tables(
                     f"parameter '{name}': stop {index} has a law of its own, which knows no {name}"
                 )
             table[row] = _COLUMNS[name], index
-        elif name in _SOURCES:
+        elif name in SOURCES:
             check_index(parameter, "excitation", len(system.excitation))
             source = system.excitation[index]
             if not hasattr(source, name):
@@ -98,7 +98,7 @@ def parameter_tables(
             column = system.force_column(system.participation[source.at])
             drive_by[row, source.order // 2] = turn(source.phase_deg) * column
         else:
-            known = ", ".join([*_COLUMNS, *_SOURCES])
+            known = ", ".join([*_COLUMNS, *SOURCES])
             raise SystemModelError(f"unknown parameter '{name}'; there are: {known}")
     return table, drive_by
 

@@ -2,9 +2,10 @@
 
 Beside the branches of the starts that are known, those in the directory or else the ones that are
 kept with the package, it finds others, writes the starts of all into the directory, and reports how
-many may be missing. With ``--less-damping FACTOR`` it does not simulate, but goes by way of less
-damping. The directory keeps what is found, and the same command goes on where it was interrupted
-(but for following the starts); once it has ended, it looks for more beside what it has found.
+many may be missing. With ``--detour DAMPING EXCITATION`` it does not simulate, but goes by way of a
+system with these factors, see `by_detour`. The directory keeps what is found, and the same command
+goes on where it was interrupted (but for following the starts); once it has ended, it looks for
+more beside what it has found.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import hashlib
 from pathlib import Path
 
 from nldyn.command import answering
-from nldyn.damping_search import by_less_damping
+from nldyn.detour_search import by_detour
 from nldyn.diagrams import Diagram, Progress
 from nldyn.exploration import Exploration, ExploreOptions, explore
 from nldyn.paper.jobs import JOBS, LONG, Job
@@ -39,17 +40,14 @@ def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Explorat
     return found
 
 
-def search_by_less_damping(name: str, folder: Path, factor: float) -> Diagram:
-    """Look for branches of a model by way of a share of its damping, and write the starts of all.
-
-    See `by_less_damping`.
-    """
+def search_by_detour(name: str, folder: Path, damping: float, excitation: float) -> Diagram:
+    """Look for branches of a model with `by_detour`, and write the starts of all."""
     job = next(job for job in JOBS if job.name == name)
     with progress_line() as report:
         known, place = known_branches(job, folder, report)
-        found = by_less_damping(
-            known, factor, max_period=LONGEST, options=LONG,
-            progress=report, checkpoint=place.with_suffix(".less.h5"),
+        found = by_detour(
+            known, damping, excitation, max_period=LONGEST, options=LONG,
+            progress=report, checkpoint=place.with_suffix(".detour.h5"),
         )  # fmt: skip
     write_starts(starts_path(name, folder), found.branches)
     return found
@@ -75,7 +73,7 @@ def main() -> None:
     parser.add_argument("directory", type=Path)
     parser.add_argument("models", nargs="*", metavar="MODEL", help=f"of {', '.join(MODELS)}")
     parser.add_argument(
-        "--less-damping", type=float, metavar="FACTOR", help="of the damping, between 0 and 1"
+        "--detour", type=float, nargs=2, metavar=("DAMPING", "EXCITATION"), help="factors of these"
     )
     given = parser.parse_args()
     unknown = set(given.models) - set(MODELS)
@@ -83,10 +81,10 @@ def main() -> None:
         parser.error(f"unknown model {sorted(unknown)[0]!r} (there are: {', '.join(MODELS)})")
     given.directory.mkdir(parents=True, exist_ok=True)
     for name in given.models or MODELS:
-        if given.less_damping is None:
+        if given.detour is None:
             said = search(name, given.directory).report()
         else:
-            said = search_by_less_damping(name, given.directory, given.less_damping).notes[-1]
+            said = search_by_detour(name, given.directory, *given.detour).notes[-1]
         print(f"{name}: {said}", flush=True)
 
 

@@ -9,7 +9,7 @@ from nldyn import ContinuationOptions, ExploreOptions, explore, index_sum
 from nldyn.fixed_point_index import index_note
 from nldyn.flow import FlowMap
 from nldyn.paper.jobs import JOBS, scene_system
-from nldyn.paper.search import MODELS, search, search_by_less_damping
+from nldyn.paper.search import MODELS, search, search_by_detour
 from nldyn.paper.starts import follow_starts, read_starts, starts_path, write_starts
 from nldyn.search import orbit_near
 
@@ -86,11 +86,11 @@ def two_known(monkeypatch, tmp_path):
     return job.name, tmp_path
 
 
-def test_less_damping_gives_starts(two_known):
+def test_a_detour_gives_starts(two_known):
     name, folder = two_known
     known = read_starts(name, folder)
-    done = search_by_less_damping(name, folder, 0.5)
-    assert done.notes[-1].startswith("at 0.5 of the damping: ")
+    done = search_by_detour(name, folder, 0.5, 1.2)
+    assert done.notes[-1].startswith("at 0.5 of the damping and 1.2 of the excitation: ")
     assert len(read_starts(name, folder)) == len(done.branches) >= len(known) == 2
 
 
@@ -101,7 +101,7 @@ def test_a_search_is_kept_and_gives_starts_from_which_the_next_one_begins(two_kn
     done = search(name, folder, effort)
     found = read_starts(name, folder)
     assert len(found) == len(done.diagram.branches) > done.stage.given == 2
-    more = search_by_less_damping(name, folder, 0.5)
+    more = search_by_detour(name, folder, 0.5, 1.0)
     assert len(read_starts(name, folder)) == len(more.branches) >= len(found)
     starts_path(name, folder).write_bytes(first)
     again = search(name, folder, effort)

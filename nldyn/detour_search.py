@@ -1,4 +1,4 @@
-"""Further branches by way of less damping, where they are joined to others."""
+"""Further branches by way of a changed system, where they are joined to others."""
 
 from __future__ import annotations
 
@@ -12,19 +12,21 @@ from cms.threads import one_thread
 from nldyn.branch import Branch
 from nldyn.checkpoint import checkpoint_of_several
 from nldyn.continuation import ContinuationOptions
-from nldyn.damping import carried, damped
+from nldyn.detour import Detour
 from nldyn.diagrams import Collector, Diagram, Progress, check_flow, middle_orbit
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.exploration import FINEST_SPACING
 from nldyn.orbit import Orbit, same_orbit
 
-PLACES = 3  # orbits of each branch that are carried to less damping, in case some get lost
+PLACES = 3  # orbits of each branch that are carried there, in case some get lost
+MOST = 1e3  # factor of damping or excitation
 
 
 @one_thread()
-def by_less_damping(
+def by_detour(
     known: Diagram,
-    factor: float = 0.5,
+    damping: float = 0.5,
+    excitation: float = 1.0,
     *,
     max_period: int = 3,
     spacing: float = 0.002,
@@ -32,21 +34,22 @@ def by_less_damping(
     progress: Progress | None = None,
     checkpoint: str | Path | None = None,
 ) -> Diagram:
-    """Find further branches where the modal damping is less and the branches known lead to them.
+    """Find further branches by way of another damping or excitation, where known ones lead to them.
 
-    Closed branches (isolas) grow when the damping falls, and join others. So the branches known are
-    followed at a share of the damping; the orbits of these, at frequencies next to each other, are
-    carried back to the damping of the system, and what lies on no known branch is on a new one.
-    Isolas that join none of the branches known there are not found, nor, but by chance, those that
-    are narrower than the spacing of the frequencies. Another factor may find more, as may another
-    call with the branches found.
+    Closed branches (isolas) grow when the damping falls, or with more or less of the excitation,
+    and join others. So the branches known are followed there; the orbits of these, at frequencies
+    next to each other, are carried back to the system as it is, and what lies on no known branch is
+    on a new one. Isolas that join none of the branches known there are not found, nor, but by
+    chance, those that are narrower than the spacing of the frequencies. Other factors may find
+    more, as may another call with the branches found.
 
     Parameters
     ----------
     known : Diagram
         Branches of a system, from `diagram` or `explore`, with their orbits.
-    factor : float
-        Of the modal damping, between 0 and 1. Point dampers stay as they are.
+    damping, excitation : float
+        Factors, up to 1000 or down to its inverse, of the modal damping and of all sources of
+        excitation. Point dampers stay as they are.
     max_period : int
         Longest orbits carried, and wanted.
     spacing : float
@@ -56,8 +59,8 @@ def by_less_damping(
     progress : callable, optional
         Called as ``progress(what, frequency_hz)``.
     checkpoint : str or Path, optional
-        File that keeps the branches found, also those of an earlier call, whatever its factor: they
-        count as known. Those at less damping are not kept, and followed anew.
+        File that keeps the branches found, also those of an earlier call, whatever its factors:
+        they count as known. Those of the changed system are not kept, and followed anew.
 
     Returns
     -------
@@ -79,12 +82,13 @@ def by_less_damping(
     ...     excitation=[HarmonicForce("force", 7.4926)])
     >>> branch = continue_branch(solve_orbit(system, 11.0), (7.2, 11.0))
     >>> known = Diagram((branch,), (7.2, 11.0), "tip")
-    >>> more = by_less_damping(known, max_period=1, spacing=0.1)
+    >>> more = by_detour(known, max_period=1, spacing=0.1)
     >>> len(more.branches), more.branches[1].closed
     (2, True)
     """
-    _check(known, factor, max_period, spacing, options, progress)
-    own, log_factor = known.branches[0].points[0].problem.flow, math.log(factor)
+    _check(known, damping, excitation, max_period, spacing, options, progress)
+    own = known.branches[0].points[0].problem.flow
+    detour = Detour(own, damping, excitation)
     low, high = known.range_hz
     options, progress = options or ContinuationOptions(), progress or (lambda what, hz: None)
     box = Collector(own, (low, high), known.observe, options, progress)
@@ -92,20 +96,20 @@ def by_less_damping(
     box.checkpoint = checkpoint_of_several(checkpoint, box.branches, own, (low, high))
     with box.checkpoint:
         _go_on(box, max_period)
-        less = _followed(box, log_factor, max_period)
+        there = _followed(box, detour, max_period)
         count = math.ceil(math.log(high / low) / math.log1p(spacing))
         tried = came = 0
         for frequency in np.geomspace(low, high, count + 2)[1:-1].tolist():
             progress("back", frequency)
-            orbits = [orbit for branch in less for orbit in branch.at(frequency)]
-            carriages = (carried(own, orbit, log_factor, 0.0) for orbit in orbits)
+            orbits = [orbit for branch in there for orbit in branch.at(frequency)]
+            carriages = (detour.carried(orbit, 1.0, 0.0) for orbit in orbits)
             back = [orbit for orbit in carriages if orbit is not None]
             tried, came = tried + len(orbits), came + len(back)
             _follow_new(box, back, max_period)
     new = len(box.branches) - len(known.branches)
     box.notes.append(
-        f"at {factor:g} of the damping: {_counted(len(less))}, {came} of {tried} orbits carried "
-        f"back, {_counted(new)} found so"
+        f"at {damping:g} of the damping and {excitation:g} of the excitation: "
+        f"{_counted(len(there))}, {came} of {tried} orbits carried back, {_counted(new)} found so"
     )
     return Diagram(tuple(box.branches), known.range_hz, known.observe, tuple(box.notes))
 
@@ -116,7 +120,8 @@ def _counted(number: int) -> str:
 
 def _check(
     known: Diagram,
-    factor: float,
+    damping: float,
+    excitation: float,
     max_period: int,
     spacing: float,
     options: ContinuationOptions | None,
@@ -128,8 +133,13 @@ def _check(
         progress=(progress, Callable, None),
     )
     check_whole("max_period", max_period, 1)
-    if not (is_finite(factor) and 0.0 < factor < 1.0):
-        raise SystemModelError(f"factor must lie between 0 and 1, got {shown(factor)}")
+    for name, factor in (("damping", damping), ("excitation", excitation)):
+        if not (is_finite(factor) and 1.0 / MOST <= factor <= MOST):
+            raise SystemModelError(
+                f"{name} must be a factor from {1.0 / MOST:g} to {MOST:g}, got {shown(factor)}"
+            )
+    if damping == excitation == 1.0:
+        raise SystemModelError("damping and excitation are both 1: that is the system itself")
     if not (is_finite(spacing) and FINEST_SPACING <= spacing < 1.0):
         raise SystemModelError(
             f"spacing must lie between {FINEST_SPACING:g} and 1, got {shown(spacing)}"
@@ -137,8 +147,8 @@ def _check(
     if not known.branches:
         raise SystemModelError("known: has no branches to begin with")
     check_flow(known, known.branches[0].points[0].problem.flow)
-    if not np.any(known.branches[0].points[0].system.damping):
-        raise SystemModelError("known: is of a system without modal damping")
+    if damping != 1.0 and not np.any(known.branches[0].points[0].system.damping):
+        raise SystemModelError("known: is of a system without modal damping, which has no factor")
 
 
 def _go_on(box: Collector, max_period: int) -> None:
@@ -150,17 +160,16 @@ def _go_on(box: Collector, max_period: int) -> None:
     box.follow_up(count, max_period, max_period, None)
 
 
-def _followed(known: Collector, log_factor: float, max_period: int) -> list[Branch]:
-    """Branches at another damping to which those known lead."""
-    own, progress = known.flow, known.progress
-    less = damped(own, log_factor)
-    box = Collector(less, known.range_hz, known.observe, known.options, progress)
+def _followed(known: Collector, detour: Detour, max_period: int) -> list[Branch]:
+    """Branches of the changed system to which those known lead."""
+    progress = known.progress
+    box = Collector(detour.flow(1.0), known.range_hz, known.observe, known.options, progress)
     for branch in known.branches:
         if branch.period > max_period:
             continue
         for orbit in _spread(branch.points, known.range_hz):
-            progress("less damping", orbit.frequency_hz)
-            other = carried(own, orbit, 0.0, log_factor)
+            progress("there", orbit.frequency_hz)
+            other = detour.carried(orbit, 0.0, 1.0)
             if other is not None:
                 box.follow(other, max_period, max_period, None)
     return box.branches

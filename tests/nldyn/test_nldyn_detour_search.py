@@ -1,4 +1,4 @@
-"""Isolas are found by way of less damping, where other branches lead to them."""
+"""Isolas are found by way of a changed system, where other branches lead to them."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from nldyn import (
     Stop,
     System,
     SystemModelError,
-    by_less_damping,
+    by_detour,
     continue_branch,
     index_sum,
     load_branches,
     solve_orbit,
 )
-from nldyn.damping import carried
+from nldyn.detour import Detour
 
 RANGE_HZ = (7.2, 11.0)
 
@@ -44,7 +44,7 @@ def harmonic() -> Diagram:
 @pytest.fixture(scope="module")
 def found(harmonic) -> Diagram:
     """What less damping leads to."""
-    return by_less_damping(harmonic, max_period=1, spacing=0.1)
+    return by_detour(harmonic, max_period=1, spacing=0.1)
 
 
 def test_an_isola_that_joins_the_known_branch_at_less_damping_is_found(harmonic, found):
@@ -56,6 +56,12 @@ def test_an_isola_that_joins_the_known_branch_at_less_damping_is_found(harmonic,
     less = continue_branch(solve_orbit(two_modes(0.5 * 0.013513), 10.99), RANGE_HZ)
     at_own, beside, at_less = (len(branch.at(8.0)) for branch in (*found.branches, less))
     assert at_less == at_own + beside > at_own
+
+
+def test_less_excitation_leads_to_the_isola_as_well(harmonic, found):
+    other = by_detour(harmonic, 1.0, 0.8, max_period=1, spacing=0.1)
+    assert len(other.branches) == 2
+    assert all(found.branches[1].contains(orbit) for orbit in other.branches[1].points)
 
 
 def test_orbits_of_the_isola_close_under_runge_kutta(found):
@@ -71,18 +77,22 @@ def test_the_indices_add_up_to_one_with_the_isola_and_without(harmonic, found):
         assert index_sum(harmonic.branches, hz) == index_sum(found.branches, hz) == 1
 
 
-@pytest.mark.parametrize("factor", [0.2, 0.9, 3.0])
-def test_carried_to_another_damping_and_back_an_orbit_is_the_same(harmonic, factor):
+@pytest.mark.parametrize(
+    ("damping", "excitation"), [(0.2, 1.0), (0.9, 1.1), (3.0, 1.0), (1.0, 0.5), (1.0, 1.5)]
+)
+def test_carried_by_a_detour_and_back_an_orbit_is_the_same(harmonic, damping, excitation):
     orbit = harmonic.branches[0].at(10.0)[0]
-    other = carried(orbit.problem.flow, orbit, 0.0, np.log(factor))
-    assert np.allclose(other.system.damping, factor * orbit.system.damping, rtol=1e-12)
+    detour = Detour(orbit.problem.flow, damping, excitation)
+    other = detour.carried(orbit, 0.0, 1.0)
+    assert np.allclose(other.system.damping, damping * orbit.system.damping, rtol=1e-12)
+    assert other.system.excitation[0].amplitude == pytest.approx(excitation * 7.4926, rel=1e-12)
     assert other.frequency_hz == pytest.approx(10.0, rel=1e-14)
-    back = carried(orbit.problem.flow, other, np.log(factor), 0.0)
+    back = detour.carried(other, 1.0, 0.0)
     assert np.abs(back.point - orbit.point).max() < 1e-9 * np.abs(orbit.point[:-1]).max()
 
 
 def test_what_is_known_is_not_found_again(found):
-    again = by_less_damping(found, 0.8, max_period=1, spacing=0.2)
+    again = by_detour(found, 0.8, max_period=1, spacing=0.2)
     assert len(again.branches) == 2
     assert again.notes[:-1] == found.notes
 
@@ -97,25 +107,25 @@ def test_interrupted_it_goes_on_with_what_it_has_found(harmonic, found, tmp_path
 
     for _ in range(2):
         with pytest.raises(KeyboardInterrupt):
-            by_less_damping(
+            by_detour(
                 harmonic, max_period=1, spacing=0.1, progress=interrupt, checkpoint=place
             )
         assert len(load_branches(place)) == 1  # what is known is not kept
-    resumed = by_less_damping(harmonic, max_period=1, spacing=0.1, checkpoint=place)
+    resumed = by_detour(harmonic, max_period=1, spacing=0.1, checkpoint=place)
     assert [len(b.nodes) for b in resumed.branches] == [len(b.nodes) for b in found.branches]
     assert np.array_equal(resumed.branches[1].frequency_hz, found.branches[1].frequency_hz)
 
 
 def test_some_orbits_are_carried_back_however_wide_the_spacing(found):
     short = replace(found, range_hz=(7.95, 8.05))
-    done = by_less_damping(short, max_period=1, spacing=0.5)
+    done = by_detour(short, max_period=1, spacing=0.5)
     assert " 0 of 0 orbits" not in done.notes[-1]
 
 
 def test_another_factor_loses_nothing_that_the_file_has(harmonic, found, tmp_path):
     place = tmp_path / "found.h5"
-    by_less_damping(harmonic, max_period=1, spacing=0.1, checkpoint=place)
-    again = by_less_damping(harmonic, 0.95, max_period=1, spacing=0.5, checkpoint=place)
+    by_detour(harmonic, max_period=1, spacing=0.1, checkpoint=place)
+    again = by_detour(harmonic, 0.95, max_period=1, spacing=0.5, checkpoint=place)
     for branches in (again.branches[1:], load_branches(place)):
         (isola,) = branches
         assert np.array_equal(isola.frequency_hz, found.branches[1].frequency_hz)
@@ -130,15 +140,17 @@ def test_a_branch_of_a_wider_range_and_one_without_its_course_may_be_known(harmo
         known = Diagram((branch,), [low, high], "tip")
         place = tmp_path / "found.h5"
         for _ in range(2):
-            done = by_less_damping(known, max_period=1, spacing=0.1, checkpoint=place)
+            done = by_detour(known, max_period=1, spacing=0.1, checkpoint=place)
             assert len(done.branches) == 2
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"factor": 1.0}, "factor must lie between 0 and 1, got 1"),
-        ({"factor": float("nan")}, "factor must lie between 0 and 1, got nan"),
+        ({"damping": 1.0}, "damping and excitation are both 1"),
+        ({"damping": 0.0}, "damping must be a factor from 0.001 to 1000, got 0"),
+        ({"damping": float("nan")}, "damping must be a factor"),
+        ({"excitation": -2.0}, "excitation must be a factor"),
         ({"spacing": 0.0}, "spacing must lie between 1e-06 and 1, got 0"),
         ({"max_period": 0}, "max_period must be"),
         ({"known": Diagram((), RANGE_HZ, "tip")}, "known: has no branches to begin with"),
@@ -146,18 +158,18 @@ def test_a_branch_of_a_wider_range_and_one_without_its_course_may_be_known(harmo
 )
 def test_bad_input_is_refused(harmonic, change, message):
     with pytest.raises(SystemModelError, match=message):
-        by_less_damping(**{"known": harmonic, **change})
+        by_detour(**{"known": harmonic, **change})
 
 
 def test_branches_of_two_systems_are_refused(harmonic):
     other = continue_branch(solve_orbit(two_modes(0.02), 10.99), (10.9, 11.0))
     known = replace(harmonic, branches=(*harmonic.branches, replace(other, name="of another")))
     with pytest.raises(SystemModelError, match="branch of another is of another system"):
-        by_less_damping(known)
+        by_detour(known)
 
 
 def test_a_system_without_modal_damping_is_refused():
     system = replace(two_modes(), damping=np.zeros((2, 2)))
     branch = continue_branch(solve_orbit(system, 10.99), (10.9, 11.0))
     with pytest.raises(SystemModelError, match="without modal damping"):
-        by_less_damping(Diagram((branch,), (10.9, 11.0), "tip"))
+        by_detour(Diagram((branch,), (10.9, 11.0), "tip"))

@@ -1,0 +1,106 @@
+"""Ways of orbits through systems of other damping and excitation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nldyn.elements import Excitation
+from nldyn.errors import SystemModelError
+from nldyn.flow import FlowMap
+from nldyn.linear import Real
+from nldyn.orbit import ConvergenceError, Orbit, minimal_period, solve_orbit
+from nldyn.parameters import SOURCES
+
+FIRST_STEP, SHORTEST_STEP = 0.25, 1e-3  # in the logarithms of the factors
+LONGER, SHORTER = 1.5, 0.4  # the next step, after one that led on and one that did not
+MISS = 0.3  # of an orbit: distance from where it was expected
+
+
+@dataclass(frozen=True)
+class Detour:
+    """A way from a system to one of other damping and excitation; its places are shares of it.
+
+    Parameters
+    ----------
+    own : FlowMap
+        Of the system where it begins.
+    damping, excitation : float
+        Factors of the modal damping and of the excitation where it ends; before, powers of them.
+    """
+
+    own: FlowMap
+    damping: float = 1.0
+    excitation: float = 1.0
+
+    @property
+    def length(self) -> float:
+        """Of the way, in the logarithms of the factors."""
+        return math.hypot(math.log(self.damping), math.log(self.excitation))
+
+    def flow(self, share: float) -> FlowMap:
+        """The flow map after a share of the way."""
+        if share == 0.0:
+            return self.own
+        system = self.own.system
+        if self.damping != 1.0:
+            system = replace(system, damping=self.damping**share * system.damping)
+        if self.excitation != 1.0:
+            factor = self.excitation**share
+            sources = tuple(_scaled(source, factor) for source in system.excitation)
+            system = system.with_elements(excitation=sources)
+        return FlowMap(system, self.own.options)
+
+    def carried(self, orbit: Orbit, start: float, end: float) -> Orbit | None:
+        """The orbit of the same frequency at another place, or None where its way there ends.
+
+        It ends at a fold, as a rule. Newton's method starts from the line through the two orbits
+        before.
+        """
+        x, step = start, math.copysign(FIRST_STEP / self.length, end - start)
+        here = _states(orbit)
+        slope = np.zeros_like(here)
+        while x != end:
+            y = x + step if abs(step) < abs(end - x) else end
+            guess = here + slope * (y - x)
+            found = self._near(orbit, y, guess)
+            if found is None:
+                step *= SHORTER
+                if abs(step) * self.length < SHORTEST_STEP:
+                    return None
+                continue
+            states = _states(found)
+            slope = (states - here) / (y - x)
+            orbit, here, x = found, states, y
+            step *= LONGER
+        return orbit
+
+    def _near(self, orbit: Orbit, share: float, guess: Real) -> Orbit | None:
+        """The orbit near a guess at a place, if it is of the same period."""
+        try:
+            found = solve_orbit(
+                self.flow(share),
+                orbit.frequency_hz,
+                orbit.period,
+                guess=guess,
+                observe=orbit.observe,
+                segments=orbit.problem.segments,
+            )
+            states = _states(found)
+        except (ConvergenceError, SystemModelError):
+            return None
+        far = float(np.linalg.norm(states - guess)) > MISS * float(np.linalg.norm(states))
+        return None if far or minimal_period(found) != orbit.period else found
+
+
+def _scaled(source: Excitation, factor: float) -> Excitation:
+    """A source of excitation, times a factor."""
+    name = next(name for name in SOURCES if hasattr(source, name))
+    return replace(source, **{name: factor * getattr(source, name)})
+
+
+def _states(orbit: Orbit) -> Real:
+    """States (k, 2n) at the shooting phases, in coordinates that do not depend on the damping."""
+    return orbit.states(orbit.problem.phases[:-1])
