@@ -30,6 +30,7 @@ from nldyn.critical import correct_across, turns_near_crossing
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
 from nldyn.shooting import metric_length
+from nldyn.system import System
 
 PRECISION = 1e-9  # in σ, to which a special point is located
 BESIDE = 1e-3  # in σ: the least distance of points that tell the direction of a branch
@@ -42,6 +43,8 @@ ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
 PASSED = 1e-6  # least of a branch point's test on both sides of a fold that is no crossing
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
 MOST_LOOKS = 12  # times that a step is cut at such points
+SMOOTH_TOUCH = 1.5  # exponent of a stop from which on multipliers have a slope at a touch
+MOST_HALVES = 8  # times that a step beside a grazing point is halved towards it
 CROSSES = 1e-12  # least unfolding of a crossing, relative to the orbit, that is not rounding
 ON_CROSSING = 3e-7  # distance from it, relative to the orbit, at which a branch cannot be told
 NEAR_ONE = 1e-3  # a multiplier no nearer to 1 is not that of an orbit where branches cross
@@ -302,15 +305,64 @@ def special_points_between(
         If an orbit is not found where it should be.
     """
     _check_dips(before, a, b, after)
-    several = a.orbit.multipliers.size > 2
-    if several and smooth(a, b):
-        points = [a, *looked_into(before, a, b, after), b]
-    else:
-        least = 2 if several and changed(a, b) else 0  # beside one change two others may hide
-        points = [a, *resolved(a, b, least, 5 if several else 3, FAR if several else FAR_ALONE), b]
+    marks = [before, a, *beside_grazing(before, a, b, after), b, after]
+    points = [a]
+    for z, first, last, c in zip(marks, marks[1:], marks[2:], marks[3:], strict=False):
+        assert first is not None and last is not None
+        points += [*_inside(z, first, last, c), last]
     for i in range(len(points) - 2, 0, -1):
         insert_dip(points, i)
     return [special for pair in pairwise(points) for special in located_between(*pair)]
+
+
+def _inside(
+    z: BranchPoint | None, a: BranchPoint, b: BranchPoint, c: BranchPoint | None
+) -> list[BranchPoint]:
+    """Points between a and b, close enough that a multiplier crosses the circle once at most."""
+    several = a.orbit.multipliers.size > 2
+    if several and smooth(a, b):
+        return looked_into(z, a, b, c)
+    least = 2 if several and changed(a, b) else 0  # beside one change two others may hide
+    if touches_sharply(a.orbit.system) and a.orbit.impacts != b.orbit.impacts:
+        least = 3
+    return resolved(a, b, least, 5 if several else 3, FAR if several else FAR_ALONE)
+
+
+def beside_grazing(
+    before: BranchPoint | None, a: BranchPoint, b: BranchPoint, after: BranchPoint | None
+) -> list[BranchPoint]:
+    """Points between a and b, closer and closer to a grazing point beside them.
+
+    Where a stop is touched sharply, multipliers go there with the root of the distance: the ends of
+    a step that is long beside this distance do not tell what they do within.
+
+    Raises
+    ------
+    LocateError
+        If no orbit of the branch is found there.
+    """
+    if not touches_sharply(a.orbit.system) or a.orbit.impacts != b.orbit.impacts:
+        return []
+    length = abs(b.arclength - a.arclength)
+    shares: set[float] = set()
+    if before is not None and before.orbit.impacts != a.orbit.impacts:
+        shares.update(_halves(length, abs(a.arclength - before.arclength)))
+    if after is not None and after.orbit.impacts != b.orbit.impacts:
+        shares.update(1.0 - x for x in _halves(length, abs(after.arclength - b.arclength)))
+    chord = Chord(a, b)
+    return [chord.at(share) for share in sorted(shares)]
+
+
+def touches_sharply(system: System) -> bool:
+    """Whether a stop is so stiff from the first touch that multipliers have no slope there."""
+    return any(stop.exponent < SMOOTH_TOUCH for stop in system.stops)
+
+
+def _halves(length: float, beside: float) -> list[float]:
+    """Shares 1/2, 1/4, ... of a step, down to a quarter of the step beside it."""
+    least = max(0.25 * beside, 0.5**MOST_HALVES * length)
+    count = math.ceil(math.log2(max(length / least, 2.0)))
+    return [0.5**k for k in range(1, count + 1)]
 
 
 def _check_dips(

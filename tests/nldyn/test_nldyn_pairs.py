@@ -1,6 +1,15 @@
-"""Two special points of a kind within a step, at low damping."""
+"""Two special points of a kind within a step."""
 
-from nldyn import ContinuationOptions, continue_branch, solve_orbit
+import numpy as np
+
+from nldyn import (
+    ContinuationOptions,
+    Stop,
+    System,
+    Unbalance,
+    continue_branch,
+    solve_orbit,
+)
 from nldyn.paper.jobs import scene_system
 
 
@@ -14,3 +23,26 @@ def test_two_flips_within_a_step_are_found():
     flips = [s.frequency_hz for s in branch.special_points if s.kind == "PD"]
     assert len(branch.points) < 5
     assert [round(hz, 4) for hz in flips] == [39.0346, 39.0739]
+
+
+def test_two_folds_behind_a_grazing_point_are_found_from_every_start():
+    """They lie 5e-7 of the frequency apart: where a linear stop is touched, a multiplier dips."""
+    system = System(
+        np.array([125.66370614359172, 334.85673403]), np.diag([1.43255671, 3.81734136]),
+        {"m": np.array([1.0, -0.74994498]), "n": np.array([0.5, -0.30212696]),
+         "f": np.array([1.0, 0.89401234])},
+        (Stop("m", 18911763.49182209), Stop.linear("n", 79370.93133132052, direction=-1)),
+        (), (Unbalance("f", 0.0004592791346638346),),
+    )  # fmt: skip
+    state = np.array([3.20561900e-05, 1.51622911e-05, -1.88056171e-03, -6.42275901e-04])
+    first = continue_branch(solve_orbit(system, 15.99458909443381, guess=state), (15.9, 16.6))
+    (grazing,) = (
+        s.frequency_hz
+        for s in first.special_points
+        if s.kind == "GR" and 16.2115 < s.frequency_hz < 16.2117
+    )
+    for start in first.points[::5]:
+        branch = continue_branch(start, (15.9, 16.6))
+        kinds = [s.kind for s in branch.special_points if abs(s.frequency_hz - grazing) < 1e-4]
+        assert sorted(kinds) == ["GR", "LP", "LP", "LP"]
+        assert len(branch.at(16.211585)) == 4
