@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from nldyn.branch import Branch, Course
     from nldyn.flow import FlowMap
     from nldyn.orbit import Orbit
+    from nldyn.system import System
 
 Kept = TypeVar("Kept")
 Item = TypeVar("Item")
@@ -104,6 +105,8 @@ class Checkpoint(Keeper["Branch"]):
         As for `Keeper`.
     strict : str
         Name of the file, if it shall hold nothing but the computation asked for.
+    held : list, optional
+        Branches of the file that are known otherwise; see `new_branches`.
     """
 
     def __init__(
@@ -112,9 +115,11 @@ class Checkpoint(Keeper["Branch"]):
         finished: list[Branch] | None = None,
         earlier: Sequence[Branch] = (),
         strict: str = "",
+        held: list[Branch] | None = None,
     ) -> None:
         super().__init__(write, finished, earlier)
         self._strict = strict
+        self._held = [] if held is None else held
 
     def branch_from(self, orbit: Orbit, *courses: Course) -> Branch | None:
         """Take from the file the branch that was begun at an orbit with one of some courses.
@@ -137,16 +142,21 @@ class Checkpoint(Keeper["Branch"]):
             )
         return None
 
-    def branches(self) -> Iterator[Branch]:
-        """Take from the file one branch after the other."""
+    def new_branches(self, is_known: Callable[[Branch], bool]) -> Iterator[Branch]:
+        """Take from the file one branch after the other, but for those known, which stay there."""
         while self._earlier:
-            yield self._earlier.pop(0)
+            branch = self._earlier.pop(0)
+            if is_known(branch):
+                self._held.append(branch)
+            else:
+                yield branch
 
 
 def checkpoint_at(
     place: str | Path | Checkpoint | None,
+    system: System,
 ) -> AbstractContextManager[Checkpoint]:
-    """The checkpoint of one continuation in a file; one that keeps nothing for None.
+    """The checkpoint of one continuation of a system in a file; one that keeps nothing for None.
 
     One that is given is left to the giver to end.
 
@@ -161,7 +171,7 @@ def checkpoint_at(
         return nullcontext(place)
     if place is None:
         return Checkpoint()
-    write, earlier = _file(place)
+    write, earlier = _file(place, system)
     return Checkpoint(write, earlier=earlier, strict=str(place))
 
 
@@ -184,7 +194,7 @@ def checkpoint_of_several(
         return Checkpoint()
     from nldyn.store import same_flow
 
-    write, earlier = _file(place)
+    write, earlier = _file(place, flow.system)
     for branch in earlier:
         same_range = branch.course is not None and branch.course.range_hz == range_hz
         if not (same_range and same_flow(branch.points[0].problem.flow, flow)):
@@ -193,21 +203,24 @@ def checkpoint_of_several(
                 "file, or delete it"
             )
     known = len(finished)
+    held: list[Branch] = []
 
     def write_new(branches: Sequence[Branch]) -> None:
-        if len(branches) > known:
-            write(branches[known:])
+        if held or len(branches) > known:
+            write([*held, *branches[known:]])
 
-    return Checkpoint(write_new, finished, earlier)
+    return Checkpoint(write_new, finished, earlier, held=held)
 
 
-def _file(place: str | Path) -> tuple[Callable[[Sequence[Branch]], None], list[Branch]]:
-    """What writes a file, and the branches in it."""
-    from nldyn.store import check_writable, load_branches, save_branches
+def _file(
+    place: str | Path, system: System
+) -> tuple[Callable[[Sequence[Branch]], None], list[Branch]]:
+    """What writes a file, and the branches of a system in it."""
+    from nldyn.store import check_writable, laws_of, load_bare_branches, save_branches
 
     path = check_writable(place)
-    earlier = begun_before(load_branches, path) if path.exists() else []
-    return partial(save_branches, path), earlier
+    read = partial(load_bare_branches, laws=laws_of(system))
+    return partial(save_branches, path), begun_before(read, path) if path.exists() else []
 
 
 def begun_before(read: Callable[[Path], Kept], path: Path) -> Kept:

@@ -991,7 +991,7 @@ def continue_branch(
         alike(orbit, [numbers("open_ends", end) for end in open_ends]),
         check_requested(at, (low, high)),
     )
-    with checkpoint_at(checkpoint) as kept:
+    with checkpoint_at(checkpoint, orbit.system) as kept:
         known = kept.branch_from(orbit, course)
         if known is not None:
             return known.extend(at=at, progress=progress, checkpoint=kept)

@@ -480,7 +480,7 @@ def _keeper(place: str | Path | None, known: Curve | None = None) -> Keeper[Curv
     if place is None:
         return Keeper()
     from nldyn.curve_store import load_curves, save_curves
-    from nldyn.store import check_writable
+    from nldyn.store import check_writable, laws_of
 
     path = check_writable(place)
     if path.exists():
@@ -490,7 +490,7 @@ def _keeper(place: str | Path | None, known: Curve | None = None) -> Keeper[Curv
                 "holds, or choose another file, or delete it"
             )
         condition = known.points[0].condition
-        laws = {i: s.law for i, s in enumerate(known.orbits[0].system.stops) if s.law}
+        laws = laws_of(known.orbits[0].system)
         monitor = condition.monitor if isinstance(condition, Held) else None
         held = begun_before(partial(load_curves, laws=laws, monitor=monitor), path)
         if not (len(held) == 1 and _is_piece(held[0], known)):

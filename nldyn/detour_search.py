@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from cms.threads import one_thread
-from nldyn.branch import Branch
+from nldyn.branch import Branch, check_branches
 from nldyn.checkpoint import checkpoint_of_several
-from nldyn.continuation import ContinuationOptions
+from nldyn.continuation import ContinuationOptions, check_range
 from nldyn.detour import Detour
 from nldyn.diagrams import Collector, Diagram, Progress, check_flow, middle_orbit
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.exploration import FINEST_SPACING
-from nldyn.orbit import Orbit, same_orbit
+from nldyn.orbit import Orbit, check_observe, same_orbit
 
 PLACES = 3  # orbits of each branch that are carried there, in case some get lost
 MOST = 1e3  # factor of damping or excitation
@@ -114,6 +115,38 @@ def by_detour(
     return Diagram(tuple(box.branches), known.range_hz, known.observe, tuple(box.notes))
 
 
+def check_factors(damping: float, excitation: float) -> None:
+    """Raise unless a detour with these factors makes sense."""
+    for name, factor in (("damping", damping), ("excitation", excitation)):
+        if not (is_finite(factor) and 1.0 / MOST <= factor <= MOST):
+            raise SystemModelError(
+                f"{name} must be a factor from {1.0 / MOST:g} to {MOST:g}, got {shown(factor)}"
+            )
+    if damping == excitation == 1.0:
+        raise SystemModelError("damping and excitation are both 1: that is the system itself")
+
+
+def check_known(known: Diagram) -> None:
+    """Raise unless a diagram has branches, all of one system and followed over its range."""
+    low, high = check_range(known.range_hz)
+    check_branches("known: branches", known.branches)
+    check_types(notes=(known.notes, tuple))
+    if not known.branches:
+        raise SystemModelError("known: has no branches to begin with")
+    flow = known.branches[0].points[0].problem.flow
+    check_observe(flow.system, known.observe)
+    check_flow(known, flow)
+    for branch in known.branches:
+        if branch.course is None:
+            continue
+        a, b = branch.course.range_hz
+        if not a <= low < high <= b:
+            raise SystemModelError(
+                f"known: branch '{branch.name}' was followed from {a:g} to {b:g} Hz, not over the "
+                f"range of the diagram, {low:g} to {high:g} Hz"
+            )
+
+
 def _counted(number: int) -> str:
     return f"{number} branch" if number == 1 else f"{number} branches"
 
@@ -133,20 +166,12 @@ def _check(
         progress=(progress, Callable, None),
     )
     check_whole("max_period", max_period, 1)
-    for name, factor in (("damping", damping), ("excitation", excitation)):
-        if not (is_finite(factor) and 1.0 / MOST <= factor <= MOST):
-            raise SystemModelError(
-                f"{name} must be a factor from {1.0 / MOST:g} to {MOST:g}, got {shown(factor)}"
-            )
-    if damping == excitation == 1.0:
-        raise SystemModelError("damping and excitation are both 1: that is the system itself")
+    check_factors(damping, excitation)
     if not (is_finite(spacing) and FINEST_SPACING <= spacing < 1.0):
         raise SystemModelError(
             f"spacing must lie between {FINEST_SPACING:g} and 1, got {shown(spacing)}"
         )
-    if not known.branches:
-        raise SystemModelError("known: has no branches to begin with")
-    check_flow(known, known.branches[0].points[0].problem.flow)
+    check_known(known)
     if damping != 1.0 and not np.any(known.branches[0].points[0].system.damping):
         raise SystemModelError("known: is of a system without modal damping, which has no factor")
 
@@ -154,9 +179,9 @@ def _check(
 def _go_on(box: Collector, max_period: int) -> None:
     """Finish the branches that the file holds, and follow what they lead to."""
     count = len(box.branches)
-    for branch in box.checkpoint.branches():
-        if not box.known(middle_orbit(branch)):
-            box.add(branch.extend(checkpoint=box.checkpoint))
+    for branch in box.checkpoint.new_branches(lambda branch: box.known(middle_orbit(branch))):
+        progress = partial(box.progress, f"1/{branch.period}")
+        box.add(branch.extend(progress=progress, checkpoint=box.checkpoint))
     box.follow_up(count, max_period, max_period, None)
 
 

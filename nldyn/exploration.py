@@ -611,13 +611,13 @@ class _Survey:
         SystemModelError, OutputError
             As `explore`.
         """
-        from nldyn.store import check_writable, load_exploration, save_exploration
+        from nldyn.store import check_writable, laws_of, load_exploration, save_exploration
 
         place = check_writable(path)
         earlier: Sequence[Branch] = ()
         begun = place.exists()
         if begun:
-            laws = {i: s.law for i, s in enumerate(self.question.flow.system.stops) if s.law}
+            laws = laws_of(self.question.flow.system)
             kept = begun_before(partial(load_exploration, laws=laws), place)
             given = replace(
                 kept.diagram,

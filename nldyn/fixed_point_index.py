@@ -30,7 +30,7 @@ def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) 
     Parameters
     ----------
     branches : iterable of Branch
-        Of one system; those of a `Diagram`, for example.
+        Of one system, each of them once; those of a `Diagram`, for example.
     frequency_hz : float
         Excitation frequency in Hz, within the range that the branches were followed in.
     period : int
@@ -45,7 +45,7 @@ def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) 
     ------
     SystemModelError
         If the frequency or the period is none, the frequency lies outside the range that a branch
-        was followed in, there is no branch, or a mode is not damped.
+        was followed in, there is no branch, they are of several systems, or a mode is not damped.
 
     References
     ----------
@@ -64,6 +64,8 @@ def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) 
     >>> [orbit.stable for orbit in branch.at(12.15)], index_sum([branch], 12.15)
     ([True, False, True], 1)
     """
+    from nldyn.store import same_flow
+
     branches = list(branches) if isinstance(branches, Iterable) else branches
     check_branches("branches", branches)
     check_frequency("frequency_hz", frequency_hz)
@@ -77,6 +79,9 @@ def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) 
                 f"index_sum: branch '{branch.name}' was followed from {low:g} to {high:g} Hz, "
                 f"which does not tell of {frequency_hz:g} Hz"
             )
+    flow = branches[0].nodes[0].orbit.problem.flow
+    if not all(same_flow(branch.nodes[0].orbit.problem.flow, flow) for branch in branches):
+        raise SystemModelError("index_sum: the branches must be of one system and accuracy")
     counted = [branch for branch in branches if period % branch.period == 0]
     if not all(is_damped(branch.nodes[0].orbit.problem.flow.system) for branch in counted):
         raise SystemModelError(

@@ -39,7 +39,7 @@ def extend(
         options=options or course.options,
         at=check_requested(course.at if at is None else at, (low, high)),
     )
-    with checkpoint_at(checkpoint) as kept:
+    with checkpoint_at(checkpoint, branch.points[0].system) as kept:
         known = kept.branch_from(branch.points[course.start], new, course)
         if known is not None and known.course is not None and known.course.range_hz == (low, high):
             branch, course = known, known.course  # this very extension was begun before

@@ -124,6 +124,19 @@ def load_branches(path: str | Path, *, laws: Laws | None = None) -> list[Branch]
         return _read_branches(root, _read_flows(root, laws))
 
 
+def load_bare_branches(path: Path, laws: Laws) -> list[Branch]:
+    """Read the branches of a file that holds nothing else: writing them leaves nothing out."""
+    with _opened(path) as root:
+        if root.has_attribute("range_hz"):
+            raise SystemModelError(f"{path}: holds a diagram or exploration, not branches alone")
+        return _read_branches(root, _read_flows(root, laws))
+
+
+def laws_of(system: System) -> Laws:
+    """Contact laws of a system's own, by the numbers of their stops."""
+    return {i: stop.law for i, stop in enumerate(system.stops) if stop.law}
+
+
 def load_diagram(path: str | Path, *, laws: Laws | None = None) -> Diagram:
     """Read a diagram that `Diagram.save` wrote.
 

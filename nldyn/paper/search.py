@@ -15,8 +15,9 @@ import hashlib
 from pathlib import Path
 
 from nldyn.command import answering
-from nldyn.detour_search import by_detour
+from nldyn.detour_search import by_detour, check_factors
 from nldyn.diagrams import Diagram, Progress
+from nldyn.errors import SystemModelError
 from nldyn.exploration import Exploration, ExploreOptions, explore
 from nldyn.paper.jobs import JOBS, LONG, Job
 from nldyn.paper.starts import LONGEST, follow_starts, read_starts, starts_path, write_starts
@@ -76,10 +77,18 @@ def main() -> None:
         "--detour", type=float, nargs=2, metavar=("DAMPING", "EXCITATION"), help="factors of these"
     )
     given = parser.parse_args()
+    if given.detour is not None:
+        try:
+            check_factors(*given.detour)
+        except SystemModelError as error:
+            parser.error(str(error))
     unknown = set(given.models) - set(MODELS)
     if unknown:
         parser.error(f"unknown model {sorted(unknown)[0]!r} (there are: {', '.join(MODELS)})")
-    given.directory.mkdir(parents=True, exist_ok=True)
+    try:
+        given.directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        parser.error(f"{given.directory} cannot be made: {error.strerror}")
     for name in given.models or MODELS:
         if given.detour is None:
             said = search(name, given.directory).report()

@@ -18,9 +18,11 @@ from nldyn import (
     continue_branch,
     index_sum,
     load_branches,
+    load_diagram,
     solve_orbit,
 )
 from nldyn.detour import Detour
+from nldyn.store import save_branches
 
 RANGE_HZ = (7.2, 11.0)
 
@@ -122,6 +124,18 @@ def test_some_orbits_are_carried_back_however_wide_the_spacing(found):
     assert " 0 of 0 orbits" not in done.notes[-1]
 
 
+def test_what_a_file_of_known_branches_holds_stays_there(harmonic, found, tmp_path):
+    place = tmp_path / "known.h5"
+    save_branches(place, harmonic.branches)
+    by_detour(harmonic, max_period=1, spacing=0.1, checkpoint=place)
+    kept = load_branches(place)
+    assert [len(b.nodes) for b in kept] == [len(b.nodes) for b in found.branches]
+    found.save(place)
+    with pytest.raises(SystemModelError, match="holds a diagram or exploration"):
+        by_detour(harmonic, max_period=1, spacing=0.1, checkpoint=place)
+    assert len(load_diagram(place).branches) == 2
+
+
 def test_another_factor_loses_nothing_that_the_file_has(harmonic, found, tmp_path):
     place = tmp_path / "found.h5"
     by_detour(harmonic, max_period=1, spacing=0.1, checkpoint=place)
@@ -154,11 +168,26 @@ def test_a_branch_of_a_wider_range_and_one_without_its_course_may_be_known(harmo
         ({"spacing": 0.0}, "spacing must lie between 1e-06 and 1, got 0"),
         ({"max_period": 0}, "max_period must be"),
         ({"known": Diagram((), RANGE_HZ, "tip")}, "known: has no branches to begin with"),
+        ({"known": Diagram((1,), RANGE_HZ, "tip")}, "known: branches must be a list of branches"),
+        ({"known": Diagram((), (9.0, 8.0), "tip")}, "range_hz must be two positive frequencies"),
     ],
 )
 def test_bad_input_is_refused(harmonic, change, message):
     with pytest.raises(SystemModelError, match=message):
         by_detour(**{"known": harmonic, **change})
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"observe": "nose"}, "nose"),
+        ({"notes": None}, "notes must be"),
+        ({"range_hz": (7.0, 11.0)}, "was followed from 7.2 to 11 Hz, not over the range"),
+    ],
+)
+def test_a_diagram_that_makes_no_sense_is_refused(harmonic, change, message):
+    with pytest.raises(SystemModelError, match=message):
+        by_detour(replace(harmonic, **change))
 
 
 def test_branches_of_two_systems_are_refused(harmonic):

@@ -1,5 +1,6 @@
 """Indices of fixed points add up to one where no orbit is missing."""
 
+from dataclasses import replace
 from itertools import count
 
 import numpy as np
@@ -109,6 +110,14 @@ def test_the_index_is_the_sign_of_the_determinant(doubled):
                 determinant = np.linalg.det(np.eye(2) - map_by)
                 if abs(determinant) > 1e-6:
                     assert index(orbit, times) == np.sign(determinant)
+
+
+def test_branches_of_two_systems_are_refused(doubled):
+    system = doubled.branches[0].points[0].system
+    other = replace(system, excitation=(HarmonicForce("middle", 1.0),))
+    branches = [doubled.branches[0], continue_branch(solve_orbit(other, 50.0), (28.0, 60.0))]
+    with pytest.raises(SystemModelError, match="of one system and accuracy"):
+        index_sum(branches, 50.0)
 
 
 def test_a_mode_without_damping_is_refused():

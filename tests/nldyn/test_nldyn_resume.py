@@ -15,6 +15,7 @@ from one_dof import RANGE_HZ
 from nldyn import (
     Branch,
     ContinuationOptions,
+    HarmonicForce,
     Stop,
     System,
     SystemModelError,
@@ -351,3 +352,23 @@ def test_an_interrupted_diagram_goes_on(one_dof, picture, tmp_path, monkeypatch,
     again.save(tmp_path / "again.h5")
     picture.save(tmp_path / "once.h5")
     assert (tmp_path / "again.h5").read_bytes() == (tmp_path / "once.h5").read_bytes()
+
+
+def test_a_file_of_a_system_with_a_law_of_its_own_is_gone_on_with(tmp_path):
+    """A file cannot hold the law; the system that is asked about has it."""
+
+    def law(depth, speed):
+        return 3e5 * depth + 1e9 * depth**2, 3e5 + 2e9 * depth, 0.0 * speed
+
+    system = System.from_modal(
+        [20.0], {"m": [1.0]}, modal_damping=0.02,
+        stops=[Stop("m", 3e5, 1.0, gap=2e-3, law=law)], excitation=[HarmonicForce("m", 10.0)],
+    )  # fmt: skip
+    start, path = solve_orbit(system, 30.0), tmp_path / "law.h5"
+    with pytest.raises(KeyboardInterrupt):
+        continue_branch(
+            start, (15.0, 40.0), checkpoint=path, progress=stopper(20, KeyboardInterrupt)
+        )
+    resumed = continue_branch(start, (15.0, 40.0), checkpoint=path)
+    whole = continue_branch(start, (15.0, 40.0))
+    assert np.array_equal(resumed.frequency_hz, whole.frequency_hz)
