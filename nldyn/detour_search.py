@@ -71,7 +71,7 @@ def by_detour(
     Raises
     ------
     SystemModelError
-        For input that makes no sense, and for a system without modal damping.
+        For input that makes no sense, and for a factor of a modal damping that is none.
     OutputError
         If `checkpoint` cannot be written.
 
@@ -126,7 +126,7 @@ def check_factors(damping: float, excitation: float) -> None:
         raise SystemModelError("damping and excitation are both 1: that is the system itself")
 
 
-def check_known(known: Diagram) -> None:
+def _check_known(known: Diagram) -> None:
     """Raise unless a diagram has branches, all of one system and followed over its range."""
     low, high = check_range(known.range_hz)
     check_branches("known: branches", known.branches)
@@ -171,7 +171,7 @@ def _check(
         raise SystemModelError(
             f"spacing must lie between {FINEST_SPACING:g} and 1, got {shown(spacing)}"
         )
-    check_known(known)
+    _check_known(known)
     if damping != 1.0 and not np.any(known.branches[0].points[0].system.damping):
         raise SystemModelError("known: is of a system without modal damping, which has no factor")
 
@@ -204,7 +204,9 @@ def _spread(orbits: Sequence[Orbit], range_hz: tuple[float, float]) -> list[Orbi
     """A few of some orbits within a range, from the inside."""
     low, high = range_hz
     within = [orbit for orbit in orbits if low <= orbit.frequency_hz <= high]
-    places = np.linspace(0.0, len(within) - 1.0, PLACES + 2)[1:-1] if within else np.empty(0)
+    if not within:
+        return []
+    places = np.linspace(0.0, len(within) - 1.0, PLACES + 2)[1:-1]
     return [within[i] for i in sorted({round(place) for place in places.tolist()})]
 
 

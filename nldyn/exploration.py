@@ -436,8 +436,7 @@ class Exploration:
     def _indices(self) -> list[str]:
         """Whether orbits are missing for certain, where unstable ones were looked for as well."""
         longest = min(self.question.effort.unstable_period, self.question.max_period)
-        told = longest and self.finished and self.coverage
-        if not (told and is_damped(self.question.flow.system)):
+        if not (longest and self.finished and is_damped(self.question.flow.system)):
             return []
         return [index_note(self.diagram.branches, self.diagram.range_hz, longest)]
 

@@ -83,7 +83,7 @@ def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) 
     if not all(same_flow(branch.nodes[0].orbit.problem.flow, flow) for branch in branches):
         raise SystemModelError("index_sum: the branches must be of one system and accuracy")
     counted = [branch for branch in branches if period % branch.period == 0]
-    if not all(is_damped(branch.nodes[0].orbit.problem.flow.system) for branch in counted):
+    if counted and not is_damped(flow.system):
         raise SystemModelError(
             "index_sum: the indices add up to one only where every mode is damped, but one is not"
         )

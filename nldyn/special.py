@@ -305,10 +305,10 @@ def special_points_between(
         If an orbit is not found where it should be.
     """
     _check_dips(before, a, b, after)
-    marks = [before, a, *beside_grazing(before, a, b, after), b, after]
+    coarse = [a, *beside_grazing(before, a, b, after), b]
+    around = [before, *coarse, after]
     points = [a]
-    for z, first, last, c in zip(marks, marks[1:], marks[2:], marks[3:], strict=False):
-        assert first is not None and last is not None
+    for (first, last), z, c in zip(pairwise(coarse), around, around[3:], strict=False):
         points += [*_inside(z, first, last, c), last]
     for i in range(len(points) - 2, 0, -1):
         insert_dip(points, i)
