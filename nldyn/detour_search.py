@@ -14,9 +14,10 @@ from nldyn.branch import Branch, check_branches
 from nldyn.checkpoint import checkpoint_of_several
 from nldyn.continuation import ContinuationOptions, check_range
 from nldyn.detour import Detour
-from nldyn.diagrams import Collector, Diagram, Progress, check_flow, middle_orbit
+from nldyn.diagrams import Collector, Diagram, Progress, check_flow, counted, middle_orbit
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.exploration import FINEST_SPACING
+from nldyn.fixed_point_index import index_note, is_damped
 from nldyn.orbit import Orbit, check_observe, same_orbit
 
 PLACES = 3  # orbits of each branch that are carried there, in case some get lost
@@ -66,7 +67,8 @@ def by_detour(
     Returns
     -------
     Diagram
-        The branches known, then those found; the last note tells what was tried.
+        The branches known, then those found; the last note tells what was tried, the one before,
+        if every mode is damped, whether the indices add up to one, see `index_sum`.
 
     Raises
     ------
@@ -107,10 +109,12 @@ def by_detour(
             back = [orbit for orbit in carriages if orbit is not None]
             tried, came = tried + len(orbits), came + len(back)
             _follow_new(box, back, max_period)
-    new = len(box.branches) - len(known.branches)
+    if is_damped(own.system):
+        box.notes.append(index_note(box.branches, known.range_hz, max_period))
+    new = box.branches[len(known.branches) :]
     box.notes.append(
         f"at {damping:g} of the damping and {excitation:g} of the excitation: "
-        f"{_counted(len(there))}, {came} of {tried} orbits carried back, {_counted(new)} found so"
+        f"{counted(there)}, {came} of {tried} orbits carried back, {counted(new)} found so"
     )
     return Diagram(tuple(box.branches), known.range_hz, known.observe, tuple(box.notes))
 
@@ -145,10 +149,6 @@ def _check_known(known: Diagram) -> None:
                 f"known: branch '{branch.name}' was followed from {a:g} to {b:g} Hz, not over the "
                 f"range of the diagram, {low:g} to {high:g} Hz"
             )
-
-
-def _counted(number: int) -> str:
-    return f"{number} branch" if number == 1 else f"{number} branches"
 
 
 def _check(

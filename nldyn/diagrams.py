@@ -293,6 +293,11 @@ class Collector:
             self.add(branch)
 
 
+def counted(branches: Sequence[Branch]) -> str:
+    """How many branches, in words."""
+    return "1 branch" if len(branches) == 1 else f"{len(branches)} branches"
+
+
 def middle_orbit(branch: Branch) -> Orbit:
     """Orbit of a branch away from where it ends and from where it turns or crosses another one.
 

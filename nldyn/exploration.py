@@ -17,7 +17,7 @@ from cms.threads import one_thread
 from nldyn.branch import Branch, is_at
 from nldyn.checkpoint import Checkpoint, begun_before
 from nldyn.continuation import MOST_POINTS, ContinuationOptions, check_range, shifts
-from nldyn.diagrams import Collector, Diagram, Progress, check_flow
+from nldyn.diagrams import Collector, Diagram, Progress, check_flow, counted
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.fixed_point_index import index_note, is_damped, sum_of_indices
 from nldyn.flow import FlowMap, flow_of
@@ -355,7 +355,7 @@ class Exploration:
         )
         low, high = self.diagram.range_hz
         found = ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "none"
-        first = f"{low:g} to {high:g} Hz: {len(self.diagram.branches)} branches ({found})"
+        first = f"{low:g} to {high:g} Hz: {counted(self.diagram.branches)} ({found})"
         return "\n".join([first, *self.coverage_lines(), *self.diagram.notes])
 
     def coverage_lines(self) -> list[str]:
@@ -384,7 +384,9 @@ class Exploration:
                 "done"
             )
         lines += self._rounds()
-        open_ranges = ", ".join(f"{a:.4g}-{b:.4g}" for a, b in self.unsettled_ranges())
+        open_ranges = ", ".join(
+            f"{a:.4g}-{b:.4g}" if a < b else f"{a:.4g}" for a, b in self.unsettled_ranges()
+        )
         if open_ranges:
             lines.append(
                 f"motions that did not settle (chaos, longer periods or slow decay): "

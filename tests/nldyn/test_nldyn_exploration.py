@@ -144,6 +144,7 @@ def test_linear_system_has_one_branch_on_which_everything_settles():
     assert [branch.period for branch in found.diagram.branches] == [1]
     assert found.settled_share == 1.0
     assert found.unsettled_ranges() == []
+    assert found.report().startswith("5 to 20 Hz: 1 branch (1 harmonic)\n")
 
 
 def test_deflation_leaves_a_known_orbit_for_another_one():
