@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     )
     from nldyn.errors import SceneError, SystemModelError
     from nldyn.executors import Outcome, TaskError, run_all
-    from nldyn.exploration import Coverage, Exploration, ExploreOptions, explore
+    from nldyn.exploration import Coverage, Exploration, ExploreOptions
     from nldyn.fixed_point_index import index_sum
     from nldyn.flow import FlowMap, FlowOptions
     from nldyn.fourier import Spectrum, spectrum
@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     from nldyn.special import LocateError
     from nldyn.store import load_branch, load_branches, load_diagram, load_exploration
     from nldyn.studies import study
+    from nldyn.survey import explore
     from nldyn.system import System
     from nldyn.wear import (
         ContactMeasures,
@@ -91,7 +92,7 @@ _HOMES = {
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
     "errors": "SceneError SystemModelError",
     "executors": "Outcome TaskError run_all",
-    "exploration": "Coverage Exploration ExploreOptions explore",
+    "exploration": "Coverage Exploration ExploreOptions",
     "fixed_point_index": "index_sum",
     "flow": "FlowMap FlowOptions",
     "fourier": "Spectrum spectrum",
@@ -116,6 +117,7 @@ _HOMES = {
     "special": "LocateError",
     "store": "load_branch load_branches load_diagram load_exploration",
     "studies": "study",
+    "survey": "explore",
     "system": "System",
     "wear": "ContactMeasures SpectraMap contact_measures measures_table spectra_map spectra_table",
 }

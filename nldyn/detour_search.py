@@ -17,7 +17,7 @@ from nldyn.detour import Detour
 from nldyn.diagrams import Collector, Diagram, Progress, check_flow, counted, middle_orbit
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.exploration import FINEST_SPACING
-from nldyn.fixed_point_index import index_note, is_damped
+from nldyn.fixed_point_index import index_note, is_damped, without_index_note
 from nldyn.orbit import Orbit, check_observe, same_orbit
 
 PLACES = 3  # orbits of each branch that are carried there, in case some get lost
@@ -68,7 +68,8 @@ def by_detour(
     -------
     Diagram
         The branches known, then those found; the last note tells what was tried, the one before,
-        if every mode is damped, whether the indices add up to one, see `index_sum`.
+        if every mode is damped, whether the indices add up to one, see `index_sum`. What
+        `known` notes of them is left out.
 
     Raises
     ------
@@ -95,7 +96,7 @@ def by_detour(
     low, high = known.range_hz
     options, progress = options or ContinuationOptions(), progress or (lambda what, hz: None)
     box = Collector(own, (low, high), known.observe, options, progress)
-    box.take(known.branches, known.notes)
+    box.take(known.branches, without_index_note(known.notes))
     box.checkpoint = checkpoint_of_several(checkpoint, box.branches, own, (low, high))
     with box.checkpoint:
         _go_on(box, max_period)

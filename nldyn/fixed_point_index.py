@@ -13,6 +13,7 @@ from nldyn.orbit import Orbit
 from nldyn.system import System
 
 FREQUENCIES = 60  # at which the indices are added up
+NOTE = "indices of the fixed points of "  # how the note on them begins
 
 
 def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) -> int:
@@ -98,7 +99,7 @@ def index_note(branches: Sequence[Branch], range_hz: tuple[float, float], longes
     low, high = range_hz
     inside = np.geomspace(low, high, FREQUENCIES + 2)[1:-1].tolist()
     powers = "P" if longest == 1 else f"P to P^{longest}"
-    told = f"indices of the fixed points of {powers} at {len(inside)} frequencies add up to one"
+    told = f"{NOTE}{powers} at {len(inside)} frequencies add up to one"
     counted = [branch for branch in branches if branch.period <= longest]
     orbits = [[orbit for branch in counted for orbit in branch.at(hz)] for hz in inside]
     wrong = []
@@ -111,6 +112,11 @@ def index_note(branches: Sequence[Branch], range_hz: tuple[float, float], longes
     if not wrong:
         return told
     return f"{told} but for {', '.join(wrong)}: orbits are missing, or a branch was broken off"
+
+
+def without_index_note(notes: Iterable[str]) -> list[str]:
+    """Notes but those of `index_note`, which hold no longer once branches are added."""
+    return [note for note in notes if not note.startswith(NOTE)]
 
 
 def sum_of_indices(orbits: Iterable[Orbit], period: int) -> int:

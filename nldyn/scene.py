@@ -493,7 +493,8 @@ def explore_scene(
     """
     flow, table = _to_follow(scene)
     from nldyn.continuation import ContinuationOptions
-    from nldyn.exploration import ExploreOptions, explore
+    from nldyn.exploration import ExploreOptions
+    from nldyn.survey import explore
 
     if scene.explore is None:
         raise scene_error(scene.file, ("explore",), "is missing")

@@ -18,11 +18,12 @@ from nldyn.command import answering
 from nldyn.detour_search import by_detour, check_factors
 from nldyn.diagrams import Diagram, Progress
 from nldyn.errors import SystemModelError
-from nldyn.exploration import Exploration, ExploreOptions, explore
+from nldyn.exploration import Exploration, ExploreOptions
 from nldyn.paper.jobs import JOBS, LONG, Job
 from nldyn.paper.starts import LONGEST, follow_starts, read_starts, starts_path, write_starts
 from nldyn.progress import progress_line
 from nldyn.store import load_diagram
+from nldyn.survey import explore
 
 EFFORT = ExploreOptions(spacing=0.01, starts=1, settling=200, rounds=24, passing=24)
 MODELS = tuple(job.name for job in JOBS if job.doubled)

@@ -25,7 +25,6 @@ from nldyn import (
     continue_branch,
     crossings,
     diagram,
-    exploration,
     explore,
     find_orbits,
     index_sum,
@@ -33,10 +32,12 @@ from nldyn import (
     load_diagram,
     load_exploration,
     solve_orbit,
+    survey,
     switch_at_flip,
 )
+from nldyn.deflation import deflated_orbit
 from nldyn.diagrams import Collector, middle_orbit
-from nldyn.exploration import chao_lower_bound, deflated_orbit, settling_periods
+from nldyn.exploration import chao_lower_bound, settling_periods
 from nldyn.orbit import stroboscopic
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
@@ -99,8 +100,8 @@ def test_a_frequency_is_searched_until_the_indices_of_its_orbits_add_up(monkeypa
     """Branches that pass a short range may be missed; their indices are missed, too."""
     system, effort = system_of("two_dof_xi_0.01"), ExploreOptions(spacing=0.01, starts=6)
     sums, reports = [], []
-    for again in (0, exploration.AGAIN):
-        monkeypatch.setattr(exploration, "AGAIN", again)
+    for again in (0, survey.AGAIN):
+        monkeypatch.setattr(survey, "AGAIN", again)
         found = explore(system, (36.0, 37.0), 3, effort=effort)
         branches = found.diagram.branches
         sums.append([index_sum(branches, hz, n) for hz in (36.2, 36.8) for n in (1, 2, 3)])
@@ -113,7 +114,7 @@ def test_a_frequency_is_searched_until_the_indices_of_its_orbits_add_up(monkeypa
 
 def test_short_motions_pass_unstable_orbits_of_further_branches(monkeypatch):
     """Two modes from 29 to 29.3 Hz, where one motion of 30 periods comes to few of them."""
-    monkeypatch.setattr(exploration, "AGAIN", 0)
+    monkeypatch.setattr(survey, "AGAIN", 0)
     system, few = system_of("two_dof_xi_0.01"), ExploreOptions(spacing=0.1, starts=1, settling=30)
     without, found = (
         explore(system, (29.0, 29.3), 2, effort=replace(few, passing=n)) for n in (0, 24)
@@ -150,11 +151,10 @@ def test_linear_system_has_one_branch_on_which_everything_settles():
 def test_deflation_leaves_a_known_orbit_for_another_one():
     """Two modes at 23 Hz have several harmonic orbits; with one known, Newton finds others."""
     flow = FlowMap(system_of("two_dof_xi_0.01"))
-    box = Collector(flow, (22.0, 24.0), "middle", None, lambda what, hz: None)
     first = solve_orbit(flow, 23.0)
     state = stroboscopic(first)[0]
     starts = random_states(flow, first.omega, 8, seed=1)
-    found = [deflated_orbit(box, start, 1, first.omega, [first]) for start in starts]
+    found = [deflated_orbit(flow, start, 1, first.omega, [first], "middle") for start in starts]
     others = [orbit for orbit in found if orbit is not None]
     assert others
     for other in others:
@@ -167,9 +167,8 @@ def test_deflation_finds_nothing_where_there_is_one_orbit():
         [10.0], {"tip": [1.0]}, modal_damping=0.05, excitation=[Unbalance("tip", 1e-5)]
     )
     orbit = solve_orbit(system, 12.0)
-    box = Collector(orbit.problem.flow, (5.0, 20.0), "tip", None, lambda what, hz: None)
     start = 1.5 * stroboscopic(orbit)[0]
-    assert deflated_orbit(box, start, 1, orbit.omega, [orbit]) is None
+    assert deflated_orbit(orbit.problem.flow, start, 1, orbit.omega, [orbit], "tip") is None
 
 
 def test_settling_time_follows_the_slowest_decay():
@@ -372,7 +371,7 @@ def test_known_branches_are_taken_over_and_others_found(whole, harmonic):
 
 def test_what_known_branches_lead_to_is_followed(monkeypatch):
     """The harmonic branch of the 1-DOF model flips at 10.434 Hz; no motion is simulated."""
-    monkeypatch.setattr(exploration._Survey, "_motion", lambda *_: (None, None))
+    monkeypatch.setattr(survey._Survey, "_motion", lambda *_: (None, None))
     system, effort = system_of("one_dof"), ExploreOptions(spacing=0.1, unstable_period=0)
     known = diagram(system, (10.3, 10.6), (1,))
     found = explore(system, (10.3, 10.6), 2, effort=effort, known=known).diagram

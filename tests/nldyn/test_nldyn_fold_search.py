@@ -22,19 +22,19 @@ from nldyn import (
     SystemModelError,
     Unbalance,
     continue_branch,
-    exploration,
     explore,
     find_orbits,
     load_exploration,
     solve_orbit,
+    survey,
 )
 from nldyn.branch import is_at
-from nldyn.exploration import _Survey
 from nldyn.flow import flow_of
 from nldyn.fold_search import connected_folds, leading_parameter
 from nldyn.paper.jobs import scene_system
 from nldyn.paper.starts import read_starts
 from nldyn.search import orbit_near
+from nldyn.survey import _Survey
 
 
 def two_modes() -> System:
@@ -131,7 +131,7 @@ def looked_at(monkeypatch) -> list[float]:
         frequencies.append(fold.frequency_hz)
         return [orbit], ["2 points"]
 
-    monkeypatch.setattr(exploration, "connected_folds", lead)
+    monkeypatch.setattr(survey, "connected_folds", lead)
     return frequencies
 
 
@@ -197,7 +197,7 @@ def test_folds_that_cannot_be_followed_are_noted(harmonic, monkeypatch):
     def fail(*given):
         raise ConvergenceError("no start")
 
-    monkeypatch.setattr(exploration, "connected_folds", fail)
+    monkeypatch.setattr(survey, "connected_folds", fail)
     found = explored(harmonic)
     notes = [note for note in found.diagram.notes if "was not followed in modal_damping" in note]
     folds = [s for b in found.diagram.branches for s in b.special_points if s.kind == "LP"]

@@ -12,7 +12,7 @@ from fakes import diagram
 import nldyn.paper
 import nldyn.progress
 import nldyn.scene
-from nldyn import continuation, exploration, load_branches, load_diagram, load_exploration
+from nldyn import continuation, load_branches, load_diagram, load_exploration, survey
 from nldyn.cli import main
 from nldyn.paper.kept import kept, kept_folder
 from nldyn.resources import example, mesh
@@ -173,7 +173,7 @@ def test_a_scene_is_explored(tmp_path):
 def test_an_exploration_goes_on_after_ctrl_c(tmp_path, monkeypatch):
     scene, out = explored_scene(tmp_path), tmp_path / "out"
     assert invoke("run", scene, "--out", tmp_path / "whole", "--quiet").exit_code == 0
-    step = exploration._Survey.step
+    step = survey._Survey.step
     steps = []
 
     def counted(*arguments):
@@ -182,7 +182,7 @@ def test_an_exploration_goes_on_after_ctrl_c(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         step(*arguments)
 
-    monkeypatch.setattr(exploration._Survey, "step", counted)
+    monkeypatch.setattr(survey._Survey, "step", counted)
     stopped = invoke("run", scene, "--out", out, "--quiet")
     assert stopped.exit_code == 130 and "goes on from there" in stopped.stderr
     assert load_exploration(tmp_path / "out.unfinished.h5").stage.steps == 4
