@@ -134,7 +134,7 @@ class Checkpoint(Keeper["Branch"]):
         for course in courses:
             for number, branch in enumerate(self._earlier):
                 if _is_begun_at(branch, orbit, course):
-                    return self._earlier.pop(number)
+                    return self._taken(number)
         if self._strict and self._earlier:
             raise SystemModelError(
                 f"{self._strict}: holds another continuation (other system, start, range or "
@@ -145,11 +145,18 @@ class Checkpoint(Keeper["Branch"]):
     def new_branches(self, is_known: Callable[[Branch], bool]) -> Iterator[Branch]:
         """Take from the file one branch after the other, but for those known, which stay there."""
         while self._earlier:
-            branch = self._earlier.pop(0)
-            if is_known(branch):
-                self._held.append(branch)
+            if is_known(self._earlier[0]):
+                self._held.append(self._earlier[0])
+                del self._earlier[0]
             else:
-                yield branch
+                yield self._taken(0)
+
+    def _taken(self, number: int) -> Branch:
+        """A branch of the file, which counts as the one at work from now on."""
+        branch = self._earlier[number]
+        self.work = lambda: branch
+        del self._earlier[number]
+        return branch
 
 
 def checkpoint_at(

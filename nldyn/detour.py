@@ -11,7 +11,7 @@ from nldyn.elements import Excitation
 from nldyn.errors import SystemModelError
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
-from nldyn.orbit import ConvergenceError, Orbit, minimal_period, solve_orbit
+from nldyn.orbit import ConvergenceError, Orbit, solve_orbit
 from nldyn.parameters import SOURCES
 
 FIRST_STEP, SHORTEST_STEP = 0.25, 1e-3  # in the logarithms of the factors
@@ -92,7 +92,7 @@ class Detour:
         except (ConvergenceError, SystemModelError):
             return None
         far = float(np.linalg.norm(states - guess)) > MISS * float(np.linalg.norm(states))
-        return None if far or minimal_period(found) != orbit.period else found
+        return None if far else found
 
 
 def _scaled(source: Excitation, factor: float) -> Excitation:

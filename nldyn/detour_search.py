@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -12,13 +11,13 @@ import numpy as np
 from cms.threads import one_thread
 from nldyn.branch import Branch, check_branches
 from nldyn.checkpoint import checkpoint_of_several
-from nldyn.continuation import ContinuationOptions, check_range
+from nldyn.continuation import ContinuationOptions
 from nldyn.detour import Detour
-from nldyn.diagrams import Collector, Diagram, Progress, check_flow, counted, middle_orbit
+from nldyn.diagrams import Collector, Diagram, Progress, check_known, counted, middle_orbit
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
-from nldyn.exploration import FINEST_SPACING
+from nldyn.exploration import FINEST_SPACING, steps_between
 from nldyn.fixed_point_index import index_note, is_damped, without_index_note
-from nldyn.orbit import Orbit, check_observe, same_orbit
+from nldyn.orbit import Orbit, same_orbit
 
 PLACES = 3  # orbits of each branch that are carried there, in case some get lost
 MOST = 1e3  # factor of damping or excitation
@@ -74,7 +73,7 @@ def by_detour(
     Raises
     ------
     SystemModelError
-        For input that makes no sense, and for a factor of a modal damping that is none.
+        For input that makes no sense, and for a factor of a damping or an excitation that is none.
     OutputError
         If `checkpoint` cannot be written.
 
@@ -101,7 +100,7 @@ def by_detour(
     with box.checkpoint:
         _go_on(box, max_period)
         there = _followed(box, detour, max_period)
-        count = math.ceil(math.log(high / low) / math.log1p(spacing))
+        count = steps_between(low, high, spacing)
         tried = came = 0
         for frequency in np.geomspace(low, high, count + 2)[1:-1].tolist():
             progress("back", frequency)
@@ -117,7 +116,7 @@ def by_detour(
         f"at {damping:g} of the damping and {excitation:g} of the excitation: "
         f"{counted(there)}, {came} of {tried} orbits carried back, {counted(new)} found so"
     )
-    return Diagram(tuple(box.branches), known.range_hz, known.observe, tuple(box.notes))
+    return Diagram(tuple(box.branches), (low, high), known.observe, tuple(box.notes))
 
 
 def check_factors(damping: float, excitation: float) -> None:
@@ -133,14 +132,11 @@ def check_factors(damping: float, excitation: float) -> None:
 
 def _check_known(known: Diagram) -> None:
     """Raise unless a diagram has branches, all of one system and followed over its range."""
-    low, high = check_range(known.range_hz)
     check_branches("known: branches", known.branches)
-    check_types(notes=(known.notes, tuple))
     if not known.branches:
         raise SystemModelError("known: has no branches to begin with")
-    flow = known.branches[0].points[0].problem.flow
-    check_observe(flow.system, known.observe)
-    check_flow(known, flow)
+    check_known(known, known.branches[0].points[0].problem.flow)
+    low, high = known.range_hz
     for branch in known.branches:
         if branch.course is None:
             continue
@@ -173,8 +169,11 @@ def _check(
             f"spacing must lie between {FINEST_SPACING:g} and 1, got {shown(spacing)}"
         )
     _check_known(known)
-    if damping != 1.0 and not np.any(known.branches[0].points[0].system.damping):
+    system = known.branches[0].points[0].system
+    if damping != 1.0 and not np.any(system.damping):
         raise SystemModelError("known: is of a system without modal damping, which has no factor")
+    if excitation != 1.0 and not system.excitation:
+        raise SystemModelError("known: is of a system without excitation, which has no factor")
 
 
 def _go_on(box: Collector, max_period: int) -> None:
@@ -182,7 +181,7 @@ def _go_on(box: Collector, max_period: int) -> None:
     count = len(box.branches)
     for branch in box.checkpoint.new_branches(lambda branch: box.known(middle_orbit(branch))):
         progress = partial(box.progress, f"1/{branch.period}")
-        box.add(branch.extend(progress=progress, checkpoint=box.checkpoint))
+        box.take_in(branch.extend(progress=progress, checkpoint=box.checkpoint))
     box.follow_up(count, max_period, max_period, None)
 
 

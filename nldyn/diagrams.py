@@ -18,6 +18,7 @@ from nldyn.branch import (
     BranchPoint,
     Course,
     SpecialPoint,
+    check_branches,
     is_at,
 )
 from nldyn.checkpoint import Checkpoint, checkpoint_of_several
@@ -102,10 +103,14 @@ class Diagram:
         save_diagram(path, self)
 
 
-def check_flow(known: Diagram, flow: FlowMap) -> None:
-    """Raise unless all branches that are known are of this flow map."""
+def check_known(known: Diagram, flow: FlowMap) -> None:
+    """Raise unless a diagram is sound, and all of its branches are of this flow map."""
     from nldyn.store import same_flow
 
+    check_range(known.range_hz)
+    check_branches("known: branches", known.branches)
+    check_types(**{"known: notes": (known.notes, tuple)})
+    check_observe(flow.system, known.observe)
     for branch in known.branches:
         if not same_flow(branch.points[0].problem.flow, flow):
             raise SystemModelError(f"known: branch {branch.name} is of another system or accuracy")
@@ -133,16 +138,13 @@ class Collector:
     def of_period(self, period: int) -> list[Branch]:
         return [branch for branch in self.branches if branch.period == period]
 
-    def add(self, branch: Branch) -> None:
+    def _add(self, branch: Branch) -> None:
         count = len(self.branches) + 1
         label = "harmonic" if branch.period == 1 else f"1/{branch.period}"
         named = replace(branch, name=f"{count:02d} {label}")
-        self.checkpoint.work = None
         self._keep(named)
         self.notes += [f"branch {named.name}: {note}" for note in named.notes]
-        for end, reason in broken_off(named):
-            hz = end.orbit.frequency_hz
-            self.notes.append(f"branch {named.name} was broken off at {hz:.6g} Hz: {reason}")
+        self.notes += notes_on_ends(named)
 
     def _keep(self, branch: Branch) -> None:
         self.branches.append(branch)
@@ -289,8 +291,21 @@ class Collector:
             branch = branch.extend(progress=progress, checkpoint=self.checkpoint)
         else:
             branch = complete("", None, None, start, course, progress, self.checkpoint)
+        self.take_in(branch)
+
+    def take_in(self, branch: Branch) -> None:
+        """Add the branch that was at work, unless it is a known one."""
         if not self._repeats(branch):
-            self.add(branch)
+            self._add(branch)
+        self.checkpoint.work = None
+
+
+def notes_on_ends(branch: Branch) -> list[str]:
+    """Where a branch was broken off, and why."""
+    return [
+        f"branch {branch.name} was broken off at {end.orbit.frequency_hz:.6g} Hz: {reason}"
+        for end, reason in broken_off(branch)
+    ]
 
 
 def counted(branches: Sequence[Branch]) -> str:

@@ -40,11 +40,12 @@ class ExploreOptions:
         Largest relative distance of the frequencies at which motions are simulated. A branch that
         is stable only in a narrower window may be missed.
     starts : int
-        Random initial states at each of them, beside the motions of the frequency before.
+        Initial states at each of them, rest and random ones, beside the motions of the frequency
+        before.
     rounds : int
-        Most searches through the range. Each begins from random states of its own at frequencies
-        between those of the ones before; one that finds no new branch up to the longest period
-        looked for is the last.
+        Most searches through the range. Each begins from rest and random states of its own at
+        frequencies between those of the ones before; one that finds no new branch up to the
+        longest period looked for is the last.
     settling : int
         Most excitation periods after which a motion may have settled. The limit itself follows the
         damping; where this one cuts it, the report says so.
@@ -171,7 +172,7 @@ class Question:
         lie are van der Corput's sequence 1/2, 1/4, 3/4, 1/8, ...: each fills the largest gaps.
         """
         low, high = self.range_hz
-        steps = math.ceil(math.log(high / low) / self.effort.spacing)
+        steps = steps_between(low, high, self.effort.spacing)
         found: list[float] = np.geomspace(low, high, steps + 1).tolist()
         if turn == 0:
             return found
@@ -285,9 +286,13 @@ class Exploration:
 
     @property
     def meetings(self) -> tuple[int, ...]:
-        """In how many rounds motions came to each branch of the periods looked for."""
-        counts = np.asarray(self.stage.met).sum(axis=0).tolist()
-        branches = self.diagram.branches[: self.stage.branches]
+        """In how many of the rounds done motions came to each branch they know of.
+
+        Of the branches of the periods looked for.
+        """
+        rounds, known = len(self.stage.ends), (0, *self.stage.ends)[-1]
+        counts = np.asarray(self.stage.met)[:rounds, :known].sum(axis=0).tolist()
+        branches = self.diagram.branches[:known]
         longest = self.question.max_period
         return tuple(n for n, b in zip(counts, branches, strict=True) if b.period <= longest)
 
@@ -377,8 +382,9 @@ class Exploration:
         longest = self.question.max_period
         return [
             f"branches up to period {longest} that the rounds added: {found}",
-            f"of them motions came to {len(self.meetings) - never}, {once} in one round only and "
-            f"{twice} in two: at least about {self.unmet_branches:.0f} more are to be expected "
+            f"in {len(self.stage.ends)} rounds motions came to {len(self.meetings) - never} of "
+            f"{len(self.meetings)} branches, to {once} in one round only and to {twice} in two: "
+            f"at least about {self.unmet_branches:.0f} more are to be expected "
             f"that motions would come to (Chao 1987); {never} were reached otherwise"
             + (f" or known before, as {self.stage.given} were" if self.stage.given else ""),
         ]
@@ -452,6 +458,11 @@ def chao_lower_bound(counts: Sequence[int], rounds: int) -> float:
         return math.nan
     once, twice = counts.count(1), counts.count(2)
     return (rounds - 1) / rounds * once * max(once - 1, 0) / (2.0 * (twice + 1))
+
+
+def steps_between(low: float, high: float, spacing: float) -> int:
+    """Number of equal ratios, at most 1 + spacing, from a low frequency to a high one."""
+    return math.ceil(math.log(high / low) / math.log1p(spacing))
 
 
 def settling_periods(system: System, frequency_hz: float) -> int:

@@ -98,7 +98,7 @@ def index_note(branches: Sequence[Branch], range_hz: tuple[float, float], longes
     """
     low, high = range_hz
     inside = np.geomspace(low, high, FREQUENCIES + 2)[1:-1].tolist()
-    powers = "P" if longest == 1 else f"P to P^{longest}"
+    powers = "P" if longest == 1 else f"P to {_power(longest)}"
     told = f"{NOTE}{powers} at {len(inside)} frequencies add up to one"
     counted = [branch for branch in branches if branch.period <= longest]
     orbits = [[orbit for branch in counted for orbit in branch.at(hz)] for hz in inside]
@@ -106,12 +106,16 @@ def index_note(branches: Sequence[Branch], range_hz: tuple[float, float], longes
     for n in range(1, longest + 1):
         at = [hz for hz, here in zip(inside, orbits, strict=True) if sum_of_indices(here, n) != 1]
         if len(at) > 1:
-            wrong.append(f"P^{n} at {len(at)} of them from {at[0]:.5g} to {at[-1]:.5g} Hz")
+            wrong.append(f"{_power(n)} at {len(at)} of them from {at[0]:.5g} to {at[-1]:.5g} Hz")
         elif at:
-            wrong.append(f"P^{n} at {at[0]:.5g} Hz")
+            wrong.append(f"{_power(n)} at {at[0]:.5g} Hz")
     if not wrong:
         return told
     return f"{told} but for {', '.join(wrong)}: orbits are missing, or a branch was broken off"
+
+
+def _power(n: int) -> str:
+    return "P" if n == 1 else f"P^{n}"
 
 
 def without_index_note(notes: Iterable[str]) -> list[str]:

@@ -17,7 +17,7 @@ from nldyn.branch import Branch, is_at
 from nldyn.checkpoint import Checkpoint, begun_before
 from nldyn.continuation import ContinuationOptions, check_range
 from nldyn.deflation import deflated_orbit
-from nldyn.diagrams import Collector, Diagram, Progress, check_flow
+from nldyn.diagrams import Collector, Diagram, Progress, check_known
 from nldyn.errors import SystemModelError, check_types, check_whole, shown
 from nldyn.exploration import (
     Coverage,
@@ -167,7 +167,8 @@ def explore(
 
 def _check_known(known: Diagram, question: Question) -> None:
     """Raise unless branches that are known belong to the question."""
-    if known.range_hz != question.range_hz:
+    check_known(known, question.flow)
+    if tuple(known.range_hz) != question.range_hz:
         (a, b), (low, high) = known.range_hz, question.range_hz
         raise SystemModelError(
             f"known: is of {a:g} to {b:g} Hz, but {low:g} to {high:g} Hz are to be explored"
@@ -176,7 +177,6 @@ def _check_known(known: Diagram, question: Question) -> None:
         raise SystemModelError(
             f"known: observes {shown(known.observe)}, not {shown(question.observe)}"
         )
-    check_flow(known, question.flow)
 
 
 def _same_branches(a: Diagram, b: Diagram) -> bool:
@@ -261,21 +261,19 @@ class _Survey:
             box.follow_up(0, *self._depth)
         starts = stage.carried
         if up:
-            seed = (self.effort.seed, turn, place)
+            seed: tuple[int, ...] = (self.effort.seed, turn, place)
             starts = np.vstack([starts, random_states(flow, omega, self.effort.starts, seed)])
         known = _Known(box, frequency)
         here, carried = self._search(starts, known, also_unstable=up)
         if up and self.effort.passing:
-            count = self.effort.passing + 1  # the first is rest
             number = AGAIN + 1  # of the seed, after those of the searches again
-            states = random_states(flow, omega, count, (self.effort.seed, turn, place, number))
-            self._pass_by(states[1:], known)
+            seed = (self.effort.seed, turn, place, number)
+            self._pass_by(_at_random(flow, omega, self.effort.passing, seed), known)
         for again in range(AGAIN if up else 0):
             if not known.incomplete(min(self.effort.unstable_period, self.max_period)):
                 break
-            starts = random_states(
-                flow, omega, self.effort.starts, (self.effort.seed, turn, place, again + 1)
-            )
+            seed = (self.effort.seed, turn, place, again + 1)
+            starts = _at_random(flow, omega, self.effort.starts, seed)
             here = here.with_more(self._search(starts, known, also_unstable=True)[0])
         both = {c.frequency_hz: c for c in stage.coverage}
         both[frequency] = both[frequency].with_more(here) if frequency in both else here
@@ -536,6 +534,11 @@ class _Known:
             if float(off.max()) < size:
                 return orbit
         return None
+
+
+def _at_random(flow: FlowMap, omega: float, count: int, seed: tuple[int, ...]) -> Real:
+    """Random states (count, 2n), without the rest that `random_states` begins with."""
+    return random_states(flow, omega, count + 1, seed)[1:]
 
 
 def _nearest(places: Real, state: Real) -> float:

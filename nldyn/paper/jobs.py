@@ -8,8 +8,8 @@ from concurrent.futures import Future
 from dataclasses import dataclass, replace
 
 import cms
-from nldyn.continuation import ContinuationOptions
-from nldyn.diagrams import Diagram, Progress, Seed, diagram
+from nldyn.continuation import ContinuationOptions, broken_off
+from nldyn.diagrams import Diagram, Progress, Seed, diagram, notes_on_ends
 from nldyn.elements import Stop
 from nldyn.paper.starts import follow_starts, keep_numbers, read_starts
 from nldyn.paper.workers import Workers, tell
@@ -64,7 +64,7 @@ class Job:
             found = follow_starts(
                 self.system(), starts, self.range_hz, LONG, self.doubled, progress
             )
-            return replace(found, notes=tuple(_summed_up(found.notes)))
+            return replace(found, notes=tuple(_summed_up(found)))
         found = diagram(
             self.system(),
             self.range_hz,
@@ -78,11 +78,12 @@ class Job:
         return found
 
 
-def _summed_up(notes: Sequence[str]) -> list[str]:
-    """Notes on branches that were broken off, counted by their reason, and the others."""
-    ends = [note.partition(" Hz: ")[2] for note in notes if " was broken off at " in note]
-    counted = [f"{n} ends of branches broken off: {why}" for why, n in Counter(ends).items()]
-    return counted + [note for note in notes if " was broken off at " not in note]
+def _summed_up(found: Diagram) -> list[str]:
+    """How many ends of branches were broken off for which reason, and all other notes."""
+    reasons = Counter(reason for branch in found.branches for _, reason in broken_off(branch))
+    each = {note for branch in found.branches for note in notes_on_ends(branch)}
+    counted = [f"{n} ends of branches broken off: {why}" for why, n in reasons.items()]
+    return counted + [note for note in found.notes if note not in each]
 
 
 def scene_system(name: str) -> System:
@@ -155,9 +156,14 @@ JOBS = (
 )
 
 
+def job_named(name: str) -> Job:
+    """The job of a name."""
+    return next(job for job in JOBS if job.name == name)
+
+
 def run_job(name: str) -> Diagram:
     """Compute the job of one name (in a worker process), with what the figures need of it."""
-    job = next(job for job in JOBS if job.name == name)
+    job = job_named(name)
 
     def progress(what: str, frequency_hz: float) -> None:
         tell(f"{name}: {what}", frequency_hz)

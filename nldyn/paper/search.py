@@ -12,17 +12,28 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+from nldyn.cli import plain_errors, told_what_is_kept
 from nldyn.command import answering
 from nldyn.detour_search import by_detour, check_factors
 from nldyn.diagrams import Diagram, Progress
 from nldyn.errors import SystemModelError
 from nldyn.exploration import Exploration, ExploreOptions
-from nldyn.paper.jobs import JOBS, LONG, Job
-from nldyn.paper.starts import LONGEST, follow_starts, read_starts, starts_path, write_starts
+from nldyn.flow import flow_of
+from nldyn.paper.jobs import JOBS, LONG, Job, job_named
+from nldyn.paper.starts import (
+    LONGEST,
+    Start,
+    follow_starts,
+    read_starts,
+    starts_path,
+    write_starts,
+)
 from nldyn.progress import progress_line
-from nldyn.store import load_diagram
+from nldyn.store import load_diagram, same_flow
 from nldyn.survey import explore
 
 EFFORT = ExploreOptions(spacing=0.01, starts=1, settling=200, rounds=24, passing=24)
@@ -30,43 +41,68 @@ MODELS = tuple(job.name for job in JOBS if job.doubled)
 
 
 def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Exploration:
-    """Explore a model, and write the starts that it gives."""
-    job = next(job for job in JOBS if job.name == name)
+    """Explore a model, and write the starts that it gives.
+
+    The states at random differ between searches that begin beside different starts.
+    """
+    job = job_named(name)
     with progress_line() as report:
-        known, place = known_branches(job, folder, report)
-        found = explore(
-            job.system(), job.range_hz, LONGEST, effort=effort, options=LONG, known=known,
-            progress=report, checkpoint=place.with_suffix(".searched.h5"),
-        )  # fmt: skip
-    write_starts(starts_path(name, folder), found.diagram.branches)
+        known, place, seed = known_branches(job, folder, report)
+        kept = place.with_suffix(".searched.h5")
+        with told_what_is_kept(kept):
+            found = explore(
+                job.system(), job.range_hz, LONGEST, effort=replace(effort, seed=seed),
+                options=LONG, known=known, progress=report, checkpoint=kept,
+            )  # fmt: skip
+    keep(found.diagram, job, folder)
     return found
 
 
 def search_by_detour(name: str, folder: Path, damping: float, excitation: float) -> Diagram:
     """Look for branches of a model with `by_detour`, and write the starts of all."""
-    job = next(job for job in JOBS if job.name == name)
+    job = job_named(name)
     with progress_line() as report:
-        known, place = known_branches(job, folder, report)
-        found = by_detour(
-            known, damping, excitation, max_period=LONGEST, options=LONG,
-            progress=report, checkpoint=place.with_suffix(".detour.h5"),
-        )  # fmt: skip
-    write_starts(starts_path(name, folder), found.branches)
+        known, place, _ = known_branches(job, folder, report)
+        kept = place.with_suffix(".detour.h5")
+        with told_what_is_kept(kept):
+            found = by_detour(
+                known, damping, excitation, max_period=LONGEST, options=LONG,
+                progress=report, checkpoint=kept,
+            )  # fmt: skip
+    keep(found, job, folder)
     return found
 
 
-def known_branches(job: Job, folder: Path, progress: Progress) -> tuple[Diagram, Path]:
-    """Branches that the starts known lead to, and their file, which is named after these starts."""
+def known_branches(job: Job, folder: Path, progress: Progress) -> tuple[Diagram, Path, int]:
+    """Branches that the starts known lead to, their file, and a number made of these starts."""
     path = starts_path(job.name, folder)
     starts = read_starts(job.name, folder) if path.exists() else read_starts(job.name)
-    digest = hashlib.sha256(b"".join(start.state.tobytes() for start in starts)).hexdigest()
-    path = folder / f"{job.name}.{digest[:12]}.h5"
-    if not path.exists():
+    place, seed = branches_path(job, folder, starts)
+    if not (place.exists() and _is_of(load_diagram(place), job)):
         doubled = (LONGEST, LONG.max_points)
-        follow_starts(
-            job.system(), starts, job.range_hz, LONG, doubled, progress, whole=True
-        ).save(path)
-    return load_diagram(path), path
+        system = job.system()
+        known = follow_starts(system, starts, job.range_hz, LONG, doubled, progress, whole=True)
+        known.save(place)
+    return load_diagram(place), place, seed
+
+
+def keep(found: Diagram, job: Job, folder: Path) -> None:
+    """Write the starts of branches, and the branches for the next search."""
+    write_starts(starts_path(job.name, folder), found.branches)
+    found.save(branches_path(job, folder, read_starts(job.name, folder))[0])
+
+
+def branches_path(job: Job, folder: Path, starts: Sequence[Start]) -> tuple[Path, int]:
+    """File of the branches through some starts, named after these, and a number made of them."""
+    texts = [f"{s.period} {s.frequency_hz!r} {s.state.tolist()}" for s in starts]
+    digest = hashlib.sha256("\n".join(texts).encode()).hexdigest()[:12]
+    return folder / f"{job.name}.{digest}.h5", int(digest, 16)
+
+
+def _is_of(found: Diagram, job: Job) -> bool:
+    """Whether branches are of the model as it is now."""
+    flow = flow_of(job.system())
+    return all(same_flow(branch.points[0].problem.flow, flow) for branch in found.branches)
 
 
 def main() -> None:
@@ -91,10 +127,11 @@ def main() -> None:
     except OSError as error:
         parser.error(f"{given.directory} cannot be made: {error.strerror}")
     for name in given.models or MODELS:
-        if given.detour is None:
-            said = search(name, given.directory).report()
-        else:
-            said = search_by_detour(name, given.directory, *given.detour).notes[-1]
+        with plain_errors():
+            if given.detour is None:
+                said = search(name, given.directory).report()
+            else:
+                said = "\n".join(search_by_detour(name, given.directory, *given.detour).notes)
         print(f"{name}: {said}", flush=True)
 
 

@@ -21,7 +21,9 @@ from nldyn import (
     load_diagram,
     solve_orbit,
 )
+from nldyn.checkpoint import Checkpoint
 from nldyn.detour import Detour
+from nldyn.diagrams import Collector
 from nldyn.store import save_branches
 
 RANGE_HZ = (7.2, 11.0)
@@ -62,6 +64,14 @@ def test_an_isola_that_joins_the_known_branch_at_less_damping_is_found(harmonic,
 
 def test_it_says_whether_orbits_are_missing_for_certain(found):
     assert found.notes[-2] == "indices of the fixed points of P at 60 frequencies add up to one"
+
+
+def test_it_says_that_orbits_are_missing_where_only_the_isola_is_known(found):
+    known = replace(found, branches=found.branches[1:])
+    alone = by_detour(known, 0.95, max_period=1, spacing=0.5)
+    assert len(alone.branches) == 1
+    assert " but for P at 60 of them " in alone.notes[-2]
+    assert alone.notes[-2].endswith("orbits are missing, or a branch was broken off")
 
 
 def test_less_excitation_leads_to_the_isola_as_well(harmonic, found):
@@ -122,6 +132,46 @@ def test_interrupted_it_goes_on_with_what_it_has_found(harmonic, found, tmp_path
     assert np.array_equal(resumed.branches[1].frequency_hz, found.branches[1].frequency_hz)
 
 
+def test_a_branch_that_repeats_a_known_one_is_not_kept(harmonic, monkeypatch, tmp_path):
+    monkeypatch.setattr(Collector, "_repeats", lambda *_: True)
+    place = tmp_path / "found.h5"
+    assert len(by_detour(harmonic, max_period=1, spacing=0.1, checkpoint=place).branches) == 1
+    assert not place.exists()
+
+
+def test_a_branch_of_the_file_that_turns_out_to_be_known_is_not_added(
+    harmonic, found, monkeypatch, tmp_path
+):
+    place = tmp_path / "found.h5"
+    save_branches(place, found.branches[1:])
+    monkeypatch.setattr(Collector, "_repeats", lambda *_: True)
+    done = by_detour(harmonic, 0.95, max_period=1, spacing=0.5, checkpoint=place)
+    assert len(done.branches) == 1
+
+
+@pytest.mark.parametrize("at", ["test", "work"])
+def test_no_branch_of_a_file_is_lost_to_an_interrupt(at):
+    kept: list[str] = []
+    given = ["known", "tested", "later"]
+
+    def write(branches):
+        kept[:] = branches
+
+    held: list[str] = []
+    checkpoint = Checkpoint(lambda some: write([*held, *some]), earlier=given, held=held)
+
+    def is_known(branch: str) -> bool:
+        if branch == "tested" and at == "test":
+            raise KeyboardInterrupt
+        return branch == "known"
+
+    with pytest.raises(KeyboardInterrupt), checkpoint:
+        for _ in checkpoint.new_branches(is_known):
+            raise KeyboardInterrupt
+    checkpoint.write()
+    assert sorted(kept) == sorted(given)
+
+
 def test_some_orbits_are_carried_back_however_wide_the_spacing(found):
     short = replace(found, range_hz=(7.95, 8.05))
     done = by_detour(short, max_period=1, spacing=0.5)
@@ -173,7 +223,6 @@ def test_a_branch_of_a_wider_range_and_one_without_its_course_may_be_known(harmo
         ({"max_period": 0}, "max_period must be"),
         ({"known": Diagram((), RANGE_HZ, "tip")}, "known: has no branches to begin with"),
         ({"known": Diagram((1,), RANGE_HZ, "tip")}, "known: branches must be a list of branches"),
-        ({"known": Diagram((), (9.0, 8.0), "tip")}, "range_hz must be two positive frequencies"),
     ],
 )
 def test_bad_input_is_refused(harmonic, change, message):
@@ -186,6 +235,7 @@ def test_bad_input_is_refused(harmonic, change, message):
     [
         ({"observe": "nose"}, "nose"),
         ({"notes": None}, "notes must be"),
+        ({"range_hz": (9.0, 8.0)}, "range_hz must be two positive frequencies"),
         ({"range_hz": (7.0, 11.0)}, "was followed from 7.2 to 11 Hz, not over the range"),
     ],
 )
@@ -201,8 +251,21 @@ def test_branches_of_two_systems_are_refused(harmonic):
         by_detour(known)
 
 
-def test_a_system_without_modal_damping_is_refused():
-    system = replace(two_modes(), damping=np.zeros((2, 2)))
+def known_of(system: System) -> Diagram:
+    """The harmonic branch of a system, in a short range."""
     branch = continue_branch(solve_orbit(system, 10.99), (10.9, 11.0))
+    return Diagram((branch,), (10.9, 11.0), "tip")
+
+
+def test_a_system_without_modal_damping_has_no_factor_of_it_and_no_sum_of_indices():
+    known = known_of(replace(two_modes(), damping=np.zeros((2, 2))))
     with pytest.raises(SystemModelError, match="without modal damping"):
-        by_detour(Diagram((branch,), (10.9, 11.0), "tip"))
+        by_detour(known)
+    done = by_detour(known, 1.0, 1.1, max_period=1, spacing=0.5)
+    assert not any("indices" in note for note in done.notes)
+
+
+def test_a_system_without_excitation_has_no_factor_of_it():
+    known = known_of(two_modes().with_elements(excitation=()))
+    with pytest.raises(SystemModelError, match="without excitation"):
+        by_detour(known, 0.5, 1.1)

@@ -88,8 +88,8 @@ def test_no_branch_is_found_twice(around_37):
 
 def test_every_simulation_is_accounted_for(around_37):
     """Twelve random starts at each frequency, and those carried over from the one before."""
-    steps = np.diff(np.log([c.frequency_hz for c in around_37.coverage]))
-    assert steps.max() <= 0.005 * (1 + 1e-9)
+    frequencies = np.array([c.frequency_hz for c in around_37.coverage])
+    assert (frequencies[1:] / frequencies[:-1]).max() <= 1.005 * (1 + 1e-12)
     for c in around_37.coverage:
         assert c.settled + c.unsettled + c.failed >= 12
         assert all(period <= 4 for period in c.periods)
@@ -229,7 +229,34 @@ def test_rounds_find_what_the_first_one_misses():
     )
     assert not first.diagram.of_period(3)
     assert all_rounds.diagram.of_period(3)
-    assert all_rounds.new_branches[-1] == 0 or len(all_rounds.new_branches) == 6
+    assert first.new_branches == all_rounds.new_branches[:1]
+
+
+def test_a_round_at_work_does_not_count_in_the_estimate(whole):
+    begun = np.vstack([whole.stage.met, np.ones((1, whole.stage.branches), dtype=bool)])
+    going_on = replace(whole, stage=replace(whole.stage, met=begun))
+    assert going_on.meetings == whole.meetings
+    assert going_on.unmet_branches == whole.unmet_branches < np.inf
+
+
+def test_a_frequency_is_searched_again_from_random_states_only(monkeypatch):
+    """Of one state each time none is rest, from which the first search has begun."""
+    tried, search = [], survey._Survey._search
+
+    def noted(self, starts, known, **others):
+        tried.append(starts)
+        return search(self, starts, known, **others)
+
+    monkeypatch.setattr(survey._Survey, "_search", noted)
+    monkeypatch.setattr(survey, "AGAIN", 3)
+    monkeypatch.setattr(survey._Known, "incomplete", lambda *_: True)
+    effort = ExploreOptions(spacing=0.5, starts=1, settling=30)
+    explore(system_of("one_dof"), (36.0, 38.0), 1, effort=effort)
+    first, *again = tried[:4]
+    assert not first.any()
+    states = [start for starts in again for start in starts]
+    assert len(states) == 3 and all(state.any() for state in states)
+    assert len({state.tobytes() for state in states}) == 3
 
 
 def test_a_finished_exploration_goes_on_with_more_rounds(whole, tmp_path):
@@ -404,6 +431,13 @@ def test_known_branches_of_something_else_are_refused(harmonic):
         explore(finer, **QUESTION, known=harmonic)
     with pytest.raises(SystemModelError, match="known must be"):
         explore(system_of("one_dof"), **QUESTION, known=harmonic.branches)
+    for change, message in (
+        ({"branches": (1,)}, "known: branches must be a list of branches"),
+        ({"notes": None}, "known: notes must be"),
+        ({"observe": "nose"}, "nose"),
+    ):
+        with pytest.raises(SystemModelError, match=message):
+            explore(system_of("one_dof"), **QUESTION, known=replace(harmonic, **change))
 
 
 def test_coverage_is_kept_where_no_branch_is_found(tmp_path, monkeypatch):

@@ -3,13 +3,14 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from nldyn import ContinuationOptions, ExploreOptions, explore, index_sum
 from nldyn.fixed_point_index import index_note
 from nldyn.flow import FlowMap
-from nldyn.paper.jobs import JOBS, scene_system
-from nldyn.paper.search import MODELS, search, search_by_detour
+from nldyn.paper.jobs import job_named, scene_system
+from nldyn.paper.search import MODELS, known_branches, main, search, search_by_detour
 from nldyn.paper.starts import follow_starts, read_starts, starts_path, write_starts
 from nldyn.search import orbit_near
 
@@ -25,7 +26,7 @@ def found():
 
 @pytest.mark.parametrize("name", MODELS)
 def test_starts_lead_to_orbits_of_their_period(name):
-    job = next(job for job in JOBS if job.name == name)
+    job = job_named(name)
     flow = FlowMap(job.system())
     starts = read_starts(name)
     assert {start.period for start in starts} == {1, 2, 3}
@@ -77,9 +78,9 @@ def test_a_start_that_leads_nowhere_is_counted(found, tmp_path):
 @pytest.fixture
 def two_known(monkeypatch, tmp_path):
     """A short range of the 2-DOF model, and a directory with two starts."""
-    job = next(job for job in JOBS if job.name == "two_dof_xi_0.01")
+    job = job_named("two_dof_xi_0.01")
     low, high = 35.5, 36.5
-    monkeypatch.setattr("nldyn.paper.search.JOBS", (replace(job, range_hz=(low, high)),))
+    monkeypatch.setattr("nldyn.paper.jobs.JOBS", (replace(job, range_hz=(low, high)),))
     head, *rows = starts_path(job.name).read_text(encoding="utf-8").splitlines(keepends=True)
     within = [row for row in rows if low < float(row.split(",")[1]) < high]
     starts_path(job.name, tmp_path).write_text("".join([head, *within[:2]]), encoding="utf-8")
@@ -89,21 +90,51 @@ def two_known(monkeypatch, tmp_path):
 def test_a_detour_gives_starts(two_known):
     name, folder = two_known
     known = read_starts(name, folder)
-    done = search_by_detour(name, folder, 0.5, 1.2)
-    assert done.notes[-1].startswith("at 0.5 of the damping and 1.2 of the excitation: ")
-    assert len(read_starts(name, folder)) == len(done.branches) >= len(known) == 2
+    done = search_by_detour(name, folder, 1.0, 2.0)
+    assert done.notes[-1].startswith("at 1 of the damping and 2 of the excitation: ")
+    assert len(read_starts(name, folder)) == len(done.branches) > len(known) == 2
 
 
-def test_a_search_is_kept_and_gives_starts_from_which_the_next_one_begins(two_known):
+def test_a_search_is_kept_and_gives_starts_from_which_the_next_one_begins(
+    two_known, monkeypatch
+):
     name, folder = two_known
     first = starts_path(name, folder).read_bytes()
     effort = ExploreOptions(spacing=0.02, starts=1, settling=100)
     done = search(name, folder, effort)
     found = read_starts(name, folder)
     assert len(found) == len(done.diagram.branches) > done.stage.given == 2
+    monkeypatch.setattr("nldyn.paper.search.follow_starts", None)  # all are followed already
     more = search_by_detour(name, folder, 0.5, 1.0)
     assert len(read_starts(name, folder)) == len(more.branches) >= len(found)
     starts_path(name, folder).write_bytes(first)
     again = search(name, folder, effort)
     assert again.stage.steps == done.stage.steps
     assert len(again.diagram.branches) == len(done.diagram.branches)
+
+
+def test_the_command_tells_all_notes(two_known, monkeypatch, capsys):
+    name, folder = two_known
+    monkeypatch.setattr("sys.argv", ["search", str(folder), name, "--detour", "0.5", "1.2"])
+    main()
+    first, *others, last = capsys.readouterr().out.splitlines()
+    assert first == f"{name}: from 2 starts, 0 of which lead to no orbit"
+    assert any(note.startswith("indices of the fixed points of P to P^3 ") for note in others)
+    assert last.startswith("at 0.5 of the damping and 1.2 of the excitation: ")
+
+
+def test_branches_of_the_model_as_it_was_are_followed_anew(two_known):
+    """The file is named after the starts, which lead to orbits of a changed model as well."""
+    name, folder = two_known
+    job = job_named(name)
+    system = job.system()
+    damping = 1.001 * system.damping
+    changed = replace(job, system=lambda: replace(system, damping=damping))
+    files = set()
+    for model in (job, changed):
+        known, place, _ = known_branches(model, folder, lambda what, hz: None)
+        files.add(place)
+        assert len(known.branches) == 2
+        for branch in known.branches:
+            assert np.array_equal(branch.points[0].system.damping, model.system().damping)
+    assert len(files) == 1
