@@ -403,7 +403,7 @@ def diagram(
     for seed in seeds:
         if not low <= seed.near_hz <= high:
             raise SystemModelError(
-                f"subharmonic near_hz = {seed.near_hz:g} lies outside range_hz ({low:g}, {high:g})"
+                f"seeds: near_hz = {seed.near_hz:g} lies outside range_hz ({low:g}, {high:g})"
             )
     check_whole("search_points", search_points, 1)
     check_whole("doublings", doublings, 0)

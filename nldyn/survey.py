@@ -27,7 +27,7 @@ from nldyn.exploration import (
     Stage,
     settling_periods,
 )
-from nldyn.fixed_point_index import is_damped, sum_of_indices
+from nldyn.fixed_point_index import is_damped, sum_of_indices, without_index_note
 from nldyn.flow import FlowMap, flow_of
 from nldyn.fold_search import connected_folds, leading_parameter
 from nldyn.linear import Real
@@ -153,6 +153,7 @@ def explore(
     if known is None:
         known = Diagram((), question.range_hz, question.observe, ())
     _check_known(known, question)
+    known = replace(known, notes=tuple(without_index_note(known.notes)))
     survey = _Survey(box, question, known)
     if checkpoint is None or not survey.goes_on_in(checkpoint):
         box.take(known.branches, known.notes)
