@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from nldyn.errors import SceneError, SystemModelError
     from nldyn.executors import Outcome, TaskError, run_all
     from nldyn.exploration import Coverage, Exploration, ExploreOptions
-    from nldyn.fixed_point_index import index_sum
+    from nldyn.fixed_point_index import index_gaps, index_sum
     from nldyn.flow import FlowMap, FlowOptions
     from nldyn.fourier import Spectrum, spectrum
     from nldyn.lifetimes import ChaosLifetime, chaos_lifetime
@@ -93,7 +93,7 @@ _HOMES = {
     "errors": "SceneError SystemModelError",
     "executors": "Outcome TaskError run_all",
     "exploration": "Coverage Exploration ExploreOptions",
-    "fixed_point_index": "index_sum",
+    "fixed_point_index": "index_gaps index_sum",
     "flow": "FlowMap FlowOptions",
     "fourier": "Spectrum spectrum",
     "contacts": "Impacts impacts",
@@ -193,6 +193,7 @@ __all__ = [
     "hertz_stiffness",
     "impact_section",
     "impacts",
+    "index_gaps",
     "index_sum",
     "load_branch",
     "load_branches",

@@ -6,13 +6,17 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nldyn.branch import Branch, check_branches
+from nldyn.continuation import check_range
 from nldyn.errors import SystemModelError, check_frequency, check_whole
+from nldyn.linear import Real
 from nldyn.orbit import Orbit
 from nldyn.system import System
 
-FREQUENCIES = 60  # at which the indices are added up
+RESOLVED = 1e-8  # relative width of a range of frequencies that counts
+CLEAR = 1e-6  # distance of |1 - μ| from where an index changes, to be told from it
 NOTE = "indices of the fixed points of "  # how the note on them begins
 
 
@@ -65,50 +69,162 @@ def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) 
     >>> [orbit.stable for orbit in branch.at(12.15)], index_sum([branch], 12.15)
     ([True, False, True], 1)
     """
+    given = _checked("index_sum", branches, period, frequency_hz, frequency_hz)
+    return sum_of_indices([o for branch in given for o in branch.at(frequency_hz)], period)
+
+
+def index_gaps(
+    branches: Iterable[Branch], range_hz: tuple[float, float], period: int = 1
+) -> list[tuple[float, float]]:
+    """Ranges of frequency in which the indices of the fixed points of Pⁿ do not add up to one.
+
+    Along each branch the index is that of the computed orbits; it changes at folds, branch points
+    and, for even multiples of the branch's period, at flips. So the sum is known all over the
+    range, without solving for any orbit. Between the ends of the ranges given orbits are missing,
+    see `index_sum`. Ranges narrower than 1e-8 of the frequency are left out: doubled branches end
+    not quite at their flip.
+
+    Parameters
+    ----------
+    branches : iterable of Branch
+        Of one system, each of them once; those of a `Diagram`, for example.
+    range_hz : (float, float)
+        Frequencies in Hz, ascending, within the range that the branches were followed in.
+    period : int
+        Number n of excitation periods.
+
+    Returns
+    -------
+    list of (float, float)
+        In Hz, ascending; none if the sum is one everywhere.
+
+    Raises
+    ------
+    SystemModelError
+        As `index_sum`.
+
+    Examples
+    --------
+    The doubled branch between two flips of the harmonic one is not among those given.
+
+    >>> from nldyn import Stop, System, Unbalance, continue_branch, index_gaps, solve_orbit
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> branch = continue_branch(solve_orbit(system, 40.0), (30.0, 60.0))
+    >>> index_gaps([branch], (30.0, 60.0))
+    []
+    >>> gaps = index_gaps([branch], (30.0, 60.0), 2)
+    """
+    low, high = check_range(range_hz)
+    given = _checked("index_gaps", branches, period, low, high)
+    ends, rise = _changes(given, period)
+    first, last = np.log(2.0 * math.pi * np.array([low, high]))
+    wrong: list[tuple[float, float]] = []
+    order = np.argsort(ends, kind="stable")
+    ends = np.concatenate([[first], np.clip(ends[order], first, last), [last]])
+    sums = np.concatenate([[0], np.cumsum(rise[order])])
+    for a, b, total in zip(ends[:-1], ends[1:], sums, strict=True):
+        if total == 1 or b <= a:
+            continue
+        if wrong and wrong[-1][1] == a:
+            wrong[-1] = (wrong[-1][0], b)
+        else:
+            wrong.append((a, b))
+    wide = [np.exp(gap) / (2.0 * math.pi) for gap in wrong if gap[1] - gap[0] > RESOLVED]
+    return [(float(a), float(b)) for a, b in wide]
+
+
+def _checked(
+    caller: str, branches: Iterable[Branch], period: int, low: float, high: float
+) -> list[Branch]:
+    """Those of some branches whose period divides n, checked.
+
+    Raises
+    ------
+    SystemModelError
+        As `index_sum`.
+    """
     from nldyn.store import same_flow
 
     branches = list(branches) if isinstance(branches, Iterable) else branches
     check_branches("branches", branches)
-    check_frequency("frequency_hz", frequency_hz)
+    check_frequency("frequency_hz", low)
     check_whole("period", period, 1)
     if not branches:
-        raise SystemModelError("index_sum: branches must not be empty")
+        raise SystemModelError(f"{caller}: branches must not be empty")
     for branch in branches:
-        low, high = branch.course.range_hz if branch.course else (0.0, math.inf)
-        if not low * (1.0 - 1e-12) <= frequency_hz <= high * (1.0 + 1e-12):
+        a, b = branch.course.range_hz if branch.course else (0.0, math.inf)
+        if not a * (1.0 - 1e-12) <= low <= high <= b * (1.0 + 1e-12):
+            asked = f"{low:g}" if low == high else f"{low:g} to {high:g}"
             raise SystemModelError(
-                f"index_sum: branch '{branch.name}' was followed from {low:g} to {high:g} Hz, "
-                f"which does not tell of {frequency_hz:g} Hz"
+                f"{caller}: branch '{branch.name}' was followed from {a:g} to {b:g} Hz, "
+                f"which does not tell of {asked} Hz"
             )
     flow = branches[0].nodes[0].orbit.problem.flow
     if not all(same_flow(branch.nodes[0].orbit.problem.flow, flow) for branch in branches):
-        raise SystemModelError("index_sum: the branches must be of one system and accuracy")
+        raise SystemModelError(f"{caller}: the branches must be of one system and accuracy")
     counted = [branch for branch in branches if period % branch.period == 0]
     if counted and not is_damped(flow.system):
         raise SystemModelError(
-            "index_sum: the indices add up to one only where every mode is damped, but one is not"
+            f"{caller}: the indices add up to one only where every mode is damped, but one is not"
         )
-    return sum_of_indices([o for branch in counted for o in branch.at(frequency_hz)], period)
+    return counted
+
+
+def _changes(branches: Sequence[Branch], period: int) -> tuple[Real, NDArray[np.int_]]:
+    """Values of ln ω at which the sum of the indices changes, and by how much."""
+    ends, rises = [np.empty(0)], [np.empty(0, dtype=int)]
+    for branch in branches:
+        x, signs = _along(branch, period // branch.period)
+        a, b = np.minimum(x[:-1], x[1:]), np.maximum(x[:-1], x[1:])
+        ends += [a, b]
+        rises += [branch.period * signs, -branch.period * signs]
+    return np.concatenate(ends), np.concatenate(rises)
+
+
+def _along(branch: Branch, times: int) -> tuple[Real, NDArray[np.int_]]:
+    """Values of ln ω at the places of a branch, and the index between each and the next one.
+
+    It is that of the end whose multipliers are clear of where it changes, or follows from what is
+    next to it along the branch.
+    """
+    places = list(branch.places)
+    if branch.closed:
+        places[-1] = places[0]  # beyond which it lies
+    changing = {"LP", "BP", "PD"} if times % 2 == 0 else {"LP", "BP"}
+    changes = {id(s.point) for s in branch.special_points if s.kind in changing}
+    turn = [-1 if id(place) in changes else 1 for place in places]
+    clear = [
+        _distance(place.orbit, times) if sign == 1 else 0.0
+        for place, sign in zip(places, turn, strict=True)
+    ]
+    signs = []
+    for i in range(len(places) - 1):
+        best = i if clear[i] >= clear[i + 1] else i + 1
+        signs.append(index(places[best].orbit, times) if clear[best] > CLEAR else 0)
+    for i in range(1, len(signs)):
+        signs[i] = signs[i] or signs[i - 1] * turn[i]
+    for i in range(len(signs) - 2, -1, -1):
+        signs[i] = signs[i] or signs[i + 1] * turn[i + 1]
+    return np.array([place.orbit.point[-1] for place in places]), np.array(signs, dtype=int)
+
+
+def _distance(orbit: Orbit, times: int) -> float:
+    """How far an orbit is from where its index changes: the smallest of |1 - μᵢ^times|."""
+    return float(np.abs(orbit.multipliers**times - 1.0).min())
 
 
 def index_note(branches: Sequence[Branch], range_hz: tuple[float, float], longest: int) -> str:
-    """Whether the indices of the fixed points of P to P^longest add up to one, in a sentence.
-
-    They are added up at `FREQUENCIES` frequencies within the range.
-    """
-    low, high = range_hz
-    inside = np.geomspace(low, high, FREQUENCIES + 2)[1:-1].tolist()
+    """Whether the indices of the fixed points of P to P^longest add up to one, in a sentence."""
     powers = "P" if longest == 1 else f"P to {_power(longest)}"
-    told = f"{NOTE}{powers} at {len(inside)} frequencies add up to one"
-    counted = [branch for branch in branches if branch.period <= longest]
-    orbits = [[orbit for branch in counted for orbit in branch.at(hz)] for hz in inside]
+    told = f"{NOTE}{powers} add up to one from {range_hz[0]:g} to {range_hz[1]:g} Hz"
     wrong = []
     for n in range(1, longest + 1):
-        at = [hz for hz, here in zip(inside, orbits, strict=True) if sum_of_indices(here, n) != 1]
-        if len(at) > 1:
-            wrong.append(f"{_power(n)} at {len(at)} of them from {at[0]:.5g} to {at[-1]:.5g} Hz")
-        elif at:
-            wrong.append(f"{_power(n)} at {at[0]:.5g} Hz")
+        gaps = index_gaps(branches, range_hz, n)
+        if gaps:
+            ranges = f"in {len(gaps)} ranges " if len(gaps) > 1 else ""
+            wrong.append(f"{_power(n)} {ranges}from {gaps[0][0]:.7g} to {gaps[-1][1]:.7g} Hz")
     if not wrong:
         return told
     return f"{told} but for {', '.join(wrong)}: orbits are missing, or a branch was broken off"

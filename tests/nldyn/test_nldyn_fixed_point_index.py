@@ -20,10 +20,11 @@ from nldyn import (
     continue_branch,
     diagram,
     explore,
+    index_gaps,
     index_sum,
     solve_orbit,
 )
-from nldyn.fixed_point_index import FREQUENCIES, index, index_note
+from nldyn.fixed_point_index import index, index_note
 
 
 @pytest.fixture(scope="module")
@@ -82,12 +83,43 @@ def test_the_note_tells_for_each_power_where_orbits_are_missing(doubled):
     low, high = doubled.range_hz
     harmonic = [branch for branch in doubled.branches if branch.period == 1]
     (flip,) = [s.frequency_hz for s in harmonic[0].special_points if s.kind == "PD"]
-    inside = np.geomspace(low, high, FREQUENCIES + 2)[1:-1]
-    above = inside[inside > flip]
-    where = f"P^2 at {above.size} of them from {above[0]:.5g} to {above[-1]:.5g} Hz"
+    assert index_gaps(harmonic, (low, high), 2) == [pytest.approx((flip, high), rel=1e-12)]
+    where = f"P^2 from {flip:.7g} to 60 Hz"
     told = index_note(harmonic, (low, high), 3)
-    assert f" add up to one but for {where}: orbits are missing" in told
-    assert index_note(harmonic, (low, flip), 3).endswith(" add up to one")
+    assert told.startswith("indices of the fixed points of P to P^3 add up to one from 28 to 60 ")
+    assert told.endswith(f" but for {where}: orbits are missing, or a branch was broken off")
+    assert index_note(harmonic, (low, flip), 3).endswith(f" add up to one from 28 to {flip:g} Hz")
+
+
+@settings(max_examples=40, deadline=None)
+@given(share=st.floats(0.001, 0.999), period=st.integers(1, 4), left=st.booleans())
+def test_the_gaps_are_where_the_sum_is_not_one(doubled, share, period, left):
+    low, high = doubled.range_hz
+    frequency = low * (high / low) ** share
+    branches = [branch for branch in doubled.branches if left or branch.period == 1]
+    inside = any(a < frequency < b for a, b in index_gaps(branches, doubled.range_hz, period))
+    assert (index_sum(branches, frequency, period) != 1) == inside
+
+
+def test_the_index_between_special_points_follows_from_what_is_beside_them(harmonic_branch):
+    """No computed point lies between the folds of the superharmonic peak; the flips stay, too."""
+    assert index_gaps([harmonic_branch], RANGE_HZ) == []
+    folds = [s.point.arclength for s in harmonic_branch.special_points if s.kind == "LP"]
+    nodes = harmonic_branch.nodes
+    outside = [node for node in nodes if not min(folds) < node.arclength < max(folds)]
+    sparse = replace(harmonic_branch, nodes=tuple(outside))
+    assert len(folds) > 2 and len(outside) < len(nodes)
+    assert index_gaps([sparse], RANGE_HZ) == []
+
+
+def test_a_branch_that_is_missing_in_a_narrow_range_shows(doubled):
+    """The doubled branch ends at 28.7 Hz or so; a millionth of it is left out."""
+    (branch,) = [branch for branch in doubled.branches if branch.period == 1]
+    (flip,) = [s.frequency_hz for s in branch.special_points if s.kind == "PD"]
+    short = (flip * (1.0 - 1e-6), flip * (1.0 + 1e-6))
+    assert index_gaps(doubled.branches, short, 2) == []
+    ((a, b),) = index_gaps([branch], short, 2)
+    assert (a, b) == pytest.approx((flip, short[1]), rel=1e-12)
 
 
 def test_a_branch_that_is_broken_off_shows(harmonic_branch, one_dof):
