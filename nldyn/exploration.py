@@ -477,7 +477,7 @@ def settling_periods(system: System, frequency_hz: float) -> int:
     >>> settling_periods(system, 10.0)
     64
     """
-    slowest = min(-float(np.linalg.eigvals(block).real.max()) for block in system.linear.blocks)
+    slowest = system.linear.slowest_decay
     if slowest <= 0.0:
         return UNDAMPED
     return max(math.ceil(DECAYS * frequency_hz / slowest), FEWEST)

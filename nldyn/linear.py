@@ -54,6 +54,11 @@ class LinearPart:
     growth: Real
     condition: float
 
+    @property
+    def slowest_decay(self) -> float:
+        """Rate in 1/s of the free motion that decays last; not positive if one does not decay."""
+        return -float(np.linalg.eigvals(self.blocks).real.max())
+
     def times_block(self, rows: Real) -> Real:
         """Rows (..., 2n) times the block-diagonal matrix A."""
         pairs = rows.reshape(*rows.shape[:-1], -1, 2)
