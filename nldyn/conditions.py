@@ -12,6 +12,7 @@ from nldyn._events import nearest
 from nldyn.bordered import (
     DIFFERENCE,
     Condition,
+    Corrected,
     Evaluation,
     OrbitFamily,
     correct,
@@ -445,20 +446,30 @@ def nearest_crossing(orbit: Orbit) -> tuple[Orbit, float] | None:
     ----------
     G. Moore (1980), *Numer. Funct. Anal. Optim.* 2, 441-472.
     """
+    found = _beside("BP", orbit)
+    if found is None:
+        return None
+    return replace(found.orbit, problem=orbit.problem), abs(float(found.at.point[-1]))
+
+
+def nearest_flip(orbit: Orbit) -> Orbit | None:
+    """The flip of the branch of an orbit, if it has one beside it."""
+    found = _beside("PD", orbit)
+    return None if found is None else replace(found.orbit, problem=orbit.problem)
+
+
+def _beside(kind: str, orbit: Orbit) -> Corrected | None:
+    """The special point of a kind beside an orbit."""
     hz = orbit.frequency_hz
     family = OrbitFamily.around(orbit, (Chart(Parameter(FREQUENCY), 0.5 * hz, 2.0 * hz),))
     try:
-        family, condition = defined_by("BP", family, orbit)
+        family, condition = defined_by(kind, family, orbit)
         guess = family.unknowns(orbit)
         found = correct(family, guess, condition, max_iterations=12)
     except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
         return None
-    moved = found.at.point - guess
-    apart = metric_length(family.metric(guess), moved)
-    if not found.converged or apart > BESIDE:
-        return None
-    crossing = replace(found.orbit, problem=orbit.problem)
-    return crossing, abs(float(found.at.point[-1]))
+    apart = metric_length(family.metric(guess), found.at.point - guess)
+    return found if found.converged and apart <= BESIDE else None
 
 
 def defined_by(kind: str, family: OrbitFamily, orbit: Orbit) -> tuple[OrbitFamily, Condition]:

@@ -30,7 +30,7 @@ from nldyn.branch import (
     check_special,
 )
 from nldyn.checkpoint import Checkpoint, checkpoint_at
-from nldyn.conditions import TOUCH, depth_row
+from nldyn.conditions import TOUCH, depth_row, nearest_flip
 from nldyn.crossings import check_requested, requested
 from nldyn.errors import (
     LARGEST_FREQUENCY,
@@ -570,8 +570,8 @@ def _flip_between(a: BranchPoint, b: BranchPoint) -> BranchPoint:
     """The orbit of half the period near the flip between a and b, run through twice.
 
     The shooting equations of the doubled branch are singular at the flip, so the point where the
-    halves agree is interpolated and solved as an orbit of half the period: the states are exact,
-    the frequency is that of the interpolation.
+    halves agree is interpolated and solved as an orbit of half the period; from there Newton's
+    method goes to the flip, unless it fails.
 
     Raises
     ------
@@ -592,6 +592,7 @@ def _flip_between(a: BranchPoint, b: BranchPoint) -> BranchPoint:
     single = ShootingProblem(problem.flow, problem.period // 2, half)
     mean = 0.5 * (nodes[:half] + nodes[half:])
     orbit = refine(single, mean, float(np.exp(point[-1])), a.orbit.observe)
+    orbit = nearest_flip(orbit) or orbit
     states = np.tile(single.nodes(orbit.point), (2, 1)).ravel()
     doubled = Orbit(
         problem,

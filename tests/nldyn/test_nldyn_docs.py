@@ -71,7 +71,7 @@ def test_example_of_exploring_runs(tmp_path, monkeypatch, capsys):
     text = (ROOT / "docs" / "exploring.md").read_text(encoding="utf-8")
     exec("".join(re.findall(r"```python\n(.*?)```", text, flags=re.S)), {})
     said = capsys.readouterr().out
-    assert "1/3" in said and said.endswith("[1, 1, 1]\n")
+    assert "1/3" in said and said.endswith("[1, 1, 1]\n[]\n")
     assert (tmp_path / "explored.png").is_file()
 
 
