@@ -80,9 +80,9 @@ def index_gaps(
 
     Along each branch the index is that of the computed orbits; it changes at folds, branch points
     and, for even multiples of the branch's period, at flips. So the sum is known all over the
-    range, without solving for any orbit. Between the ends of the ranges given orbits are missing,
-    see `index_sum`. Ranges narrower than 1e-8 of the frequency are left out: doubled branches end
-    not quite at their flip.
+    range, without solving for any orbit. Within the ranges given orbits are missing, see
+    `index_sum`. Ranges narrower than 1e-8 of the frequency are left out: a branch may not end
+    quite at the flip where it is born.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def index_gaps(
 
     Examples
     --------
-    The doubled branch between two flips of the harmonic one is not among those given.
+    From a flip of the harmonic branch on, its doubled branch is not among those given.
 
     >>> from nldyn import Stop, System, Unbalance, continue_branch, index_gaps, solve_orbit
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
@@ -114,7 +114,8 @@ def index_gaps(
     >>> branch = continue_branch(solve_orbit(system, 40.0), (30.0, 60.0))
     >>> index_gaps([branch], (30.0, 60.0))
     []
-    >>> gaps = index_gaps([branch], (30.0, 60.0), 2)
+    >>> [(round(a, 2), round(b, 2)) for a, b in index_gaps([branch], (30.0, 60.0), 2)]
+    [(33.65, 60.0)]
     """
     low, high = check_range(range_hz)
     given = _checked("index_gaps", branches, period, low, high)
