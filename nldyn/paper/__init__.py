@@ -34,7 +34,7 @@ def main(out: str | Path, workers: int = 2) -> None:
     from nldyn.paper.chaos import chaos_of, submit_sweeps, write_chaos_figure
     from nldyn.paper.claims import evaluate, verdict_counts, write_claims
     from nldyn.paper.figures import write_figures
-    from nldyn.paper.jobs import submit_diagrams
+    from nldyn.paper.jobs import joined, submit_diagrams
     from nldyn.paper.kept import kept_folder
     from nldyn.paper.page import write_page
     from nldyn.paper.workers import worker_processes
@@ -48,7 +48,7 @@ def main(out: str | Path, workers: int = 2) -> None:
             diagrams = submit_diagrams(processes)
             sweeps = submit_sweeps(processes)
         chaos = chaos_of(processes.values(sweeps, "sweeps"), processes)
-        results = processes.values(diagrams, "diagrams")
+        results = joined(processes.values(diagrams, "diagrams"))
     with result_directory(out, "paper") as folder:
         rows = evaluate(results, chaos)
         write_claims(rows, folder / "claims.csv")

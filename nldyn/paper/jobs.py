@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 
@@ -11,7 +11,8 @@ import cms
 from nldyn.continuation import ContinuationOptions, broken_off
 from nldyn.diagrams import Diagram, Progress, Seed, diagram, notes_on_ends
 from nldyn.elements import Stop
-from nldyn.paper.starts import follow_starts, keep_numbers, read_starts
+from nldyn.fixed_point_index import index_note
+from nldyn.paper.starts import follow_starts, keep_numbers, longest_whole, read_starts
 from nldyn.paper.workers import Workers, tell
 from nldyn.progress import compilation_told
 from nldyn.resources import example
@@ -57,14 +58,18 @@ class Job:
     options: ContinuationOptions | None = None
     doubled: tuple[int, int] | None = None
 
-    def run(self, progress: Progress | None = None) -> Diagram:
-        """Compute the diagram."""
+    @property
+    def families(self) -> tuple[int, ...]:
+        """Odd parts of the periods of its starts; no branch of one leads to one of another."""
+        if self.doubled is None:
+            return (1,)
+        return tuple(sorted({odd_part(start.period) for start in read_starts(self.name)}))
+
+    def run(self, family: int = 1, progress: Progress | None = None) -> Diagram:
+        """Compute the diagram, or of one with starts the branches of one family."""
         if self.doubled is not None:
-            starts = read_starts(self.name)
-            found = follow_starts(
-                self.system(), starts, self.range_hz, LONG, self.doubled, progress
-            )
-            return replace(found, notes=tuple(_summed_up(found)))
+            starts = [s for s in read_starts(self.name) if odd_part(s.period) == family]
+            return follow_starts(self.system(), starts, self.range_hz, LONG, self.doubled, progress)
         found = diagram(
             self.system(),
             self.range_hz,
@@ -76,6 +81,30 @@ class Job:
         )
         keep_numbers(found.branches)
         return found
+
+
+def odd_part(period: int) -> int:
+    """A period without its factors of two, which flips add."""
+    return period // (period & -period)
+
+
+def joined(parts: Mapping[tuple[str, int], Diagram]) -> dict[str, Diagram]:
+    """The diagrams of some jobs, from those of their families."""
+    return {name: _whole(name, parts) for name in dict.fromkeys(name for name, _ in parts)}
+
+
+def _whole(name: str, parts: Mapping[tuple[str, int], Diagram]) -> Diagram:
+    """The diagram of a job from those of its families, with what all of them together tell."""
+    first, *others = (part for (job, _), part in parts.items() if job == name)
+    doubled = job_named(name).doubled
+    if doubled is None:
+        return first
+    both = (first, *others)
+    branches = tuple(branch for part in both for branch in part.branches)
+    notes = tuple(note for part in both for note in part.notes)
+    found = replace(first, branches=branches, notes=notes)
+    told = index_note(branches, first.range_hz, longest_whole(doubled[0]))
+    return replace(found, notes=(*_summed_up(found), told))
 
 
 def _summed_up(found: Diagram) -> list[str]:
@@ -161,18 +190,24 @@ def job_named(name: str) -> Job:
     return next(job for job in JOBS if job.name == name)
 
 
-def run_job(name: str) -> Diagram:
-    """Compute the job of one name (in a worker process), with what the figures need of it."""
+def run_job(name: str, family: int) -> Diagram:
+    """Compute a family of a job (in a worker process), with what the figures need of it."""
     job = job_named(name)
 
     def progress(what: str, frequency_hz: float) -> None:
         tell(f"{name}: {what}", frequency_hz)
 
     with compilation_told(progress):
-        return job.run(progress)
+        return job.run(family, progress)
 
 
-def submit_diagrams(workers: Workers, jobs: Sequence[Job] = JOBS) -> dict[str, Future[Diagram]]:
-    """Begin jobs, the longest first."""
+def submit_diagrams(
+    workers: Workers, jobs: Sequence[Job] = JOBS
+) -> dict[tuple[str, int], Future[Diagram]]:
+    """Begin each family of some jobs, the longest jobs first; see `joined`."""
     scene_system("one_dof")  # fail early, before any process is started
-    return {job.name: workers.submit(job.name, run_job, job.name) for job in jobs}
+    return {
+        (job.name, family): workers.submit(f"{job.name}.{family}", run_job, job.name, family)
+        for job in jobs
+        for family in job.families
+    }

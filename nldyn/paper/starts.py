@@ -19,7 +19,6 @@ import numpy as np
 from nldyn.branch import Branch
 from nldyn.continuation import ContinuationOptions
 from nldyn.diagrams import Collector, Diagram, Progress, middle_orbit
-from nldyn.fixed_point_index import index_note
 from nldyn.flow import flow_of
 from nldyn.linear import Real
 from nldyn.orbit import check_observe, stroboscopic
@@ -111,7 +110,7 @@ def follow_starts(
     observe = check_observe(system, None)
     box = Collector(flow, range_hz, observe, options, progress or (lambda what, hz: None))
     longest, most = doubled
-    wanted = max(LONGEST, longest // 2)
+    wanted = longest_whole(longest)
     lost = 0
     for start in starts:
         omega = 2.0 * math.pi * start.frequency_hz
@@ -123,9 +122,14 @@ def follow_starts(
         box.follow(orbit, longest, wanted, most)
         if not whole:
             keep_numbers(box.branches[count:])
-    notes = [f"from {len(starts)} starts, {lost} of which lead to no orbit"]
-    notes.append(index_note(box.branches, range_hz, wanted))
-    return Diagram(tuple(box.branches), range_hz, observe, (*notes, *box.notes))
+    periods = ", ".join(map(str, sorted({start.period for start in starts})))
+    note = f"from {len(starts)} starts of period {periods}, {lost} of which lead to no orbit"
+    return Diagram(tuple(box.branches), range_hz, observe, (note, *box.notes))
+
+
+def longest_whole(longest: int) -> int:
+    """Longest period of branches followed to their ends, so that their flips are followed, too."""
+    return max(LONGEST, longest // 2)
 
 
 def keep_numbers(branches: Sequence[Branch]) -> None:

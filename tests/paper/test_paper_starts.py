@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from nldyn import ContinuationOptions, ExploreOptions, explore, index_sum
+from nldyn.continuation import broken_off
+from nldyn.diagrams import middle_orbit
 from nldyn.fixed_point_index import index_note
 from nldyn.flow import FlowMap
-from nldyn.paper.jobs import job_named, scene_system
+from nldyn.paper.jobs import LONG, job_named, joined, scene_system
 from nldyn.paper.search import MODELS, known_branches, main, search, search_by_detour
 from nldyn.paper.starts import follow_starts, read_starts, starts_path, write_starts
 from nldyn.search import orbit_near
@@ -50,10 +52,8 @@ def test_what_is_followed_from_starts_is_what_the_search_found(found, tmp_path):
     for branch in found.branches:
         middle = branch.points[len(branch.points) // 2]
         assert sum(other.contains(middle) for other in again.branches) == 1
-    assert again.notes[:2] == (
-        f"from {len(starts)} starts, 0 of which lead to no orbit",
-        "indices of the fixed points of P to P^3 add up to one from 35.5 to 36.5 Hz",
-    )
+    first = f"from {len(starts)} starts of period 1, 2, 3, 0 of which lead to no orbit"
+    assert again.notes[0] == first
 
 
 def test_a_missing_branch_is_told_by_its_indices(found):
@@ -72,7 +72,28 @@ def test_a_start_that_leads_nowhere_is_counted(found, tmp_path):
         scene_system("two_dof_xi_0.01"), read_starts("some", tmp_path), found.range_hz,
         ContinuationOptions(), WITHOUT_DOUBLED,
     )  # fmt: skip
-    assert again.notes[0] == "from 2 starts, 1 of which lead to no orbit"
+    assert again.notes[0].startswith("from 2 starts of period ")
+    assert again.notes[0].endswith(", 1 of which lead to no orbit")
+
+
+def test_families_followed_apart_are_the_diagram_followed_at_once(found, monkeypatch, tmp_path):
+    """Flips lead from periods 1 and 2 to 4, but not from period 3 to these or back."""
+    name = "two_dof_xi_0.01"
+    job = replace(job_named(name), range_hz=found.range_hz, doubled=(4, 10))
+    write_starts(starts_path(name, tmp_path), found.branches)
+    starts = read_starts(name, tmp_path)
+    monkeypatch.setattr("nldyn.paper.jobs.JOBS", (job,))
+    monkeypatch.setattr("nldyn.paper.jobs.read_starts", lambda name: starts)
+    assert job.families == (1, 3)
+    (whole,) = joined({(name, family): job.run(family) for family in job.families}).values()
+    once = follow_starts(job.system(), starts, job.range_hz, LONG, job.doubled)
+    assert sorted(b.period for b in whole.branches) == sorted(b.period for b in once.branches)
+    for branch in once.branches:
+        assert any(other.contains(middle_orbit(branch)) for other in whole.branches)
+    assert len({branch.name for branch in whole.branches}) == len(whole.branches)
+    assert whole.notes[-1].endswith("of P to P^3 add up to one from 35.5 to 36.5 Hz")
+    ends = sum(len(broken_off(branch)) for branch in whole.branches)
+    assert whole.notes[0] == f"{ends} ends of branches broken off: 10 points"
 
 
 @pytest.fixture
@@ -118,7 +139,7 @@ def test_the_command_tells_all_notes(two_known, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["search", str(folder), name, "--detour", "0.5", "1.2"])
     main()
     first, *others, last = capsys.readouterr().out.splitlines()
-    assert first == f"{name}: from 2 starts, 0 of which lead to no orbit"
+    assert first == f"{name}: from 2 starts of period 2, 3, 0 of which lead to no orbit"
     assert any(note.startswith("indices of the fixed points of P to P^3 ") for note in others)
     assert last.startswith("at 0.5 of the damping and 1.2 of the excitation: ")
 
