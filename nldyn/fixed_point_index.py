@@ -222,7 +222,7 @@ def index_note(branches: Sequence[Branch], range_hz: tuple[float, float], longes
     told = f"{NOTE}{powers} add up to one from {range_hz[0]:g} to {range_hz[1]:g} Hz"
     wrong = []
     for n in range(1, longest + 1):
-        gaps = index_gaps(branches, range_hz, n)
+        gaps = index_gaps(branches, range_hz, n) if branches else [range_hz]
         if gaps:
             ranges = f"in {len(gaps)} ranges " if len(gaps) > 1 else ""
             wrong.append(f"{_power(n)} {ranges}from {gaps[0][0]:.7g} to {gaps[-1][1]:.7g} Hz")

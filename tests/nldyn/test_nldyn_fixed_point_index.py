@@ -57,6 +57,11 @@ def test_no_piece_of_a_crossing_branch_is_missing_beside_the_branch_point():
         assert index_sum(found.diagram.branches, frequency, 1) == 1
 
 
+def test_the_note_tells_that_all_is_missing_where_there_is_no_branch():
+    told = index_note([], (28.0, 60.0), 1)
+    assert " but for P from 28 to 60 Hz: orbits are missing" in told
+
+
 @settings(max_examples=40, deadline=None)
 @given(share=st.floats(0.001, 0.999))
 def test_the_harmonic_branch_has_the_sum_one_at_every_frequency(harmonic_branch, share):
