@@ -211,10 +211,13 @@ def checkpoint_of_several(
             )
     known = len(finished)
     held: list[Branch] = []
+    written = bool(earlier)
 
     def write_new(branches: Sequence[Branch]) -> None:
-        if held or len(branches) > known:
+        nonlocal written
+        if written or len(branches) > known:
             write([*held, *branches[known:]])
+            written = True
 
     return Checkpoint(write_new, finished, earlier, held=held)
 

@@ -104,16 +104,22 @@ class Diagram:
 
 
 def check_known(known: Diagram, flow: FlowMap) -> None:
-    """Raise unless a diagram is sound, and all of its branches are of this flow map."""
+    """Raise unless a diagram's branches are of this flow map and were followed over its range."""
     from nldyn.store import same_flow
 
-    check_range(known.range_hz)
+    low, high = check_range(known.range_hz)
     check_branches("known: branches", known.branches)
     check_types(**{"known: notes": (known.notes, tuple)})
     check_observe(flow.system, known.observe)
     for branch in known.branches:
         if not same_flow(branch.points[0].problem.flow, flow):
             raise SystemModelError(f"known: branch {branch.name} is of another system or accuracy")
+        a, b = branch.course.range_hz if branch.course else (low, high)
+        if not a <= low < high <= b:
+            raise SystemModelError(
+                f"known: branch '{branch.name}' was followed from {a:g} to {b:g} Hz, not over the "
+                f"range of the diagram, {low:g} to {high:g} Hz"
+            )
 
 
 @dataclass

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.branch import Branch, check_branches
+from nldyn.branch import CLOSED, Branch, check_branches
 from nldyn.continuation import check_range
 from nldyn.errors import SystemModelError, check_frequency, check_whole
 from nldyn.linear import Real
@@ -78,11 +79,12 @@ def index_gaps(
 ) -> list[tuple[float, float]]:
     """Ranges of frequency in which the indices of the fixed points of Pⁿ do not add up to one.
 
-    Along each branch the index is that of the computed orbits; it changes at folds, branch points
-    and, for even multiples of the branch's period, at flips. So the sum is known all over the
+    Along each branch the index is that of the computed orbits; it changes at folds, where branches
+    cross and, for even multiples of the branch's period, at flips. So the sum is known all over the
     range, without solving for any orbit. Within the ranges given orbits are missing, see
-    `index_sum`. Ranges narrower than 1e-8 of the frequency are left out: a branch may not end
-    quite at the flip where it is born.
+    `index_sum`, or a closed branch that was broken off, behind where it had begun, is there twice.
+    Ranges narrower than 1e-8 of the frequency are left out: a branch may not end quite at the flip
+    where it is born.
 
     Parameters
     ----------
@@ -166,7 +168,7 @@ def _checked(
     if not all(same_flow(branch.nodes[0].orbit.problem.flow, flow) for branch in branches):
         raise SystemModelError(f"{caller}: the branches must be of one system and accuracy")
     counted = [branch for branch in branches if period % branch.period == 0]
-    if counted and not is_damped(flow.system):
+    if not is_damped(flow.system):
         raise SystemModelError(
             f"{caller}: the indices add up to one only where every mode is damped, but one is not"
         )
@@ -188,22 +190,29 @@ def _along(branch: Branch, times: int) -> tuple[Real, NDArray[np.int_]]:
     """Values of ln ω at the places of a branch, and the index between each and the next one.
 
     It is that of the end whose multipliers are clear of where it changes, or follows from what is
-    next to it along the branch.
+    next to it along the branch. At a branch point it changes unless what is clear on both sides
+    says that it does not: a branch that leaves there to one side only comes back with the same.
     """
     places = list(branch.places)
-    if branch.closed:
+    if branch.stop_reasons[1] == CLOSED:
         places[-1] = places[0]  # beyond which it lies
     changing = {"LP", "BP", "PD"} if times % 2 == 0 else {"LP", "BP"}
-    changes = {id(s.point) for s in branch.special_points if s.kind in changing}
-    turn = [-1 if id(place) in changes else 1 for place in places]
+    special = {id(s.point): s.kind for s in branch.special_points if s.kind in changing}
+    kinds = [special.get(id(place), "") for place in places]
+    turn = [-1 if kind else 1 for kind in kinds]
     clear = [
-        _distance(place.orbit, times) if sign == 1 else 0.0
-        for place, sign in zip(places, turn, strict=True)
+        0.0 if kind else _distance(place.orbit, times)
+        for place, kind in zip(places, kinds, strict=True)
     ]
     signs = []
     for i in range(len(places) - 1):
         best = i if clear[i] >= clear[i + 1] else i + 1
         signs.append(index(places[best].orbit, times) if clear[best] > CLEAR else 0)
+    known = [i for i, sign in enumerate(signs) if sign]
+    for a, b in pairwise(known):
+        crossings = [i for i in range(a + 1, b + 1) if kinds[i] == "BP"]
+        if crossings and signs[a] * math.prod(turn[a + 1 : b + 1]) != signs[b]:
+            turn[crossings[0]] = 1
     for i in range(1, len(signs)):
         signs[i] = signs[i] or signs[i - 1] * turn[i]
     for i in range(len(signs) - 2, -1, -1):
@@ -213,7 +222,8 @@ def _along(branch: Branch, times: int) -> tuple[Real, NDArray[np.int_]]:
 
 def _distance(orbit: Orbit, times: int) -> float:
     """How far an orbit is from where its index changes: the smallest of |1 - μᵢ^times|."""
-    return float(np.abs(orbit.multipliers**times - 1.0).min())
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(np.nanmin(np.abs(orbit.multipliers**times - 1.0), initial=math.inf))
 
 
 def index_note(branches: Sequence[Branch], range_hz: tuple[float, float], longest: int) -> str:
@@ -225,7 +235,7 @@ def index_note(branches: Sequence[Branch], range_hz: tuple[float, float], longes
         gaps = index_gaps(branches, range_hz, n) if branches else [range_hz]
         if gaps:
             ranges = f"in {len(gaps)} ranges " if len(gaps) > 1 else ""
-            wrong.append(f"{_power(n)} {ranges}from {gaps[0][0]:.7g} to {gaps[-1][1]:.7g} Hz")
+            wrong.append(f"{_power(n)} {ranges}from {gaps[0][0]:.10g} to {gaps[-1][1]:.10g} Hz")
     if not wrong:
         return told
     return f"{told} but for {', '.join(wrong)}: orbits are missing, or a branch was broken off"

@@ -65,7 +65,7 @@ class Job:
             return (1,)
         return tuple(sorted({odd_part(start.period) for start in read_starts(self.name)}))
 
-    def run(self, family: int = 1, progress: Progress | None = None) -> Diagram:
+    def run(self, family: int, progress: Progress | None = None) -> Diagram:
         """Compute the diagram, or of one with starts the branches of one family."""
         if self.doubled is not None:
             starts = [s for s in read_starts(self.name) if odd_part(s.period) == family]

@@ -3,9 +3,9 @@
 Beside the branches of the starts that are known, those in the directory or else the ones that are
 kept with the package, it finds others, writes the starts of all into the directory, and reports how
 many may be missing. With ``--detour DAMPING EXCITATION`` it does not simulate, but goes by way of a
-system with these factors, see `by_detour`. The directory keeps what is found, and the same command
-goes on where it was interrupted (but for following the starts); once it has ended, it looks for
-more beside what it has found.
+system with these factors, see `by_detour`. The directory keeps what is found, up to a gigabyte for
+each search, and the same command goes on where it was interrupted (but for following the starts);
+once it has ended, it looks for more beside what it has found, from other random states.
 """
 
 from __future__ import annotations
@@ -43,18 +43,20 @@ MODELS = tuple(job.name for job in JOBS if job.doubled)
 def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Exploration:
     """Explore a model, and write the starts that it gives.
 
-    The states at random differ between searches that begin beside different starts.
+    The states at random differ between searches, also of those that begin beside the same starts.
     """
     job = job_named(name)
     with progress_line() as report:
         known, place, seed = known_branches(job, folder, report)
+        ended = len(list(folder.glob(f"{place.stem}.searched-*.h5")))
         kept = place.with_suffix(".searched.h5")
         with told_what_is_kept(kept):
             found = explore(
-                job.system(), job.range_hz, LONGEST, effort=replace(effort, seed=seed),
+                job.system(), job.range_hz, LONGEST, effort=replace(effort, seed=seed + ended),
                 options=LONG, known=known, progress=report, checkpoint=kept,
             )  # fmt: skip
     keep(found.diagram, job, folder)
+    kept.rename(place.with_suffix(f".searched-{ended + 1}.h5"))
     return found
 
 
@@ -78,12 +80,15 @@ def known_branches(job: Job, folder: Path, progress: Progress) -> tuple[Diagram,
     path = starts_path(job.name, folder)
     starts = read_starts(job.name, folder) if path.exists() else read_starts(job.name)
     place, seed = branches_path(job, folder, starts)
-    if not (place.exists() and _is_of(load_diagram(place), job)):
+    if not place.exists():
         doubled = (LONGEST, LONG.max_points)
         system = job.system()
         known = follow_starts(system, starts, job.range_hz, LONG, doubled, progress, whole=True)
         known.save(place)
-    return load_diagram(place), place, seed
+    known = load_diagram(place)
+    if not _is_of(known, job):
+        raise SystemModelError(f"{folder}: {place.stem}* are of another model; delete them")
+    return known, place, seed
 
 
 def keep(found: Diagram, job: Job, folder: Path) -> None:

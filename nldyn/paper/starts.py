@@ -105,6 +105,11 @@ def follow_starts(
         Called as ``progress(what, frequency_hz)``.
     whole : bool
         Whether the branches are to be followed any further; if not, see `keep_numbers`.
+
+    Returns
+    -------
+    Diagram
+        The first note tells how many starts there were, and how many of them lead to no orbit.
     """
     flow = flow_of(system)
     observe = check_observe(system, None)

@@ -133,19 +133,38 @@ def test_interrupted_it_goes_on_with_what_it_has_found(harmonic, found, tmp_path
     assert np.array_equal(resumed.branches[1].frequency_hz, found.branches[1].frequency_hz)
 
 
-def test_a_branch_that_repeats_a_known_one_is_not_kept(harmonic, monkeypatch, tmp_path):
-    monkeypatch.setattr(Collector, "_repeats", lambda *_: True)
+@pytest.fixture
+def all_repeated(monkeypatch):
+    """Every branch that is followed in the system itself turns out to repeat a known one."""
+    repeats = Collector._repeats
+    monkeypatch.setattr(
+        Collector, "_repeats", lambda box, b: box.checkpoint._write is not None or repeats(box, b)
+    )
+
+
+def test_a_branch_that_repeats_a_known_one_is_not_kept(harmonic, all_repeated, tmp_path):
     place = tmp_path / "found.h5"
-    assert len(by_detour(harmonic, max_period=1, spacing=0.1, checkpoint=place).branches) == 1
+    done = by_detour(harmonic, max_period=1, spacing=0.1, checkpoint=place)
+    assert not re.search(r" 0 of \d+ orbits carried back", done.notes[-1])
+    assert len(done.branches) == 1
     assert not place.exists()
 
 
+def test_a_branch_that_repeats_a_known_one_does_not_stay_in_the_file(
+    harmonic, all_repeated, monkeypatch, tmp_path
+):
+    monkeypatch.setattr("nldyn.checkpoint.PAUSE", 0.0)
+    monkeypatch.setattr("nldyn.checkpoint.SHARE", 0.0)
+    place = tmp_path / "found.h5"
+    by_detour(harmonic, max_period=1, spacing=0.1, checkpoint=place)
+    assert load_branches(place) == []
+
+
 def test_a_branch_of_the_file_that_turns_out_to_be_known_is_not_added(
-    harmonic, found, monkeypatch, tmp_path
+    harmonic, found, all_repeated, tmp_path
 ):
     place = tmp_path / "found.h5"
     save_branches(place, found.branches[1:])
-    monkeypatch.setattr(Collector, "_repeats", lambda *_: True)
     done = by_detour(harmonic, 0.95, max_period=1, spacing=0.5, checkpoint=place)
     assert len(done.branches) == 1
 

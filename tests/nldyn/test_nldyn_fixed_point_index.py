@@ -57,6 +57,19 @@ def test_no_piece_of_a_crossing_branch_is_missing_beside_the_branch_point():
         assert index_sum(found.diagram.branches, frequency, 1) == 1
 
 
+@pytest.mark.parametrize("first_step", [0.007, 0.02])
+def test_there_is_no_gap_beside_the_pitchforks_of_a_broken_symmetry(first_step):
+    """The index of the branch that leaves there to one side does not change."""
+    stops = [Stop.linear("m", 1e6, gap=1e-3, direction=side) for side in (1, -1)]
+    system = System.from_modal(
+        [10.0], {"m": [1.0]}, modal_damping=0.1, stops=stops, excitation=[HarmonicForce("m", 3.0)]
+    )
+    options = ContinuationOptions(first_step=first_step)
+    found = diagram(system, (6.0, 10.0), (1,), search_points=3, options=options)
+    assert [s.kind for b in found.branches for s in b.special_points].count("BP") == 4
+    assert index_gaps(found.branches, found.range_hz) == []
+
+
 def test_the_note_tells_that_all_is_missing_where_there_is_no_branch():
     told = index_note([], (28.0, 60.0), 1)
     assert " but for P from 28 to 60 Hz: orbits are missing" in told
@@ -89,7 +102,7 @@ def test_the_note_tells_for_each_power_where_orbits_are_missing(doubled):
     harmonic = [branch for branch in doubled.branches if branch.period == 1]
     (flip,) = [s.frequency_hz for s in harmonic[0].special_points if s.kind == "PD"]
     assert index_gaps(harmonic, (low, high), 2) == [pytest.approx((flip, high), rel=1e-12)]
-    where = f"P^2 from {flip:.7g} to 60 Hz"
+    where = f"P^2 from {flip:.10g} to 60 Hz"
     told = index_note(harmonic, (low, high), 3)
     assert told.startswith("indices of the fixed points of P to P^3 add up to one from 28 to 60 ")
     assert told.endswith(f" but for {where}: orbits are missing, or a branch was broken off")
