@@ -17,6 +17,7 @@ from nldyn.orbit import ConvergenceError, Orbit
 # across a grazing, where the first jumps; nearer to one than this they are not computed.
 DIFFERENCE = 1e-3
 SHORTEST_DIFFERENCE = 1e-5
+UNIT_PRODUCT = 1e-6  # distance from 1 of products on a curve where they are 1
 DOUBLE = 1e-6  # product of unit null vectors from which a multiplier counts as double
 
 
@@ -86,8 +87,7 @@ def along_flips(condition: Singular, orbit: Orbit, mu: Complex) -> dict[str, flo
 
 def along_tori(_: Singular | None, orbit: Orbit | None, mu: Complex) -> dict[str, float]:
     """Tests on a Neimark-Sacker curve: strong resonances, and what the other multipliers do."""
-    pair = torus_pair(mu)
-    cosine = 0.5 * float((mu[pair[0]] + mu[pair[1]]).real)
+    pair, cosine = torus_pair(mu), torus_cosine(mu)
     others = np.delete(mu, pair)
     tests = {
         "R1": 1.0 - cosine,
@@ -116,6 +116,23 @@ def torus_pair(mu: Complex) -> list[int]:
     i, j = np.triu_indices(mu.size, 1)
     best = int(np.argmin(np.abs(mu[i] * mu[j] - 1.0)))
     return [int(i[best]), int(j[best])]
+
+
+def torus_cosine(mu: Complex) -> float:
+    """Half the sum of the two multipliers whose product is nearest to 1.
+
+    The cosine of their angle on the unit circle, beyond ±1 at a neutral saddle.
+    """
+    pair = torus_pair(mu)
+    return 0.5 * float((mu[pair[0]] + mu[pair[1]]).real)
+
+
+def cosine_near(mu: Complex, cosine: float) -> float:
+    """The same of the pair, among all whose product is 1, that has it nearest to a value."""
+    i, j = np.triu_indices(mu.size, 1)
+    off = np.abs(mu[i] * mu[j] - 1.0)
+    found = 0.5 * (mu[i] + mu[j]).real[off <= max(UNIT_PRODUCT, off.min())]
+    return float(found[np.argmin(np.abs(found - cosine))])
 
 
 def is_torus(mu: Complex) -> bool:

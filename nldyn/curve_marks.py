@@ -20,7 +20,8 @@ from nldyn.parameter_values import FREQUENCY, Chart, checked_parameter, value_of
 from nldyn.parameters import Parameter
 from nldyn.special import LocateError, leaves_circle, root, touching_extremes
 
-POLE = 1e-3  # of its values beside it: what a test is not below where it changes sign at a pole
+POLE = 1e-3  # of its values beside it: what a test is not below where it has no root but a pole
+COEFFICIENTS = ("CP", "GPD")  # have poles where a curve meets another
 
 
 class Located(Protocol):
@@ -172,8 +173,10 @@ def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], lis
         try:
             sigma, error = root(lambda x, test=test: test(chord.at(x)))  # type: ignore[misc]
             point = chord.at(sigma)
-            if name == "GPD" and abs(test(point)) > POLE * max(abs(test(a)), abs(test(b))):
-                continue  # the coefficient has a pole where the flip meets a fold
+            if abs(test(point)) > POLE * max(abs(test(a)), abs(test(b))):
+                if name not in COEFFICIENTS:
+                    notes.append(f"{name} near {_place(a)} may be missing: its test jumps there")
+                continue
             if _is_true(name, point):
                 found.append((sigma, _marked(name, point, error * (b.arclength - a.arclength))))
         except (LocateError, ConvergenceError) as error:

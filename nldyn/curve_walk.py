@@ -21,7 +21,7 @@ from nldyn.bordered import (
     tangent_surface,
 )
 from nldyn.branch import NOT_FINISHED, SHORT_STEP
-from nldyn.codimension import codimension_tests, is_torus
+from nldyn.codimension import codimension_tests, cosine_near, is_torus, torus_cosine
 from nldyn.conditions import Both, BranchPoint, Grazing, Singular
 from nldyn.continuation import ContinuationOptions, passed_flip
 from nldyn.errors import SystemModelError
@@ -41,6 +41,7 @@ BEHIND = (1e-5, 1e-6, 1e-7)  # extremes, relative to the orbit, of a first point
 ALONG = 1e-12  # part of a unit tangent that is rounding
 AT_POINT = 1e-6  # share of a step within which two points are one
 CORNER_STEP = 1e-3  # a step shorter than this may have met a corner
+TURN = 0.1  # of the cosine of a pair on the unit circle from point to point
 
 
 @dataclass(frozen=True, eq=False)
@@ -424,6 +425,8 @@ class CurveWalk:
         angle = math.acos(min(max(cosine, -1.0), 1.0))
         if angle > self.options.max_angle:
             return None
+        if is_torus_curve(here.condition) and self._other_pair(here.orbit, there.orbit):
+            return None
         touched = there.orbit.impacts != here.orbit.impacts
         grazes = isinstance(here.condition, Grazing)
         if touched and not grazes:
@@ -432,6 +435,15 @@ class CurveWalk:
             if root or step > self.options.grazing_step:
                 return None
         return there, angle, miss
+
+    @staticmethod
+    def _other_pair(a: Orbit, b: Orbit) -> bool:
+        """Whether the pair of multipliers whose product is 1 cannot be that of the point before.
+
+        The condition of a Neimark-Sacker point holds for neutral saddles, too, and some may be near.
+        """
+        before = torus_cosine(a.multipliers)
+        return abs(cosine_near(b.multipliers, before) - before) > TURN
 
     def _left_at_once(self) -> str:
         """Name of a parameter at the end of its range, beyond which the curve would begin."""
