@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
     from nldyn.convergence import Study, converge
     from nldyn.curve_marks import LocatedPoint, refine_special
-    from nldyn.curve_plots import plot_curves
+    from nldyn.curve_plots import plot_curves, plot_orbit_curve
     from nldyn.curve_store import load_curve, load_curves, save_curves
     from nldyn.curves import Curve, continue_constant, continue_in, continue_special
     from nldyn.detour_search import by_detour
@@ -84,7 +84,7 @@ _HOMES = {
     "continuation": "ContinuationOptions Walk continue_branch switch_at_flip",
     "convergence": "Study converge",
     "curve_marks": "LocatedPoint refine_special",
-    "curve_plots": "plot_curves",
+    "curve_plots": "plot_curves plot_orbit_curve",
     "curve_store": "load_curve load_curves save_curves",
     "curves": "Curve continue_constant continue_in continue_special",
     "detour_search": "by_detour",
@@ -210,6 +210,7 @@ __all__ = [
     "plot_curves",
     "plot_diagram",
     "plot_history",
+    "plot_orbit_curve",
     "plot_phase_portrait",
     "plot_section",
     "plot_spectra",

@@ -40,8 +40,8 @@ from nldyn.system import System
 # bends on a shorter length, its second difference against the first tells: h g''/g' is 2 BENT at
 # most, so that h² g(3)/6 is about 1e-4 of the slope if g(3)/g' is about the square of g''/g'. No
 # bend is seen in rounding. A difference to one side is wrong by h g''/2, so it is always short.
-# The ends of motions change more smoothly with a parameter, but for light contacts; what the flow map
-# errs by changes as smoothly, and rounding of 1e-13 allows short differences.
+# The ends of motions change smoothly with a parameter, but on a short length beside light contacts;
+# so does what the flow map errs by, and rounding of 1e-13 allows short differences.
 DIFFERENCE = 1e-4
 END_DIFFERENCE = 1e-6
 LARGEST_CHANGE = 1e-3
@@ -422,9 +422,10 @@ def correct(
             if not step < 2.0:
                 raise ConvergenceError("Newton's method diverged")
             if step <= rtol or (step < ROUNDING and step > 0.3 * before):
-                found = Corrected(family.at(point), along, step, iteration, "")
+                at = family.at(point)
+                found = Corrected(at, along, step, iteration, "")
                 if found.residual(condition) < SATISFIED:
-                    return found
+                    return found if row is None else replace(found, along=_direction(at, condition))
         except (ConvergenceError, SystemModelError, np.linalg.LinAlgError, OverflowError) as error:
             return Corrected(family.at(point), along, step, iteration, str(error))
     failure = f"Newton's method did not converge, last relative step {step:.1e}"
@@ -457,6 +458,12 @@ def _newton_step(
     if not np.all(np.isfinite(change)):
         raise ConvergenceError("singular Jacobian")
     return change, surface @ _kernel(by_surface), slopes
+
+
+def _direction(at: Evaluation, condition: Condition) -> Real:
+    """The direction of a curve; where the surface turns fast, slopes of before do not tell it."""
+    _, surface = tangent_surface(at)
+    return np.asarray(surface @ _kernel(gradient(at, surface, condition)))
 
 
 def _kernel(by_surface: Real) -> Real:

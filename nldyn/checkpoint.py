@@ -103,8 +103,10 @@ class Checkpoint(Keeper["Branch"]):
     ----------
     write, finished, earlier
         As for `Keeper`.
-    strict : str
-        Name of the file, if it shall hold nothing but the computation asked for.
+    name : str
+        Of the file, if it shall hold nothing but the computation asked for.
+    several : bool
+        Whether that is one of several branches, of which the file then holds the first.
     held : list, optional
         Branches of the file that are known otherwise; see `new_branches`.
     """
@@ -114,11 +116,13 @@ class Checkpoint(Keeper["Branch"]):
         write: Callable[[Sequence[Branch]], None] | None = None,
         finished: list[Branch] | None = None,
         earlier: Sequence[Branch] = (),
-        strict: str = "",
+        name: str = "",
+        several: bool = False,
         held: list[Branch] | None = None,
     ) -> None:
         super().__init__(write, finished, earlier)
-        self._strict = strict
+        self._name = name
+        self._several, self._begun = several, False
         self._held = [] if held is None else held
 
     def branch_from(self, orbit: Orbit, *courses: Course) -> Branch | None:
@@ -129,15 +133,17 @@ class Checkpoint(Keeper["Branch"]):
         Raises
         ------
         SystemModelError
-            If the file is strict and holds something else.
+            If the file holds something else.
         """
         for course in courses:
             for number, branch in enumerate(self._earlier):
                 if _is_begun_at(branch, orbit, course):
                     return self._taken(number)
-        if self._strict and self._earlier:
+        elsewhere = self._earlier and not (self._several and self._begun)
+        self._begun = True
+        if self._name and elsewhere:
             raise SystemModelError(
-                f"{self._strict}: holds another continuation (other system, start, range or "
+                f"{self._name}: holds another continuation (other system, start, range or "
                 "options); choose another file, or delete it"
             )
         return None
@@ -153,6 +159,7 @@ class Checkpoint(Keeper["Branch"]):
 
     def _taken(self, number: int) -> Branch:
         """A branch of the file, which counts as the one at work from now on."""
+        self._begun = True
         branch = self._earlier[number]
         self.work = lambda: branch
         del self._earlier[number]
@@ -179,7 +186,7 @@ def checkpoint_at(
     if place is None:
         return Checkpoint()
     write, earlier = _file(place, system)
-    return Checkpoint(write, earlier=earlier, strict=str(place))
+    return Checkpoint(write, earlier=earlier, name=str(place))
 
 
 def checkpoint_of_several(
@@ -219,7 +226,7 @@ def checkpoint_of_several(
             write([*held, *branches[known:]])
             written = True
 
-    return Checkpoint(write_new, finished, earlier, held=held)
+    return Checkpoint(write_new, finished, earlier, name=str(place), several=True, held=held)
 
 
 def _file(

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from nldyn.bordered import Condition, Free, OrbitFamily, correct
+from nldyn.bordered import Condition, Free, OrbitFamily, correct, length_unit
 from nldyn.branch import check_special
 from nldyn.codimension import is_torus, torus_pair
-from nldyn.conditions import BranchPoint, Grazing, Singular, defined_by
+from nldyn.conditions import Both, BranchPoint, Grazing, Singular, defined_by
 from nldyn.curve_walk import CurvePoint, between, curve_point, is_torus_curve
 from nldyn.errors import check_whole
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit
 from nldyn.parameter_values import FREQUENCY, Chart, checked_parameter, value_of
 from nldyn.parameters import Parameter
-from nldyn.special import LocateError, leaves_circle, root, touching_extremes
+from nldyn.shooting import metric_length
+from nldyn.special import LocateError, Touch, leaves_circle, root, touching_extremes
 
 POLE = 1e-3  # of its values beside it: what a test is not below where it has no root but a pole
+ALIKE = 1e-6  # share of a step within which touches are those of one orbit by symmetry
 COEFFICIENTS = ("CP", "GPD")  # have poles where a curve meets another
 
 
@@ -181,10 +183,80 @@ def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], lis
                 found.append((sigma, _marked(name, point, error * (b.arclength - a.arclength))))
         except (LocateError, ConvergenceError) as error:
             notes.append(f"{name} near {_place(a)} may be missing: {error}")
+    for touches in _touches(a, b):
+        try:
+            found.append(_touched(touches, chord))
+        except (LocateError, ConvergenceError) as error:
+            name = _touch_name(a.condition)
+            notes.append(f"{name} near {_place(a)} may be missing: {error}")
     if b.corner:
         found.append((1.0, _marked(b.corner, b, b.found.step)))
     found.sort(key=lambda pair: pair[0])
     return [mark for _, mark in found], notes
+
+
+def _touched(touches: Sequence[Touch], chord: CurveChord) -> tuple[float, LocatedPoint]:
+    """Where a stop is touched between two points of a curve.
+
+    At a branch point the curve may have a corner there, before which Newton's method on planes
+    steps to and fro; then it is sought with both conditions.
+
+    Raises
+    ------
+    LocateError, ConvergenceError
+        If none of the touches, which are alike, is found.
+    """
+    name, touch = _touch_name(chord.first.condition), touches[0]
+    try:
+        sigma, error = root(lambda x: touch.depth(chord.at(x)))  # type: ignore[arg-type]
+        length = chord.last.arclength - chord.first.arclength
+        return sigma, _marked(name, chord.at(sigma), error * length)
+    except (LocateError, ConvergenceError):
+        for other in touches:
+            met = _met_at_touch(name, chord, other)
+            if met is not None:
+                return met
+        raise
+
+
+def _met_at_touch(name: str, chord: CurveChord, touch: Touch) -> tuple[float, LocatedPoint] | None:
+    """The point where a stop is touched, by Newton's method for both conditions."""
+    a, b = chord.first, chord.last
+    sigma, family = _share(touch, a, b), a.found.at.family
+    guess = between(a, b, sigma)
+    grazing = Grazing(touch.output, touch.is_maximum, touch.phase, length_unit(a.orbit))
+    both = Both(a.condition, grazing)
+    found = correct(family, guess, both, max_iterations=25)
+    away = metric_length(family.metric(a.point), found.at.point - guess)
+    if not found.converged or away > b.arclength - a.arclength:
+        return None
+    parameters = tuple(chart.parameter for chart in family.charts)
+    values, residual = found.at.values, found.residual(both)
+    return sigma, LocatedPoint(name, found.orbit, parameters, values, residual, found.step)
+
+
+def _share(touch: Touch, a: CurvePoint, b: CurvePoint) -> float:
+    """Share of the way from a to b at which a stop is touched, by linear interpolation."""
+    before, after = touch.depth(a), touch.depth(b)  # type: ignore[arg-type]
+    return before / (before - after)
+
+
+def _touches(a: CurvePoint, b: CurvePoint) -> list[list[Touch]]:
+    """Touches between two points, those together that a symmetry of the structure exchanges."""
+    condition = a.condition
+    if a.corner or b.corner:
+        return []
+    alike: dict[float, list[Touch]] = {}
+    for touch in touching_extremes(a.orbit, b.orbit):
+        own = isinstance(condition, Grazing) and condition.is_of(
+            touch.output, touch.is_maximum, touch.phase, a.orbit.period
+        )
+        if own:
+            continue
+        share = _share(touch, a, b)
+        near = next((other for other in alike if abs(other - share) < ALIKE), share)
+        alike.setdefault(near, []).append(touch)
+    return list(alike.values())
 
 
 def _changes_of_sign(
@@ -196,20 +268,10 @@ def _changes_of_sign(
         names = [name for name in names if name not in ("NS", "GRNS")]
     if "LP" in names and "BP" in names:  # at a fold both change sign
         names.remove("BP")
-    found: list[tuple[str, Callable[[CurvePoint], float]]] = [
+    return [
         (name, lambda point, name=name: point.tests[name])  # type: ignore[misc]
         for name in names
     ]
-    condition = a.condition
-    if a.corner or b.corner:
-        return found
-    for touch in touching_extremes(a.orbit, b.orbit):
-        own = isinstance(condition, Grazing) and condition.is_of(
-            touch.output, touch.is_maximum, touch.phase, a.orbit.period
-        )
-        if not own:
-            found.append((_touch_name(condition), touch.depth))  # type: ignore[arg-type]
-    return found
 
 
 def _touch_name(condition: Condition) -> str:

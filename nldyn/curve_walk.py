@@ -440,7 +440,7 @@ class CurveWalk:
     def _other_pair(a: Orbit, b: Orbit) -> bool:
         """Whether the pair of multipliers whose product is 1 cannot be that of the point before.
 
-        The condition of a Neimark-Sacker point holds for neutral saddles, too, and some may be near.
+        The condition of a Neimark-Sacker point holds for neutral saddles, too; some may be near.
         """
         before = torus_cosine(a.multipliers)
         return abs(cosine_near(b.multipliers, before) - before) > TURN

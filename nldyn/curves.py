@@ -30,7 +30,7 @@ from nldyn.curve_walk import (
 from nldyn.errors import SystemModelError, check_choice, check_types, is_finite, shown
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
-from nldyn.orbit import ConvergenceError, Orbit, check_minimal
+from nldyn.orbit import ConvergenceError, Orbit, check_minimal, same_orbit
 from nldyn.parameter_values import Chart, checked_parameter, value_of
 from nldyn.parameters import Parameter
 from nldyn.special import LocateError, root
@@ -179,7 +179,7 @@ class Curve:
         return _followed(whole, options, progress, keeper)
 
     def at(self, name: str, value: float) -> list[Orbit]:
-        """All orbits of the curve at which a parameter has a value, corrected there.
+        """All orbits of the curve at which a parameter has a value, corrected there, each once.
 
         Parameters
         ----------
@@ -202,7 +202,11 @@ class Curve:
             )
         which = names.index(name)
         first = self.points[:1] if math.isclose(self.values[0, which], value) else ()
-        return [point.orbit for point in (*first, *passages(self.points, which, value))]
+        found: list[CurvePoint] = []
+        for point in (*first, *passages(self.points, which, value)):
+            if not any(_same_place(point, other) for other in found):
+                found.append(point)
+        return [point.orbit for point in found]
 
 
 def continue_in(
@@ -582,6 +586,11 @@ def _marked(points: Sequence[CurvePoint]) -> tuple[list[LocatedPoint], list[str]
         marks += more
         notes += lost
     return marks, notes
+
+
+def _same_place(a: CurvePoint, b: CurvePoint) -> bool:
+    """Whether two points have the same orbit of the same system."""
+    return np.allclose(a.values, b.values, rtol=1e-8, atol=0.0) and same_orbit(a.orbit, b.orbit)
 
 
 def _start(family: OrbitFamily, orbit: Orbit, condition: Condition) -> CurvePoint:

@@ -110,7 +110,6 @@ def check_known(known: Diagram, flow: FlowMap) -> None:
     low, high = check_range(known.range_hz)
     check_branches("known: branches", known.branches)
     check_types(**{"known: notes": (known.notes, tuple)})
-    check_observe(flow.system, known.observe)
     for branch in known.branches:
         if not same_flow(branch.points[0].problem.flow, flow):
             raise SystemModelError(f"known: branch {branch.name} is of another system or accuracy")
@@ -120,6 +119,7 @@ def check_known(known: Diagram, flow: FlowMap) -> None:
                 f"known: branch '{branch.name}' was followed from {a:g} to {b:g} Hz, not over the "
                 f"range of the diagram, {low:g} to {high:g} Hz"
             )
+    check_observe(flow.system, known.observe)
 
 
 @dataclass

@@ -27,6 +27,10 @@ from nldyn.system import System
 DECAYS = 4.0  # time allowed for settling, over the slowest decay time of the linear part
 FEWEST, UNDAMPED = 30, 600  # periods of it: at least, and where nothing decays
 FINEST_SPACING = 1e-6
+CAN_BE_MISSING = (
+    "may be missing all the same: isolas that no motion came near, and what is stable in small "
+    "basins or between two frequencies; another seed, more rounds or by_detour may find them"
+)
 LARGEST_FACTOR = 100.0  # by which a parameter is changed in search of folds
 
 
@@ -371,7 +375,7 @@ class Exploration:
                 f"motions that did not settle (chaos, longer periods or slow decay): "
                 f"{open_ranges} Hz"
             )
-        return lines + self._folds() + self._cut() + self._indices
+        return lines + self._folds() + self._cut() + self._indices + [CAN_BE_MISSING]
 
     def _rounds(self) -> list[str]:
         """What each round found, and how many branches are still to be expected."""

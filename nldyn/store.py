@@ -868,6 +868,9 @@ def _read_stops(group: _Group, laws: Laws) -> tuple[Stop, ...]:
     numbers = ("stiffness", "exponent", "gap", "direction", "dissipation")
     values = {name: group.array(name, count) for name in (*numbers, "is_against", "has_own_law")}
     trials = group.array("law_trials", *((count, len(TRIALS), 3) if count else (0,)))
+    for i in laws:
+        if i not in range(count) or not values["has_own_law"][i]:
+            raise SystemModelError(f"{group.path}: laws: no stop {i} has a law of its own")
     stops = []
     for i in range(count):
         law = None

@@ -211,6 +211,7 @@ def test_a_law_of_the_users_own_is_passed_again(tmp_path):
     branch.save(path)
     assert_same_branches(load_branch(path, laws={0: hertz}), branch)
     refused(path, "stop 0 at 'middle'", "laws={0: law}")
+    refused(path, "no stop 1 has a law of its own", laws={0: hertz, 1: hertz})
     refused(path, "stop 0 at 'middle'", "is not the one", laws={0: stiffer})
 
 

@@ -142,7 +142,10 @@ def all_repeated(monkeypatch):
     )
 
 
-def test_a_branch_that_repeats_a_known_one_is_not_kept(harmonic, all_repeated, tmp_path):
+def test_a_branch_that_repeats_a_known_one_is_not_kept(
+    harmonic, all_repeated, monkeypatch, tmp_path
+):
+    monkeypatch.setattr("nldyn.checkpoint.PAUSE", 1e9)  # written at the end only
     place = tmp_path / "found.h5"
     done = by_detour(harmonic, max_period=1, spacing=0.1, checkpoint=place)
     assert not re.search(r" 0 of \d+ orbits carried back", done.notes[-1])

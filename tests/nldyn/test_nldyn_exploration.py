@@ -128,6 +128,7 @@ def test_report_tells_what_was_tried(around_37):
     text = around_37.report()
     assert f"simulations at {len(around_37.coverage)} frequencies" in text
     assert "harmonic" in text and "1/3" in text
+    assert "may be missing all the same: isolas that no motion came near" in text
 
 
 def test_repeated_exploration_gives_the_same_branches():
@@ -431,10 +432,12 @@ def test_known_branches_of_something_else_are_refused(harmonic):
         explore(finer, **QUESTION, known=harmonic)
     with pytest.raises(SystemModelError, match="known must be"):
         explore(system_of("one_dof"), **QUESTION, known=harmonic.branches)
+    short = continue_branch(solve_orbit(system_of("one_dof"), 37.0), (36.5, 37.5))
     for change, message in (
         ({"branches": (1,)}, "known: branches must be a list of branches"),
         ({"notes": None}, "known: notes must be"),
         ({"observe": "nose"}, "nose"),
+        ({"branches": (short,)}, "followed from 36.5 to 37.5 Hz, not over the range"),
     ):
         with pytest.raises(SystemModelError, match=message):
             explore(system_of("one_dof"), **QUESTION, known=replace(harmonic, **change))

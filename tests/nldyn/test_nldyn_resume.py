@@ -372,3 +372,17 @@ def test_a_file_of_a_system_with_a_law_of_its_own_is_gone_on_with(tmp_path):
     resumed = continue_branch(start, (15.0, 40.0), checkpoint=path)
     whole = continue_branch(start, (15.0, 40.0))
     assert np.array_equal(resumed.frequency_hz, whole.frequency_hz)
+
+
+def test_a_diagram_does_not_replace_a_branch(one_dof, tmp_path):
+    """Neither one kept while it was computed nor one that was saved; it begins elsewhere."""
+    for name in ("kept.h5", "saved.h5"):
+        path = tmp_path / name
+        kept = path if name == "kept.h5" else None
+        branch = continue_branch(solve_orbit(one_dof, 30.0), (29.0, 31.0), checkpoint=kept)
+        if kept is None:
+            branch.save(path)
+        before = path.read_bytes()
+        with pytest.raises(SystemModelError, match="holds another continuation"):
+            diagram(one_dof, (29.0, 31.0), (1,), checkpoint=path)
+        assert path.read_bytes() == before

@@ -1,0 +1,125 @@
+"""Curves that pass light contacts, neutral saddles and touches of several stops at once."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+
+from nldyn import (
+    HarmonicForce,
+    Parameter,
+    Stop,
+    System,
+    SystemModelError,
+    continue_branch,
+    continue_in,
+    continue_special,
+    plot_orbit_curve,
+    solve_orbit,
+)
+
+SECOND = Parameter("natural_frequency_hz", 1)
+
+
+def two_modes() -> System:
+    """Two modes of which the second one meets a Hertz stop."""
+    return System.from_modal(
+        [10.0, 23.0], {"a": [1.0, 0.6], "b": [0.4, -1.0]}, modal_damping=0.02,
+        stops=[Stop("b", 1e9, gap=5e-4)], excitation=[HarmonicForce("a", 0.5)],
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def harmonic():
+    return continue_branch(solve_orbit(two_modes(), 8.0), (4.0, 45.0))
+
+
+def test_a_flip_is_followed_past_contacts_of_a_few_nanometres(harmonic):
+    """A difference by the mode's frequency reaches across them unless it is short."""
+    flip = [p for p in harmonic.special_points if p.kind == "PD"][2]
+    curve = continue_special(flip, ("frequency_hz", SECOND), ((4.0, 10.15), (20.5, 23.1)))
+    assert all(reason.startswith("end of the range") for reason in curve.stop_reasons)
+    orbit = min(curve.at("natural_frequency_hz", 20.8), key=lambda orbit: orbit.frequency_hz)
+    other = continue_branch(orbit, (orbit.frequency_hz - 1e-3, orbit.frequency_hz + 1e-3))
+    flips = [p.frequency_hz for p in other.special_points if p.kind == "PD"]
+    assert flips == [pytest.approx(orbit.frequency_hz, rel=1e-9)]
+
+
+def test_a_neimark_sacker_curve_does_not_go_over_to_neutral_saddles(harmonic):
+    """Some lie so near to its start that a step of usual length led there."""
+    start = next(p for p in harmonic.special_points if p.kind == "NS")
+    curve = continue_special(start, ("frequency_hz", "gap"), ((4.0, 45.0), (1e-4, 2e-3)))
+    assert curve.stop_reasons == ("becomes a curve of neutral saddles at a resonance",) * 2
+    assert curve.notes == ()
+    assert [mark.kind for mark in curve.marks].count("R1") == 2
+    for mark in curve.marks:
+        mu = mark.orbit.multipliers
+        if mark.kind == "R1":  # both multipliers of a pair
+            assert np.sort(np.abs(mu - 1.0))[1] < 1e-3
+        if mark.kind == "LPNS":
+            assert np.abs(mu - 1.0).min() < 1e-6
+            pair = mu[np.abs(mu.imag) > 1e-3]
+            assert np.abs(np.abs(pair) - 1.0).max() < 1e-6
+    inner = np.array([orbit.multipliers for orbit in curve.orbits[1:-1]])
+    off = np.abs(np.abs(inner) - 1.0) + (np.abs(inner.imag) < 1e-9)
+    assert off.min(axis=1).max() < 1e-6
+
+
+def cubic(depth: float, speed: float) -> tuple[float, float, float]:
+    stiffness, third = 0.5 * (20.0 * math.pi) ** 2, (20.0 * math.pi) ** 2 / 1e-6
+    return stiffness * depth + third * depth**3, stiffness + 3.0 * third * depth**2, 0.0
+
+
+def test_stops_touched_at_once_by_symmetry_are_one_mark():
+    """Two stops with a law of one's own; their contacts are split at one orbit."""
+    stops = [Stop("m", 2e3, 1.0, law=cubic, direction=side) for side in (1, -1)]
+    system = System.from_modal(
+        [10.0], {"m": [1.0]}, modal_damping=0.03, stops=stops,
+        excitation=[HarmonicForce("m", 45.0)],
+    )  # fmt: skip
+    branch = continue_branch(solve_orbit(system, 10.9), (10.6, 10.9))
+    (broken,) = [p for p in branch.special_points if p.kind == "BP"]
+    curve = continue_special(broken, ("frequency_hz", "amplitude"), ((10.0, 11.0), (44.0, 48.0)))
+    assert curve.notes == ()
+    (mark,) = [mark for mark in curve.marks if mark.kind == "GRBP"]
+    for stop in (0, 1):
+        values = mark.orbit.extremes(stop).values
+        assert np.abs(values).min() < 1e-9 * np.abs(values).max()
+
+
+def bilinear() -> System:
+    """One mode and a linear stop as stiff as the mode itself, four times over."""
+    return System.from_modal(
+        [10.0], {"m": [1.0]}, modal_damping=0.03, stops=[Stop.linear("m", 15791.0, gap=1e-3)],
+        excitation=[HarmonicForce("m", 1.0)],
+    )  # fmt: skip
+
+
+def test_a_closed_curve_has_each_orbit_once_at_a_value():
+    branch = continue_branch(solve_orbit(bilinear(), 8.0), (5.0, 20.0))
+    folds = [p for p in branch.special_points if p.kind == "LP"]
+    curve = continue_special(folds[-1], ("frequency_hz", "gap"), ((3.0, 40.0), (1e-4, 5e-3)))
+    found = [orbit.frequency_hz for orbit in curve.at("gap", 1e-3)]
+    assert sorted(found) == pytest.approx(sorted({round(hz, 6) for hz in found}), abs=1e-6)
+    assert len(found) == len({round(hz, 6) for hz in found})
+    beside = [orbit.frequency_hz for orbit in curve.at("gap", 1.0001e-3)]
+    assert len(found) == len(beside)
+
+
+def test_orbits_over_a_parameter_are_drawn_with_their_special_points():
+    curve = continue_in(solve_orbit(bilinear(), 12.2), "gap", (3e-4, 3e-3))
+    kinds = {mark.kind for mark in curve.marks}
+    assert "LP" in kinds
+    ax = plot_orbit_curve(curve)
+    assert ax.get_xlabel() == "gap (mm)"
+    assert ax.get_ylabel().startswith("max |y| at m (")
+    lines = {line.get_label(): line for line in ax.lines if not line.get_label().startswith("_")}
+    assert {"stable", "unstable", "cyclic fold"} <= set(lines)
+    assert lines["stable"].get_linestyle() == "-" != lines["unstable"].get_linestyle()
+    assert to_hex(lines["stable"].get_color()) == to_hex(lines["unstable"].get_color())
+    assert lines["cyclic fold"].get_xdata().size == sum(m.kind == "LP" for m in curve.marks)
+    with pytest.raises(SystemModelError, match="plot_orbit_curve needs a curve in one parameter"):
+        plot_orbit_curve([curve])
