@@ -33,10 +33,12 @@ from nldyn.shooting import metric_length
 RANGE_END = "end of the range of "
 RESONANCE_END = "becomes a curve of neutral saddles at a resonance"
 CLOSED_CURVE = "closed curve"
+VANISHES = "the extreme that grazes meets another one, and both vanish"
 DISSOLVED = "the branch point dissolves, as the symmetry does that brings it about"
 UNFOLDED = 1e-6  # unfolding number from which a branch point has dissolved
 MEETING = 1e-9  # arclength within which a curve and a grazing meet
 MOST_SECANTS = 20
+NEAR_EXTREME = 0.1  # of a radian between two extremes that are about to meet
 BEHIND = (1e-5, 1e-6, 1e-7)  # extremes, relative to the orbit, of a first point behind a corner
 ALONG = 1e-12  # part of a unit tangent that is rounding
 AT_POINT = 1e-6  # share of a step within which two points are one
@@ -295,6 +297,16 @@ def _meeting(
     return None
 
 
+def _extremes_meet(here: CurvePoint) -> bool:
+    """Whether the extreme of a curve of grazings has one of the other kind close by."""
+    if not isinstance(here.condition, Grazing):
+        return False
+    found, full = here.orbit.extremes(here.condition.stop), 2.0 * math.pi * here.orbit.period
+    others = found.phases[found.is_maximum != here.condition.is_maximum]
+    apart = np.abs((others - here.condition.phase + 0.5 * full) % full - 0.5 * full)
+    return bool(apart.min(initial=full) < NEAR_EXTREME)
+
+
 def _grazes_linear(orbit: Orbit) -> bool:
     """Whether the extreme nearest to zero is one of a linear stop."""
     try:
@@ -371,7 +383,9 @@ class CurveWalk:
                             attempt = ahead.pop(0), self.options.max_angle, self.options.max_miss
                     if step < self.options.min_step:
                         self.stop_reason = (
-                            f"{SHORT_STEP}{self.options.min_step:g}: {self._obstacle}"
+                            VANISHES
+                            if _extremes_meet(here)
+                            else f"{SHORT_STEP}{self.options.min_step:g}: {self._obstacle}"
                         )
                         return
             there, angle, miss = attempt

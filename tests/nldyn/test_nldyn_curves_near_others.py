@@ -123,3 +123,19 @@ def test_orbits_over_a_parameter_are_drawn_with_their_special_points():
     assert lines["cyclic fold"].get_xdata().size == sum(m.kind == "LP" for m in curve.marks)
     with pytest.raises(SystemModelError, match="plot_orbit_curve needs a curve in one parameter"):
         plot_orbit_curve([curve])
+
+
+def test_a_curve_of_grazings_tells_where_its_extreme_vanishes():
+    """The minimum that splits a contact meets the maximum beside it: value and slope are zero."""
+    system = System.from_modal(
+        [10.0, 18.56], {"a": [1.4746, -0.3626], "b": [0.5771, 0.7398]}, modal_damping=0.01432,
+        stops=[Stop.linear("b", 36784.0, gap=2.24e-4)], excitation=[HarmonicForce("a", 0.5)],
+    )  # fmt: skip
+    branch = continue_branch(solve_orbit(system, 9.0), (8.9, 9.2))
+    (split,) = [p for p in branch.special_points if p.kind == "GR" and 9.05 < p.frequency_hz < 9.1]
+    curve = continue_special(split, ("frequency_hz", "gap"), ((8.9, 60.0), (2e-4, 2e-3)))
+    assert curve.stop_reasons[1] == "the extreme that grazes meets another one, and both vanish"
+    extremes = curve.orbits[-1].extremes(0)
+    near = np.abs(extremes.values) < 1e-9 * np.abs(extremes.values).max()
+    assert set(extremes.is_maximum[near]) == {True, False}
+    assert np.ptp(extremes.phases[near]) < 0.01
