@@ -342,8 +342,8 @@ class Corrected:
     ----------
     at : Evaluation
         The equations at the last point.
-    along : (N + m,) array
-        Direction of the curve, if one is left free: of no particular length or sense.
+    condition : Condition
+        What was to be met.
     step : float
         Relative length of the last Newton step.
     iterations : int
@@ -353,10 +353,23 @@ class Corrected:
     """
 
     at: Evaluation
-    along: Real
+    condition: Condition
     step: float
     iterations: int
     failure: str
+
+    @cached_property
+    def along(self) -> Real:
+        """Direction (N + m,) of the curve, if one is left free: of no particular length or sense.
+
+        Raises
+        ------
+        ConvergenceError
+            If the equations have no derivatives there.
+        """
+        _, surface = tangent_surface(self.at)
+        by_surface = gradient(self.at, surface, self.condition)
+        return np.asarray(surface @ np.linalg.svd(by_surface, full_matrices=True)[2][-1])
 
     @property
     def converged(self) -> bool:
@@ -410,32 +423,31 @@ def correct(
     Corrected
     """
     point, before, step = guess, math.inf, math.inf
-    along, slopes = np.zeros(guess.size), None
+    slopes = None
     for iteration in range(1, max_iterations + 1):
         try:
             if not (step < KEEP_SLOPES and step < 0.1 * before):
                 slopes = None
             before = step
-            change, along, slopes = _newton_step(family.at(point), condition, slopes, row, level)
+            change, slopes = _newton_step(family.at(point), condition, slopes, row, level)
             step = metric_length(family.metric(point), change)
             point = point + change
             if not step < 2.0:
                 raise ConvergenceError("Newton's method diverged")
             if step <= rtol or (step < ROUNDING and step > 0.3 * before):
-                at = family.at(point)
-                found = Corrected(at, along, step, iteration, "")
+                found = Corrected(family.at(point), condition, step, iteration, "")
                 if found.residual(condition) < SATISFIED:
-                    return found if row is None else replace(found, along=_direction(at, condition))
+                    return found
         except (ConvergenceError, SystemModelError, np.linalg.LinAlgError, OverflowError) as error:
-            return Corrected(family.at(point), along, step, iteration, str(error))
+            return Corrected(family.at(point), condition, step, iteration, str(error))
     failure = f"Newton's method did not converge, last relative step {step:.1e}"
-    return Corrected(family.at(point), along, step, max_iterations, failure)
+    return Corrected(family.at(point), condition, step, max_iterations, failure)
 
 
 def _newton_step(
     at: Evaluation, condition: Condition, slopes: Real | None, row: Real | None, level: float
-) -> tuple[Real, Real, Real]:
-    """The change of the unknowns, the direction that leaves all equations as they are, and g'.
+) -> tuple[Real, Real]:
+    """The change of the unknowns, and g'.
 
     The derivatives of g, as rows (n_conditions, N + m) that hold on the surface, are computed
     unless given.
@@ -457,18 +469,7 @@ def _newton_step(
     change = normal + surface @ np.linalg.solve(rows, right)
     if not np.all(np.isfinite(change)):
         raise ConvergenceError("singular Jacobian")
-    return change, surface @ _kernel(by_surface), slopes
-
-
-def _direction(at: Evaluation, condition: Condition) -> Real:
-    """The direction of a curve; where the surface turns fast, slopes of before do not tell it."""
-    _, surface = tangent_surface(at)
-    return np.asarray(surface @ _kernel(gradient(at, surface, condition)))
-
-
-def _kernel(by_surface: Real) -> Real:
-    """The direction on the surface in which the conditions change least."""
-    return np.asarray(np.linalg.svd(by_surface, full_matrices=True)[2][-1])
+    return change, slopes
 
 
 def tangent_surface(at: Evaluation) -> tuple[Real, Real]:

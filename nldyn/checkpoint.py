@@ -103,12 +103,11 @@ class Checkpoint(Keeper["Branch"]):
     ----------
     write, finished, earlier
         As for `Keeper`.
-    name : str
-        Of the file, if it shall hold nothing but the computation asked for.
-    several : bool
-        Whether that is one of several branches, of which the file then holds the first.
+    strict : str
+        Name of the file, if it shall hold nothing but the computation asked for.
     held : list, optional
-        Branches of the file that are known otherwise; see `new_branches`.
+        Branches of the file that stay there: those known otherwise, see `new_branches`, and at the
+        end those that were not asked for.
     """
 
     def __init__(
@@ -116,14 +115,17 @@ class Checkpoint(Keeper["Branch"]):
         write: Callable[[Sequence[Branch]], None] | None = None,
         finished: list[Branch] | None = None,
         earlier: Sequence[Branch] = (),
-        name: str = "",
-        several: bool = False,
+        strict: str = "",
         held: list[Branch] | None = None,
     ) -> None:
         super().__init__(write, finished, earlier)
-        self._name = name
-        self._several, self._begun = several, False
+        self._strict = strict
         self._held = [] if held is None else held
+
+    def __exit__(self, error: type[BaseException] | None, *rest: object) -> None:
+        if error is None:
+            self._held += self._earlier
+        super().__exit__(error, *rest)
 
     def branch_from(self, orbit: Orbit, *courses: Course) -> Branch | None:
         """Take from the file the branch that was begun at an orbit with one of some courses.
@@ -133,17 +135,15 @@ class Checkpoint(Keeper["Branch"]):
         Raises
         ------
         SystemModelError
-            If the file holds something else.
+            If the file is strict and holds something else.
         """
         for course in courses:
             for number, branch in enumerate(self._earlier):
                 if _is_begun_at(branch, orbit, course):
                     return self._taken(number)
-        elsewhere = self._earlier and not (self._several and self._begun)
-        self._begun = True
-        if self._name and elsewhere:
+        if self._strict and self._earlier:
             raise SystemModelError(
-                f"{self._name}: holds another continuation (other system, start, range or "
+                f"{self._strict}: holds another continuation (other system, start, range or "
                 "options); choose another file, or delete it"
             )
         return None
@@ -159,7 +159,6 @@ class Checkpoint(Keeper["Branch"]):
 
     def _taken(self, number: int) -> Branch:
         """A branch of the file, which counts as the one at work from now on."""
-        self._begun = True
         branch = self._earlier[number]
         self.work = lambda: branch
         del self._earlier[number]
@@ -186,7 +185,7 @@ def checkpoint_at(
     if place is None:
         return Checkpoint()
     write, earlier = _file(place, system)
-    return Checkpoint(write, earlier=earlier, name=str(place))
+    return Checkpoint(write, earlier=earlier, strict=str(place))
 
 
 def checkpoint_of_several(
@@ -226,7 +225,7 @@ def checkpoint_of_several(
             write([*held, *branches[known:]])
             written = True
 
-    return Checkpoint(write_new, finished, earlier, name=str(place), several=True, held=held)
+    return Checkpoint(write_new, finished, earlier, held=held)
 
 
 def _file(

@@ -128,7 +128,7 @@ def torus_cosine(mu: Complex) -> float:
 
 
 def cosine_near(mu: Complex, cosine: float) -> float:
-    """The same of the pair, among all whose product is 1, that has it nearest to a value."""
+    """The `torus_cosine` nearest to a value, of all pairs of multipliers whose product is 1."""
     i, j = np.triu_indices(mu.size, 1)
     off = np.abs(mu[i] * mu[j] - 1.0)
     found = 0.5 * (mu[i] + mu[j]).real[off <= max(UNIT_PRODUCT, off.min())]

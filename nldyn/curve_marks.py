@@ -12,18 +12,16 @@ from nldyn.bordered import Condition, Free, OrbitFamily, correct, length_unit
 from nldyn.branch import check_special
 from nldyn.codimension import is_torus, torus_pair
 from nldyn.conditions import Both, BranchPoint, Grazing, Singular, defined_by
-from nldyn.curve_walk import CurvePoint, between, curve_point, is_torus_curve
+from nldyn.curve_walk import UNFOLDED, CurvePoint, between, curve_point, is_torus_curve
 from nldyn.errors import check_whole
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit
 from nldyn.parameter_values import FREQUENCY, Chart, checked_parameter, value_of
 from nldyn.parameters import Parameter
-from nldyn.shooting import metric_length
 from nldyn.special import LocateError, Touch, leaves_circle, root, touching_extremes
 
 POLE = 1e-3  # of its values beside it: what a test is not below where it has no root but a pole
 ALIKE = 1e-6  # share of a step within which touches are those of one orbit by symmetry
-COEFFICIENTS = ("CP", "GPD")  # have poles where a curve meets another
 
 
 class Located(Protocol):
@@ -176,7 +174,7 @@ def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], lis
             sigma, error = root(lambda x, test=test: test(chord.at(x)))  # type: ignore[misc]
             point = chord.at(sigma)
             if abs(test(point)) > POLE * max(abs(test(a)), abs(test(b))):
-                if name not in COEFFICIENTS:
+                if name != "GPD":  # whose coefficient has a pole where a flip meets a fold
                     notes.append(f"{name} near {_place(a)} may be missing: its test jumps there")
                 continue
             if _is_true(name, point):
@@ -222,13 +220,15 @@ def _touched(touches: Sequence[Touch], chord: CurveChord) -> tuple[float, Locate
 def _met_at_touch(name: str, chord: CurveChord, touch: Touch) -> tuple[float, LocatedPoint] | None:
     """The point where a stop is touched, by Newton's method for both conditions."""
     a, b = chord.first, chord.last
-    sigma, family = _share(touch, a, b), a.found.at.family
-    guess = between(a, b, sigma)
+    family, guess = a.found.at.family, between(a, b, _share(touch, a, b))
     grazing = Grazing(touch.output, touch.is_maximum, touch.phase, length_unit(a.orbit))
     both = Both(a.condition, grazing)
     found = correct(family, guess, both, max_iterations=25)
-    away = metric_length(family.metric(a.point), found.at.point - guess)
-    if not found.converged or away > b.arclength - a.arclength:
+    weights, way = family.metric(a.point), b.point - a.point
+    sigma = float((found.at.point - a.point) @ (weights * way) / (way @ (weights * way)))
+    if not (found.converged and 0.0 <= sigma <= 1.0):
+        return None
+    if isinstance(a.condition, BranchPoint) and abs(found.at.point[-1]) > UNFOLDED:
         return None
     parameters = tuple(chart.parameter for chart in family.charts)
     values, residual = found.at.values, found.residual(both)

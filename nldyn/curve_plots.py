@@ -17,6 +17,7 @@ from nldyn.plot import (
     STABLE,
     UNSTABLE,
     length_unit,
+    mark_style,
     new_axes,
     stability_runs,
 )
@@ -145,17 +146,15 @@ def plot_orbit_curve(curve: Curve, ax: Axes | None = None) -> Axes:
             ls=STABLE if run.stable else UNSTABLE, label=None if name in named else name,
         )  # fmt: skip
         named.add(name)
-    for kind, marker in MARKERS.items():
+    for kind in MARKERS:
         marks = [mark for mark in curve.marks if mark.kind == kind]
         places = [
             (float(mark.values[0]) * scale, mark.orbit.max_abs_displacement / factor)
             for mark in marks
         ]
         if places:
-            ax.plot(
-                *zip(*places, strict=True), marker, color="k", ms=4.5, mfc="none", ls="none",
-                label=MARKER_NAMES[kind],
-            )  # fmt: skip
+            x_marks, y_marks = zip(*places, strict=True)
+            ax.plot(x_marks, y_marks, label=f"{MARKER_NAMES[kind]} ({kind})", **mark_style(kind))
     ax.set_xlabel(label)
     ax.set_ylabel(f"max |y| at {orbits[0].observe} ({unit})")
     ax.legend(frameon=False)

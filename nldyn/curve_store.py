@@ -210,8 +210,8 @@ def _read_curve(group: _Group, laws: Laws, monitor: OwnMonitor | None) -> Curve:
     lengths, steps = group.array("arclength", count), group.array("step", count)
     conditions = _read_conditions(group, family, count, points, monitor)
     found = [
-        Corrected(Evaluation(family, point), tangent, step, 0, "")
-        for point, tangent, step in zip(points, tangents, steps.tolist(), strict=True)
+        Corrected(Evaluation(family, point), condition, step, 0, "")
+        for point, condition, step in zip(points, conditions, steps.tolist(), strict=True)
     ]
     places = group.array("mark_point", len(kinds), size)
     residuals, errors = (group.array(f"mark_{name}", len(kinds)) for name in ("residual", "error"))

@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from nldyn._events import nearest
 from nldyn.bordered import (
     SHORTEST_DIFFERENCE,
     Condition,
@@ -38,12 +39,14 @@ DISSOLVED = "the branch point dissolves, as the symmetry does that brings it abo
 UNFOLDED = 1e-6  # unfolding number from which a branch point has dissolved
 MEETING = 1e-9  # arclength within which a curve and a grazing meet
 MOST_SECANTS = 20
-NEAR_EXTREME = 0.1  # of a radian between two extremes that are about to meet
+MEETS = 1e-6  # depth, relative to the orbit, of an extreme that one of depth zero is about to meet
 BEHIND = (1e-5, 1e-6, 1e-7)  # extremes, relative to the orbit, of a first point behind a corner
 ALONG = 1e-12  # part of a unit tangent that is rounding
 AT_POINT = 1e-6  # share of a step within which two points are one
 CORNER_STEP = 1e-3  # a step shorter than this may have met a corner
-TURN = 0.1  # of the cosine of a pair on the unit circle from point to point
+# The condition of a Neimark-Sacker point holds for neutral saddles, too, and some may be near: the
+# cosine of the pair's angle changes by no more than this from point to point.
+TURN = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +113,7 @@ class CurvePoint:
             tangent[place] /= new.slope(float(point[place]))
         family = replace(at.family, charts=charts)
         tangent /= metric_length(family.metric(point), tangent)
-        found = replace(self.found, at=Evaluation(family, point), along=tangent)
+        found = replace(self.found, at=Evaluation(family, point))
         return replace(self, found=found, tangent=tangent)
 
     def reversed(self) -> CurvePoint:
@@ -188,7 +191,12 @@ def _on_plane(
     row = np.zeros(guess.size)
     row[a.found.at.family.n_states + which] = 1.0
     found = correct(a.found.at.family, guess, a.condition, row, coordinate)
-    return curve_point(found, a.condition, way, a.arclength + length) if found.converged else None
+    if not found.converged:
+        return None
+    try:
+        return curve_point(found, a.condition, way, a.arclength + length)
+    except ConvergenceError:
+        return None
 
 
 def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> list[CurvePoint]:
@@ -297,14 +305,14 @@ def _meeting(
     return None
 
 
-def _extremes_meet(here: CurvePoint) -> bool:
-    """Whether the extreme of a curve of grazings has one of the other kind close by."""
-    if not isinstance(here.condition, Grazing):
+def extremes_meet(here: CurvePoint) -> bool:
+    """Whether the next extreme of the other kind is as near to zero as the one that grazes."""
+    grazing = here.condition
+    if not isinstance(grazing, Grazing):
         return False
-    found, full = here.orbit.extremes(here.condition.stop), 2.0 * math.pi * here.orbit.period
-    others = found.phases[found.is_maximum != here.condition.is_maximum]
-    apart = np.abs((others - here.condition.phase + 0.5 * full) % full - 0.5 * full)
-    return bool(apart.min(initial=full) < NEAR_EXTREME)
+    found, full = here.orbit.extremes(grazing.stop), 2.0 * math.pi * here.orbit.period
+    other = nearest(found.phases, found.is_maximum, not grazing.is_maximum, grazing.phase, full)
+    return bool(other >= 0 and abs(found.values[other]) < MEETS * grazing.unit)
 
 
 def _grazes_linear(orbit: Orbit) -> bool:
@@ -351,12 +359,15 @@ class CurveWalk:
     options: ContinuationOptions
     origin: CurvePoint | None = None
     stop_reason: str = NOT_FINISHED
+    _cosine: float = field(default=math.nan, init=False, repr=False)  # of a pair on the circle
     _obstacle: str = field(default="", init=False, repr=False)
 
     def __iter__(self) -> Iterator[CurvePoint]:
         """Walk along the curve."""
         here, step = self.start, self.options.first_step
         curvature = np.zeros(here.tangent.size)
+        if is_torus_curve(here.condition):
+            self._cosine = torus_cosine(here.orbit.multipliers)
         yield here
         if left := self._left_at_once():
             self.stop_reason = f"{RANGE_END}{left}"
@@ -384,7 +395,7 @@ class CurveWalk:
                     if step < self.options.min_step:
                         self.stop_reason = (
                             VANISHES
-                            if _extremes_meet(here)
+                            if extremes_meet(here)
                             else f"{SHORT_STEP}{self.options.min_step:g}: {self._obstacle}"
                         )
                         return
@@ -394,6 +405,8 @@ class CurveWalk:
                 yield from last
                 return
             yield there
+            if is_torus_curve(there.condition):
+                self._cosine = cosine_near(there.orbit.multipliers, self._cosine)
             curvature = (there.tangent - here.tangent) / (there.arclength - here.arclength)
             if there.corner:
                 curvature = np.zeros(here.tangent.size)
@@ -439,8 +452,10 @@ class CurveWalk:
         angle = math.acos(min(max(cosine, -1.0), 1.0))
         if angle > self.options.max_angle:
             return None
-        if is_torus_curve(here.condition) and self._other_pair(here.orbit, there.orbit):
-            return None
+        if is_torus_curve(here.condition):
+            cosine = cosine_near(there.orbit.multipliers, self._cosine)
+            if abs(cosine - self._cosine) > TURN:  # a neutral saddle, or another pair
+                return None
         touched = there.orbit.impacts != here.orbit.impacts
         grazes = isinstance(here.condition, Grazing)
         if touched and not grazes:
@@ -449,15 +464,6 @@ class CurveWalk:
             if root or step > self.options.grazing_step:
                 return None
         return there, angle, miss
-
-    @staticmethod
-    def _other_pair(a: Orbit, b: Orbit) -> bool:
-        """Whether the pair of multipliers whose product is 1 cannot be that of the point before.
-
-        The condition of a Neimark-Sacker point holds for neutral saddles, too; some may be near.
-        """
-        before = torus_cosine(a.multipliers)
-        return abs(cosine_near(b.multipliers, before) - before) > TURN
 
     def _left_at_once(self) -> str:
         """Name of a parameter at the end of its range, beyond which the curve would begin."""

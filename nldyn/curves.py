@@ -181,6 +181,8 @@ class Curve:
     def at(self, name: str, value: float) -> list[Orbit]:
         """All orbits of the curve at which a parameter has a value, corrected there, each once.
 
+        Of two that are close to a turn of the parameter, nearer than 1e-7 of it, none may be found.
+
         Parameters
         ----------
         name : str

@@ -355,11 +355,18 @@ def _draw_marks(
         return False
     hz = [float(point.orbit.frequency_hz) for point in points]
     y = [float(point.orbit.max_abs_displacement) / factor for point in points]
-    ax.plot(hz, y, **_mark_style(kind, size))
+    ax.plot(hz, y, **mark_style(kind, size))
     return True
 
 
-def _mark_style(kind: str, size: float = 4.5) -> dict[str, Any]:
+def mark_style(kind: str, size: float = 4.5) -> dict[str, Any]:
+    """How special points of a kind are drawn: arguments of `Axes.plot`.
+
+    Examples
+    --------
+    >>> mark_style("PD")["marker"]
+    's'
+    """
     return {
         "linestyle": "none",
         "marker": MARKERS[kind],
@@ -419,7 +426,7 @@ def draw_legend(
     ]
     for kind in marked:
         label = f"{MARKER_NAMES[kind]} ({kind})"
-        entries.append(Line2D([], [], label=label, **_mark_style(kind)))
+        entries.append(Line2D([], [], label=label, **mark_style(kind)))
     ax.legend(handles=entries, fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
 
 

@@ -3,9 +3,9 @@
 Beside the branches of the starts that are known, those in the directory or else the ones that are
 kept with the package, it finds others, writes the starts of all into the directory, and reports how
 many may be missing. With ``--detour DAMPING EXCITATION`` it does not simulate, but goes by way of a
-system with these factors, see `by_detour`. The directory keeps what is found, up to a gigabyte for
-each search, and the same command goes on where it was interrupted (but for following the starts);
-once it has ended, it looks for more beside what it has found, from other random states.
+system with these factors, see `by_detour`. The directory keeps what is found, and the same command
+goes on where it was interrupted (but for following the starts); once it has ended, it looks for
+more beside what it has found, from other random states.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from nldyn.paper.starts import (
     write_starts,
 )
 from nldyn.progress import progress_line
-from nldyn.store import load_diagram, same_flow
+from nldyn.store import load_diagram, same_flow, write_whole
 from nldyn.survey import explore
 
 EFFORT = ExploreOptions(spacing=0.01, starts=1, settling=200, rounds=24, passing=24)
@@ -48,15 +48,18 @@ def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Explorat
     job = job_named(name)
     with progress_line() as report:
         known, place, seed = known_branches(job, folder, report)
-        ended = len(list(folder.glob(f"{place.stem}.searched-*.h5")))
-        kept = place.with_suffix(".searched.h5")
+        kept, ended = place.with_suffix(".searched.h5"), place.with_suffix(".searches.csv")
+        before = ended.read_text(encoding="utf-8") if ended.exists() else "seed,new branches\n"
+        effort = replace(effort, seed=seed + before.count("\n"))
         with told_what_is_kept(kept):
             found = explore(
-                job.system(), job.range_hz, LONGEST, effort=replace(effort, seed=seed + ended),
-                options=LONG, known=known, progress=report, checkpoint=kept,
+                job.system(), job.range_hz, LONGEST, effort=effort, options=LONG,
+                known=known, progress=report, checkpoint=kept,
             )  # fmt: skip
     keep(found.diagram, job, folder)
-    kept.rename(place.with_suffix(f".searched-{ended + 1}.h5"))
+    line = f"{effort.seed},{len(found.diagram.branches) - found.stage.given}\n"
+    write_whole(ended, (before + line).encode())
+    kept.unlink(missing_ok=True)
     return found
 
 

@@ -9,6 +9,7 @@ import pytest
 from matplotlib.colors import to_hex
 
 from nldyn import (
+    ContinuationOptions,
     HarmonicForce,
     Parameter,
     Stop,
@@ -20,6 +21,7 @@ from nldyn import (
     plot_orbit_curve,
     solve_orbit,
 )
+from nldyn.curve_walk import CurvePoint, extremes_meet
 
 SECOND = Parameter("natural_frequency_hz", 1)
 
@@ -54,7 +56,7 @@ def test_a_neimark_sacker_curve_does_not_go_over_to_neutral_saddles(harmonic):
     curve = continue_special(start, ("frequency_hz", "gap"), ((4.0, 45.0), (1e-4, 2e-3)))
     assert curve.stop_reasons == ("becomes a curve of neutral saddles at a resonance",) * 2
     assert curve.notes == ()
-    assert [mark.kind for mark in curve.marks].count("R1") == 2
+    assert [mark.kind for mark in curve.marks] == ["R1", "LPNS", "R1"]
     for mark in curve.marks:
         mu = mark.orbit.multipliers
         if mark.kind == "R1":  # both multipliers of a pair
@@ -102,11 +104,10 @@ def test_a_closed_curve_has_each_orbit_once_at_a_value():
     branch = continue_branch(solve_orbit(bilinear(), 8.0), (5.0, 20.0))
     folds = [p for p in branch.special_points if p.kind == "LP"]
     curve = continue_special(folds[-1], ("frequency_hz", "gap"), ((3.0, 40.0), (1e-4, 5e-3)))
-    found = [orbit.frequency_hz for orbit in curve.at("gap", 1e-3)]
-    assert sorted(found) == pytest.approx(sorted({round(hz, 6) for hz in found}), abs=1e-6)
-    assert len(found) == len({round(hz, 6) for hz in found})
-    beside = [orbit.frequency_hz for orbit in curve.at("gap", 1.0001e-3)]
-    assert len(found) == len(beside)
+    assert curve.stop_reasons == ("closed curve", "closed curve")
+    for gap in (1e-3, 1.0001e-3):
+        first, last = sorted(orbit.frequency_hz for orbit in curve.at("gap", gap))
+        assert last - first > 1.0
 
 
 def test_orbits_over_a_parameter_are_drawn_with_their_special_points():
@@ -117,10 +118,10 @@ def test_orbits_over_a_parameter_are_drawn_with_their_special_points():
     assert ax.get_xlabel() == "gap (mm)"
     assert ax.get_ylabel().startswith("max |y| at m (")
     lines = {line.get_label(): line for line in ax.lines if not line.get_label().startswith("_")}
-    assert {"stable", "unstable", "cyclic fold"} <= set(lines)
+    assert {"stable", "unstable", "cyclic fold (LP)"} <= set(lines)
     assert lines["stable"].get_linestyle() == "-" != lines["unstable"].get_linestyle()
     assert to_hex(lines["stable"].get_color()) == to_hex(lines["unstable"].get_color())
-    assert lines["cyclic fold"].get_xdata().size == sum(m.kind == "LP" for m in curve.marks)
+    assert lines["cyclic fold (LP)"].get_xdata().size == sum(m.kind == "LP" for m in curve.marks)
     with pytest.raises(SystemModelError, match="plot_orbit_curve needs a curve in one parameter"):
         plot_orbit_curve([curve])
 
@@ -135,7 +136,21 @@ def test_a_curve_of_grazings_tells_where_its_extreme_vanishes():
     (split,) = [p for p in branch.special_points if p.kind == "GR" and 9.05 < p.frequency_hz < 9.1]
     curve = continue_special(split, ("frequency_hz", "gap"), ((8.9, 60.0), (2e-4, 2e-3)))
     assert curve.stop_reasons[1] == "the extreme that grazes meets another one, and both vanish"
+    assert [extremes_meet(point) for point in curve.points].index(True) > len(curve.points) - 10
     extremes = curve.orbits[-1].extremes(0)
     near = np.abs(extremes.values) < 1e-9 * np.abs(extremes.values).max()
     assert set(extremes.is_maximum[near]) == {True, False}
     assert np.ptp(extremes.phases[near]) < 0.01
+
+
+def test_a_change_of_sign_at_a_jump_is_a_note_and_no_mark(harmonic, monkeypatch):
+    fold = next(p for p in harmonic.special_points if p.kind == "LP")
+    options = ContinuationOptions(max_points=3)
+    monkeypatch.setattr(
+        CurvePoint, "tests", property(lambda point: {"R1": -1.0 if point.arclength < 0 else 1.0})
+    )
+    window = ((4.0, 45.0), (1e-4, 2e-3))
+    curve = continue_special(fold, ("frequency_hz", "gap"), window, options=options)
+    assert curve.marks == ()
+    (note,) = curve.notes
+    assert note.startswith("R1 near ") and note.endswith("may be missing: its test jumps there")

@@ -374,15 +374,12 @@ def test_a_file_of_a_system_with_a_law_of_its_own_is_gone_on_with(tmp_path):
     assert np.array_equal(resumed.frequency_hz, whole.frequency_hz)
 
 
-def test_a_diagram_does_not_replace_a_branch(one_dof, tmp_path):
-    """Neither one kept while it was computed nor one that was saved; it begins elsewhere."""
-    for name in ("kept.h5", "saved.h5"):
-        path = tmp_path / name
-        kept = path if name == "kept.h5" else None
-        branch = continue_branch(solve_orbit(one_dof, 30.0), (29.0, 31.0), checkpoint=kept)
-        if kept is None:
-            branch.save(path)
-        before = path.read_bytes()
-        with pytest.raises(SystemModelError, match="holds another continuation"):
-            diagram(one_dof, (29.0, 31.0), (1,), checkpoint=path)
-        assert path.read_bytes() == before
+def test_a_diagram_keeps_the_other_branches_of_its_file(one_dof, tmp_path):
+    """A branch begun elsewhere stays there; one of other periods is used."""
+    path = tmp_path / "kept.h5"
+    mine = continue_branch(solve_orbit(one_dof, 30.0), (29.0, 31.0), name="mine", checkpoint=path)
+    for _ in range(2):
+        found = diagram(one_dof, (29.0, 31.0), (1,), checkpoint=path)
+        kept = {branch.name: branch for branch in load_branches(path)}
+        assert set(kept) == {"mine", *(branch.name for branch in found.branches)}
+        assert_same_branches(kept["mine"], mine)

@@ -130,6 +130,9 @@ def test_a_search_is_kept_and_gives_starts_from_which_the_next_one_begins(
     starts_path(name, folder).write_bytes(first)
     again = search(name, folder, effort)
     assert again.question.effort.seed == done.question.effort.seed + 1
+    ended = [path.read_text() for path in folder.glob("*.searches.csv")]
+    assert [text.count("\n") for text in ended] == [3]  # a line of names, and two searches
+    assert not list(folder.glob("*.searched.h5"))
     assert again.stage.given == 2
 
 
