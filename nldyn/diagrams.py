@@ -376,8 +376,8 @@ def diagram(
         Called as ``progress(what, frequency_hz)``.
     checkpoint : str or Path, optional
         File that keeps the branches computed so far, as for `continue_branch`. If it exists, the
-        simulations are repeated, but of the branches only what is not in it is computed; one of
-        another system, accuracy or range is refused.
+        simulations are repeated, but of the branches only what is not in it is computed; those that
+        were begun elsewhere stay in it. One of another system, accuracy or range is refused.
 
     Returns
     -------
