@@ -627,21 +627,21 @@ def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
     orbit = _true_crossing(special.orbit)
     if orbit is None or distance(special.orbit, orbit) > NEIGHBOUR:
         return special
-    at = special.point
-    weights = orbit.problem.metric(orbit.point)
-    ahead = float((orbit.point - at.orbit.point) @ (weights * at.tangent))
-    ahead /= metric_length(weights, at.tangent)
-    point = BranchPoint(orbit, at.tangent, at.arclength + ahead)
+    point = BranchPoint(orbit, special.point.tangent, special.point.arclength)
     return SpecialPoint("BP", point, special.frequency_error)
 
 
 def _along(chord: Chord, special: SpecialPoint) -> SpecialPoint:
-    """A special point of a chord; a branch point with the tangent of the chord's branch."""
+    """A special point of a chord; a branch point with tangent and place of the chord's branch.
+
+    It may have been found from an orbit of the other branch, whose tangent leads elsewhere.
+    """
     if special.kind != "BP":
         return special
-    at = special.point
-    tangent = chord.direction(chord.place(at))
-    return replace(special, point=BranchPoint(at.orbit, tangent, at.arclength))
+    orbit, sigma = special.orbit, chord.place(special.point)
+    length = chord.last.arclength - chord.first.arclength
+    arclength = chord.first.arclength + sigma * length
+    return replace(special, point=BranchPoint(orbit, chord.direction(sigma), arclength))
 
 
 def accounted(a: Orbit, found: list[SpecialPoint], b: Orbit) -> bool:

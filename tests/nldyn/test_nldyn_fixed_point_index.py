@@ -70,6 +70,26 @@ def test_there_is_no_gap_beside_the_pitchforks_of_a_broken_symmetry(first_step):
     assert index_gaps(found.branches, found.range_hz) == []
 
 
+def test_a_crossing_found_from_the_other_branch_has_its_place_on_this_one():
+    """One of four crossings of a 1/3 branch is approached along the branch that turns there."""
+    stops = [Stop("y", stiffness=5e8, gap=2e-6, direction=side) for side in (1, -1)]
+    system = System.from_modal(
+        [12.0], {"y": [0.7]}, modal_damping=0.02, stops=stops, excitation=[Unbalance("y", 6e-6)]
+    )
+    found = diagram(system, (20.0, 70.0), (1, 3), search_points=6)
+    assert index_gaps(found.branches, found.range_hz, 3) == []
+    passed = 0
+    for branch in found.branches:
+        crossings = [id(s.point) for s in branch.special_points if s.kind == "BP"]
+        places = branch.places
+        for before, place, after in zip(places, places[1:], places[2:], strict=False):
+            if id(place) in crossings and abs(place.tangent[-1]) > 0.1:
+                hz = [point.orbit.frequency_hz for point in (before, place, after)]
+                assert sorted(hz) in (hz, hz[::-1])
+                passed += 1
+    assert passed == 5
+
+
 def test_the_note_tells_that_all_is_missing_where_there_is_no_branch():
     told = index_note([], (28.0, 60.0), 1)
     assert " but for P from 28 to 60 Hz: orbits are missing" in told
