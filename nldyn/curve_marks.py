@@ -175,18 +175,17 @@ def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], lis
             point = chord.at(sigma)
             if abs(test(point)) > POLE * max(abs(test(a)), abs(test(b))):
                 if name != "GPD":  # whose coefficient has a pole where a flip meets a fold
-                    notes.append(f"{name} near {_place(a)} may be missing: its test jumps there")
+                    notes.append(_missing(name, a, "its test jumps there"))
                 continue
             if _is_true(name, point):
                 found.append((sigma, _marked(name, point, error * (b.arclength - a.arclength))))
         except (LocateError, ConvergenceError) as error:
-            notes.append(f"{name} near {_place(a)} may be missing: {error}")
+            notes.append(_missing(name, a, error))
     for touches in _touches(a, b):
         try:
             found.append(_touched(touches, chord))
         except (LocateError, ConvergenceError) as error:
-            name = _touch_name(a.condition)
-            notes.append(f"{name} near {_place(a)} may be missing: {error}")
+            notes.append(_missing(_touch_name(a.condition), a, error))
     if b.corner:
         found.append((1.0, _marked(b.corner, b, b.found.step)))
     found.sort(key=lambda pair: pair[0])
@@ -311,7 +310,9 @@ def _marked(name: str, point: CurvePoint, error: float) -> LocatedPoint:
     return mark
 
 
-def _place(point: CurvePoint) -> str:
+def _missing(name: str, point: CurvePoint, why: Exception | str) -> str:
+    """The note that a mark may be missing behind a point."""
     charts = point.found.at.family.charts
     pairs = zip(charts, point.values.tolist(), strict=True)
-    return ", ".join(f"{chart.parameter.name} = {value:.8g}" for chart, value in pairs)
+    place = ", ".join(f"{chart.parameter.name} = {value:.8g}" for chart, value in pairs)
+    return f"{name} near {place} may be missing: {why}"

@@ -199,7 +199,6 @@ def _along(branch: Branch, times: int) -> tuple[Real, NDArray[np.int_]]:
     changing = {"LP", "BP", "PD"} if times % 2 == 0 else {"LP", "BP"}
     special = {id(s.point): s.kind for s in branch.special_points if s.kind in changing}
     kinds = [special.get(id(place), "") for place in places]
-    turn = [-1 if kind else 1 for kind in kinds]
     clear = [
         0.0 if kind else _distance(place.orbit, times)
         for place, kind in zip(places, kinds, strict=True)
@@ -208,6 +207,16 @@ def _along(branch: Branch, times: int) -> tuple[Real, NDArray[np.int_]]:
     for i in range(len(places) - 1):
         best = i if clear[i] >= clear[i + 1] else i + 1
         signs.append(index(places[best].orbit, times) if clear[best] > CLEAR else 0)
+    _fill(signs, kinds)
+    return np.array([place.orbit.point[-1] for place in places]), np.array(signs, dtype=int)
+
+
+def _fill(signs: list[int], kinds: Sequence[str]) -> None:
+    """Set the signs that are not clear, zero so far, from those that are.
+
+    `kinds` names the special points, among the places between them, at which the sign may change.
+    """
+    turn = [-1 if kind else 1 for kind in kinds]
     known = [i for i, sign in enumerate(signs) if sign]
     for a, b in pairwise(known):
         crossings = [i for i in range(a + 1, b + 1) if kinds[i] == "BP"]
@@ -217,7 +226,6 @@ def _along(branch: Branch, times: int) -> tuple[Real, NDArray[np.int_]]:
         signs[i] = signs[i] or signs[i - 1] * turn[i]
     for i in range(len(signs) - 2, -1, -1):
         signs[i] = signs[i] or signs[i + 1] * turn[i + 1]
-    return np.array([place.orbit.point[-1] for place in places]), np.array(signs, dtype=int)
 
 
 def _distance(orbit: Orbit, times: int) -> float:

@@ -93,7 +93,7 @@ def test_stops_touched_at_once_by_symmetry_are_one_mark():
 
 
 def bilinear() -> System:
-    """One mode and a linear stop as stiff as the mode itself, four times over."""
+    """One mode and a linear stop four times as stiff as it."""
     return System.from_modal(
         [10.0], {"m": [1.0]}, modal_damping=0.03, stops=[Stop.linear("m", 15791.0, gap=1e-3)],
         excitation=[HarmonicForce("m", 1.0)],

@@ -375,7 +375,7 @@ def test_a_file_of_a_system_with_a_law_of_its_own_is_gone_on_with(tmp_path):
 
 
 def test_a_diagram_keeps_the_other_branches_of_its_file(one_dof, tmp_path):
-    """A branch begun elsewhere stays there; one of other periods is used."""
+    """A branch begun elsewhere stays there, also when the same call is made again."""
     path = tmp_path / "kept.h5"
     mine = continue_branch(solve_orbit(one_dof, 30.0), (29.0, 31.0), name="mine", checkpoint=path)
     for _ in range(2):
