@@ -1,8 +1,9 @@
-"""Ways of orbits through systems of other damping and excitation."""
+"""Ways of orbits through systems with other numbers."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,8 +13,11 @@ from nldyn.errors import SystemModelError
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, solve_orbit
-from nldyn.parameters import SOURCES
+from nldyn.parameter_values import value_of, with_value
+from nldyn.parameters import SOURCES, Parameter
+from nldyn.system import System
 
+DAMPING, EXCITATION = "damping", "excitation"
 FIRST_STEP, SHORTEST_STEP = 0.25, 1e-3  # in the logarithms of the factors
 LONGER, SHORTER = 1.5, 0.4  # the next step, after one that led on and one that did not
 MISS = 0.3  # of an orbit: distance from where it was expected
@@ -21,36 +25,31 @@ MISS = 0.3  # of an orbit: distance from where it was expected
 
 @dataclass(frozen=True)
 class Detour:
-    """A way from a system to one of other damping and excitation; its places are shares of it.
+    """A way from a system to one with other numbers; its places are shares of it.
 
     Parameters
     ----------
     own : FlowMap
         Of the system where it begins.
-    damping, excitation : float
-        Factors of the modal damping and of the excitation where it ends; before, powers of them.
+    factors : mapping of str or Parameter to float
+        Factors of numbers of the system where it ends; before, powers of them. See `by_detour`.
     """
 
     own: FlowMap
-    damping: float = 1.0
-    excitation: float = 1.0
+    factors: Mapping[str | Parameter, float]
 
     @property
     def length(self) -> float:
         """Of the way, in the logarithms of the factors."""
-        return math.hypot(math.log(self.damping), math.log(self.excitation))
+        return math.hypot(*map(math.log, self.factors.values()))
 
     def flow(self, share: float) -> FlowMap:
         """The flow map after a share of the way."""
         if share == 0.0:
             return self.own
         system = self.own.system
-        if self.damping != 1.0:
-            system = replace(system, damping=self.damping**share * system.damping)
-        if self.excitation != 1.0:
-            factor = self.excitation**share
-            sources = tuple(_scaled(source, factor) for source in system.excitation)
-            system = system.with_elements(excitation=sources)
+        for name, factor in self.factors.items():
+            system = times(system, name, factor**share)
         return FlowMap(system, self.own.options)
 
     def carried(self, orbit: Orbit, start: float, end: float) -> Orbit | None:
@@ -93,6 +92,23 @@ class Detour:
             return None
         far = float(np.linalg.norm(states - guess)) > MISS * float(np.linalg.norm(states))
         return None if far else found
+
+
+def has_damping(system: System) -> bool:
+    """Whether any mode or damper takes energy away."""
+    return bool(np.any(system.damping)) or any(d.coefficient > 0.0 for d in system.dampers)
+
+
+def times(system: System, name: str | Parameter, factor: float) -> System:
+    """The system with a number, all of its damping, or all of its excitation times a factor."""
+    if name == DAMPING:
+        dampers = tuple(replace(d, coefficient=factor * d.coefficient) for d in system.dampers)
+        return replace(system, damping=factor * system.damping, dampers=dampers)
+    if name == EXCITATION:
+        sources = tuple(_scaled(source, factor) for source in system.excitation)
+        return system.with_elements(excitation=sources)
+    parameter = Parameter(name) if isinstance(name, str) else name
+    return with_value(system, parameter, factor * value_of(system, math.nan, parameter))
 
 
 def _scaled(source: Excitation, factor: float) -> Excitation:

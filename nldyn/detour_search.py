@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -12,22 +13,24 @@ from cms.threads import one_thread
 from nldyn.branch import Branch, check_branches
 from nldyn.checkpoint import checkpoint_of_several
 from nldyn.continuation import ContinuationOptions
-from nldyn.detour import Detour
+from nldyn.detour import DAMPING, EXCITATION, Detour, has_damping, times
 from nldyn.diagrams import Collector, Diagram, Progress, check_known, counted, middle_orbit
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.exploration import FINEST_SPACING, steps_between
 from nldyn.fixed_point_index import index_note, is_damped, without_index_note
 from nldyn.orbit import Orbit, same_orbit
+from nldyn.parameter_values import FREQUENCY, checked_parameter, value_of
+from nldyn.parameters import Parameter
+from nldyn.system import System
 
 PLACES = 3  # orbits of each branch that are carried there, in case some get lost
-MOST = 1e3  # factor of damping or excitation
+MOST = 1e3  # factor
 
 
 @one_thread()
 def by_detour(
     known: Diagram,
-    damping: float = 0.5,
-    excitation: float = 1.0,
+    factors: Mapping[str | Parameter, float],
     *,
     max_period: int = 3,
     spacing: float = 0.002,
@@ -35,22 +38,25 @@ def by_detour(
     progress: Progress | None = None,
     checkpoint: str | Path | None = None,
 ) -> Diagram:
-    """Find further branches by way of another damping or excitation, where known ones lead to them.
+    """Find further branches by way of a system with other numbers, where known ones lead to them.
 
-    Closed branches (isolas) grow when the damping falls, or with more or less of the excitation,
-    and join others. So the branches known are followed there; the orbits of these, at frequencies
-    next to each other, are carried back to the system as it is, and what lies on no known branch is
-    on a new one. Isolas that join none of the branches known there are not found, nor, but by
-    chance, those that are narrower than the spacing of the frequencies. Other factors may find
-    more, as may another call with the branches found.
+    Closed branches (isolas) grow and join others when the damping falls, with more or less of the
+    excitation, or when a natural frequency moves. So the branches known are followed there; the
+    orbits of these, at frequencies next to each other, are carried back to the system as it is, and
+    what lies on no known branch is on a new one. Isolas that join none of the branches known there
+    are not found, nor, but by chance, those that are narrower than the spacing of the frequencies.
+    Other factors may find more, as may another call with the branches found.
 
     Parameters
     ----------
     known : Diagram
         Branches of a system, from `diagram` or `explore`, with their orbits.
-    damping, excitation : float
-        Factors, up to 1000 or down to its inverse, of the modal damping and of all sources of
-        excitation. Point dampers stay as they are.
+    factors : mapping of str or Parameter to float
+        What is changed and how many times it is there, up to 1000 or down to its inverse:
+        ``{"damping": 0.5}`` halves the damping of all modes and all dampers,
+        ``{"excitation": 1.4}`` is of all sources of excitation, and
+        ``{Parameter("natural_frequency_hz", 1): 0.99}`` of one number, with the names of
+        `continue_in`. Several are changed together.
     max_period : int
         Longest orbits carried, and wanted.
     spacing : float
@@ -73,7 +79,7 @@ def by_detour(
     Raises
     ------
     SystemModelError
-        For input that makes no sense, and for a factor of a damping or an excitation that is none.
+        For input that makes no sense, and for a factor of a number that is zero or not there.
     OutputError
         If `checkpoint` cannot be written.
 
@@ -85,13 +91,13 @@ def by_detour(
     ...     excitation=[HarmonicForce("force", 7.4926)])
     >>> branch = continue_branch(solve_orbit(system, 11.0), (7.2, 11.0))
     >>> known = Diagram((branch,), (7.2, 11.0), "tip")
-    >>> more = by_detour(known, max_period=1, spacing=0.1)
+    >>> more = by_detour(known, {"damping": 0.5}, max_period=1, spacing=0.1)
     >>> len(more.branches), more.branches[1].closed
     (2, True)
     """
-    _check(known, damping, excitation, max_period, spacing, options, progress)
+    _check(known, factors, max_period, spacing, options, progress)
     own = known.branches[0].points[0].problem.flow
-    detour = Detour(own, damping, excitation)
+    detour = Detour(own, factors)
     low, high = known.range_hz
     options, progress = options or ContinuationOptions(), progress or (lambda what, hz: None)
     box = Collector(own, (low, high), known.observe, options, progress)
@@ -113,27 +119,60 @@ def by_detour(
         box.notes.append(index_note(box.branches, known.range_hz, max_period))
     new = box.branches[len(known.branches) :]
     box.notes.append(
-        f"at {damping:g} of the damping and {excitation:g} of the excitation: "
+        f"at {' and '.join(f'{f:g} of {_named(name)}' for name, f in factors.items())}: "
         f"{counted(there)}, {came} of {tried} orbits carried back, {counted(new)} found so"
     )
     return Diagram(tuple(box.branches), (low, high), known.observe, tuple(box.notes))
 
 
-def check_factors(damping: float, excitation: float) -> None:
-    """Raise unless a detour with these factors makes sense."""
-    for name, factor in (("damping", damping), ("excitation", excitation)):
-        if not (is_finite(factor) and 1.0 / MOST <= factor <= MOST):
+def check_factors(system: System, factors: Mapping[str | Parameter, float]) -> None:
+    """Raise unless a detour with these factors makes sense.
+
+    Raises
+    ------
+    SystemModelError
+        For no factor, one that is 1 or out of bounds, and one of a number that the system does not
+        have, that is zero, or that cannot be so many times as large.
+    """
+    check_types(factors=(factors, Mapping))
+    if not factors:
+        raise SystemModelError('factors: names nothing to change; try {"damping": 0.5}')
+    for name, factor in factors.items():
+        _check_has(system, name)
+        if not (is_finite(factor) and 1.0 / MOST <= factor <= MOST and factor != 1.0):
             raise SystemModelError(
-                f"{name} must be a factor from {1.0 / MOST:g} to {MOST:g}, got {shown(factor)}"
+                f"factors: that of {_named(name)} must be a number from {1.0 / MOST:g} to {MOST:g} "
+                f"other than 1, got {shown(factor)}"
             )
-    if damping == excitation == 1.0:
-        raise SystemModelError("damping and excitation are both 1: that is the system itself")
+        system = times(system, name, factor)
+
+
+def _check_has(system: System, name: str | Parameter) -> None:
+    """Raise unless a system has what a factor is of."""
+    if name == DAMPING:
+        there = has_damping(system)
+    elif name == EXCITATION:
+        there = bool(system.excitation)
+    elif name in (FREQUENCY, Parameter(FREQUENCY)):
+        raise SystemModelError("factors: orbits are carried at their own frequency_hz")
+    elif isinstance(name, str | Parameter):
+        there = value_of(system, math.nan, checked_parameter(system, name)) != 0.0
+    else:
+        raise SystemModelError(f"factors: must be of names or parameters, got {shown(name)}")
+    if not there:
+        raise SystemModelError(f"factors: {_named(name)} is zero, which no factor changes")
+
+
+def _named(name: str | Parameter) -> str:
+    """What a factor is of, as a note tells it."""
+    if name in (DAMPING, EXCITATION):
+        return f"the {name}"
+    return name if isinstance(name, str) else f"{name.name} {name.index}"
 
 
 def _check(
     known: Diagram,
-    damping: float,
-    excitation: float,
+    factors: Mapping[str | Parameter, float],
     max_period: int,
     spacing: float,
     options: ContinuationOptions | None,
@@ -145,7 +184,6 @@ def _check(
         progress=(progress, Callable, None),
     )
     check_whole("max_period", max_period, 1)
-    check_factors(damping, excitation)
     if not (is_finite(spacing) and FINEST_SPACING <= spacing < 1.0):
         raise SystemModelError(
             f"spacing must lie between {FINEST_SPACING:g} and 1, got {shown(spacing)}"
@@ -154,11 +192,7 @@ def _check(
     if not known.branches:
         raise SystemModelError("known: has no branches to begin with")
     check_known(known, known.branches[0].points[0].problem.flow)
-    system = known.branches[0].points[0].system
-    if damping != 1.0 and not np.any(system.damping):
-        raise SystemModelError("known: is of a system without modal damping, which has no factor")
-    if excitation != 1.0 and not system.excitation:
-        raise SystemModelError("known: is of a system without excitation, which has no factor")
+    check_factors(known.branches[0].points[0].system, factors)
 
 
 def _go_on(box: Collector, max_period: int) -> None:

@@ -622,12 +622,12 @@ def _by_more_damping(
     problem: ShootingProblem, omega: float, observe: str, pieces: int
 ) -> Orbit | None:
     """Orbit at more damping, which a motion from rest comes near, carried back, or None."""
-    from nldyn.detour import Detour
+    from nldyn.detour import DAMPING, Detour, has_damping
 
-    if not np.any(problem.flow.system.damping):
+    if not has_damping(problem.flow.system):
         return None
     for factor in MORE_DAMPING:
-        detour = Detour(problem.flow, damping=factor)
+        detour = Detour(problem.flow, {DAMPING: factor})
         try:
             more = replace(problem, flow=detour.flow(1.0))
             orbit = _first_orbit(more, _simulated(more, omega, pieces), omega, observe)

@@ -2,17 +2,18 @@
 
 Beside the branches of the starts that are known, those in the directory or else the ones that are
 kept with the package, it finds others, writes the starts of all into the directory, and reports how
-many may be missing. With ``--detour DAMPING EXCITATION`` it does not simulate, but goes by way of a
-system with these factors, see `by_detour`. The directory keeps what is found, and the same command
-goes on where it was interrupted (but for following the starts); once it has ended, it looks for
-more beside what it has found, from other random states.
+many may be missing. With ``--detour damping=0.5 natural_frequency_hz[1]=0.99`` at the end, say, it
+does not simulate, but goes by way of a system with these factors, see `by_detour`. The directory
+keeps what is found, and the same command goes on where it was interrupted (but for following the
+starts); once it has ended, it looks for more beside what it has found, from other random states.
 """
 
 from __future__ import annotations
 
 import argparse
 import hashlib
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,6 +33,7 @@ from nldyn.paper.starts import (
     starts_path,
     write_starts,
 )
+from nldyn.parameters import Parameter
 from nldyn.progress import progress_line
 from nldyn.store import load_diagram, same_flow, write_whole
 from nldyn.survey import explore
@@ -63,15 +65,16 @@ def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Explorat
     return found
 
 
-def search_by_detour(name: str, folder: Path, damping: float, excitation: float) -> Diagram:
+def search_by_detour(name: str, folder: Path, factors: Mapping[str | Parameter, float]) -> Diagram:
     """Look for branches of a model with `by_detour`, and write the starts of all."""
     job = job_named(name)
+    check_factors(job.system(), factors)
     with progress_line() as report:
         known, place, _ = known_branches(job, folder, report)
         kept = place.with_suffix(".detour.h5")
         with told_what_is_kept(kept):
             found = by_detour(
-                known, damping, excitation, max_period=LONGEST, options=LONG,
+                known, factors, max_period=LONGEST, options=LONG,
                 progress=report, checkpoint=kept,
             )  # fmt: skip
     keep(found, job, folder)
@@ -113,20 +116,38 @@ def _is_of(found: Diagram, job: Job) -> bool:
     return all(same_flow(branch.points[0].problem.flow, flow) for branch in found.branches)
 
 
+def factor_of(text: str) -> tuple[str | Parameter, float]:
+    """Name and factor of ``damping=0.5``, or parameter and factor of ``stiffness[1]=2``.
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If the text is neither.
+    """
+    parts = re.fullmatch(r"(\w+)(?:\[(\d+)\])?=(.+)", text)
+    try:
+        if parts is None:
+            raise ValueError
+        name, index, factor = parts.groups()
+        return (Parameter(name, int(index)) if index else name), float(factor)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not of the form NAME=FACTOR or NAME[INDEX]=FACTOR"
+        ) from None
+
+
 def main() -> None:
     """Search the models named, or all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("directory", type=Path)
     parser.add_argument("models", nargs="*", metavar="MODEL", help=f"of {', '.join(MODELS)}")
     parser.add_argument(
-        "--detour", type=float, nargs=2, metavar=("DAMPING", "EXCITATION"), help="factors of these"
+        "--detour", type=factor_of, nargs="+", metavar="NAME=FACTOR", help="what is changed there"
     )
     given = parser.parse_args()
-    if given.detour is not None:
-        try:
-            check_factors(*given.detour)
-        except SystemModelError as error:
-            parser.error(str(error))
+    factors = dict(given.detour or ())
+    if given.detour and len(factors) < len(given.detour):
+        parser.error("argument --detour: names something twice")
     unknown = set(given.models) - set(MODELS)
     if unknown:
         parser.error(f"unknown model {sorted(unknown)[0]!r} (there are: {', '.join(MODELS)})")
@@ -136,10 +157,10 @@ def main() -> None:
         parser.error(f"{given.directory} cannot be made: {error.strerror}")
     for name in given.models or MODELS:
         with plain_errors():
-            if given.detour is None:
-                said = search(name, given.directory).report()
+            if factors:
+                said = "\n".join(search_by_detour(name, given.directory, factors).notes)
             else:
-                said = "\n".join(search_by_detour(name, given.directory, *given.detour).notes)
+                said = search(name, given.directory).report()
         print(f"{name}: {said}", flush=True)
 
 

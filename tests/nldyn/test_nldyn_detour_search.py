@@ -10,8 +10,10 @@ import pytest
 from independent import Motion
 
 from nldyn import (
+    Damper,
     Diagram,
     HarmonicForce,
+    Parameter,
     Stop,
     System,
     SystemModelError,
@@ -25,9 +27,11 @@ from nldyn import (
 from nldyn.checkpoint import Checkpoint
 from nldyn.detour import Detour
 from nldyn.diagrams import Collector
+from nldyn.orbit import Orbit, same_orbit
 from nldyn.store import save_branches
 
 RANGE_HZ = (7.2, 11.0)
+HALF = {"damping": 0.5}
 
 
 def two_modes(modal_damping: float = 0.013513) -> System:
@@ -49,7 +53,7 @@ def harmonic() -> Diagram:
 @pytest.fixture(scope="module")
 def found(harmonic) -> Diagram:
     """What less damping leads to."""
-    return by_detour(harmonic, max_period=1, spacing=0.1)
+    return by_detour(harmonic, HALF, max_period=1, spacing=0.1)
 
 
 def test_an_isola_that_joins_the_known_branch_at_less_damping_is_found(harmonic, found):
@@ -69,24 +73,29 @@ def test_it_says_whether_orbits_are_missing_for_certain(found):
 
 def test_it_says_that_orbits_are_missing_where_only_the_isola_is_known(found):
     known = replace(found, branches=found.branches[1:])
-    alone = by_detour(known, 0.95, max_period=1, spacing=0.5)
+    alone = by_detour(known, {"damping": 0.95}, max_period=1, spacing=0.5)
     assert len(alone.branches) == 1
     assert " but for P from 7.2 to 11 Hz: " in alone.notes[-2]
     assert alone.notes[-2].endswith("orbits are missing, or a branch was broken off")
 
 
 def test_less_excitation_leads_to_the_isola_as_well(harmonic, found):
-    other = by_detour(harmonic, 1.0, 0.8, max_period=1, spacing=0.1)
+    other = by_detour(harmonic, {"excitation": 0.8}, max_period=1, spacing=0.1)
     assert len(other.branches) == 2
     assert all(found.branches[1].contains(orbit) for orbit in other.branches[1].points)
 
 
+def runge_kutta_gap(orbit: Orbit) -> float:
+    """How far from closing an orbit of one period is by another integration, relative."""
+    start = orbit.states([0.0])[0]
+    end, _ = Motion(two_modes()).run(start, (0.0, 2.0 * np.pi), orbit.omega, tangent=False)
+    scale = np.repeat([1.0, orbit.omega], 2) * np.abs(start[:2]).max()
+    return float(np.abs((end - start) / scale).max())
+
+
 def test_orbits_of_the_isola_close_under_runge_kutta(found):
     for orbit in found.branches[1].at(8.0):
-        start = orbit.states([0.0])[0]
-        end, _ = Motion(two_modes()).run(start, (0.0, 2.0 * np.pi), orbit.omega, tangent=False)
-        scale = np.repeat([1.0, orbit.omega], 2) * np.abs(start[:2]).max()
-        assert np.abs((end - start) / scale).max() < 1e-8
+        assert runge_kutta_gap(orbit) < 1e-8
 
 
 def test_the_indices_add_up_to_one_with_the_isola_and_without(harmonic, found):
@@ -94,22 +103,60 @@ def test_the_indices_add_up_to_one_with_the_isola_and_without(harmonic, found):
         assert index_sum(harmonic.branches, hz) == index_sum(found.branches, hz) == 1
 
 
+SECOND = Parameter("natural_frequency_hz", 1)
+
+
 @pytest.mark.parametrize(
-    ("damping", "excitation"), [(0.2, 1.0), (0.9, 1.1), (3.0, 1.0), (1.0, 0.5), (1.0, 1.5)]
+    "factors",
+    [
+        {"damping": 0.2},
+        {"damping": 0.9, "excitation": 1.1},
+        {"damping": 3.0},
+        {"excitation": 0.5},
+        {"excitation": 1.5},
+        {"stiffness": 2.0, SECOND: 0.97},
+        {Parameter("coefficient"): 4.0},
+    ],
 )
-def test_carried_by_a_detour_and_back_an_orbit_is_the_same(harmonic, damping, excitation):
-    orbit = harmonic.branches[0].at(10.0)[0]
-    detour = Detour(orbit.problem.flow, damping, excitation)
+def test_carried_by_a_detour_and_back_an_orbit_is_the_same(factors):
+    system = replace(two_modes(), dampers=(Damper("tip", 0.3),))
+    orbit = solve_orbit(system, 10.0)
+    detour = Detour(orbit.problem.flow, factors)
     other = detour.carried(orbit, 0.0, 1.0)
-    assert np.allclose(other.system.damping, damping * orbit.system.damping, rtol=1e-12)
-    assert other.system.excitation[0].amplitude == pytest.approx(excitation * 7.4926, rel=1e-12)
+    there, tiny = other.system, {"rtol": 1e-12}
+    all_damping = factors.get("damping", 1.0)
+    modal = all_damping * system.damping.diagonal() * [1.0, factors.get(SECOND, 1.0)]
+    coefficient = 0.3 * all_damping * factors.get(Parameter("coefficient"), 1.0)
+    assert np.allclose(there.damping, np.diag(modal), **tiny)
+    assert there.dampers[0].coefficient == pytest.approx(coefficient, rel=1e-12)
+    amplitude = 7.4926 * factors.get("excitation", 1.0)
+    assert there.excitation[0].amplitude == pytest.approx(amplitude, rel=1e-12)
+    assert there.stops[0].stiffness == pytest.approx(3.5791e7 * factors.get("stiffness", 1.0))
+    assert np.allclose(there.frequencies_hz, [10.0, 30.307 * factors.get(SECOND, 1.0)], **tiny)
     assert other.frequency_hz == pytest.approx(10.0, rel=1e-14)
+    expected = solve_orbit(there, 10.0, guess=other.states(other.problem.phases[:-1]))
+    assert same_orbit(other, expected)
     back = detour.carried(other, 1.0, 0.0)
     assert np.abs(back.point - orbit.point).max() < 1e-9 * np.abs(orbit.point[:-1]).max()
 
 
+def test_another_natural_frequency_leads_to_the_isola_and_to_a_branch_from_lower_frequencies(
+    harmonic, found
+):
+    """The other branch ends at the range's end, and does not join at less damping."""
+    other = by_detour(harmonic, {SECOND: 1.05}, max_period=1, spacing=0.1)
+    assert other.notes[-1].startswith("at 1.05 of natural_frequency_hz 1: ")
+    isola, lower = sorted(other.branches[1:], key=lambda branch: branch.closed, reverse=True)
+    assert all(found.branches[1].contains(orbit) for orbit in isola.points)
+    assert not lower.closed
+    assert lower.frequency_hz.min() == pytest.approx(7.2)
+    assert not any(b.contains(o) for b in found.branches for o in lower.points)
+    for orbit in lower.at(7.5):
+        assert runge_kutta_gap(orbit) < 1e-8
+
+
 def test_what_is_known_is_not_found_again(found):
-    again = by_detour(found, 0.8, max_period=1, spacing=0.2)
+    again = by_detour(found, {"damping": 0.8}, max_period=1, spacing=0.2)
     assert len(again.branches) == 2
     assert again.notes[:-2] == (found.notes[-1],)  # the indices are told of once
 
@@ -125,10 +172,10 @@ def test_interrupted_it_goes_on_with_what_it_has_found(harmonic, found, tmp_path
     for _ in range(2):
         with pytest.raises(KeyboardInterrupt):
             by_detour(
-                harmonic, max_period=1, spacing=0.1, progress=interrupt, checkpoint=place
+                harmonic, HALF, max_period=1, spacing=0.1, progress=interrupt, checkpoint=place
             )
         assert len(load_branches(place)) == 1  # what is known is not kept
-    resumed = by_detour(harmonic, max_period=1, spacing=0.1, checkpoint=place)
+    resumed = by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
     assert [len(b.nodes) for b in resumed.branches] == [len(b.nodes) for b in found.branches]
     assert np.array_equal(resumed.branches[1].frequency_hz, found.branches[1].frequency_hz)
 
@@ -147,7 +194,7 @@ def test_a_branch_that_repeats_a_known_one_is_not_kept(
 ):
     monkeypatch.setattr("nldyn.checkpoint.PAUSE", 1e9)  # written at the end only
     place = tmp_path / "found.h5"
-    done = by_detour(harmonic, max_period=1, spacing=0.1, checkpoint=place)
+    done = by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
     assert not re.search(r" 0 of \d+ orbits carried back", done.notes[-1])
     assert len(done.branches) == 1
     assert not place.exists()
@@ -159,7 +206,7 @@ def test_a_branch_that_repeats_a_known_one_does_not_stay_in_the_file(
     monkeypatch.setattr("nldyn.checkpoint.PAUSE", 0.0)
     monkeypatch.setattr("nldyn.checkpoint.SHARE", 0.0)
     place = tmp_path / "found.h5"
-    by_detour(harmonic, max_period=1, spacing=0.1, checkpoint=place)
+    by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
     assert load_branches(place) == []
 
 
@@ -168,7 +215,7 @@ def test_a_branch_of_the_file_that_turns_out_to_be_known_is_not_added(
 ):
     place = tmp_path / "found.h5"
     save_branches(place, found.branches[1:])
-    done = by_detour(harmonic, 0.95, max_period=1, spacing=0.5, checkpoint=place)
+    done = by_detour(harmonic, {"damping": 0.95}, max_period=1, spacing=0.5, checkpoint=place)
     assert len(done.branches) == 1
 
 
@@ -197,7 +244,7 @@ def test_no_branch_of_a_file_is_lost_to_an_interrupt(at):
 
 def test_some_orbits_are_carried_back_however_wide_the_spacing(found):
     short = replace(found, range_hz=(7.95, 8.05))
-    done = by_detour(short, max_period=1, spacing=0.5)
+    done = by_detour(short, HALF, max_period=1, spacing=0.5)
     tried = re.search(r" of (\d+) orbits carried back", done.notes[-1])
     assert int(tried[1]) > 0
 
@@ -205,19 +252,19 @@ def test_some_orbits_are_carried_back_however_wide_the_spacing(found):
 def test_what_a_file_of_known_branches_holds_stays_there(harmonic, found, tmp_path):
     place = tmp_path / "known.h5"
     save_branches(place, harmonic.branches)
-    by_detour(harmonic, max_period=1, spacing=0.1, checkpoint=place)
+    by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
     kept = load_branches(place)
     assert [len(b.nodes) for b in kept] == [len(b.nodes) for b in found.branches]
     found.save(place)
     with pytest.raises(SystemModelError, match="holds a diagram or exploration"):
-        by_detour(harmonic, max_period=1, spacing=0.1, checkpoint=place)
+        by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
     assert len(load_diagram(place).branches) == 2
 
 
 def test_another_factor_loses_nothing_that_the_file_has(harmonic, found, tmp_path):
     place = tmp_path / "found.h5"
-    by_detour(harmonic, max_period=1, spacing=0.1, checkpoint=place)
-    again = by_detour(harmonic, 0.95, max_period=1, spacing=0.5, checkpoint=place)
+    by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
+    again = by_detour(harmonic, {"damping": 0.95}, max_period=1, spacing=0.5, checkpoint=place)
     for branches in (again.branches[1:], load_branches(place)):
         (isola,) = branches
         assert np.array_equal(isola.frequency_hz, found.branches[1].frequency_hz)
@@ -232,17 +279,26 @@ def test_a_branch_of_a_wider_range_and_one_without_its_course_may_be_known(harmo
         known = Diagram((branch,), [low, high], "tip")
         place = tmp_path / "found.h5"
         for _ in range(2):
-            done = by_detour(known, max_period=1, spacing=0.1, checkpoint=place)
+            done = by_detour(known, HALF, max_period=1, spacing=0.1, checkpoint=place)
             assert len(done.branches) == 2
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"damping": 1.0}, "damping and excitation are both 1"),
-        ({"damping": 0.0}, "damping must be a factor from 0.001 to 1000, got 0"),
-        ({"damping": float("nan")}, "damping must be a factor"),
-        ({"excitation": -2.0}, "excitation must be a factor"),
+        ({"factors": 0.5}, "factors must be"),
+        ({"factors": {}}, "factors: names nothing to change"),
+        ({"factors": {"damping": 1.0}}, "that of the damping must .* other than 1, got 1"),
+        ({"factors": {"damping": 0.0}}, "must be a number from 0.001 to 1000 .* got 0"),
+        ({"factors": {"damping": float("nan")}}, "that of the damping must be a number"),
+        ({"factors": {"excitation": -2.0}}, "that of the excitation must be a number"),
+        ({"factors": {SECOND: "half"}}, "that of natural_frequency_hz 1 must be a number"),
+        ({"factors": {"gap": 0.5}}, "factors: gap is zero, which no factor changes"),
+        ({"factors": {"frequency_hz": 0.5}}, "carried at their own frequency_hz"),
+        ({"factors": {"exponent": 0.5}}, "exponent must"),
+        ({"factors": {"nonsense": 0.5}}, "unknown parameter 'nonsense'"),
+        ({"factors": {1: 0.5}}, "factors: must be of names or parameters, got 1"),
+        ({"factors": {Parameter("stiffness", 1): 0.5}}, "there is no stop 1"),
         ({"spacing": 0.0}, "spacing must lie between 1e-06 and 1, got 0"),
         ({"max_period": 0}, "max_period must be"),
         ({"known": Diagram((), RANGE_HZ, "tip")}, "known: has no branches to begin with"),
@@ -251,7 +307,7 @@ def test_a_branch_of_a_wider_range_and_one_without_its_course_may_be_known(harmo
 )
 def test_bad_input_is_refused(harmonic, change, message):
     with pytest.raises(SystemModelError, match=message):
-        by_detour(**{"known": harmonic, **change})
+        by_detour(**{"known": harmonic, "factors": HALF, **change})
 
 
 @pytest.mark.parametrize(
@@ -265,14 +321,14 @@ def test_bad_input_is_refused(harmonic, change, message):
 )
 def test_a_diagram_that_makes_no_sense_is_refused(harmonic, change, message):
     with pytest.raises(SystemModelError, match=message):
-        by_detour(replace(harmonic, **change))
+        by_detour(replace(harmonic, **change), HALF)
 
 
 def test_branches_of_two_systems_are_refused(harmonic):
     other = continue_branch(solve_orbit(two_modes(0.02), 10.99), (10.9, 11.0))
     known = replace(harmonic, branches=(*harmonic.branches, replace(other, name="of another")))
     with pytest.raises(SystemModelError, match="branch of another is of another system"):
-        by_detour(known)
+        by_detour(known, HALF)
 
 
 def known_of(system: System) -> Diagram:
@@ -281,15 +337,15 @@ def known_of(system: System) -> Diagram:
     return Diagram((branch,), (10.9, 11.0), "tip")
 
 
-def test_a_system_without_modal_damping_has_no_factor_of_it_and_no_sum_of_indices():
+def test_a_system_without_damping_has_no_factor_of_it_and_no_sum_of_indices():
     known = known_of(replace(two_modes(), damping=np.zeros((2, 2))))
-    with pytest.raises(SystemModelError, match="without modal damping"):
-        by_detour(known)
-    done = by_detour(known, 1.0, 1.1, max_period=1, spacing=0.5)
+    with pytest.raises(SystemModelError, match="the damping is zero"):
+        by_detour(known, HALF)
+    done = by_detour(known, {"excitation": 1.1}, max_period=1, spacing=0.5)
     assert not any("indices" in note for note in done.notes)
 
 
 def test_a_system_without_excitation_has_no_factor_of_it():
     known = known_of(two_modes().with_elements(excitation=()))
-    with pytest.raises(SystemModelError, match="without excitation"):
-        by_detour(known, 0.5, 1.1)
+    with pytest.raises(SystemModelError, match="the excitation is zero"):
+        by_detour(known, {"damping": 0.5, "excitation": 1.1})

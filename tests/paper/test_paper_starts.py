@@ -110,8 +110,8 @@ def two_known(monkeypatch, tmp_path):
 def test_a_detour_gives_starts(two_known):
     name, folder = two_known
     known = read_starts(name, folder)
-    done = search_by_detour(name, folder, 1.0, 2.0)
-    assert done.notes[-1].startswith("at 1 of the damping and 2 of the excitation: ")
+    done = search_by_detour(name, folder, {"excitation": 2.0})
+    assert done.notes[-1].startswith("at 2 of the excitation: ")
     assert len(read_starts(name, folder)) == len(done.branches) > len(known) == 2
 
 
@@ -125,7 +125,7 @@ def test_a_search_is_kept_and_gives_starts_from_which_the_next_one_begins(
     found = read_starts(name, folder)
     assert len(found) == len(done.diagram.branches) > done.stage.given == 2
     monkeypatch.setattr("nldyn.paper.search.follow_starts", None)  # all are followed already
-    more = search_by_detour(name, folder, 0.5, 1.0)
+    more = search_by_detour(name, folder, {"damping": 0.5})
     assert len(read_starts(name, folder)) == len(more.branches) >= len(found)
     starts_path(name, folder).write_bytes(first)
     again = search(name, folder, effort)
@@ -138,12 +138,13 @@ def test_a_search_is_kept_and_gives_starts_from_which_the_next_one_begins(
 
 def test_the_command_tells_all_notes(two_known, monkeypatch, capsys):
     name, folder = two_known
-    monkeypatch.setattr("sys.argv", ["search", str(folder), name, "--detour", "0.5", "1.2"])
+    factors = ["damping=0.5", "natural_frequency_hz[1]=1.01"]
+    monkeypatch.setattr("sys.argv", ["search", str(folder), name, "--detour", *factors])
     main()
     first, *others, last = capsys.readouterr().out.splitlines()
     assert first == f"{name}: from 2 starts of period 2, 3, 0 of which lead to no orbit"
     assert any(note.startswith("indices of the fixed points of P to P^3 ") for note in others)
-    assert last.startswith("at 0.5 of the damping and 1.2 of the excitation: ")
+    assert last.startswith("at 0.5 of the damping and 1.01 of natural_frequency_hz 1: ")
 
 
 def test_branches_of_another_model_are_refused(two_known):
@@ -156,3 +157,24 @@ def test_branches_of_another_model_are_refused(two_known):
     changed = replace(job, system=lambda: replace(system, damping=1.001 * system.damping))
     with pytest.raises(SystemModelError, match="are of another model; delete them"):
         known_branches(changed, folder, lambda what, hz: None)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["damping"], "'damping' is not of the form NAME=FACTOR or NAME[INDEX]=FACTOR"),
+        (["stiffness[a]=2"], "is not of the form"),
+        (["damping=half"], "is not of the form"),
+        (["damping=0.5", "damping=0.3"], "names something twice"),
+        (["gap=2"], "factors: gap is zero, which no factor changes"),
+        (["nonsense=2"], "unknown parameter 'nonsense'"),
+    ],
+)
+def test_detours_that_make_no_sense_are_refused(two_known, given, message, monkeypatch, capsys):
+    name, folder = two_known
+    monkeypatch.setattr("sys.argv", ["search", str(folder), name, "--detour", *given])
+    monkeypatch.setattr("nldyn.paper.search.follow_starts", None)  # before any work
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    assert message in capsys.readouterr().err
