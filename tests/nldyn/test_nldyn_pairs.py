@@ -4,13 +4,16 @@ import numpy as np
 
 from nldyn import (
     ContinuationOptions,
+    FlowMap,
     Stop,
     System,
     Unbalance,
     continue_branch,
     solve_orbit,
 )
+from nldyn.fixed_point_index import _changes
 from nldyn.paper.jobs import scene_system
+from nldyn.search import orbit_near
 
 
 def test_two_flips_within_a_step_are_found():
@@ -46,3 +49,22 @@ def test_two_folds_behind_a_grazing_point_are_found_from_every_start():
         kinds = [s.kind for s in branch.special_points if abs(s.frequency_hz - grazing) < 1e-4]
         assert sorted(kinds) == ["GR", "LP", "LP", "LP"]
         assert len(branch.at(16.211585)) == 4
+
+
+def test_only_the_last_point_of_a_closed_branch_lies_beyond_its_start():
+    """Also where a touch, twice within the last step, puts a point between its ends."""
+    flow = FlowMap(scene_system("four_dof_xi_0.001"))
+    hz, state = 28.218257384643508, [
+        1.8984869179784e-6, -1.1909021869360e-5, -1.8386967220751e-6, -7.5170210415372e-7,
+        -3.9881359108745e-8, 2.5616578435823e-7, -3.0953090011517e-8, -1.8729804769715e-7,
+    ]  # fmt: skip
+    orbit = orbit_near(flow, np.array(state), 3, 2.0 * np.pi * hz, "middle")
+    isola = continue_branch(orbit, (28.0, 28.5))
+    assert isola.closed
+    first, *_, before, last = (node.orbit.point for node in isola.nodes)
+    weights, step = orbit.problem.metric(first), last - before
+    assert 0.0 < (first - before) @ (weights * step) <= step @ (weights * step)
+    ends, rises = _changes([isola], 3)  # the two halves of an isola have opposite indices
+    order = np.argsort(ends, kind="stable")
+    sums, widths = np.cumsum(rises[order]), np.diff(ends[order], append=np.inf)
+    assert not sums[widths > 1e-9].any()
