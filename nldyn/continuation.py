@@ -783,8 +783,8 @@ class Trail:
             special = [s for s in special if not self._is_flip_at_end(s)]
         elif self.walk.stop_reason == CLOSED:  # the last step leads beyond the start
             special = [s for s in special if not self._is_repeated(s.point)]
-            dips = self.nodes[:-1]  # some of which may have been inserted there
-            self.nodes = [*(p for p in dips if not self._is_repeated(p)), self.nodes[-1]]
+            last = self.nodes.pop()  # a dip may have put others there
+            self.nodes = [*(p for p in self.nodes if not self._is_repeated(p)), last]
         end = self._end(next(i for i, p in enumerate(self.nodes) if p is self._stride.here))
         return Leg(self.nodes, special, self.notes, self.walk.stop_reason, end)
 

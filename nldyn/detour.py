@@ -5,19 +5,30 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any, Final, Literal
 
 import numpy as np
 
 from nldyn.elements import Excitation
-from nldyn.errors import SystemModelError
+from nldyn.errors import SystemModelError, is_finite, shown
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, solve_orbit
-from nldyn.parameter_values import value_of, with_value
+from nldyn.parameter_values import (
+    EVERY_MODE,
+    FREQUENCY,
+    NAMES,
+    checked_parameter,
+    value_of,
+    with_value,
+)
 from nldyn.parameters import SOURCES, Parameter
 from nldyn.system import System
 
-DAMPING, EXCITATION = "damping", "excitation"
+DAMPING: Final = "damping"
+EXCITATION: Final = "excitation"
+What = Literal["damping", "excitation"] | Parameter  # changes: all of it, or one number
+MOST = 1e3  # factor
 FIRST_STEP, SHORTEST_STEP = 0.25, 1e-3  # in the logarithms of the factors
 LONGER, SHORTER = 1.5, 0.4  # the next step, after one that led on and one that did not
 MISS = 0.3  # of an orbit: distance from where it was expected
@@ -31,12 +42,12 @@ class Detour:
     ----------
     own : FlowMap
         Of the system where it begins.
-    factors : mapping of str or Parameter to float
-        Factors of numbers of the system where it ends; before, powers of them. See `by_detour`.
+    factors : mapping of What to float
+        Factors where it ends, see `checked_factors`; before, powers of them.
     """
 
     own: FlowMap
-    factors: Mapping[str | Parameter, float]
+    factors: Mapping[What, float]
 
     @property
     def length(self) -> float:
@@ -48,8 +59,8 @@ class Detour:
         if share == 0.0:
             return self.own
         system = self.own.system
-        for name, factor in self.factors.items():
-            system = times(system, name, factor**share)
+        for what, factor in self.factors.items():
+            system = times(system, what, factor**share)
         return FlowMap(system, self.own.options)
 
     def carried(self, orbit: Orbit, start: float, end: float) -> Orbit | None:
@@ -94,27 +105,94 @@ class Detour:
         return None if far else found
 
 
-def has_damping(system: System) -> bool:
-    """Whether any mode or damper takes energy away."""
-    return bool(np.any(system.damping)) or any(d.coefficient > 0.0 for d in system.dampers)
-
-
-def times(system: System, name: str | Parameter, factor: float) -> System:
-    """The system with a number, all of its damping, or all of its excitation times a factor."""
-    if name == DAMPING:
+def times(system: System, what: What, factor: float) -> System:
+    """The system with all of its damping, all of its excitation, or a parameter times a factor."""
+    if isinstance(what, Parameter):
+        return with_value(system, what, factor * value_of(system, math.nan, what))
+    if what == DAMPING:
         dampers = tuple(replace(d, coefficient=factor * d.coefficient) for d in system.dampers)
         return replace(system, damping=factor * system.damping, dampers=dampers)
-    if name == EXCITATION:
-        sources = tuple(_scaled(source, factor) for source in system.excitation)
-        return system.with_elements(excitation=sources)
-    parameter = Parameter(name) if isinstance(name, str) else name
-    return with_value(system, parameter, factor * value_of(system, math.nan, parameter))
+    sources = tuple(_scaled(source, factor) for source in system.excitation)
+    return system.with_elements(excitation=sources)
+
+
+def checked_factors(
+    system: System, factors: Mapping[str | Parameter, float]
+) -> dict[What, float]:
+    """Factors of "damping", "excitation" and parameters, of which a name alone means index 0.
+
+    Raises
+    ------
+    SystemModelError
+        For no factor, one that is 1 or out of bounds, and one of what the system does not have,
+        what is zero, was named before, or cannot be so many times as large.
+    """
+    if not (isinstance(factors, Mapping) and factors):
+        raise SystemModelError(
+            f'factors must be a mapping such as {{"damping": 0.5}}, got {shown(factors)}'
+        )
+    checked: dict[What, float] = {}
+    for name, factor in factors.items():
+        what = _checked_name(system, name)
+        if what in checked:
+            raise SystemModelError(f"factors: {named(what)} is named twice")
+        if not (is_finite(factor) and 1.0 / MOST <= factor <= MOST and factor != 1.0):
+            raise SystemModelError(
+                f"factors: that of {named(what)} must be a number from {1.0 / MOST:g} to {MOST:g} "
+                f"other than 1, got {shown(factor)}"
+            )
+        checked[what] = float(factor)
+        try:
+            system = times(system, what, checked[what])
+        except SystemModelError as error:
+            raise SystemModelError(
+                f"factors: {named(what)} cannot be {factor:g} times as large: {error}"
+            ) from None
+    return checked
+
+
+def _checked_name(system: System, name: object) -> What:
+    """What a factor is of, if the system has it and it is not zero."""
+    text = name.name if isinstance(name, Parameter) else name
+    what: What
+    if text == FREQUENCY:
+        raise SystemModelError(f"factors: orbits are carried at their own {FREQUENCY}")
+    if name == DAMPING:
+        what, there = DAMPING, bool(np.any(system.total_damping))
+    elif name == EXCITATION:
+        what, there = EXCITATION, any(_strength(source) != 0.0 for source in system.excitation)
+    elif isinstance(name, str | Parameter) and text in NAMES:
+        what = checked_parameter(system, name)
+        there = value_of(system, math.nan, what) != 0.0
+    else:
+        known = ", ".join([DAMPING, EXCITATION, *(other for other in NAMES if other != FREQUENCY)])
+        reason = "has no index" if text in (DAMPING, EXCITATION) else f"is none of {known}"
+        raise SystemModelError(f"factors: {shown(text)} {reason}")
+    if not there:
+        raise SystemModelError(f"factors: {named(what)} is zero, which no factor changes")
+    return what
+
+
+def named(what: What) -> str:
+    """What a factor is of, in a note or message."""
+    if isinstance(what, str):
+        return f"the {what}"
+    return f"{what.name} of all modes" if what.index == EVERY_MODE else f"{what.name}[{what.index}]"
+
+
+def _strength(source: Excitation) -> float:
+    return float(getattr(source, _size_of(source)))
+
+
+def _size_of(source: Excitation) -> str:
+    """Name of the number that tells how strong a source of excitation is."""
+    return next(name for name in SOURCES if hasattr(source, name))
 
 
 def _scaled(source: Excitation, factor: float) -> Excitation:
     """A source of excitation, times a factor."""
-    name = next(name for name in SOURCES if hasattr(source, name))
-    return replace(source, **{name: factor * getattr(source, name)})
+    changed: dict[str, Any] = {_size_of(source): factor * _strength(source)}
+    return replace(source, **changed)
 
 
 def _states(orbit: Orbit) -> Real:

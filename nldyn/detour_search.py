@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -13,18 +12,15 @@ from cms.threads import one_thread
 from nldyn.branch import Branch, check_branches
 from nldyn.checkpoint import checkpoint_of_several
 from nldyn.continuation import ContinuationOptions
-from nldyn.detour import DAMPING, EXCITATION, Detour, has_damping, times
+from nldyn.detour import Detour, checked_factors, named
 from nldyn.diagrams import Collector, Diagram, Progress, check_known, counted, middle_orbit
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.exploration import FINEST_SPACING, steps_between
 from nldyn.fixed_point_index import index_note, is_damped, without_index_note
 from nldyn.orbit import Orbit, same_orbit
-from nldyn.parameter_values import FREQUENCY, checked_parameter, value_of
 from nldyn.parameters import Parameter
-from nldyn.system import System
 
 PLACES = 3  # orbits of each branch that are carried there, in case some get lost
-MOST = 1e3  # factor
 
 
 @one_thread()
@@ -55,8 +51,9 @@ def by_detour(
         What is changed and how many times it is there, up to 1000 or down to its inverse:
         ``{"damping": 0.5}`` halves the damping of all modes and all dampers,
         ``{"excitation": 1.4}`` is of all sources of excitation, and
-        ``{Parameter("natural_frequency_hz", 1): 0.99}`` of one number, with the names of
-        `continue_in`. Several are changed together.
+        ``{Parameter("natural_frequency_hz", 1): 0.99}`` of one number. Names and indices are those
+        of `continue_in`, but for the frequency; a name alone means index 0. Several are changed
+        one after the other.
     max_period : int
         Longest orbits carried, and wanted.
     spacing : float
@@ -79,7 +76,7 @@ def by_detour(
     Raises
     ------
     SystemModelError
-        For input that makes no sense, and for a factor of a number that is zero or not there.
+        For input that makes no sense, and for a factor of what is zero or not there.
     OutputError
         If `checkpoint` cannot be written.
 
@@ -95,9 +92,9 @@ def by_detour(
     >>> len(more.branches), more.branches[1].closed
     (2, True)
     """
-    _check(known, factors, max_period, spacing, options, progress)
+    _check(known, max_period, spacing, options, progress)
     own = known.branches[0].points[0].problem.flow
-    detour = Detour(own, factors)
+    detour = Detour(own, checked_factors(own.system, factors))
     low, high = known.range_hz
     options, progress = options or ContinuationOptions(), progress or (lambda what, hz: None)
     box = Collector(own, (low, high), known.observe, options, progress)
@@ -117,62 +114,17 @@ def by_detour(
             _follow_new(box, back, max_period)
     if is_damped(own.system):
         box.notes.append(index_note(box.branches, known.range_hz, max_period))
-    new = box.branches[len(known.branches) :]
-    box.notes.append(
-        f"at {' and '.join(f'{f:g} of {_named(name)}' for name, f in factors.items())}: "
-        f"{counted(there)}, {came} of {tried} orbits carried back, {counted(new)} found so"
-    )
-    return Diagram(tuple(box.branches), (low, high), known.observe, tuple(box.notes))
-
-
-def check_factors(system: System, factors: Mapping[str | Parameter, float]) -> None:
-    """Raise unless a detour with these factors makes sense.
-
-    Raises
-    ------
-    SystemModelError
-        For no factor, one that is 1 or out of bounds, and one of a number that the system does not
-        have, that is zero, or that cannot be so many times as large.
-    """
-    check_types(factors=(factors, Mapping))
-    if not factors:
-        raise SystemModelError('factors: names nothing to change; try {"damping": 0.5}')
-    for name, factor in factors.items():
-        _check_has(system, name)
-        if not (is_finite(factor) and 1.0 / MOST <= factor <= MOST and factor != 1.0):
-            raise SystemModelError(
-                f"factors: that of {_named(name)} must be a number from {1.0 / MOST:g} to {MOST:g} "
-                f"other than 1, got {shown(factor)}"
-            )
-        system = times(system, name, factor)
-
-
-def _check_has(system: System, name: str | Parameter) -> None:
-    """Raise unless a system has what a factor is of."""
-    if name == DAMPING:
-        there = has_damping(system)
-    elif name == EXCITATION:
-        there = bool(system.excitation)
-    elif name in (FREQUENCY, Parameter(FREQUENCY)):
-        raise SystemModelError("factors: orbits are carried at their own frequency_hz")
-    elif isinstance(name, str | Parameter):
-        there = value_of(system, math.nan, checked_parameter(system, name)) != 0.0
-    else:
-        raise SystemModelError(f"factors: must be of names or parameters, got {shown(name)}")
+    new = counted(box.branches[len(known.branches) :])
+    changed = " and ".join(f"{f:g} of {named(what)}" for what, f in detour.factors.items())
+    led = f"{counted(there)}, {came} of {tried} orbits carried back"
     if not there:
-        raise SystemModelError(f"factors: {_named(name)} is zero, which no factor changes")
-
-
-def _named(name: str | Parameter) -> str:
-    """What a factor is of, as a note tells it."""
-    if name in (DAMPING, EXCITATION):
-        return f"the {name}"
-    return name if isinstance(name, str) else f"{name.name} {name.index}"
+        led = "no orbit got there, as some may with factors nearer to 1"
+    box.notes.append(f"at {changed}: {led}, {new} beside those given")
+    return Diagram(tuple(box.branches), (low, high), known.observe, tuple(box.notes))
 
 
 def _check(
     known: Diagram,
-    factors: Mapping[str | Parameter, float],
     max_period: int,
     spacing: float,
     options: ContinuationOptions | None,
@@ -192,7 +144,6 @@ def _check(
     if not known.branches:
         raise SystemModelError("known: has no branches to begin with")
     check_known(known, known.branches[0].points[0].problem.flow)
-    check_factors(known.branches[0].points[0].system, factors)
 
 
 def _go_on(box: Collector, max_period: int) -> None:

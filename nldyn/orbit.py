@@ -622,9 +622,9 @@ def _by_more_damping(
     problem: ShootingProblem, omega: float, observe: str, pieces: int
 ) -> Orbit | None:
     """Orbit at more damping, which a motion from rest comes near, carried back, or None."""
-    from nldyn.detour import DAMPING, Detour, has_damping
+    from nldyn.detour import DAMPING, Detour
 
-    if not has_damping(problem.flow.system):
+    if not np.any(problem.flow.system.total_damping):
         return None
     for factor in MORE_DAMPING:
         detour = Detour(problem.flow, {DAMPING: factor})

@@ -26,9 +26,10 @@ _EXCITATION = -1
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of a stop or of an excitation.
+    """A number of a system.
 
-    `continue_in` and the like know more names, see `nldyn.parameter_values`.
+    Motions have exact derivatives by the numbers of stops and excitations. `continue_in`,
+    `by_detour` and the like know those of dampers and modes, too, see `nldyn.parameter_values`.
 
     Parameters
     ----------
@@ -36,7 +37,7 @@ class Parameter:
         gap, stiffness, exponent or dissipation of a stop (not of one with a law of its own, but
         for the gap), amplitude or mass_times_radius of an excitation.
     index : int
-        Which of the stops or excitations of the system.
+        Which of the stops, excitations, dampers or modes of the system.
 
     Raises
     ------

@@ -2,8 +2,8 @@
 
 Beside the branches of the starts that are known, those in the directory or else the ones that are
 kept with the package, it finds others, writes the starts of all into the directory, and reports how
-many may be missing. With ``--detour damping=0.5 natural_frequency_hz[1]=0.99`` at the end, say, it
-does not simulate, but goes by way of a system with these factors, see `by_detour`. The directory
+many may be missing. With ``--detour damping=0.5 "natural_frequency_hz[1]=0.99"`` at the end, say,
+it does not simulate, but goes by way of a system with these factors, see `by_detour`. The directory
 keeps what is found, and the same command goes on where it was interrupted (but for following the
 starts); once it has ended, it looks for more beside what it has found, from other random states.
 """
@@ -19,7 +19,8 @@ from pathlib import Path
 
 from nldyn.cli import plain_errors, told_what_is_kept
 from nldyn.command import answering
-from nldyn.detour_search import by_detour, check_factors
+from nldyn.detour import checked_factors
+from nldyn.detour_search import by_detour
 from nldyn.diagrams import Diagram, Progress
 from nldyn.errors import SystemModelError
 from nldyn.exploration import Exploration, ExploreOptions
@@ -68,7 +69,6 @@ def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Explorat
 def search_by_detour(name: str, folder: Path, factors: Mapping[str | Parameter, float]) -> Diagram:
     """Look for branches of a model with `by_detour`, and write the starts of all."""
     job = job_named(name)
-    check_factors(job.system(), factors)
     with progress_line() as report:
         known, place, _ = known_branches(job, folder, report)
         kept = place.with_suffix(".detour.h5")
@@ -124,7 +124,7 @@ def factor_of(text: str) -> tuple[str | Parameter, float]:
     argparse.ArgumentTypeError
         If the text is neither.
     """
-    parts = re.fullmatch(r"(\w+)(?:\[(\d+)\])?=(.+)", text)
+    parts = re.fullmatch(r"(\w+)(?:\[(-?\d+)\])?=(.+)", text)
     try:
         if parts is None:
             raise ValueError
@@ -142,8 +142,10 @@ def main() -> None:
     parser.add_argument("directory", type=Path)
     parser.add_argument("models", nargs="*", metavar="MODEL", help=f"of {', '.join(MODELS)}")
     parser.add_argument(
-        "--detour", type=factor_of, nargs="+", metavar="NAME=FACTOR", help="what is changed there"
-    )
+        "--detour", type=factor_of, nargs="+", action="extend", metavar="NAME=FACTOR",
+        help="what is changed there: damping, excitation, or a parameter such as 'stiffness[0]'; "
+        "give it after the models",
+    )  # fmt: skip
     given = parser.parse_args()
     factors = dict(given.detour or ())
     if given.detour and len(factors) < len(given.detour):
@@ -151,6 +153,11 @@ def main() -> None:
     unknown = set(given.models) - set(MODELS)
     if unknown:
         parser.error(f"unknown model {sorted(unknown)[0]!r} (there are: {', '.join(MODELS)})")
+    for name in given.models or MODELS if factors else ():
+        try:
+            checked_factors(job_named(name).system(), factors)
+        except SystemModelError as error:
+            parser.error(f"argument --detour: {name}: {error}")
     try:
         given.directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -144,7 +144,7 @@ def test_the_command_tells_all_notes(two_known, monkeypatch, capsys):
     first, *others, last = capsys.readouterr().out.splitlines()
     assert first == f"{name}: from 2 starts of period 2, 3, 0 of which lead to no orbit"
     assert any(note.startswith("indices of the fixed points of P to P^3 ") for note in others)
-    assert last.startswith("at 0.5 of the damping and 1.01 of natural_frequency_hz 1: ")
+    assert last.startswith("at 0.5 of the damping and 1.01 of natural_frequency_hz[1]: ")
 
 
 def test_branches_of_another_model_are_refused(two_known):
@@ -166,15 +166,19 @@ def test_branches_of_another_model_are_refused(two_known):
         (["stiffness[a]=2"], "is not of the form"),
         (["damping=half"], "is not of the form"),
         (["damping=0.5", "damping=0.3"], "names something twice"),
-        (["gap=2"], "factors: gap is zero, which no factor changes"),
-        (["nonsense=2"], "unknown parameter 'nonsense'"),
+        (["damping=0.5", "--detour", "damping=0.3"], "names something twice"),
+        (["gap=2"], "two_dof_xi_0.01: factors: gap[0] is zero, which no factor changes"),
+        (["natural_frequency_hz[2]=2"], "there is no mode 2"),
+        (["modal_damping[-1]=1"], "that of modal_damping of all modes must be a number"),
+        (["nonsense=2"], "'nonsense' is none of damping, "),
     ],
 )
 def test_detours_that_make_no_sense_are_refused(two_known, given, message, monkeypatch, capsys):
     name, folder = two_known
-    monkeypatch.setattr("sys.argv", ["search", str(folder), name, "--detour", *given])
-    monkeypatch.setattr("nldyn.paper.search.follow_starts", None)  # before any work
+    new = folder / "new"
+    monkeypatch.setattr("sys.argv", ["search", str(new), name, "--detour", *given])
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 2
     assert message in capsys.readouterr().err
+    assert not new.exists()
