@@ -153,7 +153,8 @@ def main() -> None:
     unknown = set(given.models) - set(MODELS)
     if unknown:
         parser.error(f"unknown model {sorted(unknown)[0]!r} (there are: {', '.join(MODELS)})")
-    for name in given.models or MODELS if factors else ():
+    names = given.models or MODELS
+    for name in names if factors else ():
         try:
             checked_factors(job_named(name).system(), factors)
         except SystemModelError as error:
@@ -162,7 +163,7 @@ def main() -> None:
         given.directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         parser.error(f"{given.directory} cannot be made: {error.strerror}")
-    for name in given.models or MODELS:
+    for name in names:
         with plain_errors():
             if factors:
                 said = "\n".join(search_by_detour(name, given.directory, factors).notes)
