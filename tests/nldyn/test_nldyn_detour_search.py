@@ -205,7 +205,7 @@ def test_a_branch_that_repeats_a_known_one_does_not_stay_in_the_file(
     monkeypatch.setattr("nldyn.checkpoint.PAUSE", 0.0)
     monkeypatch.setattr("nldyn.checkpoint.SHARE", 0.0)
     place = tmp_path / "found.h5"
-    by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
+    by_detour(harmonic, HALF, max_period=1, spacing=0.3, checkpoint=place)
     assert load_branches(place) == []
 
 
