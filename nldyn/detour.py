@@ -22,7 +22,7 @@ from nldyn.parameter_values import (
     value_of,
     with_value,
 )
-from nldyn.parameters import SOURCES, Parameter
+from nldyn.parameters import Parameter, size_of, strength
 from nldyn.system import System
 
 DAMPING: Final = "damping"
@@ -160,7 +160,7 @@ def _checked_name(system: System, name: object) -> What:
     if name == DAMPING:
         what, there = DAMPING, bool(np.any(system.total_damping))
     elif name == EXCITATION:
-        what, there = EXCITATION, any(_strength(source) != 0.0 for source in system.excitation)
+        what, there = EXCITATION, any(strength(source) != 0.0 for source in system.excitation)
     elif isinstance(name, str | Parameter) and text in NAMES:
         what = checked_parameter(system, name)
         there = value_of(system, math.nan, what) != 0.0
@@ -180,18 +180,9 @@ def named(what: What) -> str:
     return f"{what.name} of all modes" if what.index == EVERY_MODE else f"{what.name}[{what.index}]"
 
 
-def _strength(source: Excitation) -> float:
-    return float(getattr(source, _size_of(source)))
-
-
-def _size_of(source: Excitation) -> str:
-    """Name of the number that tells how strong a source of excitation is."""
-    return next(name for name in SOURCES if hasattr(source, name))
-
-
 def _scaled(source: Excitation, factor: float) -> Excitation:
     """A source of excitation, times a factor."""
-    changed: dict[str, Any] = {_size_of(source): factor * _strength(source)}
+    changed: dict[str, Any] = {size_of(source): factor * strength(source)}
     return replace(source, **changed)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn._kernels import DISSIPATION, EXPONENT, GAP, STIFFNESS
-from nldyn.elements import turn
+from nldyn.elements import Excitation, turn
 from nldyn.errors import SystemModelError, check_types, check_whole
 from nldyn.linear import Complex
 from nldyn.system import System
@@ -22,6 +22,16 @@ _COLUMNS = {
 }
 SOURCES = ("amplitude", "mass_times_radius")
 _EXCITATION = -1
+
+
+def size_of(source: Excitation) -> str:
+    """Name of the number that tells how strong a source of excitation is."""
+    return next(name for name in SOURCES if hasattr(source, name))
+
+
+def strength(source: Excitation) -> float:
+    """The number itself: in kg m of an unbalance, else in N."""
+    return float(getattr(source, size_of(source)))
 
 
 @dataclass(frozen=True)

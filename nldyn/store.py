@@ -34,6 +34,7 @@ from nldyn.exploration import Coverage, Exploration, ExploreOptions, Question, S
 from nldyn.flow import FlowMap, FlowOptions, Trajectory
 from nldyn.linear import LinearPart, Real
 from nldyn.orbit import Orbit
+from nldyn.parameters import strength
 from nldyn.result_directory import OutputError, in_use, is_writable
 from nldyn.shooting import ShootingProblem
 from nldyn.system import System, same_system
@@ -448,7 +449,7 @@ def _write_flow(group: Any, flow: FlowMap) -> None:
             "kind": ["unbalance" if isinstance(s, Unbalance) else "harmonic" for s in sources],
         },
         {
-            "size": ("kg m of an unbalance, else N", [_strength(s) for s in sources]),
+            "size": ("kg m of an unbalance, else N", [strength(s) for s in sources]),
             "phase_deg": ("degree", [s.phase_deg for s in sources]),
         },
     )
@@ -461,10 +462,6 @@ def _write_columns(
         _set_attribute(group, name, values)
     for name, (unit, column) in numbers.items():
         _put(group, name, np.array(column, dtype=float), unit)
-
-
-def _strength(source: Excitation) -> float:
-    return source.mass_times_radius if isinstance(source, Unbalance) else source.amplitude
 
 
 def _trials(stop: Stop) -> list[tuple[float, float, float]]:
@@ -909,9 +906,9 @@ def _read_excitation(group: _Group) -> tuple[Excitation, ...]:
     at, kinds = group.texts("at"), group.texts("kind")
     size, phase = group.array("size", len(at)), group.array("phase_deg", len(at))
     sources: list[Excitation] = []
-    for place, kind, strength, angle in zip(at, kinds, size.tolist(), phase.tolist(), strict=True):
+    for place, kind, amount, angle in zip(at, kinds, size.tolist(), phase.tolist(), strict=True):
         if kind not in ("unbalance", "harmonic"):
             raise group.fault("attribute", "kind", f"has an unknown entry '{kind}'")
         maker = Unbalance if kind == "unbalance" else HarmonicForce
-        sources.append(maker(place, strength, angle))
+        sources.append(maker(place, amount, angle))
     return tuple(sources)
