@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -107,20 +108,49 @@ def by_detour(
         tried = came = 0
         for frequency in np.geomspace(low, high, count + 2)[1:-1].tolist():
             progress("back", frequency)
-            orbits = [orbit for branch in there for orbit in branch.at(frequency)]
-            carriages = (detour.carried(orbit, 1.0, 0.0) for orbit in orbits)
-            back = [orbit for orbit in carriages if orbit is not None]
+            orbits = [(via, orbit) for via in there for orbit in via.branch.at(frequency)]
+            carriages = ((via, detour.carried(orbit, 1.0, 0.0)) for via, orbit in orbits)
+            back = [(via, orbit) for via, orbit in carriages if orbit is not None]
             tried, came = tried + len(orbits), came + len(back)
             _follow_new(box, back, max_period)
     if is_damped(own.system):
         box.notes.append(index_note(box.branches, known.range_hz, max_period))
-    new = counted(box.branches[len(known.branches) :])
-    changed = " and ".join(f"{f:g} of {named(what)}" for what, f in detour.factors.items())
-    led = f"{counted(there)}, {came} of {tried} orbits carried back"
-    if not there:
-        led = "no orbit got there, as some may with factors nearer to 1"
-    box.notes.append(f"at {changed}: {led}, {new} beside those given")
+    box.notes.append(_told(known, box, detour, there, f"{came} of {tried}", max_period))
     return Diagram(tuple(box.branches), (low, high), known.observe, tuple(box.notes))
+
+
+@dataclass
+class Via:
+    """A branch of the changed system, with which branches of the system itself it joins.
+
+    Parameters
+    ----------
+    branch : Branch
+        Of the changed system.
+    entries, exits : set of int
+        Indices of the branches whose orbits were carried to it, and of those on which orbits of it
+        lie that were carried back.
+    """
+
+    branch: Branch
+    entries: set[int] = field(default_factory=set)
+    exits: set[int] = field(default_factory=set)
+
+
+def _told(
+    known: Diagram, box: Collector, detour: Detour, there: Sequence[Via], back: str, longest: int
+) -> str:
+    """What was tried, what was found, and how much of what is known would have been found so."""
+    changed = " and ".join(f"{f:g} of {named(what)}" for what, f in detour.factors.items())
+    new = f"{counted(box.branches[len(known.branches) :])} beside those given"
+    if not there:
+        return f"at {changed}: no orbit got there, as some may with factors nearer to 1, {new}"
+    given = {i for i, branch in enumerate(known.branches) if branch.period <= longest}
+    met = {i for i in given if any(i in via.exits and via.entries - {i} for via in there)}
+    return (
+        f"at {changed}: {counted([via.branch for via in there])}, {back} orbits carried back, "
+        f"{len(met)} of the {len(given)} given met from others, {new}"
+    )
 
 
 def _check(
@@ -155,11 +185,12 @@ def _go_on(box: Collector, max_period: int) -> None:
     box.follow_up(count, max_period, max_period, None)
 
 
-def _followed(known: Collector, detour: Detour, max_period: int) -> list[Branch]:
+def _followed(known: Collector, detour: Detour, max_period: int) -> list[Via]:
     """Branches of the changed system to which those known lead."""
     progress = known.progress
     box = Collector(detour.flow(1.0), known.range_hz, known.observe, known.options, progress)
-    for branch in known.branches:
+    entries: list[tuple[int, int]] = []  # branch there, and the one that its orbit came from
+    for index, branch in enumerate(known.branches):
         if branch.period > max_period:
             continue
         for orbit in _spread(branch.points, known.range_hz):
@@ -167,7 +198,8 @@ def _followed(known: Collector, detour: Detour, max_period: int) -> list[Branch]
             other = detour.carried(orbit, 0.0, 1.0)
             if other is not None:
                 box.follow(other, max_period, max_period, None)
-    return box.branches
+                entries += [(j, index) for j, b in enumerate(box.branches) if b.contains(other)]
+    return [Via(b, {i for at, i in entries if at == j}) for j, b in enumerate(box.branches)]
 
 
 def _spread(orbits: Sequence[Orbit], range_hz: tuple[float, float]) -> list[Orbit]:
@@ -180,13 +212,19 @@ def _spread(orbits: Sequence[Orbit], range_hz: tuple[float, float]) -> list[Orbi
     return [within[i] for i in sorted({round(place) for place in places.tolist()})]
 
 
-def _follow_new(box: Collector, orbits: Sequence[Orbit], max_period: int) -> None:
-    """Follow the orbits, all of one frequency, that lie on no branch of the box."""
-    here: list[Orbit] = []
+def _follow_new(box: Collector, back: Sequence[tuple[Via, Orbit]], max_period: int) -> None:
+    """Follow the orbits, all of one frequency, that lie on no branch of the box; note the others.
+
+    Those of a branch that is found on the way are noted as well.
+    """
+    here: list[tuple[int, Orbit]] = []
     seen = 0
-    for orbit in orbits:
-        for branch in box.branches[seen:]:
-            here += branch.at(orbit.frequency_hz)
+    for via, orbit in back:
+        for index, branch in enumerate(box.branches[seen:], seen):
+            here += [(index, other) for other in branch.at(orbit.frequency_hz)]
         seen = len(box.branches)
-        if not any(same_orbit(orbit, other) for other in here):
+        on = next((index for index, other in here if same_orbit(orbit, other)), None)
+        if on is not None:
+            via.exits.add(on)
+        else:
             box.follow(orbit, max_period, max_period, None)

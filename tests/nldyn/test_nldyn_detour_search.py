@@ -160,6 +160,17 @@ def test_what_is_known_is_not_found_again(found):
     assert again.notes[:-2] == (found.notes[-1],)  # the indices are told of once
 
 
+@pytest.mark.parametrize(("damping", "met"), [(0.5, 2), (0.95, 0)])
+def test_it_tells_how_many_of_the_known_would_have_been_found_from_others(found, damping, met):
+    """With half the damping both are one branch; with nearly all of it the isola is closed."""
+    done = by_detour(found, {"damping": damping}, max_period=1, spacing=0.1)
+    assert f", {met} of the 2 given met from others, 0 branches" in done.notes[-1]
+
+
+def test_of_one_known_branch_none_is_met_from_others(found):
+    assert ", 0 of the 1 given met from others, 1 branch beside those given" in found.notes[-1]
+
+
 def test_interrupted_it_goes_on_with_what_it_has_found(harmonic, found, tmp_path):
     place, seen = tmp_path / "found.h5", []
 
