@@ -70,9 +70,10 @@ def by_detour(
     Returns
     -------
     Diagram
-        The branches known, then those found; the last note tells what was tried, the one before,
-        if every mode is damped, whether the indices add up to one, see `index_sum`. What
-        `known` notes of them is left out.
+        The branches known, then those found. The last note tells what was tried, and how many of
+        the branches known orbits of others came to: that many it would have found, had each alone
+        been unknown. The one before tells, if every mode is damped, whether the indices add up to
+        one, see `index_sum`. What `known` notes of them is left out.
 
     Raises
     ------
