@@ -70,10 +70,11 @@ def by_detour(
     Returns
     -------
     Diagram
-        The branches known, then those found. The last note tells what was tried, and how many of
-        the branches known orbits of others came to: that many it would have found, had each alone
-        been unknown. The one before tells, if every mode is damped, whether the indices add up to
-        one, see `index_sum`. What `known` notes of them is left out.
+        The branches known, then those found. The last note tells what was tried, and of how many
+        of the branches given, up to `max_period`, an orbit came back by way of others of them: at
+        least so many it would have found, had each alone been unknown. The note before tells, if
+        every mode is damped, whether the indices add up to one, see `index_sum`. What `known` notes
+        of them is left out.
 
     Raises
     ------
@@ -116,21 +117,29 @@ def by_detour(
             _follow_new(box, back, max_period)
     if is_damped(own.system):
         box.notes.append(index_note(box.branches, known.range_hz, max_period))
-    box.notes.append(_told(known, box, detour, there, f"{came} of {tried}", max_period))
+    new = counted(box.branches[len(known.branches) :])
+    changed = " and ".join(f"{f:g} of {named(what)}" for what, f in detour.factors.items())
+    led = (
+        f"{counted([via.branch for via in there])}, {came} of {tried} orbits carried back, "
+        f"{_met_from_others(known, there, max_period)}"
+        if there
+        else "no orbit got there, as some may with factors nearer to 1"
+    )
+    box.notes.append(f"at {changed}: {led}, {new} beside those given")
     return Diagram(tuple(box.branches), (low, high), known.observe, tuple(box.notes))
 
 
 @dataclass
 class Via:
-    """A branch of the changed system, with which branches of the system itself it joins.
+    """A branch of the changed system, and the branches of the system itself that it joins.
 
     Parameters
     ----------
     branch : Branch
         Of the changed system.
     entries, exits : set of int
-        Indices of the branches whose orbits were carried to it, and of those on which orbits of it
-        lie that were carried back.
+        Indices of the branches an orbit of which was carried to it, and of those on which an orbit
+        of it lay when it was carried back.
     """
 
     branch: Branch
@@ -138,20 +147,11 @@ class Via:
     exits: set[int] = field(default_factory=set)
 
 
-def _told(
-    known: Diagram, box: Collector, detour: Detour, there: Sequence[Via], back: str, longest: int
-) -> str:
-    """What was tried, what was found, and how much of what is known would have been found so."""
-    changed = " and ".join(f"{f:g} of {named(what)}" for what, f in detour.factors.items())
-    new = f"{counted(box.branches[len(known.branches) :])} beside those given"
-    if not there:
-        return f"at {changed}: no orbit got there, as some may with factors nearer to 1, {new}"
-    given = {i for i, branch in enumerate(known.branches) if branch.period <= longest}
-    met = {i for i in given if any(i in via.exits and via.entries - {i} for via in there)}
-    return (
-        f"at {changed}: {counted([via.branch for via in there])}, {back} orbits carried back, "
-        f"{len(met)} of the {len(given)} given met from others, {new}"
-    )
+def _met_from_others(known: Diagram, there: Sequence[Via], max_period: int) -> str:
+    """To how many of the branches known an orbit came back by way of others of them."""
+    given = {i for i, branch in enumerate(known.branches) if branch.period <= max_period}
+    met = {i for i in given if any(i in via.exits and via.entries & given - {i} for via in there)}
+    return f"{len(met)} of the {len(given)} given met from others"
 
 
 def _check(
@@ -190,7 +190,7 @@ def _followed(known: Collector, detour: Detour, max_period: int) -> list[Via]:
     """Branches of the changed system to which those known lead."""
     progress = known.progress
     box = Collector(detour.flow(1.0), known.range_hz, known.observe, known.options, progress)
-    entries: list[tuple[int, int]] = []  # branch there, and the one that its orbit came from
+    there: list[Via] = []
     for index, branch in enumerate(known.branches):
         if branch.period > max_period:
             continue
@@ -199,8 +199,11 @@ def _followed(known: Collector, detour: Detour, max_period: int) -> list[Via]:
             other = detour.carried(orbit, 0.0, 1.0)
             if other is not None:
                 box.follow(other, max_period, max_period, None)
-                entries += [(j, index) for j, b in enumerate(box.branches) if b.contains(other)]
-    return [Via(b, {i for at, i in entries if at == j}) for j, b in enumerate(box.branches)]
+                there += [Via(new) for new in box.branches[len(there) :]]
+                for via in there:
+                    if via.branch.contains(other):
+                        via.entries.add(index)
+    return there
 
 
 def _spread(orbits: Sequence[Orbit], range_hz: tuple[float, float]) -> list[Orbit]:
@@ -214,10 +217,7 @@ def _spread(orbits: Sequence[Orbit], range_hz: tuple[float, float]) -> list[Orbi
 
 
 def _follow_new(box: Collector, back: Sequence[tuple[Via, Orbit]], max_period: int) -> None:
-    """Follow the orbits, all of one frequency, that lie on no branch of the box; note the others.
-
-    Those of a branch that is found on the way are noted as well.
-    """
+    """Follow the orbits, all of one frequency, that lie on no branch; note where the others lie."""
     here: list[tuple[int, Orbit]] = []
     seen = 0
     for via, orbit in back:

@@ -17,8 +17,10 @@ from nldyn import (
     Stop,
     System,
     SystemModelError,
+    Unbalance,
     by_detour,
     continue_branch,
+    find_orbits,
     index_sum,
     load_branches,
     load_diagram,
@@ -139,13 +141,18 @@ def test_carried_by_a_detour_and_back_an_orbit_is_the_same(factors):
     assert np.abs(back.point - orbit.point).max() < 1e-9 * np.abs(orbit.point[:-1]).max()
 
 
+@pytest.fixture(scope="module")
+def three(harmonic) -> Diagram:
+    """What a higher second natural frequency leads to."""
+    return by_detour(harmonic, {SECOND: 1.05}, max_period=1, spacing=0.1)
+
+
 def test_another_natural_frequency_leads_to_the_isola_and_to_a_branch_from_lower_frequencies(
-    harmonic, found
+    three, found
 ):
     """The other branch ends at the range's end, and does not join at less damping."""
-    other = by_detour(harmonic, {SECOND: 1.05}, max_period=1, spacing=0.1)
-    assert other.notes[-1].startswith("at 1.05 of natural_frequency_hz[1]: ")
-    isola, lower = sorted(other.branches[1:], key=lambda branch: branch.closed, reverse=True)
+    assert three.notes[-1].startswith("at 1.05 of natural_frequency_hz[1]: ")
+    isola, lower = sorted(three.branches[1:], key=lambda branch: branch.closed, reverse=True)
     assert all(found.branches[1].contains(orbit) for orbit in isola.points)
     assert not lower.closed
     assert lower.frequency_hz.min() == pytest.approx(7.2)
@@ -160,15 +167,43 @@ def test_what_is_known_is_not_found_again(found):
     assert again.notes[:-2] == (found.notes[-1],)  # the indices are told of once
 
 
+def met_from_others(done: Diagram) -> tuple[int, int]:
+    """How many branches of how many the note of a detour says that it met by way of others."""
+    met, given = re.search(r" (\d+) of the (\d+) given met from others", done.notes[-1]).groups()
+    return int(met), int(given)
+
+
 @pytest.mark.parametrize(("damping", "met"), [(0.5, 2), (0.95, 0)])
-def test_it_tells_how_many_of_the_known_would_have_been_found_from_others(found, damping, met):
+def test_known_branches_are_met_from_others_where_they_join_there(found, damping, met):
     """With half the damping both are one branch; with nearly all of it the isola is closed."""
     done = by_detour(found, {"damping": damping}, max_period=1, spacing=0.1)
-    assert f", {met} of the 2 given met from others, 0 branches" in done.notes[-1]
+    assert met_from_others(done) == (met, 2)
 
 
-def test_of_one_known_branch_none_is_met_from_others(found):
-    assert ", 0 of the 1 given met from others, 1 branch beside those given" in found.notes[-1]
+def test_as_many_are_met_from_others_as_are_found_with_each_left_out(three):
+    """All three lead to one branch there, from which orbits come back to two of them only."""
+    found_again = 0
+    for branch in three.branches:
+        others = replace(three, branches=tuple(b for b in three.branches if b is not branch))
+        done = by_detour(others, {SECOND: 1.05}, max_period=1, spacing=0.5)
+        middle = branch.points[len(branch.points) // 2]
+        found_again += any(new.contains(middle) for new in done.branches[2:])
+    done = by_detour(three, {SECOND: 1.05}, max_period=1, spacing=0.5)
+    assert met_from_others(done) == (found_again, 3) == (2, 3)
+
+
+def test_branches_of_longer_periods_than_wanted_do_not_count_as_given():
+    system = System.from_modal(
+        [13.1], {"middle": [0.635]}, modal_damping=0.0142,
+        stops=[Stop("middle", stiffness=5.17e9)], excitation=[Unbalance("middle", 4.92e-6)],
+    )  # fmt: skip
+    range_hz = (50.0, 51.0)
+    harmonic = continue_branch(solve_orbit(system, 50.5), range_hz)
+    halves = [continue_branch(orbit, range_hz) for orbit in find_orbits(system, 50.5, 2)]
+    known = Diagram((harmonic, *halves), range_hz, "middle")
+    assert halves
+    done = by_detour(known, {"damping": 0.9}, max_period=1, spacing=0.5)
+    assert met_from_others(done) == (0, 1)
 
 
 def test_interrupted_it_goes_on_with_what_it_has_found(harmonic, found, tmp_path):
@@ -188,6 +223,7 @@ def test_interrupted_it_goes_on_with_what_it_has_found(harmonic, found, tmp_path
     resumed = by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
     assert [len(b.nodes) for b in resumed.branches] == [len(b.nodes) for b in found.branches]
     assert np.array_equal(resumed.branches[1].frequency_hz, found.branches[1].frequency_hz)
+    assert met_from_others(resumed) == met_from_others(found) == (0, 1)
 
 
 @pytest.fixture
