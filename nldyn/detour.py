@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 import numpy as np
 
+from nldyn.bordered import OrbitFamily, correct
+from nldyn.conditions import Singular
 from nldyn.elements import Excitation
 from nldyn.errors import SystemModelError, is_finite, shown
 from nldyn.flow import FlowMap
@@ -18,11 +20,13 @@ from nldyn.parameter_values import (
     EVERY_MODE,
     FREQUENCY,
     NAMES,
+    Chart,
     checked_parameter,
     value_of,
     with_value,
 )
 from nldyn.parameters import Parameter, size_of, strength
+from nldyn.shooting import ShootingProblem
 from nldyn.system import System
 
 DAMPING: Final = "damping"
@@ -66,43 +70,78 @@ class Detour:
     def carried(self, orbit: Orbit, start: float, end: float) -> Orbit | None:
         """The orbit of the same frequency at another place, or None where its way there ends.
 
-        It ends at a fold, as a rule. Newton's method starts from the line through the two orbits
-        before.
+        It ends at a fold, as a rule.
+        """
+        return self._led(orbit, start, end, self._near)
+
+    def carried_fold(self, fold: Orbit, start: float, end: float) -> Orbit | None:
+        """The fold at another place, at a frequency of its own, or None where its way there ends.
+
+        It ends where two folds meet, as a rule.
+        """
+        return self._led(fold, start, end, self._fold_near)
+
+    def _led(
+        self,
+        orbit: Orbit,
+        start: float,
+        end: float,
+        near: Callable[[Orbit, float, Real], Orbit | None],
+    ) -> Orbit | None:
+        """The orbit led from place to place by Newton's method, from the line through the last two.
+
+        An orbit is taken only if it is near where it was expected.
         """
         x, step = start, math.copysign(FIRST_STEP / self.length, end - start)
-        here = _states(orbit)
+        here = _unknowns(orbit)
         slope = np.zeros_like(here)
         while x != end:
             y = x + step if abs(step) < abs(end - x) else end
             guess = here + slope * (y - x)
-            found = self._near(orbit, y, guess)
-            if found is None:
+            found = near(orbit, y, guess)
+            if found is None or _far(there := _unknowns(found), guess):
                 step *= SHORTER
                 if abs(step) * self.length < SHORTEST_STEP:
                     return None
                 continue
-            states = _states(found)
-            slope = (states - here) / (y - x)
-            orbit, here, x = found, states, y
+            slope = (there - here) / (y - x)
+            orbit, here, x = found, there, y
             step *= LONGER
         return orbit
 
     def _near(self, orbit: Orbit, share: float, guess: Real) -> Orbit | None:
         """The orbit near a guess at a place, if it is of the same period."""
+        segments = orbit.problem.segments
         try:
-            found = solve_orbit(
+            return solve_orbit(
                 self.flow(share),
                 orbit.frequency_hz,
                 orbit.period,
-                guess=guess,
+                guess=guess[:-1].reshape(segments, -1),
                 observe=orbit.observe,
-                segments=orbit.problem.segments,
+                segments=segments,
             )
-            states = _states(found)
         except (ConvergenceError, SystemModelError):
             return None
-        far = float(np.linalg.norm(states - guess)) > MISS * float(np.linalg.norm(states))
-        return None if far else found
+
+    def _fold_near(self, fold: Orbit, share: float, guess: Real) -> Orbit | None:
+        """The fold near a guess at a place, from the borders of another one."""
+        segments = fold.problem.segments
+        try:
+            flow = self.flow(share)
+            hz = fold.frequency_hz * math.exp(guess[-1] - math.log(fold.omega))
+            chart = Chart.of(Parameter(FREQUENCY), (0.5 * hz, 2.0 * hz))
+            family = OrbitFamily(
+                flow.system, flow.options, fold.period, segments, fold.observe, hz, (chart,)
+            )
+            nodes = flow.to_state(guess[:-1].reshape(segments, -1))
+            point = np.append(nodes.ravel(), chart.coordinate(hz))
+            found = correct(family, point, Singular.of("LP", fold))
+        except SystemModelError:
+            return None
+        if not found.converged:
+            return None
+        return replace(found.orbit, problem=ShootingProblem(flow, fold.period, segments))
 
 
 def times(system: System, what: What, factor: float) -> System:
@@ -186,6 +225,11 @@ def _scaled(source: Excitation, factor: float) -> Excitation:
     return replace(source, **changed)
 
 
-def _states(orbit: Orbit) -> Real:
-    """States (k, 2n) at the shooting phases, in coordinates that do not depend on the damping."""
-    return orbit.states(orbit.problem.phases[:-1])
+def _far(unknowns: Real, guess: Real) -> bool:
+    """Whether an orbit is not where it was expected."""
+    return bool(np.linalg.norm(unknowns - guess) > MISS * np.linalg.norm(unknowns[:-1]))
+
+
+def _unknowns(orbit: Orbit) -> Real:
+    """States at the shooting phases, in coordinates that do not depend on the damping, and ln ω."""
+    return np.append(orbit.states(orbit.problem.phases[:-1]).ravel(), math.log(orbit.omega))

@@ -18,7 +18,7 @@ from nldyn.diagrams import Collector, Diagram, Progress, check_known, counted, m
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.exploration import FINEST_SPACING, steps_between
 from nldyn.fixed_point_index import index_note, is_damped, without_index_note
-from nldyn.orbit import Orbit, same_orbit
+from nldyn.orbit import Orbit, minimal_period, same_orbit
 from nldyn.parameters import Parameter
 
 PLACES = 3  # orbits of each branch that are carried there, in case some get lost
@@ -39,9 +39,10 @@ def by_detour(
 
     Closed branches (isolas) grow and join others when the damping falls, with more or less of the
     excitation, or when a natural frequency moves. So the branches known are followed there; the
-    orbits of these, at frequencies next to each other, are carried back to the system as it is, and
-    what lies on no known branch is on a new one. Isolas that join none of the branches known there
-    are not found, nor, but by chance, those that are narrower than the spacing of the frequencies.
+    orbits of these, at frequencies next to each other, are carried back to the system as it is, as
+    are their folds, whose frequencies move on the way, so that narrow branches are met as well.
+    What lies on no known branch is on a new one. Isolas that join none of the branches known there
+    are not found, nor those of which no orbit comes back.
     Other factors may find more, as may another call with the branches found.
 
     Parameters
@@ -115,13 +116,14 @@ def by_detour(
             back = [(via, orbit) for via, orbit in carriages if orbit is not None]
             tried, came = tried + len(orbits), came + len(back)
             _follow_new(box, back, max_period)
+        folds = _folds_carried_back(box, detour, there, max_period)
     if is_damped(own.system):
         box.notes.append(index_note(box.branches, known.range_hz, max_period))
     new = counted(box.branches[len(known.branches) :])
     changed = " and ".join(f"{f:g} of {named(what)}" for what, f in detour.factors.items())
     led = (
         f"{counted([via.branch for via in there])}, {came} of {tried} orbits carried back, "
-        f"{_met_from_others(known, there, max_period)}"
+        f"{folds}, {_met_from_others(known, there, max_period)}"
         if there
         else "no orbit got there, as some may with factors nearer to 1"
     )
@@ -229,3 +231,29 @@ def _follow_new(box: Collector, back: Sequence[tuple[Via, Orbit]], max_period: i
             via.exits.add(on)
         else:
             box.follow(orbit, max_period, max_period, None)
+
+
+def _folds_carried_back(
+    box: Collector, detour: Detour, there: Sequence[Via], max_period: int
+) -> str:
+    """Carry the folds back, and follow the branches of those that are on none of the box.
+
+    Notes on which branches the others are, and returns how many came back.
+    """
+    tried = came = 0
+    for via in there:
+        for special in via.branch.special_points:
+            if special.kind != "LP":
+                continue
+            box.progress("folds", special.frequency_hz)
+            fold = detour.carried_fold(special.orbit, 1.0, 0.0)
+            tried += 1
+            if fold is None:
+                continue
+            came += 1
+            on = box.with_fold(fold)
+            if on is not None:
+                via.exits.add(on)
+            elif minimal_period(fold) == fold.period:
+                box.follow(fold, max_period, max_period, None)
+    return f"{came} of {tried} folds"

@@ -336,16 +336,8 @@ class _Survey:
                 box.notes.append(f"the curve in {parameter.name} of {which} broke off: {reason}")
             passed += found
             for orbit in found:
-                if not self._is_known_fold(orbit):
+                if box.with_fold(orbit) is None:
                     self._follow(orbit)
-
-    def _is_known_fold(self, orbit: Orbit) -> bool:
-        return any(
-            is_at(orbit, special)
-            for branch in self.box.of_period(orbit.period)
-            for special in branch.special_points
-            if special.kind == "LP"
-        )
 
     def _search(
         self, starts: Real, known: _Known, *, also_unstable: bool

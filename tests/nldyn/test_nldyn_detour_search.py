@@ -147,6 +147,29 @@ def three(harmonic) -> Diagram:
     return by_detour(harmonic, {SECOND: 1.05}, max_period=1, spacing=0.1)
 
 
+@pytest.mark.parametrize("factors", [{"damping": 0.9}, {"excitation": 1.02}, {SECOND: 1.003}])
+def test_a_fold_carried_there_and_back_is_the_same_and_moves_meanwhile(found, factors):
+    (first, *_) = [s for s in found.branches[1].special_points if s.kind == "LP"]
+    detour = Detour(first.orbit.problem.flow, checked_factors(two_modes(), factors))
+    there = detour.carried_fold(first.orbit, 0.0, 1.0)
+    assert runge_kutta_gap(there, detour.flow(1.0).system) < 1e-8
+    assert np.abs(there.multipliers - 1.0).min() < 1e-6
+    assert abs(there.frequency_hz / first.frequency_hz - 1.0) > 1e-5
+    back = detour.carried_fold(there, 1.0, 0.0)
+    assert back.frequency_hz == pytest.approx(first.frequency_hz, rel=1e-8)
+
+
+def test_folds_alone_lead_to_an_isola_that_lies_between_the_frequencies(
+    harmonic, found, monkeypatch
+):
+    monkeypatch.setattr("nldyn.detour_search.steps_between", lambda low, high, spacing: 0)
+    done = by_detour(harmonic, HALF, max_period=1)
+    assert ", 0 of 0 orbits carried back, " in done.notes[-1]
+    (isola,) = done.branches[1:]
+    assert isola.closed
+    assert all(found.branches[1].contains(orbit) for orbit in isola.points)
+
+
 def test_another_natural_frequency_leads_to_the_isola_and_to_a_branch_from_lower_frequencies(
     three, found
 ):
@@ -181,7 +204,7 @@ def test_known_branches_are_met_from_others_where_they_join_there(found, damping
 
 
 def test_as_many_are_met_from_others_as_are_found_with_each_left_out(three):
-    """All three lead to one branch there, from which orbits come back to two of them only."""
+    """Orbits of the grid come back to two of them only, folds to the third as well."""
     found_again = 0
     for branch in three.branches:
         others = replace(three, branches=tuple(b for b in three.branches if b is not branch))
@@ -189,7 +212,7 @@ def test_as_many_are_met_from_others_as_are_found_with_each_left_out(three):
         middle = branch.points[len(branch.points) // 2]
         found_again += any(new.contains(middle) for new in done.branches[2:])
     done = by_detour(three, {SECOND: 1.05}, max_period=1, spacing=0.5)
-    assert met_from_others(done) == (found_again, 3) == (2, 3)
+    assert met_from_others(done) == (found_again, 3) == (3, 3)
 
 
 def test_branches_of_longer_periods_than_wanted_do_not_count_as_given():
