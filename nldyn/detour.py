@@ -129,7 +129,7 @@ class Detour:
         segments = fold.problem.segments
         try:
             flow = self.flow(share)
-            hz = fold.frequency_hz * math.exp(guess[-1] - math.log(fold.omega))
+            hz = math.exp(guess[-1]) / (2.0 * math.pi)
             chart = Chart.of(Parameter(FREQUENCY), (0.5 * hz, 2.0 * hz))
             family = OrbitFamily(
                 flow.system, flow.options, fold.period, segments, fold.observe, hz, (chart,)

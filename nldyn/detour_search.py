@@ -236,9 +236,9 @@ def _follow_new(box: Collector, back: Sequence[tuple[Via, Orbit]], max_period: i
 def _folds_carried_back(
     box: Collector, detour: Detour, there: Sequence[Via], max_period: int
 ) -> str:
-    """Carry the folds back, and follow the branches of those that are on none of the box.
+    """Carry the folds back, follow the branches of those on none of the box; how many came back.
 
-    Notes on which branches the others are, and returns how many came back.
+    Where the others lie is noted.
     """
     tried = came = 0
     for via in there:
