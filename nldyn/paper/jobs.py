@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import cms
 from nldyn.continuation import ContinuationOptions, broken_off
@@ -65,11 +66,22 @@ class Job:
             return (1,)
         return tuple(sorted({odd_part(start.period) for start in read_starts(self.name)}))
 
-    def run(self, family: int, progress: Progress | None = None) -> Diagram:
-        """Compute the diagram, or of one with starts the branches of one family."""
+    def run(self, family: int, folder: Path, progress: Progress | None = None) -> Diagram:
+        """Compute the diagram, or of one with starts the branches of one family.
+
+        The folder keeps what each start leads to.
+        """
         if self.doubled is not None:
             starts = [s for s in read_starts(self.name) if odd_part(s.period) == family]
-            return follow_starts(self.system(), starts, self.range_hz, LONG, self.doubled, progress)
+            return follow_starts(
+                self.system(),
+                starts,
+                self.range_hz,
+                LONG,
+                self.doubled,
+                progress,
+                keep_at=lambda number: folder / f"{self.name}.{family}.{number}.pickle",
+            )
         found = diagram(
             self.system(),
             self.range_hz,
@@ -190,15 +202,18 @@ def job_named(name: str) -> Job:
     return next(job for job in JOBS if job.name == name)
 
 
-def run_job(name: str, family: int) -> Diagram:
-    """Compute a family of a job (in a worker process), with what the figures need of it."""
+def run_job(name: str, family: int, folder: Path) -> Diagram:
+    """Compute a family of a job (in a worker process), with what the figures need of it.
+
+    The folder keeps what an interrupted run has computed.
+    """
     job = job_named(name)
 
     def progress(what: str, frequency_hz: float) -> None:
         tell(f"{name}: {what}", frequency_hz)
 
     with compilation_told(progress):
-        return job.run(family, progress)
+        return job.run(family, folder, progress)
 
 
 def submit_diagrams(
@@ -207,7 +222,9 @@ def submit_diagrams(
     """Begin each family of some jobs, the longest jobs first; see `joined`."""
     scene_system("one_dof")  # fail early, before any process is started
     return {
-        (job.name, family): workers.submit(f"{job.name}.{family}", run_job, job.name, family)
+        (job.name, family): workers.submit(
+            f"{job.name}.{family}", run_job, job.name, family, workers.folder
+        )
         for job in jobs
         for family in job.families
     }

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from nldyn.resources import PACKAGE
 
@@ -38,21 +38,29 @@ def kept_folder(directory: str | Path) -> Path:
 
 
 def kept(path: Path, function: Callable[..., Value], *arguments: object) -> Value:
-    """Value of a function, from a file if it was computed before.
-
-    A file that cannot be read counts as none, and a value that cannot be written is given all the
-    same.
-    """
-    with suppress(OSError, EOFError, pickle.UnpicklingError), path.open("rb") as file:
-        known: Value = pickle.load(file)
+    """Value of a function, from a file if it was computed before."""
+    known: Value | None = read_kept(path)
+    if known is not None:
         return known
     value = function(*arguments)
+    keep(path, value)
+    return value
+
+
+def read_kept(path: Path) -> Any:
+    """What a file keeps; None if there is none, or it cannot be read."""
+    with suppress(OSError, EOFError, pickle.UnpicklingError), path.open("rb") as file:
+        return pickle.load(file)
+    return None
+
+
+def keep(path: Path, value: object) -> None:
+    """Keep a value in a file, whole or not at all; not where it cannot be written."""
     draft = path.with_suffix(f".{os.getpid()}.new")
     with suppress(OSError):
         with draft.open("wb") as file:
             pickle.dump(value, file, pickle.HIGHEST_PROTOCOL)
         draft.replace(path)
-    return value
 
 
 def has_values(folder: Path) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from nldyn.diagrams import Collector, Diagram, Progress, middle_orbit
 from nldyn.flow import flow_of
 from nldyn.linear import Real
 from nldyn.orbit import check_observe, stroboscopic
+from nldyn.paper.kept import keep, read_kept
 from nldyn.search import orbit_near
 from nldyn.store import write_whole
 from nldyn.system import System
@@ -85,6 +86,7 @@ def follow_starts(
     progress: Progress | None = None,
     *,
     whole: bool = False,
+    keep_at: Callable[[int], Path] | None = None,
 ) -> Diagram:
     """Follow the branches through some orbits, and those that they lead to.
 
@@ -105,6 +107,9 @@ def follow_starts(
         Called as ``progress(what, frequency_hz)``.
     whole : bool
         Whether the branches are to be followed any further; if not, see `keep_numbers`.
+    keep_at : callable, optional
+        Gives the file that keeps what the start of a number leads to. What an interrupted run has
+        kept there is taken from it.
 
     Returns
     -------
@@ -114,22 +119,54 @@ def follow_starts(
     flow = flow_of(system)
     observe = check_observe(system, None)
     box = Collector(flow, range_hz, observe, options, progress or (lambda what, hz: None))
-    longest, most = doubled
-    wanted = longest_whole(longest)
     lost = 0
-    for start in starts:
-        omega = 2.0 * math.pi * start.frequency_hz
-        orbit = orbit_near(flow, start.state, start.period, omega, observe)
-        if orbit is None or orbit.period != start.period:
-            lost += 1
-            continue
-        count = len(box.branches)
-        box.follow(orbit, longest, wanted, most)
-        if not whole:
-            keep_numbers(box.branches[count:])
+    for number, start in enumerate(starts):
+        path = keep_at(number) if keep_at else None
+        found: Found | None = read_kept(path) if path else None
+        if found is not None:
+            box.take_back(found.branches, found.notes)
+        else:
+            found = _follow(box, start, doubled, whole)
+            if path:
+                keep(path, found)
+        lost += found.lost
     periods = ", ".join(map(str, sorted({start.period for start in starts})))
     note = f"from {len(starts)} starts of period {periods}, {lost} of which lead to no orbit"
     return Diagram(tuple(box.branches), range_hz, observe, (note, *box.notes))
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a start leads to.
+
+    Parameters
+    ----------
+    branches : tuple of Branch
+        Not known from the starts before.
+    notes : tuple of str
+        On them.
+    lost : bool
+        Whether it leads to no orbit of its period.
+    """
+
+    branches: tuple[Branch, ...]
+    notes: tuple[str, ...]
+    lost: bool
+
+
+def _follow(box: Collector, start: Start, doubled: tuple[int, int], whole: bool) -> Found:
+    """Follow the branch of a start and those that it leads to, see `follow_starts`."""
+    longest, most = doubled
+    count, told = len(box.branches), len(box.notes)
+    omega = 2.0 * math.pi * start.frequency_hz
+    orbit = orbit_near(box.flow, start.state, start.period, omega, box.observe)
+    lost = orbit is None or orbit.period != start.period
+    if orbit is not None and not lost:
+        box.follow(orbit, longest, longest_whole(longest), most)
+    branches = tuple(box.branches[count:])
+    if not whole:
+        keep_numbers(branches)
+    return Found(branches, tuple(box.notes[told:]), lost)
 
 
 def longest_whole(longest: int) -> int:

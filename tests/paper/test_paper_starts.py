@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from nldyn import ContinuationOptions, ExploreOptions, SystemModelError, explore, index_sum
@@ -84,7 +85,9 @@ def test_families_followed_apart_are_the_diagram_followed_at_once(found, monkeyp
     monkeypatch.setattr("nldyn.paper.jobs.JOBS", (job,))
     monkeypatch.setattr("nldyn.paper.jobs.read_starts", lambda name: starts)
     assert job.families == (1, 3)
-    (whole,) = joined({(name, family): job.run(family) for family in job.families}).values()
+    (whole,) = joined(
+        {(name, family): job.run(family, tmp_path) for family in job.families}
+    ).values()
     once = follow_starts(job.system(), starts, job.range_hz, LONG, job.doubled)
     assert sorted(b.period for b in whole.branches) == sorted(b.period for b in once.branches)
     for branch in once.branches:
@@ -93,6 +96,43 @@ def test_families_followed_apart_are_the_diagram_followed_at_once(found, monkeyp
     assert whole.notes[-1].endswith("of P to P^3 add up to one from 35.5 to 36.5 Hz")
     ends = sum(len(broken_off(branch)) for branch in whole.branches)
     assert whole.notes[0] == f"{ends} ends of branches broken off: 10 points"
+
+
+def test_what_starts_lead_to_is_kept_when_a_run_is_interrupted(found, monkeypatch, tmp_path):
+    """The resumed run asks only for the starts left, and gives what one at once gives."""
+    name = "two_dof_xi_0.01"
+    job = replace(job_named(name), range_hz=found.range_hz, doubled=(4, 10))
+    write_starts(starts_path(name, tmp_path), found.branches)
+    starts = [start for start in read_starts(name, tmp_path) if start.period < 3]
+    monkeypatch.setattr("nldyn.paper.jobs.read_starts", lambda name: starts)
+    asked = []
+
+    def orbit_until_interrupted(*arguments):
+        if len(asked) == 3:
+            raise KeyboardInterrupt
+        asked.append(arguments)
+        return orbit_near(*arguments)
+
+    (folder := tmp_path / "kept").mkdir()
+    with monkeypatch.context() as patch:
+        patch.setattr("nldyn.paper.starts.orbit_near", orbit_until_interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            job.run(1, folder)
+    (folder / f"{name}.1.1.pickle").write_bytes(b"cut")  # that one is followed again
+    calls = []
+    monkeypatch.setattr(
+        "nldyn.paper.starts.orbit_near", lambda *a: calls.append(a) or orbit_near(*a)
+    )
+    resumed = job.run(1, folder)
+    assert len(calls) == len(starts) - 2 > 2
+    (other := tmp_path / "other").mkdir()
+    once = job.run(1, other)
+    assert resumed.notes == once.notes
+    assert [branch.name for branch in resumed.branches] == [branch.name for branch in once.branches]
+    for branch, same in zip(resumed.branches, once.branches, strict=True):
+        assert branch.stop_reasons == same.stop_reasons
+        points = [[orbit.point for orbit in b.points] for b in (branch, same)]
+        np.testing.assert_array_equal(*points)
 
 
 @pytest.fixture
