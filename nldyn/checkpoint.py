@@ -18,7 +18,9 @@ from typing import TYPE_CHECKING, Generic, Self, TypeVar
 import numpy as np
 
 from nldyn.errors import SystemModelError
+from nldyn.flow import same_flow
 from nldyn.result_directory import OutputError
+from nldyn.whole_file import check_writable
 
 if TYPE_CHECKING:
     from nldyn.branch import Branch, Course
@@ -205,8 +207,6 @@ def checkpoint_of_several(
     """
     if place is None:
         return Checkpoint()
-    from nldyn.store import same_flow
-
     write, earlier = _file(place, flow.system)
     for branch in earlier:
         same_range = branch.course is not None and branch.course.range_hz == range_hz
@@ -232,7 +232,8 @@ def _file(
     place: str | Path, system: System
 ) -> tuple[Callable[[Sequence[Branch]], None], list[Branch]]:
     """What writes a file, and the branches of a system in it."""
-    from nldyn.store import check_writable, laws_of, load_bare_branches, save_branches
+    from nldyn.flow_store import laws_of
+    from nldyn.store import load_bare_branches, save_branches
 
     path = check_writable(place)
     read = partial(load_bare_branches, laws=laws_of(system))
@@ -250,8 +251,6 @@ def begun_before(read: Callable[[Path], Kept], path: Path) -> Kept:
 
 def _is_begun_at(branch: Branch, orbit: Orbit, course: Course) -> bool:
     """Whether a branch comes from a continuation of an orbit with the same range and options."""
-    from nldyn.store import same_flow
-
     mine = branch.course
     if mine is None or branch.period != orbit.period:
         return False

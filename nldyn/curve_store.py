@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from nldyn.bordered import Condition, Corrected, Evaluation, Free, OrbitFamily
@@ -23,25 +22,15 @@ from nldyn.curve_walk import CurvePoint
 from nldyn.curves import Curve
 from nldyn.errors import SystemModelError, check_types, shown
 from nldyn.flow import FlowMap
+from nldyn.flow_store import STATE_UNIT, Laws, checked_laws, read_flow, write_flow
+from nldyn.hdf5 import Group, new_file, opened, put, set_attribute
 from nldyn.linear import Real
 from nldyn.orbit import Orbit
 from nldyn.parameter_values import UNITS as PARAMETER_UNITS
 from nldyn.parameter_values import Chart, checked_parameter
 from nldyn.parameters import Parameter
-from nldyn.store import (
-    STATE_UNIT,
-    Laws,
-    _Group,
-    _opened,
-    _put,
-    _read_flow,
-    _set_attribute,
-    _write_flow,
-    checked_laws,
-    write_whole,
-)
 from nldyn.tables import UNITS
-from nldyn.version import software_version
+from nldyn.whole_file import write_whole
 
 FORMAT = "nldyn curves"
 FORMAT_VERSION = 1
@@ -71,10 +60,7 @@ def save_curves(path: str | Path, curves: Sequence[Curve]) -> None:
     if not isinstance(curves, list | tuple) or not all(isinstance(c, Curve) for c in curves):
         raise SystemModelError(f"curves must be a list of curves, got {shown(curves)}")
     memory = io.BytesIO()
-    with h5py.File(memory, "w", libver=("v110", "v110")) as file:
-        file.attrs["format"] = FORMAT
-        file.attrs["format_version"] = FORMAT_VERSION
-        file.attrs["software"] = f"nldyn {software_version()}"
+    with new_file(memory, FORMAT, FORMAT_VERSION) as file:
         groups = file.create_group("curves")
         for number, curve in enumerate(curves):
             _write_curve(groups.create_group(f"{number:04d}"), curve)
@@ -87,7 +73,7 @@ def load_curves(
     """Read all curves of a file; see `load_curve`."""
     known = checked_laws(laws)
     check_types(monitor=(monitor, Callable, None))
-    with _opened(path, FORMAT, FORMAT_VERSION) as root:
+    with opened(path, FORMAT, FORMAT_VERSION) as root:
         groups = root.group("curves").groups()
         return [_read_curve(group, known, monitor) for group in groups]
 
@@ -147,29 +133,29 @@ def _write_curve(group: Any, curve: Curve) -> None:
         "corners": [point.corner for point in points],
         "marks": [mark.kind for mark in marks],
     }.items():
-        _set_attribute(group, key, value)
-    _write_flow(group.create_group("flow_map"), FlowMap(family.system, family.options))
+        set_attribute(group, key, value)
+    write_flow(group.create_group("flow_map"), FlowMap(family.system, family.options))
     charts = [(c.parameter.index, c.low, c.high) for c in family.charts]
-    _put(group, "ranges", np.array(charts, dtype=float), "index, then those of the parameters")
+    put(group, "ranges", np.array(charts, dtype=float), "index, then those of the parameters")
     if family.unfolding is not None:
-        _put(group, "unfolding", family.unfolding, STATE_UNIT)
-    _put(group, "point", [point.point for point in points], POINT_UNIT)
-    _put(group, "tangent", [point.tangent for point in points], "as point")
-    _put(group, "arclength", [point.arclength for point in points], "1")
-    _put(group, "step", [point.found.step for point in points], "1")
+        put(group, "unfolding", family.unfolding, STATE_UNIT)
+    put(group, "point", [point.point for point in points], POINT_UNIT)
+    put(group, "tangent", [point.tangent for point in points], "as point")
+    put(group, "arclength", [point.arclength for point in points], "1")
+    put(group, "step", [point.found.step for point in points], "1")
     condition = group.create_group("condition")
-    _set_attribute(condition, "kind", type(points[0].condition).__name__)
+    set_attribute(condition, "kind", type(points[0].condition).__name__)
     rows = [_numbers_of(point.condition) for point in points]
     for name in rows[0]:
-        _put(condition, name, np.array([row[name] for row in rows], dtype=float), "relative or SI")
+        put(condition, name, np.array([row[name] for row in rows], dtype=float), "relative or SI")
     places = [family.unknowns(mark.orbit) for mark in marks]
-    _put(group, "mark_point", np.reshape(places, (len(marks), points[0].point.size)), POINT_UNIT)
-    _put(group, "mark_residual", [mark.residual for mark in marks], "1")
-    _put(group, "mark_error", [mark.error for mark in marks], "1")
+    put(group, "mark_point", np.reshape(places, (len(marks), points[0].point.size)), POINT_UNIT)
+    put(group, "mark_residual", [mark.residual for mark in marks], "1")
+    put(group, "mark_error", [mark.error for mark in marks], "1")
     table = group.create_group("table")
     units = {"residual": "1", **PARAMETER_UNITS, **UNITS}
     for name, column in curve.table().items():
-        _put(table, name, column, units.get(name) or units[name.rsplit("_", 1)[0]])
+        put(table, name, column, units.get(name) or units[name.rsplit("_", 1)[0]])
 
 
 def _numbers_of(condition: Condition) -> dict[str, Any]:
@@ -184,8 +170,8 @@ def _numbers_of(condition: Condition) -> dict[str, Any]:
     return {name: getattr(condition, name) for name in names}
 
 
-def _read_curve(group: _Group, laws: Laws, monitor: OwnMonitor | None) -> Curve:
-    flow = _read_flow(group.group("flow_map"), laws)
+def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve:
+    flow = read_flow(group.group("flow_map"), laws)
     names = group.texts("parameters")
     ranges = group.array("ranges", len(names), 3)
     charts = tuple(
@@ -242,7 +228,7 @@ def _read_curve(group: _Group, laws: Laws, monitor: OwnMonitor | None) -> Curve:
 
 
 def _read_conditions(
-    curve: _Group, family: OrbitFamily, count: int, points: Real, monitor: OwnMonitor | None
+    curve: Group, family: OrbitFamily, count: int, points: Real, monitor: OwnMonitor | None
 ) -> list[Condition]:
     group, n = curve.group("condition"), family.n_states
     kind, of = group.text("kind"), curve.text("kind")

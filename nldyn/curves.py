@@ -28,13 +28,14 @@ from nldyn.curve_walk import (
     passages,
 )
 from nldyn.errors import SystemModelError, check_choice, check_types, is_finite, shown
-from nldyn.flow import FlowMap
+from nldyn.flow import FlowMap, same_flow
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, check_minimal, same_orbit
 from nldyn.parameter_values import Chart, checked_parameter, value_of
 from nldyn.parameters import Parameter
 from nldyn.special import LocateError, root
 from nldyn.tables import orbit_columns
+from nldyn.whole_file import check_writable
 
 CurvePart = Literal["points", "marks"]
 CLOSE = 1e-3  # how far the defining condition of a start may be off
@@ -486,7 +487,7 @@ def _keeper(place: str | Path | None, known: Curve | None = None) -> Keeper[Curv
     if place is None:
         return Keeper()
     from nldyn.curve_store import load_curves, save_curves
-    from nldyn.store import check_writable, laws_of
+    from nldyn.flow_store import laws_of
 
     path = check_writable(place)
     if path.exists():
@@ -509,8 +510,6 @@ def _keeper(place: str | Path | None, known: Curve | None = None) -> Keeper[Curv
 
 def _is_piece(held: Curve, known: Curve) -> bool:
     """Whether a curve has no points but those of another one."""
-    from nldyn.store import same_flow
-
     if (held.kind, held.parameters) != (known.kind, known.parameters):
         return False
     a, b = held.points[0].found.at.family, known.points[0].found.at.family

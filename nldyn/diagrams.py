@@ -33,7 +33,7 @@ from nldyn.continuation import (
     switch_at_flip,
 )
 from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
-from nldyn.flow import FlowMap, flow_of
+from nldyn.flow import FlowMap, flow_of, same_flow
 from nldyn.normal_forms import switch_at_branch_point
 from nldyn.orbit import ConvergenceError, Orbit, check_observe, solve_orbit
 from nldyn.search import SearchOptions, Strobe, orbits_from_strobe, reach, simulate_strobe
@@ -105,8 +105,6 @@ class Diagram:
 
 def check_known(known: Diagram, flow: FlowMap) -> None:
     """Raise unless a diagram's branches are of this flow map and were followed over its range."""
-    from nldyn.store import same_flow
-
     low, high = check_range(known.range_hz)
     check_branches("known: branches", known.branches)
     check_types(**{"known: notes": (known.notes, tuple)})

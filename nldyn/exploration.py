@@ -17,7 +17,7 @@ from nldyn.continuation import MOST_POINTS, ContinuationOptions
 from nldyn.diagrams import Diagram, counted
 from nldyn.errors import SystemModelError, check_whole, is_finite, shown
 from nldyn.fixed_point_index import index_note, is_damped
-from nldyn.flow import FlowMap
+from nldyn.flow import FlowMap, same_flow
 from nldyn.fold_search import leading_parameter
 from nldyn.linear import Real
 from nldyn.orbit import LONGEST_PERIOD
@@ -194,8 +194,6 @@ class Question:
 
     def same(self, other: Question) -> bool:
         """Whether another question is this one, but for the number of rounds."""
-        from nldyn.store import same_flow
-
         mine, its = (
             (q.range_hz, q.max_period, q.observe, replace(q.effort, rounds=1), q.options)
             for q in (self, other)

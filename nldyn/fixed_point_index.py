@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from nldyn.branch import CLOSED, Branch, check_branches
 from nldyn.continuation import check_range
 from nldyn.errors import SystemModelError, check_frequency, check_whole
+from nldyn.flow import same_flow
 from nldyn.linear import Real
 from nldyn.orbit import Orbit
 from nldyn.system import System
@@ -148,8 +149,6 @@ def _checked(
     SystemModelError
         As `index_sum`.
     """
-    from nldyn.store import same_flow
-
     branches = list(branches) if isinstance(branches, Iterable) else branches
     check_branches("branches", branches)
     check_frequency("frequency_hz", low)

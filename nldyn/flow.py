@@ -47,7 +47,7 @@ from nldyn.interruption import interrupted
 from nldyn.kernel_cache import first_call
 from nldyn.linear import Complex, Real
 from nldyn.parameters import Parameter, parameter_tables
-from nldyn.system import System, numbers
+from nldyn.system import System, numbers, same_system
 
 __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
 
@@ -810,3 +810,12 @@ def _duration_factor(p: float) -> float:
     """
     q = 1.0 / (p + 1.0)
     return 2.0 * math.sqrt(math.pi) * math.gamma(1.0 + q) / math.gamma(0.5 + q)
+
+
+def same_flow(a: FlowMap, b: FlowMap) -> bool:
+    """Whether two flow maps have the same numbers and laws, and states in the same coordinates."""
+    return a is b or (
+        a.options == b.options
+        and same_system(a.system, b.system)
+        and np.array_equal(a.system.linear.right, b.system.linear.right)
+    )

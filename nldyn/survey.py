@@ -43,6 +43,7 @@ from nldyn.orbit import (
 from nldyn.parameters import Parameter
 from nldyn.search import orbit_beside, orbit_near, random_states
 from nldyn.system import System
+from nldyn.whole_file import check_writable
 
 RETURNS = 3.0  # recorded periods after settling, over the longest period looked for
 NEAR = 0.1  # a return within this share of the motion is worth a Newton iteration
@@ -212,7 +213,8 @@ class _Survey:
         SystemModelError, OutputError
             As `explore`.
         """
-        from nldyn.store import check_writable, laws_of, load_exploration, save_exploration
+        from nldyn.flow_store import laws_of
+        from nldyn.store import load_exploration, save_exploration
 
         place = check_writable(path)
         earlier: Sequence[Branch] = ()

@@ -24,7 +24,7 @@ from nldyn.detour_search import by_detour
 from nldyn.diagrams import Diagram, Progress
 from nldyn.errors import SystemModelError
 from nldyn.exploration import Exploration, ExploreOptions
-from nldyn.flow import flow_of
+from nldyn.flow import flow_of, same_flow
 from nldyn.paper.jobs import JOBS, LONG, Job, job_named
 from nldyn.paper.starts import (
     LONGEST,
@@ -36,8 +36,9 @@ from nldyn.paper.starts import (
 )
 from nldyn.parameters import Parameter
 from nldyn.progress import progress_line
-from nldyn.store import load_diagram, same_flow, write_whole
+from nldyn.store import load_diagram
 from nldyn.survey import explore
+from nldyn.whole_file import write_whole
 
 EFFORT = ExploreOptions(spacing=0.01, starts=1, settling=200, rounds=24, passing=24)
 MODELS = tuple(job.name for job in JOBS if job.doubled)

@@ -24,8 +24,8 @@ from nldyn.linear import Real
 from nldyn.orbit import check_observe, stroboscopic
 from nldyn.paper.kept import keep, read_kept
 from nldyn.search import orbit_near
-from nldyn.store import write_whole
 from nldyn.system import System
+from nldyn.whole_file import write_whole
 
 DATA = Path(__file__).parent / "data"
 LONGEST = 3  # period of the orbits looked for
