@@ -26,16 +26,15 @@ from nldyn.parameter_values import (
     with_value,
 )
 from nldyn.parameters import Parameter, size_of, strength
-from nldyn.shooting import ShootingProblem
 from nldyn.system import System
 
 DAMPING: Final = "damping"
 EXCITATION: Final = "excitation"
 What = Literal["damping", "excitation"] | Parameter  # changes: all of it, or one number
 MOST = 1e3  # factor
-FIRST_STEP, SHORTEST_STEP = 0.25, 1e-3  # in the logarithms of the factors
+PROBE, FIRST_STEP, SHORTEST_STEP = 1e-4, 0.25, 1e-5  # in the logarithms of the factors
 LONGER, SHORTER = 1.5, 0.4  # the next step, after one that led on and one that did not
-MISS = 0.3  # of an orbit: distance from where it was expected
+MISS, FREQUENCY_MISS = 0.3, 0.05  # of an orbit: distance from where it was expected, relative
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ class Detour:
     def carried_fold(self, fold: Orbit, start: float, end: float) -> Orbit | None:
         """The fold at another place, at a frequency of its own, or None where its way there ends.
 
-        It ends where two folds meet, as a rule.
+        It ends where two folds meet, or beside another one that attracts Newton's method.
         """
         return self._led(fold, start, end, self._fold_near)
 
@@ -90,23 +89,25 @@ class Detour:
     ) -> Orbit | None:
         """The orbit led from place to place by Newton's method, from the line through the last two.
 
-        An orbit is taken only if it is near where it was expected.
+        The first step is short and gives the line. An orbit is taken only if it is near where it
+        was expected.
         """
-        x, step = start, math.copysign(FIRST_STEP / self.length, end - start)
+        x, step = start, PROBE / self.length
         here = _unknowns(orbit)
         slope = np.zeros_like(here)
         while x != end:
-            y = x + step if abs(step) < abs(end - x) else end
+            step = min(step, abs(end - x))
+            y = end if step == abs(end - x) else x + math.copysign(step, end - start)
             guess = here + slope * (y - x)
             found = near(orbit, y, guess)
             if found is None or _far(there := _unknowns(found), guess):
                 step *= SHORTER
-                if abs(step) * self.length < SHORTEST_STEP:
+                if step * self.length < SHORTEST_STEP:
                     return None
                 continue
             slope = (there - here) / (y - x)
+            step = FIRST_STEP / self.length if x == start else LONGER * step
             orbit, here, x = found, there, y
-            step *= LONGER
         return orbit
 
     def _near(self, orbit: Orbit, share: float, guess: Real) -> Orbit | None:
@@ -139,9 +140,7 @@ class Detour:
             found = correct(family, point, Singular.of("LP", fold))
         except SystemModelError:
             return None
-        if not found.converged:
-            return None
-        return replace(found.orbit, problem=ShootingProblem(flow, fold.period, segments))
+        return found.orbit if found.converged else None
 
 
 def times(system: System, what: What, factor: float) -> System:
@@ -227,7 +226,9 @@ def _scaled(source: Excitation, factor: float) -> Excitation:
 
 def _far(unknowns: Real, guess: Real) -> bool:
     """Whether an orbit is not where it was expected."""
-    return bool(np.linalg.norm(unknowns - guess) > MISS * np.linalg.norm(unknowns[:-1]))
+    off = unknowns - guess
+    far = np.linalg.norm(off[:-1]) > MISS * np.linalg.norm(unknowns[:-1])
+    return bool(far or abs(off[-1]) > FREQUENCY_MISS)
 
 
 def _unknowns(orbit: Orbit) -> Real:

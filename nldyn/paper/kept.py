@@ -58,9 +58,12 @@ def keep(path: Path, value: object) -> None:
     """Keep a value in a file, whole or not at all; not where it cannot be written."""
     draft = path.with_suffix(f".{os.getpid()}.new")
     with suppress(OSError):
-        with draft.open("wb") as file:
-            pickle.dump(value, file, pickle.HIGHEST_PROTOCOL)
-        draft.replace(path)
+        try:
+            with draft.open("wb") as file:
+                pickle.dump(value, file, pickle.HIGHEST_PROTOCOL)
+            draft.replace(path)
+        finally:
+            draft.unlink(missing_ok=True)
 
 
 def has_values(folder: Path) -> bool:

@@ -60,7 +60,7 @@ def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Explorat
                 job.system(), job.range_hz, LONGEST, effort=effort, options=LONG,
                 known=known, progress=report, checkpoint=kept,
             )  # fmt: skip
-    keep(found.diagram, job, folder)
+    write_found(found.diagram, job, folder)
     line = f"{effort.seed},{len(found.diagram.branches) - found.stage.given}\n"
     write_whole(ended, (before + line).encode())
     kept.unlink(missing_ok=True)
@@ -78,7 +78,7 @@ def search_by_detour(name: str, folder: Path, factors: Mapping[str | Parameter, 
                 known, factors, max_period=LONGEST, options=LONG,
                 progress=report, checkpoint=kept,
             )  # fmt: skip
-    keep(found, job, folder)
+    write_found(found, job, folder)
     return found
 
 
@@ -98,7 +98,7 @@ def known_branches(job: Job, folder: Path, progress: Progress) -> tuple[Diagram,
     return known, place, seed
 
 
-def keep(found: Diagram, job: Job, folder: Path) -> None:
+def write_found(found: Diagram, job: Job, folder: Path) -> None:
     """Write the starts of branches, and the branches for the next search."""
     write_starts(starts_path(job.name, folder), found.branches)
     found.save(branches_path(job, folder, read_starts(job.name, folder))[0])

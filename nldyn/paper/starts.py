@@ -122,7 +122,7 @@ def follow_starts(
     lost = 0
     for number, start in enumerate(starts):
         path = keep_at(number) if keep_at else None
-        found: Found | None = read_kept(path) if path else None
+        found: Followed | None = read_kept(path) if path else None
         if found is not None:
             box.take_back(found.branches, found.notes)
         else:
@@ -136,7 +136,7 @@ def follow_starts(
 
 
 @dataclass(frozen=True)
-class Found:
+class Followed:
     """What a start leads to.
 
     Parameters
@@ -154,7 +154,7 @@ class Found:
     lost: bool
 
 
-def _follow(box: Collector, start: Start, doubled: tuple[int, int], whole: bool) -> Found:
+def _follow(box: Collector, start: Start, doubled: tuple[int, int], whole: bool) -> Followed:
     """Follow the branch of a start and those that it leads to, see `follow_starts`."""
     longest, most = doubled
     count, told = len(box.branches), len(box.notes)
@@ -166,7 +166,7 @@ def _follow(box: Collector, start: Start, doubled: tuple[int, int], whole: bool)
     branches = tuple(box.branches[count:])
     if not whole:
         keep_numbers(branches)
-    return Found(branches, tuple(box.notes[told:]), lost)
+    return Followed(branches, tuple(box.notes[told:]), lost)
 
 
 def longest_whole(longest: int) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ from nldyn import (
     solve_orbit,
 )
 from nldyn.checkpoint import Checkpoint
-from nldyn.detour import Detour, checked_factors
+from nldyn.detour import Detour, _far, checked_factors
 from nldyn.diagrams import Collector
 from nldyn.orbit import Orbit
 from nldyn.store import save_branches
@@ -36,12 +37,15 @@ RANGE_HZ = (7.2, 11.0)
 HALF = {"damping": 0.5}
 
 
-def two_modes(modal_damping: float = 0.013513) -> System:
-    """A stop that touches one of two modes, whose harmonic branch leaves an isola beside it."""
+def two_modes(modal_damping: float = 0.013513, size: float = 1.0) -> System:
+    """A stop that touches one of two modes, whose harmonic branch leaves an isola beside it.
+
+    Its motions are so many times as large as those of size 1, and otherwise the same.
+    """
     return System.from_modal(
         [10.0, 30.307], {"tip": [1.0, -1.2178], "force": [1.0, 1.0309]},
-        modal_damping=modal_damping, stops=[Stop("tip", 3.5791e7)],
-        excitation=[HarmonicForce("force", 7.4926)],
+        modal_damping=modal_damping, stops=[Stop("tip", 3.5791e7 * size**-0.5)],
+        excitation=[HarmonicForce("force", 7.4926 * size)],
     )  # fmt: skip
 
 
@@ -157,6 +161,100 @@ def test_a_fold_carried_there_and_back_is_the_same_and_moves_meanwhile(found, fa
     assert abs(there.frequency_hz / first.frequency_hz - 1.0) > 1e-5
     back = detour.carried_fold(there, 1.0, 0.0)
     assert back.frequency_hz == pytest.approx(first.frequency_hz, rel=1e-8)
+
+
+def folds_of(diagram: Diagram) -> list[Orbit]:
+    return [s.orbit for b in diagram.branches for s in b.special_points if s.kind == "LP"]
+
+
+@pytest.fixture
+def asked(monkeypatch) -> list[tuple[float, bytes]]:
+    """Places on its way at which a fold is looked for, and from which guesses."""
+    asked: list[tuple[float, bytes]] = []
+    near = Detour._fold_near
+
+    def noted(self, fold, share, guess):
+        asked.append((share, guess.tobytes()))
+        return near(self, fold, share, guess)
+
+    monkeypatch.setattr(Detour, "_fold_near", noted)
+    return asked
+
+
+@pytest.mark.parametrize("index", [0, 1])
+@pytest.mark.parametrize("factor", [0.993, 1.007])
+def test_every_fold_gets_to_a_natural_frequency_a_little_off(three, index, factor, asked):
+    """Newton's method finds some from nowhere but near by: steps below 1e-3 are needed at first."""
+    factors = checked_factors(two_modes(), {Parameter("natural_frequency_hz", index): factor})
+    folds = folds_of(three)
+    detour = Detour(folds[0].problem.flow, factors)
+    assert len(folds) == 9
+    for fold in folds:
+        asked.clear()
+        there = detour.carried_fold(fold, 0.0, 1.0)
+        assert np.abs(there.multipliers - 1.0).min() < 1e-6
+        assert there.frequency_hz != pytest.approx(fold.frequency_hz, rel=1e-5)
+        assert len(set(asked)) == len(asked) >= 2
+
+
+def test_a_fold_whose_way_is_straight_takes_two_steps(three, asked):
+    """The first one gives the line."""
+    fold = folds_of(three)[0]
+    factors = checked_factors(two_modes(), {"excitation": 1.1})
+    assert Detour(fold.problem.flow, factors).carried_fold(fold, 0.0, 1.0) is not None
+    assert len(asked) == 2 and asked[1][0] == 1.0
+
+
+def test_folds_of_small_motions_are_carried_as_those_of_large_ones():
+    """A millionth of the motion: the same frequencies."""
+    ends = []
+    for size in (1.0, 1e-6):
+        system = two_modes(size=size)
+        branch = continue_branch(solve_orbit(system, 10.99), RANGE_HZ)
+        detour = Detour(branch.points[0].problem.flow, checked_factors(system, HALF))
+        folds = folds_of(Diagram((branch,), RANGE_HZ, "tip"))
+        ends.append([detour.carried_fold(fold, 0.0, 1.0).frequency_hz for fold in folds])
+    assert len(ends[0]) == 4
+    assert ends[1] == pytest.approx(ends[0], rel=1e-8)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-6])
+@pytest.mark.parametrize(
+    ("states", "frequency", "far"),
+    [(0.3, 0.0, False), (0.45, 0.0, True), (0.0, 0.04, False), (0.0, -0.06, True)],
+)
+def test_far_is_told_of_states_and_of_frequencies(size, states, frequency, far):
+    guess = np.array([3.0 * size, 4.0 * size, 5.0])
+    off = np.array([0.0, 5.0 * size * states, frequency])
+    assert _far(guess + off, guess) == far
+
+
+def test_an_orbit_far_from_where_it_was_expected_is_not_taken(harmonic):
+    orbit, other = (solve_orbit(two_modes(), hz) for hz in (10.0, 7.5))
+    detour = Detour(orbit.problem.flow, checked_factors(two_modes(), HALF))
+    asked = []
+
+    def near(here, share, guess):
+        asked.append(share)
+        return orbit if share < 0.01 else other
+
+    assert detour._led(orbit, 0.0, 1.0, near) is None
+    assert max(asked) > 0.01 > min(asked)
+
+
+def test_what_is_no_fold_in_the_end_is_not_taken(found, monkeypatch):
+    fold = folds_of(found)[0]
+    monkeypatch.setattr(
+        "nldyn.detour.correct", lambda *_: SimpleNamespace(converged=False, orbit=fold)
+    )
+    detour = Detour(fold.problem.flow, checked_factors(two_modes(), HALF))
+    assert detour.carried_fold(fold, 0.0, 1.0) is None
+
+
+def test_all_folds_of_the_branches_there_and_no_other_points_are_carried_back(found):
+    less = continue_branch(solve_orbit(two_modes(0.5 * 0.013513), 10.99), RANGE_HZ)
+    tried = re.search(r" \d+ of (\d+) folds", found.notes[-1])
+    assert int(tried[1]) == len(folds_of(Diagram((less,), RANGE_HZ, "tip")))
 
 
 def test_folds_alone_lead_to_an_isola_that_lies_between_the_frequencies(

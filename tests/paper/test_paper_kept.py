@@ -1,7 +1,9 @@
 """An interrupted `nldyn paper` goes on with what it has computed."""
 
+import pytest
+
 import nldyn.paper.kept
-from nldyn.paper.kept import kept, kept_folder, unfinished_folder
+from nldyn.paper.kept import keep, kept, kept_folder, read_kept, unfinished_folder
 from nldyn.paper.workers import worker_processes
 
 
@@ -23,6 +25,19 @@ def test_a_damaged_file_and_a_folder_that_is_gone_do_no_harm(tmp_path):
     assert kept(path, abs, -3) == 3
     assert kept(path, abs, -4) == 3  # written anew
     assert kept(tmp_path / "gone" / "value.pickle", abs, -5) == 5
+
+
+def test_a_value_that_cannot_be_kept_leaves_what_was_kept_before(tmp_path):
+    class Unwritable:
+        def __reduce__(self):
+            raise ZeroDivisionError
+
+    path = tmp_path / "value.pickle"
+    keep(path, "before")
+    with pytest.raises(ZeroDivisionError):
+        keep(path, [bytes(10**6), Unwritable()])
+    assert read_kept(path) == "before"
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_processes_take_what_an_earlier_run_has_kept(tmp_path):

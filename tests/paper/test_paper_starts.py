@@ -99,11 +99,15 @@ def test_families_followed_apart_are_the_diagram_followed_at_once(found, monkeyp
 
 
 def test_what_starts_lead_to_is_kept_when_a_run_is_interrupted(found, monkeypatch, tmp_path):
-    """The resumed run asks only for the starts left, and gives what one at once gives."""
+    """The resumed run asks only for the starts left, and gives what one at once gives.
+
+    The first start leads to no orbit.
+    """
     name = "two_dof_xi_0.01"
     job = replace(job_named(name), range_hz=found.range_hz, doubled=(4, 10))
     write_starts(starts_path(name, tmp_path), found.branches)
     starts = [start for start in read_starts(name, tmp_path) if start.period < 3]
+    starts.insert(0, replace(starts[0], state=np.array([1.0, -1.0, 1.0, -1.0])))
     monkeypatch.setattr("nldyn.paper.jobs.read_starts", lambda name: starts)
     asked = []
 
@@ -128,6 +132,7 @@ def test_what_starts_lead_to_is_kept_when_a_run_is_interrupted(found, monkeypatc
     (other := tmp_path / "other").mkdir()
     once = job.run(1, other)
     assert resumed.notes == once.notes
+    assert resumed.notes[0].endswith(", 1 of which lead to no orbit")
     assert [branch.name for branch in resumed.branches] == [branch.name for branch in once.branches]
     for branch, same in zip(resumed.branches, once.branches, strict=True):
         assert branch.stop_reasons == same.stop_reasons
