@@ -68,6 +68,7 @@ EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit b
 MEETING_STEP = 1e-4  # longest step over which a doubled branch may meet the one it comes from
 AT_FLIP = 1e-5  # distance of a turn of a doubled branch from its end that may be the flip itself
 FLAT = 1e-4  # frequency part of tangents beside such a turn, below which it is
+FROM_FOLD = 1e-4  # arclength from a fold to the point at which a branch through it begins
 LONGER_CROSSINGS = (1.0, 10.0, 100.0)  # times that, where no shorter step succeeds
 LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
 RECENT = 10  # points behind a walk that it does not come back to
@@ -640,7 +641,8 @@ def start_point(orbit: Orbit, direction: float) -> BranchPoint:
     """Branch point at an orbit, heading up (+1) or down (-1) in frequency.
 
     Beside a flip or a fold, where the frequency hardly tells the orbits of a branch apart, the
-    orbit is met again on the plane across the branch.
+    orbit is met again on the plane across the branch. From a fold it is a short way to the point:
+    at the fold itself rounding decides on which side of it the orbit is.
 
     Raises
     ------
@@ -662,7 +664,14 @@ def start_point(orbit: Orbit, direction: float) -> BranchPoint:
         found = problem.correct(orbit.point, across, longest=MET_AGAIN)
     if not found.converged:
         raise ConvergenceError(f"no orbit at {orbit.frequency_hz:g} Hz: {found.failure}")
-    return BranchPoint(orbit, problem.tangent(found, towards), 0.0)
+    tangent = problem.tangent(found, towards)
+    if abs(float(tangent[-1])) < FLAT:
+        across = problem.metric(orbit.point) * tangent
+        beside = problem.correct(orbit.point + FROM_FOLD * tangent, across)
+        if beside.converged:
+            moved = Orbit.of(problem, beside, orbit.observe)
+            return BranchPoint(moved, problem.tangent(beside, tangent), 0.0)
+    return BranchPoint(orbit, tangent, 0.0)
 
 
 def trace(
@@ -994,11 +1003,12 @@ def continue_branch(
         alike(orbit, [numbers("open_ends", end) for end in open_ends]),
         check_requested(at, (low, high)),
     )
+    start = start_point(orbit, 1.0)
     with checkpoint_at(checkpoint, orbit.system) as kept:
-        known = kept.branch_from(orbit, course)
+        known = kept.branch_from(start.orbit, course)
         if known is not None:
             return known.extend(at=at, progress=progress, checkpoint=kept)
-        return complete(name, None, None, start_point(orbit, 1.0), course, progress, kept)
+        return complete(name, None, None, start, course, progress, kept)
 
 
 @one_thread()

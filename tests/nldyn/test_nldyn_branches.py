@@ -99,12 +99,16 @@ def test_a_doubled_branch_can_be_started_right_beside_its_flip(harmonic_branch, 
     assert ends == pytest.approx([low.frequency_hz, high.frequency_hz], rel=1e-12)
 
 
-def test_a_branch_can_be_started_at_its_folds(harmonic_branch):
+def test_a_branch_started_at_one_of_its_folds_has_the_same_special_points(harmonic_branch):
     for fold in (s for s in harmonic_branch.special_points if s.kind == "LP"):
-        hz = fold.frequency_hz
-        branch = continue_branch(fold.orbit, (0.999 * hz, 1.001 * hz))
-        met = [s.frequency_hz for s in branch.special_points if s.kind == "LP"]
-        assert min(abs(other - hz) for other in met) < 1e-9 * hz
+        low, high = 0.98 * fold.frequency_hz, 1.02 * fold.frequency_hz
+        branch = continue_branch(fold.orbit, (low, high))
+        met = [(s.kind, s.frequency_hz) for s in branch.special_points]
+        known = [s for s in harmonic_branch.special_points if low < s.frequency_hz < high]
+        on_it = [(s.kind, s.frequency_hz) for s in known if branch.contains(s.orbit)]
+        assert ("LP", pytest.approx(fold.frequency_hz, rel=1e-9)) in met
+        assert sorted(kind for kind, _ in met) == sorted(kind for kind, _ in on_it)
+        assert sorted(hz for _, hz in met) == pytest.approx(sorted(hz for _, hz in on_it), rel=1e-9)
 
 
 def test_flip_that_is_not_found_leaves_no_point_twice(harmonic_branch, monkeypatch):
