@@ -946,7 +946,8 @@ def continue_branch(
     Parameters
     ----------
     orbit : Orbit
-        Where to start; its frequency must lie in the range.
+        Where to start; its frequency must lie in the range. From a fold the first point is 1e-4 of
+        arclength away.
     range_hz : (float, float)
         Frequencies in Hz, ascending. The ends are met exactly.
     name : str
