@@ -8,7 +8,6 @@ software may read and this one does not. Datasets carry their unit as the attrib
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,6 @@ from nldyn.parameter_values import UNITS as PARAMETER_UNITS
 from nldyn.parameter_values import Chart, checked_parameter
 from nldyn.parameters import Parameter
 from nldyn.tables import UNITS
-from nldyn.whole_file import write_whole
 
 FORMAT = "nldyn curves"
 FORMAT_VERSION = 1
@@ -59,12 +57,10 @@ def save_curves(path: str | Path, curves: Sequence[Curve]) -> None:
     """
     if not isinstance(curves, list | tuple) or not all(isinstance(c, Curve) for c in curves):
         raise SystemModelError(f"curves must be a list of curves, got {shown(curves)}")
-    memory = io.BytesIO()
-    with new_file(memory, FORMAT, FORMAT_VERSION) as file:
+    with new_file(path, FORMAT, FORMAT_VERSION) as file:
         groups = file.create_group("curves")
         for number, curve in enumerate(curves):
             _write_curve(groups.create_group(f"{number:04d}"), curve)
-    write_whole(path, memory.getvalue())
 
 
 def load_curves(

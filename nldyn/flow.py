@@ -670,6 +670,15 @@ def flow_of(system: System | FlowMap) -> FlowMap:
     return system if isinstance(system, FlowMap) else FlowMap(system)
 
 
+def same_flow(a: FlowMap, b: FlowMap) -> bool:
+    """Whether two flow maps have the same numbers and laws, and states in the same coordinates."""
+    return a is b or (
+        a.options == b.options
+        and same_system(a.system, b.system)
+        and np.array_equal(a.system.linear.right, b.system.linear.right)
+    )
+
+
 @dataclass(frozen=True)
 class Trajectory:
     """Recorded motion: exact at any instant, not a table of samples.
@@ -810,12 +819,3 @@ def _duration_factor(p: float) -> float:
     """
     q = 1.0 / (p + 1.0)
     return 2.0 * math.sqrt(math.pi) * math.gamma(1.0 + q) / math.gamma(0.5 + q)
-
-
-def same_flow(a: FlowMap, b: FlowMap) -> bool:
-    """Whether two flow maps have the same numbers and laws, and states in the same coordinates."""
-    return a is b or (
-        a.options == b.options
-        and same_system(a.system, b.system)
-        and np.array_equal(a.system.linear.right, b.system.linear.right)
-    )

@@ -15,15 +15,25 @@ from numpy.typing import ArrayLike, NDArray
 from nldyn.errors import SystemModelError, shown
 from nldyn.linear import Real
 from nldyn.version import software_version
+from nldyn.whole_file import write_whole
 
 
-def new_file(memory: io.BytesIO, format_: str, version: int) -> h5py.File:
-    """A file in memory with the attributes that tell what it is."""
-    file = h5py.File(memory, "w", libver=("v110", "v110"))
-    file.attrs["format"] = format_
-    file.attrs["format_version"] = version
-    file.attrs["software"] = f"nldyn {software_version()}"
-    return file
+@contextmanager
+def new_file(path: str | Path, format_: str, version: int) -> Iterator[h5py.File]:
+    """A file with the attributes that tell what it is, written whole or not at all at the end.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    memory = io.BytesIO()
+    with h5py.File(memory, "w", libver=("v110", "v110")) as file:
+        file.attrs["format"] = format_
+        file.attrs["format_version"] = version
+        file.attrs["software"] = f"nldyn {software_version()}"
+        yield file
+    write_whole(path, memory.getvalue())
 
 
 def put(group: Any, name: str, values: ArrayLike, unit: str) -> None:

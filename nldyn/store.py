@@ -9,7 +9,6 @@ Datasets carry their unit as the attribute ``unit``.
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, fields
@@ -32,7 +31,6 @@ from nldyn.linear import Real
 from nldyn.orbit import Orbit
 from nldyn.shooting import ShootingProblem
 from nldyn.tables import UNITS, orbit_columns
-from nldyn.whole_file import write_whole
 
 FORMAT = "nldyn branches"
 FORMAT_VERSION = 2
@@ -49,18 +47,18 @@ def save_branches(path: str | Path, branches: Sequence[Branch]) -> None:
     SystemModelError
         If the points of a branch are of different systems.
     """
-    write_whole(path, _content(branches, {}))
+    _write(path, branches, {})
 
 
 def save_diagram(path: str | Path, diagram: Diagram) -> None:
     """Write a diagram with its branches to one file, whole or not at all; see `Diagram.save`."""
-    write_whole(path, _content(diagram.branches, _of_diagram(diagram)))
+    _write(path, diagram.branches, _of_diagram(diagram))
 
 
 def save_exploration(path: str | Path, found: Exploration) -> None:
     """Write an exploration to one file, whole or not at all; see `Exploration.save`."""
     diagram = found.diagram
-    write_whole(path, _content(diagram.branches, _of_diagram(diagram), found))
+    _write(path, diagram.branches, _of_diagram(diagram), found)
 
 
 def _of_diagram(diagram: Diagram) -> dict[str, Any]:
@@ -175,15 +173,15 @@ def load_exploration(path: str | Path, *, laws: Laws | None = None) -> Explorati
         return Exploration(diagram, question, stage)
 
 
-def _content(
+def _write(
+    path: str | Path,
     branches: Sequence[Branch],
     attributes: Mapping[str, Any],
     exploration: Exploration | None = None,
-) -> bytes:
-    """The bytes of a file of branches."""
-    memory = io.BytesIO()
+) -> None:
+    """Write a file of branches."""
     flows: list[FlowMap] = []
-    with new_file(memory, FORMAT, FORMAT_VERSION) as file:
+    with new_file(path, FORMAT, FORMAT_VERSION) as file:
         for key, value in attributes.items():
             set_attribute(file, key, value)
         groups = file.create_group("branches")
@@ -194,7 +192,6 @@ def _content(
         maps = file.create_group("flow_maps")
         for number, flow in enumerate(flows):
             write_flow(maps.create_group(f"{number:04d}"), flow)
-    return memory.getvalue()
 
 
 def _write_branch(group: Any, branch: Branch, flows: list[FlowMap]) -> None:
