@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from nldyn.branch import Branch, BranchPoint, SpecialPoint
     from nldyn.cascades import Cascade, cascade, cascades_in
     from nldyn.contacts import Impacts, impacts
-    from nldyn.continuation import ContinuationOptions, Walk, continue_branch, switch_at_flip
+    from nldyn.continuation import continue_branch
     from nldyn.convergence import Study, converge
     from nldyn.curve_marks import LocatedPoint, refine_special
     from nldyn.curve_plots import plot_curves, plot_orbit_curve
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from nldyn.curves import Curve, continue_constant, continue_in, continue_special
     from nldyn.detour_search import by_detour
     from nldyn.diagrams import Diagram, Seed, diagram
+    from nldyn.doubling import switch_at_flip
     from nldyn.elements import (
         Damper,
         HarmonicForce,
@@ -63,10 +64,12 @@ if TYPE_CHECKING:
     from nldyn.setting import Setting
     from nldyn.simulation import Motion, simulate, sweep
     from nldyn.special import LocateError
+    from nldyn.step_control import ContinuationOptions
     from nldyn.store import load_branch, load_branches, load_diagram, load_exploration
     from nldyn.studies import study
     from nldyn.survey import explore
     from nldyn.system import System
+    from nldyn.walk import Walk
     from nldyn.wear import (
         ContactMeasures,
         SpectraMap,
@@ -81,7 +84,7 @@ _HOMES = {
     "basin_maps": "Basins Plane basins",
     "branch": "Branch BranchPoint SpecialPoint",
     "cascades": "Cascade cascade cascades_in",
-    "continuation": "ContinuationOptions Walk continue_branch switch_at_flip",
+    "continuation": "continue_branch",
     "convergence": "Study converge",
     "curve_marks": "LocatedPoint refine_special",
     "curve_plots": "plot_curves plot_orbit_curve",
@@ -89,6 +92,7 @@ _HOMES = {
     "curves": "Curve continue_constant continue_in continue_special",
     "detour_search": "by_detour",
     "diagrams": "Diagram Seed diagram",
+    "doubling": "switch_at_flip",
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
     "errors": "SceneError SystemModelError",
     "executors": "Outcome TaskError run_all",
@@ -115,10 +119,12 @@ _HOMES = {
     "selection": "Selection reduce_for",
     "setting": "Setting",
     "special": "LocateError",
+    "step_control": "ContinuationOptions",
     "store": "load_branch load_branches load_diagram load_exploration",
     "studies": "study",
     "survey": "explore",
     "system": "System",
+    "walk": "Walk",
     "wear": "ContactMeasures SpectraMap contact_measures measures_table spectra_map spectra_table",
 }
 

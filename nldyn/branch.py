@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray
 
     from nldyn.checkpoint import Checkpoint
-    from nldyn.continuation import ContinuationOptions
+    from nldyn.step_control import ContinuationOptions
 
 Part = Literal["points", "special_points", "requested"]
 

@@ -17,16 +17,13 @@ from nldyn.branch import (
     check_special,
     is_at,
 )
-from nldyn.continuation import (
-    ContinuationOptions,
-    Walk,
-    check_range,
-    make_branch,
-    switch_at_flip,
-)
+from nldyn.continuation import check_range, make_branch
 from nldyn.critical import CoefficientError, Estimate, doubled_parameter, flip, loop_of
+from nldyn.doubling import switch_at_flip
 from nldyn.errors import SystemModelError, check_types, check_whole
 from nldyn.special import LocateError, special_points_between
+from nldyn.step_control import ContinuationOptions
+from nldyn.walk import Walk
 
 FEIGENBAUM = 4.669201609102991  # limit of the ratios, Feigenbaum (1978)
 POINTS_BETWEEN = 8  # of a doubled branch up to its flip, if that lies where it is expected

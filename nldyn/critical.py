@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from nldyn.linear import Real
 from nldyn.orbit import Orbit
-from nldyn.shooting import ShootingProblem
+from nldyn.shooting import ShootingProblem, metric_length
 
 LARGEST_STEP = 0.1  # in ξ, of the differences
 SMALLEST_STEP = 1e-7
@@ -563,3 +563,19 @@ def crossing(loop: Loop) -> Crossing:
         estimated(twice_v, along_v),
     )
     return Crossing(q, v, quadratic, estimated(cubic, along_q))
+
+
+def crossing_tangents(orbit: Orbit) -> list[Real]:
+    """Unit tangents (N + 1,) of the branches that cross at an orbit, from the branching equation.
+
+    Raises
+    ------
+    CoefficientError
+        If the coefficients of the equation cannot be found, or it has no real solution.
+    """
+    found = crossing(loop_of(orbit))
+    if not found.roots:
+        raise CoefficientError("the branching equation has no real solution")
+    ways = [np.append((a * found.q + b * found.v).ravel(), b) for a, b in found.roots]
+    weights = orbit.problem.metric(orbit.point)
+    return [way / metric_length(weights, way) for way in ways]

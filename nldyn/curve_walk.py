@@ -24,12 +24,13 @@ from nldyn.bordered import (
 from nldyn.branch import NOT_FINISHED, SHORT_STEP
 from nldyn.codimension import codimension_tests, cosine_near, is_torus, torus_cosine
 from nldyn.conditions import Both, BranchPoint, Grazing, Singular
-from nldyn.continuation import ContinuationOptions, passed_flip
+from nldyn.doubling import passed_flip
 from nldyn.errors import SystemModelError
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit
 from nldyn.parameter_values import Chart
 from nldyn.shooting import metric_length
+from nldyn.step_control import ContinuationOptions
 
 RANGE_END = "end of the range of "
 RESONANCE_END = "becomes a curve of neutral saddles at a resonance"

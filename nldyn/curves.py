@@ -17,7 +17,6 @@ from nldyn.bordered import Condition, Free, OrbitFamily, correct, gradient, tang
 from nldyn.branch import NOT_FINISHED, check_special
 from nldyn.checkpoint import Keeper, begun_before
 from nldyn.conditions import Held, Monitor, defined_by
-from nldyn.continuation import ContinuationOptions
 from nldyn.curve_marks import CurveChord, Located, LocatedPoint, marks_between
 from nldyn.curve_walk import (
     CLOSED_CURVE,
@@ -34,6 +33,7 @@ from nldyn.orbit import ConvergenceError, Orbit, check_minimal, same_orbit
 from nldyn.parameter_values import Chart, checked_parameter, value_of
 from nldyn.parameters import Parameter
 from nldyn.special import LocateError, root
+from nldyn.step_control import ContinuationOptions
 from nldyn.tables import orbit_columns
 from nldyn.whole_file import check_writable
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nldyn.continuation import shifts
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
 from nldyn.orbit import (
@@ -19,6 +18,7 @@ from nldyn.orbit import (
     shooting_problem,
     spread,
 )
+from nldyn.walk import shifts
 
 LONGEST = 0.5  # step of an iteration, relative to the orbit
 ITERATIONS = 20

@@ -12,7 +12,6 @@ import numpy as np
 from cms.threads import one_thread
 from nldyn.branch import Branch, check_branches
 from nldyn.checkpoint import checkpoint_of_several
-from nldyn.continuation import ContinuationOptions
 from nldyn.detour import Detour, checked_factors, named
 from nldyn.diagrams import Collector, Diagram, Progress, check_known, counted, middle_orbit
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
@@ -20,6 +19,7 @@ from nldyn.exploration import FINEST_SPACING, steps_between
 from nldyn.fixed_point_index import index_note, is_damped, without_index_note
 from nldyn.orbit import Orbit, minimal_period, same_orbit
 from nldyn.parameters import Parameter
+from nldyn.step_control import ContinuationOptions
 
 PLACES = 3  # orbits of each branch that are carried there, in case some get lost
 

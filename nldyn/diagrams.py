@@ -22,23 +22,17 @@ from nldyn.branch import (
     is_at,
 )
 from nldyn.checkpoint import Checkpoint, checkpoint_of_several
-from nldyn.continuation import (
-    ContinuationOptions,
-    Rows,
-    broken_off,
-    check_range,
-    complete,
-    open_ends,
-    start_point,
-    switch_at_flip,
-)
+from nldyn.continuation import broken_off, check_range, complete, open_ends, start_point
+from nldyn.doubling import switch_at_flip
 from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
 from nldyn.flow import FlowMap, flow_of, same_flow
 from nldyn.normal_forms import switch_at_branch_point
 from nldyn.orbit import ConvergenceError, Orbit, check_observe, solve_orbit
 from nldyn.search import SearchOptions, Strobe, orbits_from_strobe, reach, simulate_strobe
 from nldyn.special import LocateError
+from nldyn.step_control import ContinuationOptions
 from nldyn.system import System
+from nldyn.walk import Rows
 
 MORE_STARTS = 4  # times as many in the second search, which looks for orbits with contact
 

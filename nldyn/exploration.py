@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.continuation import MOST_POINTS, ContinuationOptions
 from nldyn.diagrams import Diagram, counted
 from nldyn.errors import SystemModelError, check_whole, is_finite, shown
 from nldyn.fixed_point_index import index_note, is_damped
@@ -22,6 +21,7 @@ from nldyn.fold_search import leading_parameter
 from nldyn.linear import Real
 from nldyn.orbit import LONGEST_PERIOD
 from nldyn.search import MOST_COUNT
+from nldyn.step_control import MOST_POINTS, ContinuationOptions
 from nldyn.system import System
 
 DECAYS = 4.0  # time allowed for settling, over the slowest decay time of the linear part

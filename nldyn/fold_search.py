@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from nldyn.branch import SpecialPoint
-from nldyn.continuation import ContinuationOptions
 from nldyn.curve_walk import CLOSED_CURVE, RANGE_END, CurveWalk, passages
 from nldyn.curves import special_start
 from nldyn.errors import SystemModelError
 from nldyn.orbit import Orbit
 from nldyn.parameter_values import EVERY_MODE, FREQUENCY, Chart, checked_parameter, value_of
 from nldyn.parameters import Parameter
+from nldyn.step_control import ContinuationOptions
 from nldyn.system import System
 
 

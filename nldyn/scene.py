@@ -425,8 +425,8 @@ def compute(
     if scene.explore is not None:
         return explore_scene(scene, progress, checkpoint).diagram
     flow, table = _to_follow(scene)
-    from nldyn.continuation import ContinuationOptions
     from nldyn.diagrams import Seed, diagram
+    from nldyn.step_control import ContinuationOptions
 
     with _told_as(scene, ("continuation",), SystemModelError):
         found = diagram(
@@ -492,8 +492,8 @@ def explore_scene(
     1.0
     """
     flow, table = _to_follow(scene)
-    from nldyn.continuation import ContinuationOptions
     from nldyn.exploration import ExploreOptions
+    from nldyn.step_control import ContinuationOptions
     from nldyn.survey import explore
 
     if scene.explore is None:

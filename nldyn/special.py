@@ -140,8 +140,9 @@ class Chord:
         problem = a.orbit.problem
         row = self._row
         offset = float(row @ (a.orbit.point + sigma * self._secant))
-        found = problem.correct(self.between(sigma), row, offset=offset)
-        if found.converged:
+        guess = self.between(sigma)
+        found = problem.correct(guess, row, offset=offset)
+        if found.converged and self._is_beside(found.point - guess):
             orbit = Orbit.of(problem, found, a.orbit.observe)
             tangent = problem.tangent(found, self._secant)
             if float(row @ tangent) * float(row @ self._secant) < 0.0:
@@ -149,9 +150,9 @@ class Chord:
             if self._across(tangent):
                 raise LocateError("the branch turns within one step")
         else:
-            crossing = correct_across(problem, self.between(sigma), row, offset)
+            crossing = correct_across(problem, guess, row, offset)
             if crossing is None or crossing[2] > CROSSING_ERROR:
-                raise LocateError(found.failure)
+                raise LocateError(found.failure or "Newton's method went to another branch")
             orbit = Orbit(problem, *crossing, a.orbit.observe)
             tangent = self.direction(sigma)
         length = a.arclength + sigma * (self.last.arclength - a.arclength)
@@ -201,6 +202,12 @@ class Chord:
     def _unit(self, vector: Real) -> Real:
         weights = self.first.orbit.problem.metric(self.first.orbit.point)
         return np.asarray(vector / metric_length(weights, vector))
+
+    def _is_beside(self, way: Real) -> bool:
+        """Whether a way from the chord is no longer than the chord, or than that of a crossing."""
+        weights = self.first.orbit.problem.metric(self.first.orbit.point)
+        length = metric_length(weights, self._secant)
+        return metric_length(weights, way) <= max(length, SHORTEST_CROSSING)
 
     def _across(self, tangent: Real) -> bool:
         """Whether a tangent departs from the chord by more than a branch may within a step."""

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nldyn._kernels import Record
 from nldyn.branch import Branch, BranchPoint, Course, SpecialPoint, WalkEnd
-from nldyn.continuation import ContinuationOptions, alike
+from nldyn.continuation import alike
 from nldyn.diagrams import Diagram
 from nldyn.errors import SystemModelError
 from nldyn.exploration import Coverage, Exploration, ExploreOptions, Question, Stage
@@ -30,6 +30,7 @@ from nldyn.hdf5 import Group, new_file, opened, put, set_attribute
 from nldyn.linear import Real
 from nldyn.orbit import Orbit
 from nldyn.shooting import ShootingProblem
+from nldyn.step_control import ContinuationOptions
 from nldyn.tables import UNITS, orbit_columns
 
 FORMAT = "nldyn branches"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cms.threads import one_thread
 from nldyn.branch import Branch, is_at
 from nldyn.checkpoint import Checkpoint, begun_before
-from nldyn.continuation import ContinuationOptions, check_range
+from nldyn.continuation import check_range
 from nldyn.deflation import deflated_orbit
 from nldyn.diagrams import Collector, Diagram, Progress, check_known
 from nldyn.errors import SystemModelError, check_types, check_whole, shown
@@ -42,6 +42,7 @@ from nldyn.orbit import (
 )
 from nldyn.parameters import Parameter
 from nldyn.search import orbit_beside, orbit_near, random_states
+from nldyn.step_control import ContinuationOptions
 from nldyn.system import System
 from nldyn.whole_file import check_writable
 

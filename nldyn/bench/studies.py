@@ -142,6 +142,9 @@ SUBJECTS = {
     "between.py": "special points",
     "branch.py": "special points",
     "continuation.py": "walk",
+    "trail.py": "walk",
+    "walk.py": "walk",
+    "doubling.py": "walk",
     "linalg": "linear algebra (numpy)",
 }
 

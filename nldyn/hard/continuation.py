@@ -10,10 +10,11 @@ from functools import cache, partial
 import numpy as np
 
 from nldyn.branch import Branch, SpecialPoint
-from nldyn.continuation import ContinuationOptions, continue_branch
+from nldyn.continuation import continue_branch
 from nldyn.hard.case import Case, Measured
 from nldyn.orbit import Orbit, solve_orbit
 from nldyn.paper.jobs import scene_system
+from nldyn.step_control import ContinuationOptions
 from nldyn.system import System
 
 SUBJECT = "continuation at low damping"

@@ -9,7 +9,7 @@ import numpy as np
 
 from nldyn.bench.exact import Series
 from nldyn.branch import Branch, SpecialPoint
-from nldyn.continuation import ContinuationOptions, continue_branch
+from nldyn.continuation import continue_branch
 from nldyn.curves import continue_special
 from nldyn.elements import HarmonicForce, Stop, Unbalance
 from nldyn.hard.case import Case, Measured
@@ -28,6 +28,7 @@ from nldyn.linear import Real
 from nldyn.normal_forms import normal_form, switch_at_branch_point
 from nldyn.orbit import Orbit, solve_orbit
 from nldyn.search import find_orbits
+from nldyn.step_control import ContinuationOptions
 from nldyn.system import System
 
 SUBJECT = "resonances, folds and cusps"

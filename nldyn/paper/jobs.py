@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cms
-from nldyn.continuation import ContinuationOptions, broken_off
+from nldyn.continuation import broken_off
 from nldyn.diagrams import Diagram, Progress, Seed, diagram, notes_on_ends
 from nldyn.elements import Stop
 from nldyn.fixed_point_index import index_note
@@ -18,6 +18,7 @@ from nldyn.paper.workers import Workers, tell
 from nldyn.progress import compilation_told
 from nldyn.resources import example
 from nldyn.scene import build_component, build_system, load_scene
+from nldyn.step_control import ContinuationOptions
 from nldyn.system import System
 
 BILINEAR_ALPHA = 790.0  # section 3, from equation 3.2

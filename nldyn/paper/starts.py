@@ -17,13 +17,13 @@ from pathlib import Path
 import numpy as np
 
 from nldyn.branch import Branch
-from nldyn.continuation import ContinuationOptions
 from nldyn.diagrams import Collector, Diagram, Progress, middle_orbit
 from nldyn.flow import flow_of
 from nldyn.linear import Real
 from nldyn.orbit import check_observe, stroboscopic
 from nldyn.paper.kept import keep, read_kept
 from nldyn.search import orbit_near
+from nldyn.step_control import ContinuationOptions
 from nldyn.system import System
 from nldyn.whole_file import write_whole
 

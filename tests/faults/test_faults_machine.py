@@ -12,7 +12,7 @@ import pytest
 from killing import check_whole, run, same_results
 from limited_commands import command, refusal
 
-from nldyn import checkpoint, continuation, output, plot
+from nldyn import Walk, checkpoint, output, plot
 from nldyn.resources import example
 
 START = "from nldyn.command import main; main()"
@@ -182,7 +182,7 @@ def stopped_at(monkeypatch, owner, name, call):
 STAGES = {
     "scene": ("nldyn.scene", "load_scene", 1, False),
     "search": ("nldyn.diagrams", "simulate_strobe", 1, False),
-    "walk": ("nldyn.continuation.Walk", "_advance", 20, True),
+    "walk": ("nldyn.walk.Walk", "_advance", 20, True),
     "tables": ("nldyn.output", "write_table", 2, True),
     "picture": ("nldyn.plot", "save_diagram", 1, True),
     "exchange": ("nldyn.result_directory", "_swap", 1, True),
@@ -192,7 +192,7 @@ STAGES = {
 @pytest.mark.parametrize("stage", STAGES)
 def test_ctrl_c_at_every_stage(scene, whole, tmp_path, monkeypatch, stage):
     place, name, call, kept = STAGES[stage]
-    owner = sys.modules.get(place) or continuation.Walk
+    owner = sys.modules.get(place) or Walk
     out = tmp_path / "out"
     with monkeypatch.context() as pressed:
         stopped_at(pressed, owner, name, call)

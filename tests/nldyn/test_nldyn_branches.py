@@ -28,12 +28,13 @@ from nldyn import (
 )
 from nldyn._events import branch_point_test, flip_test, torus_test
 from nldyn.branch import BranchPoint
-from nldyn.continuation import start_point, trace
+from nldyn.continuation import start_point
 from nldyn.orbit import minimal_period, same_orbit
 from nldyn.peaks import lowest_orbit, resonance_peaks
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
 from nldyn.special import LocateError, special_points_between
+from nldyn.trail import trace
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +116,7 @@ def test_flip_that_is_not_found_leaves_no_point_twice(harmonic_branch, monkeypat
     def fails(*_, **__):
         raise ConvergenceError("no orbit")
 
-    monkeypatch.setattr("nldyn.continuation.refine", fails)
+    monkeypatch.setattr("nldyn.doubling.refine", fails)
     flip = next(f for f in flips(harmonic_branch) if 8.0 < f.frequency_hz < 11.0)
     nodes, _, reason, _ = trace(switch_at_flip(flip), (5.7, 90.0))
     assert reason.startswith("meets the branch of period 1 beyond 10.4")
@@ -387,9 +388,9 @@ def test_branch_notes_where_special_points_may_be_missing(one_dof, monkeypatch, 
     def fails(*_):
         raise LocateError("no root found")
 
-    monkeypatch.setattr("nldyn.continuation.special_points_between", fails)
+    monkeypatch.setattr("nldyn.trail.special_points_between", fails)
     if middle_fails:
-        monkeypatch.setattr("nldyn.continuation.Chord.at", fails)
+        monkeypatch.setattr("nldyn.trail.Chord.at", fails)
     branch = continue_branch(solve_orbit(one_dof, 33.0), (32.9, 33.1))
     pieces = (1 if middle_fails else 16) * (len(branch.points) - 1)
     assert len(branch.notes) == pieces

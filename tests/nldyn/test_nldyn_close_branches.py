@@ -18,12 +18,12 @@ from nldyn import (
     Stop,
     System,
     Unbalance,
-    continuation,
     continue_branch,
     diagram,
     solve_orbit,
     switch_at_branch_point,
     switch_at_flip,
+    walk,
 )
 from nldyn.continuation import start_point
 from nldyn.hard.continuation import beam as four_modes
@@ -252,8 +252,8 @@ def test_end_of_a_doubled_branch_is_told_as_no_fold():
 
 def test_a_walk_that_comes_back_to_where_it_was_says_so(monkeypatch):
     """Made to jump at a nearly perfect pitchfork, it would go round the closed branch for ever."""
-    monkeypatch.setattr(continuation, "SHORTEST_CROSSING", 1e-4)
-    monkeypatch.setattr(continuation, "is_crossing", lambda orbit: True)
+    monkeypatch.setattr(walk, "SHORTEST_CROSSING", 1e-4)
+    monkeypatch.setattr(walk, "is_crossing", lambda orbit: True)
     branch = continue_branch(
         solve_orbit(between_stops(1e-9), 11.0),
         (11.0, 11.8),

@@ -36,11 +36,11 @@ from nldyn import (
 from nldyn.bordered import OrbitFamily
 from nldyn.codimension import along_tori, flip_coefficient, is_torus
 from nldyn.conditions import Singular, bialternate, max_abs_displacement, peak_force
-from nldyn.continuation import trace
 from nldyn.orbit import Orbit, shooting_problem
 from nldyn.parameter_values import EVERY_MODE, Chart, value_of, with_value
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
+from nldyn.trail import trace
 
 MASS, NATURAL, RATIO = 2.0, 2.0 * math.pi * 10.0, 0.03
 

@@ -30,7 +30,6 @@ from nldyn import (
 )
 from nldyn.branch import SpecialPoint
 from nldyn.cascades import FEIGENBAUM
-from nldyn.continuation import trace
 from nldyn.critical import (
     CoefficientError,
     Estimate,
@@ -45,6 +44,7 @@ from nldyn.critical import (
 )
 from nldyn.normal_forms import is_symmetric, resonance
 from nldyn.orbit import refine, shooting_problem
+from nldyn.trail import trace
 
 
 def of_kind(branch, kind):

@@ -20,8 +20,8 @@ from nldyn import (
     System,
     SystemModelError,
     Unbalance,
+    Walk,
     checkpoint,
-    continuation,
     continue_branch,
     diagram,
     load_branch,
@@ -296,13 +296,13 @@ def test_checkpoints_are_not_written_more_often_than_a_share_of_the_time(monkeyp
 def points_computed(monkeypatch):
     """Count the points that walks compute."""
     made = []
-    advance = continuation.Walk._advance
+    advance = Walk._advance
 
     def counted(*arguments):
         made.append(None)
         return advance(*arguments)
 
-    monkeypatch.setattr(continuation.Walk, "_advance", counted)
+    monkeypatch.setattr(Walk, "_advance", counted)
     return made
 
 

@@ -12,7 +12,7 @@ from fakes import diagram
 import nldyn.paper
 import nldyn.progress
 import nldyn.scene
-from nldyn import continuation, load_branches, load_diagram, load_exploration, survey
+from nldyn import Walk, load_branches, load_diagram, load_exploration, survey
 from nldyn.cli import main
 from nldyn.paper.kept import kept, kept_folder
 from nldyn.resources import example, mesh
@@ -114,7 +114,7 @@ def short_scene(folder):
 def test_a_run_goes_on_after_ctrl_c(tmp_path, monkeypatch):
     scene, out = short_scene(tmp_path), tmp_path / "new" / "out"
     assert invoke("run", scene, "--out", tmp_path / "whole", "--quiet").exit_code == 0
-    advance = continuation.Walk._advance
+    advance = Walk._advance
     steps = []
 
     def counted(*arguments):
@@ -123,7 +123,7 @@ def test_a_run_goes_on_after_ctrl_c(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return advance(*arguments)
 
-    monkeypatch.setattr(continuation.Walk, "_advance", counted)
+    monkeypatch.setattr(Walk, "_advance", counted)
     limit = 60
     stopped = invoke("run", scene, "--out", out, "--quiet")
     unfinished = tmp_path / "new" / "out.unfinished.h5"

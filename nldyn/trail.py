@@ -1,0 +1,284 @@
+"""A walk with the special points that lie on its way."""
+
+from __future__ import annotations
+
+from bisect import bisect
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from operator import attrgetter
+
+from nldyn.branch import CLOSED, JOINS, NOT_FINISHED, BranchPoint, SpecialPoint, WalkEnd
+from nldyn.linear import Real
+from nldyn.orbit import ConvergenceError
+from nldyn.shooting import metric_length
+from nldyn.special import (
+    Chord,
+    LocateError,
+    distance,
+    insert_dip,
+    special_points_between,
+    without_repeats,
+)
+from nldyn.step_control import ContinuationOptions
+from nldyn.walk import COMES_BACK, MEETS_OPEN_END, Stride, Walk
+
+AT_FLIP = 1e-5  # distance of a turn of a doubled branch from its end that may be the flip itself
+FLAT = 1e-4  # frequency part of tangents beside such a turn, below which it is
+SHORTEST_DETOUR = 1e-6  # first step of a walk that looks closely at what lies within a step
+MOST_DETOUR = 500  # points of such a walk
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """What a walk in one direction has found, in its own order.
+
+    Parameters
+    ----------
+    nodes, special_points, notes : list
+        As in `Branch`.
+    reason : str
+        Why the walk stopped.
+    end : WalkEnd, optional
+        How it would go on.
+    """
+
+    nodes: list[BranchPoint]
+    special_points: list[SpecialPoint]
+    notes: list[str]
+    reason: str
+    end: WalkEnd | None
+
+
+@dataclass
+class Trail:
+    """A walk with what is found on the way.
+
+    Special points of a pair of neighbouring points are located as soon as the next point is known,
+    since that may put another point between them.
+
+    Parameters
+    ----------
+    walk : Walk
+        The walk.
+    nodes, special_points, notes : list
+        What was found before, if the walk goes on; of the pairs of nodes all but the last have
+        been searched.
+    """
+
+    walk: Walk
+    nodes: list[BranchPoint] = field(default_factory=list)
+    special_points: list[SpecialPoint] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._searched = max(len(self.nodes) - 2, 0)
+        self._mark = self._here() if self.nodes else None
+
+    @classmethod
+    def going_on(
+        cls,
+        leg: Leg,
+        range_hz: tuple[float, float],
+        options: ContinuationOptions,
+        open_ends: Real,
+    ) -> Trail:
+        """The same walk with another end of its range or other options."""
+        walk = Walk(leg.nodes[0], range_hz, options, open_ends)
+        end = leg.end
+        if end is None:
+            return cls(walk)
+        here = leg.nodes[end.node]
+        walk.stride = Stride(here, end.step, end.behind, end.count)
+        walk.visited = list(leg.nodes[: end.kept])
+        return cls(
+            walk,
+            [*leg.nodes[: end.kept], here],
+            leg.special_points[: end.special_points],
+            leg.notes[: end.notes],
+        )
+
+    def follow(
+        self,
+        progress: Callable[[float], None] | None = None,
+        keep: Callable[[], None] | None = None,
+    ) -> Leg:
+        """Walk to the end.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called with the frequency of every point.
+        keep : callable, optional
+            Called after every point, when `so_far` tells of it.
+        """
+        for point in self.walk:
+            self.nodes.append(point)
+            if progress is not None:
+                progress(point.orbit.frequency_hz)
+            if len(self.nodes) > 2:
+                insert_dip(self.nodes, len(self.nodes) - 2)
+            regular = self.walk.stride is not None and self.walk.stride.here is point
+            self._search(len(self.nodes) - 2, closely=regular)
+            if regular:
+                self._mark = self._here()
+                if keep is not None:
+                    keep()
+        self._search(len(self.nodes) - 1, closely=False)
+        if self.walk.stop_reason.startswith(COMES_BACK):
+            self.notes.append(self.walk.stop_reason)
+        special = self.special_points
+        if self.walk.stop_reason.startswith(JOINS):
+            special = [s for s in special if not self._is_flip_at_end(s)]
+        elif self.walk.stop_reason == CLOSED:  # the last step leads beyond the start
+            special = [s for s in special if not self._is_repeated(s.point)]
+            last = self.nodes.pop()  # a dip may have put others there
+            self.nodes = [*(p for p in self.nodes if not self._is_repeated(p)), last]
+        end = self._end(next(i for i, p in enumerate(self.nodes) if p is self._stride.here))
+        return Leg(self.nodes, special, self.notes, self.walk.stop_reason, end)
+
+    def so_far(self) -> Leg | None:
+        """What was found up to the last complete point; None before the first."""
+        if self._mark is None:
+            return None
+        kept, special, notes, stride = self._mark
+        return Leg(
+            [*self.nodes[:kept], stride.here],
+            self.special_points[:special],
+            self.notes[:notes],
+            NOT_FINISHED,
+            self._end(kept),
+        )
+
+    def _is_flip_at_end(self, special: SpecialPoint) -> bool:
+        """Whether a turn of a doubled branch is where it joins the one that it comes from."""
+        if special.kind not in ("BP", "LP"):
+            return False
+        if distance(self.nodes[-1].orbit, special.orbit) > AT_FLIP:
+            return False
+        after = bisect(self.nodes, special.point.arclength, key=attrgetter("arclength"))
+        beside = self.nodes[max(after - 1, 0) : after + 1]
+        return special.kind == "BP" or min(abs(float(p.tangent[-1])) for p in beside) < FLAT
+
+    def _is_repeated(self, point: BranchPoint) -> bool:
+        """Whether a point of a closed branch lies where the walk has begun again."""
+        here = self._stride.here
+        return point.arclength > here.arclength and self.walk.closes(here, point)
+
+    @property
+    def _stride(self) -> Stride:
+        assert self.walk.stride is not None
+        return self.walk.stride
+
+    def _here(self) -> tuple[int, int, int, Stride]:
+        """How much will stay as it is, whatever follows."""
+        return len(self.nodes) - 1, len(self.special_points), len(self.notes), self._stride
+
+    def _end(self, node: int) -> WalkEnd | None:
+        if self._mark is None:
+            return None
+        kept, special, notes, stride = self._mark
+        return WalkEnd(stride.step, stride.behind, stride.count, node, kept, special, notes)
+
+    def _walk_closely(self) -> bool:
+        """Put the points of a walk with shorter steps into the step searched, if it led on.
+
+        A narrow resonance may lie within one step: the branch leaves at its foot and comes back
+        beside it. What lies behind is moved by the length of the detour.
+        """
+        a, b = self.nodes[self._searched : self._searched + 2]
+        between = _detour(a, b, self.walk)
+        if between is None:
+            return False
+        last = between[-1]
+        weights = last.orbit.problem.metric(last.orbit.point)
+        end = last.arclength + metric_length(weights, b.orbit.point - last.orbit.point)
+        behind = self.nodes[self._searched + 1 :]
+        moved = [replace(p, arclength=p.arclength + (end - b.arclength)) for p in behind]
+        self.nodes[self._searched + 1 :] = [*between, *moved]
+        self.walk.stride = replace(self._stride, here=moved[-1])
+        return True
+
+    def _search(self, pairs: int, closely: bool = True) -> None:
+        """Locate the special points of the first pairs of nodes, as far as that is not done.
+
+        Where that fails, the step is walked again with shorter ones; not at the end of the walk,
+        whose last steps a longer one does anew.
+        """
+        known = len(self.special_points)
+        ahead = len(self.nodes) - pairs  # nodes that stay beyond those searched
+        while self._searched < len(self.nodes) - ahead:
+            a, b = self.nodes[self._searched : self._searched + 2]
+            before = self.nodes[self._searched - 1] if self._searched else None
+            after = next(iter(self.nodes[self._searched + 2 :]), None)
+            try:
+                self.special_points += special_points_between(a, b, before, after)
+            except (LocateError, ConvergenceError) as error:
+                if closely and self._walk_closely():
+                    continue
+                found, lost = _by_halves(a, b, error)
+                self.special_points += found
+                self.notes += lost
+            self._searched += 1
+        if len(self.special_points) > known:
+            self.special_points = without_repeats(self.special_points)
+
+
+def trace(
+    start: BranchPoint,
+    range_hz: tuple[float, float],
+    options: ContinuationOptions | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[list[BranchPoint], list[SpecialPoint], str, list[str]]:
+    """Walk from a point in the direction of its tangent and collect special points.
+
+    Returns the points, the special points, why the walk stopped, and notes on what may be missing.
+    """
+    trail = Trail(Walk(start, range_hz, options or ContinuationOptions()))
+    leg = trail.follow(progress)
+    return leg.nodes, leg.special_points, leg.reason, leg.notes
+
+
+def _detour(a: BranchPoint, b: BranchPoint, walk: Walk) -> list[BranchPoint] | None:
+    """Points of a walk with shorter steps from a that passes b in its direction, or None."""
+    first_step = (b.arclength - a.arclength) / 64.0
+    if first_step < max(SHORTEST_DETOUR, walk.options.min_step):
+        return None
+    options = replace(
+        walk.options, first_step=first_step, max_step=8.0 * first_step, max_points=MOST_DETOUR
+    )
+    inner = Walk(a, walk.range_hz, options, b.orbit.point[None])
+    between = list(inner)[1:-1]
+    if inner.stop_reason != MEETS_OPEN_END or not between:
+        return None
+    last = between[-1]
+    weights = last.orbit.problem.metric(last.orbit.point)
+    ahead = float((b.orbit.point - last.orbit.point) @ (weights * b.tangent))
+    return between if ahead > 0.0 else None
+
+
+def _by_halves(
+    a: BranchPoint, b: BranchPoint, reason: Exception, depth: int = 0
+) -> tuple[list[SpecialPoint], list[str]]:
+    """Special points of a chord on which a correction failed: try again on its halves.
+
+    With notes on the pieces where it failed again.
+    """
+    try:
+        if depth > 3:
+            raise reason
+        middle = Chord(a, b).at(0.5)
+    except (LocateError, ConvergenceError) as error:
+        hz = sorted(point.orbit.frequency_hz for point in (a, b))
+        return [], [
+            f"special points between {hz[0]:.8g} and {hz[1]:.8g} Hz may be missing: {error}"
+        ]
+    found: list[SpecialPoint] = []
+    notes: list[str] = []
+    for first, last in ((a, middle), (middle, b)):
+        try:
+            found += special_points_between(first, last)
+        except (LocateError, ConvergenceError) as error:
+            more, lost = _by_halves(first, last, error, depth + 1)
+            found += more
+            notes += lost
+    return found, notes
