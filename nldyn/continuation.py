@@ -28,10 +28,12 @@ from nldyn.orbit import ConvergenceError, Orbit, check_minimal
 from nldyn.special import ON_CROSSING, lies_on_crossing
 from nldyn.step_control import ContinuationOptions
 from nldyn.system import numbers
-from nldyn.trail import FLAT, Leg, Trail
+from nldyn.trail import Leg, Trail
 from nldyn.walk import shifts
 
 FROM_FOLD = 1e-4  # arclength from a fold to the point at which a branch through it begins
+MIDDLE = 0.1  # of that, within which it lies
+FLAT = 1e-3  # frequency part of a tangent, rounding beside flips included, that may be a fold's
 MET_AGAIN = 1e-6  # longest Newton step by which a solved orbit is met again across its branch
 
 
@@ -109,7 +111,7 @@ def continue_branch(
         alike(orbit, [numbers("open_ends", end) for end in open_ends]),
         check_requested(at, (low, high)),
     )
-    start = start_point(orbit, 1.0)
+    start = start_point(orbit, 1.0, (low, high))
     with checkpoint_at(checkpoint, orbit.system) as kept:
         known = kept.branch_from(start.orbit, course)
         if known is not None:
@@ -171,12 +173,12 @@ def complete(
     return branch
 
 
-def start_point(orbit: Orbit, direction: float) -> BranchPoint:
+def start_point(orbit: Orbit, direction: float, range_hz: tuple[float, float]) -> BranchPoint:
     """Branch point at an orbit, heading up (+1) or down (-1) in frequency.
 
     Beside a flip or a fold, where the frequency hardly tells the orbits of a branch apart, the
-    orbit is met again on the plane across the branch. From a fold it is a short way to the point:
-    at the fold itself rounding decides on which side of it the orbit is.
+    orbit is met again on the plane across the branch. From a fold it is a short way to the point,
+    if that lies in the range: at the fold itself rounding decides on which side the orbit is.
 
     Raises
     ------
@@ -198,14 +200,33 @@ def start_point(orbit: Orbit, direction: float) -> BranchPoint:
         found = problem.correct(orbit.point, across, longest=MET_AGAIN)
     if not found.converged:
         raise ConvergenceError(f"no orbit at {orbit.frequency_hz:g} Hz: {found.failure}")
-    tangent = problem.tangent(found, towards)
-    if abs(float(tangent[-1])) < FLAT:
-        across = problem.metric(orbit.point) * tangent
-        beside = problem.correct(orbit.point + FROM_FOLD * tangent, across)
-        if beside.converged:
-            moved = Orbit.of(problem, beside, orbit.observe)
-            return BranchPoint(moved, problem.tangent(beside, tangent), 0.0)
-    return BranchPoint(orbit, tangent, 0.0)
+    here = BranchPoint(orbit, problem.tangent(found, towards), 0.0)
+    beside = _beside_fold(here, direction)
+    low, high = range_hz
+    return beside if beside and low <= beside.orbit.frequency_hz <= high else here
+
+
+def _beside_fold(here: BranchPoint, direction: float) -> BranchPoint | None:
+    """Point a short way from a fold that is here, where the branch heads up (+1) or down (-1).
+
+    None if no fold is here: the branch turns in the middle between the points on both sides.
+    """
+    if abs(float(here.tangent[-1])) > FLAT:
+        return None
+    problem, place = here.orbit.problem, here.orbit.point
+    across = problem.metric(place) * here.tangent
+    sides = [
+        problem.correct(place + way * here.tangent, across, longest=FROM_FOLD)
+        for way in (-FROM_FOLD, FROM_FOLD)
+    ]
+    if not all(side.converged for side in sides):
+        return None
+    tangents = [problem.tangent(side, here.tangent) for side in sides]
+    first, last = (float(tangent[-1]) for tangent in tangents)
+    if abs(first + last) > MIDDLE * abs(first - last):
+        return None
+    index = int(last * direction > 0.0)
+    return BranchPoint(Orbit.of(problem, sides[index], here.orbit.observe), tangents[index], 0.0)
 
 
 def goes_on(leg: Leg, course: Course) -> bool:

@@ -199,7 +199,7 @@ class Collector:
             if self.known(orbit):
                 continue
             try:
-                start = start_point(orbit, 1.0)
+                start = start_point(orbit, 1.0, self.range_hz)
             except ConvergenceError as error:
                 self.notes.append(f"orbit of period {orbit.period} found but not followed: {error}")
             else:
@@ -245,7 +245,7 @@ class Collector:
                 observe=orbit.observe,
                 segments=orbit.problem.segments,
             )
-            start = start_point(image, 1.0)
+            start = start_point(image, 1.0, self.range_hz)
         except ConvergenceError as error:
             self.notes.append(f"the mirror image of branch {branch.name} was not found: {error}")
         else:

@@ -14,6 +14,7 @@ from nldyn import (
     ContinuationOptions,
     ConvergenceError,
     FlowMap,
+    HarmonicForce,
     SearchOptions,
     Stop,
     System,
@@ -29,7 +30,7 @@ from nldyn import (
 from nldyn._events import branch_point_test, flip_test, torus_test
 from nldyn.branch import BranchPoint
 from nldyn.continuation import start_point
-from nldyn.orbit import minimal_period, same_orbit
+from nldyn.orbit import Orbit, minimal_period, same_orbit
 from nldyn.peaks import lowest_orbit, resonance_peaks
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
@@ -88,7 +89,7 @@ def test_doubled_branch_joins_two_flips(harmonic_branch):
         assert minimal_period(end) == 1
 
 
-@pytest.mark.parametrize("amplitude", [1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize("amplitude", [1e-2, 1.0001e-4, 1e-4, 9.999e-5, 9.99e-5, 9.9e-5, 1e-6])
 def test_a_doubled_branch_can_be_started_right_beside_its_flip(harmonic_branch, amplitude):
     """Down to 1e-10 of the frequency beside it, which tells its orbits apart no longer."""
     low, high = (f for f in flips(harmonic_branch) if 8.0 < f.frequency_hz < 11.0)
@@ -98,18 +99,65 @@ def test_a_doubled_branch_can_be_started_right_beside_its_flip(harmonic_branch, 
     assert all(reason.startswith("joins the branch") for reason in branch.stop_reasons)
     ends = sorted(node.orbit.frequency_hz for node in (branch.nodes[0], branch.nodes[-1]))
     assert ends == pytest.approx([low.frequency_hz, high.frequency_hz], rel=1e-12)
+    assert len(branch.points) > 20
+    assert all(special.kind != "BP" for special in branch.special_points)
 
 
-def test_a_branch_started_at_one_of_its_folds_has_the_same_special_points(harmonic_branch):
-    for fold in (s for s in harmonic_branch.special_points if s.kind == "LP"):
-        low, high = 0.98 * fold.frequency_hz, 1.02 * fold.frequency_hz
-        branch = continue_branch(fold.orbit, (low, high))
-        met = [(s.kind, s.frequency_hz) for s in branch.special_points]
-        known = [s for s in harmonic_branch.special_points if low < s.frequency_hz < high]
-        on_it = [(s.kind, s.frequency_hz) for s in known if branch.contains(s.orbit)]
-        assert ("LP", pytest.approx(fold.frequency_hz, rel=1e-9)) in met
-        assert sorted(kind for kind, _ in met) == sorted(kind for kind, _ in on_it)
-        assert sorted(hz for _, hz in met) == pytest.approx(sorted(hz for _, hz in on_it), rel=1e-9)
+@pytest.fixture(scope="module")
+def doubled_branch(harmonic_branch):
+    flip = next(f for f in flips(harmonic_branch) if 8.0 < f.frequency_hz < 11.0)
+    return continue_branch(switch_at_flip(flip).orbit, RANGE_HZ)
+
+
+def beside(fold, distance):
+    """An orbit of the branch at an arclength from a fold."""
+    problem, across = fold.orbit.problem, fold.orbit.problem.metric(fold.orbit.point)
+    place = fold.orbit.point + distance * fold.point.tangent
+    return Orbit.of(problem, problem.correct(place, across * fold.point.tangent), "middle")
+
+
+@pytest.mark.parametrize("distance", [-1e-8, -1e-9, -1e-10, -1e-11, 0.0, 1e-11, 1e-10, 1e-9, 1e-8])
+def test_a_branch_started_at_one_of_its_folds_has_the_same_special_points(
+    harmonic_branch, doubled_branch, distance
+):
+    for whole in (harmonic_branch, doubled_branch):
+        for fold in (s for s in whole.special_points if s.kind == "LP"):
+            low, high = 0.99 * fold.frequency_hz, 1.01 * fold.frequency_hz
+            branch = continue_branch(beside(fold, distance), (low, high))
+            met = sorted(s.frequency_hz for s in branch.special_points)
+            known = [s for s in whole.special_points if low < s.frequency_hz < high]
+            on_it = [s for s in known if branch.contains(s.orbit)]
+            assert fold in on_it
+            assert met == pytest.approx(sorted(s.frequency_hz for s in on_it), rel=1e-9)
+
+
+def test_a_branch_started_at_a_fold_stays_in_the_range(harmonic_branch):
+    """At its end it has one point if both sides of the fold lie beyond."""
+    folds = [s for s in harmonic_branch.special_points if s.kind == "LP"]
+    assert len(folds) > 2
+    for fold in folds:
+        hz = fold.frequency_hz
+        counts = []
+        for range_hz in ((0.99 * hz, hz), (hz, 1.01 * hz)):
+            branch = continue_branch(fold.orbit, range_hz)
+            met = [node.orbit.frequency_hz for node in branch.nodes]
+            assert min(met) >= range_hz[0] * (1.0 - 1e-14)
+            assert max(met) <= range_hz[1] * (1.0 + 1e-14)
+            counts.append(len(met))
+        assert min(counts) == 1 < max(counts)
+
+
+def test_a_flat_flank_is_no_fold():
+    """Beside the top of a sharp resonance all change is of the amplitude, none of the frequency."""
+    system = System.from_modal(
+        [10.0], {"tip": [1.0]}, modal_damping=2e-6,
+        excitation=[HarmonicForce("tip", 1e-4)], stops=[Stop("tip", 1e7, gap=10.0)],
+    )  # fmt: skip
+    start = solve_orbit(system, 9.99998)
+    for range_hz in ((9.9, 9.99998), (9.99998, 10.1), (9.9, 10.1)):
+        branch = continue_branch(start, range_hz)
+        assert start.frequency_hz in [node.orbit.frequency_hz for node in branch.nodes]
+        assert np.all(np.diff([node.arclength for node in branch.nodes]) > 0.0)
 
 
 def test_flip_that_is_not_found_leaves_no_point_twice(harmonic_branch, monkeypatch):
@@ -328,7 +376,7 @@ def test_both_orbits_close_to_a_fold_are_given(harmonic_branch, index):
 
 
 def test_walk_can_be_stopped_between_two_points_and_taken_up_again(one_dof):
-    start = start_point(solve_orbit(one_dof, 45.0), 1.0)
+    start = start_point(solve_orbit(one_dof, 45.0), 1.0, RANGE_HZ)
     walk = Walk(start, (40.0, 60.0), ContinuationOptions())
     some = list(itertools.islice(walk, 4))
     assert [p.arclength for p in some] == sorted(p.arclength for p in some)

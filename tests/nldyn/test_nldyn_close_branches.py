@@ -382,7 +382,7 @@ def test_neimark_sacker_points_in_a_small_part_of_a_step_are_found(before_hz):
         way = orbit.point - points[-1].orbit.point if points else np.zeros(orbit.point.size)
         length = metric_length(orbit.problem.metric(orbit.point), way)
         arclength = points[-1].arclength + length if points else 0.0
-        points.append(replace(start_point(orbit, -1.0), arclength=arclength))
+        points.append(replace(start_point(orbit, -1.0, (54.0, 55.0)), arclength=arclength))
     z, a, b, c = points
     found = special_points_between(a, b, z, c)
     walked = [s for s in branch.special_points if 54.6851172 < s.frequency_hz < 54.6987555]
