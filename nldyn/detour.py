@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
@@ -32,9 +32,11 @@ DAMPING: Final = "damping"
 EXCITATION: Final = "excitation"
 What = Literal["damping", "excitation"] | Parameter  # changes: all of it, or one number
 MOST = 1e3  # factor
-PROBE, FIRST_STEP, SHORTEST_STEP = 1e-4, 0.25, 1e-5  # in the logarithms of the factors
-LONGER, SHORTER = 1.5, 0.4  # the next step, after one that led on and one that did not
-MISS, FREQUENCY_MISS = 0.3, 0.05  # of an orbit: distance from where it was expected, relative
+PROBE, SHORTEST_STEP = 1e-4, 1e-5  # in the logarithms of the factors
+LONGER, SHORTER = 3.0, 0.4  # the next step, after one that led on and one that did not
+MISS = 0.3  # distance of an orbit from where it was expected, over its way
+FIRST_MISS = 0.01  # the same after the first step, over the orbit
+ROUNDING = 1e-6  # of an orbit, relative
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,8 @@ class Detour:
     def carried_fold(self, fold: Orbit, start: float, end: float) -> Orbit | None:
         """The fold at another place, at a frequency of its own, or None where its way there ends.
 
-        It ends where two folds meet, or beside another one that attracts Newton's method.
+        It ends where two folds meet, or beside another one that attracts Newton's method; seldom
+        that one is taken unseen.
         """
         return self._led(fold, start, end, self._fold_near)
 
@@ -87,27 +90,27 @@ class Detour:
         end: float,
         near: Callable[[Orbit, float, Real], Orbit | None],
     ) -> Orbit | None:
-        """The orbit led from place to place by Newton's method, from the line through the last two.
+        """The orbit led from place to place by Newton's method, from the curve through the last.
 
-        The first step is short and gives the line. An orbit is taken only if it is near where it
-        was expected.
+        The first step is short and gives a line, of which the second is a multiple; then a parabola
+        goes through the last three orbits. One is taken only if it is near where it was expected,
+        beside the way to it.
         """
-        x, step = start, PROBE / self.length
-        here = _unknowns(orbit)
-        slope = np.zeros_like(here)
-        while x != end:
+        step = PROBE / self.length
+        known = [(start, _unknowns(orbit))]
+        while (x := known[-1][0]) != end:
             step = min(step, abs(end - x))
             y = end if step == abs(end - x) else x + math.copysign(step, end - start)
-            guess = here + slope * (y - x)
+            guess = _extrapolated(known[-3:], y)
             found = near(orbit, y, guess)
-            if found is None or _far(there := _unknowns(found), guess):
+            if found is None or _far(there := _unknowns(found), guess, known):
                 step *= SHORTER
                 if step * self.length < SHORTEST_STEP:
                     return None
                 continue
-            slope = (there - here) / (y - x)
-            step = FIRST_STEP / self.length if x == start else LONGER * step
-            orbit, here, x = found, there, y
+            step *= LONGER
+            orbit = found
+            known.append((y, there))
         return orbit
 
     def _near(self, orbit: Orbit, share: float, guess: Real) -> Orbit | None:
@@ -224,11 +227,28 @@ def _scaled(source: Excitation, factor: float) -> Excitation:
     return replace(source, **changed)
 
 
-def _far(unknowns: Real, guess: Real) -> bool:
-    """Whether an orbit is not where it was expected."""
-    off = unknowns - guess
-    far = np.linalg.norm(off[:-1]) > MISS * np.linalg.norm(unknowns[:-1])
-    return bool(far or abs(off[-1]) > FREQUENCY_MISS)
+def _extrapolated(known: Sequence[tuple[float, Real]], place: float) -> Real:
+    """Value at a place of the polynomial through some known ones, by Neville's scheme."""
+    places, values = [x for x, _ in known], [value for _, value in known]
+    for order in range(1, len(known)):
+        for i in range(len(known) - order):
+            a, b = places[i], places[i + order]
+            values[i] = ((b - place) * values[i] + (place - a) * values[i + 1]) / (b - a)
+    return values[0]
+
+
+def _far(unknowns: Real, guess: Real, known: Sequence[tuple[float, Real]]) -> bool:
+    """Whether an orbit is not where it was expected from those known, beside its way."""
+    off = _length(unknowns - guess, unknowns)
+    if len(known) == 1:
+        return off > FIRST_MISS
+    return off > MISS * _length(unknowns - known[-1][1], unknowns) + ROUNDING
+
+
+def _length(way: Real, unknowns: Real) -> float:
+    """Of a way between orbits, relative to one of them."""
+    states = float(np.linalg.norm(way[:-1]) / np.linalg.norm(unknowns[:-1]))
+    return math.hypot(states, float(way[-1]))
 
 
 def _unknowns(orbit: Orbit) -> Real:

@@ -11,6 +11,7 @@ import pytest
 from independent import Motion
 
 from nldyn import (
+    ContinuationOptions,
     Damper,
     Diagram,
     HarmonicForce,
@@ -27,10 +28,15 @@ from nldyn import (
     load_diagram,
     solve_orbit,
 )
+from nldyn.branch import is_at
 from nldyn.checkpoint import Checkpoint
 from nldyn.detour import Detour, _far, checked_factors
 from nldyn.diagrams import Collector
+from nldyn.flow import flow_of
 from nldyn.orbit import Orbit
+from nldyn.paper.jobs import scene_system
+from nldyn.paper.starts import read_starts
+from nldyn.search import orbit_near
 from nldyn.store import save_branches
 
 RANGE_HZ = (7.2, 11.0)
@@ -197,12 +203,33 @@ def test_every_fold_gets_to_a_natural_frequency_a_little_off(three, index, facto
         assert len(set(asked)) == len(asked) >= 2
 
 
-def test_a_fold_whose_way_is_straight_takes_two_steps(three, asked):
-    """The first one gives the line."""
+def test_a_fold_whose_way_is_smooth_takes_steps_each_longer_than_the_one_before(three, asked):
     fold = folds_of(three)[0]
     factors = checked_factors(two_modes(), {"excitation": 1.1})
     assert Detour(fold.problem.flow, factors).carried_fold(fold, 0.0, 1.0) is not None
-    assert len(asked) == 2 and asked[1][0] == 1.0
+    places = [place for place, _ in asked]
+    steps = np.diff([0.0, *places])
+    assert places[-1] == 1.0 and len(places) <= 8
+    assert steps[1:-1] == pytest.approx(3.0 * steps[:-2])
+
+
+@pytest.mark.parametrize(
+    ("start_hz", "fold_hz", "factors"),
+    [(20.4822, 20.566850, {"excitation": 1.1}), (36.2940, 34.850836, {SECOND: 1.007})],
+)
+def test_a_fold_is_not_changed_for_another_one_near_by_on_its_way(start_hz, fold_hz, factors):
+    """Where its way ends beside another one, 0.005 of the orbit away, it is lost instead."""
+    system = scene_system("two_dof_xi_0.001")
+    starts = read_starts("two_dof_xi_0.001")
+    start = min(starts, key=lambda s: abs(s.frequency_hz - start_hz))
+    omega = 2.0 * np.pi * start.frequency_hz
+    orbit = orbit_near(flow_of(system), start.state, 3, omega, "middle")
+    branch = continue_branch(orbit, (18.0, 90.0), options=ContinuationOptions(max_points=250))
+    (fold,) = (s for s in branch.special_points if abs(s.frequency_hz - fold_hz) < 2e-6)
+    detour = Detour(orbit.problem.flow, checked_factors(system, factors))
+    there = detour.carried_fold(fold.orbit, 0.0, 1.0)
+    back = there and detour.carried_fold(there, 1.0, 0.0)
+    assert back is None or is_at(back, fold)
 
 
 def test_folds_of_small_motions_are_carried_as_those_of_large_ones():
@@ -220,13 +247,16 @@ def test_folds_of_small_motions_are_carried_as_those_of_large_ones():
 
 @pytest.mark.parametrize("size", [1.0, 1e-6])
 @pytest.mark.parametrize(
-    ("states", "frequency", "far"),
-    [(0.3, 0.0, False), (0.45, 0.0, True), (0.0, 0.04, False), (0.0, -0.06, True)],
+    ("states", "frequency", "share"), [(0.1, 0.0, 1.0), (0.0, 0.1, 1.0), (3e-3, 4e-3, 0.05)]
 )
-def test_far_is_told_of_states_and_of_frequencies(size, states, frequency, far):
-    guess = np.array([3.0 * size, 4.0 * size, 5.0])
-    off = np.array([0.0, 5.0 * size * states, frequency])
-    assert _far(guess + off, guess) == far
+def test_far_is_told_of_states_and_of_frequencies(size, states, frequency, share):
+    """What was missed, over the way, and for the first step over the orbit."""
+    there = np.array([3.0 * size, 4.0 * size, 5.0])
+    way = np.array([3.0 * size * states, 4.0 * size * states, frequency])
+    before = [(0.0, there - 2.0 * way), (0.5, there - way)]
+    for miss, far in ((0.25, False), (0.35, True)):
+        assert _far(there, there - miss * way, before) == far
+    assert _far(there, there - 0.25 * way, before[:1]) == (share == 1.0)
 
 
 def test_an_orbit_far_from_where_it_was_expected_is_not_taken(harmonic):
