@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import secrets
+from contextlib import suppress
 from pathlib import Path
 
 from nldyn.errors import shown
-from nldyn.result_directory import OutputError, in_use, is_writable
+from nldyn.result_directory import OutputError, clear_leftovers, in_use, is_writable
 
 
 def check_writable(path: str | Path) -> Path:
@@ -30,23 +31,29 @@ def check_writable(path: str | Path) -> Path:
             raise OutputError(f"{path}: there is no such folder")
         if not is_writable(target.parent):
             raise OutputError(f"{path}: the folder is read-only")
-    except (TypeError, ValueError) as error:
+        with suppress(FileNotFoundError):
+            os.lstat(_draft(target))  # its name may be too long
+    except (TypeError, ValueError, OSError) as error:
         if isinstance(error, OutputError):
             raise
-        raise OutputError(f"{shown(path)} cannot be the name of a file: {error}") from None
+        fault = (error.strerror or "").lower() if isinstance(error, OSError) else error
+        raise OutputError(f"{shown(path)} cannot be the name of a file: {fault}") from None
     return target
 
 
 def write_whole(path: str | Path, content: bytes) -> None:
     """Write a file beside its place, then put it there; on an error the place is as it was.
 
+    A link stays one. What killed runs have left of the same name is removed.
+
     Raises
     ------
     OutputError
         If the system refuses.
     """
-    target = check_writable(path)
-    draft = target.with_name(f".{target.name}.{secrets.token_hex(4)}.new")
+    target = check_writable(path).resolve()
+    clear_leftovers(target)
+    draft = _draft(target)
     try:
         with draft.open("wb") as file, in_use(draft):
             file.write(content)
@@ -57,4 +64,10 @@ def write_whole(path: str | Path, content: bytes) -> None:
         fault = (error.strerror or str(error)).lower()
         raise OutputError(f"{path}: cannot be written: {fault}") from error
     finally:
-        draft.unlink(missing_ok=True)
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
+
+
+def _draft(target: Path) -> Path:
+    """Where a file is written before it is put in its place."""
+    return target.with_name(f".{target.name}.{secrets.token_hex(4)}.new")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import pickle
 import shutil
 import sys
@@ -14,9 +13,12 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from nldyn.resources import PACKAGE
+from nldyn.result_directory import OutputError
+from nldyn.whole_file import write_whole
 
 Value = TypeVar("Value")
 ENDING = ".unfinished"
+DIGEST_SIZE = hashlib.sha256().digest_size
 BESIDE = ("cms", "fem", "meshes", "docs/examples")  # what results depend on, beside the package
 
 
@@ -48,22 +50,20 @@ def kept(path: Path, function: Callable[..., Value], *arguments: object) -> Valu
 
 
 def read_kept(path: Path) -> Any:
-    """What a file keeps; None if there is none, or it cannot be read."""
-    with suppress(OSError, EOFError, pickle.UnpicklingError), path.open("rb") as file:
-        return pickle.load(file)
-    return None
+    """What a file keeps; None if there is none, or it is not as it was written."""
+    try:
+        written = path.read_bytes()
+    except OSError:
+        return None
+    digest, content = written[:DIGEST_SIZE], written[DIGEST_SIZE:]
+    return pickle.loads(content) if digest == hashlib.sha256(content).digest() else None
 
 
 def keep(path: Path, value: object) -> None:
     """Keep a value in a file, whole or not at all; not where it cannot be written."""
-    draft = path.with_suffix(f".{os.getpid()}.new")
-    with suppress(OSError):
-        try:
-            with draft.open("wb") as file:
-                pickle.dump(value, file, pickle.HIGHEST_PROTOCOL)
-            draft.replace(path)
-        finally:
-            draft.unlink(missing_ok=True)
+    content = pickle.dumps(value, pickle.HIGHEST_PROTOCOL)
+    with suppress(OutputError):
+        write_whole(path, hashlib.sha256(content).digest() + content)
 
 
 def has_values(folder: Path) -> bool:

@@ -31,6 +31,7 @@ from nldyn import (
     store,
 )
 from nldyn.result_directory import OutputError
+from nldyn.whole_file import check_writable
 
 
 def two_modes():
@@ -388,6 +389,26 @@ def test_what_is_not_a_name_of_a_file_is_refused(branch):
     for name in (3, "a\0b"):
         with pytest.raises(OutputError, match="cannot be the name of a file"):
             branch.save(name)
+
+
+@pytest.mark.parametrize("length", [245, 255, 300])
+def test_a_name_that_is_too_long_is_refused_before_any_work(branch, tmp_path, length):
+    """Also one that is itself short enough, but not with what is added while it is written."""
+    place = tmp_path / ("b" * (length - 3) + ".h5")
+    for write in (branch.save, check_writable):
+        with pytest.raises(OutputError, match="cannot be the name of a file: file name too long"):
+            write(place)
+
+
+def test_writing_follows_a_link_and_removes_what_a_killed_run_has_left(branch, tmp_path):
+    (there := tmp_path / "there").mkdir()
+    link, place = tmp_path / "link.h5", there / "branch.h5"
+    link.symlink_to(place)
+    (there / ".branch.h5.0123abcd.new").write_bytes(b"left")
+    for _ in range(2):
+        branch.save(link)
+        assert link.is_symlink() and [entry.name for entry in there.iterdir()] == ["branch.h5"]
+        assert_same_branches(load_branch(link), branch)
 
 
 def test_an_empty_list_of_branches_comes_back_empty(tmp_path):

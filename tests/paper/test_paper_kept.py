@@ -27,6 +27,17 @@ def test_a_damaged_file_and_a_folder_that_is_gone_do_no_harm(tmp_path):
     assert kept(tmp_path / "gone" / "value.pickle", abs, -5) == 5
 
 
+def test_no_damage_to_a_file_gives_another_value(tmp_path):
+    path = tmp_path / "value.pickle"
+    keep(path, [1.5, "text", bytes(20)])
+    written = path.read_bytes()
+    for place in range(len(written)):
+        path.write_bytes(written[:place])
+        assert read_kept(path) is None
+        path.write_bytes(written[:place] + bytes([written[place] ^ 4]) + written[place + 1 :])
+        assert read_kept(path) is None
+
+
 def test_a_value_that_cannot_be_kept_leaves_what_was_kept_before(tmp_path):
     class Unwritable:
         def __reduce__(self):
