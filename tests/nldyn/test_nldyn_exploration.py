@@ -586,6 +586,24 @@ def test_orbits_beside_the_ends_of_a_doubled_branch_are_known():
     assert len(box.branches) == 2
 
 
+def test_branches_taken_back_leave_a_search_as_it_was():
+    """Where they were broken off, meet flips and cross is known as in the run that found them."""
+    orbit = solve_orbit(between_stops(), 11.0)
+    options = ContinuationOptions(max_points=32)
+    first, again = (
+        Collector(orbit.problem.flow, (11.0, 11.8), "m", options, lambda *at: None)
+        for _ in range(2)
+    )
+    first.follow(orbit, 2, 2, None)
+    again.take_back(first.branches, first.notes)
+    assert again.branches == first.branches and again.notes == first.notes
+    assert again.flip_ends == first.flip_ends != []
+    assert again.crossings == first.crossings != []
+    assert again.open_ends.keys() == first.open_ends.keys() != set()
+    for like, rows in first.open_ends.items():
+        np.testing.assert_array_equal(again.open_ends[like].so_far(), rows.so_far())
+
+
 def test_mirror_image_of_a_branch_of_a_symmetric_system_is_followed_too():
     """A closed 1/3 branch between two equal stops, which is not symmetric itself."""
     orbit = solve_orbit(between_stops(), 11.26, 3, guess=[7.9058e-06, 9.9213e-05])

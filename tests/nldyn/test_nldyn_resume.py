@@ -290,6 +290,17 @@ def test_checkpoints_are_not_written_more_often_than_a_share_of_the_time(monkeyp
     assert len(written) >= 4
 
 
+def test_a_continuation_begun_at_a_fold_goes_on(whole, tmp_path, often):
+    fold = next(s for s in whole.special_points if s.kind == "LP")
+    range_hz = (0.95 * fold.frequency_hz, 1.05 * fold.frequency_hz)
+    path = tmp_path / "branch.h5"
+    with pytest.raises(RuntimeError):
+        continue_branch(fold.orbit, range_hz, progress=stopper(5), checkpoint=path)
+    assert len(load_branch(path).nodes) >= 5
+    resumed = continue_branch(fold.orbit, range_hz, checkpoint=path)
+    assert_same_branches(resumed, continue_branch(fold.orbit, range_hz))
+
+
 # --- diagrams ------------------------------------------------------------------------------------
 
 
