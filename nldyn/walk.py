@@ -186,7 +186,7 @@ class Walk:
         self, problem: ShootingProblem, behind: Real, here: BranchPoint, step: float
     ) -> tuple[float, BranchPoint, float, float] | None:
         """The longest step up to `step` that leads to a next point, with what `_advance` gives."""
-        passed = False
+        tried = False
         while step >= self.options.min_step:
             attempt = self._advance(problem, behind, here, step)
             if attempt is None and step <= KINK:
@@ -197,8 +197,8 @@ class Walk:
             if attempt is not None:
                 return step, *attempt
             step *= 0.5
-            if not passed and self.options.min_step <= step < SHORTEST_CROSSING:
-                passed, attempt = True, self._past_crossing(here)
+            if not tried and self.options.min_step <= step < SHORTEST_CROSSING:
+                tried, attempt = True, self._past_crossing(here)
                 if attempt is not None:
                     return attempt[0].arclength - here.arclength, *attempt
         return None
