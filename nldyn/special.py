@@ -142,7 +142,11 @@ class Chord:
         offset = float(row @ (a.orbit.point + sigma * self._secant))
         guess = self.between(sigma)
         found = problem.correct(guess, row, offset=offset)
-        if found.converged and self._is_beside(found.point - guess):
+        beside = found.converged and self._is_beside(found.point - guess)
+        crossing = None if beside else self._where_branches_cross(guess, offset)
+        if crossing is not None:
+            orbit, tangent = crossing, self.direction(sigma)
+        elif found.converged:
             orbit = Orbit.of(problem, found, a.orbit.observe)
             tangent = problem.tangent(found, self._secant)
             if float(row @ tangent) * float(row @ self._secant) < 0.0:
@@ -150,11 +154,7 @@ class Chord:
             if self._across(tangent):
                 raise LocateError("the branch turns within one step")
         else:
-            crossing = correct_across(problem, guess, row, offset)
-            if crossing is None or crossing[2] > CROSSING_ERROR:
-                raise LocateError(found.failure or "Newton's method went to another branch")
-            orbit = Orbit(problem, *crossing, a.orbit.observe)
-            tangent = self.direction(sigma)
+            raise LocateError(found.failure)
         length = a.arclength + sigma * (self.last.arclength - a.arclength)
         point = BranchPoint(orbit, tangent, length)
         if crosses(self.first, point) and crosses(self.last, point):
@@ -202,6 +202,14 @@ class Chord:
     def _unit(self, vector: Real) -> Real:
         weights = self.first.orbit.problem.metric(self.first.orbit.point)
         return np.asarray(vector / metric_length(weights, vector))
+
+    def _where_branches_cross(self, guess: Real, offset: float) -> Orbit | None:
+        """The orbit of this branch beside a guess, if another branch crosses it there."""
+        problem = self.first.orbit.problem
+        crossing = correct_across(problem, guess, self._row, offset)
+        if crossing is None or crossing[2] > CROSSING_ERROR:
+            return None
+        return Orbit(problem, *crossing, self.first.orbit.observe)
 
     def _is_beside(self, way: Real) -> bool:
         """Whether a way from the chord is no longer than the chord, or than that of a crossing."""
