@@ -33,7 +33,7 @@ from nldyn.walk import shifts
 
 FROM_FOLD = 1e-4  # arclength from a fold to the point at which a branch through it begins
 MIDDLE = 0.1  # of that, within which it lies
-FLAT = 1e-3  # frequency part of a tangent, rounding beside flips included, that may be a fold's
+NEARLY_FLAT = 1e-3  # frequency part of a tangent that may be a fold's; rounding beside flips
 MET_AGAIN = 1e-6  # longest Newton step by which a solved orbit is met again across its branch
 
 
@@ -211,7 +211,7 @@ def _beside_fold(here: BranchPoint, direction: float) -> BranchPoint | None:
 
     None if no fold is here: the branch turns in the middle between the points on both sides.
     """
-    if abs(float(here.tangent[-1])) > FLAT:
+    if abs(float(here.tangent[-1])) > NEARLY_FLAT:
         return None
     problem, place = here.orbit.problem, here.orbit.point
     across = problem.metric(place) * here.tangent

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from nldyn.linear import Real
 from nldyn.orbit import Orbit
-from nldyn.shooting import ShootingProblem, metric_length
+from nldyn.shooting import ShootingProblem
 
 LARGEST_STEP = 0.1  # in ξ, of the differences
 SMALLEST_STEP = 1e-7
@@ -512,14 +512,11 @@ class Crossing:
     def roots(self) -> tuple[tuple[float, float], ...]:
         """Both (α, β) with aa α² + 2 ab αβ + bb β² = 0, lengths 1; none if they are not real."""
         aa, ab, bb = (number.value for number in self.quadratic)
-        if self.is_pitchfork:
-            pairs = [(1.0, 0.0), (-0.5 * bb, ab)]
-        else:
-            inner = ab * ab - aa * bb
-            if inner <= 0.0:
-                return ()
-            far = -(ab + math.copysign(math.sqrt(inner), ab))
-            pairs = [(far, aa), (bb, far)]
+        inner = ab * ab - aa * bb
+        if inner <= 0.0:
+            return ()
+        far = -(ab + math.copysign(math.sqrt(inner), ab))
+        pairs = ((far, aa), (bb, far))
         return tuple((a / math.hypot(a, b), b / math.hypot(a, b)) for a, b in pairs)
 
 
@@ -563,19 +560,3 @@ def crossing(loop: Loop) -> Crossing:
         estimated(twice_v, along_v),
     )
     return Crossing(q, v, quadratic, estimated(cubic, along_q))
-
-
-def crossing_tangents(orbit: Orbit) -> list[Real]:
-    """Unit tangents (N + 1,) of the branches that cross at an orbit, from the branching equation.
-
-    Raises
-    ------
-    CoefficientError
-        If the coefficients of the equation cannot be found, or it has no real solution.
-    """
-    found = crossing(loop_of(orbit))
-    if not found.roots:
-        raise CoefficientError("the branching equation has no real solution")
-    ways = [np.append((a * found.q + b * found.v).ravel(), b) for a, b in found.roots]
-    weights = orbit.problem.metric(orbit.point)
-    return [way / metric_length(weights, way) for way in ways]

@@ -35,7 +35,7 @@ MOST = 1e3  # factor
 PROBE, SHORTEST_STEP = 1e-4, 1e-5  # in the logarithms of the factors
 LONGER, SHORTER = 3.0, 0.4  # the next step, after one that led on and one that did not
 MISS = 0.3  # distance of an orbit from where it was expected, over its way
-FIRST_MISS = 0.01  # the same after the first step, over the orbit
+FIRST_MISS = 3e-3  # the same after the first step, over the orbit
 ROUNDING = 1e-6  # of an orbit, relative
 
 

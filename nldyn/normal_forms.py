@@ -19,7 +19,6 @@ from nldyn.critical import (
     Estimate,
     Loop,
     crossing,
-    crossing_tangents,
     doubled_parameter,
     flip,
     fold,
@@ -29,7 +28,7 @@ from nldyn.critical import (
 from nldyn.errors import SystemModelError, check_positive, check_types
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit
-from nldyn.shooting import asymmetry
+from nldyn.shooting import asymmetry, metric_length
 from nldyn.special import LocateError
 
 CLOSE = 1e-3  # relative distance in frequency of a special point that counts as close
@@ -362,8 +361,16 @@ def other_tangent(special: SpecialPoint) -> Real:
     Of the two solutions of the branching equation it is the one further from the direction of the
     branch on which the point was found.
     """
-    along = special.orbit.problem.metric(special.orbit.point) * special.point.tangent
-    return min(crossing_tangents(special.orbit), key=lambda tangent: abs(float(tangent @ along)))
+    found = crossing(loop_of(special.orbit))
+    if not found.roots:
+        raise CoefficientError("the branching equation has no real solution")
+    weights = special.orbit.problem.metric(special.orbit.point)
+    tangents = []
+    for alpha, beta in found.roots:
+        tangent = np.append((alpha * found.q + beta * found.v).ravel(), beta)
+        tangents.append(tangent / metric_length(weights, tangent))
+    along = [abs(float(special.point.tangent @ (weights * t))) for t in tangents]
+    return np.asarray(tangents[int(np.argmin(along))])
 
 
 def _step_off(special: SpecialPoint, direction: Real, amplitude: float) -> BranchPoint:

@@ -128,7 +128,8 @@ class Chord:
         LocateError
             If Newton's method fails there, or finds an orbit at which the branch runs across the
             chord: then it turns between the two points, and a tangent that is taken along the chord
-            would change its sign without passing a fold. Or if it finds one of another branch.
+            would change its sign without passing a fold. Or if it finds one of another branch that
+            crosses this one, as far as the signs of the tests tell.
         """
         if sigma <= 0.0:
             return self.first

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from nldyn.branch import CLOSED, JOINS, NOT_FINISHED, POINTS, RANGE_END, SHORT_STEP, BranchPoint
 from nldyn.conditions import TOUCH, depth_row
-from nldyn.critical import CoefficientError, crossing_tangents
 from nldyn.doubling import flip_between, half_difference, passed_flip
 from nldyn.errors import check_types
 from nldyn.linear import Real
@@ -34,6 +33,7 @@ BROKEN = 1e-8  # asymmetry of an orbit that is more than rounding
 EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
 MEETING_STEP = 1e-4  # longest step over which a doubled branch may meet the one it comes from
 LONGER_CROSSINGS = (1.0, 10.0, 100.0)  # times that, where no shorter step succeeds
+FARTHEST_CROSSING = 1e-4  # distance of one from which a step may begin
 LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
 RECENT = 10  # points behind a walk that it does not come back to
 SAME_PLACE = 1e-8  # distance of points that are one, relative to the orbit
@@ -305,17 +305,16 @@ class Walk:
     def _past_crossing(self, here: BranchPoint) -> tuple[BranchPoint, float, float] | None:
         """Next point from one beside which branches cross, or None.
 
-        Its place and tangent are some mixture of theirs, and the next orbits may be so ill
-        conditioned that Newton's method does not find them: the tangent at the crossing tells
-        where longer steps lead.
+        Its place is some mixture of theirs, and the next orbits may be so ill conditioned that
+        Newton's method does not find them: longer steps lead on from the crossing itself.
         """
         crossing = _crossing_ahead(here)
         if crossing is None:
             return None
         problem, obstacle = here.orbit.problem, self._obstacle
-        behind = max(here.arclength - crossing.arclength, 0.0)
+        back = max(here.arclength - crossing.arclength, 0.0)
         for factor in LONGER_CROSSINGS:
-            length = behind + factor * SHORTEST_CROSSING
+            length = back + factor * SHORTEST_CROSSING
             none = np.empty((0, crossing.tangent.size))
             attempt = self._advance(problem, none, crossing, length, length)
             if attempt is not None:
@@ -393,23 +392,19 @@ class Walk:
 
 
 def _crossing_ahead(here: BranchPoint) -> BranchPoint | None:
-    """Where another branch crosses that of a point beside there, in the direction of its tangent.
+    """Where another branch crosses that of a point right beside there, on its tangent.
 
     It may lie a little behind.
     """
     crossing = crossing_beside(here.orbit)
     if crossing is None:
         return None
+    way = crossing.point - here.orbit.point
     weights = here.orbit.problem.metric(here.orbit.point)
-    along = weights * here.tangent
-    try:
-        tangents = crossing_tangents(crossing)
-    except CoefficientError:
+    if metric_length(weights, way) > FARTHEST_CROSSING:
         return None
-    way = max(tangents, key=lambda tangent: abs(float(tangent @ along)))
-    way = way if float(way @ along) > 0.0 else -way
-    ahead = float((crossing.point - here.orbit.point) @ (weights * way))
-    return BranchPoint(crossing, way, here.arclength + ahead)
+    ahead = float(way @ (weights * here.tangent)) / metric_length(weights, here.tangent)
+    return BranchPoint(crossing, here.tangent, here.arclength + ahead)
 
 
 def shifts(problem: ShootingProblem, point: Real) -> list[Real]:

@@ -8,11 +8,11 @@ from contextlib import suppress
 from pathlib import Path
 
 from nldyn.errors import shown
-from nldyn.result_directory import OutputError, clear_leftovers, in_use, is_writable
+from nldyn.result_directory import OutputError, in_use, is_writable
 
 
 def check_writable(path: str | Path) -> Path:
-    """A path at which a file may be written, or an OutputError, before the work.
+    """Where a file is written, at the end of all links, or an OutputError, before the work.
 
     Examples
     --------
@@ -22,9 +22,9 @@ def check_writable(path: str | Path) -> Path:
     nldyn.result_directory.OutputError: /no/such/folder/branch.h5: there is no such folder
     """
     try:
-        target = Path(path)
-        if "\0" in str(target):
+        if "\0" in str(path):
             raise ValueError("it has a null character")
+        target = Path(path).resolve()
         if target.is_dir():
             raise OutputError(f"{path}: is a folder, not a file")
         if not target.parent.is_dir():
@@ -33,7 +33,7 @@ def check_writable(path: str | Path) -> Path:
             raise OutputError(f"{path}: the folder is read-only")
         with suppress(FileNotFoundError):
             os.lstat(_draft(target))  # its name may be too long
-    except (TypeError, ValueError, OSError) as error:
+    except (TypeError, ValueError, OSError, RuntimeError) as error:
         if isinstance(error, OutputError):
             raise
         fault = (error.strerror or "").lower() if isinstance(error, OSError) else error
@@ -44,15 +44,14 @@ def check_writable(path: str | Path) -> Path:
 def write_whole(path: str | Path, content: bytes) -> None:
     """Write a file beside its place, then put it there; on an error the place is as it was.
 
-    A link stays one. What killed runs have left of the same name is removed.
+    A link stays one.
 
     Raises
     ------
     OutputError
         If the system refuses.
     """
-    target = check_writable(path).resolve()
-    clear_leftovers(target)
+    target = check_writable(path)
     draft = _draft(target)
     try:
         with draft.open("wb") as file, in_use(draft):

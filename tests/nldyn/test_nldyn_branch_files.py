@@ -400,15 +400,27 @@ def test_a_name_that_is_too_long_is_refused_before_any_work(branch, tmp_path, le
             write(place)
 
 
-def test_writing_follows_a_link_and_removes_what_a_killed_run_has_left(branch, tmp_path):
+def test_writing_follows_a_link(branch, tmp_path):
     (there := tmp_path / "there").mkdir()
     link, place = tmp_path / "link.h5", there / "branch.h5"
     link.symlink_to(place)
-    (there / ".branch.h5.0123abcd.new").write_bytes(b"left")
     for _ in range(2):
         branch.save(link)
         assert link.is_symlink() and [entry.name for entry in there.iterdir()] == ["branch.h5"]
         assert_same_branches(load_branch(link), branch)
+
+
+def test_a_link_to_where_nothing_can_be_written_is_refused_before_any_work(tmp_path):
+    link = tmp_path / "link.h5"
+    for place, fault in (
+        (tmp_path / "none" / "b.h5", "there is no such folder"),
+        (tmp_path / ("b" * 250), "file name too long"),
+        (link, "cannot be the name of a file: .*loop"),
+    ):
+        link.unlink(missing_ok=True)
+        link.symlink_to(place)
+        with pytest.raises(OutputError, match=fault):
+            check_writable(link)
 
 
 def test_an_empty_list_of_branches_comes_back_empty(tmp_path):

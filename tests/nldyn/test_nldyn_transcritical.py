@@ -9,6 +9,7 @@ branch goes through from y > 0 to y < 0.
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -28,15 +29,20 @@ from nldyn import (
     solve_orbit,
     switch_at_branch_point,
 )
+from nldyn.normal_forms import other_tangent
+from nldyn.orbit import Orbit
 
 FORCE, DAMPING_X, DAMPING_Y = 9.0, 0.1, 0.02
 OWN_X, OWN_Y, PRELOAD = 20.0, 1.0, 1.0
 SPRING_X, SPRING_Y = OWN_X + 8.0, OWN_Y + 4.0 + 2.0 + 3.0
 
 
-def system() -> System:
-    quadratic = [Stop(at, 1.0, 2.0, gap=-PRELOAD) for at in ("x + y", "x - y", "y")]
-    others = [Stop("x", 2.0, 2.0, -PRELOAD, -1), Stop("y", 1.0, 3.0, -PRELOAD, -1)]
+def system(preload_y: float = PRELOAD) -> System:
+    """Its branches cross at the smaller an angle the less the two stops at y are preloaded."""
+    p = preload_y
+    quadratic = [Stop(at, 1.0, 2.0, gap=-PRELOAD) for at in ("x + y", "x - y")]
+    quadratic.append(Stop("y", 1.0 / p, 2.0, gap=-p))
+    others = [Stop("x", 2.0, 2.0, -PRELOAD, -1), Stop("y", 1.0 / p**2, 3.0, -p, -1)]
     return System.from_matrices(
         np.eye(2), np.diag([OWN_X, OWN_Y]),
         {"x": [1.0, 0.0], "y": [0.0, 1.0], "x + y": [1.0, 1.0], "x - y": [1.0, -1.0]},
@@ -53,12 +59,18 @@ def multipliers_of_y(hz, force=FORCE):
 
 @pytest.fixture(scope="module")
 def branch():
+    return branch_without_y()
+
+
+@cache
+def branch_without_y(preload_y=PRELOAD):
     hz = 0.45
     omega = 2.0 * math.pi * hz
     response = FORCE / (SPRING_X - omega**2 + 1j * DAMPING_X * omega)
     shape = system().participation["x"]
     start = np.outer([response.real, (1j * omega * response).real], shape).ravel()
-    return continue_branch(solve_orbit(system(), hz, guess=start, observe="y"), (hz, 0.56))
+    orbit = solve_orbit(system(preload_y), hz, guess=start, observe="y")
+    return continue_branch(orbit, (hz, 0.56))
 
 
 def test_branch_points_are_where_a_multiplier_of_mathieus_equation_is_one(branch):
@@ -99,3 +111,24 @@ def test_transcritical_points_are_followed_where_y_can_stay_zero(branch):
     gap = Parameter("gap", 2)
     with pytest.raises(SystemModelError, match="dissolves when frequency_hz or gap changes"):
         continue_special(special, ("frequency_hz", gap), ((0.4, 0.6), (-1.1, -0.9)))
+
+
+@pytest.mark.parametrize("preload_y", [1.0, 1e-3])
+@pytest.mark.parametrize("beside", [-3e-5, -3e-6, -5e-7, 5e-7, 2e-6, 1e-4])
+def test_a_walk_begun_beside_the_point_stays_on_its_branch_and_finds_it(preload_y, beside):
+    """Also where the other branch crosses at an angle of 0.08."""
+    special = branch_without_y(preload_y).special_points[0]
+    problem, place = special.orbit.problem, special.orbit.point
+    tangents = special.point.tangent, other_tangent(special)
+    window = 0.998 * special.frequency_hz, 1.002 * special.frequency_hz
+    for tangent, has_y in zip(tangents, (False, True), strict=True):
+        across = problem.metric(place) * tangent
+        found = problem.correct(place + beside * tangent, across / np.linalg.norm(across))
+        walked = continue_branch(Orbit.of(problem, found, "y"), window)
+        assert walked.stop_reasons == ("end of the frequency range",) * 2
+        assert [s.kind for s in walked.special_points] == ["BP"]
+        assert walked.special_points[0].frequency_hz == pytest.approx(
+            special.frequency_hz, rel=1e-9
+        )
+        ends = [walked.points[i].max_abs_displacement for i in (0, -1)]
+        assert (min(ends) > 1e-6) == has_y == (max(ends) > 1e-9)
