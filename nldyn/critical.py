@@ -510,7 +510,7 @@ class Crossing:
 
     @property
     def roots(self) -> tuple[tuple[float, float], ...]:
-        """Both (α, β) with aa α² + 2 ab αβ + bb β² = 0, lengths 1; none if they are not real."""
+        """Both (α, β) with aa α² + 2 ab αβ + bb β² = 0, lengths 1, or none if they are not real."""
         aa, ab, bb = (number.value for number in self.quadratic)
         inner = ab * ab - aa * bb
         if inner <= 0.0:
