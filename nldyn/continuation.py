@@ -33,7 +33,7 @@ from nldyn.walk import shifts
 
 FROM_FOLD = 1e-4  # arclength from a fold to the point at which a branch through it begins
 MIDDLE = 0.1  # of that, within which it lies
-NEARLY_FLAT = 1e-3  # frequency part of a tangent that may be a fold's; rounding beside flips
+NEARLY_FLAT = 1e-3  # frequency part of a tangent, up to which it may be that of a fold
 MET_AGAIN = 1e-6  # longest Newton step by which a solved orbit is met again across its branch
 
 

@@ -32,7 +32,7 @@ MEETS_OPEN_END = "meets another branch where that was broken off"
 BROKEN = 1e-8  # asymmetry of an orbit that is more than rounding
 EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
 MEETING_STEP = 1e-4  # longest step over which a doubled branch may meet the one it comes from
-LONGER_CROSSINGS = (1.0, 10.0, 100.0)  # times that, where no shorter step succeeds
+LONGER_CROSSINGS = (1.0, 10.0, 100.0)  # steps from a crossing, over `SHORTEST_CROSSING`
 FARTHEST_CROSSING = 1e-4  # distance of one from which a step may begin
 LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
 RECENT = 10  # points behind a walk that it does not come back to
@@ -313,9 +313,9 @@ class Walk:
             return None
         problem, obstacle = here.orbit.problem, self._obstacle
         back = max(here.arclength - crossing.arclength, 0.0)
+        none = np.empty((0, crossing.tangent.size))
         for factor in LONGER_CROSSINGS:
             length = back + factor * SHORTEST_CROSSING
-            none = np.empty((0, crossing.tangent.size))
             attempt = self._advance(problem, none, crossing, length, length)
             if attempt is not None:
                 return attempt

@@ -33,9 +33,9 @@ def check_writable(path: str | Path) -> Path:
             raise OutputError(f"{path}: the folder is read-only")
         with suppress(FileNotFoundError):
             os.lstat(_draft(target))  # its name may be too long
+    except OutputError:
+        raise
     except (TypeError, ValueError, OSError, RuntimeError) as error:
-        if isinstance(error, OutputError):
-            raise
         fault = (error.strerror or "").lower() if isinstance(error, OSError) else error
         raise OutputError(f"{shown(path)} cannot be the name of a file: {fault}") from None
     return target

@@ -247,16 +247,16 @@ def test_folds_of_small_motions_are_carried_as_those_of_large_ones():
 
 @pytest.mark.parametrize("size", [1.0, 1e-6])
 @pytest.mark.parametrize(
-    ("states", "frequency", "share"), [(0.1, 0.0, 1.0), (0.0, 0.1, 1.0), (3e-3, 4e-3, 0.05)]
+    ("states", "frequency", "first_far"), [(0.1, 0.0, True), (0.0, 0.1, True), (3e-3, 4e-3, False)]
 )
-def test_far_is_told_of_states_and_of_frequencies(size, states, frequency, share):
+def test_far_is_told_of_states_and_of_frequencies(size, states, frequency, first_far):
     """What was missed, over the way, and for the first step over the orbit."""
     there = np.array([3.0 * size, 4.0 * size, 5.0])
     way = np.array([3.0 * size * states, 4.0 * size * states, frequency])
     before = [(0.0, there - 2.0 * way), (0.5, there - way)]
     for miss, far in ((0.25, False), (0.35, True)):
         assert _far(there, there - miss * way, before) == far
-    assert _far(there, there - 0.25 * way, before[:1]) == (share == 1.0)
+    assert _far(there, there - 0.25 * way, before[:1]) == first_far
 
 
 def test_an_orbit_far_from_where_it_was_expected_is_not_taken(harmonic):
