@@ -23,7 +23,7 @@ from nldyn.shooting import ShootingProblem
 
 LARGEST_STEP = 0.1  # in ξ, of the differences
 SMALLEST_STEP = 1e-7
-LOCATED = 1e-4  # of an orbit's size: branch points are located no better where branches turn
+LOCATED = 1e-7  # of an orbit's size: branch points lie no further from where they are said to be
 NEAR_CROSSING = 5e-3  # of an orbit's size: a turn within it may be a crossing
 RATIO = 1.6  # of successive steps
 STEPS = 8

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 import numpy as np
+from scipy.interpolate import krogh_interpolate
 
 from nldyn.bordered import OrbitFamily, correct
 from nldyn.conditions import Singular
@@ -101,7 +102,8 @@ class Detour:
         while (x := known[-1][0]) != end:
             step = min(step, abs(end - x))
             y = end if step == abs(end - x) else x + math.copysign(step, end - start)
-            guess = _extrapolated(known[-3:], y)
+            places, values = zip(*known[-3:], strict=True)
+            guess = krogh_interpolate(places, values, y)
             found = near(orbit, y, guess)
             if found is None or _far(there := _unknowns(found), guess, known):
                 step *= SHORTER
@@ -225,16 +227,6 @@ def _scaled(source: Excitation, factor: float) -> Excitation:
     """A source of excitation, times a factor."""
     changed: dict[str, Any] = {size_of(source): factor * strength(source)}
     return replace(source, **changed)
-
-
-def _extrapolated(known: Sequence[tuple[float, Real]], place: float) -> Real:
-    """Value at a place of the polynomial through some known ones, by Neville's scheme."""
-    places, values = [x for x, _ in known], [value for _, value in known]
-    for order in range(1, len(known)):
-        for i in range(len(known) - order):
-            a, b = places[i], places[i + order]
-            values[i] = ((b - place) * values[i] + (place - a) * values[i + 1]) / (b - a)
-    return values[0]
 
 
 def _far(unknowns: Real, guess: Real, known: Sequence[tuple[float, Real]]) -> bool:

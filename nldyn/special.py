@@ -109,10 +109,18 @@ class Chord:
         return self.last.orbit.point - self.first.orbit.point
 
     @cached_property
+    def _weights(self) -> Real:
+        return self.first.orbit.problem.metric(self.first.orbit.point)
+
+    @cached_property
+    def _length(self) -> float:
+        return metric_length(self._weights, self._secant)
+
+    @cached_property
     def _row(self) -> Real:
         """Along the secant, or the slope of a touch's depth if that rises or falls all the way."""
         a = self.first.orbit
-        row = a.problem.metric(a.point) * self._secant
+        row = self._weights * self._secant
         if abs(self.last.arclength - self.first.arclength) < TOUCH:
             depth = depth_row(a)
             ways = self._secant, self.first.tangent, self.last.tangent
@@ -201,8 +209,7 @@ class Chord:
         return self._unit(towards)
 
     def _unit(self, vector: Real) -> Real:
-        weights = self.first.orbit.problem.metric(self.first.orbit.point)
-        return np.asarray(vector / metric_length(weights, vector))
+        return np.asarray(vector / metric_length(self._weights, vector))
 
     def _where_branches_cross(self, guess: Real, offset: float) -> Orbit | None:
         """The orbit of this branch beside a guess, if another branch crosses it there."""
@@ -214,19 +221,13 @@ class Chord:
 
     def _is_beside(self, way: Real) -> bool:
         """Whether a way from the chord is no longer than the chord, or than that of a crossing."""
-        weights = self.first.orbit.problem.metric(self.first.orbit.point)
-        length = metric_length(weights, self._secant)
-        return metric_length(weights, way) <= max(length, SHORTEST_CROSSING)
+        return metric_length(self._weights, way) <= max(self._length, SHORTEST_CROSSING)
 
     def _across(self, tangent: Real) -> bool:
         """Whether a tangent departs from the chord by more than a branch may within a step."""
-        weights = self.first.orbit.problem.metric(self.first.orbit.point)
-        length, along, pace = (
-            metric_length(weights, self._secant),
-            float(self._secant @ (weights * tangent)),
-            metric_length(weights, tangent),
-        )
-        return length > BEND and along < STEEPEST * length * pace
+        along = float(self._secant @ (self._weights * tangent))
+        pace = metric_length(self._weights, tangent)
+        return self._length > BEND and along < STEEPEST * self._length * pace
 
     def frequency_slope(self, point: BranchPoint) -> float:
         """Derivative of ln ω with respect to σ."""

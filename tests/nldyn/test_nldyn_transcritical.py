@@ -73,8 +73,9 @@ def branch_without_y(preload_y=PRELOAD):
     return continue_branch(orbit, (hz, 0.56))
 
 
-def test_branch_points_are_where_a_multiplier_of_mathieus_equation_is_one(branch):
-    points = branch.special_points
+@pytest.mark.parametrize("preload_y", [1.0, 1e-3])
+def test_branch_points_are_where_a_multiplier_of_mathieus_equation_is_one(preload_y):
+    points = branch_without_y(preload_y).special_points
     assert [s.kind for s in points] == ["BP", "BP"]
     for special in points:
         assert np.abs(multipliers_of_y(special.frequency_hz) - 1.0).min() < 1e-8
