@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
+from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole, numbers
 from nldyn.executors import check_execution, values_of
 from nldyn.exploration import settling_periods
 from nldyn.flow import FlowMap, flow_of
@@ -36,7 +36,7 @@ from nldyn.simulation import (
     starting_state,
     transient_end,
 )
-from nldyn.system import System, numbers
+from nldyn.system import System
 
 Kind = Literal["periodic", "quasi-periodic", "chaotic", "drifting", "undecided", "failed"]
 

@@ -28,13 +28,14 @@ from nldyn.errors import (
     check_types,
     check_whole,
     is_finite,
+    numbers,
     shown,
 )
 from nldyn.executors import check_execution, values_of
 from nldyn.flow import FlowMap, chain, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import Orbit, check_bounded, check_observe, stroboscopic
-from nldyn.system import System, numbers, same_system
+from nldyn.system import System, same_system
 
 CHUNK = 16  # periods between two looks at where a motion is
 CELLS = 250  # initial states in one computation

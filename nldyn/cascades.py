@@ -17,10 +17,10 @@ from nldyn.branch import (
     check_special,
     is_at,
 )
-from nldyn.continuation import check_range, make_branch
+from nldyn.continuation import make_branch
 from nldyn.critical import CoefficientError, Estimate, doubled_parameter, flip, loop_of
 from nldyn.doubling import switch_at_flip
-from nldyn.errors import SystemModelError, check_types, check_whole
+from nldyn.errors import SystemModelError, check_range, check_types, check_whole
 from nldyn.special import LocateError, special_points_between
 from nldyn.step_control import ContinuationOptions
 from nldyn.walk import Walk

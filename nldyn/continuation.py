@@ -22,12 +22,11 @@ from nldyn.branch import (
 )
 from nldyn.checkpoint import Checkpoint, checkpoint_at
 from nldyn.crossings import check_requested, requested
-from nldyn.errors import LARGEST_FREQUENCY, SMALLEST_FREQUENCY, SystemModelError, check_types, shown
+from nldyn.errors import SystemModelError, check_range, check_types, numbers
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, check_minimal
 from nldyn.special import ON_CROSSING, lies_on_crossing
 from nldyn.step_control import ContinuationOptions
-from nldyn.system import numbers
 from nldyn.trail import Leg, Trail
 from nldyn.walk import shifts
 
@@ -323,17 +322,3 @@ def alike(orbit: Orbit, places: Sequence[Real]) -> Real:
     """Those of some shooting unknowns that are as many as an orbit's, (m, N + 1)."""
     size = orbit.point.size
     return np.array([place for place in places if place.size == size]).reshape(-1, size)
-
-
-def check_range(range_hz: tuple[float, float]) -> tuple[float, float]:
-    """A frequency range as two floats, or a SystemModelError that says what is wrong."""
-    ends = numbers("range_hz", range_hz)
-    if ends.shape != (2,):
-        raise SystemModelError(f"range_hz must be two frequencies, got {shown(range_hz)}")
-    low, high = ends.tolist()
-    if not SMALLEST_FREQUENCY <= low < high <= LARGEST_FREQUENCY:
-        raise SystemModelError(
-            f"range_hz must be two positive frequencies, ascending, from {SMALLEST_FREQUENCY:g} "
-            f"to {LARGEST_FREQUENCY:g}; got ({low:g}, {high:g})"
-        )
-    return low, high

@@ -22,9 +22,9 @@ from nldyn.branch import (
     is_at,
 )
 from nldyn.checkpoint import Checkpoint, checkpoint_of_several
-from nldyn.continuation import broken_off, check_range, complete, open_ends, start_point
+from nldyn.continuation import broken_off, complete, open_ends, start_point
 from nldyn.doubling import switch_at_flip
-from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
+from nldyn.errors import SystemModelError, check_frequency, check_range, check_types, check_whole
 from nldyn.flow import FlowMap, flow_of, same_flow
 from nldyn.normal_forms import switch_at_branch_point
 from nldyn.orbit import ConvergenceError, Orbit, check_observe, solve_orbit

@@ -8,6 +8,9 @@ from numbers import Integral, Real
 from reprlib import repr as shortened
 from typing import Any, TypeGuard
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 SMALLEST_FREQUENCY, LARGEST_FREQUENCY = 1e-12, 1e12  # Hz, of an excitation
 
 
@@ -41,6 +44,33 @@ def check_frequency(name: str, value: object) -> None:
             f"{name} must be positive, from {SMALLEST_FREQUENCY:g} to {LARGEST_FREQUENCY:g}, "
             f"got {shown(value)}"
         )
+
+
+def check_range(range_hz: tuple[float, float]) -> tuple[float, float]:
+    """A frequency range as two floats, or a SystemModelError that says what is wrong."""
+    ends = numbers("range_hz", range_hz)
+    if ends.shape != (2,):
+        raise SystemModelError(f"range_hz must be two frequencies, got {shown(range_hz)}")
+    low, high = ends.tolist()
+    if not SMALLEST_FREQUENCY <= low < high <= LARGEST_FREQUENCY:
+        raise SystemModelError(
+            f"range_hz must be two positive frequencies, ascending, from {SMALLEST_FREQUENCY:g} "
+            f"to {LARGEST_FREQUENCY:g}; got ({low:g}, {high:g})"
+        )
+    return low, high
+
+
+def numbers(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """An array of finite floats, or a SystemModelError under the name."""
+    try:
+        if values is None or np.iscomplexobj(values):
+            raise TypeError
+        array = np.array(values, dtype=float)  # a copy: the caller may change the original
+    except (TypeError, ValueError, OverflowError):
+        raise SystemModelError(f"{name} must hold numbers only") from None
+    if not np.all(np.isfinite(array)):
+        raise SystemModelError(f"{name} has an entry that is not finite")
+    return array
 
 
 def check_types(**arguments: tuple[Any, ...]) -> None:

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.branch import CLOSED, Branch, check_branches
-from nldyn.continuation import check_range
-from nldyn.errors import SystemModelError, check_frequency, check_whole
+from nldyn.errors import SystemModelError, check_frequency, check_range, check_whole
 from nldyn.flow import same_flow
 from nldyn.linear import Real
 from nldyn.orbit import Orbit

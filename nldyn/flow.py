@@ -40,6 +40,7 @@ from nldyn.errors import (
     check_types,
     check_whole,
     is_finite,
+    numbers,
     shown,
 )
 from nldyn.gauss import GaussTables, gauss_tables
@@ -47,7 +48,7 @@ from nldyn.interruption import interrupted
 from nldyn.kernel_cache import first_call
 from nldyn.linear import Complex, Real
 from nldyn.parameters import Parameter, parameter_tables
-from nldyn.system import System, numbers, same_system
+from nldyn.system import System, same_system
 
 __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nldyn.errors import SystemModelError, check_types, check_whole, shown
+from nldyn.errors import SystemModelError, check_types, check_whole, numbers, shown
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit, check_observe
-from nldyn.system import System, numbers
+from nldyn.system import System
 
 MOST_SAMPLES = 2**18
 

@@ -17,7 +17,7 @@ from nldyn.attractors import Attractor
 from nldyn.basin_maps import UNDECIDED, Basins
 from nldyn.branch import Branch, check_branches
 from nldyn.diagrams import Diagram
-from nldyn.errors import SystemModelError, check_choice, check_types, is_finite, shown
+from nldyn.errors import SystemModelError, check_choice, check_types, is_finite, numbers, shown
 from nldyn.linear import Real
 from nldyn.orbit import check_observe, stroboscopic
 from nldyn.plot import (
@@ -34,7 +34,6 @@ from nldyn.plot import (
 )
 from nldyn.sections import BruteForce, Column, impact_section, stroboscopic_section
 from nldyn.simulation import Motion
-from nldyn.system import numbers
 from nldyn.wear import UNITS as MEASURE_UNITS
 from nldyn.wear import SpectraMap
 

@@ -12,13 +12,13 @@ from typing import Any, overload
 import numpy as np
 
 from nldyn._growth import growth_rates
-from nldyn.errors import SystemModelError, check_whole
+from nldyn.errors import SystemModelError, check_whole, numbers
 from nldyn.executors import check_execution, values_of
 from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, contact_damping
 from nldyn.simulation import MOST_PERIODS, cases_at, is_list, transient_end
-from nldyn.system import System, numbers
+from nldyn.system import System
 
 BLOCK = 64  # periods in one call
 FEWEST_BLOCKS = 16  # from which an error is estimated

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from nldyn.elements import Stop
-from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole
+from nldyn.errors import SystemModelError, check_frequency, check_types, check_whole, numbers
 from nldyn.flow import FlowError, FlowMap, Solution, Trajectory, chain, flow_of
 from nldyn.linear import Real
 from nldyn.multipliers import (
@@ -29,7 +29,7 @@ from nldyn.multipliers import (
 )
 from nldyn.preload import at_rest, held_motion, rest
 from nldyn.shooting import ShootingProblem
-from nldyn.system import System, numbers
+from nldyn.system import System
 
 SEGMENTS_PER_PERIOD = 2
 LONGEST_PERIOD = 10**4  # excitation periods of an orbit

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from nldyn.branch import Branch
 from nldyn.checkpoint import Checkpoint, checkpoint_at
-from nldyn.continuation import check_range, complete, split
+from nldyn.continuation import complete, split
 from nldyn.crossings import check_requested
-from nldyn.errors import SystemModelError
+from nldyn.errors import SystemModelError, check_range
 from nldyn.step_control import ContinuationOptions
 
 

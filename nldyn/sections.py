@@ -14,8 +14,7 @@ import numpy as np
 
 from nldyn.attractors import Attractor, AttractorOptions, Kind, attractor_from
 from nldyn.contacts import check_stop, impacts
-from nldyn.continuation import check_range
-from nldyn.errors import SystemModelError, check_choice, check_types, check_whole
+from nldyn.errors import SystemModelError, check_choice, check_range, check_types, check_whole
 from nldyn.executors import check_execution, values_of
 from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real

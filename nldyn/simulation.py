@@ -11,13 +11,7 @@ from typing import Any, overload
 
 import numpy as np
 
-from nldyn.errors import (
-    SystemModelError,
-    check_frequency,
-    check_whole,
-    is_finite,
-    shown,
-)
+from nldyn.errors import SystemModelError, check_frequency, check_whole, is_finite, numbers, shown
 from nldyn.executors import check_execution, values_of
 from nldyn.flow import FlowMap, Trajectory, flow_of
 from nldyn.linear import Real
@@ -29,7 +23,7 @@ from nldyn.orbit import (
     check_observe,
     history_of,
 )
-from nldyn.system import System, numbers
+from nldyn.system import System
 
 BLOCK = 64  # periods recorded in one call
 PIECE = 2000  # periods of a transient whose states are held at once

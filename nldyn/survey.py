@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from cms.threads import one_thread
 from nldyn.branch import Branch, is_at
 from nldyn.checkpoint import Checkpoint, begun_before
-from nldyn.continuation import check_range
 from nldyn.deflation import deflated_orbit
 from nldyn.diagrams import Collector, Diagram, Progress, check_known
-from nldyn.errors import SystemModelError, check_types, check_whole, shown
+from nldyn.errors import SystemModelError, check_range, check_types, check_whole, shown
 from nldyn.exploration import (
     Coverage,
     Exploration,

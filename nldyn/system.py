@@ -13,7 +13,7 @@ import scipy.linalg as sla
 from numpy.typing import ArrayLike
 
 from nldyn.elements import Damper, Excitation, Stop
-from nldyn.errors import SystemModelError, shown
+from nldyn.errors import SystemModelError, numbers, shown
 from nldyn.linear import Complex, LinearPart, Real, at_resonance, linear_part
 
 Element = TypeVar("Element")
@@ -449,19 +449,6 @@ def same_system(a: System, b: System) -> bool:
         )
         and (a.stops, a.dampers, a.excitation) == (b.stops, b.dampers, b.excitation)
     )
-
-
-def numbers(name: str, values: ArrayLike) -> Real:
-    """An array of finite floats, or a SystemModelError under the name."""
-    try:
-        if values is None or np.iscomplexobj(values):
-            raise TypeError
-        array = np.array(values, dtype=float)  # a copy: the caller may change the original
-    except (TypeError, ValueError, OverflowError):
-        raise SystemModelError(f"{name} must hold numbers only") from None
-    if not np.all(np.isfinite(array)):
-        raise SystemModelError(f"{name} has an entry that is not finite")
-    return array
 
 
 def _negative(K: Real) -> bool:
