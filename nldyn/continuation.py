@@ -25,7 +25,7 @@ from nldyn.crossings import check_requested, requested
 from nldyn.errors import SystemModelError, check_range, check_types, numbers
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, check_minimal
-from nldyn.special import ON_CROSSING, lies_on_crossing
+from nldyn.special import ON_CROSSING, SAME, distance, lies_on_crossing
 from nldyn.step_control import ContinuationOptions
 from nldyn.trail import Leg, Trail
 from nldyn.walk import shifts
@@ -249,6 +249,7 @@ def join(name: str, forward: Leg, backward: Leg | None, course: Course) -> Branc
     if backward is None:
         first = CLOSED if forward.reason == CLOSED else NOT_FINISHED
         backward = Leg([forward.nodes[0]], [], [], first, None)
+    forward, backward = _without_repeat(forward, backward)
     branch = make_branch(
         name,
         [_reversed(point) for point in backward.nodes[:0:-1]] + forward.nodes,
@@ -264,6 +265,28 @@ def join(name: str, forward: Leg, backward: Leg | None, course: Course) -> Branc
         ends=(backward.end, forward.end),
     )
     return replace(branch, course=whole)
+
+
+def _without_repeat(forward: Leg, backward: Leg) -> tuple[Leg, Leg]:
+    """Two legs from one start, of which only one tells a branch point that lies at it.
+
+    There rounding decides the sign of the branch point's test, so that both may have met it; it is
+    left out of the leg of which it lies behind the start.
+    """
+    if not (forward.special_points and backward.special_points):
+        return forward, backward
+    a, b = forward.special_points[0], backward.special_points[0]
+    if {a.kind, b.kind} != {"BP"} or distance(a.orbit, b.orbit) > SAME:
+        return forward, backward
+    if a.point.arclength < 0.0:
+        return _without_first(forward), backward
+    return forward, _without_first(backward)
+
+
+def _without_first(leg: Leg) -> Leg:
+    """A leg without its first special point."""
+    end = leg.end and replace(leg.end, special_points=max(leg.end.special_points - 1, 0))
+    return replace(leg, special_points=leg.special_points[1:], end=end)
 
 
 def split(branch: Branch, course: Course) -> tuple[Leg, Leg | None]:

@@ -33,6 +33,7 @@ from nldyn.special import LocateError
 
 CLOSE = 1e-3  # relative distance in frequency of a special point that counts as close
 NEAR_RESONANCE_DEG = 5.0
+UNCHANGED = 1e-3  # relative change of a null vector that is none
 SIDES = {1: "above", -1: "below"}
 LOST = "the coefficient is lost in its error"
 NUMBERS = {1: "one", 2: "two", 3: "three"}
@@ -271,7 +272,7 @@ def _pitchfork(special: SpecialPoint, found: Crossing) -> NormalForm:
     form: Coefficients = found.pitchfork
     shift = form.parameter
     hz, sign, side = _hz(special), form.nonlinear.sign, shift.sign
-    symmetric = is_symmetric(special.orbit)
+    symmetric = _breaks_mirror(special.orbit, found.q)
     title = f"Branch point at {hz}, pitchfork"
     if symmetric:
         title += " (the symmetry x(t + T/2) = -x(t) breaks)"
@@ -314,6 +315,18 @@ def _transcritical(special: SpecialPoint, found: Crossing) -> NormalForm:
 def is_symmetric(orbit: Orbit, rtol: float = 1e-4) -> bool:
     """Whether half a period turns the orbit into its mirror image, x(t + T/2) = -x(t)."""
     return asymmetry(orbit.problem, orbit.point) <= rtol
+
+
+def _breaks_mirror(orbit: Orbit, q: Real) -> bool:
+    """Whether a change q (k, 2n) takes an orbit's symmetry x(t + T/2) = -x(t) from it.
+
+    Then half a period leaves q as it is; a mirrored q keeps the symmetry, and another one tells
+    that the system has none.
+    """
+    if not is_symmetric(orbit):
+        return False
+    shifted = np.roll(q, orbit.problem.segments // 2, axis=0)
+    return bool(np.abs(shifted - q).max() < UNCHANGED * np.abs(q).max())
 
 
 def switch_at_branch_point(

@@ -46,6 +46,7 @@ MOST_LOOKS = 12  # times that a step is cut at such points
 SMOOTH_TOUCH = 1.5  # exponent of a stop from which on multipliers have a slope at a touch
 MOST_HALVES = 8  # times that a step beside a grazing point is halved towards it
 CROSSES = 1e-12  # least unfolding of a crossing, relative to the orbit, that is not rounding
+MIXED = 1e-5  # distance from a crossing within which a tangent may be of both branches
 ON_CROSSING = 3e-7  # distance from it, relative to the orbit, at which a branch cannot be told
 NEAR_ONE = 1e-3  # a multiplier no nearer to 1 is not that of an orbit where branches cross
 SHORTEST_LOOK = 1e-6  # arclength of a step, below which it is not cut there
@@ -485,7 +486,7 @@ def turned_over(
         sigma = min(max((where - first.arclength) / span, 0.02), 0.98)
         extra = Chord(first, last).at(sigma)
         if differs(a, extra):
-            return None if lies_on_crossing(extra.orbit, ON_CROSSING) else extra
+            return None if lies_on_crossing(extra.orbit, MIXED) else extra
         triples = ((a, extra, b), (z, a, extra)) if ahead else ((z, extra, a), (extra, a, b))
         for triple in triples:
             where = next(islice(hidden_dips(*triple), number, None), math.nan)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from bisect import bisect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from operator import attrgetter
 
 from nldyn.branch import CLOSED, JOINS, NOT_FINISHED, BranchPoint, SpecialPoint, WalkEnd
@@ -26,6 +27,8 @@ AT_FLIP = 1e-5  # distance of a turn of a doubled branch from its end that may b
 FLAT = 1e-4  # frequency part of tangents beside such a turn, below which it is
 SHORTEST_DETOUR = 1e-6  # first step of a walk that looks closely at what lies within a step
 MOST_DETOUR = 500  # points of such a walk
+STRAIGHT = 1.1  # its length over that of the step, up to which it leads straight there
+BEYOND = 1.01  # factor by which the range of one that searches its last step is wider
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,14 +189,12 @@ class Trail:
         beside it. What lies behind is moved by the length of the detour.
         """
         a, b = self.nodes[self._searched : self._searched + 2]
-        between = _detour(a, b, self.walk)
+        between = _detour(a, b, self.walk, self.walk.range_hz)
         if between is None:
             return False
-        last = between[-1]
-        weights = last.orbit.problem.metric(last.orbit.point)
-        end = last.arclength + metric_length(weights, b.orbit.point - last.orbit.point)
+        longer = _arclength_behind(between, b) - b.arclength
         behind = self.nodes[self._searched + 1 :]
-        moved = [replace(p, arclength=p.arclength + (end - b.arclength)) for p in behind]
+        moved = [replace(p, arclength=p.arclength + longer) for p in behind]
         self.nodes[self._searched + 1 :] = [*between, *moved]
         self.walk.stride = replace(self._stride, here=moved[-1])
         return True
@@ -201,8 +202,8 @@ class Trail:
     def _search(self, pairs: int, closely: bool = True) -> None:
         """Locate the special points of the first pairs of nodes, as far as that is not done.
 
-        Where that fails, the step is walked again with shorter ones; not at the end of the walk,
-        whose last steps a longer one does anew.
+        Where that fails, the step is walked again with shorter ones, whose points are kept; not at
+        the end of the walk, whose last steps a longer one does anew.
         """
         known = len(self.special_points)
         ahead = len(self.nodes) - pairs  # nodes that stay beyond those searched
@@ -215,12 +216,26 @@ class Trail:
             except (LocateError, ConvergenceError) as error:
                 if closely and self._walk_closely():
                     continue
-                found, lost = _by_halves(a, b, error)
+                between = None if closely else self._straight_way(a, b)
+                pieces = between and _in_pieces([a, *between, b])
+                found, lost = pieces or _by_halves(a, b, error)
                 self.special_points += found
                 self.notes += lost
             self._searched += 1
         if len(self.special_points) > known:
             self.special_points = without_repeats(self.special_points)
+
+    def _straight_way(self, a: BranchPoint, b: BranchPoint) -> list[BranchPoint] | None:
+        """Points of a walk with shorter steps from a to b, if it leads there straight.
+
+        To know b again it must pass it, also at the end of the range.
+        """
+        low, high = self.walk.range_hz
+        between = _detour(a, b, self.walk, (low / BEYOND, high * BEYOND))
+        if between is None:
+            return None
+        length = _arclength_behind(between, b) - a.arclength
+        return between if length < STRAIGHT * (b.arclength - a.arclength) else None
 
 
 def trace(
@@ -238,7 +253,9 @@ def trace(
     return leg.nodes, leg.special_points, leg.reason, leg.notes
 
 
-def _detour(a: BranchPoint, b: BranchPoint, walk: Walk) -> list[BranchPoint] | None:
+def _detour(
+    a: BranchPoint, b: BranchPoint, walk: Walk, range_hz: tuple[float, float]
+) -> list[BranchPoint] | None:
     """Points of a walk with shorter steps from a that passes b in its direction, or None."""
     first_step = (b.arclength - a.arclength) / 64.0
     if first_step < max(SHORTEST_DETOUR, walk.options.min_step):
@@ -246,7 +263,7 @@ def _detour(a: BranchPoint, b: BranchPoint, walk: Walk) -> list[BranchPoint] | N
     options = replace(
         walk.options, first_step=first_step, max_step=8.0 * first_step, max_points=MOST_DETOUR
     )
-    inner = Walk(a, walk.range_hz, options, b.orbit.point[None])
+    inner = Walk(a, range_hz, options, b.orbit.point[None])
     between = list(inner)[1:-1]
     if inner.stop_reason != MEETS_OPEN_END or not between:
         return None
@@ -254,6 +271,13 @@ def _detour(a: BranchPoint, b: BranchPoint, walk: Walk) -> list[BranchPoint] | N
     weights = last.orbit.problem.metric(last.orbit.point)
     ahead = float((b.orbit.point - last.orbit.point) @ (weights * b.tangent))
     return between if ahead > 0.0 else None
+
+
+def _arclength_behind(way: Sequence[BranchPoint], b: BranchPoint) -> float:
+    """Arclength of a point that is met behind a way."""
+    last = way[-1]
+    weights = last.orbit.problem.metric(last.orbit.point)
+    return last.arclength + metric_length(weights, b.orbit.point - last.orbit.point)
 
 
 def _by_halves(
@@ -272,13 +296,20 @@ def _by_halves(
         return [], [
             f"special points between {hz[0]:.8g} and {hz[1]:.8g} Hz may be missing: {error}"
         ]
+    return _in_pieces([a, middle, b], depth + 1)
+
+
+def _in_pieces(
+    points: Sequence[BranchPoint], depth: int = 0
+) -> tuple[list[SpecialPoint], list[str]]:
+    """Special points between some points of a branch, with notes on what could not be searched."""
     found: list[SpecialPoint] = []
     notes: list[str] = []
-    for first, last in ((a, middle), (middle, b)):
+    for a, b in pairwise(points):
         try:
-            found += special_points_between(first, last)
+            found += special_points_between(a, b)
         except (LocateError, ConvergenceError) as error:
-            more, lost = _by_halves(first, last, error, depth + 1)
+            more, lost = _by_halves(a, b, error, depth)
             found += more
             notes += lost
     return found, notes

@@ -27,6 +27,8 @@ def check_writable(path: str | Path) -> Path:
         target = Path(path).resolve()
         if target.is_dir():
             raise OutputError(f"{path}: is a folder, not a file")
+        if target.exists() and not target.is_file():
+            raise OutputError(f"{path}: is a device or a pipe, not a file")
         if not target.parent.is_dir():
             raise OutputError(f"{path}: there is no such folder")
         if not is_writable(target.parent):

@@ -372,7 +372,9 @@ def test_places_that_cannot_be_written_are_named(branch, tmp_path):
     locked = tmp_path / "locked"
     locked.mkdir()
     locked.chmod(0o555)
+    os.mkfifo(tmp_path / "pipe")
     for place, fault in (
+        (tmp_path / "pipe", "is a device or a pipe, not a file"),
         (tmp_path / "none" / "b.h5", "there is no such folder"),
         (tmp_path, "is a folder"),
         (locked / "b.h5", "the folder is read-only"),

@@ -14,6 +14,8 @@ from test_nldyn_uncoupled import oscillator
 from nldyn import (
     ContinuationOptions,
     ConvergenceError,
+    FlowMap,
+    FlowOptions,
     HarmonicForce,
     Stop,
     System,
@@ -276,6 +278,41 @@ def test_halves_of_a_broken_symmetry_are_the_same_from_any_step(first_step):
     assert Counter(s.kind for s in halves.special_points) == {"BP": 2, "PD": 4, "GR": 4}
     met = sorted(s.frequency_hz for s in halves.special_points if s.kind == "BP")
     assert met == pytest.approx(sorted(s.frequency_hz for s in pitchforks), rel=1e-9)
+
+
+@pytest.fixture(scope="module")
+def facing():
+    """Branch of a mass between two stiff linear stops, which the motion of a period touches."""
+    return continue_branch(solve_orbit(facing_stops(), 8.0), (6.5, 8.5))
+
+
+def facing_stops() -> System:
+    return System.from_modal(
+        [10.0], {"m": [1.0]}, modal_damping=0.02, excitation=[HarmonicForce("m", 2.0)],
+        stops=[Stop("m", 1e7, direction=side) for side in (1, -1)],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("amplitude", "side"), [(5e-6, 1), (2e-6, 0), (2e-6, 1), (1e-6, 1)])
+def test_a_half_begun_beside_its_pitchfork_has_that_once_and_no_fold(facing, amplitude, side):
+    """Its frequency falls all the way; a tangent within 1e-6 of the pitchfork may be of both."""
+    special = [s for s in facing.special_points if s.kind == "BP"][1]
+    hz = special.frequency_hz
+    half = switch_at_branch_point(special, amplitude)[side].orbit
+    branch = continue_branch(half, (0.99 * hz, 1.01 * hz))
+    assert not branch.notes
+    (only,) = branch.special_points
+    assert only.kind == "BP"
+    assert only.frequency_hz == pytest.approx(hz, rel=1e-9)
+
+
+def test_a_symmetric_branch_is_followed_with_a_coarse_flow_map(facing):
+    """Its orbits are as asymmetric as the error of the map, which breaks no symmetry."""
+    coarse = FlowMap(facing_stops(), FlowOptions(rtol=3e-5))
+    branch = continue_branch(solve_orbit(coarse, 8.0), (6.5, 8.5))
+    assert branch.stop_reasons == ("end of the frequency range",) * 2
+    fine = [s.frequency_hz for s in facing.special_points]
+    assert [s.frequency_hz for s in branch.special_points] == pytest.approx(fine, rel=3e-5)
 
 
 def test_only_orbits_beside_a_crossing_lie_on_it():

@@ -9,6 +9,7 @@ branch goes through from y > 0 to y < 0.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from functools import cache
 
 import numpy as np
@@ -65,12 +66,15 @@ def branch():
 @cache
 def branch_without_y(preload_y=PRELOAD):
     hz = 0.45
+    orbit = solve_orbit(system(preload_y), hz, guess=orbit_without_y(hz), observe="y")
+    return continue_branch(orbit, (hz, 0.56))
+
+
+def orbit_without_y(hz):
     omega = 2.0 * math.pi * hz
     response = FORCE / (SPRING_X - omega**2 + 1j * DAMPING_X * omega)
     shape = system().participation["x"]
-    start = np.outer([response.real, (1j * omega * response).real], shape).ravel()
-    orbit = solve_orbit(system(preload_y), hz, guess=start, observe="y")
-    return continue_branch(orbit, (hz, 0.56))
+    return np.outer([response.real, (1j * omega * response).real], shape).ravel()
 
 
 @pytest.mark.parametrize("preload_y", [1.0, 1e-3])
@@ -114,6 +118,25 @@ def test_transcritical_points_are_followed_where_y_can_stay_zero(branch):
         continue_special(special, ("frequency_hz", gap), ((0.4, 0.6), (-1.1, -0.9)))
 
 
+@pytest.mark.parametrize("beside", [3.2e-7, 4e-7, -5e-7])
+def test_a_branch_begun_beside_a_branch_point_has_it_once(beside):
+    """There rounding decides the sign of the branch point's test, in both directions."""
+    special = branch_without_y().special_points[1]
+    problem, tangent = special.orbit.problem, other_tangent(special)
+    across = problem.metric(special.orbit.point) * tangent
+    found = problem.correct(special.orbit.point + beside * tangent, across / np.linalg.norm(across))
+    hz = special.frequency_hz
+    short = ContinuationOptions(first_step=0.001, max_step=3e-3)
+    narrow, wide = (0.9998 * hz, 1.0002 * hz), (0.9995 * hz, 1.0005 * hz)
+    branch = continue_branch(Orbit.of(problem, found, "y"), narrow, options=short)
+    for told in (branch, branch.extend(wide)):
+        assert Counter(s.kind for s in told.special_points)["BP"] == 1
+    assert [s.frequency_hz for s in branch.extend(wide).special_points] == [
+        s.frequency_hz
+        for s in continue_branch(Orbit.of(problem, found, "y"), wide, options=short).special_points
+    ]
+
+
 @pytest.mark.parametrize("preload_y", [1.0, 1e-3])
 @pytest.mark.parametrize("beside", [-3e-5, -3e-6, -5e-7, 5e-7, 2e-6, 1e-4])
 def test_a_walk_begun_beside_the_point_stays_on_its_branch_and_finds_it(preload_y, beside):
@@ -133,3 +156,26 @@ def test_a_walk_begun_beside_the_point_stays_on_its_branch_and_finds_it(preload_
         )
         ends = [walked.points[i].max_abs_displacement for i in (0, -1)]
         assert (min(ends) > 1e-6) == has_y == (max(ends) > 1e-9)
+
+
+def test_two_branch_points_within_one_of_the_last_steps_are_both_found():
+    """There y and -y are alike: stops that bend the same way put pitchforks at the same places."""
+    hz, bend = 0.45, 0.1
+    own_y = SPRING_Y - 4.0 - 6.0 * bend
+    stops = [Stop(at, 1.0, 2.0, gap=-PRELOAD) for at in ("x + y", "x - y")]
+    stops += [Stop("x", 2.0, 2.0, -PRELOAD, -1)]
+    stops += [Stop("y", bend, 3.0, -1.0, side) for side in (1, -1)]
+    alike = System.from_matrices(
+        np.eye(2), np.diag([OWN_X, own_y]),
+        {"x": [1.0, 0.0], "y": [0.0, 1.0], "x + y": [1.0, 1.0], "x - y": [1.0, -1.0]},
+        damping=np.diag([DAMPING_X, DAMPING_Y]), stops=stops,
+        excitation=[HarmonicForce("x", FORCE)],
+    )  # fmt: skip
+    orbit = solve_orbit(alike, hz, guess=orbit_without_y(hz), observe="y")
+    branch = continue_branch(orbit, (hz, 0.52))
+    assert [s.kind for s in branch.special_points] == ["BP", "BP"]
+    low, high = (s.frequency_hz for s in branch.special_points)
+    assert not any(low < node.orbit.frequency_hz < high for node in branch.nodes)
+    assert not branch.notes
+    for special in branch.special_points:
+        assert np.abs(multipliers_of_y(special.frequency_hz) - 1.0).min() < 1e-8
