@@ -27,8 +27,22 @@ from nldyn.doubling import switch_at_flip
 from nldyn.errors import SystemModelError, check_frequency, check_range, check_types, check_whole
 from nldyn.flow import FlowMap, flow_of, same_flow
 from nldyn.normal_forms import switch_at_branch_point
-from nldyn.orbit import ConvergenceError, Orbit, check_observe, solve_orbit
-from nldyn.search import SearchOptions, Strobe, orbits_from_strobe, reach, simulate_strobe
+from nldyn.orbit import (
+    ConvergenceError,
+    Orbit,
+    check_observe,
+    minimal_period,
+    solve_orbit,
+    stroboscopic,
+)
+from nldyn.search import (
+    SearchOptions,
+    Strobe,
+    orbit_near,
+    orbits_from_strobe,
+    reach,
+    simulate_strobe,
+)
 from nldyn.special import LocateError
 from nldyn.step_control import ContinuationOptions
 from nldyn.system import System
@@ -277,8 +291,18 @@ class Collector:
     def from_branch_point(
         self, special: SpecialPoint, options: ContinuationOptions | None = None
     ) -> None:
-        """Follow the other branch through a branch point both ways, unless it is known."""
+        """Follow the other branch through a branch point both ways, unless it is known.
+
+        Where a doubled branch comes to the flip that it is born at, that is the one of the shorter
+        period.
+        """
         if not self._is_new_crossing(special):
+            return
+        orbit, shorter = special.orbit, minimal_period(special.orbit)
+        if shorter < orbit.period:
+            state = stroboscopic(orbit)[0]
+            single = orbit_near(self.flow, state, shorter, orbit.omega, orbit.observe)
+            self.from_orbits([single] if single else [])
             return
         try:
             starts = switch_at_branch_point(special)

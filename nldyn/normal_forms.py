@@ -27,7 +27,7 @@ from nldyn.critical import (
 )
 from nldyn.errors import SystemModelError, check_positive, check_types
 from nldyn.linear import Complex, Real
-from nldyn.orbit import Orbit
+from nldyn.orbit import Orbit, minimal_period
 from nldyn.shooting import asymmetry, metric_length
 from nldyn.special import LocateError
 
@@ -126,6 +126,8 @@ def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> N
     if special.kind not in kinds:
         raise SystemModelError(f"no special point is of the kind {special.kind!r}")
     try:
+        if special.kind == "BP" and minimal_period(special.orbit) < special.orbit.period:
+            return _flip_met(special)
         return kinds[special.kind](special, loop_of(special.orbit))
     except CoefficientError as error:
         title, name = {
@@ -268,6 +270,15 @@ def _branch_point(special: SpecialPoint, loop: Loop) -> NormalForm:
     return _pitchfork(special, found) if found.is_pitchfork else _transcritical(special, found)
 
 
+def _flip_met(special: SpecialPoint) -> NormalForm:
+    shorter, hz = minimal_period(special.orbit), _hz(special)
+    sentence = (
+        f"Branch point at {hz}: here the orbit is one of period {shorter}, at a flip of a branch "
+        "of that period, from which this branch is born."
+    )
+    return NormalForm("flip", sentence)
+
+
 def _pitchfork(special: SpecialPoint, found: Crossing) -> NormalForm:
     form: Coefficients = found.pitchfork
     shift = form.parameter
@@ -354,10 +365,16 @@ def switch_at_branch_point(
     SystemModelError
         If the special point is not a branch point.
     LocateError
-        If the other branch is not found.
+        If the other branch is not found, or is one of a shorter period, whose flip this is.
     """
     check_special("switch_at_branch_point", special, "BP")
     check_positive("amplitude", amplitude)
+    shorter = minimal_period(special.orbit)
+    if shorter < special.orbit.period:
+        raise LocateError(
+            f"the other branch at {_hz(special)} is one of period {shorter}, whose flip this is: "
+            "solve for its orbits"
+        )
     try:
         direction = other_tangent(special)
     except CoefficientError as error:

@@ -17,6 +17,7 @@ from nldyn import (
     FlowMap,
     FlowOptions,
     HarmonicForce,
+    SpecialPoint,
     Stop,
     System,
     SystemModelError,
@@ -24,6 +25,7 @@ from nldyn import (
     checkpoint,
     continue_branch,
     crossings,
+    describe,
     diagram,
     explore,
     find_orbits,
@@ -33,6 +35,7 @@ from nldyn import (
     load_exploration,
     solve_orbit,
     survey,
+    switch_at_branch_point,
     switch_at_flip,
 )
 from nldyn.deflation import deflated_orbit
@@ -557,6 +560,29 @@ def test_a_doubled_branch_begins_at_its_flip():
     )
     for amplitude in (1e-2, 1e-3):
         assert box.branches[1].contains(switch_at_flip(flip, amplitude).orbit)
+
+
+def test_where_a_doubled_branch_comes_to_its_flip_the_other_one_has_half_the_period():
+    """Followed on as a branch of the doubled period it would be the same orbits twice."""
+    flow = FlowMap(system_of("one_dof"))
+    box, other = (
+        Collector(flow, (28.0, 60.0), "middle", ContinuationOptions(), lambda what, hz: None)
+        for _ in range(2)
+    )
+    box.from_orbits([solve_orbit(flow, 50.0)])
+    harmonic = box.branches[0]
+    box.from_flip(next(s for s in harmonic.special_points if s.kind == "PD"))
+    doubled = box.branches[1]
+    end = SpecialPoint("BP", doubled.nodes[0], 0.0)
+    with pytest.raises(LocateError, match="is one of period 1, whose flip this is"):
+        switch_at_branch_point(end)
+    assert "is one of period 1, at a flip of a branch of that period" in describe(end)
+    box.from_branch_point(end)
+    assert box.branches == [harmonic, doubled] and not box.notes
+    other.take([doubled], [])
+    other.from_branch_point(end)
+    assert [branch.period for branch in other.branches] == [2, 1]
+    assert other.branches[1].contains(harmonic.at(50.0)[0])
 
 
 def test_orbits_of_a_branch_are_known_where_newtons_method_at_their_frequency_fails(monkeypatch):
