@@ -207,7 +207,9 @@ class Collector:
         self.crossings.append(special)
         return True
 
-    def from_orbits(self, orbits: Iterable[Orbit]) -> None:
+    def from_orbits(
+        self, orbits: Iterable[Orbit], options: ContinuationOptions | None = None
+    ) -> None:
         """Follow each orbit both ways, unless its branch is known."""
         for orbit in orbits:
             if self.known(orbit):
@@ -217,7 +219,7 @@ class Collector:
             except ConvergenceError as error:
                 self.notes.append(f"orbit of period {orbit.period} found but not followed: {error}")
             else:
-                self.from_start(start)
+                self.from_start(start, options)
 
     def follow(self, orbit: Orbit, longest: int, wanted: int, most: int | None) -> None:
         """Follow an orbit's branch unless it is known, and what it leads to; see `follow_up`."""
@@ -236,7 +238,7 @@ class Collector:
             branch = self.branches[count]
             count += 1
             for special in branch.special_points:
-                period = branch.period * (2 if special.kind == "PD" else 1)
+                period = minimal_period(special.orbit) * (2 if special.kind == "PD" else 1)
                 options = self.options if period <= wanted else shorter
                 if special.kind == "PD" and period <= longest:
                     self.from_flip(special, options)
@@ -302,7 +304,11 @@ class Collector:
         if shorter < orbit.period:
             state = stroboscopic(orbit)[0]
             single = orbit_near(self.flow, state, shorter, orbit.omega, orbit.observe)
-            self.from_orbits([single] if single else [])
+            if single is None:
+                hz = f"{special.frequency_hz:.6g} Hz"
+                self.notes.append(f"no orbit of period {shorter} found at the branch point at {hz}")
+            else:
+                self.from_orbits([single], options)
             return
         try:
             starts = switch_at_branch_point(special)

@@ -127,7 +127,7 @@ def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> N
         raise SystemModelError(f"no special point is of the kind {special.kind!r}")
     try:
         if special.kind == "BP" and minimal_period(special.orbit) < special.orbit.period:
-            return _flip_met(special)
+            return _shorter_period_met(special)
         return kinds[special.kind](special, loop_of(special.orbit))
     except CoefficientError as error:
         title, name = {
@@ -270,13 +270,13 @@ def _branch_point(special: SpecialPoint, loop: Loop) -> NormalForm:
     return _pitchfork(special, found) if found.is_pitchfork else _transcritical(special, found)
 
 
-def _flip_met(special: SpecialPoint) -> NormalForm:
+def _shorter_period_met(special: SpecialPoint) -> NormalForm:
     shorter, hz = minimal_period(special.orbit), _hz(special)
-    sentence = (
-        f"Branch point at {hz}: here the orbit is one of period {shorter}, at a flip of a branch "
-        "of that period, from which this branch is born."
-    )
-    return NormalForm("flip", sentence)
+    sentence = f"Branch point at {hz}: here the orbit is one of period {shorter}"
+    if special.orbit.period == 2 * shorter:
+        sentence += ", at a flip of a branch of that period, from which this branch is born."
+        return NormalForm("flip", sentence)
+    return NormalForm("branch point", f"{sentence}, of a branch of that period.")
 
 
 def _pitchfork(special: SpecialPoint, found: Crossing) -> NormalForm:
@@ -365,15 +365,14 @@ def switch_at_branch_point(
     SystemModelError
         If the special point is not a branch point.
     LocateError
-        If the other branch is not found, or is one of a shorter period, whose flip this is.
+        If the other branch is not found, or is one of a shorter period.
     """
     check_special("switch_at_branch_point", special, "BP")
     check_positive("amplitude", amplitude)
     shorter = minimal_period(special.orbit)
     if shorter < special.orbit.period:
         raise LocateError(
-            f"the other branch at {_hz(special)} is one of period {shorter}, whose flip this is: "
-            "solve for its orbits"
+            f"the other branch at {_hz(special)} is one of period {shorter}: solve for its orbits"
         )
     try:
         direction = other_tangent(special)

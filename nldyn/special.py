@@ -530,13 +530,31 @@ def located_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[Spec
 
 
 def _located(kind: str, chord: Chord) -> list[SpecialPoint]:
-    """Where a test changes its sign on a chord; nothing if that is no pair on the unit circle."""
+    """Where a test changes its sign on a chord; nothing if that is no pair on the unit circle.
+
+    Where branches cross beside an end of the chord, the tangent there may be of both: its change of
+    sign is not that of a fold, unless a multiplier tells.
+    """
+    if kind == "LP" and not _is_plain_fold(chord):
+        crossing = _crossing_at_an_end(chord)
+        if crossing is not None:
+            at = BranchPoint(crossing, chord.first.tangent, chord.first.arclength)
+            return [_along(chord, SpecialPoint("BP", at, crossing.error))]
     special = locate(kind, chord, lambda point: tests(point)[kind])
     if kind == "NS" and not _on_unit_circle(special.orbit.multipliers):
         return []
     if kind == "LP" and _is_plain_fold(chord):
         return [special]
     return [_along(chord, _crossing_or_fold(special))]
+
+
+def _crossing_at_an_end(chord: Chord) -> Orbit | None:
+    """Where branches cross so near to an end of a chord that its tangent may be of both."""
+    for orbit in (chord.first.orbit, chord.last.orbit):
+        crossing = crossing_beside(orbit)
+        if crossing is not None and distance(orbit, crossing) < MIXED:
+            return crossing
+    return None
 
 
 def _vanishes(touch: Touch, at: BranchPoint, a: BranchPoint, b: BranchPoint) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -28,7 +29,7 @@ FLAT = 1e-4  # frequency part of tangents beside such a turn, below which it is
 SHORTEST_DETOUR = 1e-6  # first step of a walk that looks closely at what lies within a step
 MOST_DETOUR = 500  # points of such a walk
 STRAIGHT = 1.1  # its length over that of the step, up to which it leads straight there
-BEYOND = 1.01  # factor by which the range of one that searches its last step is wider
+BEYOND = 0.25  # of the step: how far in ln ω one that searches the last may leave the range
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,11 +232,16 @@ class Trail:
         To know b again it must pass it, also at the end of the range.
         """
         low, high = self.walk.range_hz
-        between = _detour(a, b, self.walk, (low / BEYOND, high * BEYOND))
+        step = b.arclength - a.arclength
+        beyond = math.exp(BEYOND * step)
+        between = _detour(a, b, self.walk, (low / beyond, high * beyond))
         if between is None:
             return None
-        length = _arclength_behind(between, b) - a.arclength
-        return between if length < STRAIGHT * (b.arclength - a.arclength) else None
+        longer = (_arclength_behind(between, b) - a.arclength) / step
+        if longer > STRAIGHT:
+            return None
+        lengths = (a.arclength + (p.arclength - a.arclength) / longer for p in between)
+        return [replace(p, arclength=x) for p, x in zip(between, lengths, strict=True)]
 
 
 def trace(

@@ -24,11 +24,12 @@ def check_writable(path: str | Path) -> Path:
     try:
         if "\0" in str(path):
             raise ValueError("it has a null character")
-        target = Path(path).resolve()
-        if target.is_dir():
+        place = Path(path)
+        if place.is_dir():
             raise OutputError(f"{path}: is a folder, not a file")
-        if target.exists() and not target.is_file():
+        if place.exists() and not place.is_file():
             raise OutputError(f"{path}: is a device or a pipe, not a file")
+        target = place.resolve()
         if not target.parent.is_dir():
             raise OutputError(f"{path}: there is no such folder")
         if not is_writable(target.parent):

@@ -574,15 +574,17 @@ def test_where_a_doubled_branch_comes_to_its_flip_the_other_one_has_half_the_per
     box.from_flip(next(s for s in harmonic.special_points if s.kind == "PD"))
     doubled = box.branches[1]
     end = SpecialPoint("BP", doubled.nodes[0], 0.0)
-    with pytest.raises(LocateError, match="is one of period 1, whose flip this is"):
+    with pytest.raises(LocateError, match="is one of period 1: solve for its orbits"):
         switch_at_branch_point(end)
     assert "is one of period 1, at a flip of a branch of that period" in describe(end)
     box.from_branch_point(end)
     assert box.branches == [harmonic, doubled] and not box.notes
     other.take([doubled], [])
-    other.from_branch_point(end)
+    other.from_branch_point(end, ContinuationOptions(max_points=5))
     assert [branch.period for branch in other.branches] == [2, 1]
-    assert other.branches[1].contains(harmonic.at(50.0)[0])
+    single = other.branches[1]
+    assert single.stop_reasons == ("5 points",) * 2
+    assert harmonic.contains(single.nodes[0].orbit)
 
 
 def test_orbits_of_a_branch_are_known_where_newtons_method_at_their_frequency_fails(monkeypatch):

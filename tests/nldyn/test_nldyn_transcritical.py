@@ -158,7 +158,8 @@ def test_a_walk_begun_beside_the_point_stays_on_its_branch_and_finds_it(preload_
         assert (min(ends) > 1e-6) == has_y == (max(ends) > 1e-9)
 
 
-def test_two_branch_points_within_one_of_the_last_steps_are_both_found():
+@pytest.mark.parametrize(("end", "longest"), [(0.52, 0.05), (0.504, 0.3)])
+def test_two_branch_points_within_one_of_the_last_steps_are_both_found(end, longest):
     """There y and -y are alike: stops that bend the same way put pitchforks at the same places."""
     hz, bend = 0.45, 0.1
     own_y = SPRING_Y - 4.0 - 6.0 * bend
@@ -172,7 +173,8 @@ def test_two_branch_points_within_one_of_the_last_steps_are_both_found():
         excitation=[HarmonicForce("x", FORCE)],
     )  # fmt: skip
     orbit = solve_orbit(alike, hz, guess=orbit_without_y(hz), observe="y")
-    branch = continue_branch(orbit, (hz, 0.52))
+    options = ContinuationOptions(max_step=longest)
+    branch = continue_branch(orbit, (hz, end), options=options)
     assert [s.kind for s in branch.special_points] == ["BP", "BP"]
     low, high = (s.frequency_hz for s in branch.special_points)
     assert not any(low < node.orbit.frequency_hz < high for node in branch.nodes)
