@@ -217,19 +217,20 @@ class Trail:
             except (LocateError, ConvergenceError) as error:
                 if closely and self._walk_closely():
                     continue
-                between = None if closely else self._straight_way(a, b)
-                pieces = between and _in_pieces([a, *between, b])
-                found, lost = pieces or _by_halves(a, b, error)
+                found, lost = _by_halves(a, b, error)
+                every = self._along_straight_way(a, b) if lost and not closely else None
+                if every is not None:
+                    found, lost = every, []
                 self.special_points += found
                 self.notes += lost
             self._searched += 1
         if len(self.special_points) > known:
             self.special_points = without_repeats(self.special_points)
 
-    def _straight_way(self, a: BranchPoint, b: BranchPoint) -> list[BranchPoint] | None:
-        """Points of a walk with shorter steps from a to b, if it leads there straight.
+    def _along_straight_way(self, a: BranchPoint, b: BranchPoint) -> list[SpecialPoint] | None:
+        """All special points on a walk with shorter steps, if it leads from a to b straight.
 
-        To know b again it must pass it, also at the end of the range.
+        To know b again it must pass it, also at the end of the range. None if any may be missing.
         """
         low, high = self.walk.range_hz
         step = b.arclength - a.arclength
@@ -241,7 +242,9 @@ class Trail:
         if longer > STRAIGHT:
             return None
         lengths = (a.arclength + (p.arclength - a.arclength) / longer for p in between)
-        return [replace(p, arclength=x) for p, x in zip(between, lengths, strict=True)]
+        way = [replace(p, arclength=x) for p, x in zip(between, lengths, strict=True)]
+        found, lost = _in_pieces([a, *way, b])
+        return None if lost else found
 
 
 def trace(
