@@ -9,11 +9,12 @@ branch goes through from y > 0 to y < 0.
 from __future__ import annotations
 
 import math
-from collections import Counter
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from branches_alike import assert_same_branches
 from test_nldyn_mathieu import mathieu_multipliers_of
 
 from nldyn import (
@@ -125,16 +126,15 @@ def test_a_branch_begun_beside_a_branch_point_has_it_once(beside):
     problem, tangent = special.orbit.problem, other_tangent(special)
     across = problem.metric(special.orbit.point) * tangent
     found = problem.correct(special.orbit.point + beside * tangent, across / np.linalg.norm(across))
-    hz = special.frequency_hz
-    short = ContinuationOptions(first_step=0.001, max_step=3e-3)
-    narrow, wide = (0.9998 * hz, 1.0002 * hz), (0.9995 * hz, 1.0005 * hz)
-    branch = continue_branch(Orbit.of(problem, found, "y"), narrow, options=short)
-    for told in (branch, branch.extend(wide)):
-        assert Counter(s.kind for s in told.special_points)["BP"] == 1
-    assert [s.frequency_hz for s in branch.extend(wide).special_points] == [
-        s.frequency_hz
-        for s in continue_branch(Orbit.of(problem, found, "y"), wide, options=short).special_points
-    ]
+    window = 0.9995 * special.frequency_hz, 1.0005 * special.frequency_hz
+    few = ContinuationOptions(first_step=0.001, max_step=3e-3, max_points=3)
+    more = replace(few, max_points=5)
+    orbit = Orbit.of(problem, found, "y")
+    branch = continue_branch(orbit, window, options=few)
+    longer = branch.extend(options=more)
+    for told in (branch, longer):
+        assert [s.kind for s in told.special_points] == ["BP"]
+    assert_same_branches(longer, continue_branch(orbit, window, options=more))
 
 
 @pytest.mark.parametrize("preload_y", [1.0, 1e-3])
