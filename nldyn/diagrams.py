@@ -238,6 +238,8 @@ class Collector:
             branch = self.branches[count]
             count += 1
             for special in branch.special_points:
+                if special.kind not in ("PD", "BP"):
+                    continue
                 period = minimal_period(special.orbit) * (2 if special.kind == "PD" else 1)
                 options = self.options if period <= wanted else shorter
                 if special.kind == "PD" and period <= longest:

@@ -126,8 +126,6 @@ def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> N
     if special.kind not in kinds:
         raise SystemModelError(f"no special point is of the kind {special.kind!r}")
     try:
-        if special.kind == "BP" and minimal_period(special.orbit) < special.orbit.period:
-            return _shorter_period_met(special)
         return kinds[special.kind](special, loop_of(special.orbit))
     except CoefficientError as error:
         title, name = {
@@ -266,13 +264,15 @@ def resonance(mu: complex) -> str:
 
 
 def _branch_point(special: SpecialPoint, loop: Loop) -> NormalForm:
+    shorter = minimal_period(special.orbit)
+    if shorter < special.orbit.period:
+        return _shorter_period_met(special, shorter)
     found = crossing(loop)
     return _pitchfork(special, found) if found.is_pitchfork else _transcritical(special, found)
 
 
-def _shorter_period_met(special: SpecialPoint) -> NormalForm:
-    shorter, hz = minimal_period(special.orbit), _hz(special)
-    sentence = f"Branch point at {hz}: here the orbit is one of period {shorter}"
+def _shorter_period_met(special: SpecialPoint, shorter: int) -> NormalForm:
+    sentence = f"Branch point at {_hz(special)}: here the orbit is one of period {shorter}"
     if special.orbit.period == 2 * shorter:
         sentence += ", at a flip of a branch of that period, from which this branch is born."
         return NormalForm("flip", sentence)

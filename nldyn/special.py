@@ -550,11 +550,7 @@ def _located(kind: str, chord: Chord) -> list[SpecialPoint]:
 
 def _crossing_at_an_end(chord: Chord) -> Orbit | None:
     """Where branches cross so near to an end of a chord that its tangent may be of both."""
-    for orbit in (chord.first.orbit, chord.last.orbit):
-        crossing = crossing_beside(orbit)
-        if crossing is not None and distance(orbit, crossing) < MIXED:
-            return crossing
-    return None
+    return _crossing_within(chord.first.orbit, MIXED) or _crossing_within(chord.last.orbit, MIXED)
 
 
 def _vanishes(touch: Touch, at: BranchPoint, a: BranchPoint, b: BranchPoint) -> bool:
@@ -602,8 +598,13 @@ def _turns_twice(a: SpecialPoint, b: SpecialPoint) -> bool:
     apart = abs(a.point.arclength - b.point.arclength)
     turning = apart < NEIGHBOUR and max(_pace(a), _pace(b)) < NEIGHBOUR
     kinds = {a.kind, b.kind}
-    one = apart < NEIGHBOUR and distance(a.orbit, b.orbit) < SAME
-    return (kinds == {"BP"} and (turning or one)) or (kinds == {"BP", "LP"} and turning)
+    one = apart < NEIGHBOUR and same_crossing(a, b)
+    return one or (turning and kinds in ({"BP"}, {"BP", "LP"}))
+
+
+def same_crossing(a: SpecialPoint, b: SpecialPoint) -> bool:
+    """Whether two special points are one branch point."""
+    return a.kind == b.kind == "BP" and distance(a.orbit, b.orbit) < SAME
 
 
 def _pace(special: SpecialPoint) -> float:
@@ -622,8 +623,13 @@ def lies_on_crossing(orbit: Orbit, within: float) -> bool:
 
     On a plane across a branch Newton's method may find any orbit of the other one there.
     """
+    return _crossing_within(orbit, within) is not None
+
+
+def _crossing_within(orbit: Orbit, within: float) -> Orbit | None:
+    """Where branches cross within a distance of an orbit, relative to it, if they do."""
     crossing = crossing_beside(orbit)
-    return crossing is not None and distance(orbit, crossing) < within
+    return crossing if crossing is not None and distance(orbit, crossing) < within else None
 
 
 def crossing_beside(orbit: Orbit) -> Orbit | None:
