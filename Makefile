@@ -15,7 +15,8 @@ $(VENV)/.installed: pyproject.toml
 paper: $(VENV)/.installed
 	$(BIN)/nldyn paper --out results/paper
 
-# the workers share the cores: with more threads each, small products of matrices take 100 times as long
+# the workers share the cores: with two threads each, exponentials of 2 x 2 matrices took 200 times as
+# long on a busy machine
 test: $(VENV)/.installed
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile
 
