@@ -25,7 +25,7 @@ from nldyn.crossings import check_requested, requested
 from nldyn.errors import SystemModelError, check_range, check_types, numbers
 from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, check_minimal
-from nldyn.special import ON_CROSSING, lies_on_crossing, same_crossing
+from nldyn.special import NEIGHBOUR, ON_CROSSING, lies_on_crossing, same_crossing
 from nldyn.step_control import ContinuationOptions
 from nldyn.trail import Leg, Trail
 from nldyn.walk import shifts
@@ -276,7 +276,8 @@ def _without_repeat(forward: Leg, backward: Leg) -> tuple[Leg, Leg]:
     if not (forward.special_points and backward.special_points):
         return forward, backward
     a, b = forward.special_points[0], backward.special_points[0]
-    if not same_crossing(a, b):
+    farthest = max(abs(a.point.arclength), abs(b.point.arclength))
+    if not (farthest < NEIGHBOUR and same_crossing(a, b)):
         return forward, backward
     if a.point.arclength < 0.0:
         return _without_first(forward), backward

@@ -486,7 +486,7 @@ def turned_over(
         sigma = min(max((where - first.arclength) / span, 0.02), 0.98)
         extra = Chord(first, last).at(sigma)
         if differs(a, extra):
-            return None if lies_on_crossing(extra.orbit, MIXED) else extra
+            return None if lies_on_crossing(extra.orbit, ON_CROSSING) else extra
         triples = ((a, extra, b), (z, a, extra)) if ahead else ((z, extra, a), (extra, a, b))
         for triple in triples:
             where = next(islice(hidden_dips(*triple), number, None), math.nan)
@@ -533,19 +533,25 @@ def _located(kind: str, chord: Chord) -> list[SpecialPoint]:
     """Where a test changes its sign on a chord; nothing if that is no pair on the unit circle.
 
     Where branches cross beside an end of the chord, the tangent there may be of both: its change of
-    sign is not that of a fold, unless a multiplier tells.
+    sign is not that of a fold, unless a multiplier tells or the frequency turns.
     """
-    if kind == "LP" and not _is_plain_fold(chord):
-        crossing = _crossing_at_an_end(chord)
-        if crossing is not None:
-            at = BranchPoint(crossing, chord.first.tangent, chord.first.arclength)
-            return [_along(chord, SpecialPoint("BP", at, crossing.error))]
     special = locate(kind, chord, lambda point: tests(point)[kind])
     if kind == "NS" and not _on_unit_circle(special.orbit.multipliers):
         return []
     if kind == "LP" and _is_plain_fold(chord):
         return [special]
+    if kind == "LP" and not _turns_at(special.orbit, chord):
+        crossing = _crossing_at_an_end(chord)
+        if crossing is not None:
+            at = replace(special.point, orbit=crossing)
+            return [_along(chord, SpecialPoint("BP", at, crossing.error))]
     return [_along(chord, _crossing_or_fold(special))]
+
+
+def _turns_at(fold: Orbit, chord: Chord) -> bool:
+    """Whether the frequency of a fold lies beyond those at the ends of its chord."""
+    ends = chord.first.orbit.omega, chord.last.orbit.omega
+    return not min(ends) <= fold.omega <= max(ends)
 
 
 def _crossing_at_an_end(chord: Chord) -> Orbit | None:

@@ -14,10 +14,12 @@ from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError
 from nldyn.shooting import metric_length
 from nldyn.special import (
+    NEIGHBOUR,
     Chord,
     LocateError,
     distance,
     insert_dip,
+    same_crossing,
     special_points_between,
     without_repeats,
 )
@@ -134,11 +136,28 @@ class Trail:
         if self.walk.stop_reason.startswith(JOINS):
             special = [s for s in special if not self._is_flip_at_end(s)]
         elif self.walk.stop_reason == CLOSED:  # the last step leads beyond the start
-            special = [s for s in special if not self._is_repeated(s.point)]
+            special = self._once_around()
             last = self.nodes.pop()  # a dip may have put others there
             self.nodes = [*(p for p in self.nodes if not self._is_repeated(p)), last]
         end = self._end(next(i for i, p in enumerate(self.nodes) if p is self._stride.here))
         return Leg(self.nodes, special, self.notes, self.walk.stop_reason, end)
+
+    def _once_around(self) -> list[SpecialPoint]:
+        """The special points of a closed branch, whose last step leads beyond the start.
+
+        What lies there was told after the start. Of a branch point beside that rounding decides
+        whether the first step or the last tells it, or both.
+        """
+        before = self._stride.here.arclength
+        near = self.nodes[-1].arclength - before + NEIGHBOUR
+        told: list[SpecialPoint] = []
+        for special in self.special_points:
+            beside = [s for s in told if s.point.arclength < near]
+            if special.point.arclength > before and any(same_crossing(special, s) for s in beside):
+                continue
+            if special.kind == "BP" or not self._is_repeated(special.point):
+                told.append(special)
+        return told
 
     def so_far(self) -> Leg | None:
         """What was found up to the last complete point; None before the first."""

@@ -30,7 +30,7 @@ from nldyn.step_control import ContinuationOptions
 KINK = TOUCH  # step below which a branch may bend by any angle where the number of contacts changes
 MEETS_OPEN_END = "meets another branch where that was broken off"
 BROKEN = 1e-8  # asymmetry of an orbit that is more than rounding,
-BY_TOLERANCE = 0.1  # or, over the tolerance of the flow map, more than its error
+BY_TOLERANCE = 1.0  # or, over the tolerance of the flow map, more than its error (0.3 at most seen)
 EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
 MEETING_STEP = 1e-4  # longest step over which a doubled branch may meet the one it comes from
 LONGER_CROSSINGS = (1.0, 10.0, 100.0)  # steps from a crossing, over `SHORTEST_CROSSING`

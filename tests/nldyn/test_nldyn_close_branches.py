@@ -309,6 +309,29 @@ def test_a_half_begun_beside_its_pitchfork_has_that_once_and_no_fold(facing, amp
     assert only.frequency_hz == pytest.approx(hz, rel=1e-9)
 
 
+@pytest.mark.parametrize("index", [0, 1])
+@pytest.mark.parametrize("amplitude", [1e-5, 1e-6, 4.1630532849205377e-07])
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_closed_half_begun_beside_its_pitchfork_has_that_once(facing, index, amplitude, side):
+    """The first step or the last may tell it, or both; as many as one begun far from it has."""
+    special = [s for s in facing.special_points if s.kind == "BP"][index]
+    far, near = (
+        continue_branch(switch_at_branch_point(special, a)[side].orbit, (6.5, 8.5))
+        for a in (1e-2, amplitude)
+    )
+    for branch in (far, near):
+        assert branch.closed and not branch.notes
+    kinds, hz = zip(*[told_by(branch) for branch in (far, near)], strict=True)
+    assert kinds[0] == kinds[1] == 2 * ["BP"] + 4 * ["LP"]
+    assert hz[1] == pytest.approx(hz[0], rel=1e-9)
+
+
+def told_by(branch):
+    """Kinds and frequencies of the special points of a branch, sorted."""
+    told = sorted((s.kind, s.frequency_hz) for s in branch.special_points)
+    return [kind for kind, _ in told], [hz for _, hz in told]
+
+
 def test_a_symmetric_branch_is_followed_with_a_coarse_flow_map(facing):
     """Its orbits are as asymmetric as the error of the map, which breaks no symmetry."""
     coarse = FlowMap(facing_stops(), FlowOptions(rtol=3e-5))

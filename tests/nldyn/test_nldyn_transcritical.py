@@ -45,10 +45,14 @@ def system(preload_y: float = PRELOAD) -> System:
     quadratic = [Stop(at, 1.0, 2.0, gap=-PRELOAD) for at in ("x + y", "x - y")]
     quadratic.append(Stop("y", 1.0 / p, 2.0, gap=-p))
     others = [Stop("x", 2.0, 2.0, -PRELOAD, -1), Stop("y", 1.0 / p**2, 3.0, -p, -1)]
+    return made_of(OWN_Y, [*quadratic, *others])
+
+
+def made_of(own_y: float, stops: list[Stop]) -> System:
     return System.from_matrices(
-        np.eye(2), np.diag([OWN_X, OWN_Y]),
+        np.eye(2), np.diag([OWN_X, own_y]),
         {"x": [1.0, 0.0], "y": [0.0, 1.0], "x + y": [1.0, 1.0], "x - y": [1.0, -1.0]},
-        damping=np.diag([DAMPING_X, DAMPING_Y]), stops=[*quadratic, *others],
+        damping=np.diag([DAMPING_X, DAMPING_Y]), stops=stops,
         excitation=[HarmonicForce("x", FORCE)],
     )  # fmt: skip
 
@@ -76,6 +80,38 @@ def orbit_without_y(hz):
     response = FORCE / (SPRING_X - omega**2 + 1j * DAMPING_X * omega)
     shape = system().participation["x"]
     return np.outer([response.real, (1j * omega * response).real], shape).ravel()
+
+
+def bent_slightly(bend: float) -> System:
+    """Stops at y bend so little that the other branch is folded close to where it crosses."""
+    stiff = 0.1
+    stops = [Stop(at, 1.0, 2.0, gap=-PRELOAD) for at in ("x + y", "x - y")]
+    stops += [Stop("x", 2.0, 2.0, -PRELOAD, -1)]
+    stops += [Stop("y", stiff, 3.0, -1.0, side) for side in (1, -1)]
+    stops += [Stop("y", bend, 2.0, -1.0), Stop("y", bend, 3.0, -1.0, -1)]
+    own_y = SPRING_Y - 4.0 - 6.0 * stiff - 5.0 * bend
+    return made_of(own_y, stops)
+
+
+@pytest.mark.parametrize("beside", [9e-6, 2e-6, -5e-6])
+@pytest.mark.parametrize("step", [0.01, 0.02, 0.05])
+def test_a_fold_beyond_a_branch_point_beside_the_start_is_told(beside, step):
+    """There the tangent may be of both branches, and its sign that of no fold."""
+    hz = 0.45
+    orbit = solve_orbit(bent_slightly(2e-3), hz, guess=orbit_without_y(hz), observe="y")
+    special = continue_branch(orbit, (hz, 0.501)).special_points[0]
+    assert special.kind == "BP"
+    problem, tangent = special.orbit.problem, other_tangent(special)
+    across = problem.metric(special.orbit.point) * tangent
+    found = problem.correct(special.orbit.point + beside * tangent, across / np.linalg.norm(across))
+    window = 0.9 * special.frequency_hz, 1.1 * special.frequency_hz
+    few = ContinuationOptions(first_step=step, max_step=step, max_points=2)
+    branch = continue_branch(Orbit.of(problem, found, "y"), window, options=few)
+    fold, crossing = sorted(branch.special_points, key=lambda s: s.frequency_hz)
+    assert (fold.kind, crossing.kind) == ("LP", "BP")
+    assert crossing.frequency_hz == pytest.approx(special.frequency_hz, rel=1e-9)
+    assert fold.frequency_hz == pytest.approx(refine_special(fold).frequency_hz, rel=1e-9)
+    assert np.all(branch.frequency_hz > fold.frequency_hz)
 
 
 @pytest.mark.parametrize("preload_y", [1.0, 1e-3])
