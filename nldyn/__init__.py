@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     )
     from nldyn.parameters import Parameter
     from nldyn.plot import plot_diagram
+    from nldyn.pseudo_orbit_search import by_pseudo_orbits
     from nldyn.search import SearchOptions, find_orbits
     from nldyn.sections import BruteForce, brute_force, impact_section, stroboscopic_section
     from nldyn.selection import Selection, reduce_for
@@ -91,6 +92,7 @@ _HOMES = {
     "curve_store": "load_curve load_curves save_curves",
     "curves": "Curve continue_constant continue_in continue_special",
     "detour_search": "by_detour",
+    "pseudo_orbit_search": "by_pseudo_orbits",
     "diagrams": "Diagram Seed diagram",
     "doubling": "switch_at_flip",
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
@@ -180,6 +182,7 @@ __all__ = [
     "basins",
     "brute_force",
     "by_detour",
+    "by_pseudo_orbits",
     "cascade",
     "cascades_in",
     "chaos_lifetime",

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from cms.threads import one_thread
-from nldyn.branch import Branch, check_branches
-from nldyn.checkpoint import checkpoint_of_several
+from nldyn.beside import check_search, collector_beside, diagram_of, take_kept
+from nldyn.branch import Branch
 from nldyn.detour import Detour, checked_factors, named
-from nldyn.diagrams import Collector, Diagram, Progress, check_known, counted, middle_orbit
-from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
-from nldyn.exploration import FINEST_SPACING, steps_between
-from nldyn.fixed_point_index import index_note, is_damped, without_index_note
+from nldyn.diagrams import Collector, Diagram, Progress, counted
+from nldyn.exploration import steps_between
 from nldyn.orbit import Orbit, minimal_period, same_orbit
 from nldyn.parameters import Parameter
 from nldyn.step_control import ContinuationOptions
@@ -96,29 +93,24 @@ def by_detour(
     >>> len(more.branches), more.branches[1].closed
     (2, True)
     """
-    _check(known, max_period, spacing, options, progress)
+    check_search(known, max_period, spacing, options, progress)
     own = known.branches[0].points[0].problem.flow
     detour = Detour(own, checked_factors(own.system, factors))
     low, high = known.range_hz
-    options, progress = options or ContinuationOptions(), progress or (lambda what, hz: None)
-    box = Collector(own, (low, high), known.observe, options, progress)
-    box.take(known.branches, without_index_note(known.notes))
-    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, own, (low, high))
+    box = collector_beside(known, options, progress, checkpoint)
     with box.checkpoint:
-        _go_on(box, max_period)
+        take_kept(box, max_period)
         there = _followed(box, detour, max_period)
         count = steps_between(low, high, spacing)
         tried = came = 0
         for frequency in np.geomspace(low, high, count + 2)[1:-1].tolist():
-            progress("back", frequency)
+            box.progress("back", frequency)
             orbits = [(via, orbit) for via in there for orbit in via.branch.at(frequency)]
             carriages = ((via, detour.carried(orbit, 1.0, 0.0)) for via, orbit in orbits)
             back = [(via, orbit) for via, orbit in carriages if orbit is not None]
             tried, came = tried + len(orbits), came + len(back)
             _follow_new(box, back, max_period)
         folds = _folds_carried_back(box, detour, there, max_period)
-    if is_damped(own.system):
-        box.notes.append(index_note(box.branches, known.range_hz, max_period))
     new = counted(box.branches[len(known.branches) :])
     changed = " and ".join(f"{f:g} of {named(what)}" for what, f in detour.factors.items())
     led = (
@@ -127,8 +119,7 @@ def by_detour(
         if there
         else "no orbit got there, as some may with factors nearer to 1"
     )
-    box.notes.append(f"at {changed}: {led}, {new} beside those given")
-    return Diagram(tuple(box.branches), (low, high), known.observe, tuple(box.notes))
+    return diagram_of(box, max_period, f"at {changed}: {led}, {new} beside those given")
 
 
 @dataclass
@@ -154,38 +145,6 @@ def _met_from_others(known: Diagram, there: Sequence[Via], max_period: int) -> s
     given = {i for i, branch in enumerate(known.branches) if branch.period <= max_period}
     met = {i for i in given if any(i in via.exits and via.entries & given - {i} for via in there)}
     return f"{len(met)} of the {len(given)} given met from others"
-
-
-def _check(
-    known: Diagram,
-    max_period: int,
-    spacing: float,
-    options: ContinuationOptions | None,
-    progress: Progress | None,
-) -> None:
-    check_types(
-        known=(known, Diagram),
-        options=(options, ContinuationOptions, None),
-        progress=(progress, Callable, None),
-    )
-    check_whole("max_period", max_period, 1)
-    if not (is_finite(spacing) and FINEST_SPACING <= spacing < 1.0):
-        raise SystemModelError(
-            f"spacing must lie between {FINEST_SPACING:g} and 1, got {shown(spacing)}"
-        )
-    check_branches("known: branches", known.branches)
-    if not known.branches:
-        raise SystemModelError("known: has no branches to begin with")
-    check_known(known, known.branches[0].points[0].problem.flow)
-
-
-def _go_on(box: Collector, max_period: int) -> None:
-    """Finish the branches that the file holds, and follow what they lead to."""
-    count = len(box.branches)
-    for branch in box.checkpoint.new_branches(lambda branch: box.known(middle_orbit(branch))):
-        progress = partial(box.progress, f"1/{branch.period}")
-        box.take_in(branch.extend(progress=progress, checkpoint=box.checkpoint))
-    box.follow_up(count, max_period, max_period, None)
 
 
 def _followed(known: Collector, detour: Detour, max_period: int) -> list[Via]:

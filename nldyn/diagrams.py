@@ -145,7 +145,12 @@ class Collector:
     crossings: list[SpecialPoint] = field(default_factory=list)
 
     def known(self, orbit: Orbit) -> bool:
-        return any(branch.contains(orbit) for branch in self.branches)
+        return self.branch_of(orbit) is not None
+
+    def branch_of(self, orbit: Orbit) -> int | None:
+        """Index of the branch that passes through an orbit."""
+        passing = (i for i, branch in enumerate(self.branches) if branch.contains(orbit))
+        return next(passing, None)
 
     def with_fold(self, orbit: Orbit) -> int | None:
         """Index of the branch that has a fold at an orbit."""

@@ -197,13 +197,27 @@ def orbit_beside(
 ) -> Orbit | None:
     """Orbit beside a state z at a frequency near ω, by its minimal period; None if none is found.
 
-    The frequency is free, and each Newton step is the shortest of those that solve the linearised
-    equations, the Gauss-Newton method of Allgower and Georg [1990, chapter 3]. So a state beside
-    a branch that does not reach ω leads to it, and folds do no harm.
+    See `nearest_orbit`.
     """
     problem = shooting_problem(flow, period)
     try:
-        point = np.append(spread(problem, start, omega).ravel(), math.log(omega))
+        nodes = spread(problem, start, omega)
+    except ConvergenceError:
+        return None
+    return nearest_orbit(problem, nodes, omega, observe)
+
+
+def nearest_orbit(
+    problem: ShootingProblem, nodes: Real, omega: float, observe: str
+) -> Orbit | None:
+    """Orbit near some states at a frequency near ω, by its minimal period; None if none is found.
+
+    The frequency is free, and each Newton step is the shortest of those that solve the linearised
+    equations, the Gauss-Newton method of Allgower and Georg [1990, chapter 3]. So states beside
+    a branch that does not reach ω lead to it, and folds do no harm.
+    """
+    try:
+        point = np.append(nodes.ravel(), math.log(omega))
         row = np.zeros(point.size)
         row[-1] = 1.0
         for _ in range(LEAST_LENGTH_STEPS):
@@ -227,12 +241,12 @@ def orbit_beside(
         if not found.converged:
             return None
         orbit = Orbit.of(problem, found, observe)
-        shorter = minimal_period(orbit)
-        if shorter == period:
-            return orbit
-        return orbit_near(flow, stroboscopic(orbit)[0], shorter, orbit.omega, observe)
     except ConvergenceError:
         return None
+    shorter = minimal_period(orbit)
+    if shorter == orbit.period:
+        return orbit
+    return orbit_near(problem.flow, stroboscopic(orbit)[0], shorter, orbit.omega, observe)
 
 
 def _refined(problem: ShootingProblem, start: Real, omega: float, observe: str) -> Orbit | None:

@@ -3,7 +3,8 @@
 Beside the branches of the starts that are known, those in the directory or else the ones that are
 kept with the package, it finds others, writes the starts of all into the directory, and reports how
 many may be missing. With ``--detour damping=0.5 "natural_frequency_hz[1]=0.99"`` at the end, say,
-it does not simulate, but goes by way of a system with these factors, see `by_detour`. The directory
+it does not simulate, but goes by way of a system with these factors, see `by_detour`; with
+``--pseudo-orbits`` it puts pieces of known orbits together, see `by_pseudo_orbits`. The directory
 keeps what is found, and the same command goes on where it was interrupted (but for following the
 starts); once it has ended, it looks for more beside what it has found, from other random states.
 """
@@ -13,8 +14,9 @@ from __future__ import annotations
 import argparse
 import hashlib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from nldyn.cli import plain_errors, told_what_is_kept
@@ -36,6 +38,7 @@ from nldyn.paper.starts import (
 )
 from nldyn.parameters import Parameter
 from nldyn.progress import progress_line
+from nldyn.pseudo_orbit_search import by_pseudo_orbits
 from nldyn.store import load_diagram
 from nldyn.survey import explore
 from nldyn.whole_file import write_whole
@@ -69,15 +72,22 @@ def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Explorat
 
 def search_by_detour(name: str, folder: Path, factors: Mapping[str | Parameter, float]) -> Diagram:
     """Look for branches of a model with `by_detour`, and write the starts of all."""
+    return _search_beside(name, folder, partial(by_detour, factors=factors))
+
+
+def search_by_pseudo_orbits(name: str, folder: Path) -> Diagram:
+    """Look for branches of a model with `by_pseudo_orbits`, and write the starts of all."""
+    return _search_beside(name, folder, by_pseudo_orbits)
+
+
+def _search_beside(name: str, folder: Path, look: Callable[..., Diagram]) -> Diagram:
+    """Look for branches of a model beside the known ones, and write the starts of all."""
     job = job_named(name)
     with progress_line() as report:
         known, place, _ = known_branches(job, folder, report)
-        kept = place.with_suffix(".detour.h5")
+        kept = place.with_suffix(".beside.h5")
         with told_what_is_kept(kept):
-            found = by_detour(
-                known, factors, max_period=LONGEST, options=LONG,
-                progress=report, checkpoint=kept,
-            )  # fmt: skip
+            found = look(known, max_period=LONGEST, options=LONG, progress=report, checkpoint=kept)
     write_found(found, job, folder)
     return found
 
@@ -147,10 +157,15 @@ def main() -> None:
         help="what is changed there: damping, excitation, or a parameter such as 'stiffness[0]'; "
         "give it after the models",
     )  # fmt: skip
+    parser.add_argument(
+        "--pseudo-orbits", action="store_true", help="put pieces of known orbits together"
+    )
     given = parser.parse_args()
     factors = dict(given.detour or ())
     if given.detour and len(factors) < len(given.detour):
         parser.error("argument --detour: names something twice")
+    if factors and given.pseudo_orbits:
+        parser.error("argument --pseudo-orbits: not allowed with argument --detour")
     unknown = set(given.models) - set(MODELS)
     if unknown:
         parser.error(f"unknown model {sorted(unknown)[0]!r} (there are: {', '.join(MODELS)})")
@@ -168,6 +183,8 @@ def main() -> None:
         with plain_errors():
             if factors:
                 said = "\n".join(search_by_detour(name, given.directory, factors).notes)
+            elif given.pseudo_orbits:
+                said = "\n".join(search_by_pseudo_orbits(name, given.directory).notes)
             else:
                 said = search(name, given.directory).report()
         print(f"{name}: {said}", flush=True)

@@ -1,6 +1,7 @@
 """Orbits from which the branches of the larger models are followed."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -160,6 +161,15 @@ def test_a_detour_gives_starts(two_known):
     assert len(read_starts(name, folder)) == len(done.branches) > len(known) == 2
 
 
+def test_pseudo_orbits_give_starts(two_known, monkeypatch, capsys):
+    name, folder = two_known
+    monkeypatch.setattr("sys.argv", ["search", str(folder), name, "--pseudo-orbits"])
+    main()
+    last = capsys.readouterr().out.splitlines()[-1]
+    added = int(re.search(r"theirs, (\d+) branch(es)? beside those given", last)[1])
+    assert len(read_starts(name, folder)) == 2 + added > 2
+
+
 def test_a_search_is_kept_and_gives_starts_from_which_the_next_one_begins(
     two_known, monkeypatch
 ):
@@ -212,6 +222,7 @@ def test_branches_of_another_model_are_refused(two_known):
         (["damping=half"], "is not of the form"),
         (["damping=0.5", "damping=0.3"], "names something twice"),
         (["damping=0.5", "--detour", "damping=0.3"], "names something twice"),
+        (["damping=0.5", "--pseudo-orbits"], "--pseudo-orbits: not allowed with argument --detour"),
         (["gap=2"], "two_dof_xi_0.01: factors: gap[0] is zero, which no factor changes"),
         (["natural_frequency_hz[2]=2"], "there is no mode 2"),
         (["modal_damping[-1]=1"], "that of modal_damping of all modes must be a number"),

@@ -1,0 +1,74 @@
+"""What searches beside known branches have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from nldyn.branch import check_branches
+from nldyn.checkpoint import checkpoint_of_several
+from nldyn.diagrams import Collector, Diagram, Progress, check_known, middle_orbit
+from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
+from nldyn.exploration import FINEST_SPACING
+from nldyn.fixed_point_index import index_note, is_damped, without_index_note
+from nldyn.step_control import ContinuationOptions
+
+
+def check_search(
+    known: Diagram,
+    max_period: int,
+    spacing: float,
+    options: ContinuationOptions | None,
+    progress: Progress | None,
+) -> None:
+    """Raise unless the input of a search beside known branches makes sense."""
+    check_types(
+        known=(known, Diagram),
+        options=(options, ContinuationOptions, None),
+        progress=(progress, Callable, None),
+    )
+    check_whole("max_period", max_period, 1)
+    if not (is_finite(spacing) and FINEST_SPACING <= spacing < 1.0):
+        raise SystemModelError(
+            f"spacing must lie between {FINEST_SPACING:g} and 1, got {shown(spacing)}"
+        )
+    check_branches("known: branches", known.branches)
+    if not known.branches:
+        raise SystemModelError("known: has no branches to begin with")
+    check_known(known, known.branches[0].points[0].problem.flow)
+
+
+def collector_beside(
+    known: Diagram,
+    options: ContinuationOptions | None,
+    progress: Progress | None,
+    checkpoint: str | Path | None,
+) -> Collector:
+    """A collector that has the known branches, and a file for what is found beside them."""
+    own, progress = known.branches[0].points[0].problem.flow, progress or (lambda what, hz: None)
+    options = options or ContinuationOptions()
+    box = Collector(own, known.range_hz, known.observe, options, progress)
+    box.take(known.branches, without_index_note(known.notes))
+    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, own, known.range_hz)
+    return box
+
+
+def take_kept(box: Collector, max_period: int) -> None:
+    """Finish the branches that the file holds, and follow what they lead to."""
+    count = len(box.branches)
+    for branch in box.checkpoint.new_branches(lambda branch: box.known(middle_orbit(branch))):
+        progress = partial(box.progress, f"1/{branch.period}")
+        box.take_in(branch.extend(progress=progress, checkpoint=box.checkpoint))
+    box.follow_up(count, max_period, max_period, None)
+
+
+def diagram_of(box: Collector, max_period: int, note: str) -> Diagram:
+    """What a collector has, with notes on the indices, if every mode is damped, and on the search.
+
+    Indices that add up to one prove nothing; others prove that orbits are missing.
+    """
+    if is_damped(box.flow.system):
+        box.notes.append(index_note(box.branches, box.range_hz, max_period))
+    box.notes.append(note)
+    return Diagram(tuple(box.branches), box.range_hz, box.observe, tuple(box.notes))

@@ -1,0 +1,132 @@
+"""Further branches beside pieces of known orbits that nearly fit together."""
+
+from __future__ import annotations
+
+import math
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from cms.threads import one_thread
+from nldyn.beside import check_search, collector_beside, diagram_of, take_kept
+from nldyn.diagrams import Collector, Diagram, Progress, counted
+from nldyn.errors import check_whole
+from nldyn.exploration import steps_between
+from nldyn.linear import Real
+from nldyn.orbit import Orbit, shooting_problem
+from nldyn.pseudo_orbits import Pieces
+from nldyn.search import MOST_COUNT, nearest_orbit
+from nldyn.step_control import ContinuationOptions
+
+MOST_ALIKE = 4  # pseudo-orbits made of the same branches that are tried
+
+
+@one_thread()
+def by_pseudo_orbits(
+    known: Diagram,
+    *,
+    max_period: int = 3,
+    spacing: float = 0.01,
+    tries: int = 2000,
+    options: ContinuationOptions | None = None,
+    progress: Progress | None = None,
+    checkpoint: str | Path | None = None,
+) -> Diagram:
+    """Find further branches where pieces of known orbits nearly fit together.
+
+    A pseudo-orbit is a sequence of pieces of motions with small jumps between them; in a hyperbolic
+    set an orbit is near every one [Bowen 1975]. Here the pieces are single excitation periods of
+    known orbits, of any period and of frequencies close together. From each closed sequence of up
+    to `max_period` of them, those with the smallest jumps first, the Gauss-Newton method [Allgower
+    and Georg 1990, chapter 3] goes to the nearest orbit, at a frequency that it finds. If that lies
+    on no known branch, its branch is followed, with what it leads to. No motion is simulated, and
+    no other system is needed; it is the faster the fewer branches there are. What resembles no
+    orbits known is not found.
+
+    Parameters
+    ----------
+    known : Diagram
+        Branches of a system, from `diagram` or `explore`, with their orbits.
+    max_period : int
+        Longest orbits wanted.
+    spacing : float
+        Relative distance of the frequencies at which pieces are put together, and largest
+        distance of those of the pieces from it.
+    tries : int
+        Most pseudo-orbits of each length at each frequency from which an orbit is looked for; no
+        more than four are of the same branches.
+    options : ContinuationOptions, optional
+        Step control.
+    progress : callable, optional
+        Called as ``progress(what, frequency_hz)``.
+    checkpoint : str or Path, optional
+        File that keeps the branches found, also those of an earlier call: they count as known.
+
+    Returns
+    -------
+    Diagram
+        The branches known, then those found. The last note tells what was tried, and to how many of
+        the branches given, up to `max_period`, pieces of others led: at least so many it would have
+        found, had each alone been unknown. The note before tells, if every mode is damped, whether
+        the indices add up to one, see `index_sum`. What `known` notes of them is left out.
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense.
+    OutputError
+        If `checkpoint` cannot be written.
+
+    Examples
+    --------
+    >>> from nldyn import Diagram, Stop, System, Unbalance, continue_branch, solve_orbit
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> range_hz = 36.0, 39.0
+    >>> orbits = [solve_orbit(system, 37.0), solve_orbit(system, 37.0, 2, guess=[[1e-4, 0.0]])]
+    >>> branches = tuple(continue_branch(orbit, range_hz) for orbit in orbits)
+    >>> more = by_pseudo_orbits(Diagram(branches, range_hz, "middle"))
+    >>> [branch.period for branch in more.branches]
+    [1, 2, 3]
+    """
+    check_search(known, max_period, spacing, options, progress)
+    check_whole("tries", tries, 1, MOST_COUNT)
+    box = collector_beside(known, options, progress, checkpoint)
+    given = {i for i, branch in enumerate(known.branches) if branch.period <= max_period}
+    tried, came, met = 0, 0, set[int]()
+    low, high = known.range_hz
+    count = steps_between(low, high, spacing)
+    with box.checkpoint:
+        take_kept(box, max_period)
+        for frequency in np.geomspace(low, high, count + 2)[1:-1].tolist():
+            box.progress("pseudo-orbits", frequency)
+            pieces = Pieces.of(box.branches, frequency, spacing)
+            for period in range(1, max_period + 1):
+                for sequence in islice(pieces.pseudo_orbits(period, MOST_ALIKE), tries):
+                    tried += 1
+                    orbit = _orbit_near(box, pieces.nodes[list(sequence)], frequency)
+                    if orbit is None:
+                        continue
+                    came += 1
+                    on = box.branch_of(orbit)
+                    if on is None:
+                        box.follow(orbit, max_period, max_period, None)
+                    elif on not in pieces.branch[list(sequence)].tolist():
+                        met.add(on)
+    new = counted(box.branches[len(known.branches) :])
+    note = (
+        f"{came} of {tried} pseudo-orbits led to an orbit, and to {len(met & given)} of the "
+        f"{len(given)} given without a piece of theirs, {new} beside those given"
+    )
+    return diagram_of(box, max_period, note)
+
+
+def _orbit_near(box: Collector, pieces: Real, frequency_hz: float) -> Orbit | None:
+    """Orbit within the range that is nearest to a closed sequence of pieces (p, k, 2n)."""
+    problem = shooting_problem(box.flow, len(pieces))
+    nodes = pieces.reshape(problem.segments, -1)
+    orbit = nearest_orbit(problem, nodes, 2.0 * math.pi * frequency_hz, box.observe)
+    low, high = box.range_hz
+    return orbit if orbit is not None and low <= orbit.frequency_hz <= high else None

@@ -1,0 +1,136 @@
+"""Pieces of known orbits put together: where they nearly fit, another orbit may be near."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nldyn.branch import Branch
+from nldyn.linear import Real
+from nldyn.orbit import SEGMENTS_PER_PERIOD
+
+PLACES = 3  # most frequencies at which a branch gives pieces
+NEAREST = 60  # pieces that may follow one
+MOST_PATHS = 200_000  # that are prolonged
+FARTHEST = 2.0  # sum of the jumps, over the size of the pieces, up to which they are put together
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Pieces of orbits, each one excitation period long.
+
+    Parameters
+    ----------
+    branch : (m,) int array
+        Index of the branch that each is of.
+    place : (m,) int array
+        Which of the periods of its orbit it is, from zero.
+    period : (m,) int array
+        Period multiple of the orbit.
+    nodes : (m, k, 2n) array
+        States z at k equidistant phases.
+    ends : (m, 2n) array
+        States one period after the first.
+    """
+
+    branch: NDArray[np.intp]
+    place: NDArray[np.intp]
+    period: NDArray[np.intp]
+    nodes: Real
+    ends: Real
+
+    @classmethod
+    def of(cls, branches: Sequence[Branch], frequency_hz: float, spacing: float) -> Pieces:
+        """Pieces of the orbits of some branches within a relative distance of a frequency."""
+        window = frequency_hz / (1.0 + spacing), frequency_hz * (1.0 + spacing)
+        pieces = [
+            (index, place, len(nodes), nodes[place], nodes[(place + 1) % len(nodes)][0])
+            for index, branch in enumerate(branches)
+            for nodes in _orbits_within(branch, window)
+            for place in range(len(nodes))
+        ]
+        branch, place, period, nodes, ends = zip(*pieces, strict=True) if pieces else [()] * 5
+        return cls(
+            np.array(branch, dtype=np.intp),
+            np.array(place, dtype=np.intp),
+            np.array(period, dtype=np.intp),
+            np.array(nodes),
+            np.array(ends),
+        )
+
+    @property
+    def jumps(self) -> Real:
+        """Distance (m, m) from the end of a piece to the beginning of another, over their size."""
+        starts = self.nodes[:, 0]
+        size = float(np.linalg.norm(starts, axis=1).mean())
+        return np.asarray(np.linalg.norm(self.ends[:, None] - starts, axis=2) / size)
+
+    def is_orbit(self, sequence: Sequence[int]) -> bool:
+        """Whether a sequence is that of an orbit, or of orbits of one branch that do not differ."""
+        chosen = np.array(sequence)
+        if np.ptp(self.branch[chosen]):
+            return False
+        steps = np.roll(self.place[chosen], -1) - self.place[chosen] - 1
+        return not np.any(steps % self.period[chosen])
+
+    def pseudo_orbits(self, period: int, most_alike: int) -> Iterator[tuple[int, ...]]:
+        """Closed sequences of pieces, those with the smallest jumps first.
+
+        Not those that are orbits, nor more than some that are made of the same branches.
+
+        Parameters
+        ----------
+        period : int
+            Number of pieces.
+        most_alike : int
+            Most of the sequences made of the same branches.
+        """
+        if not self.branch.size:
+            return
+        alike: dict[tuple[int, ...], int] = {}
+        seen: set[tuple[int, ...]] = set()
+        for sequence in _closed_paths(self.jumps, period):
+            first = min(sequence[i:] + sequence[:i] for i in range(period))
+            branches = tuple(sorted(self.branch[list(first)].tolist()))
+            if first in seen or alike.get(branches, 0) >= most_alike or self.is_orbit(first):
+                continue
+            seen.add(first)
+            alike[branches] = alike.get(branches, 0) + 1
+            yield first
+
+
+def _orbits_within(branch: Branch, window: tuple[float, float]) -> Iterator[Real]:
+    """States (period, k, 2n) of orbits of a branch at a few frequencies within a window."""
+    low = max(window[0], min(orbit.frequency_hz for orbit in branch.points))
+    high = min(window[1], max(orbit.frequency_hz for orbit in branch.points))
+    if low >= high:
+        return
+    count = 1 + round((PLACES - 1) * (high - low) / (window[1] - window[0]))
+    step = 2.0 * math.pi / SEGMENTS_PER_PERIOD
+    phases = step * np.arange(SEGMENTS_PER_PERIOD * branch.period, dtype=float)
+    for share in (np.arange(count) + 0.5) / count:
+        for orbit in branch.at(low + share * (high - low)):
+            nodes = orbit.problem.flow.to_state(orbit.states(phases))
+            yield nodes.reshape(branch.period, SEGMENTS_PER_PERIOD, -1)
+
+
+def _closed_paths(jumps: Real, length: int) -> Iterator[tuple[int, ...]]:
+    """Closed paths over places with the shortest ways, some of them more than once, in order."""
+    near = np.argsort(jumps, axis=1)[:, :NEAREST]
+    paths = np.arange(len(jumps))[:, None]
+    ways = np.zeros(len(jumps))
+    for _ in range(length - 1):
+        last, count = paths[:, -1], near.shape[1]
+        ways = (ways[:, None] + jumps[last[:, None], near[last]]).ravel()
+        paths = np.column_stack([np.repeat(paths, count, axis=0), near[last].ravel()])
+        if len(ways) > MOST_PATHS:
+            shortest = np.argpartition(ways, MOST_PATHS)[:MOST_PATHS]
+            paths, ways = paths[shortest], ways[shortest]
+    ways = ways + jumps[paths[:, -1], paths[:, 0]]
+    order = np.argsort(ways, kind="stable")
+    for path in paths[order[ways[order] < FARTHEST]]:
+        yield tuple(path.tolist())

@@ -1,0 +1,182 @@
+"""Orbits are found beside pieces of others that nearly fit together."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from nldyn import (
+    Diagram,
+    ExploreOptions,
+    Stop,
+    System,
+    SystemModelError,
+    Unbalance,
+    by_pseudo_orbits,
+    explore,
+    index_sum,
+    load_branches,
+)
+from nldyn.exploration import steps_between
+from nldyn.pseudo_orbits import FARTHEST, Pieces
+
+RANGE_HZ = (36.0, 39.0)
+
+
+@pytest.fixture(scope="module")
+def three() -> Diagram:
+    """The branches of periods 1, 2 and 3, the last of which ends at a fold."""
+    system = System.from_matrices(
+        [[2.48]], [[16877.0]], {"middle": [1.0]}, modal_damping=0.0142,
+        stops=[Stop("middle", stiffness=5.17e9)], excitation=[Unbalance("middle", 4.92e-6)],
+    )  # fmt: skip
+    found = explore(system, RANGE_HZ, 3, effort=ExploreOptions(spacing=0.01, starts=2)).diagram
+    assert sorted(branch.period for branch in found.branches) == [1, 2, 3]
+    return found
+
+
+def without(known: Diagram, branch) -> Diagram:
+    return replace(known, branches=tuple(b for b in known.branches if b is not branch))
+
+
+@pytest.mark.parametrize("period", [1, 2, 3])
+def test_a_branch_is_found_from_pieces_of_the_others(three, period):
+    (left_out,) = three.of_period(period)
+    done = by_pseudo_orbits(without(three, left_out))
+    (found,) = done.branches[2:]
+    assert found.period == period
+    assert all(left_out.contains(orbit) for orbit in found.points)
+    assert done.notes[-1].endswith("1 branch beside those given")
+    assert [index_sum(done.branches, 36.5, n) for n in (1, 2, 3)] == [1, 1, 1]
+
+
+def test_what_is_known_is_met_and_not_found_again(three):
+    done = by_pseudo_orbits(three)
+    assert len(done.branches) == 3
+    assert ", and to 3 of the 3 given without a piece of theirs, 0 branches" in done.notes[-1]
+    assert done.notes[:-2] == tuple(n for n in three.notes if not n.startswith("indices"))
+
+
+def test_a_branch_alone_gives_no_pseudo_orbit_but_its_orbits(three):
+    harmonic = Diagram(tuple(three.of_period(1)), RANGE_HZ, "middle")
+    done = by_pseudo_orbits(harmonic)
+    assert len(done.branches) == 1
+    assert done.notes[-1].startswith("0 of 0 pseudo-orbits led to an orbit")
+
+
+def test_no_longer_orbits_are_looked_for_than_wanted(three):
+    (third,) = three.of_period(3)
+    done = by_pseudo_orbits(without(three, third), max_period=2)
+    assert len(done.branches) == 2
+    assert " of the 2 given without" in done.notes[-1]
+
+
+def test_no_more_are_tried_than_wanted(three):
+    """One of each length at each of the frequencies, at most."""
+    done = by_pseudo_orbits(three, tries=1, spacing=0.02)
+    tried = int(re.search(r"of (\d+) pseudo-orbits", done.notes[-1])[1])
+    assert 0 < tried <= 3 * steps_between(*RANGE_HZ, 0.02)
+
+
+def test_pieces_are_motions_over_one_period_of_the_excitation(three):
+    pieces = Pieces.of(three.branches, 36.5, 1e-9)
+    flow = three.branches[0].points[0].problem.flow
+    assert sorted(set(pieces.period.tolist())) == [1, 2, 3]
+    for nodes, end in zip(pieces.nodes, pieces.ends, strict=True):
+        found = flow.strobe(nodes[0], 2.0 * np.pi * 36.5, 1)
+        assert np.abs(found.ends[-1] - end).max() < 1e-6 * np.abs(pieces.nodes).max()
+
+
+def test_a_narrow_branch_gives_pieces_although_it_does_not_reach_the_frequency(three):
+    (third,) = three.of_period(3)
+    highest = third.frequency_hz.max()
+    assert Pieces.of([third], highest * 1.005, 0.01).branch.size
+    assert not Pieces.of([third], highest * 1.02, 0.01).branch.size
+
+
+def test_pieces_of_one_orbit_in_its_order_are_the_orbit():
+    place, period = np.array([0, 1, 2, 0]), np.array([3, 3, 3, 1])
+    branch = np.array([0, 0, 0, 1])
+    pieces = Pieces(branch, place, period, np.zeros((4, 2, 2)), np.zeros((4, 2)))
+    assert pieces.is_orbit((1, 2, 0))
+    assert pieces.is_orbit((3, 3, 3))
+    assert not pieces.is_orbit((0, 2, 1))
+    assert not pieces.is_orbit((0, 1))
+    assert not pieces.is_orbit((0, 1, 3))
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 3), st.integers(1, 6), st.integers(0, 2**32 - 1))
+def test_closed_sequences_come_in_the_order_of_their_jumps(length, count, seed):
+    """Against all sequences, of which those that begin elsewhere are one."""
+    rng = np.random.default_rng(seed)
+    ends, starts = rng.standard_normal((2, count, 4))
+    pieces = Pieces(
+        np.arange(count), np.zeros(count, dtype=int), np.ones(count, dtype=int),
+        starts[:, None], ends,
+    )  # fmt: skip
+    jumps = pieces.jumps
+
+    def way(sequence):
+        return sum(jumps[a, b] for a, b in zip(sequence, sequence[1:] + sequence[:1], strict=True))
+
+    wanted = {
+        min(s[i:] + s[:i] for i in range(length))
+        for s in product(range(count), repeat=length)
+        if way(s) < FARTHEST and len(set(s)) > 1
+    }
+    found = list(pieces.pseudo_orbits(length, 10**6))
+    assert len(found) == len(set(found))
+    assert set(found) == wanted
+    assert np.all(np.diff([way(sequence) for sequence in found]) > -1e-12)
+    for most in (1, 2):
+        some = [tuple(sorted(sequence)) for sequence in pieces.pseudo_orbits(length, most)]
+        assert max(map(some.count, some), default=0) <= most
+
+
+def test_interrupted_it_keeps_what_it_has_found(three, tmp_path):
+    (left_out,) = three.of_period(3)
+    place, known = tmp_path / "found.h5", without(three, left_out)
+    seen = []
+
+    def interrupt(what: str, frequency_hz: float) -> None:
+        seen.append(what)
+        if what == "pseudo-orbits" and "1/3" in seen:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        by_pseudo_orbits(known, progress=interrupt, checkpoint=place)
+    (kept,) = load_branches(place)
+    resumed = by_pseudo_orbits(known, checkpoint=place)
+    assert len(resumed.branches) == 3
+    assert np.array_equal(resumed.branches[2].frequency_hz, kept.frequency_hz)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"tries": 0}, "tries must be"),
+        ({"tries": 1.5}, "tries must be"),
+        ({"max_period": 0}, "max_period must be"),
+        ({"spacing": 0.0}, "spacing must lie between 1e-06 and 1, got 0"),
+        ({"spacing": float("nan")}, "spacing must lie"),
+        ({"known": None}, "known must be a Diagram"),
+        ({"progress": 3}, "progress must be"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(three, change, message):
+    known = change.get("known", three)
+    options = {key: value for key, value in change.items() if key != "known"}
+    with pytest.raises(SystemModelError, match=message):
+        by_pseudo_orbits(known, **options)
+
+
+def test_a_diagram_without_branches_is_refused(three):
+    with pytest.raises(SystemModelError, match="known: has no branches to begin with"):
+        by_pseudo_orbits(replace(three, branches=()))
