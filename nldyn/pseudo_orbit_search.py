@@ -80,12 +80,13 @@ def by_pseudo_orbits(
 
     Examples
     --------
-    >>> from nldyn import Diagram, Stop, System, Unbalance, continue_branch, solve_orbit
+    >>> from nldyn import Diagram, Stop, System, Unbalance
+    >>> from nldyn import continue_branch, find_orbits, solve_orbit
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])
     >>> range_hz = 36.0, 39.0
-    >>> orbits = [solve_orbit(system, 37.0), solve_orbit(system, 37.0, 2, guess=[[1e-4, 0.0]])]
+    >>> orbits = [solve_orbit(system, 37.0), *find_orbits(system, 37.0, 2)[:1]]
     >>> branches = tuple(continue_branch(orbit, range_hz) for orbit in orbits)
     >>> more = by_pseudo_orbits(Diagram(branches, range_hz, "middle"))
     >>> [branch.period for branch in more.branches]

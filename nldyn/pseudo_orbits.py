@@ -15,7 +15,7 @@ from nldyn.orbit import SEGMENTS_PER_PERIOD
 
 PLACES = 3  # most frequencies at which a branch gives pieces
 NEAREST = 60  # pieces that may follow one
-MOST_PATHS = 200_000  # that are prolonged
+MOST_PATHS = 200_000  # the shortest, that are prolonged
 FARTHEST = 2.0  # sum of the jumps, over the size of the pieces, up to which they are put together
 
 
@@ -124,12 +124,14 @@ def _closed_paths(jumps: Real, length: int) -> Iterator[tuple[int, ...]]:
     paths = np.arange(len(jumps))[:, None]
     ways = np.zeros(len(jumps))
     for _ in range(length - 1):
-        last, count = paths[:, -1], near.shape[1]
-        ways = (ways[:, None] + jumps[last[:, None], near[last]]).ravel()
-        paths = np.column_stack([np.repeat(paths, count, axis=0), near[last].ravel()])
-        if len(ways) > MOST_PATHS:
-            shortest = np.argpartition(ways, MOST_PATHS)[:MOST_PATHS]
-            paths, ways = paths[shortest], ways[shortest]
+        last = paths[:, -1]
+        longer = ways[:, None] + jumps[last[:, None], near[last]]
+        chosen = np.flatnonzero(longer < FARTHEST)
+        if chosen.size > MOST_PATHS:
+            chosen = chosen[np.argpartition(longer.flat[chosen], MOST_PATHS)[:MOST_PATHS]]
+        before, column = np.divmod(chosen, near.shape[1])
+        paths = np.column_stack([paths[before], near[last[before], column]])
+        ways = longer.flat[chosen]
     ways = ways + jumps[paths[:, -1], paths[:, 0]]
     order = np.argsort(ways, kind="stable")
     for path in paths[order[ways[order] < FARTHEST]]:
