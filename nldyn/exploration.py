@@ -64,6 +64,10 @@ class ExploreOptions:
     passing : int
         Further random initial states at each frequency on the way up, whose motions are followed
         for 60 periods only, beside which unstable orbits are looked for.
+    pseudo_orbits : int
+        Most closed sequences of pieces of known orbits, of each length up to `unstable_period`,
+        beside which orbits are looked for at each frequency on the way down, see
+        `by_pseudo_orbits`.
     fold_factor : float
         After each round the folds found are followed in frequency and damping, or where the modes
         share no damping ratio in frequency and excitation, which are divided and multiplied by up
@@ -86,6 +90,7 @@ class ExploreOptions:
     doubled_period: int = 1
     doubled_points: int | None = None
     passing: int = 0
+    pseudo_orbits: int = 0
     fold_factor: float = 1.0
     seed: int = 20
 
@@ -103,6 +108,7 @@ class ExploreOptions:
         if self.doubled_points is not None:
             check_whole("explore: doubled_points", self.doubled_points, 2, MOST_POINTS)
         check_whole("explore: passing", self.passing, 0, MOST_COUNT)
+        check_whole("explore: pseudo_orbits", self.pseudo_orbits, 0, MOST_COUNT)
         if not (is_finite(self.fold_factor) and 1.0 <= self.fold_factor <= LARGEST_FACTOR):
             raise SystemModelError(
                 f"explore: fold_factor must lie between 1 and {LARGEST_FACTOR:g}, "

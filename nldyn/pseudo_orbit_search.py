@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
@@ -13,7 +14,6 @@ from nldyn.beside import check_search, collector_beside, diagram_of, take_kept
 from nldyn.diagrams import Collector, Diagram, Progress, counted
 from nldyn.errors import check_whole
 from nldyn.exploration import steps_between
-from nldyn.linear import Real
 from nldyn.orbit import Orbit, shooting_problem
 from nldyn.pseudo_orbits import Pieces
 from nldyn.search import MOST_COUNT, nearest_orbit
@@ -85,7 +85,7 @@ def by_pseudo_orbits(
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])
-    >>> range_hz = 36.0, 39.0
+    >>> range_hz = 36.0, 38.5
     >>> orbits = [solve_orbit(system, 37.0), *find_orbits(system, 37.0, 2)[:1]]
     >>> branches = tuple(continue_branch(orbit, range_hz) for orbit in orbits)
     >>> more = by_pseudo_orbits(Diagram(branches, range_hz, "middle"))
@@ -103,19 +103,16 @@ def by_pseudo_orbits(
         take_kept(box, max_period)
         for frequency in np.geomspace(low, high, count + 2)[1:-1].tolist():
             box.progress("pseudo-orbits", frequency)
-            pieces = Pieces.of(box.branches, frequency, spacing)
-            for period in range(1, max_period + 1):
-                for sequence in islice(pieces.pseudo_orbits(period, MOST_ALIKE), tries):
-                    tried += 1
-                    orbit = _orbit_near(box, pieces.nodes[list(sequence)], frequency)
-                    if orbit is None:
-                        continue
-                    came += 1
-                    on = box.branch_of(orbit)
-                    if on is None:
-                        box.follow(orbit, max_period, max_period, None)
-                    elif on not in pieces.branch[list(sequence)].tolist():
-                        met.add(on)
+            for used, orbit in near_pseudo_orbits(box, frequency, spacing, max_period, tries):
+                tried += 1
+                if orbit is None:
+                    continue
+                came += 1
+                on = box.branch_of(orbit)
+                if on is None:
+                    box.follow(orbit, max_period, max_period, None)
+                elif on not in used:
+                    met.add(on)
     new = counted(box.branches[len(known.branches) :])
     note = (
         f"{came} of {tried} pseudo-orbits led to an orbit, and to {len(met & given)} of the "
@@ -124,10 +121,20 @@ def by_pseudo_orbits(
     return diagram_of(box, max_period, note)
 
 
-def _orbit_near(box: Collector, pieces: Real, frequency_hz: float) -> Orbit | None:
-    """Orbit within the range that is nearest to a closed sequence of pieces (p, k, 2n)."""
-    problem = shooting_problem(box.flow, len(pieces))
-    nodes = pieces.reshape(problem.segments, -1)
-    orbit = nearest_orbit(problem, nodes, 2.0 * math.pi * frequency_hz, box.observe)
+def near_pseudo_orbits(
+    box: Collector, frequency_hz: float, spacing: float, longest: int, tries: int
+) -> Iterator[tuple[set[int], Orbit | None]]:
+    """Pseudo-orbits of each length at a frequency: their branches, and the orbit near if there is.
+
+    Orbits out of the range are none.
+    """
+    pieces = Pieces.of(box.branches, frequency_hz, spacing)
     low, high = box.range_hz
-    return orbit if orbit is not None and low <= orbit.frequency_hz <= high else None
+    for period in range(1, longest + 1):
+        problem = shooting_problem(box.flow, period)
+        for sequence in islice(pieces.pseudo_orbits(period, MOST_ALIKE), tries):
+            chosen = list(sequence)
+            nodes = pieces.nodes[chosen].reshape(problem.segments, -1)
+            orbit = nearest_orbit(problem, nodes, 2.0 * math.pi * frequency_hz, box.observe)
+            inside = orbit is not None and low <= orbit.frequency_hz <= high
+            yield set(pieces.branch[chosen].tolist()), orbit if inside else None

@@ -40,6 +40,7 @@ from nldyn.orbit import (
     stroboscopic,
 )
 from nldyn.parameters import Parameter
+from nldyn.pseudo_orbit_search import near_pseudo_orbits
 from nldyn.search import orbit_beside, orbit_near, random_states
 from nldyn.step_control import ContinuationOptions
 from nldyn.system import System
@@ -278,6 +279,8 @@ class _Survey:
             seed = (self.effort.seed, turn, place, again + 1)
             starts = _at_random(flow, omega, self.effort.starts, seed)
             here = here.with_more(self._search(starts, known, also_unstable=True)[0])
+        if not up and self.effort.pseudo_orbits:
+            self._put_together(frequency)
         both = {c.frequency_hz: c for c in stage.coverage}
         both[frequency] = both[frequency].with_more(here) if frequency in both else here
         met = self._met(turn + 1)
@@ -422,6 +425,15 @@ class _Survey:
         motions = [flow.strobe(start, known.omega, PASSING) for start in starts]
         runs = [found.ends for found in motions if not found.failure]
         self._beside(runs, known, BESIDE_PASSING)
+
+    def _put_together(self, frequency_hz: float) -> None:
+        """Look for orbits beside pieces of known ones that nearly fit together."""
+        effort, longest = self.effort, len(self._unstable_periods())
+        tries = effort.pseudo_orbits
+        found = near_pseudo_orbits(self.box, frequency_hz, effort.spacing, longest, tries)
+        for _, orbit in found:
+            if orbit is not None:
+                self._follow(orbit)
 
     def _unstable_periods(self) -> range:
         return range(1, min(self.effort.unstable_period, self.max_period) + 1)

@@ -93,6 +93,7 @@ unstable_period = 2
 doubled_period = 4
 doubled_points = 30
 passing = 2
+pseudo_orbits = 3
 seed = 1
 """
 

@@ -127,6 +127,18 @@ def test_short_motions_pass_unstable_orbits_of_further_branches(monkeypatch):
         assert [index_sum(found.diagram.branches, hz, n) for n in (1, 2)] == [1, 1]
 
 
+def test_pieces_of_known_orbits_lead_to_further_branches(monkeypatch):
+    """Two modes from 29 to 29.3 Hz, where one motion of 30 periods comes to few of them."""
+    monkeypatch.setattr(survey, "AGAIN", 0)
+    system, few = system_of("two_dof_xi_0.01"), ExploreOptions(spacing=0.1, starts=1, settling=30)
+    without, found = (
+        explore(system, (29.0, 29.3), 2, effort=replace(few, pseudo_orbits=n)) for n in (0, 200)
+    )
+    assert len(without.diagram.branches) < len(found.diagram.branches)
+    for orbit in (b.points[len(b.points) // 2] for b in without.diagram.branches):
+        assert any(branch.contains(orbit) for branch in found.diagram.branches)
+
+
 def test_report_tells_what_was_tried(around_37):
     text = around_37.report()
     assert f"simulations at {len(around_37.coverage)} frequencies" in text
@@ -527,6 +539,7 @@ def test_long_doubled_branches_are_broken_off_where_told(whole):
         ({"doubled_period": 0}, "explore: doubled_period"),
         ({"doubled_points": 1}, "explore: doubled_points"),
         ({"passing": -1}, "explore: passing"),
+        ({"pseudo_orbits": -1}, "explore: pseudo_orbits"),
     ],
 )
 def test_bad_efforts_are_refused_by_name(given, says):

@@ -26,7 +26,7 @@ from nldyn import (
 from nldyn.exploration import steps_between
 from nldyn.pseudo_orbits import FARTHEST, Pieces
 
-RANGE_HZ = (36.0, 39.0)
+RANGE_HZ = (36.0, 38.5)
 
 
 @pytest.fixture(scope="module")
