@@ -12,6 +12,7 @@ from nldyn.diagrams import Collector, Diagram, Progress, check_known, middle_orb
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.exploration import FINEST_SPACING
 from nldyn.fixed_point_index import index_note, is_damped, without_index_note
+from nldyn.orbit import LONGEST_PERIOD
 from nldyn.step_control import ContinuationOptions
 
 
@@ -28,7 +29,7 @@ def check_search(
         options=(options, ContinuationOptions, None),
         progress=(progress, Callable, None),
     )
-    check_whole("max_period", max_period, 1)
+    check_whole("max_period", max_period, 1, LONGEST_PERIOD)
     if not (is_finite(spacing) and FINEST_SPACING <= spacing < 1.0):
         raise SystemModelError(
             f"spacing must lie between {FINEST_SPACING:g} and 1, got {shown(spacing)}"

@@ -380,7 +380,8 @@ class Exploration:
                 f"motions that did not settle (chaos, longer periods or slow decay): "
                 f"{open_ranges} Hz"
             )
-        return lines + self._folds() + self._cut() + self._indices + [CAN_BE_MISSING]
+        tried = self._folds() + self._beside() + self._cut()
+        return lines + tried + self._indices + [CAN_BE_MISSING]
 
     def _rounds(self) -> list[str]:
         """What each round found, and how many branches are still to be expected."""
@@ -409,6 +410,17 @@ class Exploration:
         return [
             f"the folds of the first {count} branches, up to period {self.question.max_period}, "
             f"were followed in {parameter.name}, from 1/{factor:g} of it to {factor:g} times"
+        ]
+
+    def _beside(self) -> list[str]:
+        """Where pieces of known orbits were put together."""
+        effort = self.question.effort
+        longest = min(effort.unstable_period, self.question.max_period)
+        if not (effort.pseudo_orbits and longest):
+            return []
+        return [
+            f"beside up to {effort.pseudo_orbits} pseudo-orbits of each length up to {longest} "
+            "orbits were looked for at each frequency on the way down"
         ]
 
     def _cut(self) -> list[str]:

@@ -19,7 +19,7 @@ from nldyn.pseudo_orbits import Pieces
 from nldyn.search import MOST_COUNT, nearest_orbit
 from nldyn.step_control import ContinuationOptions
 
-MOST_ALIKE = 4  # pseudo-orbits made of the same branches that are tried
+MOST_ALIKE = 4  # pseudo-orbits made of the same orbits that are tried, in other orders or places
 
 
 @one_thread()
@@ -41,8 +41,9 @@ def by_pseudo_orbits(
     to `max_period` of them, those with the smallest jumps first, the Gauss-Newton method [Allgower
     and Georg 1990, chapter 3] goes to the nearest orbit, at a frequency that it finds. If that lies
     on no known branch, its branch is followed, with what it leads to. No motion is simulated, and
-    no other system is needed; it is the faster the fewer branches there are. What resembles no
-    orbits known is not found.
+    no other system is needed; it is the faster the fewer branches there are, and slow for long
+    periods: with few branches of the 1-DOF model up to period 3 in 0.4 s, to 5 in 28 s. What
+    resembles no orbits known is not found. Flips of the branches given are not followed.
 
     Parameters
     ----------
@@ -55,13 +56,14 @@ def by_pseudo_orbits(
         distance of those of the pieces from it.
     tries : int
         Most pseudo-orbits of each length at each frequency from which an orbit is looked for; no
-        more than four are of the same branches.
+        more than four are of the same orbits.
     options : ContinuationOptions, optional
         Step control.
     progress : callable, optional
         Called as ``progress(what, frequency_hz)``.
     checkpoint : str or Path, optional
         File that keeps the branches found, also those of an earlier call: they count as known.
+        The frequencies done are not kept, and tried anew.
 
     Returns
     -------
@@ -95,14 +97,14 @@ def by_pseudo_orbits(
     check_search(known, max_period, spacing, options, progress)
     check_whole("tries", tries, 1, MOST_COUNT)
     box = collector_beside(known, options, progress, checkpoint)
-    given = {i for i, branch in enumerate(known.branches) if branch.period <= max_period}
+    given = set(range(len(known.branches)))
+    wanted = {i for i in given if known.branches[i].period <= max_period}
     tried, came, met = 0, 0, set[int]()
     low, high = known.range_hz
     count = steps_between(low, high, spacing)
     with box.checkpoint:
         take_kept(box, max_period)
         for frequency in np.geomspace(low, high, count + 2)[1:-1].tolist():
-            box.progress("pseudo-orbits", frequency)
             for used, orbit in near_pseudo_orbits(box, frequency, spacing, max_period, tries):
                 tried += 1
                 if orbit is None:
@@ -111,12 +113,12 @@ def by_pseudo_orbits(
                 on = box.branch_of(orbit)
                 if on is None:
                     box.follow(orbit, max_period, max_period, None)
-                elif on not in used:
+                elif on not in used and used <= given:
                     met.add(on)
     new = counted(box.branches[len(known.branches) :])
     note = (
-        f"{came} of {tried} pseudo-orbits led to an orbit, and to {len(met & given)} of the "
-        f"{len(given)} given without a piece of theirs, {new} beside those given"
+        f"{came} of {tried} pseudo-orbits led to an orbit, and to {len(met & wanted)} of the "
+        f"{len(wanted)} given without a piece of theirs, {new} beside those given"
     )
     return diagram_of(box, max_period, note)
 
@@ -133,6 +135,7 @@ def near_pseudo_orbits(
     for period in range(1, longest + 1):
         problem = shooting_problem(box.flow, period)
         for sequence in islice(pieces.pseudo_orbits(period, MOST_ALIKE), tries):
+            box.progress("pseudo-orbits", frequency_hz)
             chosen = list(sequence)
             nodes = pieces.nodes[chosen].reshape(problem.segments, -1)
             orbit = nearest_orbit(problem, nodes, 2.0 * math.pi * frequency_hz, box.observe)

@@ -14,8 +14,9 @@ from nldyn.linear import Real
 from nldyn.orbit import SEGMENTS_PER_PERIOD
 
 PLACES = 3  # most frequencies at which a branch gives pieces
-NEAREST = 60  # pieces that may follow one
-MOST_PATHS = 200_000  # the shortest, that are prolonged
+ALIKE = 0.05  # relative difference of orbits that are taken for one
+NEAREST = 60  # pieces that may follow one: bounds time and memory where there are hundreds
+MOST_PATHS = 200_000  # the shortest, that are prolonged: bounds them for longer periods
 FARTHEST = 2.0  # sum of the jumps, over the size of the pieces, up to which they are put together
 
 
@@ -27,6 +28,8 @@ class Pieces:
     ----------
     branch : (m,) int array
         Index of the branch that each is of.
+    passage : (m,) int array
+        Number of its orbit, the same of orbits of one branch that hardly differ.
     place : (m,) int array
         Which of the periods of its orbit it is, from zero.
     period : (m,) int array
@@ -38,6 +41,7 @@ class Pieces:
     """
 
     branch: NDArray[np.intp]
+    passage: NDArray[np.intp]
     place: NDArray[np.intp]
     period: NDArray[np.intp]
     nodes: Real
@@ -47,20 +51,18 @@ class Pieces:
     def of(cls, branches: Sequence[Branch], frequency_hz: float, spacing: float) -> Pieces:
         """Pieces of the orbits of some branches within a relative distance of a frequency."""
         window = frequency_hz / (1.0 + spacing), frequency_hz * (1.0 + spacing)
-        pieces = [
-            (index, place, len(nodes), nodes[place], nodes[(place + 1) % len(nodes)][0])
-            for index, branch in enumerate(branches)
-            for nodes in _orbits_within(branch, window)
-            for place in range(len(nodes))
-        ]
-        branch, place, period, nodes, ends = zip(*pieces, strict=True) if pieces else [()] * 5
-        return cls(
-            np.array(branch, dtype=np.intp),
-            np.array(place, dtype=np.intp),
-            np.array(period, dtype=np.intp),
-            np.array(nodes),
-            np.array(ends),
-        )
+        pieces: list[tuple[int, int, int, int, Real, Real]] = []
+        passages = 0
+        for index, branch in enumerate(branches):
+            orbits = list(_orbits_within(branch, window))
+            for number, nodes in zip(_passages(orbits), orbits, strict=True):
+                for place, after in enumerate(np.roll(nodes[:, 0], -1, axis=0)):
+                    row = index, passages + number, place, len(nodes), nodes[place], after
+                    pieces.append(row)
+            passages += len(orbits)
+        columns = zip(*pieces, strict=True) if pieces else ((),) * 6
+        branch_, passage, place_, period, nodes_, ends = map(np.array, columns)
+        return cls(branch_, passage, place_, period, nodes_, ends)
 
     @property
     def jumps(self) -> Real:
@@ -70,9 +72,9 @@ class Pieces:
         return np.asarray(np.linalg.norm(self.ends[:, None] - starts, axis=2) / size)
 
     def is_orbit(self, sequence: Sequence[int]) -> bool:
-        """Whether a sequence is that of an orbit, or of orbits of one branch that do not differ."""
+        """Whether a sequence is that of an orbit, or of orbits that hardly differ."""
         chosen = np.array(sequence)
-        if np.ptp(self.branch[chosen]):
+        if np.ptp(self.passage[chosen]):
             return False
         steps = np.roll(self.place[chosen], -1) - self.place[chosen] - 1
         return not np.any(steps % self.period[chosen])
@@ -80,14 +82,15 @@ class Pieces:
     def pseudo_orbits(self, period: int, most_alike: int) -> Iterator[tuple[int, ...]]:
         """Closed sequences of pieces, those with the smallest jumps first.
 
-        Not those that are orbits, nor more than some that are made of the same branches.
+        Not those that are orbits, nor more than some that are made of the same orbits. Of very many
+        pieces only the nearest are put together, and only the shortest of the sequences kept.
 
         Parameters
         ----------
         period : int
             Number of pieces.
         most_alike : int
-            Most of the sequences made of the same branches.
+            Most of the sequences made of the same orbits.
         """
         if not self.branch.size:
             return
@@ -95,11 +98,11 @@ class Pieces:
         seen: set[tuple[int, ...]] = set()
         for sequence in _closed_paths(self.jumps, period):
             first = min(sequence[i:] + sequence[:i] for i in range(period))
-            branches = tuple(sorted(self.branch[list(first)].tolist()))
-            if first in seen or alike.get(branches, 0) >= most_alike or self.is_orbit(first):
+            orbits = tuple(sorted(self.passage[list(first)].tolist()))
+            if first in seen or alike.get(orbits, 0) >= most_alike or self.is_orbit(first):
                 continue
             seen.add(first)
-            alike[branches] = alike.get(branches, 0) + 1
+            alike[orbits] = alike.get(orbits, 0) + 1
             yield first
 
 
@@ -116,6 +119,16 @@ def _orbits_within(branch: Branch, window: tuple[float, float]) -> Iterator[Real
         for orbit in branch.at(low + share * (high - low)):
             nodes = orbit.problem.flow.to_state(orbit.states(phases))
             yield nodes.reshape(branch.period, SEGMENTS_PER_PERIOD, -1)
+
+
+def _passages(orbits: Sequence[Real]) -> list[int]:
+    """Numbers of some orbits of a branch, the same of those that hardly differ."""
+    numbers: list[int] = []
+    for orbit in orbits:
+        size = ALIKE * float(np.linalg.norm(orbit))
+        near = (n for n in numbers if np.linalg.norm(orbit - orbits[n]) < size)
+        numbers.append(next(near, len(numbers)))
+    return numbers
 
 
 def _closed_paths(jumps: Real, length: int) -> Iterator[tuple[int, ...]]:

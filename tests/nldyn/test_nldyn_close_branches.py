@@ -27,13 +27,15 @@ from nldyn import (
     switch_at_flip,
     walk,
 )
-from nldyn.continuation import start_point
+from nldyn.continuation import _without_repeat, start_point
 from nldyn.hard.continuation import beam as four_modes
 from nldyn.normal_forms import is_symmetric
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
 from nldyn.shooting import asymmetry, metric_length
 from nldyn.special import lies_on_crossing, special_points_between
+from nldyn.trail import Leg
+from nldyn.walk import BY_TOLERANCE
 
 SHORT = ContinuationOptions(first_step=0.005, max_step=0.005)
 LONG = ContinuationOptions(first_step=0.05)
@@ -339,6 +341,28 @@ def test_a_symmetric_branch_is_followed_with_a_coarse_flow_map(facing):
     assert branch.stop_reasons == ("end of the frequency range",) * 2
     fine = [s.frequency_hz for s in facing.special_points]
     assert [s.frequency_hz for s in branch.special_points] == pytest.approx(fine, rel=3e-5)
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-4, 1e-6])
+def test_symmetric_orbits_are_no_more_asymmetric_than_taken_for_error(rtol):
+    """What is more than that breaks the symmetry, for a walk."""
+    coarse = FlowMap(facing_stops(), FlowOptions(rtol=rtol))
+    for hz in (7.5, 8.0, 8.4):
+        orbit = solve_orbit(coarse, hz)
+        assert asymmetry(orbit.problem, orbit.point) < BY_TOLERANCE * rtol
+
+
+def test_one_branch_point_passed_twice_far_from_the_start_is_told_twice(facing):
+    """Only one beside the start is met by both legs in the same place."""
+    special = next(s for s in facing.special_points if s.kind == "BP")
+
+    def leg(arclength):
+        there = replace(special, point=replace(special.point, arclength=arclength))
+        return Leg([], [there], [], "", None)
+
+    for arclength, told in ((0.5, 2), (1e-5, 1)):
+        legs = _without_repeat(leg(arclength), leg(arclength))
+        assert sum(len(one.special_points) for one in legs) == told
 
 
 def test_only_orbits_beside_a_crossing_lie_on_it():

@@ -137,6 +137,8 @@ def test_pieces_of_known_orbits_lead_to_further_branches(monkeypatch):
     assert len(without.diagram.branches) < len(found.diagram.branches)
     for orbit in (b.points[len(b.points) // 2] for b in without.diagram.branches):
         assert any(branch.contains(orbit) for branch in found.diagram.branches)
+    assert "beside up to 200 pseudo-orbits of each length up to 2 orbits" in found.report()
+    assert "pseudo-orbits of each length" not in without.report()
 
 
 def test_report_tells_what_was_tried(around_37):

@@ -19,11 +19,15 @@ from nldyn import (
     SystemModelError,
     Unbalance,
     by_pseudo_orbits,
+    continue_branch,
     explore,
+    index_gaps,
     index_sum,
     load_branches,
+    solve_orbit,
 )
 from nldyn.exploration import steps_between
+from nldyn.paper.jobs import scene_system
 from nldyn.pseudo_orbits import FARTHEST, Pieces
 
 RANGE_HZ = (36.0, 38.5)
@@ -63,11 +67,23 @@ def test_what_is_known_is_met_and_not_found_again(three):
     assert done.notes[:-2] == tuple(n for n in three.notes if not n.startswith("indices"))
 
 
-def test_a_branch_alone_gives_no_pseudo_orbit_but_its_orbits(three):
+def test_an_orbit_alone_gives_no_pseudo_orbit(three):
+    """The harmonic changes so little from 36 to 38.5 Hz that its pieces give nothing else."""
     harmonic = Diagram(tuple(three.of_period(1)), RANGE_HZ, "middle")
-    done = by_pseudo_orbits(harmonic)
+    done = by_pseudo_orbits(harmonic, spacing=0.001)
     assert len(done.branches) == 1
     assert done.notes[-1].startswith("0 of 0 pseudo-orbits led to an orbit")
+
+
+def test_different_orbits_of_one_branch_lead_to_others():
+    """Two modes from 28.5 to 30.5 Hz, the harmonic alone known; nothing is met without it."""
+    system, range_hz = scene_system("two_dof_xi_0.01"), (28.5, 30.5)
+    harmonic = continue_branch(solve_orbit(system, 29.5), range_hz)
+    known = Diagram((harmonic,), range_hz, "middle")
+    assert index_gaps(known.branches, range_hz, 2)
+    done = by_pseudo_orbits(known, max_period=2, tries=200)
+    assert not index_gaps(done.branches, range_hz, 2)
+    assert ", and to 0 of the 1 given without a piece" in done.notes[-1]
 
 
 def test_no_longer_orbits_are_looked_for_than_wanted(three):
@@ -93,6 +109,13 @@ def test_pieces_are_motions_over_one_period_of_the_excitation(three):
         assert np.abs(found.ends[-1] - end).max() < 1e-6 * np.abs(pieces.nodes).max()
 
 
+def test_orbits_on_either_side_of_a_fold_are_two(three):
+    (third,) = three.of_period(3)
+    fold = max(s.frequency_hz for s in third.special_points if s.kind == "LP")
+    pieces = Pieces.of([third], 0.99 * fold, 1e-9)
+    assert len(third.at(0.99 * fold)) == len(set(pieces.passage.tolist())) == 2
+
+
 def test_a_narrow_branch_gives_pieces_although_it_does_not_reach_the_frequency(three):
     (third,) = three.of_period(3)
     highest = third.frequency_hz.max()
@@ -101,11 +124,13 @@ def test_a_narrow_branch_gives_pieces_although_it_does_not_reach_the_frequency(t
 
 
 def test_pieces_of_one_orbit_in_its_order_are_the_orbit():
-    place, period = np.array([0, 1, 2, 0]), np.array([3, 3, 3, 1])
-    branch = np.array([0, 0, 0, 1])
-    pieces = Pieces(branch, place, period, np.zeros((4, 2, 2)), np.zeros((4, 2)))
+    """Not those of two orbits of one branch."""
+    place, period = np.array([0, 1, 2, 0, 0]), np.array([3, 3, 3, 1, 1])
+    branch, passage = np.array([0, 0, 0, 1, 1]), np.array([0, 0, 0, 1, 2])
+    pieces = Pieces(branch, passage, place, period, np.zeros((5, 2, 2)), np.zeros((5, 2)))
     assert pieces.is_orbit((1, 2, 0))
     assert pieces.is_orbit((3, 3, 3))
+    assert not pieces.is_orbit((3, 4))
     assert not pieces.is_orbit((0, 2, 1))
     assert not pieces.is_orbit((0, 1))
     assert not pieces.is_orbit((0, 1, 3))
@@ -117,10 +142,8 @@ def test_closed_sequences_come_in_the_order_of_their_jumps(length, count, seed):
     """Against all sequences, of which those that begin elsewhere are one."""
     rng = np.random.default_rng(seed)
     ends, starts = rng.standard_normal((2, count, 4))
-    pieces = Pieces(
-        np.arange(count), np.zeros(count, dtype=int), np.ones(count, dtype=int),
-        starts[:, None], ends,
-    )  # fmt: skip
+    zeros = np.zeros(count, dtype=int)
+    pieces = Pieces(zeros, np.arange(count), zeros, zeros + 1, starts[:, None], ends)
     jumps = pieces.jumps
 
     def way(sequence):
