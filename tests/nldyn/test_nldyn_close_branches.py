@@ -343,13 +343,13 @@ def test_a_symmetric_branch_is_followed_with_a_coarse_flow_map(facing):
     assert [s.frequency_hz for s in branch.special_points] == pytest.approx(fine, rel=3e-5)
 
 
-@pytest.mark.parametrize("rtol", [1e-3, 1e-4, 1e-6])
+@pytest.mark.parametrize("rtol", [1e-3, 1e-4])
 def test_symmetric_orbits_are_no_more_asymmetric_than_taken_for_error(rtol):
     """What is more than that breaks the symmetry, for a walk."""
     coarse = FlowMap(facing_stops(), FlowOptions(rtol=rtol))
-    for hz in (7.5, 8.0, 8.4):
-        orbit = solve_orbit(coarse, hz)
-        assert asymmetry(orbit.problem, orbit.point) < BY_TOLERANCE * rtol
+    branch = continue_branch(solve_orbit(coarse, 8.0), (6.5, 8.5))
+    largest = max(asymmetry(p.orbit.problem, p.orbit.point) for p in branch.nodes)
+    assert largest < 0.5 * BY_TOLERANCE * rtol
 
 
 def test_one_branch_point_passed_twice_far_from_the_start_is_told_twice(facing):
