@@ -49,9 +49,10 @@ def collector_beside(
     """A collector that has the known branches, and a file for what is found beside them."""
     own, progress = known.branches[0].points[0].problem.flow, progress or (lambda what, hz: None)
     options = options or ContinuationOptions()
-    box = Collector(own, known.range_hz, known.observe, options, progress)
+    low, high = known.range_hz
+    box = Collector(own, (low, high), known.observe, options, progress)
     box.take(known.branches, without_index_note(known.notes))
-    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, own, known.range_hz)
+    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, own, box.range_hz)
     return box
 
 
