@@ -6,11 +6,13 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from nldyn.branch import check_branches
 from nldyn.checkpoint import checkpoint_of_several
 from nldyn.diagrams import Collector, Diagram, Progress, check_known, middle_orbit
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
-from nldyn.exploration import FINEST_SPACING
+from nldyn.exploration import FINEST_SPACING, steps_between
 from nldyn.fixed_point_index import index_note, is_damped, without_index_note
 from nldyn.orbit import LONGEST_PERIOD
 from nldyn.step_control import ContinuationOptions
@@ -63,6 +65,14 @@ def take_kept(box: Collector, max_period: int) -> None:
         progress = partial(box.progress, f"1/{branch.period}")
         box.take_in(branch.extend(progress=progress, checkpoint=box.checkpoint))
     box.follow_up(count, max_period, max_period, None)
+
+
+def inner_frequencies(range_hz: tuple[float, float], spacing: float) -> list[float]:
+    """Frequencies in Hz within a range, at least one, in equal ratios of at most 1 + spacing."""
+    low, high = range_hz
+    count = steps_between(low, high, spacing)
+    found: list[float] = np.geomspace(low, high, count + 2)[1:-1].tolist()
+    return found
 
 
 def diagram_of(box: Collector, max_period: int, note: str) -> Diagram:

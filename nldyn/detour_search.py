@@ -9,11 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from cms.threads import one_thread
-from nldyn.beside import check_search, collector_beside, diagram_of, take_kept
+from nldyn.beside import (
+    check_search,
+    collector_beside,
+    diagram_of,
+    inner_frequencies,
+    take_kept,
+)
 from nldyn.branch import Branch
 from nldyn.detour import Detour, checked_factors, named
 from nldyn.diagrams import Collector, Diagram, Progress, counted
-from nldyn.exploration import steps_between
 from nldyn.orbit import Orbit, minimal_period, same_orbit
 from nldyn.parameters import Parameter
 from nldyn.step_control import ContinuationOptions
@@ -96,14 +101,12 @@ def by_detour(
     check_search(known, max_period, spacing, options, progress)
     own = known.branches[0].points[0].problem.flow
     detour = Detour(own, checked_factors(own.system, factors))
-    low, high = known.range_hz
     box = collector_beside(known, options, progress, checkpoint)
     with box.checkpoint:
         take_kept(box, max_period)
         there = _followed(box, detour, max_period)
-        count = steps_between(low, high, spacing)
         tried = came = 0
-        for frequency in np.geomspace(low, high, count + 2)[1:-1].tolist():
+        for frequency in inner_frequencies(box.range_hz, spacing):
             box.progress("back", frequency)
             orbits = [(via, orbit) for via in there for orbit in via.branch.at(frequency)]
             carriages = ((via, detour.carried(orbit, 1.0, 0.0)) for via, orbit in orbits)

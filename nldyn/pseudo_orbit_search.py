@@ -7,13 +7,16 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
-import numpy as np
-
 from cms.threads import one_thread
-from nldyn.beside import check_search, collector_beside, diagram_of, take_kept
+from nldyn.beside import (
+    check_search,
+    collector_beside,
+    diagram_of,
+    inner_frequencies,
+    take_kept,
+)
 from nldyn.diagrams import Collector, Diagram, Progress, counted
 from nldyn.errors import check_whole
-from nldyn.exploration import steps_between
 from nldyn.orbit import Orbit, shooting_problem
 from nldyn.pseudo_orbits import Pieces
 from nldyn.search import MOST_COUNT, nearest_orbit
@@ -100,11 +103,9 @@ def by_pseudo_orbits(
     given = set(range(len(known.branches)))
     wanted = {i for i in given if known.branches[i].period <= max_period}
     tried, came, met = 0, 0, set[int]()
-    low, high = known.range_hz
-    count = steps_between(low, high, spacing)
     with box.checkpoint:
         take_kept(box, max_period)
-        for frequency in np.geomspace(low, high, count + 2)[1:-1].tolist():
+        for frequency in inner_frequencies(box.range_hz, spacing):
             for used, orbit in near_pseudo_orbits(box, frequency, spacing, max_period, tries):
                 tried += 1
                 if orbit is None:

@@ -108,8 +108,8 @@ class Pieces:
 
 def _orbits_within(branch: Branch, window: tuple[float, float]) -> Iterator[Real]:
     """States (period, k, 2n) of orbits of a branch at a few frequencies within a window."""
-    low = max(window[0], min(orbit.frequency_hz for orbit in branch.points))
-    high = min(window[1], max(orbit.frequency_hz for orbit in branch.points))
+    reached = branch.frequency_hz
+    low, high = max(window[0], float(reached.min())), min(window[1], float(reached.max()))
     if low >= high:
         return
     count = 1 + round((PLACES - 1) * (high - low) / (window[1] - window[0]))

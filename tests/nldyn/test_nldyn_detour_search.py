@@ -290,7 +290,7 @@ def test_all_folds_of_the_branches_there_and_no_other_points_are_carried_back(fo
 def test_folds_alone_lead_to_an_isola_that_lies_between_the_frequencies(
     harmonic, found, monkeypatch
 ):
-    monkeypatch.setattr("nldyn.detour_search.steps_between", lambda low, high, spacing: 0)
+    monkeypatch.setattr("nldyn.beside.steps_between", lambda low, high, spacing: 0)
     done = by_detour(harmonic, HALF, max_period=1)
     assert ", 0 of 0 orbits carried back, " in done.notes[-1]
     (isola,) = done.branches[1:]

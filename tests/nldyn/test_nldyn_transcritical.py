@@ -101,17 +101,23 @@ def test_a_fold_beyond_a_branch_point_beside_the_start_is_told(beside, step):
     orbit = solve_orbit(bent_slightly(2e-3), hz, guess=orbit_without_y(hz), observe="y")
     special = continue_branch(orbit, (hz, 0.501)).special_points[0]
     assert special.kind == "BP"
-    problem, tangent = special.orbit.problem, other_tangent(special)
-    across = problem.metric(special.orbit.point) * tangent
-    found = problem.correct(special.orbit.point + beside * tangent, across / np.linalg.norm(across))
     window = 0.9 * special.frequency_hz, 1.1 * special.frequency_hz
     few = ContinuationOptions(first_step=step, max_step=step, max_points=2)
-    branch = continue_branch(Orbit.of(problem, found, "y"), window, options=few)
+    begun = orbit_along(special, other_tangent(special), beside)
+    branch = continue_branch(begun, window, options=few)
     fold, crossing = sorted(branch.special_points, key=lambda s: s.frequency_hz)
     assert (fold.kind, crossing.kind) == ("LP", "BP")
     assert crossing.frequency_hz == pytest.approx(special.frequency_hz, rel=1e-9)
     assert fold.frequency_hz == pytest.approx(refine_special(fold).frequency_hz, rel=1e-9)
     assert np.all(branch.frequency_hz > fold.frequency_hz)
+
+
+def orbit_along(special, tangent, beside):
+    """Orbit at a distance from a branch point, of the branch with a tangent."""
+    problem, place = special.orbit.problem, special.orbit.point
+    across = problem.metric(place) * tangent
+    found = problem.correct(place + beside * tangent, across / np.linalg.norm(across))
+    return Orbit.of(problem, found, "y")
 
 
 @pytest.mark.parametrize("preload_y", [1.0, 1e-3])
@@ -159,13 +165,10 @@ def test_transcritical_points_are_followed_where_y_can_stay_zero(branch):
 def test_a_branch_begun_beside_a_branch_point_has_it_once(beside):
     """There rounding decides the sign of the branch point's test, in both directions."""
     special = branch_without_y().special_points[1]
-    problem, tangent = special.orbit.problem, other_tangent(special)
-    across = problem.metric(special.orbit.point) * tangent
-    found = problem.correct(special.orbit.point + beside * tangent, across / np.linalg.norm(across))
     window = 0.9995 * special.frequency_hz, 1.0005 * special.frequency_hz
     few = ContinuationOptions(first_step=0.001, max_step=3e-3, max_points=3)
     more = replace(few, max_points=5)
-    orbit = Orbit.of(problem, found, "y")
+    orbit = orbit_along(special, other_tangent(special), beside)
     branch = continue_branch(orbit, window, options=few)
     longer = branch.extend(options=more)
     for told in (branch, longer):
@@ -178,13 +181,10 @@ def test_a_branch_begun_beside_a_branch_point_has_it_once(beside):
 def test_a_walk_begun_beside_the_point_stays_on_its_branch_and_finds_it(preload_y, beside):
     """Also where the other branch crosses at an angle of 0.08."""
     special = branch_without_y(preload_y).special_points[0]
-    problem, place = special.orbit.problem, special.orbit.point
     tangents = special.point.tangent, other_tangent(special)
     window = 0.998 * special.frequency_hz, 1.002 * special.frequency_hz
     for tangent, has_y in zip(tangents, (False, True), strict=True):
-        across = problem.metric(place) * tangent
-        found = problem.correct(place + beside * tangent, across / np.linalg.norm(across))
-        walked = continue_branch(Orbit.of(problem, found, "y"), window)
+        walked = continue_branch(orbit_along(special, tangent, beside), window)
         assert walked.stop_reasons == ("end of the frequency range",) * 2
         assert [s.kind for s in walked.special_points] == ["BP"]
         assert walked.special_points[0].frequency_hz == pytest.approx(
