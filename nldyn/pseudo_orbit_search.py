@@ -17,9 +17,9 @@ from nldyn.beside import (
 )
 from nldyn.diagrams import Collector, Diagram, Progress, counted
 from nldyn.errors import check_whole
-from nldyn.orbit import Orbit, shooting_problem
-from nldyn.pseudo_orbits import Pieces
-from nldyn.search import MOST_COUNT, nearest_orbit
+from nldyn.orbit import SEGMENTS_PER_PERIOD, Orbit
+from nldyn.pseudo_orbits import NODES, Pieces
+from nldyn.search import LONG_STEPS, MOST_COUNT, SHORT_STEPS, nearest_orbit
 from nldyn.step_control import ContinuationOptions
 
 MOST_ALIKE = 4  # pseudo-orbits made of the same orbits that are tried, in other orders or places
@@ -106,16 +106,15 @@ def by_pseudo_orbits(
     with box.checkpoint:
         take_kept(box, max_period)
         for frequency in inner_frequencies(box.range_hz, spacing):
-            for used, orbit in near_pseudo_orbits(box, frequency, spacing, max_period, tries):
+            for used, orbits in near_pseudo_orbits(box, frequency, spacing, max_period, tries):
                 tried += 1
-                if orbit is None:
-                    continue
-                came += 1
-                on = box.branch_of(orbit)
-                if on is None:
-                    box.follow(orbit, max_period, max_period, None)
-                elif on not in used and used <= given:
-                    met.add(on)
+                came += bool(orbits)
+                for orbit in orbits:
+                    on = box.branch_of(orbit)
+                    if on is None:
+                        box.follow(orbit, max_period, max_period, None)
+                    elif on not in used and used <= given:
+                        met.add(on)
     new = counted(box.branches[len(known.branches) :])
     note = (
         f"{came} of {tried} pseudo-orbits led to an orbit, and to {len(met & wanted)} of the "
@@ -126,19 +125,23 @@ def by_pseudo_orbits(
 
 def near_pseudo_orbits(
     box: Collector, frequency_hz: float, spacing: float, longest: int, tries: int
-) -> Iterator[tuple[set[int], Orbit | None]]:
-    """Pseudo-orbits of each length at a frequency: their branches, and the orbit near if there is.
+) -> Iterator[tuple[set[int], list[Orbit]]]:
+    """Pseudo-orbits of each length at a frequency: their branches, and orbits near by.
 
-    Orbits out of the range are none.
+    Those that long steps between few states lead to, and short steps between many, unless they are
+    out of the range: beside few orbits the first meet more others, beside many the second.
     """
     pieces = Pieces.of(box.branches, frequency_hz, spacing)
     low, high = box.range_hz
+    omega = 2.0 * math.pi * frequency_hz
     for period in range(1, longest + 1):
-        problem = shooting_problem(box.flow, period)
         for sequence in islice(pieces.pseudo_orbits(period, MOST_ALIKE), tries):
             box.progress("pseudo-orbits", frequency_hz)
             chosen = list(sequence)
-            nodes = pieces.nodes[chosen].reshape(problem.segments, -1)
-            orbit = nearest_orbit(problem, nodes, 2.0 * math.pi * frequency_hz, box.observe)
-            inside = orbit is not None and low <= orbit.frequency_hz <= high
-            yield set(pieces.branch[chosen].tolist()), orbit if inside else None
+            nodes = pieces.nodes[chosen]
+            orbits = [
+                nearest_orbit(box.flow, nodes[:, ::every], omega, box.observe, steps)
+                for every, steps in ((NODES // SEGMENTS_PER_PERIOD, LONG_STEPS), (1, SHORT_STEPS))
+            ]
+            inside = [o for o in orbits if o is not None and low <= o.frequency_hz <= high]
+            yield set(pieces.branch[chosen].tolist()), inside

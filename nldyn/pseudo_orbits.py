@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from nldyn.branch import Branch
 from nldyn.linear import Real
-from nldyn.orbit import SEGMENTS_PER_PERIOD
 
+NODES = 8  # states of a piece
 PLACES = 3  # most frequencies at which a branch gives pieces
 ALIKE = 0.05  # relative difference of orbits that are taken for one
 NEAREST = 60  # pieces that may follow one: bounds time and memory where there are hundreds
@@ -107,18 +107,17 @@ class Pieces:
 
 
 def _orbits_within(branch: Branch, window: tuple[float, float]) -> Iterator[Real]:
-    """States (period, k, 2n) of orbits of a branch at a few frequencies within a window."""
+    """States (period, NODES, 2n) of orbits of a branch at a few frequencies within a window."""
     reached = branch.frequency_hz
     low, high = max(window[0], float(reached.min())), min(window[1], float(reached.max()))
     if low >= high:
         return
     count = 1 + round((PLACES - 1) * (high - low) / (window[1] - window[0]))
-    step = 2.0 * math.pi / SEGMENTS_PER_PERIOD
-    phases = step * np.arange(SEGMENTS_PER_PERIOD * branch.period, dtype=float)
+    phases = 2.0 * math.pi / NODES * np.arange(NODES * branch.period, dtype=float)
     for share in (np.arange(count) + 0.5) / count:
         for orbit in branch.at(low + share * (high - low)):
             nodes = orbit.problem.flow.to_state(orbit.states(phases))
-            yield nodes.reshape(branch.period, SEGMENTS_PER_PERIOD, -1)
+            yield nodes.reshape(branch.period, NODES, -1)
 
 
 def _passages(orbits: Sequence[Real]) -> list[int]:

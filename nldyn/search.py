@@ -12,6 +12,7 @@ from nldyn.errors import check_frequency, check_whole
 from nldyn.flow import FlowMap, flow_of
 from nldyn.linear import Real
 from nldyn.orbit import (
+    SEGMENTS_PER_PERIOD,
     ConvergenceError,
     Orbit,
     check_bounded,
@@ -30,8 +31,9 @@ from nldyn.system import System
 
 MOST_COUNT = 10**7  # of starts, periods and candidates
 FREQUENCY_WEIGHT = 10.0  # of a relative change of the frequency against one of the states
-LONGEST_STEP, NEARBY = 0.5, 1e-3  # of least-length steps: the longest, and short enough to end with
-LEAST_LENGTH_STEPS = 14
+NEARBY = 1e-3  # a step of least length that is short enough to end with
+LONG_STEPS = 0.5, 14  # of least length: the longest, and how many at most
+SHORT_STEPS = 0.1, 30  # lead to nine in ten of the orbits that 80 lead to
 FREQUENCY_SHIFT = 0.05  # how far the frequency may go, relative
 
 
@@ -199,45 +201,46 @@ def orbit_beside(
 
     See `nearest_orbit`.
     """
-    problem = shooting_problem(flow, period)
     try:
-        nodes = spread(problem, start, omega)
+        nodes = spread(shooting_problem(flow, period), start, omega)
     except ConvergenceError:
         return None
-    return nearest_orbit(problem, nodes, omega, observe)
+    return nearest_orbit(flow, nodes.reshape(period, SEGMENTS_PER_PERIOD, -1), omega, observe)
 
 
 def nearest_orbit(
-    problem: ShootingProblem, nodes: Real, omega: float, observe: str
+    flow: FlowMap, nodes: Real, omega: float, observe: str, steps: tuple[float, int] = LONG_STEPS
 ) -> Orbit | None:
     """Orbit near some states at a frequency near ω, by its minimal period; None if none is found.
 
     The frequency is free, and each Newton step is the shortest of those that solve the linearised
     equations, the Gauss-Newton method of Allgower and Georg [1990, chapter 3]. So states beside
-    a branch that does not reach ω lead to it, and folds do no harm.
+    a branch that does not reach ω lead to it, and folds do no harm. With more states in a period,
+    these equations hold farther.
+
+    Parameters
+    ----------
+    flow : FlowMap
+        Of the system.
+    nodes : (period, k, 2n) array
+        States z at k equidistant phases of each excitation period, a multiple of the usual number
+        of shooting segments.
+    omega : float
+        Frequency in rad/s.
+    observe : str
+        Interface whose displacement is reported.
+    steps : (float, int)
+        Longest step, over the size of the states, and how many at most.
     """
+    period, count, _ = nodes.shape
+    problem = shooting_problem(flow, period)
+    finer = shooting_problem(flow, period, period * count)
     try:
-        point = np.append(nodes.ravel(), math.log(omega))
-        row = np.zeros(point.size)
-        row[-1] = 1.0
-        for _ in range(LEAST_LENGTH_STEPS):
-            found = problem.correct(point, row, max_iterations=1)
-            if not np.any(found.along):
-                return None
-            metric = problem.metric(point)
-            metric[-1] *= FREQUENCY_WEIGHT
-            row = metric * found.along
-            step = found.point - point
-            step -= found.along * float(row @ step) / float(row @ found.along)
-            length = metric_length(metric, step)
-            point = point + step * min(1.0, LONGEST_STEP / length if length else 1.0)
-            if not abs(point[-1] - math.log(omega)) < FREQUENCY_SHIFT:
-                return None
-            if length < NEARBY:
-                break
-        else:
+        solution = _least_length_solution(finer, nodes, omega, *steps)
+        if solution is None:
             return None
-        found = problem.correct(point, row, max_iterations=8)
+        usual = [_thinned(vector, nodes.shape) for vector in solution]
+        found = problem.correct(*usual, max_iterations=8)
         if not found.converged:
             return None
         orbit = Orbit.of(problem, found, observe)
@@ -246,7 +249,38 @@ def nearest_orbit(
     shorter = minimal_period(orbit)
     if shorter == orbit.period:
         return orbit
-    return orbit_near(problem.flow, stroboscopic(orbit)[0], shorter, orbit.omega, observe)
+    return orbit_near(flow, stroboscopic(orbit)[0], shorter, orbit.omega, observe)
+
+
+def _least_length_solution(
+    problem: ShootingProblem, nodes: Real, omega: float, longest: float, most: int
+) -> tuple[Real, Real] | None:
+    """Point that Newton steps of least length lead to, and the row that they fix; None if none."""
+    point = np.append(nodes.ravel(), math.log(omega))
+    row = np.zeros(point.size)
+    row[-1] = 1.0
+    for _ in range(most):
+        found = problem.correct(point, row, max_iterations=1)
+        if not np.any(found.along):
+            return None
+        metric = problem.metric(point)
+        metric[-1] *= FREQUENCY_WEIGHT
+        row = metric * found.along
+        step = found.point - point
+        step -= found.along * float(row @ step) / float(row @ found.along)
+        length = metric_length(metric, step)
+        point = point + step * min(1.0, longest / length if length else 1.0)
+        if not abs(point[-1] - math.log(omega)) < FREQUENCY_SHIFT:
+            return None
+        if length < NEARBY:
+            return point, row
+    return None
+
+
+def _thinned(vector: Real, shape: tuple[int, ...]) -> Real:
+    """A point, or a row, with the usual number of segments in a period."""
+    every = shape[1] // SEGMENTS_PER_PERIOD
+    return np.append(vector[:-1].reshape(shape)[:, ::every].ravel(), vector[-1])
 
 
 def _refined(problem: ShootingProblem, start: Real, omega: float, observe: str) -> Orbit | None:

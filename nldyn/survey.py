@@ -431,8 +431,8 @@ class _Survey:
         effort, longest = self.effort, len(self._unstable_periods())
         tries = effort.pseudo_orbits
         found = near_pseudo_orbits(self.box, frequency_hz, effort.spacing, longest, tries)
-        for _, orbit in found:
-            if orbit is not None:
+        for _, orbits in found:
+            for orbit in orbits:
                 self._follow(orbit)
 
     def _unstable_periods(self) -> range:

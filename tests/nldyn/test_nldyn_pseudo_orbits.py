@@ -27,8 +27,10 @@ from nldyn import (
     solve_orbit,
 )
 from nldyn.exploration import steps_between
+from nldyn.orbit import SEGMENTS_PER_PERIOD
 from nldyn.paper.jobs import scene_system
-from nldyn.pseudo_orbits import FARTHEST, Pieces
+from nldyn.pseudo_orbits import FARTHEST, NODES, Pieces
+from nldyn.search import LONG_STEPS, SHORT_STEPS, nearest_orbit
 
 RANGE_HZ = (36.0, 38.5)
 
@@ -98,6 +100,24 @@ def test_no_more_are_tried_than_wanted(three):
     done = by_pseudo_orbits(three, tries=1, spacing=0.02)
     tried = int(re.search(r"of (\d+) pseudo-orbits", done.notes[-1])[1])
     assert 0 < tried <= 3 * steps_between(*RANGE_HZ, 0.02)
+
+
+def test_short_steps_between_more_states_lead_back_to_an_orbit_more_often(three):
+    """Forty times, each of its pieces moved by itself by a tenth of their size."""
+    (third,) = three.of_period(3)
+    orbit = third.at(36.5)[0]
+    flow = orbit.problem.flow
+    phases = 2.0 * np.pi / NODES * np.arange(3 * NODES)
+    nodes = flow.to_state(orbit.states(phases)).reshape(3, NODES, -1)
+    size = np.linalg.norm(nodes[:, 0], axis=1).mean()
+    rng, back = np.random.default_rng(1), {LONG_STEPS: 0, SHORT_STEPS: 0}
+    for _ in range(40):
+        moved = nodes + 0.1 * size * rng.standard_normal((3, 1, 2)) / np.sqrt(2.0)
+        for every, steps in ((NODES // SEGMENTS_PER_PERIOD, LONG_STEPS), (1, SHORT_STEPS)):
+            found = nearest_orbit(flow, moved[:, ::every], orbit.omega, "middle", steps)
+            back[steps] += found is not None and third.contains(found)
+    three_sigma = 3.0 * np.sqrt(40 / 4 + 40 / 4)  # of two such counts, were both ways as good
+    assert back[SHORT_STEPS] > back[LONG_STEPS] + three_sigma
 
 
 def test_pieces_are_motions_over_one_period_of_the_excitation(three):
