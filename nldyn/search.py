@@ -205,11 +205,12 @@ def orbit_beside(
         nodes = spread(shooting_problem(flow, period), start, omega)
     except ConvergenceError:
         return None
-    return nearest_orbit(flow, nodes.reshape(period, SEGMENTS_PER_PERIOD, -1), omega, observe)
+    nodes = nodes.reshape(period, SEGMENTS_PER_PERIOD, -1)
+    return nearest_orbit(flow, nodes, omega, observe, SHORT_STEPS)
 
 
 def nearest_orbit(
-    flow: FlowMap, nodes: Real, omega: float, observe: str, steps: tuple[float, int] = LONG_STEPS
+    flow: FlowMap, nodes: Real, omega: float, observe: str, steps: tuple[float, int]
 ) -> Orbit | None:
     """Orbit near some states at a frequency near ω, by its minimal period; None if none is found.
 
