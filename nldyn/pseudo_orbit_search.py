@@ -58,8 +58,8 @@ def by_pseudo_orbits(
         Relative distance of the frequencies at which pieces are put together, and largest
         distance of those of the pieces from it.
     tries : int
-        Most pseudo-orbits of each length at each frequency from which an orbit is looked for; no
-        more than four are of the same orbits.
+        Most pseudo-orbits of each length at each frequency from which an orbit is looked for; those
+        of the same orbits, four at most, come after one of each choice of orbits.
     options : ContinuationOptions, optional
         Step control.
     progress : callable, optional

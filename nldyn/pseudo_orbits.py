@@ -82,8 +82,9 @@ class Pieces:
     def pseudo_orbits(self, period: int, most_alike: int) -> Iterator[tuple[int, ...]]:
         """Closed sequences of pieces, those with the smallest jumps first.
 
-        Not those that are orbits, nor more than some that are made of the same orbits. Of very many
-        pieces only the nearest are put together, and only the shortest of the sequences kept.
+        Not those that are orbits. First is one of each choice of orbits, then a second one, in
+        another order or place, and so on: what differs more leads to more. Of very many pieces only
+        the nearest are put together, and only the shortest of the sequences kept.
 
         Parameters
         ----------
@@ -96,14 +97,21 @@ class Pieces:
             return
         alike: dict[tuple[int, ...], int] = {}
         seen: set[tuple[int, ...]] = set()
+        later: list[list[tuple[int, ...]]] = [[] for _ in range(1, most_alike)]
         for sequence in _closed_paths(self.jumps, period):
             first = min(sequence[i:] + sequence[:i] for i in range(period))
             orbits = tuple(sorted(self.passage[list(first)].tolist()))
-            if first in seen or alike.get(orbits, 0) >= most_alike or self.is_orbit(first):
+            count = alike.get(orbits, 0)
+            if first in seen or count >= most_alike or self.is_orbit(first):
                 continue
             seen.add(first)
-            alike[orbits] = alike.get(orbits, 0) + 1
-            yield first
+            alike[orbits] = count + 1
+            if count:
+                later[count - 1].append(first)
+            else:
+                yield first
+        for sequences in later:
+            yield from sequences
 
 
 def _orbits_within(branch: Branch, window: tuple[float, float]) -> Iterator[Real]:
