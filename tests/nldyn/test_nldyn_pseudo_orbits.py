@@ -54,7 +54,7 @@ def without(known: Diagram, branch) -> Diagram:
 @pytest.mark.parametrize("period", [1, 2, 3])
 def test_a_branch_is_found_from_pieces_of_the_others(three, period):
     (left_out,) = three.of_period(period)
-    done = by_pseudo_orbits(without(three, left_out))
+    done = by_pseudo_orbits(without(three, left_out), tries=50)
     (found,) = done.branches[2:]
     assert found.period == period
     assert all(left_out.contains(orbit) for orbit in found.points)
@@ -63,7 +63,7 @@ def test_a_branch_is_found_from_pieces_of_the_others(three, period):
 
 
 def test_what_is_known_is_met_and_not_found_again(three):
-    done = by_pseudo_orbits(three)
+    done = by_pseudo_orbits(three, tries=50)
     assert len(done.branches) == 3
     assert ", and to 3 of the 3 given without a piece of theirs, 0 branches" in done.notes[-1]
     assert done.notes[:-2] == tuple(n for n in three.notes if not n.startswith("indices"))
@@ -198,9 +198,9 @@ def test_interrupted_it_keeps_what_it_has_found(three, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        by_pseudo_orbits(known, progress=interrupt, checkpoint=place)
+        by_pseudo_orbits(known, tries=50, progress=interrupt, checkpoint=place)
     (kept,) = load_branches(place)
-    resumed = by_pseudo_orbits(known, checkpoint=place)
+    resumed = by_pseudo_orbits(known, tries=50, checkpoint=place)
     assert len(resumed.branches) == 3
     assert np.array_equal(resumed.branches[2].frequency_hz, kept.frequency_hz)
 
