@@ -23,6 +23,7 @@ from nldyn.search import LONG_STEPS, MOST_COUNT, SHORT_STEPS, nearest_orbit
 from nldyn.step_control import ContinuationOptions
 
 MOST_ALIKE = 4  # pseudo-orbits made of the same orbits that are tried, in other orders or places
+WAYS = (NODES // SEGMENTS_PER_PERIOD, LONG_STEPS), (1, SHORT_STEPS)  # from every which state
 
 
 @one_thread()
@@ -141,7 +142,7 @@ def near_pseudo_orbits(
             nodes = pieces.nodes[chosen]
             orbits = [
                 nearest_orbit(box.flow, nodes[:, ::every], omega, box.observe, steps)
-                for every, steps in ((NODES // SEGMENTS_PER_PERIOD, LONG_STEPS), (1, SHORT_STEPS))
+                for every, steps in WAYS
             ]
             inside = [o for o in orbits if o is not None and low <= o.frequency_hz <= high]
             yield set(pieces.branch[chosen].tolist()), inside

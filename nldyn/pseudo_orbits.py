@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -95,17 +96,17 @@ class Pieces:
         """
         if not self.branch.size:
             return
-        alike: dict[tuple[int, ...], int] = {}
+        alike = Counter[tuple[int, ...]]()
         seen: set[tuple[int, ...]] = set()
         later: list[list[tuple[int, ...]]] = [[] for _ in range(1, most_alike)]
         for sequence in _closed_paths(self.jumps, period):
             first = min(sequence[i:] + sequence[:i] for i in range(period))
             orbits = tuple(sorted(self.passage[list(first)].tolist()))
-            count = alike.get(orbits, 0)
+            count = alike[orbits]
             if first in seen or count >= most_alike or self.is_orbit(first):
                 continue
             seen.add(first)
-            alike[orbits] = count + 1
+            alike[orbits] += 1
             if count:
                 later[count - 1].append(first)
             else:

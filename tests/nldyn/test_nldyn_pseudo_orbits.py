@@ -27,8 +27,8 @@ from nldyn import (
     solve_orbit,
 )
 from nldyn.exploration import steps_between
-from nldyn.orbit import SEGMENTS_PER_PERIOD
 from nldyn.paper.jobs import scene_system
+from nldyn.pseudo_orbit_search import WAYS
 from nldyn.pseudo_orbits import FARTHEST, NODES, Pieces
 from nldyn.search import LONG_STEPS, SHORT_STEPS, nearest_orbit
 
@@ -113,7 +113,7 @@ def test_short_steps_between_more_states_lead_back_to_an_orbit_more_often(three)
     rng, back = np.random.default_rng(1), {LONG_STEPS: 0, SHORT_STEPS: 0}
     for _ in range(40):
         moved = nodes + 0.1 * size * rng.standard_normal((3, 1, 2)) / np.sqrt(2.0)
-        for every, steps in ((NODES // SEGMENTS_PER_PERIOD, LONG_STEPS), (1, SHORT_STEPS)):
+        for every, steps in WAYS:
             found = nearest_orbit(flow, moved[:, ::every], orbit.omega, "middle", steps)
             back[steps] += found is not None and third.contains(found)
     three_sigma = 3.0 * np.sqrt(40 / 4 + 40 / 4)  # of two such counts, were both ways as good
