@@ -380,7 +380,7 @@ class Exploration:
                 f"motions that did not settle (chaos, longer periods or slow decay): "
                 f"{open_ranges} Hz"
             )
-        tried = self._folds() + self._beside() + self._cut()
+        tried = self._unstable() + self._folds() + self._beside() + self._cut()
         return lines + tried + self._indices + [CAN_BE_MISSING]
 
     def _rounds(self) -> list[str]:
@@ -397,6 +397,17 @@ class Exploration:
             f"at least about {self.unmet_branches:.0f} more are to be expected "
             f"that motions would come to (Chao 1987); {never} were reached otherwise"
             + (f" or known before, as {self.stage.given} were" if self.stage.given else ""),
+        ]
+
+    def _unstable(self) -> list[str]:
+        """Which unstable orbits were not looked for beside motions."""
+        longest, wanted = self.question.effort.unstable_period, self.question.max_period
+        if longest >= wanted:
+            return []
+        above = f" of periods above {longest}" if longest else ""
+        return [
+            f"unstable orbits{above} were not looked for (unstable_period={longest}): they are "
+            "found only where a branch of the others leads to them"
         ]
 
     def _folds(self) -> list[str]:
@@ -416,7 +427,9 @@ class Exploration:
         """Where pieces of known orbits were put together."""
         effort = self.question.effort
         longest = min(effort.unstable_period, self.question.max_period)
-        if not (effort.pseudo_orbits and longest):
+        turn, steps, length = self.question.place(self.stage.steps)
+        way_down_begun = turn > 0 or 2 * steps > length
+        if not (effort.pseudo_orbits and longest and way_down_begun):
             return []
         return [
             f"beside up to {effort.pseudo_orbits} pseudo-orbits of each length up to {longest} "

@@ -6,9 +6,11 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
 
 from nldyn.branch import Branch
 from nldyn.linear import Real
@@ -18,7 +20,8 @@ PLACES = 3  # most frequencies at which a branch gives pieces
 ALIKE = 0.05  # relative difference of orbits that are taken for one
 NEAREST = 60  # pieces that may follow one: bounds time and memory where there are hundreds
 MOST_PATHS = 200_000  # the shortest, that are prolonged: bounds them for longer periods
-FARTHEST = 2.0  # sum of the jumps, over the size of the pieces, up to which they are put together
+NEAR = 0.5  # sum of the jumps, over the size of the pieces, up to which all are as good
+FARTHEST = 2.0  # up to which they are put together
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +68,12 @@ class Pieces:
         branch_, passage, place_, period, nodes_, ends = map(np.array, columns)
         return cls(branch_, passage, place_, period, nodes_, ends)
 
-    @property
+    @cached_property
     def jumps(self) -> Real:
         """Distance (m, m) from the end of a piece to the beginning of another, over their size."""
         starts = self.nodes[:, 0]
-        size = float(np.linalg.norm(starts, axis=1).mean())
-        return np.asarray(np.linalg.norm(self.ends[:, None] - starts, axis=2) / size)
+        size = float(np.linalg.norm(starts, axis=1).mean()) or 1.0
+        return np.asarray(cdist(self.ends, starts) / size)
 
     def is_orbit(self, sequence: Sequence[int]) -> bool:
         """Whether a sequence is that of an orbit, or of orbits that hardly differ."""
@@ -81,11 +84,12 @@ class Pieces:
         return not np.any(steps % self.period[chosen])
 
     def pseudo_orbits(self, period: int, most_alike: int) -> Iterator[tuple[int, ...]]:
-        """Closed sequences of pieces, those with the smallest jumps first.
+        """Closed sequences of pieces, at random where the jumps are small, then by their size.
 
-        Not those that are orbits. First is one of each choice of orbits, then a second one, in
-        another order or place, and so on: what differs more leads to more. Of very many pieces only
-        the nearest are put together, and only the shortest of the sequences kept.
+        Not those that are orbits, nor shorter sequences repeated. First is one of each choice of
+        orbits, then a second one, in another order or place, and so on: what differs more leads to
+        more, and the smallest jumps are those of pieces that are most alike. Of very many pieces
+        only the nearest are put together, and only the shortest of the sequences kept.
 
         Parameters
         ----------
@@ -100,10 +104,12 @@ class Pieces:
         seen: set[tuple[int, ...]] = set()
         later: list[list[tuple[int, ...]]] = [[] for _ in range(1, most_alike)]
         for sequence in _closed_paths(self.jumps, period):
-            first = min(sequence[i:] + sequence[:i] for i in range(period))
+            begun_elsewhere = [sequence[i:] + sequence[:i] for i in range(period)]
+            first = min(begun_elsewhere)
             orbits = tuple(sorted(self.passage[list(first)].tolist()))
             count = alike[orbits]
-            if first in seen or count >= most_alike or self.is_orbit(first):
+            repeats = begun_elsewhere.count(first) > 1
+            if repeats or first in seen or count >= most_alike or self.is_orbit(first):
                 continue
             seen.add(first)
             alike[orbits] += 1
@@ -140,7 +146,7 @@ def _passages(orbits: Sequence[Real]) -> list[int]:
 
 
 def _closed_paths(jumps: Real, length: int) -> Iterator[tuple[int, ...]]:
-    """Closed paths over places with the shortest ways, some of them more than once, in order."""
+    """Closed paths over places, some of them more than once: near ones at random, then in order."""
     near = np.argsort(jumps, axis=1)[:, :NEAREST]
     paths = np.arange(len(jumps))[:, None]
     ways = np.zeros(len(jumps))
@@ -154,6 +160,7 @@ def _closed_paths(jumps: Real, length: int) -> Iterator[tuple[int, ...]]:
         paths = np.column_stack([paths[before], near[last[before], column]])
         ways = longer.flat[chosen]
     ways = ways + jumps[paths[:, -1], paths[:, 0]]
-    order = np.argsort(ways, kind="stable")
+    chance = np.random.default_rng(0).permutation(len(ways))
+    order = np.lexsort([chance, np.maximum(ways, NEAR)])
     for path in paths[order[ways[order] < FARTHEST]]:
         yield tuple(path.tolist())

@@ -279,7 +279,7 @@ class _Survey:
             seed = (self.effort.seed, turn, place, again + 1)
             starts = _at_random(flow, omega, self.effort.starts, seed)
             here = here.with_more(self._search(starts, known, also_unstable=True)[0])
-        if not up and self.effort.pseudo_orbits:
+        if not up and self.effort.pseudo_orbits and self.effort.unstable_period:
             self._put_together(frequency)
         both = {c.frequency_hz: c for c in stage.coverage}
         both[frequency] = both[frequency].with_more(here) if frequency in both else here
@@ -519,8 +519,7 @@ class _Known:
         """Number of the branch that an orbit, perhaps of another frequency, lies on."""
         if orbit.omega == self.omega:
             return next((i for i, other, _ in self._orbits if same_orbit(orbit, other)), None)
-        branches = self.box.branches
-        return next((i for i, branch in enumerate(branches) if branch.contains(orbit)), None)
+        return self.box.branch_of(orbit)
 
     def beside(self, state: Real, period: int) -> int | None:
         """Number of the branch with an orbit near a state, its period the given one or a part."""

@@ -6,7 +6,8 @@ many may be missing. With ``--detour damping=0.5 "natural_frequency_hz[1]=0.99"`
 it does not simulate, but goes by way of a system with these factors, see `by_detour`; with
 ``--pseudo-orbits`` it puts pieces of known orbits together, see `by_pseudo_orbits`. The directory
 keeps what is found, and the same command goes on where it was interrupted (but for following the
-starts); once it has ended, it looks for more beside what it has found, from other random states.
+starts, and for detours and pseudo-orbits, which keep their branches only); once it has ended, it
+looks for more beside what it has found, from other random states.
 """
 
 from __future__ import annotations
@@ -72,23 +73,24 @@ def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Explorat
 
 def search_by_detour(name: str, folder: Path, factors: Mapping[str | Parameter, float]) -> Diagram:
     """Look for branches of a model with `by_detour`, and write the starts of all."""
-    return _search_beside(name, folder, partial(by_detour, factors=factors))
+    return _search_beside(name, folder, "detour", partial(by_detour, factors=factors))
 
 
 def search_by_pseudo_orbits(name: str, folder: Path) -> Diagram:
     """Look for branches of a model with `by_pseudo_orbits`, and write the starts of all."""
-    return _search_beside(name, folder, by_pseudo_orbits)
+    return _search_beside(name, folder, "pseudo_orbits", by_pseudo_orbits)
 
 
-def _search_beside(name: str, folder: Path, look: Callable[..., Diagram]) -> Diagram:
+def _search_beside(name: str, folder: Path, way: str, look: Callable[..., Diagram]) -> Diagram:
     """Look for branches of a model beside the known ones, and write the starts of all."""
     job = job_named(name)
     with progress_line() as report:
         known, place, _ = known_branches(job, folder, report)
-        kept = place.with_suffix(".beside.h5")
+        kept = place.with_suffix(f".{way}.h5")
         with told_what_is_kept(kept):
             found = look(known, max_period=LONGEST, options=LONG, progress=report, checkpoint=kept)
     write_found(found, job, folder)
+    kept.unlink(missing_ok=True)
     return found
 
 
@@ -152,20 +154,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("directory", type=Path)
     parser.add_argument("models", nargs="*", metavar="MODEL", help=f"of {', '.join(MODELS)}")
-    parser.add_argument(
+    way = parser.add_mutually_exclusive_group()
+    way.add_argument(
         "--detour", type=factor_of, nargs="+", action="extend", metavar="NAME=FACTOR",
         help="what is changed there: damping, excitation, or a parameter such as 'stiffness[0]'; "
         "give it after the models",
     )  # fmt: skip
-    parser.add_argument(
+    way.add_argument(
         "--pseudo-orbits", action="store_true", help="put pieces of known orbits together"
     )
     given = parser.parse_args()
     factors = dict(given.detour or ())
     if given.detour and len(factors) < len(given.detour):
         parser.error("argument --detour: names something twice")
-    if factors and given.pseudo_orbits:
-        parser.error("argument --pseudo-orbits: not allowed with argument --detour")
     unknown = set(given.models) - set(MODELS)
     if unknown:
         parser.error(f"unknown model {sorted(unknown)[0]!r} (there are: {', '.join(MODELS)})")

@@ -139,6 +139,9 @@ def test_pieces_of_known_orbits_lead_to_further_branches(monkeypatch):
         assert any(branch.contains(orbit) for branch in found.diagram.branches)
     assert "beside up to 200 pseudo-orbits of each length up to 2 orbits" in found.report()
     assert "pseudo-orbits of each length" not in without.report()
+    way_up = replace(found, stage=replace(found.stage, steps=1, ends=()))
+    assert "not finished: 1 of " in way_up.report()
+    assert "pseudo-orbits of each length" not in way_up.report()
 
 
 def test_report_tells_what_was_tried(around_37):
@@ -146,6 +149,7 @@ def test_report_tells_what_was_tried(around_37):
     assert f"simulations at {len(around_37.coverage)} frequencies" in text
     assert "harmonic" in text and "1/3" in text
     assert "may be missing all the same: isolas that no motion came near" in text
+    assert "unstable orbits of periods above 3 were not looked for" in text
 
 
 def test_repeated_exploration_gives_the_same_branches():
