@@ -24,9 +24,9 @@ from nldyn import (
     index_gaps,
     index_sum,
     load_branches,
+    pseudo_orbits,
     solve_orbit,
 )
-import nldyn.pseudo_orbits as pseudo_orbits
 from nldyn.exploration import steps_between
 from nldyn.paper.jobs import scene_system
 from nldyn.pseudo_orbit_search import WAYS
