@@ -66,6 +66,9 @@ MOST_STEPS = 10_000_000  # in the search for one contact: a second
 
 # what a stop damps: a panel shows decay by e^-8 to 14 digits, and nothing is left of e^-40 of it
 DECAY, FADED = 8.0, 40.0
+# below this exponent a slope sets in almost at once: there nodes at the switch count, and less than
+# the usual tail is accepted
+ROUND, SHARP_TAIL = 1.5, 0.1
 CREEP = 100.0  # such an exponent over an elastic contact: the damping alone decides the speed
 
 # an orbit closes to this share of its size, or to this one times the largest entry of its segments'
@@ -599,13 +602,12 @@ def law(fl, stop, delta, speed):
 def closed_law(fl, stop, delta, speed):
     """The same within a panel on which the stop is closed.
 
-    A linear law goes on beyond the switch there: rounding may put the outermost node on its other
-    side, and would drop the whole stiffness from the slopes.
+    There a law whose slope sets in almost at once goes on beyond the switch, as an odd function:
+    the outermost node may come to lie on its other side, and would drop the whole stiffness.
     """
-    if fl.laws[stop] == 0 and fl.stops[stop, EXPONENT] == 1.0:
-        stiffness, loss = fl.stops[stop, STIFFNESS], fl.stops[stop, DISSIPATION]
-        factor = 1.0 + loss * speed
-        return stiffness * delta * factor, stiffness * factor, loss * stiffness * delta
+    if delta < 0.0 and fl.stops[stop, EXPONENT] < ROUND:
+        force, stiffness, viscosity = law(fl, stop, -delta, speed)
+        return -force, stiffness, -viscosity
     return law(fl, stop, delta, speed)
 
 
@@ -1244,6 +1246,8 @@ def resolved(fl, tab, kind, h, noise, panel):
         if singular and nearly_opens(tab, kind, panel.output, a, 10.0 * noise[a]):
             return False
         goal = fl.tail if panel.decay[1, a] <= DECAY else 0.01 * fl.tail  # see `hold`
+        if 1.0 < fl.stops[panel.active[a], EXPONENT] < ROUND:
+            goal *= SHARP_TAIL
         floor = 20.0 * noise[a] / deepest
         tail = max(goal * fl.tail / forced[a], floor)
         shake = 0.0  # of the force by the rounding of the rate

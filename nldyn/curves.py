@@ -39,6 +39,7 @@ from nldyn.whole_file import check_writable
 
 CurvePart = Literal["points", "marks"]
 CLOSE = 1e-3  # how far the defining condition of a start may be off
+CROSSES_END = 1e-3  # component of a unit tangent that leads to or from the end of a range
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -603,6 +604,11 @@ def _start(family: OrbitFamily, orbit: Orbit, condition: Condition) -> CurvePoin
     by_surface = gradient(at, surface, condition)
     along = surface @ np.linalg.svd(by_surface)[2][-1] if by_surface.size else surface[:, 0]
     row = family.metric(guess) * along
+    for place, chart in enumerate(family.charts, first):
+        at_end = chart.value(float(guess[place])) in (chart.low, chart.high)
+        if at_end and abs(along[place]) > CROSSES_END * np.linalg.norm(along):
+            row = np.zeros(guess.size)  # held there, as behind it there may be no system
+            row[place] = 1.0
     row /= np.linalg.norm(row)
     found = correct(family, guess, condition, row, float(row @ guess))
     if not found.converged:

@@ -122,6 +122,34 @@ def test_stiff_stops_of_mixed_exponents_agree_at_all_tolerances():
         np.testing.assert_allclose(end, ends[-1], rtol=1e-8)
 
 
+@pytest.mark.parametrize("exponent", [1.0, 1.0 + 1e-9, 1.003, 1.01, 1.05, 1.1, 1.2, 1.35, 1.5])
+def test_the_jacobian_of_a_law_that_is_nearly_linear_against_differences(exponent):
+    """A contact of 0.0024 of the period; differences of the states, extrapolated to order six."""
+    system = System.from_matrices(
+        [[2.48]], [[16877.0]], {"middle": [1.0]}, modal_damping=0.0142,
+        stops=[Stop("middle", 5.17e9, exponent)], excitation=[Unbalance("middle", 4.92e-6)],
+    )  # fmt: skip
+    fine, phases = FlowMap(system, FlowOptions(1e-13, nodes=28)), np.array([0.0, 2.0 * np.pi])
+    omega, start = 2.0 * np.pi * 34.8, np.array([-1.3e-5, 2.8e-7])
+
+    def difference(direction, length):
+        there, back = (
+            fine.shoot((start + way * direction)[None], phases, omega).ends[0]
+            for way in (length, -length)
+        )
+        return (there - back) / (2.0 * length)
+
+    step = 4e-9
+    columns = [
+        64.0 * difference(e, step) - 20.0 * difference(e, 2.0 * step) + difference(e, 4.0 * step)
+        for e in np.eye(2)
+    ]
+    wanted = np.transpose(columns) / 45.0
+    for rtol in (1e-6, 1e-9):
+        found = FlowMap(system, FlowOptions(rtol)).shoot(start[None], phases, omega).jacobians[0]
+        assert np.linalg.norm(found - wanted) < 10.0 * rtol * np.linalg.norm(wanted)
+
+
 def test_derivative_by_dissipation_where_there_is_none_against_differences():
     flow = [FlowMap(one_dof(dissipation)) for dissipation in (0.0, 1e-3)]
     start, phases = np.zeros((1, 2)), np.array([0.0, 2.0 * np.pi])
