@@ -36,6 +36,7 @@ BOUNDS = {
     name: (0.0, math.inf)
     for name in ("stiffness", "dissipation", *SOURCES, *_OF_DAMPERS, *_OF_MODES)
 } | {"exponent": (1.0, LARGEST_EXPONENT)}  # between which there are systems
+POSITIVE = ("stiffness", "natural_frequency_hz")  # there is no system where they are zero
 NAMES = (FREQUENCY, *_OF_STOPS, *SOURCES, *_OF_DAMPERS, *_OF_MODES)
 
 
@@ -206,6 +207,10 @@ class Chart:
             upper = "" if most == math.inf else f" and {most:g} at most"
             raise SystemModelError(
                 f"the range of {name} must be {least:g} at least{upper}, got {shown(limits)}"
+            )
+        if name in POSITIVE and low == 0.0:
+            raise SystemModelError(
+                f"the range of {name} must begin above zero, got {shown(limits)}"
             )
         return cls(parameter, float(low), float(high))
 

@@ -53,6 +53,24 @@ def test_a_curve_that_begins_at_the_end_of_a_range_ends_there():
     assert curve.values[[0, -1], 0].tolist() == [0.0, 1.0]
 
 
+@pytest.mark.parametrize(("parameter", "low"), [("dissipation", 0.0), ("exponent", 1.0)])
+def test_curves_of_folds_begin_at_the_bound_of_a_number(parameter, low):
+    """Newton's method would leave it by rounding, on one of the two folds at least."""
+    stop = Stop.linear("m", 2e4, gap=2e-4)
+    system = System.from_modal(
+        [10.0], {"m": [1.0]}, modal_damping=0.03, stops=[stop], excitation=[HarmonicForce("m", 3.0)]
+    )
+    branch = continue_branch(solve_orbit(system, 7.0), (6.0, 8.0))
+    folds = [special for special in branch.special_points if special.kind == "LP"]
+    assert len(folds) == 2
+    for fold in folds:
+        curve = continue_special(fold, ("frequency_hz", parameter), ((6.0, 8.0), (low, low + 1.0)))
+        ends = curve.values[[0, -1], 1]
+        assert low in ends
+        here = curve.values[np.flatnonzero(curve.values[:, 1] == low), 0]
+        assert np.abs(here - fold.frequency_hz).min() < 1e-9
+
+
 def linear_stop(gap=1e-3, stiffness=2e4, unbalance=2e-4) -> System:
     return System.from_matrices(
         [[MASS]], [[MASS * NATURAL**2]], {"m": [1.0]}, modal_damping=RATIO,
@@ -714,6 +732,8 @@ WINDOW = ((20.0, 30.0), (-1e-6, 1e-6))
         (lambda o: continue_in(o, "gap", (1e-6, -1e-6)), "two finite numbers, ascending"),
         (lambda o: continue_in(o, "gap", 1.0), "must be two numbers, got 1.0"),
         (lambda o: continue_in(o, "frequency_hz", (-1.0, 30.0)), "must be positive"),
+        (lambda o: continue_in(o, "stiffness", (0.0, 6e9)), "must begin above zero, got (0.0, 6"),
+        (lambda o: continue_in(o, "stiffness", (-1.0, 6e9)), "must be 0 at least, got (-1.0, 6"),
         (
             lambda o: continue_constant(o, "torque", ("frequency_hz", "gap"), WINDOW),
             "unknown monitor 'torque'; there are: peak_force",
