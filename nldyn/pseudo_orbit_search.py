@@ -23,7 +23,7 @@ from nldyn.search import LONG_STEPS, MOST_COUNT, SHORT_STEPS, nearest_orbit
 from nldyn.step_control import ContinuationOptions
 
 MOST_ALIKE = 4  # pseudo-orbits made of the same orbits that are tried, in other orders or places
-WAYS = (NODES // SEGMENTS_PER_PERIOD, LONG_STEPS), (1, SHORT_STEPS)  # from every which state
+WAYS = (NODES // SEGMENTS_PER_PERIOD, LONG_STEPS), (1, SHORT_STEPS)  # every how many states, steps
 
 
 @one_thread()
@@ -42,12 +42,13 @@ def by_pseudo_orbits(
     A pseudo-orbit is a sequence of pieces of motions with small jumps between them; in a hyperbolic
     set an orbit is near every one [Bowen 1975]. Here the pieces are single excitation periods of
     known orbits, of any period and of frequencies close together. From each closed sequence of up
-    to `max_period` of them, those with the smallest jumps first, the Gauss-Newton method [Allgower
-    and Georg 1990, chapter 3] goes to the nearest orbit, at a frequency that it finds. If that lies
-    on no known branch, its branch is followed, with what it leads to. No motion is simulated, and
-    no other system is needed; it is the faster the fewer branches there are, and slow for long
-    periods: with few branches of the 1-DOF model up to period 3 in 8 s, to 5 in 150 s. What
-    resembles no orbits known is not found. Flips of the branches given are not followed.
+    to `max_period` of them, in random order where the jumps are small and then by their size, the
+    Gauss-Newton method [Allgower and Georg 1990, chapter 3] goes to the nearest orbit, at a
+    frequency that it finds. If that lies on no known branch, its branch is followed, with what it
+    leads to. No motion is simulated, and no other system is needed; it is the faster the fewer
+    branches there are, and slow for long periods: with few branches of the 1-DOF model up to period
+    3 in 8 s, to 5 in 150 s. What resembles no orbits known is not found. Flips of the branches
+    given are not followed.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ def by_pseudo_orbits(
     -------
     Diagram
         The branches known, then those found. The last note tells what was tried, and to how many of
-        the branches given, up to `max_period`, pieces of others led: at least so many it would have
+        the branches given, up to `max_period`, pieces of others led: about so many it would have
         found, had each alone been unknown. The note before tells, if every mode is damped, whether
         the indices add up to one, see `index_sum`. What `known` notes of them is left out.
 
