@@ -130,11 +130,8 @@ class Curve:
         if part == "marks":
             columns["type"] = np.array([mark.kind for mark in self.marks], dtype=str)
         values = np.array([row.values for row in rows], dtype=float)
-        for parameter, column in zip(
-            self.parameters, values.reshape(-1, len(self.parameters)).T, strict=True
-        ):
-            name, index = parameter.name, parameter.index
-            columns[f"{name}_{index}" if index else name] = column
+        by_parameter = values.reshape(-1, len(self.parameters)).T
+        columns.update(zip(map(_column_name, self.parameters), by_parameter, strict=True))
         for name, column in orbit_columns([row.orbit for row in rows]).items():
             columns.setdefault(name, column)
         columns["residual"] = np.array([row.residual for row in rows], dtype=float)
@@ -180,15 +177,15 @@ class Curve:
         whole = replace(self, points=tuple(point.on_charts(charts) for point in self.points))
         return _followed(whole, options, progress, keeper)
 
-    def at(self, name: str, value: float) -> list[Orbit]:
+    def at(self, parameter: str | Parameter, value: float) -> list[Orbit]:
         """All orbits of the curve at which a parameter has a value, corrected there, each once.
 
         Of two that are close to a turn of the parameter, nearer than 1e-7 of it, none may be found.
 
         Parameters
         ----------
-        name : str
-            Name of one of the curve's parameters.
+        parameter : str or Parameter
+            One of the curve's, or its name: as in the table, or without index if only one has it.
         value : float
             Its value.
 
@@ -199,18 +196,33 @@ class Curve:
         """
         if not is_finite(value):
             raise SystemModelError(f"value must be a finite number, got {shown(value)}")
-        names = [parameter.name for parameter in self.parameters]
-        if name not in names:
-            raise SystemModelError(
-                f"the curve has no parameter {shown(name)}; there are: {', '.join(names)}"
-            )
-        which = names.index(name)
+        which = self._index_of(parameter)
         first = self.points[:1] if math.isclose(self.values[0, which], value) else ()
         found: list[CurvePoint] = []
         for point in (*first, *passages(self.points, which, value)):
             if not any(_same_place(point, other) for other in found):
                 found.append(point)
         return [point.orbit for point in found]
+
+    def _index_of(self, wanted: str | Parameter) -> int:
+        """Place of a parameter among the curve's."""
+        columns = [_column_name(parameter) for parameter in self.parameters]
+        names = [parameter.name for parameter in self.parameters]
+        places: dict[str | Parameter, int] = {
+            name: names.index(name) for name in names if names.count(name) == 1
+        }
+        for which, (column, parameter) in enumerate(zip(columns, self.parameters, strict=True)):
+            places[column] = places[parameter] = which
+        if not isinstance(wanted, str | Parameter) or wanted not in places:
+            raise SystemModelError(
+                f"the curve has no parameter {shown(wanted)}; there are: {', '.join(columns)}"
+            )
+        return places[wanted]
+
+
+def _column_name(parameter: Parameter) -> str:
+    """Name of a parameter in a table, with its index where that is not 0."""
+    return f"{parameter.name}_{parameter.index}" if parameter.index else parameter.name
 
 
 def continue_in(

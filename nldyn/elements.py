@@ -216,7 +216,8 @@ class Stop:
         _finite(owner, "exponent", self.exponent)
         if not 1.0 <= self.exponent <= LARGEST_EXPONENT:
             raise SystemModelError(
-                f"{owner}: exponent must lie in [1, {LARGEST_EXPONENT:g}], got {shown(self.exponent)}"
+                f"{owner}: exponent must lie in [1, {LARGEST_EXPONENT:g}], "
+                f"got {shown(self.exponent)}"
             )
         _finite(owner, "dissipation", self.dissipation)
         if self.dissipation < 0.0:

@@ -813,6 +813,23 @@ def test_a_value_that_no_orbit_has_is_told_with_those_that_there_are(one_dof):
     )
 
 
+def test_each_of_two_parameters_of_one_name_has_its_own_orbits():
+    """The gaps of two stops; a name without index means the first, as elsewhere."""
+    gaps = Parameter("gap", 0), Parameter("gap", 1)
+    options = ContinuationOptions(max_points=3)
+    start = solve_orbit(between_two_stops(gap=0.011), 1.5)
+    stops = start.system.stops
+    ranges = [(0.5 * stop.gap, 2.0 * stop.gap) for stop in stops]
+    curve = continue_constant(start, "peak_force", gaps, ranges, options=options)
+    assert {"gap", "gap_1"} <= set(curve.table())
+    for which, value in enumerate(curve.values[1]):
+        for name in (gaps[which], ("gap", "gap_1")[which]):
+            (orbit,) = curve.at(name, value)
+            assert orbit.system.stops[which].gap == pytest.approx(value, rel=1e-12)
+    with pytest.raises(SystemModelError, match="no parameter 'gap_2'; there are: gap, gap_1"):
+        curve.at("gap_2", 1.0)
+
+
 def test_a_curve_has_no_other_parameters_than_its_own(one_dof):
     options = ContinuationOptions(max_points=2)
     curve = continue_in(solve_orbit(one_dof, 26.0), "frequency_hz", (25.0, 27.0), options=options)
