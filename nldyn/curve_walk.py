@@ -19,6 +19,7 @@ from nldyn.bordered import (
     Free,
     correct,
     gradient,
+    nearest_depth,
     tangent_surface,
 )
 from nldyn.branch import NOT_FINISHED, SHORT_STEP
@@ -37,6 +38,7 @@ RESONANCE_END = "becomes a curve of neutral saddles at a resonance"
 CLOSED_CURVE = "closed curve"
 VANISHES = "the extreme that grazes meets another one, and both vanish"
 DISSOLVED = "the branch point dissolves, as the symmetry does that brings it about"
+CORNER_OF_BRANCH_POINTS = "a stop is grazed, where the curve has a corner that is not followed"
 UNFOLDED = 1e-6  # unfolding number from which a branch point has dissolved
 MEETING = 1e-9  # arclength within which a curve and a grazing meet
 MOST_SECANTS = 20
@@ -394,11 +396,7 @@ class CurveWalk:
                         if ahead:
                             attempt = ahead.pop(0), self.options.max_angle, self.options.max_miss
                     if step < self.options.min_step:
-                        self.stop_reason = (
-                            VANISHES
-                            if extremes_meet(here)
-                            else f"{SHORT_STEP}{self.options.min_step:g}: {self._obstacle}"
-                        )
+                        self.stop_reason = self._why_short(here)
                         return
             there, angle, miss = attempt
             last = self._end(here, there)
@@ -465,6 +463,14 @@ class CurveWalk:
             if root or step > self.options.grazing_step:
                 return None
         return there, angle, miss
+
+    def _why_short(self, here: CurvePoint) -> str:
+        """Why no step is short enough."""
+        if extremes_meet(here):
+            return VANISHES
+        if isinstance(here.condition, BranchPoint) and nearest_depth(here.orbit) < MEETS:
+            return CORNER_OF_BRANCH_POINTS
+        return f"{SHORT_STEP}{self.options.min_step:g}: {self._obstacle}"
 
     def _left_at_once(self) -> str:
         """Name of a parameter at the end of its range, beyond which the curve would begin."""

@@ -813,6 +813,27 @@ def test_a_value_that_no_orbit_has_is_told_with_those_that_there_are(one_dof):
     )
 
 
+def test_a_curve_of_branch_points_tells_of_the_grazing_at_which_it_ends():
+    """Two equal stops, at which the next pair of extremes is zero in the end."""
+    stop = Stop.linear("m", 2e5, gap=2e-4)
+    system = System.from_modal(
+        [10.0], {"m": [1.0]}, modal_damping=0.03, stops=[stop, replace(stop, direction=-1)],
+        excitation=[HarmonicForce("m", 3.0)],
+    )  # fmt: skip
+    guess = np.array([3.0e-4, 3.0e-2]) * np.random.default_rng(0).normal(size=2)
+    branch = continue_branch(solve_orbit(system, 8.4, guess=guess), (7.0, 10.0))
+    special = max(
+        (point for point in branch.special_points if point.kind == "BP"),
+        key=lambda point: point.frequency_hz,
+    )
+    curve = continue_special(special, ("frequency_hz", "amplitude"), ((8.5, 9.0), (2.9, 6.0)))
+    grazed, end = curve.stop_reasons
+    assert grazed == "a stop is grazed, where the curve has a corner that is not followed"
+    assert end == "end of the range of amplitude"
+    sizes = [np.abs(curve.orbits[0].extremes(stop).values) for stop in (0, 1)]
+    assert max(size.min() / size.max() for size in sizes) < 1e-5
+
+
 def test_each_of_two_parameters_of_one_name_has_its_own_orbits():
     """The gaps of two stops; a name without index means the first, as elsewhere."""
     gaps = Parameter("gap", 0), Parameter("gap", 1)
