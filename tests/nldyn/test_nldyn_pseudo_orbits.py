@@ -24,9 +24,11 @@ from nldyn import (
     index_gaps,
     index_sum,
     load_branches,
+    load_diagram,
     pseudo_orbits,
     solve_orbit,
 )
+from nldyn.branch import NOT_FINISHED
 from nldyn.exploration import steps_between
 from nldyn.paper.jobs import scene_system
 from nldyn.pseudo_orbit_search import WAYS
@@ -71,7 +73,7 @@ def test_what_is_known_is_met_and_not_found_again(three):
 
 
 def test_an_orbit_alone_gives_no_pseudo_orbit(three):
-    """The harmonic changes so little from 36 to 38.5 Hz that its pieces give nothing else."""
+    """The harmonic changes so little within 0.1 % that its pieces give nothing else."""
     harmonic = Diagram(tuple(three.of_period(1)), RANGE_HZ, "middle")
     done = by_pseudo_orbits(harmonic, spacing=0.001)
     assert len(done.branches) == 1
@@ -246,6 +248,30 @@ def test_interrupted_it_keeps_what_it_has_found(three, tmp_path):
     resumed = by_pseudo_orbits(known, tries=50, checkpoint=place)
     assert len(resumed.branches) == 3
     assert np.array_equal(resumed.branches[2].frequency_hz, kept.frequency_hz)
+
+
+def test_a_branch_that_was_begun_is_finished(three, tmp_path):
+    """Interrupted on the way along it, and with the known branches read from a file."""
+    (left_out,) = three.of_period(3)
+    place, known = tmp_path / "found.h5", tmp_path / "known.h5"
+    without(three, left_out).save(known)
+    seen = []
+
+    def interrupt(what: str, frequency_hz: float) -> None:
+        seen.append(what)
+        if seen.count("1/3") == 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        by_pseudo_orbits(load_diagram(known), tries=50, progress=interrupt, checkpoint=place)
+    (begun,) = load_branches(place)
+    assert NOT_FINISHED in begun.stop_reasons
+    (found,) = by_pseudo_orbits(load_diagram(known), tries=50, checkpoint=place).branches[2:]
+    assert len(begun.points) < len(found.points)
+    assert NOT_FINISHED not in found.stop_reasons
+    ends = [special.frequency_hz for special in found.special_points if special.kind == "LP"]
+    wanted = [special.frequency_hz for special in left_out.special_points if special.kind == "LP"]
+    assert sorted(ends) == pytest.approx(sorted(wanted), rel=1e-9)
 
 
 @pytest.mark.parametrize(
