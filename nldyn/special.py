@@ -330,7 +330,11 @@ def special_points_between(
         points += [*_inside(z, first, last, c), last]
     for i in range(len(points) - 2, 0, -1):
         insert_dip(points, i)
-    return [special for pair in pairwise(points) for special in located_between(*pair)]
+    found = [special for pair in pairwise(points) for special in located_between(*pair)]
+    grazed = a.orbit.impacts != b.orbit.impacts and bool(touching_extremes(a.orbit, b.orbit))
+    if grazed and all(special.kind != "GR" for special in found):
+        raise LocateError("a stop is touched, but no grazing point was found")
+    return found
 
 
 def _inside(

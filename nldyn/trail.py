@@ -31,6 +31,7 @@ FLAT = 1e-4  # frequency part of tangents beside such a turn, below which it is
 SHORTEST_DETOUR = 1e-6  # first step of a walk that looks closely at what lies within a step
 MOST_DETOUR = 500  # points of such a walk
 STRAIGHT = 1.1  # its length over that of the step, up to which it leads straight there
+TOGETHER = 1e-9  # arclength between two special points that rounding may exchange
 BEYOND = 0.25  # of the step: how far in ln ω one that searches the last may leave the range
 
 
@@ -140,7 +141,8 @@ class Trail:
             last = self.nodes.pop()  # a dip may have put others there
             self.nodes = [*(p for p in self.nodes if not self._is_repeated(p)), last]
         end = self._end(next(i for i, p in enumerate(self.nodes) if p is self._stride.here))
-        return Leg(self.nodes, special, self.notes, self.walk.stop_reason, end)
+        notes = [*self.notes, *not_told_apart(special)]
+        return Leg(self.nodes, special, notes, self.walk.stop_reason, end)
 
     def _once_around(self) -> list[SpecialPoint]:
         """The special points of a closed branch, whose last step leads beyond the start.
@@ -264,6 +266,16 @@ class Trail:
         way = [replace(p, arclength=x) for p, x in zip(between, lengths, strict=True)]
         found, lost = _in_pieces([a, *way, b])
         return None if lost else found
+
+
+def not_told_apart(found: Sequence[SpecialPoint]) -> list[str]:
+    """Notes on special points of different kinds, as close together as orbits are exact."""
+    return [
+        f"{a.kind} and {b.kind} near {a.frequency_hz:.8g} Hz lie so close together that their "
+        "order is not sure, nor that there are no others"
+        for a, b in pairwise(found)
+        if a.kind != b.kind and abs(a.point.arclength - b.point.arclength) < TOGETHER
+    ]
 
 
 def trace(

@@ -813,17 +813,22 @@ def test_a_value_that_no_orbit_has_is_told_with_those_that_there_are(one_dof):
     )
 
 
-def test_a_curve_of_branch_points_tells_of_the_grazing_at_which_it_ends():
-    """Two equal stops, at which the next pair of extremes is zero in the end."""
+@pytest.fixture(scope="module")
+def between_stiff_stops():
+    """Branch from 7 to 10 Hz of an oscillator between two equal stops."""
     stop = Stop.linear("m", 2e5, gap=2e-4)
     system = System.from_modal(
         [10.0], {"m": [1.0]}, modal_damping=0.03, stops=[stop, replace(stop, direction=-1)],
         excitation=[HarmonicForce("m", 3.0)],
     )  # fmt: skip
     guess = np.array([3.0e-4, 3.0e-2]) * np.random.default_rng(0).normal(size=2)
-    branch = continue_branch(solve_orbit(system, 8.4, guess=guess), (7.0, 10.0))
+    return continue_branch(solve_orbit(system, 8.4, guess=guess), (7.0, 10.0))
+
+
+def test_a_curve_of_branch_points_tells_of_the_grazing_at_which_it_ends(between_stiff_stops):
+    """Two equal stops, at which the next pair of extremes is zero in the end."""
     special = max(
-        (point for point in branch.special_points if point.kind == "BP"),
+        (point for point in between_stiff_stops.special_points if point.kind == "BP"),
         key=lambda point: point.frequency_hz,
     )
     curve = continue_special(special, ("frequency_hz", "amplitude"), ((8.5, 9.0), (2.9, 6.0)))
@@ -832,6 +837,18 @@ def test_a_curve_of_branch_points_tells_of_the_grazing_at_which_it_ends():
     assert end == "end of the range of amplitude"
     sizes = [np.abs(curve.orbits[0].extremes(stop).values) for stop in (0, 1)]
     assert max(size.min() / size.max() for size in sizes) < 1e-5
+
+
+def test_points_that_rounding_may_exchange_are_told(between_stiff_stops):
+    """Where that branch point and that grazing nearly coincide, and where they do not."""
+    start = between_stiff_stops.at(8.81599)[1]
+    others = continue_in(start, "amplitude", (2.5, 5.5))
+    for amplitude, together in ((5.286, True), (5.32, False)):
+        branch = continue_branch(others.at("amplitude", amplitude)[0], (8.75, 8.9))
+        kinds = sorted(special.kind for special in branch.special_points)
+        told = [note for note in branch.notes if "so close together that" in note]
+        assert kinds == ["BP", "GR", "LP"]
+        assert bool(told) == together
 
 
 def test_each_of_two_parameters_of_one_name_has_its_own_orbits():
