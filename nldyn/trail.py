@@ -269,12 +269,22 @@ class Trail:
 
 
 def not_told_apart(found: Sequence[SpecialPoint]) -> list[str]:
-    """Notes on special points of different kinds, as close together as orbits are exact."""
+    """Notes on special points as close together as orbits are exact, if branches cross there.
+
+    A fold beside a grazing point is told from it at any distance, but not three of them or more.
+    """
+    groups: list[list[SpecialPoint]] = []
+    for special in found:
+        place = special.point.arclength
+        if groups and abs(place - groups[-1][-1].point.arclength) < TOGETHER:
+            groups[-1].append(special)
+        else:
+            groups.append([special])
     return [
-        f"{a.kind} and {b.kind} near {a.frequency_hz:.8g} Hz lie so close together that their "
-        "order is not sure, nor that there are no others"
-        for a, b in pairwise(found)
-        if a.kind != b.kind and abs(a.point.arclength - b.point.arclength) < TOGETHER
+        f"{', '.join(s.kind for s in group)} near {group[0].frequency_hz:.8g} Hz lie so close "
+        "together that neither their order nor their kinds are sure"
+        for group in groups
+        if len(group) > 2 or (len(group) == 2 and "BP" in [s.kind for s in group])
     ]
 
 
