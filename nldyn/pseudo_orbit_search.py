@@ -47,7 +47,7 @@ def by_pseudo_orbits(
     frequency that it finds. If that lies on no known branch, its branch is followed, with what it
     leads to. No motion is simulated, and no other system is needed; it is the faster the fewer
     branches there are, and slow for long periods: with few branches of the 1-DOF model up to period
-    3 in 8 s, to 5 in 150 s. What resembles no orbits known is not found. Flips of the branches
+    3 in 6 s, to 5 in 270 s. What resembles no orbits known is not found. Flips of the branches
     given are not followed.
 
     Parameters
