@@ -206,18 +206,15 @@ class Curve:
 
     def _index_of(self, wanted: str | Parameter) -> int:
         """Place of a parameter among the curve's."""
-        columns = [_column_name(parameter) for parameter in self.parameters]
-        names = [parameter.name for parameter in self.parameters]
-        places: dict[str | Parameter, int] = {
-            name: names.index(name) for name in names if names.count(name) == 1
-        }
-        for which, (column, parameter) in enumerate(zip(columns, self.parameters, strict=True)):
-            places[column] = places[parameter] = which
-        if not isinstance(wanted, str | Parameter) or wanted not in places:
+        own = list(enumerate(self.parameters))
+        matches = [i for i, p in own if wanted in (p, _column_name(p))]
+        matches = matches or [i for i, p in own if wanted == p.name]
+        if len(matches) != 1:
+            columns = ", ".join(map(_column_name, self.parameters))
             raise SystemModelError(
-                f"the curve has no parameter {shown(wanted)}; there are: {', '.join(columns)}"
+                f"the curve has no parameter {shown(wanted)}; there are: {columns}"
             )
-        return places[wanted]
+        return matches[0]
 
 
 def _column_name(parameter: Parameter) -> str:

@@ -22,6 +22,7 @@ from nldyn._kernels import (
     NOT_CONVERGED,
     OK,
     RECORD_FULL,
+    ROUND,
     ROUNDED,
     SINGULAR,
     TOO_MANY_PIECES,
@@ -138,7 +139,7 @@ class FlowOptions:
         of its start costs ε^exponent in the Jacobian. More than a millionth would make events of
         two stops look simultaneous.
         """
-        if exponent < 1.5:
+        if exponent < ROUND:
             return 1e-13
         return min(float((1e-2 * self.rtol) ** (1.0 / exponent)), 1e-6)
 

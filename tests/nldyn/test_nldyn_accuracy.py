@@ -125,10 +125,7 @@ def test_stiff_stops_of_mixed_exponents_agree_at_all_tolerances():
 @pytest.mark.parametrize("exponent", [1.0, 1.0 + 1e-9, 1.003, 1.01, 1.05, 1.1, 1.2, 1.35, 1.5])
 def test_the_jacobian_of_a_law_that_is_nearly_linear_against_differences(exponent):
     """A contact of 0.0024 of the period; differences of the states, extrapolated to order six."""
-    system = System.from_matrices(
-        [[2.48]], [[16877.0]], {"middle": [1.0]}, modal_damping=0.0142,
-        stops=[Stop("middle", 5.17e9, exponent)], excitation=[Unbalance("middle", 4.92e-6)],
-    )  # fmt: skip
+    system = one_dof(0.0, exponent)
     fine, phases = FlowMap(system, FlowOptions(1e-13, nodes=28)), np.array([0.0, 2.0 * np.pi])
     omega, start = 2.0 * np.pi * 34.8, np.array([-1.3e-5, 2.8e-7])
 
@@ -159,10 +156,10 @@ def test_derivative_by_dissipation_where_there_is_none_against_differences():
     np.testing.assert_allclose(exact.d_parameters[0, :, 0], difference, rtol=1e-3)
 
 
-def one_dof(dissipation):
+def one_dof(dissipation, exponent=1.5):
     return System.from_matrices(
         [[2.48]], [[16877.0]], {"middle": [1.0]}, modal_damping=0.0142,
-        stops=[Stop("middle", stiffness=5.17e9, dissipation=dissipation)],
+        stops=[Stop("middle", 5.17e9, exponent, dissipation=dissipation)],
         excitation=[Unbalance("middle", 4.92e-6)],
     )  # fmt: skip
 
