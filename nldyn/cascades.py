@@ -21,8 +21,9 @@ from nldyn.continuation import make_branch
 from nldyn.critical import CoefficientError, Estimate, doubled_parameter, flip, loop_of
 from nldyn.doubling import switch_at_flip
 from nldyn.errors import SystemModelError, check_range, check_types, check_whole
-from nldyn.special import LocateError, special_points_between
+from nldyn.special import LocateError
 from nldyn.step_control import ContinuationOptions
+from nldyn.step_search import special_points_between
 from nldyn.walk import Walk
 
 FEIGENBAUM = 4.669201609102991  # limit of the ratios, Feigenbaum (1978)

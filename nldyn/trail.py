@@ -18,12 +18,11 @@ from nldyn.special import (
     Chord,
     LocateError,
     distance,
-    insert_dip,
     same_crossing,
-    special_points_between,
     without_repeats,
 )
 from nldyn.step_control import ContinuationOptions
+from nldyn.step_search import insert_dip, special_points_between
 from nldyn.walk import COMES_BACK, MEETS_OPEN_END, Stride, Walk
 
 AT_FLIP = 1e-5  # distance of a turn of a doubled branch from its end that may be the flip itself
@@ -280,12 +279,17 @@ def not_told_apart(found: Sequence[SpecialPoint]) -> list[str]:
             groups[-1].append(special)
         else:
             groups.append([special])
-    return [
-        f"{', '.join(s.kind for s in group)} near {group[0].frequency_hz:.8g} Hz lie so close "
-        "together that neither their order nor their kinds are sure"
-        for group in groups
-        if len(group) > 2 or (len(group) == 2 and "BP" in [s.kind for s in group])
-    ]
+    notes = []
+    for group in groups:
+        kinds = [special.kind for special in group]
+        if len(kinds) > 2 or (len(kinds) == 2 and "BP" in kinds):
+            each_is_known = sorted(kinds) == ["BP", "GR"]
+            unsure = "their order is not" if each_is_known else "neither their order nor kinds are"
+            notes.append(
+                f"{', '.join(kinds)} near {group[0].frequency_hz:.8g} Hz lie so close together "
+                f"that {unsure} sure"
+            )
+    return notes
 
 
 def trace(

@@ -33,7 +33,8 @@ from nldyn.normal_forms import is_symmetric
 from nldyn.resources import example
 from nldyn.scene import build_system, load_scene
 from nldyn.shooting import asymmetry, metric_length
-from nldyn.special import lies_on_crossing, special_points_between
+from nldyn.special import lies_on_crossing
+from nldyn.step_search import special_points_between
 from nldyn.trail import Leg
 from nldyn.walk import BY_TOLERANCE
 

@@ -839,18 +839,6 @@ def test_a_curve_of_branch_points_tells_of_the_grazing_at_which_it_ends(between_
     assert max(size.min() / size.max() for size in sizes) < 1e-5
 
 
-def test_points_that_rounding_may_exchange_are_told(between_stiff_stops):
-    """Where that branch point and that grazing nearly coincide, and where they do not."""
-    start = between_stiff_stops.at(8.81599)[1]
-    others = continue_in(start, "amplitude", (2.5, 5.5))
-    for amplitude, together in ((5.286, True), (5.32, False)):
-        branch = continue_branch(others.at("amplitude", amplitude)[0], (8.75, 8.9))
-        kinds = sorted(special.kind for special in branch.special_points)
-        told = [note for note in branch.notes if "so close together that neither" in note]
-        assert kinds == ["BP", "GR", "LP"]
-        assert bool(told) == together
-
-
 def test_each_of_two_parameters_of_one_name_has_its_own_orbits():
     """The gaps of two stops; a name without index means the first, as elsewhere."""
     gaps = Parameter("gap", 0), Parameter("gap", 1)
