@@ -546,8 +546,19 @@ class FlowMap:
         Returns
         -------
         Solution
+
+        Raises
+        ------
+        SystemModelError
+            If the arrays do not fit the segments.
         """
-        row = np.ascontiguousarray(row, dtype=float)
+        guess, row = (np.ascontiguousarray(x, dtype=float) for x in (guess, row))
+        unknowns = 2 * self.system.size * (phases.size - 1) + 1
+        if not guess.shape == row.shape == (unknowns,):  # the kernel would leave their memory
+            raise SystemModelError(
+                f"guess and row must have shape ({unknowns},) for {phases.size - 1} segments of "
+                f"{self.system.size} modes, got {guess.shape} and {row.shape}"
+            )
         corrector = Corrector(row, float(level), float(state_weight), rtol, longest, max_iterations)
         capacity = 64 * phases.size
         while True:
