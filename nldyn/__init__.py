@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from nldyn.curves import Curve, continue_constant, continue_in, continue_special
     from nldyn.detour_search import by_detour
     from nldyn.diagrams import Diagram, Seed, diagram
+    from nldyn.disturbed_orbits import by_disturbed_orbits
     from nldyn.doubling import switch_at_flip
     from nldyn.elements import (
         Damper,
@@ -93,6 +94,7 @@ _HOMES = {
     "curves": "Curve continue_constant continue_in continue_special",
     "detour_search": "by_detour",
     "pseudo_orbit_search": "by_pseudo_orbits",
+    "disturbed_orbits": "by_disturbed_orbits",
     "diagrams": "Diagram Seed diagram",
     "doubling": "switch_at_flip",
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
@@ -182,6 +184,7 @@ __all__ = [
     "basins",
     "brute_force",
     "by_detour",
+    "by_disturbed_orbits",
     "by_pseudo_orbits",
     "cascade",
     "cascades_in",

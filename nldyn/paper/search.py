@@ -4,10 +4,11 @@ Beside the branches of the starts that are known, those in the directory or else
 kept with the package, it finds others, writes the starts of all into the directory, and reports how
 many may be missing. With ``--detour damping=0.5 "natural_frequency_hz[1]=0.99"`` at the end, say,
 it does not simulate, but goes by way of a system with these factors, see `by_detour`; with
-``--pseudo-orbits`` it puts pieces of known orbits together, see `by_pseudo_orbits`. The directory
-keeps what is found, and the same command goes on where it was interrupted (but for following the
-starts, and for detours and pseudo-orbits, which keep their branches only); once it has ended, it
-looks for more beside what it has found, from other random states.
+``--pseudo-orbits`` it puts pieces of known orbits together, see `by_pseudo_orbits`; with
+``--disturbed 3`` its motions begin at disturbed states of known orbits, with the seed 3, see
+`by_disturbed_orbits`. The directory keeps what is found, and the same command goes on where it was
+interrupted (but for following the starts, and for the last three ways, which keep their branches
+only); once it has ended, it looks for more beside what it has found, from other random states.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from nldyn.command import answering
 from nldyn.detour import checked_factors
 from nldyn.detour_search import by_detour
 from nldyn.diagrams import Diagram, Progress
+from nldyn.disturbed_orbits import by_disturbed_orbits
 from nldyn.errors import SystemModelError
 from nldyn.exploration import Exploration, ExploreOptions
 from nldyn.flow import flow_of, same_flow
@@ -79,6 +81,11 @@ def search_by_detour(name: str, folder: Path, factors: Mapping[str | Parameter, 
 def search_by_pseudo_orbits(name: str, folder: Path) -> Diagram:
     """Look for branches of a model with `by_pseudo_orbits`, and write the starts of all."""
     return _search_beside(name, folder, "pseudo_orbits", by_pseudo_orbits)
+
+
+def search_by_disturbed_orbits(name: str, folder: Path, seed: int) -> Diagram:
+    """Look for branches of a model with `by_disturbed_orbits`, and write the starts of all."""
+    return _search_beside(name, folder, "disturbed", partial(by_disturbed_orbits, seed=seed))
 
 
 def _search_beside(name: str, folder: Path, way: str, look: Callable[..., Diagram]) -> Diagram:
@@ -149,6 +156,19 @@ def factor_of(text: str) -> tuple[str | Parameter, float]:
         ) from None
 
 
+def seed_of(text: str) -> int:
+    """Seed of random numbers.
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If the text is no whole number from zero on.
+    """
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from zero on")
+    return int(text)
+
+
 def main() -> None:
     """Search the models named, or all."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -162,6 +182,9 @@ def main() -> None:
     )  # fmt: skip
     way.add_argument(
         "--pseudo-orbits", action="store_true", help="put pieces of known orbits together"
+    )
+    way.add_argument(
+        "--disturbed", type=seed_of, metavar="SEED", help="disturb states of known orbits"
     )
     given = parser.parse_args()
     factors = dict(given.detour or ())
@@ -186,6 +209,9 @@ def main() -> None:
                 said = "\n".join(search_by_detour(name, given.directory, factors).notes)
             elif given.pseudo_orbits:
                 said = "\n".join(search_by_pseudo_orbits(name, given.directory).notes)
+            elif given.disturbed is not None:
+                found = search_by_disturbed_orbits(name, given.directory, given.disturbed)
+                said = "\n".join(found.notes)
             else:
                 said = search(name, given.directory).report()
         print(f"{name}: {said}", flush=True)
