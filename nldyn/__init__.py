@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from nldyn.contacts import Impacts, impacts
     from nldyn.continuation import continue_branch
     from nldyn.convergence import Study, converge
+    from nldyn.crossover import by_crossover
     from nldyn.curve_marks import LocatedPoint, refine_special
     from nldyn.curve_plots import plot_curves, plot_orbit_curve
     from nldyn.curve_store import load_curve, load_curves, save_curves
     from nldyn.curves import Curve, continue_constant, continue_in, continue_special
     from nldyn.detour_search import by_detour
     from nldyn.diagrams import Diagram, Seed, diagram
-    from nldyn.disturbed_orbits import by_disturbed_orbits
     from nldyn.doubling import switch_at_flip
     from nldyn.elements import (
         Damper,
@@ -88,13 +88,13 @@ _HOMES = {
     "cascades": "Cascade cascade cascades_in",
     "continuation": "continue_branch",
     "convergence": "Study converge",
+    "crossover": "by_crossover",
     "curve_marks": "LocatedPoint refine_special",
     "curve_plots": "plot_curves plot_orbit_curve",
     "curve_store": "load_curve load_curves save_curves",
     "curves": "Curve continue_constant continue_in continue_special",
     "detour_search": "by_detour",
     "pseudo_orbit_search": "by_pseudo_orbits",
-    "disturbed_orbits": "by_disturbed_orbits",
     "diagrams": "Diagram Seed diagram",
     "doubling": "switch_at_flip",
     "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
@@ -183,8 +183,8 @@ __all__ = [
     "basin_edge",
     "basins",
     "brute_force",
+    "by_crossover",
     "by_detour",
-    "by_disturbed_orbits",
     "by_pseudo_orbits",
     "cascade",
     "cascades_in",

@@ -5,10 +5,10 @@ kept with the package, it finds others, writes the starts of all into the direct
 many may be missing. With ``--detour damping=0.5 "natural_frequency_hz[1]=0.99"`` at the end, say,
 it does not simulate, but goes by way of a system with these factors, see `by_detour`; with
 ``--pseudo-orbits`` it puts pieces of known orbits together, see `by_pseudo_orbits`; with
-``--disturbed 3`` its motions begin at disturbed states of known orbits, with the seed 3, see
-`by_disturbed_orbits`. The directory keeps what is found, and the same command goes on where it was
-interrupted (but for following the starts, and for the last three ways, which keep their branches
-only); once it has ended, it looks for more beside what it has found, from other random states.
+``--crossover 3`` it mixes known orbits, with the seed 3, see `by_crossover`. The directory keeps
+what is found, and the same command goes on where it was interrupted (but for following the starts,
+and for the last three ways, which keep their branches only); once it has ended, it looks for more
+beside what it has found, from other random states.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from pathlib import Path
 
 from nldyn.cli import plain_errors, told_what_is_kept
 from nldyn.command import answering
+from nldyn.crossover import by_crossover
 from nldyn.detour import checked_factors
 from nldyn.detour_search import by_detour
 from nldyn.diagrams import Diagram, Progress
-from nldyn.disturbed_orbits import by_disturbed_orbits
 from nldyn.errors import SystemModelError
 from nldyn.exploration import Exploration, ExploreOptions
 from nldyn.flow import flow_of, same_flow
@@ -83,9 +83,9 @@ def search_by_pseudo_orbits(name: str, folder: Path) -> Diagram:
     return _search_beside(name, folder, "pseudo_orbits", by_pseudo_orbits)
 
 
-def search_by_disturbed_orbits(name: str, folder: Path, seed: int) -> Diagram:
-    """Look for branches of a model with `by_disturbed_orbits`, and write the starts of all."""
-    return _search_beside(name, folder, "disturbed", partial(by_disturbed_orbits, seed=seed))
+def search_by_crossover(name: str, folder: Path, seed: int) -> Diagram:
+    """Look for branches of a model with `by_crossover`, and write the starts of all."""
+    return _search_beside(name, folder, "crossover", partial(by_crossover, seed=seed))
 
 
 def _search_beside(name: str, folder: Path, way: str, look: Callable[..., Diagram]) -> Diagram:
@@ -183,9 +183,7 @@ def main() -> None:
     way.add_argument(
         "--pseudo-orbits", action="store_true", help="put pieces of known orbits together"
     )
-    way.add_argument(
-        "--disturbed", type=seed_of, metavar="SEED", help="disturb states of known orbits"
-    )
+    way.add_argument("--crossover", type=seed_of, metavar="SEED", help="mix known orbits")
     given = parser.parse_args()
     factors = dict(given.detour or ())
     if given.detour and len(factors) < len(given.detour):
@@ -209,8 +207,8 @@ def main() -> None:
                 said = "\n".join(search_by_detour(name, given.directory, factors).notes)
             elif given.pseudo_orbits:
                 said = "\n".join(search_by_pseudo_orbits(name, given.directory).notes)
-            elif given.disturbed is not None:
-                found = search_by_disturbed_orbits(name, given.directory, given.disturbed)
+            elif given.crossover is not None:
+                found = search_by_crossover(name, given.directory, given.crossover)
                 said = "\n".join(found.notes)
             else:
                 said = search(name, given.directory).report()

@@ -12,7 +12,7 @@ from nldyn import (
     ContinuationOptions,
     ExploreOptions,
     SystemModelError,
-    by_disturbed_orbits,
+    by_crossover,
     by_pseudo_orbits,
     explore,
     index_sum,
@@ -180,11 +180,11 @@ def test_pseudo_orbits_give_starts(two_known, monkeypatch, capsys):
     assert len(read_starts(name, folder)) == 2 + added > 2
 
 
-def test_disturbed_orbits_give_starts(two_known, monkeypatch, capsys):
+def test_mixtures_give_starts(two_known, monkeypatch, capsys):
     name, folder = two_known
-    way = partial(by_disturbed_orbits, motions=20)
-    monkeypatch.setattr("nldyn.paper.search.by_disturbed_orbits", way)
-    monkeypatch.setattr("sys.argv", ["search", str(folder), name, "--disturbed", "3"])
+    way = partial(by_crossover, tries=20)
+    monkeypatch.setattr("nldyn.paper.search.by_crossover", way)
+    monkeypatch.setattr("sys.argv", ["search", str(folder), name, "--crossover", "3"])
     main()
     last = capsys.readouterr().out.splitlines()[-1]
     added = int(re.search(r"others, (\d+) branch(es)? beside those given", last)[1])
@@ -242,8 +242,8 @@ def test_branches_of_another_model_are_refused(two_known):
         (["damping=0.5", "damping=0.3"], "names something twice"),
         (["damping=0.5", "--detour", "damping=0.3"], "names something twice"),
         (["damping=0.5", "--pseudo-orbits"], "--pseudo-orbits: not allowed with argument --detour"),
-        (["damping=0.5", "--disturbed", "1"], "--disturbed: not allowed with argument --detour"),
-        (["damping=0.5", "--disturbed", "-1"], "'-1' is no whole number from zero on"),
+        (["damping=0.5", "--crossover", "1"], "--crossover: not allowed with argument --detour"),
+        (["damping=0.5", "--crossover", "-1"], "'-1' is no whole number from zero on"),
         (["gap=2"], "two_dof_xi_0.01: factors: gap[0] is zero, which no factor changes"),
         (["natural_frequency_hz[2]=2"], "there is no mode 2"),
         (["modal_damping[-1]=1"], "that of modal_damping of all modes must be a number"),

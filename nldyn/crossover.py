@@ -1,0 +1,210 @@
+"""Further branches beside mixtures of two known orbits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cms.threads import one_thread
+from nldyn.beside import (
+    check_search,
+    collector_beside,
+    diagram_of,
+    inner_frequencies,
+    take_kept,
+)
+from nldyn.branch import Branch
+from nldyn.diagrams import Collector, Diagram, Progress, counted
+from nldyn.errors import check_whole
+from nldyn.linear import Real
+from nldyn.orbit import Orbit
+from nldyn.search import MOST_COUNT, SHORT_STEPS, nearest_orbit
+from nldyn.step_control import ContinuationOptions
+
+NODES = 8  # states of an orbit in each period
+NEIGHBOURS = 40  # branches whose orbits are mixed, the nearest in frequency
+PLACES = 6  # orbits of each
+WINDOW = 0.03  # relative distance of their frequencies, unless a branch has none so near
+BEYOND = 0.8  # part of the way between two orbits by which a mixture may lie beyond either
+
+
+@one_thread()
+def by_crossover(
+    known: Diagram,
+    *,
+    max_period: int = 3,
+    spacing: float = 0.01,
+    tries: int = 500,
+    seed: int = 0,
+    options: ContinuationOptions | None = None,
+    progress: Progress | None = None,
+    checkpoint: str | Path | None = None,
+) -> Diagram:
+    """Find further branches beside mixtures of two known orbits.
+
+    The states of two orbits of about one frequency at the same phases are mixed,
+    (1 - λ)A + λB with a random λ from -0.8 to 1.8, either begun at a random one of its periods:
+    the arithmetic crossover of genetic algorithms [Michalewicz 1996, section 5.2]. Orbits whose
+    period does not divide the one wanted give a stretch of it, which does not close. From there the
+    Gauss-Newton method [Allgower and Georg 1990, chapter 3] goes to the nearest orbit, at a
+    frequency that it finds. If that lies on no known branch, its branch is followed, with what it
+    leads to. No motion is simulated, so that orbits are found whatever their stability and energy,
+    if they lie among those known. Flips of the branches given are not followed.
+
+    Parameters
+    ----------
+    known : Diagram
+        Branches of a system, from `diagram` or `explore`, with their orbits.
+    max_period : int
+        Longest orbits wanted.
+    spacing : float
+        Relative distance of the frequencies at which orbits are mixed.
+    tries : int
+        How many mixtures of each length at each frequency.
+    seed : int
+        Of the random numbers; another one tries others.
+    options : ContinuationOptions, optional
+        Step control.
+    progress : callable, optional
+        Called as ``progress(what, frequency_hz)``.
+    checkpoint : str or Path, optional
+        File that keeps the branches found, also those of an earlier call: they count as known.
+        The frequencies done are not kept, and tried anew.
+
+    Returns
+    -------
+    Diagram
+        The branches known, then those found. The last note tells what was tried, and to how many of
+        the branches given, up to `max_period`, mixtures of others led: about so many it would have
+        found, had each alone been unknown. The note before tells, if every mode is damped, whether
+        the indices add up to one, see `index_sum`. What `known` notes of them is left out.
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense.
+    OutputError
+        If `checkpoint` cannot be written.
+
+    Examples
+    --------
+    >>> from nldyn import Diagram, Stop, System, Unbalance
+    >>> from nldyn import continue_branch, find_orbits, solve_orbit
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> range_hz = 36.0, 38.5
+    >>> orbits = [solve_orbit(system, 37.0), *find_orbits(system, 37.0, 2)[:1]]
+    >>> branches = tuple(continue_branch(orbit, range_hz) for orbit in orbits)
+    >>> more = by_crossover(Diagram(branches, range_hz, "middle"), tries=50)
+    >>> [branch.period for branch in more.branches]
+    [1, 2, 3]
+    """
+    check_search(known, max_period, spacing, options, progress)
+    check_whole("tries", tries, 1, MOST_COUNT)
+    check_whole("seed", seed, 0)
+    box = collector_beside(known, options, progress, checkpoint)
+    given = set(range(len(known.branches)))
+    wanted = {i for i in given if known.branches[i].period <= max_period}
+    tried, came, met = 0, 0, set[int]()
+    with box.checkpoint:
+        take_kept(box, max_period)
+        for frequency in inner_frequencies(box.range_hz, spacing):
+            for period in range(1, max_period + 1):
+                rng = np.random.default_rng([seed, round(1e6 * frequency), period])
+                for used, orbit in near_mixtures(box, frequency, period, tries, rng):
+                    tried += 1
+                    if orbit is None:
+                        continue
+                    came += 1
+                    on = box.branch_of(orbit)
+                    if on is None:
+                        box.follow(orbit, max_period, max_period, None)
+                    elif on not in used and used <= given:
+                        met.add(on)
+    new = counted(box.branches[len(known.branches) :])
+    note = (
+        f"{came} of {tried} mixtures led to an orbit, and to {len(met & wanted)} of the "
+        f"{len(wanted)} given from others, {new} beside those given"
+    )
+    return diagram_of(box, max_period, note)
+
+
+def near_mixtures(
+    box: Collector, frequency_hz: float, period: int, tries: int, rng: np.random.Generator
+) -> Iterator[tuple[set[int], Orbit | None]]:
+    """Mixtures of two orbits: their branches, and the orbit near by, unless out of the range."""
+    low, high = box.range_hz
+    omega = 2.0 * math.pi * frequency_hz
+    known = Loops.of(box.branches, frequency_hz)
+    for _ in range(tries):
+        box.progress("mixtures", frequency_hz)
+        used, nodes = known.mixture(period, rng)
+        orbit = nearest_orbit(box.flow, nodes, omega, box.observe, SHORT_STEPS)
+        inside = orbit is not None and low <= orbit.frequency_hz <= high
+        yield used, orbit if inside else None
+
+
+@dataclass(frozen=True, eq=False)
+class Loops:
+    """Orbits by their states.
+
+    Parameters
+    ----------
+    branch : (m,) int array
+        Index of the branch that each is of.
+    nodes : sequence of m (period, k, 2n) arrays
+        States z at k equidistant phases of each excitation period.
+    """
+
+    branch: NDArray[np.intp]
+    nodes: Sequence[Real]
+
+    @classmethod
+    def of(cls, branches: Sequence[Branch], frequency_hz: float) -> Loops:
+        """Those of the branches nearest to a frequency."""
+        away = [_distance(branch.frequency_hz, frequency_hz) for branch in branches]
+        rows = [
+            (index, _nodes(orbit))
+            for index in np.argsort(away, kind="stable")[:NEIGHBOURS].tolist()
+            for orbit in _orbits_near(branches[index], frequency_hz)
+        ]
+        return cls(np.array([index for index, _ in rows]), [nodes for _, nodes in rows])
+
+    def mixture(self, period: int, rng: np.random.Generator) -> tuple[set[int], Real]:
+        """States (period, k, 2n) between or beyond those of two orbits, and their branches."""
+        share = rng.uniform(-BEYOND, 1.0 + BEYOND)
+        chosen = rng.integers(len(self.nodes), size=2)
+        first, last = (_stretch(self.nodes[i], period, rng) for i in chosen.tolist())
+        return set(self.branch[chosen].tolist()), (1.0 - share) * first + share * last
+
+
+def _distance(reached: Real, frequency_hz: float) -> float:
+    """How far, relatively, a branch ends from a frequency; zero if it does not."""
+    low, high = math.log(reached.min() / frequency_hz), math.log(reached.max() / frequency_hz)
+    return max(0.0, low, -high)
+
+
+def _orbits_near(branch: Branch, frequency_hz: float) -> list[Orbit]:
+    """A few orbits of a branch of about a frequency, or the nearest one."""
+    away = np.abs(np.log(branch.frequency_hz / frequency_hz))
+    near = np.flatnonzero(away <= max(WINDOW, float(away.min())))
+    places = np.linspace(0.0, near.size - 1.0, min(PLACES, near.size))
+    return [branch.points[near[round(place)]] for place in places.tolist()]
+
+
+def _nodes(orbit: Orbit) -> Real:
+    """States (period, NODES, 2n) of an orbit."""
+    phases = 2.0 * math.pi / NODES * np.arange(NODES * orbit.period, dtype=float)
+    return orbit.problem.flow.to_state(orbit.states(phases)).reshape(orbit.period, NODES, -1)
+
+
+def _stretch(nodes: Real, period: int, rng: np.random.Generator) -> Real:
+    """So many periods of an orbit, from a random one of its own."""
+    first = int(rng.integers(len(nodes)))
+    return np.asarray(nodes[(first + np.arange(period)) % len(nodes)])

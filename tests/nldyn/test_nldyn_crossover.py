@@ -1,0 +1,171 @@
+"""Orbits are found beside mixtures of two others."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nldyn import (
+    Diagram,
+    ExploreOptions,
+    Stop,
+    System,
+    SystemModelError,
+    Unbalance,
+    by_crossover,
+    explore,
+    index_sum,
+    load_branches,
+)
+from nldyn.crossover import BEYOND, NEIGHBOURS, NODES, PLACES, WINDOW, Loops, _orbits_near
+from nldyn.exploration import steps_between
+
+RANGE_HZ = (36.0, 38.5)
+
+
+@pytest.fixture(scope="module")
+def three() -> Diagram:
+    """The branches of periods 1, 2 and 3, the last of which ends at a fold."""
+    system = System.from_matrices(
+        [[2.48]], [[16877.0]], {"middle": [1.0]}, modal_damping=0.0142,
+        stops=[Stop("middle", stiffness=5.17e9)], excitation=[Unbalance("middle", 4.92e-6)],
+    )  # fmt: skip
+    found = explore(system, RANGE_HZ, 3, effort=ExploreOptions(spacing=0.01, starts=2)).diagram
+    assert sorted(branch.period for branch in found.branches) == [1, 2, 3]
+    return found
+
+
+def without(known: Diagram, branch) -> Diagram:
+    return replace(known, branches=tuple(b for b in known.branches if b is not branch))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("period", [1, 2, 3])
+def test_a_branch_is_found_from_mixtures_of_the_others(three, period, seed):
+    (left_out,) = three.of_period(period)
+    done = by_crossover(without(three, left_out), tries=50, seed=seed)
+    (found,) = done.branches[2:]
+    assert found.period == period
+    assert all(left_out.contains(orbit) for orbit in found.points)
+    assert done.notes[-1].endswith("1 branch beside those given")
+    assert [index_sum(done.branches, 36.5, n) for n in (1, 2, 3)] == [1, 1, 1]
+
+
+def test_what_is_known_is_met_and_not_found_again(three):
+    done = by_crossover(three, tries=50)
+    assert len(done.branches) == 3
+    assert ", and to 3 of the 3 given from others, 0 branches" in done.notes[-1]
+    assert done.notes[:-2] == tuple(n for n in three.notes if not n.startswith("indices"))
+
+
+def test_no_longer_orbits_are_looked_for_than_wanted(three):
+    (third,) = three.of_period(3)
+    done = by_crossover(without(three, third), max_period=2, tries=20)
+    assert len(done.branches) == 2
+    assert " of the 2 given from" in done.notes[-1]
+
+
+def test_as_many_are_tried_as_wanted(three):
+    """Two of each of three lengths at each frequency."""
+    done = by_crossover(three, tries=2, spacing=0.02)
+    tried = int(re.search(r"of (\d+) mixtures", done.notes[-1])[1])
+    assert tried == 2 * 3 * steps_between(*RANGE_HZ, 0.02)
+
+
+def test_the_same_seed_gives_the_same_and_another_one_other_mixtures(three):
+    notes = [by_crossover(three, tries=20, seed=seed).notes[-1] for seed in (1, 1, 2)]
+    assert notes[0] == notes[1] != notes[2]
+
+
+def test_mixtures_lie_on_the_line_through_two_orbits():
+    """Each of one state, drawn as often as the other, up to 0.8 of the way beyond either."""
+    pair = Loops(np.array([4, 7]), [np.full((1, 1, 2), x) for x in (0.0, 1.0)])
+    rng, places, alone = np.random.default_rng(0), [], 0
+    for _ in range(4000):
+        used, nodes = pair.mixture(1, rng)
+        assert used <= {4, 7}
+        assert nodes.shape == (1, 1, 2)
+        alone += len(used) == 1
+        if len(used) == 2:
+            places.append(nodes[0, 0, 0])
+    assert abs(alone - 2000) < 5.0 * np.sqrt(1000.0)
+    assert min(places) == pytest.approx(-BEYOND, abs=0.01)
+    assert max(places) == pytest.approx(1.0 + BEYOND, abs=0.01)
+    assert np.mean(places) == pytest.approx(0.5, abs=5.0 * 0.75 / np.sqrt(len(places)))
+
+
+def test_an_orbit_is_begun_at_each_of_its_periods_and_goes_on_in_its_order():
+    """Its states are the numbers of its periods: a mixture of two stretches that begin alike."""
+    orbit, rng = Loops(np.array([0]), [np.arange(3.0)[:, None, None]]), np.random.default_rng(0)
+    mixtures = [orbit.mixture(4, rng)[1].ravel() for _ in range(50)]
+    whole = [m for m in mixtures if np.allclose(m, np.round(m)) and set(m) <= {0.0, 1.0, 2.0}]
+    assert {int(m[0]) for m in whole} == {0, 1, 2}
+    assert all(np.array_equal(np.diff(m) % 3.0, np.ones(3)) for m in whole)
+
+
+def test_loops_are_motions_over_the_period_of_the_orbit(three):
+    for branch in three.branches:
+        loops, orbits = Loops.of([branch], 36.5), _orbits_near(branch, 36.5)
+        assert len(loops.nodes) == len(orbits) > 1
+        for nodes, orbit in zip(loops.nodes, orbits, strict=True):
+            assert nodes.shape == (branch.period, NODES, 2)
+            ends = orbit.problem.flow.strobe(nodes[0, 0], orbit.omega, branch.period).ends
+            following = np.roll(nodes[:, 0], -1, axis=0)
+            assert np.abs(ends[-branch.period :] - following).max() < 1e-6 * np.abs(nodes).max()
+
+
+def test_the_branches_nearest_in_frequency_are_mixed(three):
+    """One that ends below the frequency, if there are not so many others that reach it."""
+    (harmonic,), (third,) = three.of_period(1), three.of_period(3)
+    above = 1.001 * third.frequency_hz.max()
+    for others, used in ((NEIGHBOURS - 1, True), (NEIGHBOURS, False)):
+        loops = Loops.of([third, *[harmonic] * others], above)
+        assert (0 in loops.branch) == used
+        assert len(set(loops.branch.tolist())) == NEIGHBOURS
+
+
+def test_of_a_branch_its_orbits_near_the_frequency_are_mixed_or_else_the_nearest(three):
+    (third,) = three.of_period(3)
+    assert len(Loops.of([third], 37.0).nodes) == PLACES
+    far = third.frequency_hz.max() * (1.0 + 2.0 * WINDOW)
+    assert len(Loops.of([third], far).nodes) == 1
+
+
+def test_interrupted_it_keeps_what_it_has_found(three, tmp_path):
+    (left_out,) = three.of_period(3)
+    place, known = tmp_path / "found.h5", without(three, left_out)
+    seen = []
+
+    def interrupt(what: str, frequency_hz: float) -> None:
+        seen.append(what)
+        if what == "mixtures" and "1/3" in seen:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        by_crossover(known, tries=50, progress=interrupt, checkpoint=place)
+    (kept,) = load_branches(place)
+    resumed = by_crossover(known, tries=50, checkpoint=place)
+    assert len(resumed.branches) == 3
+    assert np.array_equal(resumed.branches[2].frequency_hz, kept.frequency_hz)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"tries": 0}, "tries must be"),
+        ({"tries": 1.5}, "tries must be"),
+        ({"seed": -1}, "seed must be"),
+        ({"max_period": 0}, "max_period must be"),
+        ({"spacing": 0.0}, "spacing must lie between 1e-06 and 1, got 0"),
+        ({"known": None}, "known must be a Diagram"),
+        ({"progress": 3}, "progress must be"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(three, change, message):
+    known = change.get("known", three)
+    options = {key: value for key, value in change.items() if key != "known"}
+    with pytest.raises(SystemModelError, match=message):
+        by_crossover(known, **options)
