@@ -45,7 +45,7 @@ from nldyn.errors import (
     shown,
 )
 from nldyn.gauss import GaussTables, gauss_tables
-from nldyn.interruption import interrupted
+from nldyn.interruption import behind
 from nldyn.kernel_cache import first_call
 from nldyn.linear import Complex, Real
 from nldyn.parameters import Parameter, parameter_tables
@@ -616,11 +616,10 @@ class FlowMap:
         )  # fmt: skip
         try:
             found = newton(*arguments) if newton.overloads else first_call(newton, *arguments)
+            return found  # type: ignore[no-any-return]
         except SystemError as error:
-            if interrupted(error):
-                raise KeyboardInterrupt from error
-            raise
-        return found  # type: ignore[no-any-return]
+            told = error
+        raise behind(told)  # out here, so that it does not become its own cause
 
     @cached_property
     def _no_record(self) -> Record:

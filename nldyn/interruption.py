@@ -29,6 +29,23 @@ def interrupted(error: BaseException | None) -> bool:
     return _swallowed.is_set() or interrupted(error.__cause__ or error.__context__)
 
 
+def behind(error: BaseException) -> BaseException:
+    """What a signal's handler raised while compiled code ran, which then tells of a SystemError.
+
+    Examples
+    --------
+    >>> try:
+    ...     raise SystemError("returned a result with an exception set") from TimeoutError("late")
+    ... except SystemError as error:
+    ...     behind(error)
+    TimeoutError('late')
+    """
+    if interrupted(error):
+        return KeyboardInterrupt()
+    inner = error.__cause__ or error.__context__
+    return behind(inner) if isinstance(error, SystemError) and inner is not None else error
+
+
 @contextmanager
 def deferred_interruption() -> Iterator[None]:
     """Let Ctrl-C wait until the block is done, in the main thread, which alone it interrupts.

@@ -190,6 +190,24 @@ def test_ctrl_c_in_a_compiled_kernel_ends_all_cases():
     assert begun == [0]
 
 
+def test_what_an_alarm_raises_comes_out_of_a_compiled_kernel_as_it_is():
+    """A time limit, say; compiled code tells of a SystemError."""
+    flow = FlowMap(make_one_dof())
+    simulate(flow, 36.0, 1)  # compiled before the signal comes
+
+    def too_late(number, frame):
+        raise TimeoutError("too late")
+
+    before = signal.signal(signal.SIGALRM, too_late)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.05)
+        with pytest.raises(TimeoutError, match="too late"):
+            simulate(flow, 36.0, 1, transient=10**7)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
 def test_a_kernel_lets_other_threads_go_on():
     flow = FlowMap(make_one_dof())
     start = simulate(flow, 36.0, 1).end  # compiled before
