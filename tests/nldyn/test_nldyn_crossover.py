@@ -42,11 +42,10 @@ def without(known: Diagram, branch) -> Diagram:
     return replace(known, branches=tuple(b for b in known.branches if b is not branch))
 
 
-@pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("period", [1, 2, 3])
-def test_a_branch_is_found_from_mixtures_of_the_others(three, period, seed):
+def test_a_branch_is_found_from_mixtures_of_the_others(three, period):
     (left_out,) = three.of_period(period)
-    done = by_crossover(without(three, left_out), tries=50, seed=seed)
+    done = by_crossover(without(three, left_out), tries=50, spacing=0.02)
     (found,) = done.branches[2:]
     assert found.period == period
     assert all(left_out.contains(orbit) for orbit in found.points)
@@ -55,7 +54,7 @@ def test_a_branch_is_found_from_mixtures_of_the_others(three, period, seed):
 
 
 def test_what_is_known_is_met_and_not_found_again(three):
-    done = by_crossover(three, tries=50)
+    done = by_crossover(three, tries=50, spacing=0.02)
     assert len(done.branches) == 3
     assert ", and to 3 of the 3 given from others, 0 branches" in done.notes[-1]
     assert done.notes[:-2] == tuple(n for n in three.notes if not n.startswith("indices"))
@@ -63,7 +62,7 @@ def test_what_is_known_is_met_and_not_found_again(three):
 
 def test_no_longer_orbits_are_looked_for_than_wanted(three):
     (third,) = three.of_period(3)
-    done = by_crossover(without(three, third), max_period=2, tries=20)
+    done = by_crossover(without(three, third), max_period=2, tries=5)
     assert len(done.branches) == 2
     assert " of the 2 given from" in done.notes[-1]
 
@@ -76,7 +75,7 @@ def test_as_many_are_tried_as_wanted(three):
 
 
 def test_the_same_seed_gives_the_same_and_another_one_other_mixtures(three):
-    notes = [by_crossover(three, tries=20, seed=seed).notes[-1] for seed in (1, 1, 2)]
+    notes = [by_crossover(three, tries=5, seed=seed).notes[-1] for seed in (1, 1, 2)]
     assert notes[0] == notes[1] != notes[2]
 
 
@@ -145,9 +144,9 @@ def test_interrupted_it_keeps_what_it_has_found(three, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        by_crossover(known, tries=50, progress=interrupt, checkpoint=place)
+        by_crossover(known, tries=50, spacing=0.02, progress=interrupt, checkpoint=place)
     (kept,) = load_branches(place)
-    resumed = by_crossover(known, tries=50, checkpoint=place)
+    resumed = by_crossover(known, tries=50, spacing=0.02, checkpoint=place)
     assert len(resumed.branches) == 3
     assert np.array_equal(resumed.branches[2].frequency_hz, kept.frequency_hz)
 
