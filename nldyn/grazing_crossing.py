@@ -11,6 +11,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from nldyn._events import branch_point_test
 from nldyn.bordered import length_unit
 from nldyn.branch import BranchPoint, SpecialPoint
@@ -20,6 +22,9 @@ from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit
 from nldyn.special import (
     BEND,
+    CROSSES,
+    CROSSING_ERROR,
+    NEAR_ONE,
     Chord,
     LocateError,
     Touch,
@@ -33,7 +38,7 @@ from nldyn.special import (
 MET = 1e-13  # of an orbit's size: how well a depth is met
 ROUNDED = 1e-11  # the same where rounding forbids more
 MOST_STEPS = 8
-UNFOLDED = 1e-10  # what must be added to an orbit's equations, relative to it, if that is rounding
+BESIDE = 0.01  # part of a step by which an orbit of the branch may lie off its chord
 
 
 @dataclass(frozen=True)
@@ -64,7 +69,7 @@ class ByDepth:
         Raises
         ------
         LocateError
-            If none is found, or the branch does not lead from one end of the chord to the other.
+            If none is found beside the chord.
         """
         depth = signed_root * abs(signed_root)
         for start in self._guesses(depth):
@@ -75,56 +80,60 @@ class ByDepth:
         raise LocateError("no orbit with a given depth was found")
 
     def _guesses(self, depth: float) -> Iterator[Real]:
-        """Points near the orbit sought: on the chord, then the orbits found, the nearest first."""
+        """Points near the orbit sought: on the chord, then the orbits known, the nearest first."""
         first, last = (s * abs(s) for s in self.ends)
         yield self.chord.between((depth - first) / (last - first))
-        for _, orbit in sorted(self._known.items(), key=lambda known: abs(known[0] - depth)):
+        known = self._known | {first: self.chord.first.orbit, last: self.chord.last.orbit}
+        for _, orbit in sorted(known.items(), key=lambda pair: abs(pair[0] - depth)):
             yield orbit.point
 
     def _with_depth(self, depth: float, point: Real) -> Orbit | None:
-        """The orbit with a depth, by Newton's method from a point."""
+        """The orbit with a depth, by Newton's method from a point, if it lies on this branch."""
         a = self.chord.first.orbit
         touch, row = self.touch, self.chord.row
         grazing = Grazing(touch.output, touch.is_maximum, touch.phase, length_unit(a))
         offset, miss = float(row @ point), math.inf
+        unsure = max(CROSSES, a.error, self.chord.last.orbit.error)  # of what leads to the guess
         for _ in range(MOST_STEPS):
             found = correct_across(a.problem, point, row, offset)
-            if found is None or found[2] > UNFOLDED:
+            if found is None or found[2] > CROSSING_ERROR:
                 return None
             orbit, before = Orbit(a.problem, *found, a.observe), miss
             phase, reached = grazing.extreme(orbit)
             miss = abs(reached - depth) / grazing.unit
-            if miss < MET or 0.5 * before < miss < ROUNDED:
-                return orbit
+            if orbit.error <= unsure and (miss < MET or 0.5 * before < miss < ROUNDED):
+                return orbit if self.chord.passes(orbit, BESIDE) else None
             point, row = orbit.point, grazing.slope(orbit, phase)
             offset = float(row @ point) + depth - reached
         return None
 
 
-def crossing_at_grazing(a: BranchPoint, b: BranchPoint) -> list[SpecialPoint]:
-    """The grazing point and the branch point of a short step of a branch, in order.
+def special_points_at_grazing(a: BranchPoint, b: BranchPoint) -> list[SpecialPoint]:
+    """The grazing point of a short step beside a branch point, and that point if it is within.
 
-    Empty if the step has not these two, or others as well, or is long.
+    In order. Empty if the step has none, or other points as well, or is longer than 1e-4.
     """
     touches = touching_extremes(a.orbit, b.orbit)
-    if not (touches and touches_sharply(a.orbit.system) and changed(a, b) == ["BP"]):
+    alike = 0 < len(touches) == abs(a.orbit.impacts - b.orbit.impacts)  # begin or end together
+    if not (alike and touches_sharply(a.orbit.system) and abs(b.arclength - a.arclength) < BEND):
         return []
-    if abs(b.arclength - a.arclength) > BEND:
+    changes = changed(a, b)
+    near_one = min(np.abs(end.orbit.multipliers - 1.0).min() for end in (a, b)) < NEAR_ONE
+    if changes != ["BP"] and (changes or not near_one):
         return []
-    chord = Chord(a, b)
-    orbits = ByDepth(chord, touches[0])
+    orbits = ByDepth(Chord(a, b), touches[0])
     first, last = orbits.ends
     try:
-        share, _ = root(
-            lambda x: branch_point_test(orbits.at(first + x * (last - first)).multipliers)
-        )
-        crossing = orbits.at(first + share * (last - first))
-        grazing = orbits.at(0.0)
+        found = [_special("GR", orbits.at(0.0), orbits.chord)]
+        if changes:
+            share, _ = root(
+                lambda x: branch_point_test(orbits.at(first + x * (last - first)).multipliers)
+            )
+            crossing = orbits.at(first + share * (last - first))
+            before = share < first / (first - last)
+            found.insert(0 if before else 1, _special("BP", crossing, orbits.chord))
     except (LocateError, ConvergenceError):
         return []
-    found = [_special("BP", crossing, chord), _special("GR", grazing, chord)]
-    if share > first / (first - last):
-        found.reverse()
     return found if accounted(a.orbit, found, b.orbit) else []
 
 

@@ -39,7 +39,7 @@ SMOOTH_TOUCH = 1.5  # exponent of a stop from which on multipliers have a slope 
 CROSSES = 1e-12  # least unfolding of a crossing, relative to the orbit, that is not rounding
 MIXED = 1e-5  # distance from a crossing within which a tangent may be of both branches
 ON_CROSSING = 3e-7  # distance from it, relative to the orbit, at which a branch cannot be told
-NEAR_ONE = 1e-3  # a multiplier no nearer to 1 is not that of an orbit where branches cross
+NEAR_ONE = 1e-3  # a multiplier no nearer to 1 is not that of a fold or of crossing branches
 VANISHED = 1e-3  # an extreme at its root, relative to those beside it
 STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
 STEEPEST = 0.5  # least cosine between a branch and the chord of a step, below which it is refused
@@ -163,6 +163,14 @@ class Chord:
         """Position σ of a point of the branch, which may lie beyond the ends."""
         way = point.orbit.point - self.first.orbit.point
         return float(self.row @ way) / float(self.row @ self._secant)
+
+    def passes(self, orbit: Orbit, off: float) -> bool:
+        """Whether an orbit lies on the chord, but for a part of its length."""
+        sigma = self.place(BranchPoint(orbit, self.first.tangent, 0.0))
+        if not -off <= sigma <= 1.0 + off:
+            return False
+        away = orbit.point - self.between(min(max(sigma, 0.0), 1.0))
+        return metric_length(self._weights, away) <= off * self._length
 
     def between(self, sigma: float) -> Real:
         """Cubic interpolation of the shooting unknowns between the nearest known points."""
@@ -334,6 +342,8 @@ def _located(kind: str, chord: Chord) -> list[SpecialPoint]:
     sign is not that of a fold, unless a multiplier tells or the frequency turns.
     """
     special = locate(kind, chord, lambda point: tests(point)[kind])
+    if kind in ("LP", "BP") and np.abs(special.orbit.multipliers - 1.0).min() > NEAR_ONE:
+        raise LocateError("a test function jumps, as it does from one branch to another")
     if kind == "NS" and not _on_unit_circle(special.orbit.multipliers):
         return []
     if kind == "LP" and _is_plain_fold(chord):

@@ -10,7 +10,7 @@ from operator import itemgetter
 from nldyn._events import dip, extreme_dip, travel
 from nldyn.between import Between
 from nldyn.branch import BranchPoint, SpecialPoint
-from nldyn.grazing_crossing import crossing_at_grazing
+from nldyn.grazing_crossing import special_points_at_grazing
 from nldyn.special import (
     ON_CROSSING,
     Chord,
@@ -48,7 +48,7 @@ def special_points_between(
     LocateError
         If an orbit is not found where it should be.
     """
-    together = crossing_at_grazing(a, b)
+    together = special_points_at_grazing(a, b)
     if together:
         return together
     _check_dips(before, a, b, after)

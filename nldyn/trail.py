@@ -279,17 +279,12 @@ def not_told_apart(found: Sequence[SpecialPoint]) -> list[str]:
             groups[-1].append(special)
         else:
             groups.append([special])
-    notes = []
-    for group in groups:
-        kinds = [special.kind for special in group]
-        if len(kinds) > 2 or (len(kinds) == 2 and "BP" in kinds):
-            each_is_known = sorted(kinds) == ["BP", "GR"]
-            unsure = "their order is not" if each_is_known else "neither their order nor kinds are"
-            notes.append(
-                f"{', '.join(kinds)} near {group[0].frequency_hz:.8g} Hz lie so close together "
-                f"that {unsure} sure"
-            )
-    return notes
+    return [
+        f"{', '.join(s.kind for s in group)} near {group[0].frequency_hz:.8g} Hz lie so close "
+        "together that neither their order nor their kinds are sure"
+        for group in groups
+        if len(group) > 2 or (len(group) == 2 and "BP" in [s.kind for s in group])
+    ]
 
 
 def trace(

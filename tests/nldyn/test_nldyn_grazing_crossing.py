@@ -13,7 +13,6 @@ import pytest
 from bilinear import Bilinear
 
 from nldyn import HarmonicForce, Stop, System, continue_branch, continue_in, solve_orbit
-from nldyn.trail import TOGETHER
 
 SAMPLES = 20000
 GAP, STIFFNESS, DAMPING, NATURAL_HZ = 2e-4, 2e5, 0.03, 10.0
@@ -134,12 +133,13 @@ def branch_point(grazing, share):
 
 
 @pytest.mark.parametrize(
-    ("force", "rel"), [(5.2824, 3e-10), (5.285, 1e-11), (5.287, 1e-11), (5.32, 1e-11)]
+    ("force", "rel", "together"),
+    [(5.2824, 3e-10, True), (5.285, 1e-11, True), (5.287, 1e-11, True), (5.32, 1e-11, False)],
 )
 def test_grazing_and_branch_point_are_both_where_the_piecewise_solution_has_them(
-    by_force, force, rel
+    by_force, force, rel, together
 ):
-    """From 5e-12 Hz apart, where rounding decides which comes first."""
+    """From 5e-12 Hz apart, where rounding decides which comes first; a note tells of it."""
     natural = 2.0 * math.pi * NATURAL_HZ
     oscillator = Bilinear(2.0 * DAMPING * natural, natural**2, STIFFNESS, GAP, force)
     whole = continue_branch(by_force.at("amplitude", force)[0], RANGE_HZ)
@@ -153,8 +153,34 @@ def test_grazing_and_branch_point_are_both_where_the_piecewise_solution_has_them
             crossing = branch_point(grazing, share)
             exact = {"GR": grazing.omega, "BP": crossing.omega}
         for kind, omega in exact.items():
-            special = found[kind]
-            assert special.orbit.omega == pytest.approx(float(omega), rel=rel)
-        apart = abs(found["GR"].point.arclength - found["BP"].point.arclength)
-        told = [note for note in branch.notes if "that their order is not sure" in note]
-        assert bool(told) == (apart < TOGETHER)
+            assert found[kind].orbit.omega == pytest.approx(float(omega), rel=rel)
+        assert np.abs(found["BP"].orbit.multipliers - 1.0).min() < 3e-4
+        assert any("lie so close together" in note for note in branch.notes) == together
+
+
+@pytest.mark.parametrize("force", [5.28234, 5.28235])
+def test_a_grazing_point_beside_a_branch_point_is_found_once(by_force, force):
+    """1e-7 to 6e-6 Hz before the touch, where both lie in steps of their own or in one."""
+    whole = continue_branch(by_force.at("amplitude", force)[0], RANGE_HZ)
+    for start in whole.points[:: len(whole.points) // 6]:
+        branch = continue_branch(start, RANGE_HZ)
+        assert sorted(special.kind for special in branch.special_points) == ["BP", "GR", "LP"]
+
+
+def test_both_halves_of_a_broken_symmetry_have_the_same_points_beside_a_grazing():
+    """The branch turns at the branch point that its halves share, 1e-8 Hz from a touch of each."""
+    stops = [Stop.linear("m", 57167.0, gap=GAP, direction=sign) for sign in (1, -1)]
+    system = System.from_modal(
+        [NATURAL_HZ], {"m": [1.0]}, modal_damping=0.00723, stops=stops,
+        excitation=[HarmonicForce("m", 6.81356)],
+    )  # fmt: skip
+    start = solve_orbit(system, 7.9963, guess=np.array([5.8e-4, -2.9e-4]))
+    whole = continue_branch(start, (7.964, 8.012))
+    for begun in whole.points[:: len(whole.points) // 4]:
+        branch = continue_branch(begun, (7.964, 8.012))
+        found = sorted((special.kind, special.frequency_hz) for special in branch.special_points)
+        kinds, hz = zip(*found, strict=True)
+        assert kinds == ("BP", "GR", "GR", "LP", "LP", "LP")
+        assert hz[1] == pytest.approx(hz[2], rel=1e-10)
+        assert hz[3] == pytest.approx(hz[4], rel=1e-10)
+        assert hz[0] == pytest.approx(hz[5], rel=1e-9)  # the turn at the branch point
