@@ -47,14 +47,16 @@ def by_crossover(
 ) -> Diagram:
     """Find further branches beside mixtures of two known orbits.
 
-    The states of two orbits of about one frequency at the same phases are mixed,
+    The states of two orbits at the same phases, eight in each excitation period, are mixed,
     (1 - λ)A + λB with a random λ from -0.8 to 1.8, either begun at a random one of its periods:
-    the arithmetic crossover of genetic algorithms [Michalewicz 1996, section 5.2]. Orbits whose
-    period does not divide the one wanted give a stretch of it, which does not close. From there the
-    Gauss-Newton method [Allgower and Georg 1990, chapter 3] goes to the nearest orbit, at a
-    frequency that it finds. If that lies on no known branch, its branch is followed, with what it
-    leads to. No motion is simulated, so that orbits are found whatever their stability and energy,
-    if they lie among those known. Flips of the branches given are not followed.
+    the arithmetic crossover of genetic algorithms [Michalewicz 1996]. They are of the forty
+    branches nearest in frequency, of each up to six orbits within 3 % of it, or else the nearest;
+    both may be of one branch. Orbits whose period does not divide the one wanted give a stretch of
+    it, which does not close. From there the Gauss-Newton method [Allgower and Georg 1990, chapter
+    3] goes to the nearest orbit, at a frequency that it finds. If that lies on no known branch, its
+    branch is followed, with what it leads to. No motion is simulated, so that orbits are found
+    whatever their stability and energy, if they lie among those known. Flips of the branches given
+    are not followed.
 
     Parameters
     ----------
@@ -80,9 +82,10 @@ def by_crossover(
     -------
     Diagram
         The branches known, then those found. The last note tells what was tried, and to how many of
-        the branches given, up to `max_period`, mixtures of others led: about so many it would have
-        found, had each alone been unknown. The note before tells, if every mode is damped, whether
-        the indices add up to one, see `index_sum`. What `known` notes of them is left out.
+        the branches given, up to `max_period`, mixtures of others of them led: had each alone been
+        unknown, it would have found about so many, or more by way of new ones. The note before
+        tells, if every mode is damped, whether the indices add up to one, see `index_sum`. What
+        `known` notes of them is left out.
 
     Raises
     ------
@@ -99,11 +102,11 @@ def by_crossover(
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])
     >>> range_hz = 36.0, 38.5
-    >>> orbits = [solve_orbit(system, 37.0), *find_orbits(system, 37.0, 2)[:1]]
+    >>> orbits = [solve_orbit(system, 37.0), *find_orbits(system, 37.0, 3)[:1]]
     >>> branches = tuple(continue_branch(orbit, range_hz) for orbit in orbits)
     >>> more = by_crossover(Diagram(branches, range_hz, "middle"), tries=50)
     >>> [branch.period for branch in more.branches]
-    [1, 2, 3]
+    [1, 3, 2]
     """
     check_search(known, max_period, spacing, options, progress)
     check_whole("tries", tries, 1, MOST_COUNT)
@@ -114,10 +117,11 @@ def by_crossover(
     tried, came, met = 0, 0, set[int]()
     with box.checkpoint:
         take_kept(box, max_period)
-        for frequency in inner_frequencies(box.range_hz, spacing):
+        for number, frequency in enumerate(inner_frequencies(box.range_hz, spacing)):
+            rng = np.random.default_rng([seed, number])
+            near = Loops.of(box.branches, frequency)
             for period in range(1, max_period + 1):
-                rng = np.random.default_rng([seed, round(1e6 * frequency), period])
-                for used, orbit in near_mixtures(box, frequency, period, tries, rng):
+                for used, orbit in near_mixtures(box, near, frequency, period, tries, rng):
                     tried += 1
                     if orbit is None:
                         continue
@@ -136,15 +140,19 @@ def by_crossover(
 
 
 def near_mixtures(
-    box: Collector, frequency_hz: float, period: int, tries: int, rng: np.random.Generator
+    box: Collector,
+    near: Loops,
+    frequency_hz: float,
+    period: int,
+    tries: int,
+    rng: np.random.Generator,
 ) -> Iterator[tuple[set[int], Orbit | None]]:
     """Mixtures of two orbits: their branches, and the orbit near by, unless out of the range."""
     low, high = box.range_hz
     omega = 2.0 * math.pi * frequency_hz
-    known = Loops.of(box.branches, frequency_hz)
     for _ in range(tries):
         box.progress("mixtures", frequency_hz)
-        used, nodes = known.mixture(period, rng)
+        used, nodes = near.mixture(period, rng)
         orbit = nearest_orbit(box.flow, nodes, omega, box.observe, SHORT_STEPS)
         inside = orbit is not None and low <= orbit.frequency_hz <= high
         yield used, orbit if inside else None

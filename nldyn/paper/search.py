@@ -8,7 +8,7 @@ it does not simulate, but goes by way of a system with these factors, see `by_de
 ``--crossover 3`` it mixes known orbits, with the seed 3, see `by_crossover`. The directory keeps
 what is found, and the same command goes on where it was interrupted (but for following the starts,
 and for the last three ways, which keep their branches only); once it has ended, it looks for more
-beside what it has found, from other random states.
+beside what it has found, from other random states, with ``--crossover`` if the seed is another.
 """
 
 from __future__ import annotations
@@ -183,7 +183,12 @@ def main() -> None:
     way.add_argument(
         "--pseudo-orbits", action="store_true", help="put pieces of known orbits together"
     )
-    way.add_argument("--crossover", type=seed_of, metavar="SEED", help="mix known orbits")
+    way.add_argument(
+        "--crossover",
+        type=seed_of,
+        metavar="SEED",
+        help="mix known orbits; another seed tries others",
+    )
     given = parser.parse_args()
     factors = dict(given.detour or ())
     if given.detour and len(factors) < len(given.detour):
