@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from nldyn.diagrams import Collector, Diagram, Progress, check_known, middle_orb
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.exploration import FINEST_SPACING, steps_between
 from nldyn.fixed_point_index import index_note, is_damped, without_index_note
-from nldyn.orbit import LONGEST_PERIOD
+from nldyn.orbit import LONGEST_PERIOD, Orbit
 from nldyn.step_control import ContinuationOptions
 
 
@@ -65,6 +66,48 @@ def take_kept(box: Collector, max_period: int) -> None:
         progress = partial(box.progress, f"1/{branch.period}")
         box.take_in(branch.extend(progress=progress, checkpoint=box.checkpoint))
     box.follow_up(count, max_period, max_period, None)
+
+
+@dataclass
+class Tally:
+    """What a search beside known branches has tried.
+
+    Parameters
+    ----------
+    given : tuple of int
+        Indices of the branches known, up to the longest period wanted.
+    tried, came : int
+        How many guesses there were, and how many led to an orbit.
+    met : set of int
+        Branches known that guesses led to which were made of others of them.
+    """
+
+    given: tuple[int, ...]
+    tried: int = 0
+    came: int = 0
+    met: set[int] = field(default_factory=set)
+
+
+def follow_new(
+    box: Collector,
+    known: Diagram,
+    max_period: int,
+    found: Iterable[tuple[set[int], Sequence[Orbit]]],
+) -> Tally:
+    """Follow the orbits that lie on no branch; what each guess was made of comes with them."""
+    given = set(range(len(known.branches)))
+    tally = Tally(tuple(i for i in given if known.branches[i].period <= max_period))
+    for used, orbits in found:
+        tally.tried += 1
+        tally.came += bool(orbits)
+        for orbit in orbits:
+            on = box.branch_of(orbit)
+            if on is None:
+                box.follow(orbit, max_period, max_period, None)
+            elif on not in used and used <= given:
+                tally.met.add(on)
+    tally.met.intersection_update(tally.given)
+    return tally
 
 
 def inner_frequencies(range_hz: tuple[float, float], spacing: float) -> list[float]:

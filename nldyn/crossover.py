@@ -15,6 +15,7 @@ from nldyn.beside import (
     check_search,
     collector_beside,
     diagram_of,
+    follow_new,
     inner_frequencies,
     take_kept,
 )
@@ -112,31 +113,26 @@ def by_crossover(
     check_whole("tries", tries, 1, MOST_COUNT)
     check_whole("seed", seed, 0)
     box = collector_beside(known, options, progress, checkpoint)
-    given = set(range(len(known.branches)))
-    wanted = {i for i in given if known.branches[i].period <= max_period}
-    tried, came, met = 0, 0, set[int]()
     with box.checkpoint:
         take_kept(box, max_period)
-        for number, frequency in enumerate(inner_frequencies(box.range_hz, spacing)):
-            rng = np.random.default_rng([seed, number])
-            near = Loops.of(box.branches, frequency)
-            for period in range(1, max_period + 1):
-                for used, orbit in near_mixtures(box, near, frequency, period, tries, rng):
-                    tried += 1
-                    if orbit is None:
-                        continue
-                    came += 1
-                    on = box.branch_of(orbit)
-                    if on is None:
-                        box.follow(orbit, max_period, max_period, None)
-                    elif on not in used and used <= given:
-                        met.add(on)
+        tally = follow_new(box, known, max_period, _mixtures(box, max_period, spacing, tries, seed))
     new = counted(box.branches[len(known.branches) :])
     note = (
-        f"{came} of {tried} mixtures led to an orbit, and to {len(met & wanted)} of the "
-        f"{len(wanted)} given from others, {new} beside those given"
+        f"{tally.came} of {tally.tried} mixtures led to an orbit, and to {len(tally.met)} of the "
+        f"{len(tally.given)} given from others, {new} beside those given"
     )
     return diagram_of(box, max_period, note)
+
+
+def _mixtures(
+    box: Collector, max_period: int, spacing: float, tries: int, seed: int
+) -> Iterator[tuple[set[int], list[Orbit]]]:
+    """Those of all lengths at all frequencies."""
+    for number, frequency in enumerate(inner_frequencies(box.range_hz, spacing)):
+        rng = np.random.default_rng([seed, number])
+        near = Loops.of(box.branches, frequency)
+        for period in range(1, max_period + 1):
+            yield from near_mixtures(box, near, frequency, period, tries, rng)
 
 
 def near_mixtures(
@@ -146,7 +142,7 @@ def near_mixtures(
     period: int,
     tries: int,
     rng: np.random.Generator,
-) -> Iterator[tuple[set[int], Orbit | None]]:
+) -> Iterator[tuple[set[int], list[Orbit]]]:
     """Mixtures of two orbits: their branches, and the orbit near by, unless out of the range."""
     low, high = box.range_hz
     omega = 2.0 * math.pi * frequency_hz
@@ -154,8 +150,8 @@ def near_mixtures(
         box.progress("mixtures", frequency_hz)
         used, nodes = near.mixture(period, rng)
         orbit = nearest_orbit(box.flow, nodes, omega, box.observe, SHORT_STEPS)
-        inside = orbit is not None and low <= orbit.frequency_hz <= high
-        yield used, orbit if inside else None
+        found = [] if orbit is None else [orbit]
+        yield used, [o for o in found if low <= o.frequency_hz <= high]
 
 
 @dataclass(frozen=True, eq=False)

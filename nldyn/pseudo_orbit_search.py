@@ -12,6 +12,7 @@ from nldyn.beside import (
     check_search,
     collector_beside,
     diagram_of,
+    follow_new,
     inner_frequencies,
     take_kept,
 )
@@ -102,25 +103,18 @@ def by_pseudo_orbits(
     check_search(known, max_period, spacing, options, progress)
     check_whole("tries", tries, 1, MOST_COUNT)
     box = collector_beside(known, options, progress, checkpoint)
-    given = set(range(len(known.branches)))
-    wanted = {i for i in given if known.branches[i].period <= max_period}
-    tried, came, met = 0, 0, set[int]()
     with box.checkpoint:
         take_kept(box, max_period)
-        for frequency in inner_frequencies(box.range_hz, spacing):
-            for used, orbits in near_pseudo_orbits(box, frequency, spacing, max_period, tries):
-                tried += 1
-                came += bool(orbits)
-                for orbit in orbits:
-                    on = box.branch_of(orbit)
-                    if on is None:
-                        box.follow(orbit, max_period, max_period, None)
-                    elif on not in used and used <= given:
-                        met.add(on)
+        found = (
+            near
+            for frequency in inner_frequencies(box.range_hz, spacing)
+            for near in near_pseudo_orbits(box, frequency, spacing, max_period, tries)
+        )
+        tally = follow_new(box, known, max_period, found)
     new = counted(box.branches[len(known.branches) :])
     note = (
-        f"{came} of {tried} pseudo-orbits led to an orbit, and to {len(met & wanted)} of the "
-        f"{len(wanted)} given without a piece of theirs, {new} beside those given"
+        f"{tally.came} of {tally.tried} pseudo-orbits led to an orbit, and to {len(tally.met)} of "
+        f"the {len(tally.given)} given without a piece of theirs, {new} beside those given"
     )
     return diagram_of(box, max_period, note)
 
