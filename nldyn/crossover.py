@@ -24,10 +24,10 @@ from nldyn.diagrams import Collector, Diagram, Progress, counted
 from nldyn.errors import check_whole
 from nldyn.linear import Real
 from nldyn.orbit import Orbit
+from nldyn.pseudo_orbits import nodes_of
 from nldyn.search import MOST_COUNT, SHORT_STEPS, nearest_orbit
 from nldyn.step_control import ContinuationOptions
 
-NODES = 8  # states of an orbit in each period
 NEIGHBOURS = 40  # branches whose orbits are mixed, the nearest in frequency
 PLACES = 6  # orbits of each
 WINDOW = 0.03  # relative distance of their frequencies, unless a branch has none so near
@@ -174,7 +174,7 @@ class Loops:
         """Those of the branches nearest to a frequency."""
         away = [_distance(branch.frequency_hz, frequency_hz) for branch in branches]
         rows = [
-            (index, _nodes(orbit))
+            (index, nodes_of(orbit))
             for index in np.argsort(away, kind="stable")[:NEIGHBOURS].tolist()
             for orbit in _orbits_near(branches[index], frequency_hz)
         ]
@@ -200,12 +200,6 @@ def _orbits_near(branch: Branch, frequency_hz: float) -> list[Orbit]:
     near = np.flatnonzero(away <= max(WINDOW, float(away.min())))
     places = np.linspace(0.0, near.size - 1.0, min(PLACES, near.size))
     return [branch.points[near[round(place)]] for place in places.tolist()]
-
-
-def _nodes(orbit: Orbit) -> Real:
-    """States (period, NODES, 2n) of an orbit."""
-    phases = 2.0 * math.pi / NODES * np.arange(NODES * orbit.period, dtype=float)
-    return orbit.problem.flow.to_state(orbit.states(phases)).reshape(orbit.period, NODES, -1)
 
 
 def _stretch(nodes: Real, period: int, rng: np.random.Generator) -> Real:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -57,7 +58,7 @@ class ByDepth:
     touch: Touch
     _known: dict[float, Orbit] = field(default_factory=dict, init=False, repr=False)
 
-    @property
+    @cached_property
     def ends(self) -> tuple[float, float]:
         """Signed roots of the depths at the ends of the chord."""
         first, last = (self.touch.depth(end) for end in (self.chord.first, self.chord.last))
@@ -143,8 +144,5 @@ def _signed_root(depth: float) -> float:
 
 def _special(kind: str, orbit: Orbit, chord: Chord) -> SpecialPoint:
     """A special point of a branch, with place and tangent of its chord."""
-    a, b = chord.first, chord.last
-    sigma = chord.place(BranchPoint(orbit, a.tangent, a.arclength))
-    arclength = a.arclength + sigma * (b.arclength - a.arclength)
-    error = orbit.error + max(a.orbit.error, b.orbit.error)  # the ends' part along the null vector
-    return SpecialPoint(kind, BranchPoint(orbit, chord.direction(sigma), arclength), error)
+    ends = max(chord.first.orbit.error, chord.last.orbit.error)  # their part along the null vector
+    return SpecialPoint(kind, chord.with_place(orbit), orbit.error + ends)

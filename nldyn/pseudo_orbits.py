@@ -14,8 +14,9 @@ from scipy.spatial.distance import cdist
 
 from nldyn.branch import Branch
 from nldyn.linear import Real
+from nldyn.orbit import Orbit
 
-NODES = 8  # states of a piece
+NODES = 8  # states of an orbit in each period
 PLACES = 3  # most frequencies at which a branch gives pieces
 ALIKE = 0.05  # relative difference of orbits that are taken for one
 NEAREST = 60  # pieces that may follow one: bounds time and memory where there are hundreds
@@ -128,11 +129,15 @@ def _orbits_within(branch: Branch, window: tuple[float, float]) -> Iterator[Real
     if low >= high:
         return
     count = 1 + round((PLACES - 1) * (high - low) / (window[1] - window[0]))
-    phases = 2.0 * math.pi / NODES * np.arange(NODES * branch.period, dtype=float)
     for share in (np.arange(count) + 0.5) / count:
         for orbit in branch.at(low + share * (high - low)):
-            nodes = orbit.problem.flow.to_state(orbit.states(phases))
-            yield nodes.reshape(branch.period, NODES, -1)
+            yield nodes_of(orbit)
+
+
+def nodes_of(orbit: Orbit) -> Real:
+    """States z (period, NODES, 2n) of an orbit at equidistant phases of each of its periods."""
+    phases = 2.0 * math.pi / NODES * np.arange(NODES * orbit.period, dtype=float)
+    return orbit.problem.flow.to_state(orbit.states(phases)).reshape(orbit.period, NODES, -1)
 
 
 def _passages(orbits: Sequence[Real]) -> list[int]:

@@ -159,14 +159,20 @@ class Chord:
         self.known[sigma] = point
         return point
 
-    def place(self, point: BranchPoint) -> float:
-        """Position σ of a point of the branch, which may lie beyond the ends."""
-        way = point.orbit.point - self.first.orbit.point
+    def place(self, orbit: Orbit) -> float:
+        """Position σ of an orbit of the branch, which may lie beyond the ends."""
+        way = orbit.point - self.first.orbit.point
         return float(self.row @ way) / float(self.row @ self._secant)
+
+    def with_place(self, orbit: Orbit) -> BranchPoint:
+        """An orbit with the place and the tangent that the chord gives it."""
+        sigma = self.place(orbit)
+        length = self.last.arclength - self.first.arclength
+        return BranchPoint(orbit, self.direction(sigma), self.first.arclength + sigma * length)
 
     def passes(self, orbit: Orbit, off: float) -> bool:
         """Whether an orbit lies on the chord, but for a part of its length."""
-        sigma = self.place(BranchPoint(orbit, self.first.tangent, 0.0))
+        sigma = self.place(orbit)
         if not -off <= sigma <= 1.0 + off:
             return False
         away = orbit.point - self.between(min(max(sigma, 0.0), 1.0))
@@ -494,10 +500,7 @@ def _along(chord: Chord, special: SpecialPoint) -> SpecialPoint:
     """
     if special.kind != "BP":
         return special
-    orbit, sigma = special.orbit, chord.place(special.point)
-    length = chord.last.arclength - chord.first.arclength
-    arclength = chord.first.arclength + sigma * length
-    return replace(special, point=BranchPoint(orbit, chord.direction(sigma), arclength))
+    return replace(special, point=chord.with_place(special.orbit))
 
 
 def accounted(a: Orbit, found: list[SpecialPoint], b: Orbit) -> bool:

@@ -151,7 +151,7 @@ def looked_into(
         return []
     chord = Chord(a, b)
     beside = [p for p in (z, c) if p is not None and p.orbit.impacts == a.orbit.impacts]
-    places = {chord.place(p): p for p in beside}
+    places = {chord.place(p.orbit): p for p in beside}
     places = {x: p for x, p in places.items() if x < -CLOSE or x > 1.0 + CLOSE}
     near = sorted([*places.items(), (0.0, a), (1.0, b)], key=itemgetter(0))
     where = Between([p.orbit for _, p in near], [x for x, _ in near]).where_to_look()

@@ -1,6 +1,10 @@
-"""Whether two branches are the same to the last digit."""
+"""Whether two branches are the same to the last digit, and diagrams without one."""
+
+from dataclasses import replace
 
 import numpy as np
+
+from nldyn import Branch, Diagram
 
 
 def assert_same_points(some, others):
@@ -25,3 +29,8 @@ def assert_same_branches(a, b):
             getattr(s, name) for s in b.special_points
         ]
     assert (a.period, a.stop_reasons, a.notes) == (b.period, b.stop_reasons, b.notes)
+
+
+def without(known: Diagram, branch: Branch) -> Diagram:
+    """A diagram of all branches but one."""
+    return replace(known, branches=tuple(b for b in known.branches if b is not branch))

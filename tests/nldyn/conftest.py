@@ -1,9 +1,9 @@
-"""The 1-DOF system of equation 3.1, and its harmonic branch."""
+"""The 1-DOF system of equation 3.1, and branches of it."""
 
 import pytest
-from one_dof import RANGE_HZ, make_one_dof
+from one_dof import RANGE_HZ, THREE_HZ, make_one_dof
 
-from nldyn import System, continue_branch, solve_orbit
+from nldyn import Diagram, ExploreOptions, System, continue_branch, explore, solve_orbit
 
 
 @pytest.fixture(scope="session")
@@ -16,3 +16,11 @@ def one_dof() -> System:
 def harmonic_branch(one_dof):
     """The harmonic branch from 5.7 to 90 Hz."""
     return continue_branch(solve_orbit(one_dof, 26.0), RANGE_HZ)
+
+
+@pytest.fixture(scope="session")
+def three(one_dof) -> Diagram:
+    """The branches of periods 1, 2 and 3 at THREE_HZ, the last of which ends at a fold."""
+    found = explore(one_dof, THREE_HZ, 3, effort=ExploreOptions(spacing=0.01, starts=2)).diagram
+    assert sorted(branch.period for branch in found.branches) == [1, 2, 3]
+    return found

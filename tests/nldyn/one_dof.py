@@ -3,6 +3,7 @@
 from nldyn import Stop, System, Unbalance
 
 RANGE_HZ = (5.7, 90.0)
+THREE_HZ = (36.0, 38.5)  # where there are branches of three periods up to 3
 
 
 def make_one_dof(**changes) -> System:

@@ -3,43 +3,21 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from branches_alike import without
+from one_dof import THREE_HZ
 
 from nldyn import (
-    Diagram,
-    ExploreOptions,
-    Stop,
-    System,
     SystemModelError,
-    Unbalance,
     by_crossover,
-    explore,
     index_sum,
     load_branches,
 )
-from nldyn.crossover import BEYOND, NEIGHBOURS, NODES, PLACES, WINDOW, Loops, _orbits_near
+from nldyn.crossover import BEYOND, NEIGHBOURS, PLACES, WINDOW, Loops, _orbits_near
 from nldyn.exploration import steps_between
-
-RANGE_HZ = (36.0, 38.5)
-
-
-@pytest.fixture(scope="module")
-def three() -> Diagram:
-    """The branches of periods 1, 2 and 3, the last of which ends at a fold."""
-    system = System.from_matrices(
-        [[2.48]], [[16877.0]], {"middle": [1.0]}, modal_damping=0.0142,
-        stops=[Stop("middle", stiffness=5.17e9)], excitation=[Unbalance("middle", 4.92e-6)],
-    )  # fmt: skip
-    found = explore(system, RANGE_HZ, 3, effort=ExploreOptions(spacing=0.01, starts=2)).diagram
-    assert sorted(branch.period for branch in found.branches) == [1, 2, 3]
-    return found
-
-
-def without(known: Diagram, branch) -> Diagram:
-    return replace(known, branches=tuple(b for b in known.branches if b is not branch))
+from nldyn.pseudo_orbits import NODES
 
 
 @pytest.mark.parametrize(("period", "tries"), [(1, 50), (2, 50), (3, 200)])
@@ -73,7 +51,7 @@ def test_as_many_are_tried_as_wanted(three):
     """Two of each of three lengths at each frequency."""
     done = by_crossover(three, tries=2, spacing=0.02)
     tried = int(re.search(r"of (\d+) mixtures", done.notes[-1])[1])
-    assert tried == 2 * 3 * steps_between(*RANGE_HZ, 0.02)
+    assert tried == 2 * 3 * steps_between(*THREE_HZ, 0.02)
 
 
 def test_the_same_seed_gives_the_same_and_another_one_other_mixtures(three):

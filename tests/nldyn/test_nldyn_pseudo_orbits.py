@@ -8,19 +8,16 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
+from branches_alike import without
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from one_dof import THREE_HZ
 
 from nldyn import (
     Diagram,
-    ExploreOptions,
-    Stop,
-    System,
     SystemModelError,
-    Unbalance,
     by_pseudo_orbits,
     continue_branch,
-    explore,
     index_gaps,
     index_sum,
     load_branches,
@@ -34,24 +31,6 @@ from nldyn.paper.jobs import scene_system
 from nldyn.pseudo_orbit_search import WAYS
 from nldyn.pseudo_orbits import FARTHEST, NEAR, NODES, Pieces
 from nldyn.search import nearest_orbit
-
-RANGE_HZ = (36.0, 38.5)
-
-
-@pytest.fixture(scope="module")
-def three() -> Diagram:
-    """The branches of periods 1, 2 and 3, the last of which ends at a fold."""
-    system = System.from_matrices(
-        [[2.48]], [[16877.0]], {"middle": [1.0]}, modal_damping=0.0142,
-        stops=[Stop("middle", stiffness=5.17e9)], excitation=[Unbalance("middle", 4.92e-6)],
-    )  # fmt: skip
-    found = explore(system, RANGE_HZ, 3, effort=ExploreOptions(spacing=0.01, starts=2)).diagram
-    assert sorted(branch.period for branch in found.branches) == [1, 2, 3]
-    return found
-
-
-def without(known: Diagram, branch) -> Diagram:
-    return replace(known, branches=tuple(b for b in known.branches if b is not branch))
 
 
 @pytest.mark.parametrize("period", [1, 2, 3])
@@ -74,7 +53,7 @@ def test_what_is_known_is_met_and_not_found_again(three):
 
 def test_an_orbit_alone_gives_no_pseudo_orbit(three):
     """The harmonic changes so little within 0.1 % that its pieces give nothing else."""
-    harmonic = Diagram(tuple(three.of_period(1)), RANGE_HZ, "middle")
+    harmonic = Diagram(tuple(three.of_period(1)), THREE_HZ, "middle")
     done = by_pseudo_orbits(harmonic, spacing=0.001)
     assert len(done.branches) == 1
     assert done.notes[-1].startswith("0 of 0 pseudo-orbits led to an orbit")
@@ -102,7 +81,7 @@ def test_no_more_are_tried_than_wanted(three):
     """One of each length at each of the frequencies, at most."""
     done = by_pseudo_orbits(three, tries=1, spacing=0.02)
     tried = int(re.search(r"of (\d+) pseudo-orbits", done.notes[-1])[1])
-    assert 0 < tried <= 3 * steps_between(*RANGE_HZ, 0.02)
+    assert 0 < tried <= 3 * steps_between(*THREE_HZ, 0.02)
 
 
 def test_short_steps_between_more_states_lead_back_to_an_orbit_more_often(three):
