@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from nldyn.branch import check_branches
+from nldyn.branch import Branch, check_branches
 from nldyn.checkpoint import checkpoint_of_several
 from nldyn.diagrams import Collector, Diagram, Progress, check_known, middle_orbit
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
@@ -17,6 +18,7 @@ from nldyn.exploration import FINEST_SPACING, steps_between
 from nldyn.fixed_point_index import index_note, is_damped, without_index_note
 from nldyn.orbit import LONGEST_PERIOD, Orbit
 from nldyn.step_control import ContinuationOptions
+from nldyn.tally import Tally
 
 
 def check_search(
@@ -68,46 +70,55 @@ def take_kept(box: Collector, max_period: int) -> None:
     box.follow_up(count, max_period, max_period, None)
 
 
-@dataclass
-class Tally:
-    """What a search beside known branches has tried.
-
-    Parameters
-    ----------
-    given : tuple of int
-        Indices of the branches known, up to the longest period wanted.
-    tried, came : int
-        How many guesses there were, and how many led to an orbit.
-    met : set of int
-        Branches known that guesses led to which were made of others of them.
-    """
-
-    given: tuple[int, ...]
-    tried: int = 0
-    came: int = 0
-    met: set[int] = field(default_factory=set)
-
-
 def follow_new(
     box: Collector,
     known: Diagram,
     max_period: int,
-    found: Iterable[tuple[set[int], Sequence[Orbit]]],
+    question: str,
+    places: int,
+    near: Callable[[int], Iterable[tuple[set[int], Sequence[Orbit]]]],
 ) -> Tally:
-    """Follow the orbits that lie on no branch; what each guess was made of comes with them."""
+    """Follow the orbits that lie on no branch, found at one place of a search after the other.
+
+    What each guess was made of comes with its orbits. The places done are kept in the file of the
+    box; a search with the same question and the same known branches goes on after them.
+    """
     given = set(range(len(known.branches)))
-    tally = Tally(tuple(i for i in given if known.branches[i].period <= max_period))
-    for used, orbits in found:
-        tally.tried += 1
-        tally.came += bool(orbits)
-        for orbit in orbits:
-            on = box.branch_of(orbit)
-            if on is None:
-                box.follow(orbit, max_period, max_period, None)
-            elif on not in used and used <= given:
-                tally.met.add(on)
-    tally.met.intersection_update(tally.given)
+    wanted = {i for i in given if known.branches[i].period <= max_period}
+    begun = Tally(f"{question}, beside {_digest(known.branches)}", len(wanted))
+    tally = box.checkpoint.tally
+    if tally is None or tally.question != begun.question:
+        tally = begun
+    for place in range(tally.done, places):
+        tried, came, met = 0, 0, set[int]()
+        for used, orbits in near(place):
+            tried += 1
+            came += bool(orbits)
+            for orbit in orbits:
+                on = box.branch_of(orbit)
+                if on is None:
+                    box.follow(orbit, max_period, max_period, None)
+                elif on not in used and used <= given:
+                    met.add(on)
+        tally = replace(
+            tally,
+            done=place + 1,
+            tried=tally.tried + tried,
+            came=tally.came + came,
+            met=tally.met | (met & wanted),
+        )
+        box.checkpoint.tally = tally
+        box.checkpoint.offer()
+    box.checkpoint.tally = None
     return tally
+
+
+def _digest(branches: Sequence[Branch]) -> str:
+    """A name of some branches that tells them from others."""
+    digest = hashlib.sha256()
+    for branch in branches:
+        digest.update(branch.frequency_hz.tobytes())
+    return digest.hexdigest()[:16]
 
 
 def inner_frequencies(range_hz: tuple[float, float], spacing: float) -> list[float]:

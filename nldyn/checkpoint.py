@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from nldyn.flow import FlowMap
     from nldyn.orbit import Orbit
     from nldyn.system import System
+    from nldyn.tally import Tally
 
 Kept = TypeVar("Kept")
 Item = TypeVar("Item")
@@ -110,6 +111,11 @@ class Checkpoint(Keeper["Branch"]):
     held : list, optional
         Branches of the file that stay there: those known otherwise, see `new_branches`, and at the
         end those that were not asked for.
+
+    Attributes
+    ----------
+    tally : Tally or None
+        How far a search has come that is kept with its branches.
     """
 
     def __init__(
@@ -121,6 +127,7 @@ class Checkpoint(Keeper["Branch"]):
         held: list[Branch] | None = None,
     ) -> None:
         super().__init__(write, finished, earlier)
+        self.tally: Tally | None = None
         self._strict = strict
         self._held = [] if held is None else held
 
@@ -186,7 +193,7 @@ def checkpoint_at(
         return nullcontext(place)
     if place is None:
         return Checkpoint()
-    write, earlier = _file(place, system)
+    write, earlier, _ = _file(place, system)
     return Checkpoint(write, earlier=earlier, strict=str(place))
 
 
@@ -207,7 +214,7 @@ def checkpoint_of_several(
     """
     if place is None:
         return Checkpoint()
-    write, earlier = _file(place, flow.system)
+    write, earlier, tally = _file(place, flow.system)
     for branch in earlier:
         same_range = branch.course is not None and branch.course.range_hz == range_hz
         if not (same_range and same_flow(branch.points[0].problem.flow, flow)):
@@ -217,27 +224,30 @@ def checkpoint_of_several(
             )
     known = len(finished)
     held: list[Branch] = []
-    written = bool(earlier)
+    written = bool(earlier or tally)
 
     def write_new(branches: Sequence[Branch]) -> None:
         nonlocal written
-        if written or len(branches) > known:
-            write([*held, *branches[known:]])
+        if written or len(branches) > known or checkpoint.tally:
+            write([*held, *branches[known:]], checkpoint.tally)
             written = True
 
-    return Checkpoint(write_new, finished, earlier, held=held)
+    checkpoint = Checkpoint(write_new, finished, earlier, held=held)
+    checkpoint.tally = tally
+    return checkpoint
 
 
 def _file(
     place: str | Path, system: System
-) -> tuple[Callable[[Sequence[Branch]], None], list[Branch]]:
-    """What writes a file, and the branches of a system in it."""
+) -> tuple[Callable[..., None], list[Branch], Tally | None]:
+    """What writes a file, the branches of a system in it, and how far a search in it has come."""
     from nldyn.flow_store import laws_of
     from nldyn.store import load_bare_branches, save_branches
 
     path = check_writable(place)
     read = partial(load_bare_branches, laws=laws_of(system))
-    return partial(save_branches, path), begun_before(read, path) if path.exists() else []
+    branches, tally = begun_before(read, path) if path.exists() else ([], None)
+    return partial(save_branches, path), branches, tally
 
 
 def begun_before(read: Callable[[Path], Kept], path: Path) -> Kept:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -77,7 +78,7 @@ def by_crossover(
         Called as ``progress(what, frequency_hz)``.
     checkpoint : str or Path, optional
         File that keeps the branches found, also those of an earlier call: they count as known.
-        The frequencies done are not kept, and tried anew.
+        Once interrupted, the same call with the same file goes on after the frequencies done.
 
     Returns
     -------
@@ -115,24 +116,31 @@ def by_crossover(
     box = collector_beside(known, options, progress, checkpoint)
     with box.checkpoint:
         take_kept(box, max_period)
-        tally = follow_new(box, known, max_period, _mixtures(box, max_period, spacing, tries, seed))
+        frequencies = inner_frequencies(box.range_hz, spacing)
+        question = f"mixtures to period {max_period}, {spacing:g} apart, {tries} each, seed {seed}"
+        near = partial(_mixtures, box, frequencies, max_period, tries, seed)
+        tally = follow_new(box, known, max_period, question, len(frequencies), near)
     new = counted(box.branches[len(known.branches) :])
     note = (
         f"{tally.came} of {tally.tried} mixtures led to an orbit, and to {len(tally.met)} of the "
-        f"{len(tally.given)} given from others, {new} beside those given"
+        f"{tally.given} given from others, {new} beside those given"
     )
     return diagram_of(box, max_period, note)
 
 
 def _mixtures(
-    box: Collector, max_period: int, spacing: float, tries: int, seed: int
+    box: Collector,
+    frequencies: Sequence[float],
+    max_period: int,
+    tries: int,
+    seed: int,
+    place: int,
 ) -> Iterator[tuple[set[int], list[Orbit]]]:
-    """Those of all lengths at all frequencies."""
-    for number, frequency in enumerate(inner_frequencies(box.range_hz, spacing)):
-        rng = np.random.default_rng([seed, number])
-        near = Loops.of(box.branches, frequency)
-        for period in range(1, max_period + 1):
-            yield from near_mixtures(box, near, frequency, period, tries, rng)
+    """Those of all lengths at one of the frequencies."""
+    rng = np.random.default_rng([seed, place])
+    near = Loops.of(box.branches, frequencies[place])
+    for period in range(1, max_period + 1):
+        yield from near_mixtures(box, near, frequencies[place], period, tries, rng)
 
 
 def near_mixtures(

@@ -69,7 +69,7 @@ def by_pseudo_orbits(
         Called as ``progress(what, frequency_hz)``.
     checkpoint : str or Path, optional
         File that keeps the branches found, also those of an earlier call: they count as known.
-        The frequencies done are not kept, and tried anew.
+        Once interrupted, the same call with the same file goes on after the frequencies done.
 
     Returns
     -------
@@ -105,16 +105,17 @@ def by_pseudo_orbits(
     box = collector_beside(known, options, progress, checkpoint)
     with box.checkpoint:
         take_kept(box, max_period)
-        found = (
-            near
-            for frequency in inner_frequencies(box.range_hz, spacing)
-            for near in near_pseudo_orbits(box, frequency, spacing, max_period, tries)
-        )
-        tally = follow_new(box, known, max_period, found)
+        frequencies = inner_frequencies(box.range_hz, spacing)
+        question = f"pseudo-orbits to period {max_period}, {spacing:g} apart, {tries} each"
+
+        def near(place: int) -> Iterator[tuple[set[int], list[Orbit]]]:
+            return near_pseudo_orbits(box, frequencies[place], spacing, max_period, tries)
+
+        tally = follow_new(box, known, max_period, question, len(frequencies), near)
     new = counted(box.branches[len(known.branches) :])
     note = (
         f"{tally.came} of {tally.tried} pseudo-orbits led to an orbit, and to {len(tally.met)} of "
-        f"the {len(tally.given)} given without a piece of theirs, {new} beside those given"
+        f"the {tally.given} given without a piece of theirs, {new} beside those given"
     )
     return diagram_of(box, max_period, note)
 

@@ -4,6 +4,7 @@ A file has the attributes ``format``, ``format_version`` and ``software``; a gro
 map (system and accuracy) in ``flow_maps``, one for each branch in ``branches``, and in each branch
 one for its ``nodes``, ``special_points`` and ``requested`` points, one for its ``course``, and a
 ``table`` of what is reported of the nodes, which other software may read and this one does not.
+A ``search`` for further branches that is not done has a group of its own.
 Datasets carry their unit as the attribute ``unit``.
 """
 
@@ -32,14 +33,15 @@ from nldyn.orbit import Orbit
 from nldyn.shooting import ShootingProblem
 from nldyn.step_control import ContinuationOptions
 from nldyn.tables import UNITS, orbit_columns
+from nldyn.tally import Tally
 
 FORMAT = "nldyn branches"
 FORMAT_VERSION = 2
 RECORD_UNITS = {"phase": "rad", "duration": "s", "w": STATE_UNIT, "force": "N", "depth": "m"}
 
 
-def save_branches(path: str | Path, branches: Sequence[Branch]) -> None:
-    """Write branches to one file, whole or not at all.
+def save_branches(path: str | Path, branches: Sequence[Branch], tally: Tally | None = None) -> None:
+    """Write branches to one file, whole or not at all, and how far a search for others has come.
 
     Raises
     ------
@@ -48,7 +50,7 @@ def save_branches(path: str | Path, branches: Sequence[Branch]) -> None:
     SystemModelError
         If the points of a branch are of different systems.
     """
-    _write(path, branches, {})
+    _write(path, branches, {}, tally=tally)
 
 
 def save_diagram(path: str | Path, diagram: Diagram) -> None:
@@ -113,12 +115,13 @@ def load_branches(path: str | Path, *, laws: Laws | None = None) -> list[Branch]
         return _read_branches(root, _read_flows(root, laws))
 
 
-def load_bare_branches(path: Path, laws: Laws) -> list[Branch]:
-    """Read the branches of a file that holds nothing else: writing them leaves nothing out."""
+def load_bare_branches(path: Path, laws: Laws) -> tuple[list[Branch], Tally | None]:
+    """Read what `save_branches` wrote, of a file that holds nothing else."""
     with opened(path, FORMAT, FORMAT_VERSION) as root:
         if root.has_attribute("range_hz"):
             raise SystemModelError(f"{path}: holds a diagram or exploration, not branches alone")
-        return _read_branches(root, _read_flows(root, laws))
+        tally = _read_tally(root.group("search")) if "search" in root else None
+        return _read_branches(root, _read_flows(root, laws)), tally
 
 
 def load_diagram(path: str | Path, *, laws: Laws | None = None) -> Diagram:
@@ -179,6 +182,7 @@ def _write(
     branches: Sequence[Branch],
     attributes: Mapping[str, Any],
     exploration: Exploration | None = None,
+    tally: Tally | None = None,
 ) -> None:
     """Write a file of branches."""
     flows: list[FlowMap] = []
@@ -190,6 +194,8 @@ def _write(
             _write_branch(groups.create_group(f"{number:04d}"), branch, flows)
         if exploration is not None:
             _write_exploration(file.create_group("exploration"), exploration, flows)
+        if tally is not None:
+            _write_tally(file.create_group("search"), tally)
         maps = file.create_group("flow_maps")
         for number, flow in enumerate(flows):
             write_flow(maps.create_group(f"{number:04d}"), flow)
@@ -262,6 +268,12 @@ def _write_exploration(group: Any, found: Exploration, flows: list[FlowMap]) -> 
     periods = np.array([n for c in coverage for n in c.periods], dtype=np.int64)
     put(table, "different_periods", attractors, "1")
     put(table, "periods", periods, "1; those of one frequency after the other")
+
+
+def _write_tally(group: Any, tally: Tally) -> None:
+    for name in ("question", "given", "done", "tried", "came"):
+        set_attribute(group, name, getattr(tally, name))
+    put(group, "met", np.array(sorted(tally.met), dtype=np.int64), "1; numbers of known branches")
 
 
 def _write_options(group: Any, options: ContinuationOptions) -> None:
@@ -441,6 +453,12 @@ def _read_open_ends(group: Group, orbit: Orbit) -> Real:
     if group.has_group("open_ends"):
         return alike(orbit, group.group("open_ends").arrays())
     return group.array("open_ends", -1, orbit.point.size)
+
+
+def _read_tally(group: Group) -> Tally:
+    given, done, tried, came = map(group.whole, ("given", "done", "tried", "came"))
+    met = frozenset(group.array("met", -1, kind=np.int64).tolist())
+    return Tally(group.text("question"), given, done, tried, came, met)
 
 
 def _read_options(group: Group) -> ContinuationOptions:

@@ -7,8 +7,8 @@ it does not simulate, but goes by way of a system with these factors, see `by_de
 ``--pseudo-orbits`` it puts pieces of known orbits together, see `by_pseudo_orbits`; with
 ``--crossover 3`` it mixes known orbits, with the seed 3, see `by_crossover`. The directory keeps
 what is found, and the same command goes on where it was interrupted (but for following the starts,
-and for the last three ways, which keep their branches only); once it has ended, it looks for more
-beside what it has found, from other random states, with ``--crossover`` if the seed is another.
+and for a detour, which keeps its branches only); once it has ended, it looks for more beside what
+it has found, from other random states, with ``--crossover`` if the seed is another.
 """
 
 from __future__ import annotations

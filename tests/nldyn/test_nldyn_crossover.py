@@ -13,7 +13,6 @@ from nldyn import (
     SystemModelError,
     by_crossover,
     index_sum,
-    load_branches,
 )
 from nldyn.crossover import BEYOND, NEIGHBOURS, PLACES, WINDOW, Loops, _orbits_near
 from nldyn.exploration import steps_between
@@ -111,24 +110,6 @@ def test_of_a_branch_its_orbits_near_the_frequency_are_mixed_or_else_the_nearest
     assert len(Loops.of([third], 37.0).nodes) == PLACES
     far = third.frequency_hz.max() * (1.0 + 2.0 * WINDOW)
     assert len(Loops.of([third], far).nodes) == 1
-
-
-def test_interrupted_it_keeps_what_it_has_found(three, tmp_path):
-    (left_out,) = three.of_period(2)
-    place, known = tmp_path / "found.h5", without(three, left_out)
-    seen = []
-
-    def interrupt(what: str, frequency_hz: float) -> None:
-        seen.append(what)
-        if what == "mixtures" and "1/2" in seen:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        by_crossover(known, tries=50, spacing=0.02, progress=interrupt, checkpoint=place)
-    (kept,) = load_branches(place)
-    resumed = by_crossover(known, tries=50, spacing=0.02, checkpoint=place)
-    assert len(resumed.branches) == 3
-    assert np.array_equal(resumed.branches[2].frequency_hz, kept.frequency_hz)
 
 
 @pytest.mark.parametrize(

@@ -211,24 +211,6 @@ def test_of_very_many_pieces_some_of_the_sequences_are_left_out(seed, nearest, m
         assert (sequence in near) == (far <= 1)  # the last step back to the first may be long
 
 
-def test_interrupted_it_keeps_what_it_has_found(three, tmp_path):
-    (left_out,) = three.of_period(3)
-    place, known = tmp_path / "found.h5", without(three, left_out)
-    seen = []
-
-    def interrupt(what: str, frequency_hz: float) -> None:
-        seen.append(what)
-        if what == "pseudo-orbits" and "1/3" in seen:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        by_pseudo_orbits(known, tries=50, progress=interrupt, checkpoint=place)
-    (kept,) = load_branches(place)
-    resumed = by_pseudo_orbits(known, tries=50, checkpoint=place)
-    assert len(resumed.branches) == 3
-    assert np.array_equal(resumed.branches[2].frequency_hz, kept.frequency_hz)
-
-
 def test_a_branch_that_was_begun_is_finished(three, tmp_path):
     """Interrupted on the way along it, and with the known branches read from a file."""
     (left_out,) = three.of_period(3)

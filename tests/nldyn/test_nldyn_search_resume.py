@@ -1,0 +1,111 @@
+"""Searches beside known branches that are interrupted go on after the frequencies done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import h5py
+import pytest
+from branches_alike import without
+
+from nldyn import SystemModelError, by_crossover, by_pseudo_orbits, load_branches
+from nldyn.diagrams import Diagram
+
+Search = Callable[..., Diagram]
+WAYS: dict[str, Search] = {
+    "mixtures": partial(by_crossover, tries=4, spacing=0.006, seed=1),
+    "pseudo-orbits": partial(by_pseudo_orbits, tries=2, spacing=0.006),
+}
+
+
+class Frequencies:
+    """Those that a search tries, in Hz; it is interrupted at the one of a number."""
+
+    def __init__(self, way: str, last: int | None = None) -> None:
+        self.way, self.last = way, last
+        self.tried: list[float] = []
+
+    def __call__(self, what: str, frequency_hz: float) -> None:
+        if what == self.way and frequency_hz not in self.tried:
+            self.tried.append(frequency_hz)
+            if len(self.tried) == self.last:
+                raise KeyboardInterrupt
+
+
+@pytest.fixture(params=WAYS)
+def way(request):
+    return request.param
+
+
+@pytest.fixture
+def interrupted(three, way, tmp_path):
+    """A file of a search that was interrupted at its third frequency."""
+    place = tmp_path / "found.h5"
+    with pytest.raises(KeyboardInterrupt):
+        WAYS[way](three, progress=Frequencies(way, 3), checkpoint=place)
+    return place
+
+
+def test_interrupted_it_gives_what_an_uninterrupted_one_gives(three, way, interrupted):
+    whole, rest = Frequencies(way), Frequencies(way)
+    wanted = WAYS[way](three, progress=whole)
+    resumed = WAYS[way](three, progress=rest, checkpoint=interrupted)
+    assert len(whole.tried) > 3
+    assert rest.tried == whole.tried[2:]
+    assert resumed.notes == wanted.notes
+
+
+def test_once_ended_it_begins_anew(three, way, interrupted):
+    WAYS[way](three, checkpoint=interrupted)
+    again = Frequencies(way)
+    WAYS[way](three, progress=again, checkpoint=interrupted)
+    assert len(again.tried) > 3
+
+
+def test_another_search_begins_anew(three, way, interrupted):
+    """With other numbers, or beside other branches."""
+    for known, numbers in (
+        (three, {"tries": 5}),
+        (three, {"max_period": 2}),
+        (without(three, three.of_period(2)[0]), {}),
+    ):
+        tried = Frequencies(way, 1)
+        with pytest.raises(KeyboardInterrupt):
+            WAYS[way](known, progress=tried, checkpoint=interrupted, **numbers)
+        fresh = Frequencies(way, 1)
+        with pytest.raises(KeyboardInterrupt):
+            WAYS[way](known, progress=fresh, **numbers)
+        assert tried.tried == fresh.tried
+
+
+def test_what_it_has_found_is_not_lost(three, way, tmp_path):
+    """Nor looked for again where it was found."""
+    (left_out,) = three.of_period(2)
+    known, place = without(three, left_out), tmp_path / "found.h5"
+    tried: list[float] = []
+
+    def interrupt(what: str, frequency_hz: float) -> None:
+        if what == way and frequency_hz not in tried:
+            tried.append(frequency_hz)
+            if place.exists() and load_branches(place):
+                raise KeyboardInterrupt
+
+    search = partial(WAYS[way], tries=30)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("nldyn.checkpoint.PAUSE", 0.0)
+        patch.setattr("nldyn.checkpoint.SHARE", 0.0)
+        with pytest.raises(KeyboardInterrupt):
+            search(known, progress=interrupt, checkpoint=place)
+    rest = Frequencies(way)
+    found = search(known, progress=rest, checkpoint=place)
+    assert rest.tried[0] == tried[-1] > tried[0]
+    assert len(found.branches) == len(three.branches)
+    assert any(branch.period == 2 for branch in found.branches[2:])
+
+
+def test_a_damaged_place_is_told_by_its_name(three, way, interrupted):
+    with h5py.File(interrupted, "r+") as file:
+        del file["search"].attrs["done"]
+    with pytest.raises(SystemModelError, match=r"found\.h5: attribute '/search/done' is missing"):
+        WAYS[way](three, checkpoint=interrupted)
