@@ -52,8 +52,8 @@ def by_crossover(
     The states of two orbits at the same phases, eight in each excitation period, are mixed,
     (1 - λ)A + λB with a random λ from -0.8 to 1.8, either begun at a random one of its periods:
     the arithmetic crossover of genetic algorithms [Michalewicz 1996]. They are of the forty
-    branches nearest in frequency, of each up to six orbits within 3 % of it, or else the nearest;
-    both may be of one branch. Orbits whose period does not divide the one wanted give a stretch of
+    branches nearest in frequency, those up to the longest period wanted before others, of each up
+    to six orbits within 3 % of it, or else the nearest; both may be of one branch. Orbits whose period does not divide the one wanted give a stretch of
     it, which does not close. From there the Gauss-Newton method [Allgower and Georg 1990, chapter
     3] goes to the nearest orbit, at a frequency that it finds. If that lies on no known branch, its
     branch is followed, with what it leads to. No motion is simulated, so that orbits are found
@@ -138,7 +138,7 @@ def _mixtures(
 ) -> Iterator[tuple[set[int], list[Orbit]]]:
     """Those of all lengths at one of the frequencies."""
     rng = np.random.default_rng([seed, place])
-    near = Loops.of(box.branches, frequencies[place])
+    near = Loops.of(box.branches, frequencies[place], max_period)
     for period in range(1, max_period + 1):
         yield from near_mixtures(box, near, frequencies[place], period, tries, rng)
 
@@ -178,12 +178,13 @@ class Loops:
     nodes: Sequence[Real]
 
     @classmethod
-    def of(cls, branches: Sequence[Branch], frequency_hz: float) -> Loops:
-        """Those of the branches nearest to a frequency."""
+    def of(cls, branches: Sequence[Branch], frequency_hz: float, longest: int) -> Loops:
+        """Those of the branches nearest to a frequency, first those up to a period."""
         away = [_distance(branch.frequency_hz, frequency_hz) for branch in branches]
+        longer = [branch.period > longest for branch in branches]
         rows = [
             (index, nodes_of(orbit))
-            for index in np.argsort(away, kind="stable")[:NEIGHBOURS].tolist()
+            for index in np.lexsort((away, longer))[:NEIGHBOURS].tolist()
             for orbit in _orbits_near(branches[index], frequency_hz)
         ]
         return cls(np.array([index for index, _ in rows]), [nodes for _, nodes in rows])

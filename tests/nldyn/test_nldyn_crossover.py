@@ -86,7 +86,7 @@ def test_an_orbit_is_begun_at_each_of_its_periods_and_goes_on_in_its_order():
 
 def test_loops_are_motions_over_the_period_of_the_orbit(three):
     for branch in three.branches:
-        loops, orbits = Loops.of([branch], 36.5), _orbits_near(branch, 36.5)
+        loops, orbits = Loops.of([branch], 36.5, 3), _orbits_near(branch, 36.5)
         assert len(loops.nodes) == len(orbits) > 1
         for nodes, orbit in zip(loops.nodes, orbits, strict=True):
             assert nodes.shape == (branch.period, NODES, 2)
@@ -100,16 +100,24 @@ def test_the_branches_nearest_in_frequency_are_mixed(three):
     (harmonic,), (third,) = three.of_period(1), three.of_period(3)
     above = 1.001 * third.frequency_hz.max()
     for others, used in ((NEIGHBOURS - 1, True), (NEIGHBOURS, False)):
-        loops = Loops.of([third, *[harmonic] * others], above)
+        loops = Loops.of([third, *[harmonic] * others], above, 3)
         assert (0 in loops.branch) == used
         assert len(set(loops.branch.tolist())) == NEIGHBOURS
 
 
+def test_branches_of_longer_periods_than_wanted_are_mixed_last(three):
+    """However near: doubled ones may be many."""
+    (harmonic,), (third,) = three.of_period(1), three.of_period(3)
+    branches = [*[third] * NEIGHBOURS, harmonic]
+    for longest, used in ((1, True), (3, False)):
+        assert (NEIGHBOURS in Loops.of(branches, 37.0, longest).branch) == used
+
+
 def test_of_a_branch_its_orbits_near_the_frequency_are_mixed_or_else_the_nearest(three):
     (third,) = three.of_period(3)
-    assert len(Loops.of([third], 37.0).nodes) == PLACES
+    assert len(Loops.of([third], 37.0, 3).nodes) == PLACES
     far = third.frequency_hz.max() * (1.0 + 2.0 * WINDOW)
-    assert len(Loops.of([third], far).nodes) == 1
+    assert len(Loops.of([third], far, 3).nodes) == 1
 
 
 @pytest.mark.parametrize(
