@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nldyn.branch import Branch, check_branches
+from nldyn.branch import check_branches
 from nldyn.checkpoint import checkpoint_of_several
 from nldyn.diagrams import Collector, Diagram, Progress, check_known, middle_orbit
 from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
@@ -75,21 +75,22 @@ def follow_new(
     known: Diagram,
     max_period: int,
     question: str,
-    places: int,
+    frequencies: Sequence[float],
     near: Callable[[int], Iterable[tuple[set[int], Sequence[Orbit]]]],
 ) -> Tally:
-    """Follow the orbits that lie on no branch, found at one place of a search after the other.
+    """Follow the orbits that lie on no branch, found near one frequency after the other.
 
-    What each guess was made of comes with its orbits. The places done are kept in the file of the
-    box; a search with the same question and the same known branches goes on after them.
+    What each guess was made of comes with its orbits, which are asked for by the number of the
+    frequency. How many are done is kept in the file of the box; a search with the same question,
+    known branches and frequencies goes on after them.
     """
     given = set(range(len(known.branches)))
     wanted = {i for i in given if known.branches[i].period <= max_period}
-    begun = Tally(f"{question}, beside {_digest(known.branches)}", len(wanted))
+    begun = Tally(f"{question}, beside {_digest(known, frequencies)}", len(wanted))
     tally = box.checkpoint.tally
     if tally is None or tally.question != begun.question:
         tally = begun
-    for place in range(tally.done, places):
+    for place in range(tally.done, len(frequencies)):
         tried, came, met = 0, 0, set[int]()
         for used, orbits in near(place):
             tried += 1
@@ -113,10 +114,10 @@ def follow_new(
     return tally
 
 
-def _digest(branches: Sequence[Branch]) -> str:
-    """A name of some branches that tells them from others."""
-    digest = hashlib.sha256()
-    for branch in branches:
+def _digest(known: Diagram, frequencies: Sequence[float]) -> str:
+    """A name of branches and frequencies that tells them from others."""
+    digest = hashlib.sha256(np.array(frequencies).tobytes())
+    for branch in known.branches:
         digest.update(branch.frequency_hz.tobytes())
     return digest.hexdigest()[:16]
 

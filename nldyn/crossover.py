@@ -53,12 +53,12 @@ def by_crossover(
     (1 - λ)A + λB with a random λ from -0.8 to 1.8, either begun at a random one of its periods:
     the arithmetic crossover of genetic algorithms [Michalewicz 1996]. They are of the forty
     branches nearest in frequency, those up to the longest period wanted before others, of each up
-    to six orbits within 3 % of it, or else the nearest; both may be of one branch. Orbits whose period does not divide the one wanted give a stretch of
-    it, which does not close. From there the Gauss-Newton method [Allgower and Georg 1990, chapter
-    3] goes to the nearest orbit, at a frequency that it finds. If that lies on no known branch, its
-    branch is followed, with what it leads to. No motion is simulated, so that orbits are found
-    whatever their stability and energy, if they lie among those known. Flips of the branches given
-    are not followed.
+    to six orbits within 3 % of it, or else the nearest; both may be of one branch. Orbits whose
+    period does not divide the one wanted give a stretch of it, which does not close. From there the
+    Gauss-Newton method [Allgower and Georg 1990, chapter 3] goes to the nearest orbit, at a
+    frequency that it finds. If that lies on no known branch, its branch is followed, with what it
+    leads to. No motion is simulated, so that orbits are found whatever their stability and energy,
+    if they lie among those known. Flips of the branches given are not followed.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def by_crossover(
         frequencies = inner_frequencies(box.range_hz, spacing)
         question = f"mixtures to period {max_period}, {spacing:g} apart, {tries} each, seed {seed}"
         near = partial(_mixtures, box, frequencies, max_period, tries, seed)
-        tally = follow_new(box, known, max_period, question, len(frequencies), near)
+        tally = follow_new(box, known, max_period, question, frequencies, near)
     new = counted(box.branches[len(known.branches) :])
     note = (
         f"{tally.came} of {tally.tried} mixtures led to an orbit, and to {len(tally.met)} of the "

@@ -111,7 +111,7 @@ def by_pseudo_orbits(
         def near(place: int) -> Iterator[tuple[set[int], list[Orbit]]]:
             return near_pseudo_orbits(box, frequencies[place], spacing, max_period, tries)
 
-        tally = follow_new(box, known, max_period, question, len(frequencies), near)
+        tally = follow_new(box, known, max_period, question, frequencies, near)
     new = counted(box.branches[len(known.branches) :])
     note = (
         f"{tally.came} of {tally.tried} pseudo-orbits led to an orbit, and to {len(tally.met)} of "
