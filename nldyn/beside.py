@@ -82,11 +82,11 @@ def follow_new(
 
     What each guess was made of comes with its orbits, which are asked for by the number of the
     frequency. How many are done is kept in the file of the box; a search with the same question,
-    known branches and frequencies goes on after them.
+    known branches, frequencies and options goes on after them.
     """
     given = set(range(len(known.branches)))
     wanted = {i for i in given if known.branches[i].period <= max_period}
-    begun = Tally(f"{question}, beside {_digest(known, frequencies)}", len(wanted))
+    begun = Tally(f"{question}, beside {_digest(known, frequencies, box.options)}", len(wanted))
     tally = box.checkpoint.tally
     if tally is None or tally.question != begun.question:
         tally = begun
@@ -110,13 +110,12 @@ def follow_new(
         )
         box.checkpoint.tally = tally
         box.checkpoint.offer()
-    box.checkpoint.tally = None
     return tally
 
 
-def _digest(known: Diagram, frequencies: Sequence[float]) -> str:
-    """A name of branches and frequencies that tells them from others."""
-    digest = hashlib.sha256(np.array(frequencies).tobytes())
+def _digest(known: Diagram, frequencies: Sequence[float], options: ContinuationOptions) -> str:
+    """A name of branches, frequencies and options that tells them from others."""
+    digest = hashlib.sha256(np.array(frequencies).tobytes() + repr(options).encode())
     for branch in known.branches:
         digest.update(branch.frequency_hz.tobytes())
     return digest.hexdigest()[:16]

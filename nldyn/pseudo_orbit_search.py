@@ -69,7 +69,8 @@ def by_pseudo_orbits(
         Called as ``progress(what, frequency_hz)``.
     checkpoint : str or Path, optional
         File that keeps the branches found, also those of an earlier call: they count as known.
-        Once interrupted, the same call with the same file goes on after the frequencies done.
+        The same call with the same file goes on after the frequencies done, and gives the same
+        once all are; another search takes the place of this one in the file.
 
     Returns
     -------

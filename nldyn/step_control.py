@@ -51,7 +51,8 @@ class ContinuationOptions:
                 )
         if not self.min_step <= self.first_step <= self.max_step:
             raise SystemModelError(
-                "continuation: steps must satisfy min_step <= first_step <= max_step"
+                "continuation: steps must satisfy min_step <= first_step <= max_step, got "
+                f"{self.min_step:g}, {self.first_step:g} and {self.max_step:g}"
             )
         if self.grazing_step < self.min_step:
             raise SystemModelError("continuation: grazing_step must not be below min_step")

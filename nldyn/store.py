@@ -4,7 +4,7 @@ A file has the attributes ``format``, ``format_version`` and ``software``; a gro
 map (system and accuracy) in ``flow_maps``, one for each branch in ``branches``, and in each branch
 one for its ``nodes``, ``special_points`` and ``requested`` points, one for its ``course``, and a
 ``table`` of what is reported of the nodes, which other software may read and this one does not.
-A ``search`` for further branches that is not done has a group of its own.
+A ``search`` for further branches has a group of its own.
 Datasets carry their unit as the attribute ``unit``.
 """
 
