@@ -255,7 +255,8 @@ def root(f: Callable[[float], float]) -> tuple[float, float]:
     that is smooth on one side of its root only (the depth at a grazing point) is followed on that
     side; where trials do not come closer fast, the bracket is halved (after Brent 1973, ch. 4).
     The error is how far the next trial would have moved. A short move that brings the function no
-    nearer to zero has met its rounding level; then the error is what secants say.
+    nearer to zero has met its rounding level; then the error is what secants say. Where the
+    function jumps, its value nearest to zero may lie elsewhere: the root is where the sign changes.
 
     Raises
     ------
@@ -272,7 +273,7 @@ def root(f: Callable[[float], float]) -> tuple[float, float]:
         x = _inverse_interpolation(known, low, high)
         step = abs(x - best)
         if step <= PRECISION or high - low <= PRECISION:
-            return best, min(step, high - low)
+            return best if low <= best <= high else x, min(step, high - low)
         if step > 0.5 * move_before:
             x = 0.5 * (low + high)
         move_before, move = move, abs(x - best)
