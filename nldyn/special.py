@@ -255,8 +255,7 @@ def root(f: Callable[[float], float]) -> tuple[float, float]:
     that is smooth on one side of its root only (the depth at a grazing point) is followed on that
     side; where trials do not come closer fast, the bracket is halved (after Brent 1973, ch. 4).
     The error is how far the next trial would have moved. A short move that brings the function no
-    nearer to zero has met its rounding level; then the error is what secants say. Where the
-    function jumps, its value nearest to zero may lie elsewhere: the root is where the sign changes.
+    nearer to zero has met its rounding level; then the error is what secants say.
 
     Raises
     ------
@@ -273,7 +272,7 @@ def root(f: Callable[[float], float]) -> tuple[float, float]:
         x = _inverse_interpolation(known, low, high)
         step = abs(x - best)
         if step <= PRECISION or high - low <= PRECISION:
-            return best if low <= best <= high else x, min(step, high - low)
+            return best, min(step, high - low)
         if step > 0.5 * move_before:
             x = 0.5 * (low + high)
         move_before, move = move, abs(x - best)
@@ -355,7 +354,7 @@ def _located(kind: str, chord: Chord) -> list[SpecialPoint]:
         return []
     if kind == "LP" and _is_plain_fold(chord):
         return [special]
-    if kind == "LP" and not _turns_at(special.orbit, chord):
+    if kind == "LP" and not (_turns_at(special.orbit, chord) and _turns_beside(special, chord)):
         crossing = _crossing_at_an_end(chord)
         if crossing is not None:
             at = replace(special.point, orbit=crossing)
@@ -367,6 +366,13 @@ def _turns_at(fold: Orbit, chord: Chord) -> bool:
     """Whether the frequency of a fold lies beyond those at the ends of its chord."""
     ends = chord.first.orbit.omega, chord.last.orbit.omega
     return not min(ends) <= fold.omega <= max(ends)
+
+
+def _turns_beside(fold: SpecialPoint, chord: Chord) -> bool:
+    """Whether the branch turns at a fold, not where the tangent jumps elsewhere on the chord."""
+    sigma = chord.place(fold.orbit)
+    before, after = (tests(chord.at(sigma + way))["LP"] for way in (-BESIDE, BESIDE))
+    return before * after <= 0.0
 
 
 def _crossing_at_an_end(chord: Chord) -> Orbit | None:
