@@ -23,10 +23,12 @@ from nldyn import (
     continue_branch,
     diagram,
     solve_orbit,
+    special,
     switch_at_branch_point,
     switch_at_flip,
     walk,
 )
+from nldyn.branch import BranchPoint
 from nldyn.continuation import _without_repeat, start_point
 from nldyn.hard.continuation import beam as four_modes
 from nldyn.normal_forms import is_symmetric
@@ -310,6 +312,27 @@ def test_a_half_begun_beside_its_pitchfork_has_that_once_and_no_fold(facing, amp
     (only,) = branch.special_points
     assert only.kind == "BP"
     assert only.frequency_hz == pytest.approx(hz, rel=1e-9)
+
+
+def test_a_tangent_that_jumps_beside_a_pitchfork_tells_of_that_and_of_no_fold(facing, monkeypatch):
+    """It may be steeper where it is of both branches than at a tenth of the step farther on."""
+    pitchfork = [s for s in facing.special_points if s.kind == "BP"][1]
+    half = switch_at_branch_point(pitchfork, 5e-6)[0].orbit
+    branch = continue_branch(half, (0.99 * pitchfork.frequency_hz, 1.01 * pitchfork.frequency_hz))
+    far = next(o for o in branch.points if 5e-3 < special.distance(half, o) < 5e-2)
+    secant, length = far.point - half.point, special.distance(half, far)
+    first, last = (BranchPoint(o, secant / length, s) for o, s in ((half, 0.0), (far, length)))
+    tests = special.tests
+
+    def mixed(point):
+        steep = 2e-3 if point.arclength < 1e-4 else -5e-3
+        return tests(point) | ({"LP": steep} if point.arclength < 5e-4 else {})
+
+    monkeypatch.setattr(special, "tests", mixed)
+    monkeypatch.setattr(special, "_turns_at", lambda fold, chord: True)  # by rounding
+    (found,) = special._located("LP", special.Chord(first, last))
+    assert found.kind == "BP"
+    assert found.frequency_hz == pytest.approx(pitchfork.frequency_hz, rel=1e-9)
 
 
 @pytest.mark.parametrize("index", [0, 1])
