@@ -326,7 +326,7 @@ def test_a_tangent_that_jumps_beside_a_pitchfork_tells_of_that_and_of_no_fold(fa
 
     def mixed(point):
         steep = 2e-3 if point.arclength < 1e-4 else -5e-3
-        return tests(point) | ({"LP": steep} if point.arclength < 5e-4 else {})
+        return tests(point) | ({"LP": steep} if point.arclength < 1.5e-3 else {})
 
     monkeypatch.setattr(special, "tests", mixed)
     monkeypatch.setattr(special, "_turns_at", lambda fold, chord: True)  # by rounding
