@@ -345,7 +345,7 @@ def _located(kind: str, chord: Chord) -> list[SpecialPoint]:
     """Where a test changes its sign on a chord; nothing if that is no pair on the unit circle.
 
     Where branches cross beside an end of the chord, the tangent there may be of both: its change of
-    sign is not that of a fold, unless a multiplier tells or the frequency turns.
+    sign is not that of a fold, unless a multiplier tells, or the frequency and the sign do there.
     """
     special = locate(kind, chord, lambda point: tests(point)[kind])
     if kind in ("LP", "BP") and np.abs(special.orbit.multipliers - 1.0).min() > NEAR_ONE:
@@ -354,7 +354,8 @@ def _located(kind: str, chord: Chord) -> list[SpecialPoint]:
         return []
     if kind == "LP" and _is_plain_fold(chord):
         return [special]
-    if kind == "LP" and not (_turns_at(special.orbit, chord) and _turns_beside(special, chord)):
+    fold = special.orbit
+    if kind == "LP" and not (_turns_at(fold, chord) and _turns_beside(fold, chord)):
         crossing = _crossing_at_an_end(chord)
         if crossing is not None:
             at = replace(special.point, orbit=crossing)
@@ -368,11 +369,10 @@ def _turns_at(fold: Orbit, chord: Chord) -> bool:
     return not min(ends) <= fold.omega <= max(ends)
 
 
-def _turns_beside(fold: SpecialPoint, chord: Chord) -> bool:
+def _turns_beside(fold: Orbit, chord: Chord) -> bool:
     """Whether the branch turns at a fold, not where the tangent jumps elsewhere on the chord."""
-    sigma = chord.place(fold.orbit)
-    before, after = (tests(chord.at(sigma + way))["LP"] for way in (-BESIDE, BESIDE))
-    return before * after <= 0.0
+    sigma = chord.place(fold)
+    return "LP" in changed(chord.at(sigma - BESIDE), chord.at(sigma + BESIDE))
 
 
 def _crossing_at_an_end(chord: Chord) -> Orbit | None:
