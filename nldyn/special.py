@@ -272,7 +272,7 @@ def root(f: Callable[[float], float]) -> tuple[float, float]:
         x = _inverse_interpolation(known, low, high)
         step = abs(x - best)
         if step <= PRECISION or high - low <= PRECISION:
-            return best, min(step, high - low)
+            return best, step
         if step > 0.5 * move_before:
             x = 0.5 * (low + high)
         move_before, move = move, abs(x - best)

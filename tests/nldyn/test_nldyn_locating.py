@@ -62,6 +62,21 @@ def test_error_of_a_root_covers_the_rounding_of_the_function(noise):
         assert f.calls < 15
 
 
+@pytest.mark.parametrize("exact", [0.123, 0.77])
+def test_error_of_a_root_reaches_to_where_the_trials_ended(exact):
+    """At a flat root rounding changes the sign often; the smallest value may lie elsewhere."""
+    values = {}
+
+    def f(x):
+        values[x] = (x - exact) * abs(x - exact) + 1e-6 * math.sin(1e12 * x)
+        return values[x]
+
+    x, error = root(f)
+    reach = error + 1e-9
+    assert max(at for at, y in values.items() if y < 0.0) >= x - reach
+    assert min(at for at, y in values.items() if y > 0.0) <= x + reach
+
+
 def test_root_at_an_end():
     assert root(lambda x: x) == (0.0, 0.0)
     assert root(lambda x: x - 1.0) == (1.0, 0.0)
