@@ -25,7 +25,7 @@ from nldyn.special import (
     BEND,
     CROSSES,
     CROSSING_ERROR,
-    NEAR_ONE,
+    NEAR_CRITICAL,
     Chord,
     LocateError,
     Touch,
@@ -119,7 +119,7 @@ def special_points_at_grazing(a: BranchPoint, b: BranchPoint) -> list[SpecialPoi
     if not (alike and touches_sharply(a.orbit.system) and abs(b.arclength - a.arclength) < BEND):
         return []
     changes = changed(a, b)
-    near_one = min(np.abs(end.orbit.multipliers - 1.0).min() for end in (a, b)) < NEAR_ONE
+    near_one = min(np.abs(end.orbit.multipliers - 1.0).min() for end in (a, b)) < NEAR_CRITICAL
     if changes != ["BP"] and (changes or not near_one):
         return []
     orbits = ByDepth(Chord(a, b), touches[0])

@@ -39,7 +39,8 @@ SMOOTH_TOUCH = 1.5  # exponent of a stop from which on multipliers have a slope 
 CROSSES = 1e-12  # least unfolding of a crossing, relative to the orbit, that is not rounding
 MIXED = 1e-5  # distance from a crossing within which a tangent may be of both branches
 ON_CROSSING = 3e-7  # distance from it, relative to the orbit, at which a branch cannot be told
-NEAR_ONE = 1e-3  # a multiplier no nearer to 1 is not that of a fold or of crossing branches
+CRITICAL = {"LP": 1.0, "BP": 1.0, "PD": -1.0}  # multiplier at a special point
+NEAR_CRITICAL = 1e-3  # a multiplier no nearer to it is not that of such a point
 VANISHED = 1e-3  # an extreme at its root, relative to those beside it
 STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
 STEEPEST = 0.5  # least cosine between a branch and the chord of a step, below which it is refused
@@ -254,15 +255,18 @@ def root(f: Callable[[float], float]) -> tuple[float, float]:
     Trials come from inverse interpolation through the values nearest to zero, so that a function
     that is smooth on one side of its root only (the depth at a grazing point) is followed on that
     side; where trials do not come closer fast, the bracket is halved (after Brent 1973, ch. 4).
-    The error is how far the next trial would have moved. A short move that brings the function no
-    nearer to zero has met its rounding level; then the error is what secants say.
+    The error is how far the next trial would have moved: where the function jumps, or rounding
+    changes its sign often, as far as where the trials ended. A short move that brings the function
+    no nearer to zero has met its rounding level; then the error is what secants say.
 
     Raises
     ------
     LocateError
-        If no root is found.
+        If no root is found, or the signs at the ends are the same.
     """
     known = sorted([(f(0.0), 0.0), (f(1.0), 1.0)], key=_size)
+    if known[0][0] * known[1][0] > 0.0:
+        raise LocateError("no change of sign")
     low, high, rising = 0.0, 1.0, max(known)[1] == 1.0
     move, move_before = 1.0, 1.0
     for _ in range(100):
@@ -348,7 +352,8 @@ def _located(kind: str, chord: Chord) -> list[SpecialPoint]:
     sign is not that of a fold, unless a multiplier tells, or the frequency and the sign do there.
     """
     special = locate(kind, chord, lambda point: tests(point)[kind])
-    if kind in ("LP", "BP") and np.abs(special.orbit.multipliers - 1.0).min() > NEAR_ONE:
+    critical = CRITICAL.get(kind)
+    if critical and np.abs(special.orbit.multipliers - critical).min() > NEAR_CRITICAL:
         raise LocateError("a test function jumps, as it does from one branch to another")
     if kind == "NS" and not _on_unit_circle(special.orbit.multipliers):
         return []
@@ -461,7 +466,7 @@ def _crossing_within(orbit: Orbit, within: float) -> Orbit | None:
 
 def crossing_beside(orbit: Orbit) -> Orbit | None:
     """Where branches cross beside an orbit that has a multiplier near 1, if they do."""
-    if float(np.abs(orbit.multipliers - 1.0).min()) > NEAR_ONE:
+    if float(np.abs(orbit.multipliers - 1.0).min()) > NEAR_CRITICAL:
         return None
     return _true_crossing(orbit)
 
@@ -490,8 +495,8 @@ def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
     symmetry is not perfect it is folded beside it: then the crossing has an unfolding. A branch
     point is solved for by its own system, whose digits do not depend on the branch.
     """
-    crosses = special.kind == "BP"
-    if not crosses and not (special.kind == "LP" and turns_near_crossing(special.orbit)):
+    turns = special.kind == "LP" and turns_near_crossing(special.orbit)
+    if special.kind != "BP" and not turns:
         return special
     orbit = _true_crossing(special.orbit)
     if orbit is None or distance(special.orbit, orbit) > NEIGHBOUR:
@@ -521,10 +526,10 @@ def accounted(a: Orbit, found: list[SpecialPoint], b: Orbit) -> bool:
             continue
         mu = special.orbit.multipliers
         if special.kind == "NS":
-            distance = np.where(mu.imag == 0.0, np.inf, np.abs(np.abs(mu) - 1.0))
-            crossing = np.argsort(distance, kind="stable")[:2]
+            off_circle = np.where(mu.imag == 0.0, np.inf, np.abs(np.abs(mu) - 1.0))
+            crossing = np.argsort(off_circle, kind="stable")[:2]
         else:
-            crossing = np.argsort(np.abs(mu + (1.0 if special.kind == "PD" else -1.0)))[:1]
+            crossing = np.argsort(np.abs(mu - CRITICAL[special.kind]))[:1]
         size = crossing.size
         others = _possible_outside(np.delete(mu, crossing))
         outside = {n + size for n in others & outside} | {n for n in others if n + size in outside}

@@ -335,6 +335,23 @@ def test_a_tangent_that_jumps_beside_a_pitchfork_tells_of_that_and_of_no_fold(fa
     assert found.frequency_hz == pytest.approx(pitchfork.frequency_hz, rel=1e-9)
 
 
+@pytest.mark.parametrize("kind", ["LP", "BP", "PD"])
+def test_a_test_that_jumps_where_no_multiplier_is_critical_tells_of_no_point(
+    facing, kind, monkeypatch
+):
+    """No branch is known on which one does so within a step: it is made to."""
+    first, last = facing.nodes[3:5]
+    tests, middle = special.tests, 0.5 * (first.arclength + last.arclength)
+    assert abs(abs(first.orbit.multipliers) - 1.0).min() > 0.1
+
+    def jumping(point):
+        return tests(point) | {kind: 1.0 if point.arclength < middle else -1e-3}
+
+    monkeypatch.setattr(special, "tests", jumping)
+    with pytest.raises(special.LocateError, match="jumps"):
+        special._located(kind, special.Chord(first, last))
+
+
 @pytest.mark.parametrize("index", [0, 1])
 @pytest.mark.parametrize("amplitude", [1e-5, 1e-6, 4.1630532849205377e-07])
 @pytest.mark.parametrize("side", [0, 1])

@@ -77,6 +77,19 @@ def test_error_of_a_root_reaches_to_where_the_trials_ended(exact):
     assert min(at for at, y in values.items() if y > 0.0) <= x + reach
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_error_of_a_root_reaches_to_where_the_function_jumps(side):
+    """Its smallest value lies at an end, or within, away from its change of sign."""
+    for before in (lambda x: 1.0 + x, lambda x: abs(x - 0.3) + 1e-3):
+        x, error = root(lambda x, f=before: side * (-1e-4 * f(x) if x < 0.7 else 1.0))
+        assert abs(x - 0.7) <= 1.001 * error + 1e-9
+
+
+def test_a_function_of_one_sign_has_no_root():
+    with pytest.raises(LocateError, match="no change of sign"):
+        root(lambda x: 1.0 + x)
+
+
 def test_root_at_an_end():
     assert root(lambda x: x) == (0.0, 0.0)
     assert root(lambda x: x - 1.0) == (1.0, 0.0)
