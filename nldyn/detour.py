@@ -238,9 +238,9 @@ def _far(unknowns: Real, guess: Real, known: Sequence[tuple[float, Real]]) -> bo
 
 
 def _length(way: Real, unknowns: Real) -> float:
-    """Of a way between orbits, relative to one of them."""
-    states = float(np.linalg.norm(way[:-1]) / np.linalg.norm(unknowns[:-1]))
-    return math.hypot(states, float(way[-1]))
+    """Of a way between orbits, relative to one of them unless it is at rest."""
+    size = float(np.linalg.norm(unknowns[:-1])) or 1.0
+    return math.hypot(float(np.linalg.norm(way[:-1])) / size, float(way[-1]))
 
 
 def _unknowns(orbit: Orbit) -> Real:

@@ -36,6 +36,7 @@ from nldyn.orbit import (
     stroboscopic,
 )
 from nldyn.search import (
+    MOST_COUNT,
     SearchOptions,
     Strobe,
     orbit_near,
@@ -211,6 +212,11 @@ class Collector:
             return False
         self.crossings.append(special)
         return True
+
+    def within(self, orbits: Iterable[Orbit | None]) -> list[Orbit]:
+        """Those of some orbits that were found, and whose frequencies lie within the range."""
+        low, high = self.range_hz
+        return [o for o in orbits if o is not None and low <= o.frequency_hz <= high]
 
     def from_orbits(
         self, orbits: Iterable[Orbit], options: ContinuationOptions | None = None
@@ -452,8 +458,8 @@ def diagram(
             raise SystemModelError(
                 f"seeds: near_hz = {seed.near_hz:g} lies outside range_hz ({low:g}, {high:g})"
             )
-    check_whole("search_points", search_points, 1)
-    check_whole("doublings", doublings, 0)
+    check_whole("search_points", search_points, 1, MOST_COUNT)
+    check_whole("doublings", doublings, 0, MOST_COUNT)
     box = Collector(
         flow,
         (low, high),
@@ -560,3 +566,5 @@ def _follow_flips_of_new(box: Collector, wanted: Sequence[int], doublings: int) 
         count = len(box.branches)
         _follow_flips(box, fresh)
         fresh = box.branches[count:]
+        if not fresh:
+            break

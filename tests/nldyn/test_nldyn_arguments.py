@@ -272,6 +272,12 @@ def test_other_arguments_of_a_wrong_kind_are_named(one_dof, orbit, harmonic_bran
     check_named(
         refused(lambda x: diagram(one_dof, (20.0, 30.0), [], seeds=[x])), "seeds: each must be"
     )
+    for name in ("search_points", "doublings"):
+        def call(x, name=name):
+            return diagram(one_dof, (20.0, 30.0), [1], **{name: x})
+
+        said = refused(call, -1, 1.5, 10**12, math.nan)
+        check_named(said, f"{name} must be")
     for kind, name in ((Stop, "stop"), (Unbalance, "excitation"), (Damper, "damper")):
         said = refused(lambda x, kind=kind: kind(x, 1e9), 3, [], math.nan)
         check_named(said, f"{name}: at must be a str")

@@ -568,6 +568,14 @@ def test_it_says_so_where_no_orbit_gets_there(harmonic):
     )
 
 
+@pytest.mark.filterwarnings("error")
+def test_the_rest_of_a_system_without_excitation_is_carried_there_and_back():
+    known = known_of(two_modes().with_elements(excitation=()))
+    done = by_detour(known, HALF, max_period=1, spacing=0.5)
+    assert "1 branch, 1 of 1 orbits carried back" in done.notes[-1]
+    assert len(done.branches) == 1
+
+
 def test_a_system_without_excitation_has_no_factor_of_it():
     known = known_of(two_modes().with_elements(excitation=()))
     with pytest.raises(SystemModelError, match="the excitation is zero"):
