@@ -4,21 +4,81 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from nldyn.branch import check_branches
+from nldyn.branch import Branch, check_branches
 from nldyn.checkpoint import checkpoint_of_several
-from nldyn.diagrams import Collector, Diagram, Progress, check_known, middle_orbit
-from nldyn.errors import SystemModelError, check_types, check_whole, is_finite, shown
+from nldyn.diagrams import Collector, Diagram, Progress, check_known, counted, middle_orbit
+from nldyn.errors import (
+    SystemModelError,
+    check_range,
+    check_types,
+    check_whole,
+    is_finite,
+    shown,
+)
 from nldyn.exploration import FINEST_SPACING, steps_between
 from nldyn.fixed_point_index import index_note, is_damped, without_index_note
 from nldyn.orbit import LONGEST_PERIOD, Orbit
 from nldyn.step_control import ContinuationOptions
 from nldyn.tally import Tally
+
+Guesses = Iterable[tuple[set[int], Sequence[Orbit]]]  # branches each was made of, its orbits
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a search beside known branches looks for, and where.
+
+    Parameters
+    ----------
+    known : Diagram
+        Branches with their orbits.
+    periods : range
+        Of the orbits wanted, one after the other.
+    frequencies : sequence of float
+        Where guesses are made, in Hz.
+    """
+
+    known: Diagram
+    periods: range
+    frequencies: Sequence[float]
+
+    @classmethod
+    def checked(
+        cls,
+        known: Diagram,
+        min_period: int,
+        max_period: int,
+        range_hz: tuple[float, float] | None,
+        spacing: float,
+    ) -> Wanted:
+        """What input wants, once `check_search` has passed.
+
+        Raises
+        ------
+        SystemModelError
+            If the shortest period or the range makes no sense.
+        """
+        check_whole("min_period", min_period, 1, max_period)
+        within = range_within(known.range_hz, range_hz)
+        return cls(known, range(min_period, max_period + 1), inner_frequencies(within, spacing))
+
+    @property
+    def given(self) -> set[int]:
+        """Indices of the branches known of these periods that reach one of the frequencies."""
+        low, high = self.frequencies[0], self.frequencies[-1]
+        return {
+            index
+            for index, branch in enumerate(self.known.branches)
+            if branch.period in self.periods
+            and branch.frequency_hz.max() >= low
+            and branch.frequency_hz.min() <= high
+        }
 
 
 def check_search(
@@ -35,14 +95,34 @@ def check_search(
         progress=(progress, Callable, None),
     )
     check_whole("max_period", max_period, 1, LONGEST_PERIOD)
-    if not (is_finite(spacing) and FINEST_SPACING <= spacing < 1.0):
-        raise SystemModelError(
-            f"spacing must lie between {FINEST_SPACING:g} and 1, got {shown(spacing)}"
-        )
+    check_spacing(spacing)
     check_branches("known: branches", known.branches)
     if not known.branches:
         raise SystemModelError("known: has no branches to begin with")
     check_known(known, known.branches[0].points[0].problem.flow)
+
+
+def range_within(
+    known: tuple[float, float], range_hz: tuple[float, float] | None
+) -> tuple[float, float]:
+    """A range in Hz within that of the branches known, which is meant if there is none."""
+    if range_hz is None:
+        return known
+    low, high = check_range(range_hz)
+    if not known[0] <= low < high <= known[1]:
+        raise SystemModelError(
+            f"range_hz = ({low:g}, {high:g}) must lie within that of the branches known, "
+            f"({known[0]:g}, {known[1]:g})"
+        )
+    return low, high
+
+
+def check_spacing(spacing: float) -> None:
+    """Raise unless this may be a relative distance of frequencies."""
+    if not (is_finite(spacing) and FINEST_SPACING <= spacing < 1.0):
+        raise SystemModelError(
+            f"spacing must lie between {FINEST_SPACING:g} and 1, got {shown(spacing)}"
+        )
 
 
 def collector_beside(
@@ -70,29 +150,62 @@ def take_kept(box: Collector, max_period: int) -> None:
     box.follow_up(count, max_period, max_period, None)
 
 
-def follow_new(
+def search_beside(
     box: Collector,
-    known: Diagram,
-    max_period: int,
-    question: str,
-    frequencies: Sequence[float],
-    near: Callable[[int], Iterable[tuple[set[int], Sequence[Orbit]]]],
-) -> Tally:
+    wanted: Wanted,
+    what: str,
+    numbers: str,
+    near: Callable[[int, Sequence[Branch]], Guesses],
+) -> Diagram:
     """Follow the orbits that lie on no branch, found near one frequency after the other.
 
-    What each guess was made of comes with its orbits, which are asked for by the number of the
-    frequency. How many are done is kept in the file of the box; a search with the same question,
-    known branches, frequencies and options goes on after them.
+    How many frequencies are done is kept in the file of the box; a search with the same name,
+    numbers, known branches, periods, frequencies and options goes on after them.
+
+    Parameters
+    ----------
+    box : Collector
+        See `collector_beside`.
+    wanted : Wanted
+        What to look for, and where.
+    what : str
+        What guesses are called.
+    numbers : str
+        Of how they are made.
+    near : callable
+        Gives the guesses at the frequency of a number, and their orbits, from the branches that
+        were known when it was begun.
     """
-    given = set(range(len(known.branches)))
-    wanted = {i for i in given if known.branches[i].period <= max_period}
-    begun = Tally(f"{question}, beside {_digest(known, frequencies, box.options)}", len(wanted))
+    max_period = wanted.periods[-1]
+    with box.checkpoint:
+        take_kept(box, max_period)
+        question = f"{what}, {numbers}, {_digest(wanted, box.options)}"
+        tally = _follow_new(box, wanted, question, near)
+    new = counted(box.branches[len(wanted.known.branches) :])
+    note = (
+        f"{tally.came} of {tally.tried} {what} led to an orbit, and to {len(tally.met)} of the "
+        f"{tally.given} given from others, {new} beside those given"
+    )
+    return diagram_of(box, max_period, note)
+
+
+def _follow_new(
+    box: Collector,
+    wanted: Wanted,
+    question: str,
+    near: Callable[[int, Sequence[Branch]], Guesses],
+) -> Tally:
+    """Follow the orbits that lie on no branch; what was tried, see `search_beside`."""
+    given, to_meet = set(range(len(wanted.known.branches))), wanted.given
+    max_period = wanted.periods[-1]
     tally = box.checkpoint.tally
-    if tally is None or tally.question != begun.question:
-        tally = begun
-    for place in range(tally.done, len(frequencies)):
+    if tally is None or tally.question != question:
+        tally = Tally(question, len(to_meet), len(box.branches))
+    for place in range(tally.done, len(wanted.frequencies)):
+        box.checkpoint.tally = tally
+        box.checkpoint.offer()
         tried, came, met = 0, 0, set[int]()
-        for used, orbits in near(place):
+        for used, orbits in near(place, box.branches[: tally.known]):
             tried += 1
             came += bool(orbits)
             for orbit in orbits:
@@ -103,20 +216,21 @@ def follow_new(
                     met.add(on)
         tally = replace(
             tally,
+            known=len(box.branches),
             done=place + 1,
             tried=tally.tried + tried,
             came=tally.came + came,
-            met=tally.met | (met & wanted),
+            met=tally.met | (met & to_meet),
         )
-        box.checkpoint.tally = tally
-        box.checkpoint.offer()
+    box.checkpoint.tally = tally
     return tally
 
 
-def _digest(known: Diagram, frequencies: Sequence[float], options: ContinuationOptions) -> str:
-    """A name of branches, frequencies and options that tells them from others."""
-    digest = hashlib.sha256(np.array(frequencies).tobytes() + repr(options).encode())
-    for branch in known.branches:
+def _digest(wanted: Wanted, options: ContinuationOptions) -> str:
+    """A name of branches, periods, frequencies and options that tells them from others."""
+    digest = hashlib.sha256(np.array(wanted.frequencies).tobytes())
+    digest.update(f"{wanted.periods} {options}".encode())
+    for branch in wanted.known.branches:
         digest.update(branch.frequency_hz.tobytes())
     return digest.hexdigest()[:16]
 

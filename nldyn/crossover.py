@@ -5,23 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cms.threads import one_thread
-from nldyn.beside import (
-    check_search,
-    collector_beside,
-    diagram_of,
-    follow_new,
-    inner_frequencies,
-    take_kept,
-)
+from nldyn.beside import Wanted, check_search, collector_beside, search_beside
 from nldyn.branch import Branch
-from nldyn.diagrams import Collector, Diagram, Progress, counted
+from nldyn.diagrams import Collector, Diagram, Progress
 from nldyn.errors import check_whole
 from nldyn.linear import Real
 from nldyn.orbit import Orbit
@@ -39,7 +31,9 @@ BEYOND = 0.8  # part of the way between two orbits by which a mixture may lie be
 def by_crossover(
     known: Diagram,
     *,
+    min_period: int = 1,
     max_period: int = 3,
+    range_hz: tuple[float, float] | None = None,
     spacing: float = 0.01,
     tries: int = 500,
     seed: int = 0,
@@ -64,8 +58,11 @@ def by_crossover(
     ----------
     known : Diagram
         Branches of a system, from `diagram` or `explore`, with their orbits.
-    max_period : int
-        Longest orbits wanted.
+    min_period, max_period : int
+        Shortest and longest mixtures.
+    range_hz : (float, float), optional
+        Frequencies at which orbits are mixed, within those of `known`; all of these if not given.
+        Branches found are followed through all.
     spacing : float
         Relative distance of the frequencies at which orbits are mixed.
     tries : int
@@ -85,10 +82,10 @@ def by_crossover(
     -------
     Diagram
         The branches known, then those found. The last note tells what was tried, and to how many of
-        the branches given, up to `max_period`, mixtures of others of them led: had each alone been
-        unknown, it would have found about so many, or more by way of new ones. The note before
-        tells, if every mode is damped, whether the indices add up to one, see `index_sum`. What
-        `known` notes of them is left out.
+        the branches given, of these periods and frequencies, mixtures of others of them led: had
+        each alone been unknown, it would have found about so many, or more by way of new ones. The
+        note before tells, if every mode is damped, whether the indices add up to one, see
+        `index_sum`. What `known` notes of them is left out.
 
     Raises
     ------
@@ -112,55 +109,34 @@ def by_crossover(
     [1, 3, 2]
     """
     check_search(known, max_period, spacing, options, progress)
+    wanted = Wanted.checked(known, min_period, max_period, range_hz, spacing)
     check_whole("tries", tries, 1, MOST_COUNT)
     check_whole("seed", seed, 0)
     box = collector_beside(known, options, progress, checkpoint)
-    with box.checkpoint:
-        take_kept(box, max_period)
-        frequencies = inner_frequencies(box.range_hz, spacing)
-        question = f"mixtures to period {max_period}, {spacing:g} apart, {tries} each, seed {seed}"
-        near = partial(_mixtures, box, frequencies, max_period, tries, seed)
-        tally = follow_new(box, known, max_period, question, frequencies, near)
-    new = counted(box.branches[len(known.branches) :])
-    note = (
-        f"{tally.came} of {tally.tried} mixtures led to an orbit, and to {len(tally.met)} of the "
-        f"{tally.given} given from others, {new} beside those given"
-    )
-    return diagram_of(box, max_period, note)
 
+    def near(place: int, branches: Sequence[Branch]) -> Iterator[tuple[set[int], list[Orbit]]]:
+        rng, frequency_hz = np.random.default_rng([seed, place]), wanted.frequencies[place]
+        loops = Loops.of(branches, frequency_hz, max_period, rng)
+        for period in wanted.periods:
+            yield from near_mixtures(box, loops, frequency_hz, period, tries, rng)
 
-def _mixtures(
-    box: Collector,
-    frequencies: Sequence[float],
-    max_period: int,
-    tries: int,
-    seed: int,
-    place: int,
-) -> Iterator[tuple[set[int], list[Orbit]]]:
-    """Those of all lengths at one of the frequencies."""
-    rng = np.random.default_rng([seed, place])
-    near = Loops.of(box.branches, frequencies[place], max_period)
-    for period in range(1, max_period + 1):
-        yield from near_mixtures(box, near, frequencies[place], period, tries, rng)
+    return search_beside(box, wanted, "mixtures", f"{tries} each, seed {seed}", near)
 
 
 def near_mixtures(
     box: Collector,
-    near: Loops,
+    loops: Loops,
     frequency_hz: float,
     period: int,
     tries: int,
     rng: np.random.Generator,
 ) -> Iterator[tuple[set[int], list[Orbit]]]:
     """Mixtures of two orbits: their branches, and the orbit near by, unless out of the range."""
-    low, high = box.range_hz
     omega = 2.0 * math.pi * frequency_hz
     for _ in range(tries):
         box.progress("mixtures", frequency_hz)
-        used, nodes = near.mixture(period, rng)
-        orbit = nearest_orbit(box.flow, nodes, omega, box.observe, SHORT_STEPS)
-        found = [] if orbit is None else [orbit]
-        yield used, [o for o in found if low <= o.frequency_hz <= high]
+        used, nodes = loops.mixture(period, rng)
+        yield used, box.within([nearest_orbit(box.flow, nodes, omega, box.observe, SHORT_STEPS)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,13 +155,23 @@ class Loops:
     nodes: Sequence[Real]
 
     @classmethod
-    def of(cls, branches: Sequence[Branch], frequency_hz: float, longest: int) -> Loops:
-        """Those of the branches nearest to a frequency, first those up to a period."""
+    def of(
+        cls,
+        branches: Sequence[Branch],
+        frequency_hz: float,
+        longest: int,
+        rng: np.random.Generator,
+    ) -> Loops:
+        """Those of the branches nearest to a frequency, first those up to a period.
+
+        Of more that reach the frequency, some at random.
+        """
         away = [_distance(branch.frequency_hz, frequency_hz) for branch in branches]
         longer = [branch.period > longest for branch in branches]
+        order = np.lexsort((rng.permutation(len(branches)).tolist(), away, longer))
         rows = [
             (index, nodes_of(orbit))
-            for index in np.lexsort((away, longer))[:NEIGHBOURS].tolist()
+            for index in order[:NEIGHBOURS].tolist()
             for orbit in _orbits_near(branches[index], frequency_hz)
         ]
         return cls(np.array([index for index, _ in rows]), [nodes for _, nodes in rows])

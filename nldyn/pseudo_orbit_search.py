@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 
 from cms.threads import one_thread
-from nldyn.beside import (
-    check_search,
-    collector_beside,
-    diagram_of,
-    follow_new,
-    inner_frequencies,
-    take_kept,
-)
-from nldyn.diagrams import Collector, Diagram, Progress, counted
+from nldyn.beside import Wanted, check_search, collector_beside, search_beside
+from nldyn.branch import Branch
+from nldyn.diagrams import Collector, Diagram, Progress
 from nldyn.errors import check_whole
 from nldyn.orbit import SEGMENTS_PER_PERIOD, Orbit
 from nldyn.pseudo_orbits import NODES, Pieces
@@ -31,7 +25,9 @@ WAYS = (NODES // SEGMENTS_PER_PERIOD, LONG_STEPS), (1, SHORT_STEPS)  # every how
 def by_pseudo_orbits(
     known: Diagram,
     *,
+    min_period: int = 1,
     max_period: int = 3,
+    range_hz: tuple[float, float] | None = None,
     spacing: float = 0.01,
     tries: int = 2000,
     options: ContinuationOptions | None = None,
@@ -55,8 +51,11 @@ def by_pseudo_orbits(
     ----------
     known : Diagram
         Branches of a system, from `diagram` or `explore`, with their orbits.
-    max_period : int
-        Longest orbits wanted.
+    min_period, max_period : int
+        Least and largest number of pieces.
+    range_hz : (float, float), optional
+        Frequencies at which pieces are put together, within those of `known`; all of these if not
+        given. Branches found are followed through all.
     spacing : float
         Relative distance of the frequencies at which pieces are put together, and largest
         distance of those of the pieces from it.
@@ -76,9 +75,10 @@ def by_pseudo_orbits(
     -------
     Diagram
         The branches known, then those found. The last note tells what was tried, and to how many of
-        the branches given, up to `max_period`, pieces of others led: about so many it would have
-        found, had each alone been unknown. The note before tells, if every mode is damped, whether
-        the indices add up to one, see `index_sum`. What `known` notes of them is left out.
+        the branches given, of these periods and frequencies, pieces of others led: about so many it
+        would have found, had each alone been unknown. The note before tells, if every mode is
+        damped, whether the indices add up to one, see `index_sum`. What `known` notes of them is
+        left out.
 
     Raises
     ------
@@ -102,37 +102,33 @@ def by_pseudo_orbits(
     [1, 2, 3]
     """
     check_search(known, max_period, spacing, options, progress)
+    wanted = Wanted.checked(known, min_period, max_period, range_hz, spacing)
     check_whole("tries", tries, 1, MOST_COUNT)
     box = collector_beside(known, options, progress, checkpoint)
-    with box.checkpoint:
-        take_kept(box, max_period)
-        frequencies = inner_frequencies(box.range_hz, spacing)
-        question = f"pseudo-orbits to period {max_period}, {spacing:g} apart, {tries} each"
 
-        def near(place: int) -> Iterator[tuple[set[int], list[Orbit]]]:
-            return near_pseudo_orbits(box, frequencies[place], spacing, max_period, tries)
+    def near(place: int, branches: Sequence[Branch]) -> Iterator[tuple[set[int], list[Orbit]]]:
+        frequency_hz = wanted.frequencies[place]
+        return near_pseudo_orbits(box, branches, frequency_hz, spacing, wanted.periods, tries)
 
-        tally = follow_new(box, known, max_period, question, frequencies, near)
-    new = counted(box.branches[len(known.branches) :])
-    note = (
-        f"{tally.came} of {tally.tried} pseudo-orbits led to an orbit, and to {len(tally.met)} of "
-        f"the {tally.given} given without a piece of theirs, {new} beside those given"
-    )
-    return diagram_of(box, max_period, note)
+    return search_beside(box, wanted, "pseudo-orbits", f"{tries} each", near)
 
 
 def near_pseudo_orbits(
-    box: Collector, frequency_hz: float, spacing: float, longest: int, tries: int
+    box: Collector,
+    branches: Sequence[Branch],
+    frequency_hz: float,
+    spacing: float,
+    periods: Sequence[int],
+    tries: int,
 ) -> Iterator[tuple[set[int], list[Orbit]]]:
     """Pseudo-orbits of each length at a frequency: their branches, and orbits near by.
 
     Those that long steps between few states lead to, and short steps between many, unless they are
     out of the range: beside few orbits the first meet more others, beside many the second.
     """
-    pieces = Pieces.of(box.branches, frequency_hz, spacing)
-    low, high = box.range_hz
+    pieces = Pieces.of(branches, frequency_hz, spacing)
     omega = 2.0 * math.pi * frequency_hz
-    for period in range(1, longest + 1):
+    for period in periods:
         for sequence in islice(pieces.pseudo_orbits(period, MOST_ALIKE), tries):
             box.progress("pseudo-orbits", frequency_hz)
             chosen = list(sequence)
@@ -141,5 +137,4 @@ def near_pseudo_orbits(
                 nearest_orbit(box.flow, nodes[:, ::every], omega, box.observe, steps)
                 for every, steps in WAYS
             ]
-            inside = [o for o in orbits if o is not None and low <= o.frequency_hz <= high]
-            yield set(pieces.branch[chosen].tolist()), inside
+            yield set(pieces.branch[chosen].tolist()), box.within(orbits)

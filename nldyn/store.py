@@ -271,7 +271,7 @@ def _write_exploration(group: Any, found: Exploration, flows: list[FlowMap]) -> 
 
 
 def _write_tally(group: Any, tally: Tally) -> None:
-    for name in ("question", "given", "done", "tried", "came"):
+    for name in ("question", "given", "known", "done", "tried", "came"):
         set_attribute(group, name, getattr(tally, name))
     put(group, "met", np.array(sorted(tally.met), dtype=np.int64), "1; numbers of known branches")
 
@@ -456,9 +456,10 @@ def _read_open_ends(group: Group, orbit: Orbit) -> Real:
 
 
 def _read_tally(group: Group) -> Tally:
-    given, done, tried, came = map(group.whole, ("given", "done", "tried", "came"))
+    names = "given", "known", "done", "tried", "came"
+    given, known, done, tried, came = map(group.whole, names)
     met = frozenset(group.array("met", -1, kind=np.int64).tolist())
-    return Tally(group.text("question"), given, done, tried, came, met)
+    return Tally(group.text("question"), given, known, done, tried, came, met)
 
 
 def _read_options(group: Group) -> ContinuationOptions:

@@ -428,9 +428,10 @@ class _Survey:
 
     def _put_together(self, frequency_hz: float) -> None:
         """Look for orbits beside pieces of known ones that nearly fit together."""
-        effort, longest = self.effort, len(self._unstable_periods())
-        tries = effort.pseudo_orbits
-        found = near_pseudo_orbits(self.box, frequency_hz, effort.spacing, longest, tries)
+        box, effort, periods = self.box, self.effort, self._unstable_periods()
+        found = near_pseudo_orbits(
+            box, box.branches, frequency_hz, effort.spacing, periods, effort.pseudo_orbits
+        )
         for _, orbits in found:
             for orbit in orbits:
                 self._follow(orbit)
@@ -441,7 +442,6 @@ class _Survey:
     def _beside(self, runs: Sequence[Real], known: _Known, candidates: int) -> None:
         """Look for unstable orbits of short periods beside motions."""
         box, omega = self.box, known.omega
-        low, high = box.range_hz
         for period, run in product(self._unstable_periods(), runs):
             for start in near_returns(run[TRANSIENT:], period, candidates):
                 state = run[TRANSIENT + start]
@@ -449,8 +449,8 @@ class _Survey:
                 if number is not None:
                     known.met.append(number)
                     continue
-                orbit = orbit_beside(box.flow, state, period, omega, box.observe)
-                if orbit is not None and low <= orbit.frequency_hz <= high:
+                found = orbit_beside(box.flow, state, period, omega, box.observe)
+                for orbit in box.within([found]):
                     self._meet(orbit, known)
 
     def _deflate(self, starts: Sequence[Real], known: _Known) -> None:

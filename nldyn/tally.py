@@ -14,7 +14,9 @@ class Tally:
     question : str
         Which search it is: its way, its numbers, and the branches it began with.
     given : int
-        How many branches were known, up to the longest period wanted.
+        How many branches were known of the periods and frequencies wanted.
+    known : int
+        How many branches there were when the last of the frequencies done had been searched.
     done : int
         Frequencies that are done.
     tried, came : int
@@ -25,6 +27,7 @@ class Tally:
 
     question: str
     given: int
+    known: int
     done: int = 0
     tried: int = 0
     came: int = 0

@@ -5,7 +5,9 @@ kept with the package, it finds others, writes the starts of all into the direct
 many may be missing. With ``--detour damping=0.5 "natural_frequency_hz[1]=0.99"`` at the end, say,
 it does not simulate, but goes by way of a system with these factors, see `by_detour`; with
 ``--pseudo-orbits`` it puts pieces of known orbits together, see `by_pseudo_orbits`; with
-``--crossover 3`` it mixes known orbits, with the seed 3, see `by_crossover`. The directory keeps
+``--crossover 3`` it mixes known orbits, with the seed 3, see `by_crossover`; either at the
+frequencies and of the periods given: ``--range 18 20.5 --periods 3 3 --spacing 0.003 --tries 700``,
+say. The directory keeps
 what is found, and the same command goes on where it was interrupted (but for following the starts,
 and for a detour, which keeps its branches only); once it has ended, it looks for more beside what
 it has found, from other random states, with ``--crossover`` if the seed is another.
@@ -20,14 +22,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
+from nldyn.beside import check_spacing, range_within
 from nldyn.cli import plain_errors, told_what_is_kept
 from nldyn.command import answering
 from nldyn.crossover import by_crossover
 from nldyn.detour import checked_factors
 from nldyn.detour_search import by_detour
 from nldyn.diagrams import Diagram, Progress
-from nldyn.errors import SystemModelError
+from nldyn.errors import SystemModelError, check_range, check_whole
 from nldyn.exploration import Exploration, ExploreOptions
 from nldyn.flow import flow_of, same_flow
 from nldyn.paper.jobs import JOBS, LONG, Job, job_named
@@ -42,6 +46,7 @@ from nldyn.paper.starts import (
 from nldyn.parameters import Parameter
 from nldyn.progress import progress_line
 from nldyn.pseudo_orbit_search import by_pseudo_orbits
+from nldyn.search import MOST_COUNT
 from nldyn.store import load_diagram
 from nldyn.survey import explore
 from nldyn.whole_file import write_whole
@@ -75,17 +80,18 @@ def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Explorat
 
 def search_by_detour(name: str, folder: Path, factors: Mapping[str | Parameter, float]) -> Diagram:
     """Look for branches of a model with `by_detour`, and write the starts of all."""
-    return _search_beside(name, folder, "detour", partial(by_detour, factors=factors))
+    way = partial(by_detour, factors=factors, max_period=LONGEST)
+    return _search_beside(name, folder, "detour", way)
 
 
-def search_by_pseudo_orbits(name: str, folder: Path) -> Diagram:
+def search_by_pseudo_orbits(name: str, folder: Path, **numbers: Any) -> Diagram:
     """Look for branches of a model with `by_pseudo_orbits`, and write the starts of all."""
-    return _search_beside(name, folder, "pseudo_orbits", by_pseudo_orbits)
+    return _search_beside(name, folder, "pseudo_orbits", partial(by_pseudo_orbits, **numbers))
 
 
-def search_by_crossover(name: str, folder: Path, seed: int) -> Diagram:
+def search_by_crossover(name: str, folder: Path, **numbers: Any) -> Diagram:
     """Look for branches of a model with `by_crossover`, and write the starts of all."""
-    return _search_beside(name, folder, "crossover", partial(by_crossover, seed=seed))
+    return _search_beside(name, folder, "crossover", partial(by_crossover, **numbers))
 
 
 def _search_beside(name: str, folder: Path, way: str, look: Callable[..., Diagram]) -> Diagram:
@@ -95,7 +101,7 @@ def _search_beside(name: str, folder: Path, way: str, look: Callable[..., Diagra
         known, place, _ = known_branches(job, folder, report)
         kept = place.with_suffix(f".{way}.h5")
         with told_what_is_kept(kept):
-            found = look(known, max_period=LONGEST, options=LONG, progress=report, checkpoint=kept)
+            found = look(known, options=LONG, progress=report, checkpoint=kept)
     write_found(found, job, folder)
     kept.unlink(missing_ok=True)
     return found
@@ -169,8 +175,31 @@ def seed_of(text: str) -> int:
     return int(text)
 
 
-def main() -> None:
-    """Search the models named, or all."""
+def numbers_of(given: argparse.Namespace) -> dict[str, Any]:
+    """Of a search beside known branches: its periods, and what else was given.
+
+    Raises
+    ------
+    SystemModelError
+        For what makes no sense.
+    """
+    shortest, longest = given.periods or (1, LONGEST)
+    check_whole("--periods: the longest", longest, 1, LONGEST)
+    check_whole("--periods: the shortest", shortest, 1, longest)
+    numbers = {"min_period": shortest, "max_period": longest}
+    if given.range:
+        numbers["range_hz"] = check_range(tuple(given.range))
+    if given.spacing is not None:
+        check_spacing(given.spacing)
+        numbers["spacing"] = given.spacing
+    if given.tries is not None:
+        check_whole("--tries", given.tries, 1, MOST_COUNT)
+        numbers["tries"] = given.tries
+    return numbers
+
+
+def parser_of_command() -> argparse.ArgumentParser:
+    """What the command understands."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("directory", type=Path)
     parser.add_argument("models", nargs="*", metavar="MODEL", help=f"of {', '.join(MODELS)}")
@@ -189,6 +218,21 @@ def main() -> None:
         metavar="SEED",
         help="mix known orbits; another seed tries others",
     )
+    beside = parser.add_argument_group("of either of the last two")
+    beside.add_argument(
+        "--range", type=float, nargs=2, metavar=("LOW", "HIGH"), help="frequencies in Hz"
+    )
+    beside.add_argument(
+        "--periods", type=int, nargs=2, metavar=("SHORTEST", "LONGEST"), help="1 3 if not given"
+    )
+    beside.add_argument("--spacing", type=float, help="relative distance of the frequencies")
+    beside.add_argument("--tries", type=int, help="guesses of each period at each frequency")
+    return parser
+
+
+def main() -> None:
+    """Search the models named, or all."""
+    parser = parser_of_command()
     given = parser.parse_args()
     factors = dict(given.detour or ())
     if given.detour and len(factors) < len(given.detour):
@@ -203,21 +247,41 @@ def main() -> None:
         except SystemModelError as error:
             parser.error(f"argument --detour: {name}: {error}")
     try:
+        numbers = numbers_of(given)
+        for name in names:
+            range_within(job_named(name).range_hz, numbers.get("range_hz"))
+    except SystemModelError as error:
+        parser.error(str(error))
+    for option in ("range", "periods", "spacing", "tries"):
+        beside = given.pseudo_orbits or given.crossover is not None
+        if getattr(given, option) is not None and not beside:
+            parser.error(f"argument --{option}: goes with --pseudo-orbits or --crossover only")
+    try:
         given.directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         parser.error(f"{given.directory} cannot be made: {error.strerror}")
     for name in names:
         with plain_errors():
-            if factors:
-                said = "\n".join(search_by_detour(name, given.directory, factors).notes)
-            elif given.pseudo_orbits:
-                said = "\n".join(search_by_pseudo_orbits(name, given.directory).notes)
-            elif given.crossover is not None:
-                found = search_by_crossover(name, given.directory, given.crossover)
-                said = "\n".join(found.notes)
-            else:
-                said = search(name, given.directory).report()
-        print(f"{name}: {said}", flush=True)
+            print(f"{name}: {said(name, given, factors, numbers)}", flush=True)
+
+
+def said(
+    name: str,
+    given: argparse.Namespace,
+    factors: Mapping[str | Parameter, float],
+    numbers: Mapping[str, Any],
+) -> str:
+    """What the search of a model has to say, once it is done."""
+    folder = given.directory
+    if factors:
+        found = search_by_detour(name, folder, factors)
+    elif given.pseudo_orbits:
+        found = search_by_pseudo_orbits(name, folder, **numbers)
+    elif given.crossover is not None:
+        found = search_by_crossover(name, folder, seed=given.crossover, **numbers)
+    else:
+        return search(name, folder).report()
+    return "\n".join(found.notes)
 
 
 if __name__ == "__main__":

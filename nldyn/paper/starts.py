@@ -18,9 +18,10 @@ import numpy as np
 
 from nldyn.branch import Branch
 from nldyn.diagrams import Collector, Diagram, Progress, middle_orbit
+from nldyn.errors import SystemModelError, check_frequency, check_whole, numbers
 from nldyn.flow import flow_of
 from nldyn.linear import Real
-from nldyn.orbit import check_observe, stroboscopic
+from nldyn.orbit import LONGEST_PERIOD, Orbit, check_observe, stroboscopic
 from nldyn.paper.kept import keep, read_kept
 from nldyn.search import orbit_near
 from nldyn.step_control import ContinuationOptions
@@ -29,6 +30,7 @@ from nldyn.whole_file import write_whole
 
 DATA = Path(__file__).parent / "data"
 LONGEST = 3  # period of the orbits looked for
+AT_START = 1e-6  # largest relative distance of an orbit from its start
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,13 +53,30 @@ class Start:
 
 
 def read_starts(name: str, folder: Path = DATA) -> list[Start]:
-    """The orbits that a search of the model of this name gave."""
+    """The orbits that a search of the model of this name gave.
+
+    Raises
+    ------
+    SystemModelError
+        If the file holds none, or a line is none.
+    """
     path = starts_path(name, folder)
     with path.open(newline="", encoding="utf-8") as file:
-        return [
-            Start(int(row[0]), float(row[1]), np.array(row[2:], dtype=float))
-            for row in list(csv.reader(file))[1:]
-        ]
+        head, *rows = list(csv.reader(file)) or [[]]
+    if not rows:
+        raise SystemModelError(f"{path}: has no starts")
+    return [_start(row, len(head), f"{path}: line {line}") for line, row in enumerate(rows, 2)]
+
+
+def _start(row: Sequence[str], columns: int, place: str) -> Start:
+    """The orbit in a line of a file of starts."""
+    if not len(row) == columns >= 3:
+        raise SystemModelError(f"{place}: has {len(row)} columns, not {max(columns, 3)}")
+    frequency_hz, *state = numbers(place, row[1:]).tolist()
+    period = int(row[0]) if row[0].isdecimal() else 0
+    check_whole(f"{place}: period", period, 1, LONGEST_PERIOD)
+    check_frequency(f"{place}: frequency_hz", frequency_hz)
+    return Start(period, frequency_hz, np.array(state))
 
 
 def starts_path(name: str, folder: Path = DATA) -> Path:
@@ -114,9 +133,21 @@ def follow_starts(
     Returns
     -------
     Diagram
-        The first note tells how many starts there were, and how many of them lead to no orbit.
+        The first note tells how many starts there were, and how many of them are no orbits: from
+        their states none is found, or only one of another period or elsewhere.
+
+    Raises
+    ------
+    SystemModelError
+        If a state is not one of the system.
     """
     flow = flow_of(system)
+    for number, start in enumerate(starts, 1):
+        if start.state.size != 2 * system.size:
+            raise SystemModelError(
+                f"start {number}: has a state of {start.state.size} numbers, the system one of "
+                f"{2 * system.size}"
+            )
     observe = check_observe(system, None)
     box = Collector(flow, range_hz, observe, options, progress or (lambda what, hz: None))
     lost = 0
@@ -131,7 +162,7 @@ def follow_starts(
                 keep(path, found)
         lost += found.lost
     periods = ", ".join(map(str, sorted({start.period for start in starts})))
-    note = f"from {len(starts)} starts of period {periods}, {lost} of which lead to no orbit"
+    note = f"from {len(starts)} starts of period {periods}, {lost} of which are no orbits"
     return Diagram(tuple(box.branches), range_hz, observe, (note, *box.notes))
 
 
@@ -146,7 +177,7 @@ class Followed:
     notes : tuple of str
         On them.
     lost : bool
-        Whether it leads to no orbit of its period.
+        Whether it is no orbit.
     """
 
     branches: tuple[Branch, ...]
@@ -160,13 +191,19 @@ def _follow(box: Collector, start: Start, doubled: tuple[int, int], whole: bool)
     count, told = len(box.branches), len(box.notes)
     omega = 2.0 * math.pi * start.frequency_hz
     orbit = orbit_near(box.flow, start.state, start.period, omega, box.observe)
-    lost = orbit is None or orbit.period != start.period
-    if orbit is not None and not lost:
+    found = orbit is not None and orbit.period == start.period and _is_at(orbit, start.state)
+    if orbit is not None and found:
         box.follow(orbit, longest, longest_whole(longest), most)
     branches = tuple(box.branches[count:])
     if not whole:
         keep_numbers(branches)
-    return Followed(branches, tuple(box.notes[told:]), lost)
+    return Followed(branches, tuple(box.notes[told:]), lost=not found)
+
+
+def _is_at(orbit: Orbit, state: Real) -> bool:
+    """Whether an orbit begins at a state, but for rounding."""
+    off = float(np.linalg.norm(stroboscopic(orbit)[0] - state))
+    return off <= AT_START * float(np.linalg.norm(state))
 
 
 def longest_whole(longest: int) -> int:

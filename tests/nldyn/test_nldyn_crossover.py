@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from branches_alike import without
 from one_dof import THREE_HZ
 
-from nldyn import (
-    SystemModelError,
-    by_crossover,
-    index_sum,
-)
-from nldyn.crossover import BEYOND, NEIGHBOURS, PLACES, WINDOW, Loops, _orbits_near
+from nldyn import SystemModelError, by_crossover, index_sum
+from nldyn.beside import collector_beside
+from nldyn.crossover import BEYOND, NEIGHBOURS, PLACES, WINDOW, Loops, _orbits_near, near_mixtures
 from nldyn.exploration import steps_between
 from nldyn.pseudo_orbits import NODES
 
@@ -37,6 +35,42 @@ def test_what_is_known_is_met_and_not_found_again(three):
     met = re.search(r"to (\d) of the 3 given from others, 0 branches", done.notes[-1])
     assert int(met[1]) >= 2
     assert done.notes[:-2] == tuple(n for n in three.notes if not n.startswith("indices"))
+
+
+def test_what_its_own_orbits_lead_to_is_not_met_from_others(three):
+    """The harmonic alone: every mixture is of two of its orbits."""
+    (harmonic,) = three.of_period(1)
+    done = by_crossover(replace(three, branches=(harmonic,)), max_period=1, tries=20)
+    came, met = re.search(r"^(\d+) of .* and to (\d+) of the 1 given", done.notes[-1]).groups()
+    assert int(came) > 0
+    assert met == "0"
+
+
+def test_orbits_beyond_the_range_are_not_met(three):
+    """Mixed just below its upper end, half of them lie above it."""
+    (harmonic,) = three.of_period(1)
+    _, high = three.range_hz
+    box = collector_beside(replace(three, branches=(harmonic,)), None, None, None)
+    inside, outside = [], []
+    for top, found in ((high, inside), (2.0 * high, outside)):
+        rng = np.random.default_rng(1)
+        box.range_hz = three.range_hz[0], top
+        loops = Loops.of(box.branches, high, 1, rng)
+        for _, orbits in near_mixtures(box, loops, high, 1, 50, rng):
+            found += [orbit.frequency_hz for orbit in orbits]
+    assert inside == [hz for hz in outside if hz <= high]
+    assert len(inside) < len(outside)
+
+
+def test_only_the_periods_and_frequencies_wanted_are_tried(three):
+    tried = set()
+    done = by_crossover(
+        three, min_period=2, max_period=2, range_hz=(37.2, 38.0), tries=3, spacing=0.005,
+        progress=lambda what, hz: tried.add(hz),
+    )  # fmt: skip
+    assert 37.2 < min(tried) < max(tried) < 38.0
+    assert f" of {3 * len(tried)} mixtures led to" in done.notes[-1]
+    assert " of the 1 given from others" in done.notes[-1]  # period 3 ends below
 
 
 def test_no_longer_orbits_are_looked_for_than_wanted(three):
@@ -84,9 +118,13 @@ def test_an_orbit_is_begun_at_each_of_its_periods_and_goes_on_in_its_order():
     assert all(np.array_equal(np.diff(m) % 3.0, np.ones(3)) for m in whole)
 
 
+def loops_of(branches, frequency_hz, longest=3, seed=0):
+    return Loops.of(branches, frequency_hz, longest, np.random.default_rng(seed))
+
+
 def test_loops_are_motions_over_the_period_of_the_orbit(three):
     for branch in three.branches:
-        loops, orbits = Loops.of([branch], 36.5, 3), _orbits_near(branch, 36.5)
+        loops, orbits = loops_of([branch], 36.5), _orbits_near(branch, 36.5)
         assert len(loops.nodes) == len(orbits) > 1
         for nodes, orbit in zip(loops.nodes, orbits, strict=True):
             assert nodes.shape == (branch.period, NODES, 2)
@@ -100,24 +138,26 @@ def test_the_branches_nearest_in_frequency_are_mixed(three):
     (harmonic,), (third,) = three.of_period(1), three.of_period(3)
     above = 1.001 * third.frequency_hz.max()
     for others, used in ((NEIGHBOURS - 1, True), (NEIGHBOURS, False)):
-        loops = Loops.of([third, *[harmonic] * others], above, 3)
+        loops = loops_of([third, *[harmonic] * others], above)
         assert (0 in loops.branch) == used
         assert len(set(loops.branch.tolist())) == NEIGHBOURS
 
 
 def test_branches_of_longer_periods_than_wanted_are_mixed_last(three):
-    """However near: doubled ones may be many."""
+    """However near: doubled ones may be many. Of as many that reach the frequency, any."""
     (harmonic,), (third,) = three.of_period(1), three.of_period(3)
     branches = [*[third] * NEIGHBOURS, harmonic]
-    for longest, used in ((1, True), (3, False)):
-        assert (NEIGHBOURS in Loops.of(branches, 37.0, longest).branch) == used
+    for longest, wanted in ((1, {True}), (3, {True, False})):
+        seeds = range(300)  # left out by none: chance (40/41)^300, 6e-4
+        mixed = [NEIGHBOURS in loops_of(branches, 37.0, longest, n).branch for n in seeds]
+        assert set(mixed) == wanted
 
 
 def test_of_a_branch_its_orbits_near_the_frequency_are_mixed_or_else_the_nearest(three):
     (third,) = three.of_period(3)
-    assert len(Loops.of([third], 37.0, 3).nodes) == PLACES
+    assert len(loops_of([third], 37.0).nodes) == PLACES
     far = third.frequency_hz.max() * (1.0 + 2.0 * WINDOW)
-    assert len(Loops.of([third], far, 3).nodes) == 1
+    assert len(loops_of([third], far).nodes) == 1
 
 
 @pytest.mark.parametrize(
@@ -127,6 +167,10 @@ def test_of_a_branch_its_orbits_near_the_frequency_are_mixed_or_else_the_nearest
         ({"tries": 1.5}, "tries must be"),
         ({"seed": -1}, "seed must be"),
         ({"max_period": 0}, "max_period must be"),
+        ({"min_period": 0}, "min_period must be"),
+        ({"min_period": 3, "max_period": 2}, "min_period must be"),
+        ({"range_hz": (30.0, 37.0)}, r"\(30, 37\) must lie within that of .*, \(36, 38.5\)"),
+        ({"range_hz": (37.0, 37.0)}, "range_hz must be two positive frequencies"),
         ({"spacing": 0.0}, "spacing must lie between 1e-06 and 1, got 0"),
         ({"known": None}, "known must be a Diagram"),
         ({"progress": 3}, "progress must be"),

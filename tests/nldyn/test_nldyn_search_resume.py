@@ -7,7 +7,7 @@ from functools import partial
 
 import h5py
 import pytest
-from branches_alike import without
+from branches_alike import assert_same_branches, without
 
 from nldyn import (
     ContinuationOptions,
@@ -83,19 +83,21 @@ def test_another_search_begins_anew(three, way, interrupted):
         assert tried.tried == fresh.tried
 
 
-def test_what_it_has_found_is_not_lost(three, way, tmp_path):
-    """Nor looked for again where it was found."""
+def test_what_it_has_found_is_not_lost_and_changes_nothing_where_it_goes_on(three, way, tmp_path):
+    """Interrupted just after a branch was found: its orbits are used from the next frequency on."""
     (left_out,) = three.of_period(2)
     known, place = without(three, left_out), tmp_path / "found.h5"
+    search = partial(WAYS[way], tries=30)
+    whole = Frequencies(way)
+    wanted = search(known, progress=whole)
     tried: list[float] = []
 
     def interrupt(what: str, frequency_hz: float) -> None:
-        if what == way and frequency_hz not in tried:
+        if what == way:
             tried.append(frequency_hz)
             if place.exists() and load_branches(place):
                 raise KeyboardInterrupt
 
-    search = partial(WAYS[way], tries=30)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("nldyn.checkpoint.PAUSE", 0.0)
         patch.setattr("nldyn.checkpoint.SHARE", 0.0)
@@ -103,8 +105,10 @@ def test_what_it_has_found_is_not_lost(three, way, tmp_path):
             search(known, progress=interrupt, checkpoint=place)
     rest = Frequencies(way)
     found = search(known, progress=rest, checkpoint=place)
-    assert rest.tried[0] == tried[-1] > tried[0]
-    assert len(found.branches) == len(three.branches)
+    assert rest.tried == whole.tried[whole.tried.index(tried[-1]) :]
+    assert found.notes == wanted.notes
+    for branch, same in zip(found.branches, wanted.branches, strict=True):
+        assert_same_branches(branch, same)
     assert any(branch.period == 2 for branch in found.branches[2:])
 
 

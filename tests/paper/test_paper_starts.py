@@ -3,7 +3,6 @@
 import math
 import re
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -12,18 +11,18 @@ from nldyn import (
     ContinuationOptions,
     ExploreOptions,
     SystemModelError,
-    by_crossover,
-    by_pseudo_orbits,
     explore,
     index_sum,
 )
 from nldyn.continuation import broken_off
 from nldyn.diagrams import middle_orbit
+from nldyn.exploration import steps_between
 from nldyn.fixed_point_index import index_note
 from nldyn.flow import FlowMap
+from nldyn.orbit import stroboscopic
 from nldyn.paper.jobs import LONG, job_named, joined, scene_system
 from nldyn.paper.search import MODELS, known_branches, main, search, search_by_detour
-from nldyn.paper.starts import follow_starts, read_starts, starts_path, write_starts
+from nldyn.paper.starts import Start, follow_starts, read_starts, starts_path, write_starts
 from nldyn.search import orbit_near
 
 WITHOUT_DOUBLED = (1, 50)
@@ -37,17 +36,19 @@ def found():
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_starts_lead_to_orbits_of_their_period(name):
+def test_starts_are_orbits_of_their_period(name):
     job = job_named(name)
     flow = FlowMap(job.system())
     starts = read_starts(name)
     assert {start.period for start in starts} == {1, 2, 3}
     for start in starts:
         assert job.range_hz[0] <= start.frequency_hz <= job.range_hz[1]
-    for start in starts[::10]:
+    for start in starts:
         omega = 2.0 * math.pi * start.frequency_hz
         orbit = orbit_near(flow, start.state, start.period, omega, "middle")
         assert orbit is not None and orbit.period == start.period
+        off = np.linalg.norm(stroboscopic(orbit)[0] - start.state)
+        assert off < 1e-7 * np.linalg.norm(start.state)
 
 
 def test_what_is_followed_from_starts_is_what_the_search_found(found, tmp_path):
@@ -62,7 +63,7 @@ def test_what_is_followed_from_starts_is_what_the_search_found(found, tmp_path):
     for branch in found.branches:
         middle = branch.points[len(branch.points) // 2]
         assert sum(other.contains(middle) for other in again.branches) == 1
-    first = f"from {len(starts)} starts of period 1, 2, 3, 0 of which lead to no orbit"
+    first = f"from {len(starts)} starts of period 1, 2, 3, 0 of which are no orbits"
     assert again.notes[0] == first
 
 
@@ -72,18 +73,45 @@ def test_a_missing_branch_is_told_by_its_indices(found):
     assert f"but for P^{through.period} from " in index_note(others, found.range_hz, 3)
 
 
-def test_a_start_that_leads_nowhere_is_counted(found, tmp_path):
-    write_starts(starts_path("some", tmp_path), found.branches[:1])
-    path = starts_path("some", tmp_path)
-    head, row = path.read_text(encoding="utf-8").splitlines()
-    far = ",".join([*row.split(",")[:2], "1", "-1", "1", "-1"])
-    path.write_text("\n".join([head, row, far]) + "\n", encoding="utf-8")
+def test_what_is_no_orbit_among_the_starts_is_counted(found):
+    """Far from every orbit, or beside one of the period."""
+    orbit = middle_orbit(found.branches[0])
+    state = stroboscopic(orbit)[0]
+    states = state, np.array([1.0, -1.0, 1.0, -1.0]), 1.0001 * state
+    starts = [Start(orbit.period, orbit.frequency_hz, state) for state in states]
     again = follow_starts(
-        scene_system("two_dof_xi_0.01"), read_starts("some", tmp_path), found.range_hz,
-        ContinuationOptions(), WITHOUT_DOUBLED,
+        scene_system("two_dof_xi_0.01"), starts, found.range_hz, ContinuationOptions(),
+        WITHOUT_DOUBLED,
     )  # fmt: skip
-    assert again.notes[0].startswith("from 2 starts of period ")
-    assert again.notes[0].endswith(", 1 of which lead to no orbit")
+    assert again.notes[0].startswith("from 3 starts of period ")
+    assert again.notes[0].endswith(", 2 of which are no orbits")
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ([], "has no starts"),
+        (["period,frequency_hz,state_0"], "has no starts"),
+        (["period,frequency_hz,state_0", "1,20"], "line 2: has 2 columns, not 3"),
+        (["period,frequency_hz", "1,20"], "line 2: has 2 columns, not 3"),
+        (["period,frequency_hz,state_0", "1,20,0", "1,20,abc"], "line 3 must hold numbers only"),
+        (["period,frequency_hz,state_0", "1,20,nan"], "line 2 has an entry that is not finite"),
+        (["period,frequency_hz,state_0", "1.5,20,0"], "line 2: period must be"),
+        (["period,frequency_hz,state_0", "1,-20,0"], "line 2: frequency_hz must be positive"),
+    ],
+)
+def test_a_damaged_file_of_starts_is_told_by_its_line(lines, message, tmp_path):
+    starts_path("some", tmp_path).write_text("".join(f"{x}\n" for x in lines), encoding="utf-8")
+    with pytest.raises(SystemModelError, match=rf"starts_some\.csv: {message}"):
+        read_starts("some", tmp_path)
+
+
+def test_starts_of_another_model_are_refused(found):
+    with pytest.raises(SystemModelError, match="start 1: has a state of 2 numbers, the system one"):
+        follow_starts(
+            scene_system("two_dof_xi_0.01"), [Start(1, 36.0, np.zeros(2))], found.range_hz,
+            ContinuationOptions(), WITHOUT_DOUBLED,
+        )  # fmt: skip
 
 
 def test_families_followed_apart_are_the_diagram_followed_at_once(found, monkeypatch, tmp_path):
@@ -142,7 +170,7 @@ def test_what_starts_lead_to_is_kept_when_a_run_is_interrupted(found, monkeypatc
     (other := tmp_path / "other").mkdir()
     once = job.run(1, other)
     assert resumed.notes == once.notes
-    assert resumed.notes[0].endswith(", 1 of which lead to no orbit")
+    assert resumed.notes[0].endswith(", 1 of which are no orbits")
     assert [branch.name for branch in resumed.branches] == [branch.name for branch in once.branches]
     for branch, same in zip(resumed.branches, once.branches, strict=True):
         assert branch.stop_reasons == same.stop_reasons
@@ -172,21 +200,23 @@ def test_a_detour_gives_starts(two_known):
 
 def test_pseudo_orbits_give_starts(two_known, monkeypatch, capsys):
     name, folder = two_known
-    monkeypatch.setattr("nldyn.paper.search.by_pseudo_orbits", partial(by_pseudo_orbits, tries=20))
-    monkeypatch.setattr("sys.argv", ["search", str(folder), name, "--pseudo-orbits"])
+    command = ["search", str(folder), name, "--pseudo-orbits", "--tries", "20"]
+    monkeypatch.setattr("sys.argv", command)
     main()
     last = capsys.readouterr().out.splitlines()[-1]
-    added = int(re.search(r"theirs, (\d+) branch(es)? beside those given", last)[1])
+    added = int(re.search(r"others, (\d+) branch(es)? beside those given", last)[1])
     assert len(read_starts(name, folder)) == 2 + added > 2
 
 
 def test_mixtures_give_starts(two_known, monkeypatch, capsys):
     name, folder = two_known
-    way = partial(by_crossover, tries=20)
-    monkeypatch.setattr("nldyn.paper.search.by_crossover", way)
-    monkeypatch.setattr("sys.argv", ["search", str(folder), name, "--crossover", "3"])
+    command = ["search", str(folder), name, "--crossover", "3", "--range", "35.6", "35.95"]
+    numbers = ["--periods", "1", "2", "--spacing", "0.005", "--tries", "30"]
+    monkeypatch.setattr("sys.argv", command + numbers)
     main()
     last = capsys.readouterr().out.splitlines()[-1]
+    tried = 2 * 30 * steps_between(35.6, 35.95, 0.005)
+    assert f" of {tried} mixtures led to an orbit" in last
     added = int(re.search(r"others, (\d+) branch(es)? beside those given", last)[1])
     assert len(read_starts(name, folder)) == 2 + added > 2
 
@@ -216,7 +246,7 @@ def test_the_command_tells_all_notes(two_known, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["search", str(folder), name, "--detour", *factors])
     main()
     first, *others, last = capsys.readouterr().out.splitlines()
-    assert first == f"{name}: from 2 starts of period 2, 3, 0 of which lead to no orbit"
+    assert first == f"{name}: from 2 starts of period 2, 3, 0 of which are no orbits"
     assert any(note.startswith("indices of the fixed points of P to P^3 ") for note in others)
     assert last.startswith("at 0.5 of the damping and 1.01 of natural_frequency_hz[1]: ")
 
@@ -248,12 +278,35 @@ def test_branches_of_another_model_are_refused(two_known):
         (["natural_frequency_hz[2]=2"], "there is no mode 2"),
         (["modal_damping[-1]=1"], "that of modal_damping of all modes must be a number"),
         (["nonsense=2"], "'nonsense' is none of damping, "),
+        (["damping=0.5", "--tries", "3"], "--tries: goes with --pseudo-orbits or --crossover only"),
     ],
 )
 def test_detours_that_make_no_sense_are_refused(two_known, given, message, monkeypatch, capsys):
     name, folder = two_known
     new = folder / "new"
     monkeypatch.setattr("sys.argv", ["search", str(new), name, "--detour", *given])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    assert message in capsys.readouterr().err
+    assert not new.exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["--range", "30", "35.9"], "range_hz = (30, 35.9) must lie within that of the branches"),
+        (["--range", "36", "35"], "range_hz must be two positive frequencies, ascending"),
+        (["--periods", "1", "4"], "--periods: the longest must be"),
+        (["--periods", "3", "2"], "--periods: the shortest must be"),
+        (["--spacing", "0"], "spacing must lie between"),
+        (["--tries", "0"], "--tries must be"),
+    ],
+)
+def test_numbers_that_make_no_sense_are_refused(two_known, given, message, monkeypatch, capsys):
+    name, folder = two_known
+    new = folder / "new"
+    monkeypatch.setattr("sys.argv", ["search", str(new), name, "--crossover", "1", *given])
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 2
