@@ -64,6 +64,11 @@ class Seed:
         Period multiple n.
     near_hz : float
         Excitation frequency in Hz.
+
+    Raises
+    ------
+    SystemModelError
+        For a period or frequency that makes no sense.
     """
 
     period: int
@@ -83,7 +88,7 @@ class Diagram:
     branches : tuple of Branch
         In the order found; names tell period and origin.
     range_hz : (float, float)
-        The range.
+        The range in Hz.
     observe : str
         Interface whose displacement is reported.
     notes : tuple of str
@@ -436,6 +441,16 @@ def diagram(
         For input that makes no sense.
     OutputError
         If `checkpoint` cannot be written.
+
+    Examples
+    --------
+    >>> from nldyn import SearchOptions, Stop, System, Unbalance, diagram
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> found = diagram(system, (8.5, 9.0), (1, 2), search_points=1, search=SearchOptions(starts=1))
+    >>> sorted(branch.period for branch in found.branches)
+    [1, 2]
     """
     flow = flow_of(system)
     low, high = check_range(range_hz)

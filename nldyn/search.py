@@ -51,6 +51,11 @@ class SearchOptions:
         Near returns tried for each start, closest first: attractors, and saddles on the way.
     seed : int
         Seed of the random initial states: results are repeatable.
+
+    Raises
+    ------
+    SystemModelError
+        For numbers that make no sense.
     """
 
     starts: int = 10

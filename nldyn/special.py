@@ -243,7 +243,13 @@ class Chord:
 
 
 def locate(kind: str, chord: Chord, test: Callable[[BranchPoint], float]) -> SpecialPoint:
-    """Root of a test function on a chord whose ends have opposite signs."""
+    """Root of a test function on a chord whose ends have opposite signs.
+
+    Raises
+    ------
+    LocateError
+        If none is found, see `root`, or an orbit on the way to it, see `Chord.at`.
+    """
     sigma, error = root(lambda x: test(chord.at(x)))
     point = chord.at(sigma)
     return SpecialPoint(kind, point, error * abs(chord.frequency_slope(point)) + point.orbit.error)

@@ -295,7 +295,21 @@ def trace(
 ) -> tuple[list[BranchPoint], list[SpecialPoint], str, list[str]]:
     """Walk from a point in the direction of its tangent and collect special points.
 
-    Returns the points, the special points, why the walk stopped, and notes on what may be missing.
+    Parameters
+    ----------
+    start : BranchPoint
+        Where to begin.
+    range_hz : (float, float)
+        Frequencies in Hz.
+    options : ContinuationOptions, optional
+        Step control.
+    progress : callable, optional
+        Called with the frequency of every point.
+
+    Returns
+    -------
+    nodes, special_points, reason, notes
+        As those of a `Leg`.
     """
     trail = Trail(Walk(start, range_hz, options or ContinuationOptions()))
     leg = trail.follow(progress)
