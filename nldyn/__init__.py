@@ -60,12 +60,12 @@ if TYPE_CHECKING:
     from nldyn.parameters import Parameter
     from nldyn.plot import plot_diagram
     from nldyn.pseudo_orbit_search import by_pseudo_orbits
+    from nldyn.roots import LocateError
     from nldyn.search import SearchOptions, find_orbits
     from nldyn.sections import BruteForce, brute_force, impact_section, stroboscopic_section
     from nldyn.selection import Selection, reduce_for
     from nldyn.setting import Setting
     from nldyn.simulation import Motion, simulate, sweep
-    from nldyn.special import LocateError
     from nldyn.step_control import ContinuationOptions
     from nldyn.store import load_branch, load_branches, load_diagram, load_exploration
     from nldyn.studies import study
@@ -117,12 +117,12 @@ _HOMES = {
     "orbit_plots": "plot_contact_force plot_history plot_phase_portrait plot_spectrum",
     "parameters": "Parameter",
     "plot": "plot_diagram",
+    "roots": "LocateError",
     "search": "SearchOptions find_orbits",
     "sections": "BruteForce brute_force impact_section stroboscopic_section",
     "simulation": "Motion simulate sweep",
     "selection": "Selection reduce_for",
     "setting": "Setting",
-    "special": "LocateError",
     "step_control": "ContinuationOptions",
     "store": "load_branch load_branches load_diagram load_exploration",
     "studies": "study",

@@ -21,7 +21,7 @@ from nldyn.continuation import make_branch
 from nldyn.critical import CoefficientError, Estimate, doubled_parameter, flip, loop_of
 from nldyn.doubling import switch_at_flip
 from nldyn.errors import SystemModelError, check_range, check_types, check_whole
-from nldyn.special import LocateError
+from nldyn.roots import LocateError
 from nldyn.step_control import ContinuationOptions
 from nldyn.step_search import special_points_between
 from nldyn.walk import Walk

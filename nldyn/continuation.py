@@ -24,8 +24,8 @@ from nldyn.checkpoint import Checkpoint, checkpoint_at
 from nldyn.crossings import check_requested, requested
 from nldyn.errors import SystemModelError, check_range, check_types, numbers
 from nldyn.linear import Real
+from nldyn.near_crossing import NEIGHBOUR, ON_CROSSING, lies_on_crossing, same_crossing
 from nldyn.orbit import ConvergenceError, Orbit, check_minimal
-from nldyn.special import NEIGHBOUR, ON_CROSSING, lies_on_crossing, same_crossing
 from nldyn.step_control import ContinuationOptions
 from nldyn.trail import Leg, Trail
 from nldyn.walk import shifts

@@ -13,7 +13,8 @@ from nldyn.branch import Branch, BranchPoint
 from nldyn.errors import SystemModelError, check_frequency, shown
 from nldyn.linear import Real
 from nldyn.orbit import Orbit, same_orbit, stroboscopic
-from nldyn.special import Chord, LocateError, root
+from nldyn.roots import LocateError, root
+from nldyn.special import Chord
 
 SAME = 4e-15  # difference of two logarithms of a frequency that is rounding
 NEARLY_SAME = 1e-12  # the same, of an orbit solved for and not held there

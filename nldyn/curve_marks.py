@@ -18,7 +18,9 @@ from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit
 from nldyn.parameter_values import FREQUENCY, Chart, checked_parameter, value_of
 from nldyn.parameters import Parameter
-from nldyn.special import LocateError, Touch, leaves_circle, root, touching_extremes
+from nldyn.roots import LocateError, root
+from nldyn.special import leaves_circle
+from nldyn.touch import Touch, touching_extremes
 
 POLE = 1e-3  # of its values beside it: what a test is not below where it has no root but a pole
 ALIKE = 1e-6  # share of a step within which touches are those of one orbit by symmetry

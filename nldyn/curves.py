@@ -32,7 +32,7 @@ from nldyn.linear import Real
 from nldyn.orbit import ConvergenceError, Orbit, check_minimal, same_orbit
 from nldyn.parameter_values import Chart, checked_parameter, value_of
 from nldyn.parameters import Parameter
-from nldyn.special import LocateError, root
+from nldyn.roots import LocateError, root
 from nldyn.step_control import ContinuationOptions
 from nldyn.tables import orbit_columns
 from nldyn.whole_file import check_writable

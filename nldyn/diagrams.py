@@ -35,6 +35,7 @@ from nldyn.orbit import (
     solve_orbit,
     stroboscopic,
 )
+from nldyn.roots import LocateError
 from nldyn.search import (
     MOST_COUNT,
     SearchOptions,
@@ -44,7 +45,6 @@ from nldyn.search import (
     reach,
     simulate_strobe,
 )
-from nldyn.special import LocateError
 from nldyn.step_control import ContinuationOptions
 from nldyn.system import System
 from nldyn.walk import Rows

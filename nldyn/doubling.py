@@ -10,8 +10,9 @@ from nldyn.conditions import nearest_flip
 from nldyn.errors import check_positive
 from nldyn.linear import Real
 from nldyn.orbit import Orbit, minimal_period, refine
+from nldyn.roots import LocateError
 from nldyn.shooting import ShootingProblem, metric_length
-from nldyn.special import Chord, LocateError
+from nldyn.special import Chord
 
 
 def passed_flip(a: Orbit, b: Orbit) -> bool:

@@ -20,21 +20,11 @@ from nldyn.branch import BranchPoint, SpecialPoint
 from nldyn.conditions import Grazing
 from nldyn.critical import correct_across
 from nldyn.linear import Real
+from nldyn.near_crossing import CROSSES, NEAR_CRITICAL
 from nldyn.orbit import ConvergenceError, Orbit
-from nldyn.special import (
-    BEND,
-    CROSSES,
-    CROSSING_ERROR,
-    NEAR_CRITICAL,
-    Chord,
-    LocateError,
-    Touch,
-    accounted,
-    changed,
-    root,
-    touches_sharply,
-    touching_extremes,
-)
+from nldyn.roots import LocateError, root
+from nldyn.special import BEND, CROSSING_ERROR, Chord, accounted, changed
+from nldyn.touch import Touch, touches_sharply, touching_extremes
 
 MET = 1e-13  # of an orbit's size: how well a depth is met
 ROUNDED = 1e-11  # the same where rounding forbids more

@@ -28,8 +28,8 @@ from nldyn.critical import (
 from nldyn.errors import SystemModelError, check_positive, check_types
 from nldyn.linear import Complex, Real
 from nldyn.orbit import Orbit, minimal_period
+from nldyn.roots import LocateError
 from nldyn.shooting import asymmetry, metric_length
-from nldyn.special import LocateError
 
 CLOSE = 1e-3  # relative distance in frequency of a special point that counts as close
 NEAR_RESONANCE_DEG = 5.0

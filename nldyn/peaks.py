@@ -9,7 +9,8 @@ from scipy.optimize import minimize_scalar
 
 from nldyn.branch import Branch, BranchPoint
 from nldyn.orbit import Orbit
-from nldyn.special import Chord, LocateError
+from nldyn.roots import LocateError
+from nldyn.special import Chord
 
 
 @dataclass(frozen=True, eq=False)

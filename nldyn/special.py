@@ -2,53 +2,40 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from nldyn._events import (
-    alone,
-    branch_point_test,
-    flip_test,
-    nearest,
-    number_outside,
-    sign_changes,
-    torus_test,
-)
+from nldyn._events import branch_point_test, flip_test, number_outside, torus_test
 from nldyn.branch import BranchPoint, SpecialPoint
-from nldyn.conditions import TOUCH, depth_row, nearest_crossing
+from nldyn.conditions import TOUCH, depth_row
 from nldyn.critical import correct_across, turns_near_crossing
 from nldyn.linear import Complex, Real
+from nldyn.near_crossing import (
+    NEAR_CRITICAL,
+    NEIGHBOUR,
+    SHORTEST_CROSSING,
+    crossing_within,
+    distance,
+    true_crossing,
+)
 from nldyn.orbit import Orbit
+from nldyn.roots import LocateError, root
 from nldyn.shooting import metric_length
-from nldyn.system import System
+from nldyn.touch import Touch, changes_hidden_by_birth, touching_extremes
 
-PRECISION = 1e-9  # in σ, to which a special point is located
 BESIDE = 1e-3  # in σ: the least distance of points that tell the direction of a branch
 CROSSING_ERROR = 1e-8  # relative, of an orbit where branches cross
-NEIGHBOUR = 1e-3  # arclength between two branch points at one turn, and dP/ds there
-SHORTEST_CROSSING = 3e-6  # step over which a branch may cross another one
-SAME = 2.0 * SHORTEST_CROSSING  # distance of branch points that two such steps locate as one
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
 PASSED = 1e-6  # least of a branch point's test on both sides of a fold that is no crossing
-SMOOTH_TOUCH = 1.5  # exponent of a stop from which on multipliers have a slope at a touch
-CROSSES = 1e-12  # least unfolding of a crossing, relative to the orbit, that is not rounding
 MIXED = 1e-5  # distance from a crossing within which a tangent may be of both branches
-ON_CROSSING = 3e-7  # distance from it, relative to the orbit, at which a branch cannot be told
 CRITICAL = {"LP": 1.0, "BP": 1.0, "PD": -1.0}  # multiplier at a special point
-NEAR_CRITICAL = 1e-3  # a multiplier no nearer to it is not that of such a point
 VANISHED = 1e-3  # an extreme at its root, relative to those beside it
-STALL = 1e-6  # a move in σ, shorter than which a test function should come nearer to zero
 STEEPEST = 0.5  # least cosine between a branch and the chord of a step, below which it is refused
 BEND = 1e-4  # arclength of a chord, above which a branch does not depart from it by more
-
-
-class LocateError(RuntimeError):
-    """An orbit between two points of a branch could not be corrected."""
 
 
 def tests(point: BranchPoint) -> dict[str, float]:
@@ -255,69 +242,6 @@ def locate(kind: str, chord: Chord, test: Callable[[BranchPoint], float]) -> Spe
     return SpecialPoint(kind, point, error * abs(chord.frequency_slope(point)) + point.orbit.error)
 
 
-def root(f: Callable[[float], float]) -> tuple[float, float]:
-    """Root of a function on [0, 1] with opposite signs at the ends, and its estimated error.
-
-    Trials come from inverse interpolation through the values nearest to zero, so that a function
-    that is smooth on one side of its root only (the depth at a grazing point) is followed on that
-    side; where trials do not come closer fast, the bracket is halved (after Brent 1973, ch. 4).
-    The error is how far the next trial would have moved: where the function jumps, or rounding
-    changes its sign often, as far as where the trials ended. A short move that brings the function
-    no nearer to zero has met its rounding level; then the error is what secants say.
-
-    Raises
-    ------
-    LocateError
-        If no root is found, or the signs at the ends are the same.
-    """
-    known = sorted([(f(0.0), 0.0), (f(1.0), 1.0)], key=_size)
-    if known[0][0] * known[1][0] > 0.0:
-        raise LocateError("no change of sign")
-    low, high, rising = 0.0, 1.0, max(known)[1] == 1.0
-    move, move_before = 1.0, 1.0
-    for _ in range(100):
-        y, best = known[0]
-        if y == 0.0:
-            return best, 0.0
-        x = _inverse_interpolation(known, low, high)
-        step = abs(x - best)
-        if step <= PRECISION or high - low <= PRECISION:
-            return best, step
-        if step > 0.5 * move_before:
-            x = 0.5 * (low + high)
-        move_before, move = move, abs(x - best)
-        value = f(x)
-        if math.isnan(value):
-            break
-        if move < STALL and abs(value) > 0.5 * abs(y):
-            secants = (abs(y * (other - best) / (v - y)) for v, other in known[1:] if v != y)
-            reach = max(secants, default=1.0)
-            if reach < STALL:  # the rounding level of the function
-                return best, max(reach, move)
-        low, high = (low, x) if (value > 0.0) == rising else (x, high)
-        known = sorted([*known, (value, x)], key=_size)[:4]
-    raise LocateError("no root found")
-
-
-def _size(value: tuple[float, float]) -> float:
-    return abs(value[0])
-
-
-def _inverse_interpolation(known: list[tuple[float, float]], low: float, high: float) -> float:
-    """Where the polynomial x(y) through the most points has y = 0 within (low, high)."""
-    estimates = [x for _, x in known]
-    y = [value for value, _ in known]
-    found = 0.5 * (low + high)
-    for order in range(1, len(y)):  # Neville's scheme
-        for i in range(len(y) - order):
-            if y[i + order] == y[i]:
-                return found
-            estimates[i] += (estimates[i + 1] - estimates[i]) * y[i] / (y[i] - y[i + order])
-        if low < estimates[0] < high:
-            found = estimates[0]
-    return found
-
-
 def located_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[SpecialPoint]:
     """The special points between two points that their tests tell of, in order.
 
@@ -355,7 +279,7 @@ def _located(kind: str, chord: Chord) -> list[SpecialPoint]:
     """Where a test changes its sign on a chord; nothing if that is no pair on the unit circle.
 
     Where branches cross beside an end of the chord, the tangent there may be of both: its change of
-    sign is not that of a fold, unless a multiplier tells, or the frequency and the sign do there.
+    sign is not that of a fold, unless a multiplier tells, or the sign does there.
     """
     special = locate(kind, chord, lambda point: tests(point)[kind])
     critical = CRITICAL.get(kind)
@@ -365,19 +289,12 @@ def _located(kind: str, chord: Chord) -> list[SpecialPoint]:
         return []
     if kind == "LP" and _is_plain_fold(chord):
         return [special]
-    fold = special.orbit
-    if kind == "LP" and not (_turns_at(fold, chord) and _turns_beside(fold, chord)):
+    if kind == "LP" and not _turns_beside(special.orbit, chord):
         crossing = _crossing_at_an_end(chord)
         if crossing is not None:
             at = replace(special.point, orbit=crossing)
             return [_along(chord, SpecialPoint("BP", at, crossing.error))]
     return [_along(chord, _crossing_or_fold(special))]
-
-
-def _turns_at(fold: Orbit, chord: Chord) -> bool:
-    """Whether the frequency of a fold lies beyond those at the ends of its chord."""
-    ends = chord.first.orbit.omega, chord.last.orbit.omega
-    return not min(ends) <= fold.omega <= max(ends)
 
 
 def _turns_beside(fold: Orbit, chord: Chord) -> bool:
@@ -388,7 +305,7 @@ def _turns_beside(fold: Orbit, chord: Chord) -> bool:
 
 def _crossing_at_an_end(chord: Chord) -> Orbit | None:
     """Where branches cross so near to an end of a chord that its tangent may be of both."""
-    return _crossing_within(chord.first.orbit, MIXED) or _crossing_within(chord.last.orbit, MIXED)
+    return crossing_within(chord.first.orbit, MIXED) or crossing_within(chord.last.orbit, MIXED)
 
 
 def _vanishes(touch: Touch, at: BranchPoint, a: BranchPoint, b: BranchPoint) -> bool:
@@ -415,79 +332,6 @@ def _told_apart(signs: list[str]) -> list[str]:
     return [kind for kind in signs if not (kind == "BP" and "LP" in signs)]
 
 
-def without_repeats(found: list[SpecialPoint]) -> list[SpecialPoint]:
-    """Of neighbouring branch points where one branch turns, only the one nearest to the turn.
-
-    A branch that turns where it meets another one has a multiplier that touches 1 there without
-    passing it, so that rounding decides how often the branch point's test changes sign. The turn is
-    no fold.
-    """
-    kept: list[SpecialPoint] = []
-    for special in found:
-        if kept and _turns_twice(kept[-1], special):
-            crossings = [s for s in (kept[-1], special) if s.kind == "BP"]
-            kept[-1] = min(crossings, key=_pace)
-        else:
-            kept.append(special)
-    return kept
-
-
-def _turns_twice(a: SpecialPoint, b: SpecialPoint) -> bool:
-    apart = abs(a.point.arclength - b.point.arclength)
-    turning = apart < NEIGHBOUR and max(_pace(a), _pace(b)) < NEIGHBOUR
-    kinds = {a.kind, b.kind}
-    one = apart < NEIGHBOUR and same_crossing(a, b)
-    return one or (turning and kinds in ({"BP"}, {"BP", "LP"}))
-
-
-def same_crossing(a: SpecialPoint, b: SpecialPoint) -> bool:
-    """Whether two special points are one branch point."""
-    return a.kind == b.kind == "BP" and distance(a.orbit, b.orbit) < SAME
-
-
-def _pace(special: SpecialPoint) -> float:
-    """How fast the frequency changes along the branch."""
-    return abs(float(special.point.tangent[-1]))
-
-
-def is_crossing(orbit: Orbit) -> bool:
-    """Whether branches cross beside an orbit, and do not only come close; if it can be told."""
-    crossing = nearest_crossing(orbit)
-    return crossing is None or crossing[1] <= CROSSES
-
-
-def lies_on_crossing(orbit: Orbit, within: float) -> bool:
-    """Whether branches cross within a distance of an orbit, relative to it.
-
-    On a plane across a branch Newton's method may find any orbit of the other one there.
-    """
-    return _crossing_within(orbit, within) is not None
-
-
-def _crossing_within(orbit: Orbit, within: float) -> Orbit | None:
-    """Where branches cross within a distance of an orbit, relative to it, if they do."""
-    crossing = crossing_beside(orbit)
-    return crossing if crossing is not None and distance(orbit, crossing) < within else None
-
-
-def crossing_beside(orbit: Orbit) -> Orbit | None:
-    """Where branches cross beside an orbit that has a multiplier near 1, if they do."""
-    if float(np.abs(orbit.multipliers - 1.0).min()) > NEAR_CRITICAL:
-        return None
-    return _true_crossing(orbit)
-
-
-def distance(a: Orbit, b: Orbit) -> float:
-    """Distance of two orbits of one problem, relative to the first."""
-    return metric_length(a.problem.metric(a.point), b.point - a.point)
-
-
-def _true_crossing(orbit: Orbit) -> Orbit | None:
-    """Where branches cross beside an orbit, if they do."""
-    crossing = nearest_crossing(orbit)
-    return crossing[0] if crossing is not None and crossing[1] <= CROSSES else None
-
-
 def _is_plain_fold(chord: Chord) -> bool:
     """Whether a multiplier passes 1 clearly where a branch turns, as it does not at a crossing."""
     before, after = tests(chord.first)["BP"], tests(chord.last)["BP"]
@@ -504,7 +348,7 @@ def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
     turns = special.kind == "LP" and turns_near_crossing(special.orbit)
     if special.kind != "BP" and not turns:
         return special
-    orbit = _true_crossing(special.orbit)
+    orbit = true_crossing(special.orbit)
     if orbit is None or distance(special.orbit, orbit) > NEIGHBOUR:
         return special
     point = BranchPoint(orbit, special.point.tangent, special.point.arclength)
@@ -548,42 +392,6 @@ def _possible_outside(multipliers: Complex) -> set[int]:
     return set(range(fewest, most + 1))
 
 
-@dataclass(frozen=True)
-class Touch:
-    """An extremum of a stop's penetration whose sign differs between two neighbouring orbits."""
-
-    output: int
-    is_maximum: bool
-    phase: float
-
-    def depth(self, point: BranchPoint) -> float:
-        """Value of the extremum of this kind nearest in phase."""
-        found = point.orbit.extremes(self.output)
-        full = 2.0 * math.pi * point.orbit.period
-        index = nearest(found.phases, found.is_maximum, self.is_maximum, self.phase, full)
-        if index < 0:
-            raise LocateError("an extreme has vanished")
-        return float(found.values[index])
-
-
-def touching_extremes(a: Orbit, b: Orbit) -> list[Touch]:
-    """Extremes of the penetrations that change sign between two neighbouring orbits.
-
-    A maximum that becomes positive is a new contact; a minimum that becomes negative splits one.
-    """
-    touches = []
-    full = 2.0 * math.pi * a.period
-    for output in range(len(a.system.stops)):
-        first, last = a.extremes(output), b.extremes(output)
-        kinds, phases = sign_changes(
-            *(first.phases, first.values, first.is_maximum),
-            *(last.phases, last.values, last.is_maximum),
-            full,
-        )
-        touches += [Touch(output, bool(k), float(p)) for k, p in zip(kinds, phases, strict=True)]
-    return touches
-
-
 def leaves_circle(before: Complex, after: Complex) -> bool:
     """Whether the pair nearest to the unit circle lies beside it at one of two orbits.
 
@@ -600,36 +408,10 @@ def _pair_off_circle(multipliers: Complex) -> tuple[complex, float]:
     return complex(multipliers[i[nearest_one]]), float(off[nearest_one])
 
 
-def changes_hidden_by_birth(a: Orbit, b: Orbit) -> bool:
-    """Whether extremes that only one of two orbits has are across the stop in the other.
-
-    A maximum and a minimum of the penetration that are born together in flight may both reach the
-    stop before the next point: a new contact and its union with another one, after which there are
-    as many contacts as before.
-    """
-    full = 2.0 * math.pi * a.period
-    for output in range(len(a.system.stops)):
-        first, last = a.extremes(output), b.extremes(output)
-        if first.phases.size == last.phases.size:
-            continue
-        fewer = a
-        if first.phases.size > last.phases.size:
-            fewer, first, last = b, last, first
-        new = alone(first.phases, first.is_maximum, last.phases, last.is_maximum, full)
-        if np.any(last.values[new] * fewer.penetration(output, last.phases[new]) < 0.0):
-            return True
-    return False
-
-
 def _on_unit_circle(multipliers: Complex) -> bool:
     """Whether a complex pair (not a real pair μ, 1/μ) is what makes the torus test vanish."""
     mu = _pair_off_circle(multipliers)[0]
     return bool(abs(mu.imag) > 1e-6 * abs(mu))
-
-
-def touches_sharply(system: System) -> bool:
-    """Whether a stop is so stiff from the first touch that multipliers have no slope there."""
-    return any(stop.exponent < SMOOTH_TOUCH for stop in system.stops)
 
 
 def changed(a: BranchPoint, b: BranchPoint) -> list[str]:

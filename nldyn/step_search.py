@@ -11,18 +11,10 @@ from nldyn._events import dip, extreme_dip, travel
 from nldyn.between import Between
 from nldyn.branch import BranchPoint, SpecialPoint
 from nldyn.grazing_crossing import special_points_at_grazing
-from nldyn.special import (
-    ON_CROSSING,
-    Chord,
-    LocateError,
-    changed,
-    leaves_circle,
-    lies_on_crossing,
-    located_between,
-    tests,
-    touches_sharply,
-    touching_extremes,
-)
+from nldyn.near_crossing import ON_CROSSING, lies_on_crossing
+from nldyn.roots import LocateError
+from nldyn.special import Chord, changed, leaves_circle, located_between, tests
+from nldyn.touch import touches_sharply, touching_extremes
 
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
 MOST_LOOKS = 12  # times that a step is cut at such points

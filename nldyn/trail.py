@@ -11,16 +11,11 @@ from operator import attrgetter
 
 from nldyn.branch import CLOSED, JOINS, NOT_FINISHED, BranchPoint, SpecialPoint, WalkEnd
 from nldyn.linear import Real
+from nldyn.near_crossing import NEIGHBOUR, distance, same_crossing, without_repeats
 from nldyn.orbit import ConvergenceError
+from nldyn.roots import LocateError
 from nldyn.shooting import metric_length
-from nldyn.special import (
-    NEIGHBOUR,
-    Chord,
-    LocateError,
-    distance,
-    same_crossing,
-    without_repeats,
-)
+from nldyn.special import Chord
 from nldyn.step_control import ContinuationOptions
 from nldyn.step_search import insert_dip, special_points_between
 from nldyn.walk import COMES_BACK, MEETS_OPEN_END, Stride, Walk

@@ -15,16 +15,16 @@ from nldyn.conditions import TOUCH, depth_row
 from nldyn.doubling import flip_between, half_difference, passed_flip
 from nldyn.errors import check_types
 from nldyn.linear import Real
-from nldyn.orbit import ConvergenceError, Orbit
-from nldyn.shooting import ShootingProblem, asymmetry, metric_length
-from nldyn.special import (
+from nldyn.near_crossing import (
     ON_CROSSING,
     SHORTEST_CROSSING,
-    crosses,
     crossing_beside,
     is_crossing,
     lies_on_crossing,
 )
+from nldyn.orbit import ConvergenceError, Orbit
+from nldyn.shooting import ShootingProblem, asymmetry, metric_length
+from nldyn.special import crosses
 from nldyn.step_control import ContinuationOptions
 
 KINK = TOUCH  # step below which a branch may bend by any angle where the number of contacts changes

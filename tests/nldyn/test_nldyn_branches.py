@@ -33,8 +33,8 @@ from nldyn.continuation import start_point
 from nldyn.orbit import Orbit, minimal_period, same_orbit
 from nldyn.peaks import lowest_orbit, resonance_peaks
 from nldyn.resources import example
+from nldyn.roots import LocateError
 from nldyn.scene import build_system, load_scene
-from nldyn.special import LocateError
 from nldyn.step_search import special_points_between
 from nldyn.trail import trace
 

@@ -31,11 +31,12 @@ from nldyn import (
 from nldyn.branch import BranchPoint
 from nldyn.continuation import _without_repeat, start_point
 from nldyn.hard.continuation import beam as four_modes
+from nldyn.near_crossing import distance, lies_on_crossing
 from nldyn.normal_forms import is_symmetric
 from nldyn.resources import example
+from nldyn.roots import LocateError
 from nldyn.scene import build_system, load_scene
 from nldyn.shooting import asymmetry, metric_length
-from nldyn.special import lies_on_crossing
 from nldyn.step_search import special_points_between
 from nldyn.trail import Leg
 from nldyn.walk import BY_TOLERANCE
@@ -319,8 +320,8 @@ def test_a_tangent_that_jumps_beside_a_pitchfork_tells_of_that_and_of_no_fold(fa
     pitchfork = [s for s in facing.special_points if s.kind == "BP"][1]
     half = switch_at_branch_point(pitchfork, 5e-6)[0].orbit
     branch = continue_branch(half, (0.99 * pitchfork.frequency_hz, 1.01 * pitchfork.frequency_hz))
-    far = next(o for o in branch.points if 5e-3 < special.distance(half, o) < 5e-2)
-    secant, length = far.point - half.point, special.distance(half, far)
+    far = next(o for o in branch.points if 5e-3 < distance(half, o) < 5e-2)
+    secant, length = far.point - half.point, distance(half, far)
     first, last = (BranchPoint(o, secant / length, s) for o, s in ((half, 0.0), (far, length)))
     tests = special.tests
 
@@ -329,7 +330,6 @@ def test_a_tangent_that_jumps_beside_a_pitchfork_tells_of_that_and_of_no_fold(fa
         return tests(point) | ({"LP": steep} if point.arclength < 1.5e-3 else {})
 
     monkeypatch.setattr(special, "tests", mixed)
-    monkeypatch.setattr(special, "_turns_at", lambda fold, chord: True)  # by rounding
     (found,) = special._located("LP", special.Chord(first, last))
     assert found.kind == "BP"
     assert found.frequency_hz == pytest.approx(pitchfork.frequency_hz, rel=1e-9)
@@ -348,7 +348,7 @@ def test_a_test_that_jumps_where_no_multiplier_is_critical_tells_of_no_point(
         return tests(point) | {kind: 1.0 if point.arclength < middle else -1e-3}
 
     monkeypatch.setattr(special, "tests", jumping)
-    with pytest.raises(special.LocateError, match="jumps"):
+    with pytest.raises(LocateError, match="jumps"):
         special._located(kind, special.Chord(first, last))
 
 

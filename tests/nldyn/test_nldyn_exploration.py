@@ -43,9 +43,9 @@ from nldyn.diagrams import Collector, middle_orbit
 from nldyn.exploration import chao_lower_bound, settling_periods
 from nldyn.orbit import stroboscopic
 from nldyn.resources import example
+from nldyn.roots import LocateError
 from nldyn.scene import build_system, load_scene
 from nldyn.search import random_states
-from nldyn.special import LocateError
 
 
 def system_of(name):
