@@ -31,6 +31,7 @@ KINDS = ("LP", "PD", "NS", "BP", "GR")
 
 BESIDE = 3e-3  # of an orbit's size: a crossing within it belongs to a turn
 TOUCH = 1e-6  # of an orbit's size: depth of a touch beside its grazing point
+LEVEL, ALIKE = 1e-4, 1e-9  # relative difference of two extremes about to change places, or one
 SMALLEST_OVERLAP = 1e-3  # of null vectors: it vanishes where a multiplier is double
 
 Monitor = str | Callable[[Orbit], float]
@@ -334,6 +335,17 @@ def _depths(orbit: Orbit) -> list[tuple[int, float]]:
     return found
 
 
+def _extremes_of(monitor: Callable[[Orbit], float], orbit: Orbit) -> list[float]:
+    """What a monitor of this module is the largest of, from the recorded motion."""
+    if monitor is max_abs_displacement:
+        return [float(x) for x in np.abs(orbit.observed_extremes.values)]
+    peaks = zip(orbit.system.stops, orbit.penetration_peaks, strict=True)
+    depths = [(stop, float(depth)) for stop, found in peaks for depth in found.values]
+    if monitor is max_penetration:
+        return [depth for _, depth in depths]
+    return [float(stop.force(depth)) for stop, depth in depths] if monitor is peak_force else []
+
+
 MONITORS: dict[str, Callable[[Orbit], float]] = {
     "peak_force": peak_force,
     "max_penetration": max_penetration,
@@ -422,6 +434,14 @@ class Held:
                 f"({present:g}), got {shown(target)}"
             )
         return cls(name, function, float(target))
+
+    def changes_extreme(self, orbit: Orbit) -> bool:
+        """Whether a second extreme is nearly as large as the largest one, which is held.
+
+        Where they change places the quantity has a corner. Those that are alike by symmetry do not.
+        """
+        *_, second, first = [0.0, 0.0, *sorted(_extremes_of(self.monitor, orbit))]
+        return ALIKE * first < first - second < LEVEL * first
 
     def value(self, at: Evaluation) -> Real:
         """Relative difference from the target, shape (1,)."""

@@ -24,7 +24,7 @@ from nldyn.bordered import (
 )
 from nldyn.branch import NOT_FINISHED, SHORT_STEP
 from nldyn.codimension import codimension_tests, cosine_near, is_torus, torus_cosine
-from nldyn.conditions import Both, BranchPoint, Grazing, Singular
+from nldyn.conditions import Both, BranchPoint, Grazing, Held, Singular
 from nldyn.doubling import passed_flip
 from nldyn.errors import SystemModelError
 from nldyn.linear import Real
@@ -39,6 +39,7 @@ CLOSED_CURVE = "closed curve"
 VANISHES = "the extreme that grazes meets another one, and both vanish"
 DISSOLVED = "the branch point dissolves, as the symmetry does that brings it about"
 CORNER_OF_BRANCH_POINTS = "a stop is grazed, where the curve has a corner that is not followed"
+OTHER_EXTREME = "another extreme gets as large as the one held, where that has a corner"
 UNFOLDED = 1e-6  # unfolding number from which a branch point has dissolved
 MEETING = 1e-9  # arclength within which a curve and a grazing meet
 MOST_SECANTS = 20
@@ -470,6 +471,8 @@ class CurveWalk:
             return VANISHES
         if isinstance(here.condition, BranchPoint) and nearest_depth(here.orbit) < MEETS:
             return CORNER_OF_BRANCH_POINTS
+        if isinstance(here.condition, Held) and here.condition.changes_extreme(here.orbit):
+            return OTHER_EXTREME
         return f"{SHORT_STEP}{self.options.min_step:g}: {self._obstacle}"
 
     def _left_at_once(self) -> str:

@@ -124,7 +124,9 @@ def check_known(known: Diagram, flow: FlowMap) -> None:
     check_types(**{"known: notes": (known.notes, tuple)})
     for branch in known.branches:
         if not same_flow(branch.points[0].problem.flow, flow):
-            raise SystemModelError(f"known: branch {branch.name} is of another system or accuracy")
+            raise SystemModelError(
+                f"known: branch '{branch.name}' is of another system or accuracy"
+            )
         a, b = branch.course.range_hz if branch.course else (low, high)
         if not a <= low < high <= b:
             raise SystemModelError(

@@ -68,6 +68,9 @@ class ExploreOptions:
         Most closed sequences of pieces of known orbits, of each length up to `unstable_period`,
         beside which orbits are looked for at each frequency on the way down, see
         `by_pseudo_orbits`.
+    mixtures : int
+        Mixtures of two known orbits, of each length up to `unstable_period`, beside which orbits
+        are looked for at each frequency on the way down, see `by_crossover`.
     fold_factor : float
         After each round the folds found are followed in frequency and damping, or where the modes
         share no damping ratio in frequency and excitation, which are divided and multiplied by up
@@ -91,6 +94,7 @@ class ExploreOptions:
     doubled_points: int | None = None
     passing: int = 0
     pseudo_orbits: int = 0
+    mixtures: int = 10
     fold_factor: float = 1.0
     seed: int = 20
 
@@ -109,6 +113,7 @@ class ExploreOptions:
             check_whole("explore: doubled_points", self.doubled_points, 2, MOST_POINTS)
         check_whole("explore: passing", self.passing, 0, MOST_COUNT)
         check_whole("explore: pseudo_orbits", self.pseudo_orbits, 0, MOST_COUNT)
+        check_whole("explore: mixtures", self.mixtures, 0, MOST_COUNT)
         if not (is_finite(self.fold_factor) and 1.0 <= self.fold_factor <= LARGEST_FACTOR):
             raise SystemModelError(
                 f"explore: fold_factor must lie between 1 and {LARGEST_FACTOR:g}, "
@@ -424,16 +429,22 @@ class Exploration:
         ]
 
     def _beside(self) -> list[str]:
-        """Where pieces of known orbits were put together."""
+        """Where known orbits were mixed, or pieces of them put together."""
         effort = self.question.effort
         longest = min(effort.unstable_period, self.question.max_period)
         turn, steps, length = self.question.place(self.stage.steps)
         way_down_begun = turn > 0 or 2 * steps > length
-        if not (effort.pseudo_orbits and longest and way_down_begun):
+        if not (longest and way_down_begun):
             return []
+        guesses = {
+            f"up to {effort.pseudo_orbits} pseudo-orbits": effort.pseudo_orbits,
+            f"{effort.mixtures} mixtures": effort.mixtures,
+        }
         return [
-            f"beside up to {effort.pseudo_orbits} pseudo-orbits of each length up to {longest} "
-            "orbits were looked for at each frequency on the way down"
+            f"beside {what} of each length up to {longest} orbits were looked for at each "
+            "frequency on the way down"
+            for what, count in guesses.items()
+            if count
         ]
 
     def _cut(self) -> list[str]:

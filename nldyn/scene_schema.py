@@ -376,6 +376,7 @@ class ExploreTable(Table):
     doubled_points: Annotated[int, Field(ge=2, le=1_000_000)] | None = None
     passing: Annotated[int, Field(ge=0, le=1000)] = 0
     pseudo_orbits: Annotated[int, Field(ge=0, le=1_000_000)] = 0
+    mixtures: Annotated[int, Field(ge=0, le=1_000_000)] = 10
     fold_factor: Annotated[float, Field(ge=1, le=100)] = 1.0
     seed: Annotated[int, Field(ge=0, le=2**32)] = 20
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from cms.threads import one_thread
 from nldyn.branch import Branch, is_at
 from nldyn.checkpoint import Checkpoint, begun_before
+from nldyn.crossover import Loops, near_mixtures
 from nldyn.deflation import deflated_orbit
 from nldyn.diagrams import Collector, Diagram, Progress, check_known
 from nldyn.errors import SystemModelError, check_range, check_types, check_whole, shown
@@ -279,8 +280,9 @@ class _Survey:
             seed = (self.effort.seed, turn, place, again + 1)
             starts = _at_random(flow, omega, self.effort.starts, seed)
             here = here.with_more(self._search(starts, known, also_unstable=True)[0])
-        if not up and self.effort.pseudo_orbits and self.effort.unstable_period:
+        if not up and self.effort.unstable_period:
             self._put_together(frequency)
+            self._mix(frequency, (self.effort.seed, turn, place, AGAIN + 2))
         both = {c.frequency_hz: c for c in stage.coverage}
         both[frequency] = both[frequency].with_more(here) if frequency in both else here
         met = self._met(turn + 1)
@@ -428,6 +430,8 @@ class _Survey:
 
     def _put_together(self, frequency_hz: float) -> None:
         """Look for orbits beside pieces of known ones that nearly fit together."""
+        if not self.effort.pseudo_orbits:
+            return
         box, effort, periods = self.box, self.effort, self._unstable_periods()
         found = near_pseudo_orbits(
             box, box.branches, frequency_hz, effort.spacing, periods, effort.pseudo_orbits
@@ -435,6 +439,18 @@ class _Survey:
         for _, orbits in found:
             for orbit in orbits:
                 self._follow(orbit)
+
+    def _mix(self, frequency_hz: float, seed: Sequence[int]) -> None:
+        """Look for orbits beside mixtures of known ones."""
+        box, tries, periods = self.box, self.effort.mixtures, self._unstable_periods()
+        if not (tries and box.branches):
+            return
+        rng = np.random.default_rng(seed)
+        loops = Loops.of(tuple(box.branches), frequency_hz, periods[-1], rng)
+        for period in periods:
+            for _, orbits in near_mixtures(box, loops, frequency_hz, period, tries, rng):
+                for orbit in orbits:
+                    self._follow(orbit)
 
     def _unstable_periods(self) -> range:
         return range(1, min(self.effort.unstable_period, self.max_period) + 1)

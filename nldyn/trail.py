@@ -350,10 +350,9 @@ def _by_halves(
             raise reason
         middle = Chord(a, b).at(0.5)
     except (LocateError, ConvergenceError) as error:
-        hz = sorted(point.orbit.frequency_hz for point in (a, b))
-        return [], [
-            f"special points between {hz[0]:.8g} and {hz[1]:.8g} Hz may be missing: {error}"
-        ]
+        low, high = (f"{hz:.8g}" for hz in sorted(p.orbit.frequency_hz for p in (a, b)))
+        place = f"between {low} and {high}" if low != high else f"near {low}"
+        return [], [f"special points {place} Hz may be missing: {error}"]
     return _in_pieces([a, middle, b], depth + 1)
 
 

@@ -102,7 +102,8 @@ def _search_beside(name: str, folder: Path, way: str, look: Callable[..., Diagra
         kept = place.with_suffix(f".{way}.h5")
         with told_what_is_kept(kept):
             found = look(known, options=LONG, progress=report, checkpoint=kept)
-    write_found(found, job, folder)
+    if len(found.branches) > len(known.branches) or not starts_path(name, folder).exists():
+        write_found(found, job, folder)
     kept.unlink(missing_ok=True)
     return found
 

@@ -162,7 +162,8 @@ def follow_starts(
                 keep(path, found)
         lost += found.lost
     periods = ", ".join(map(str, sorted({start.period for start in starts})))
-    note = f"from {len(starts)} starts of period {periods}, {lost} of which are no orbits"
+    what = f"{lost} of which {'is no orbit' if lost == 1 else 'are no orbits'}"
+    note = f"from {len(starts)} starts of period {periods}, {what if lost else 'each an orbit'}"
     return Diagram(tuple(box.branches), range_hz, observe, (note, *box.notes))
 
 

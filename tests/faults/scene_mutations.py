@@ -94,6 +94,7 @@ doubled_period = 4
 doubled_points = 30
 passing = 2
 pseudo_orbits = 3
+mixtures = 3
 seed = 1
 """
 

@@ -36,6 +36,7 @@ from nldyn import (
 from nldyn.bordered import OrbitFamily
 from nldyn.codimension import along_tori, flip_coefficient, is_torus
 from nldyn.conditions import Singular, bialternate, max_abs_displacement, peak_force
+from nldyn.curve_walk import OTHER_EXTREME
 from nldyn.orbit import Orbit, shooting_problem
 from nldyn.parameter_values import EVERY_MODE, Chart, value_of, with_value
 from nldyn.resources import example
@@ -675,6 +676,31 @@ def test_a_value_far_from_the_starts_is_walked_to(one_dof, times, first):
     )
     assert curve.residuals.max() < 1e-9
     assert [peak_force(o) for o in curve.orbits] == pytest.approx([target] * len(curve.orbits))
+
+
+def test_a_curve_that_ends_where_another_force_gets_as_large_says_so():
+    """Two stops; both are pressed with 50 N at that end, one of them with less at the other."""
+    system = System.from_modal(
+        [11.0, 27.0], {"a": [0.8, 0.5], "b": [0.3, -0.9]}, modal_damping=[0.01, 0.02],
+        stops=[
+            Stop("a", stiffness=2e8, gap=7e-4),
+            Stop("a", against="b", stiffness=1e6, exponent=1.0, gap=1e-3),
+        ],
+        excitation=[Unbalance("a", 2e-4, phase_deg=30.0), HarmonicForce("b", 3.0)],
+    )  # fmt: skip
+    branch = continue_branch(solve_orbit(system, 9.0), (9.0, 20.0))
+    start = min(branch.at(14.4), key=lambda orbit: abs(peak_force(orbit) - 50.0))
+    parameters, window = ("frequency_hz", Parameter("gap", 0)), ((14.3, 14.6), (5.8e-4, 7.2e-4))
+    curve = continue_constant(start, "peak_force", parameters, window, value=50.0)
+    assert sorted(curve.stop_reasons) == sorted([OTHER_EXTREME, "end of the range of gap"])
+    by_end = [forces_by_stop(orbit) for orbit in (curve.orbits[0], curve.orbits[-1])]
+    assert sorted(abs(a / b - 1.0) < 1e-4 for a, b in by_end) == [False, True]
+
+
+def forces_by_stop(orbit):
+    """Largest force at each of two stops, by the motion of a finer orbit."""
+    impacts = finer_orbit(orbit).impact_list
+    return [max((i.force for i in impacts if i.stop == n), default=0.0) for n in (0, 1)]
 
 
 def test_a_force_can_be_asked_for_where_nothing_is_touched_yet():

@@ -118,7 +118,8 @@ def test_a_frequency_is_searched_until_the_indices_of_its_orbits_add_up(monkeypa
 def test_short_motions_pass_unstable_orbits_of_further_branches(monkeypatch):
     """Two modes from 29 to 29.3 Hz, where one motion of 30 periods comes to few of them."""
     monkeypatch.setattr(survey, "AGAIN", 0)
-    system, few = system_of("two_dof_xi_0.01"), ExploreOptions(spacing=0.1, starts=1, settling=30)
+    system = system_of("two_dof_xi_0.01")
+    few = ExploreOptions(spacing=0.1, starts=1, settling=30, mixtures=0)
     without, found = (
         explore(system, (29.0, 29.3), 2, effort=replace(few, passing=n)) for n in (0, 24)
     )
@@ -127,21 +128,29 @@ def test_short_motions_pass_unstable_orbits_of_further_branches(monkeypatch):
         assert [index_sum(found.diagram.branches, hz, n) for n in (1, 2)] == [1, 1]
 
 
-def test_pieces_of_known_orbits_lead_to_further_branches(monkeypatch):
+@pytest.mark.parametrize(
+    ("guesses", "said"),
+    [
+        ({"pseudo_orbits": 200}, "beside up to 200 pseudo-orbits of each length up to 2 orbits"),
+        ({"mixtures": 60}, "beside 60 mixtures of each length up to 2 orbits"),
+    ],
+)
+def test_pieces_and_mixtures_of_known_orbits_lead_to_further_branches(guesses, said, monkeypatch):
     """Two modes from 29 to 29.3 Hz, where one motion of 30 periods comes to few of them."""
     monkeypatch.setattr(survey, "AGAIN", 0)
-    system, few = system_of("two_dof_xi_0.01"), ExploreOptions(spacing=0.1, starts=1, settling=30)
+    system = system_of("two_dof_xi_0.01")
+    few = ExploreOptions(spacing=0.1, starts=1, settling=30, mixtures=0)
     without, found = (
-        explore(system, (29.0, 29.3), 2, effort=replace(few, pseudo_orbits=n)) for n in (0, 200)
+        explore(system, (29.0, 29.3), 2, effort=replace(few, **more)) for more in ({}, guesses)
     )
     assert len(without.diagram.branches) < len(found.diagram.branches)
     for orbit in (b.points[len(b.points) // 2] for b in without.diagram.branches):
         assert any(branch.contains(orbit) for branch in found.diagram.branches)
-    assert "beside up to 200 pseudo-orbits of each length up to 2 orbits" in found.report()
-    assert "pseudo-orbits of each length" not in without.report()
+    assert said in found.report()
+    assert " of each length" not in without.report()
     way_up = replace(found, stage=replace(found.stage, steps=1, ends=()))
     assert "not finished: 1 of " in way_up.report()
-    assert "pseudo-orbits of each length" not in way_up.report()
+    assert " of each length" not in way_up.report()
 
 
 def test_report_tells_what_was_tried(around_37):
@@ -449,7 +458,7 @@ def test_known_branches_of_something_else_are_refused(harmonic):
     with pytest.raises(SystemModelError, match="known: is of 36 to 38 Hz, but 36 to 39 Hz"):
         explore(system_of("one_dof"), (36.0, 39.0), 3, known=harmonic)
     finer = FlowMap(system_of("one_dof"), FlowOptions(rtol=1e-12))
-    with pytest.raises(SystemModelError, match="known: branch 01 harmonic is of another system"):
+    with pytest.raises(SystemModelError, match="known: branch '01 harmonic' is of another system"):
         explore(finer, **QUESTION, known=harmonic)
     with pytest.raises(SystemModelError, match="known must be"):
         explore(system_of("one_dof"), **QUESTION, known=harmonic.branches)
@@ -546,6 +555,7 @@ def test_long_doubled_branches_are_broken_off_where_told(whole):
         ({"doubled_points": 1}, "explore: doubled_points"),
         ({"passing": -1}, "explore: passing"),
         ({"pseudo_orbits": -1}, "explore: pseudo_orbits"),
+        ({"mixtures": 1.5}, "explore: mixtures"),
     ],
 )
 def test_bad_efforts_are_refused_by_name(given, says):

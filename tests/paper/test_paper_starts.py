@@ -63,7 +63,7 @@ def test_what_is_followed_from_starts_is_what_the_search_found(found, tmp_path):
     for branch in found.branches:
         middle = branch.points[len(branch.points) // 2]
         assert sum(other.contains(middle) for other in again.branches) == 1
-    first = f"from {len(starts)} starts of period 1, 2, 3, 0 of which are no orbits"
+    first = f"from {len(starts)} starts of period 1, 2, 3, each an orbit"
     assert again.notes[0] == first
 
 
@@ -170,7 +170,7 @@ def test_what_starts_lead_to_is_kept_when_a_run_is_interrupted(found, monkeypatc
     (other := tmp_path / "other").mkdir()
     once = job.run(1, other)
     assert resumed.notes == once.notes
-    assert resumed.notes[0].endswith(", 1 of which are no orbits")
+    assert resumed.notes[0].endswith(", 1 of which is no orbit")
     assert [branch.name for branch in resumed.branches] == [branch.name for branch in once.branches]
     for branch, same in zip(resumed.branches, once.branches, strict=True):
         assert branch.stop_reasons == same.stop_reasons
@@ -246,7 +246,7 @@ def test_the_command_tells_all_notes(two_known, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["search", str(folder), name, "--detour", *factors])
     main()
     first, *others, last = capsys.readouterr().out.splitlines()
-    assert first == f"{name}: from 2 starts of period 2, 3, 0 of which are no orbits"
+    assert first == f"{name}: from 2 starts of period 2, 3, each an orbit"
     assert any(note.startswith("indices of the fixed points of P to P^3 ") for note in others)
     assert last.startswith("at 0.5 of the damping and 1.01 of natural_frequency_hz[1]: ")
 
