@@ -535,7 +535,7 @@ def test_a_diagram_that_makes_no_sense_is_refused(harmonic, change, message):
 def test_branches_of_two_systems_are_refused(harmonic):
     other = continue_branch(solve_orbit(two_modes(0.02), 10.99), (10.9, 11.0))
     known = replace(harmonic, branches=(*harmonic.branches, replace(other, name="of another")))
-    with pytest.raises(SystemModelError, match="branch of another is of another system"):
+    with pytest.raises(SystemModelError, match="branch 'of another' is of another system"):
         by_detour(known, HALF)
 
 
