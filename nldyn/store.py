@@ -455,7 +455,10 @@ def _read_open_ends(group: Group, orbit: Orbit) -> Real:
     return group.array("open_ends", -1, orbit.point.size)
 
 
-def _read_tally(group: Group) -> Tally:
+def _read_tally(group: Group) -> Tally | None:
+    """None of a version that did not tell how many branches were known, which begins anew."""
+    if not group.has_attribute("known"):
+        return None
     names = "given", "known", "done", "tried", "came"
     given, known, done, tried, came = map(group.whole, names)
     met = frozenset(group.array("met", -1, kind=np.int64).tolist())

@@ -112,6 +112,19 @@ def test_what_it_has_found_is_not_lost_and_changes_nothing_where_it_goes_on(thre
     assert any(branch.period == 2 for branch in found.branches[2:])
 
 
+def test_a_search_of_an_earlier_version_begins_anew(three, way, interrupted):
+    """Its file does not tell how many branches there were when a frequency was begun."""
+    with h5py.File(interrupted, "r+") as file:
+        del file["search"].attrs["known"]
+    tried = Frequencies(way, 1)
+    with pytest.raises(KeyboardInterrupt):
+        WAYS[way](three, progress=tried, checkpoint=interrupted)
+    fresh = Frequencies(way, 1)
+    with pytest.raises(KeyboardInterrupt):
+        WAYS[way](three, progress=fresh)
+    assert tried.tried == fresh.tried
+
+
 def test_a_damaged_place_is_told_by_its_name(three, way, interrupted):
     with h5py.File(interrupted, "r+") as file:
         del file["search"].attrs["done"]
