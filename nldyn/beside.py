@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -13,21 +13,14 @@ import numpy as np
 from nldyn.branch import Branch, check_branches
 from nldyn.checkpoint import checkpoint_of_several
 from nldyn.diagrams import Collector, Diagram, Progress, check_known, counted, middle_orbit
-from nldyn.errors import (
-    SystemModelError,
-    check_range,
-    check_types,
-    check_whole,
-    is_finite,
-    shown,
-)
-from nldyn.exploration import FINEST_SPACING, steps_between
+from nldyn.errors import SystemModelError, check_range, check_types, check_whole
+from nldyn.exploration import check_spacing, steps_between
 from nldyn.fixed_point_index import index_note, is_damped, without_index_note
 from nldyn.orbit import LONGEST_PERIOD, Orbit
 from nldyn.step_control import ContinuationOptions
 from nldyn.tally import Tally
 
-Guesses = Iterable[tuple[set[int], Sequence[Orbit]]]  # branches each was made of, its orbits
+Guesses = Iterator[tuple[set[int], Sequence[Orbit]]]  # branches each was made of, its orbits
 
 
 @dataclass(frozen=True)
@@ -95,7 +88,7 @@ def check_search(
         progress=(progress, Callable, None),
     )
     check_whole("max_period", max_period, 1, LONGEST_PERIOD)
-    check_spacing(spacing)
+    check_spacing("spacing", spacing)
     check_branches("known: branches", known.branches)
     if not known.branches:
         raise SystemModelError("known: has no branches to begin with")
@@ -115,14 +108,6 @@ def range_within(
             f"({known[0]:g}, {known[1]:g})"
         )
     return low, high
-
-
-def check_spacing(spacing: float) -> None:
-    """Raise unless this may be a relative distance of frequencies."""
-    if not (is_finite(spacing) and FINEST_SPACING <= spacing < 1.0):
-        raise SystemModelError(
-            f"spacing must lie between {FINEST_SPACING:g} and 1, got {shown(spacing)}"
-        )
 
 
 def collector_beside(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cms.threads import one_thread
-from nldyn.beside import Wanted, check_search, collector_beside, search_beside
+from nldyn.beside import Guesses, Wanted, check_search, collector_beside, search_beside
 from nldyn.branch import Branch
 from nldyn.diagrams import Collector, Diagram, Progress
 from nldyn.errors import check_whole
@@ -114,29 +114,33 @@ def by_crossover(
     check_whole("seed", seed, 0)
     box = collector_beside(known, options, progress, checkpoint)
 
-    def near(place: int, branches: Sequence[Branch]) -> Iterator[tuple[set[int], list[Orbit]]]:
+    def near(place: int, branches: Sequence[Branch]) -> Guesses:
         rng, frequency_hz = np.random.default_rng([seed, place]), wanted.frequencies[place]
-        loops = Loops.of(branches, frequency_hz, max_period, rng)
-        for period in wanted.periods:
-            yield from near_mixtures(box, loops, frequency_hz, period, tries, rng)
+        return near_mixtures(box, branches, frequency_hz, wanted.periods, tries, rng)
 
     return search_beside(box, wanted, "mixtures", f"{tries} each, seed {seed}", near)
 
 
 def near_mixtures(
     box: Collector,
-    loops: Loops,
+    branches: Sequence[Branch],
     frequency_hz: float,
-    period: int,
+    periods: Sequence[int],
     tries: int,
     rng: np.random.Generator,
-) -> Iterator[tuple[set[int], list[Orbit]]]:
-    """Mixtures of two orbits: their branches, and the orbit near by, unless out of the range."""
+) -> Guesses:
+    """Mixtures of each length at a frequency: their branches, and the orbit near by.
+
+    None of an orbit that is out of the range.
+    """
+    loops = Loops.of(branches, frequency_hz, periods[-1], rng)
     omega = 2.0 * math.pi * frequency_hz
-    for _ in range(tries):
-        box.progress("mixtures", frequency_hz)
-        used, nodes = loops.mixture(period, rng)
-        yield used, box.within([nearest_orbit(box.flow, nodes, omega, box.observe, SHORT_STEPS)])
+    for period in periods:
+        for _ in range(tries):
+            box.progress("mixtures", frequency_hz)
+            used, nodes = loops.mixture(period, rng)
+            orbit = nearest_orbit(box.flow, nodes, omega, box.observe, SHORT_STEPS)
+            yield used, box.within([orbit])
 
 
 @dataclass(frozen=True, eq=False)

@@ -99,11 +99,7 @@ class ExploreOptions:
     seed: int = 20
 
     def __post_init__(self) -> None:
-        if not (is_finite(self.spacing) and FINEST_SPACING <= self.spacing < 1.0):
-            raise SystemModelError(
-                f"explore: spacing must lie between {FINEST_SPACING:g} and 1, "
-                f"got {shown(self.spacing)}"
-            )
+        check_spacing("explore: spacing", self.spacing)
         check_whole("explore: starts", self.starts, 1, MOST_COUNT)
         check_whole("explore: rounds", self.rounds, 1, MOST_COUNT)
         check_whole("explore: settling", self.settling, 1, MOST_COUNT)
@@ -503,6 +499,14 @@ def chao_lower_bound(counts: Sequence[int], rounds: int) -> float:
         return math.nan
     once, twice = counts.count(1), counts.count(2)
     return (rounds - 1) / rounds * once * max(once - 1, 0) / (2.0 * (twice + 1))
+
+
+def check_spacing(name: str, spacing: object) -> None:
+    """Raise unless this may be a relative distance of frequencies."""
+    if not (is_finite(spacing) and FINEST_SPACING <= spacing < 1.0):
+        raise SystemModelError(
+            f"{name} must lie between {FINEST_SPACING:g} and 1, got {shown(spacing)}"
+        )
 
 
 def steps_between(low: float, high: float, spacing: float) -> int:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 
 from cms.threads import one_thread
-from nldyn.beside import Wanted, check_search, collector_beside, search_beside
+from nldyn.beside import Guesses, Wanted, check_search, collector_beside, search_beside
 from nldyn.branch import Branch
 from nldyn.diagrams import Collector, Diagram, Progress
 from nldyn.errors import check_whole
-from nldyn.orbit import SEGMENTS_PER_PERIOD, Orbit
+from nldyn.orbit import SEGMENTS_PER_PERIOD
 from nldyn.pseudo_orbits import NODES, Pieces
 from nldyn.search import LONG_STEPS, MOST_COUNT, SHORT_STEPS, nearest_orbit
 from nldyn.step_control import ContinuationOptions
@@ -106,7 +106,7 @@ def by_pseudo_orbits(
     check_whole("tries", tries, 1, MOST_COUNT)
     box = collector_beside(known, options, progress, checkpoint)
 
-    def near(place: int, branches: Sequence[Branch]) -> Iterator[tuple[set[int], list[Orbit]]]:
+    def near(place: int, branches: Sequence[Branch]) -> Guesses:
         frequency_hz = wanted.frequencies[place]
         return near_pseudo_orbits(box, branches, frequency_hz, spacing, wanted.periods, tries)
 
@@ -120,7 +120,7 @@ def near_pseudo_orbits(
     spacing: float,
     periods: Sequence[int],
     tries: int,
-) -> Iterator[tuple[set[int], list[Orbit]]]:
+) -> Guesses:
     """Pseudo-orbits of each length at a frequency: their branches, and orbits near by.
 
     Those that long steps between few states lead to, and short steps between many, unless they are

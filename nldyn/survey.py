@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cms.threads import one_thread
+from nldyn.beside import Guesses
 from nldyn.branch import Branch, is_at
 from nldyn.checkpoint import Checkpoint, begun_before
-from nldyn.crossover import Loops, near_mixtures
+from nldyn.crossover import near_mixtures
 from nldyn.deflation import deflated_orbit
 from nldyn.diagrams import Collector, Diagram, Progress, check_known
 from nldyn.errors import SystemModelError, check_range, check_types, check_whole, shown
@@ -436,9 +437,7 @@ class _Survey:
         found = near_pseudo_orbits(
             box, box.branches, frequency_hz, effort.spacing, periods, effort.pseudo_orbits
         )
-        for _, orbits in found:
-            for orbit in orbits:
-                self._follow(orbit)
+        self._follow_all(found)
 
     def _mix(self, frequency_hz: float, seed: Sequence[int]) -> None:
         """Look for orbits beside mixtures of known ones."""
@@ -446,11 +445,13 @@ class _Survey:
         if not (tries and box.branches):
             return
         rng = np.random.default_rng(seed)
-        loops = Loops.of(tuple(box.branches), frequency_hz, periods[-1], rng)
-        for period in periods:
-            for _, orbits in near_mixtures(box, loops, frequency_hz, period, tries, rng):
-                for orbit in orbits:
-                    self._follow(orbit)
+        self._follow_all(near_mixtures(box, box.branches, frequency_hz, periods, tries, rng))
+
+    def _follow_all(self, guesses: Guesses) -> None:
+        """Follow the orbits that guesses led to."""
+        for _, orbits in guesses:
+            for orbit in orbits:
+                self._follow(orbit)
 
     def _unstable_periods(self) -> range:
         return range(1, min(self.effort.unstable_period, self.max_period) + 1)

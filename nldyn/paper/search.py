@@ -24,15 +24,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from nldyn.beside import check_spacing, range_within
+from nldyn.beside import range_within
 from nldyn.cli import plain_errors, told_what_is_kept
 from nldyn.command import answering
 from nldyn.crossover import by_crossover
 from nldyn.detour import checked_factors
 from nldyn.detour_search import by_detour
 from nldyn.diagrams import Diagram, Progress
-from nldyn.errors import SystemModelError, check_range, check_whole
-from nldyn.exploration import Exploration, ExploreOptions
+from nldyn.errors import SystemModelError, check_whole
+from nldyn.exploration import Exploration, ExploreOptions, check_spacing
 from nldyn.flow import flow_of, same_flow
 from nldyn.paper.jobs import JOBS, LONG, Job, job_named
 from nldyn.paper.starts import (
@@ -187,11 +187,11 @@ def numbers_of(given: argparse.Namespace) -> dict[str, Any]:
     shortest, longest = given.periods or (1, LONGEST)
     check_whole("--periods: the longest", longest, 1, LONGEST)
     check_whole("--periods: the shortest", shortest, 1, longest)
-    numbers = {"min_period": shortest, "max_period": longest}
+    numbers: dict[str, Any] = {"min_period": shortest, "max_period": longest}
     if given.range:
-        numbers["range_hz"] = check_range(tuple(given.range))
+        numbers["range_hz"] = tuple(given.range)
     if given.spacing is not None:
-        check_spacing(given.spacing)
+        check_spacing("spacing", given.spacing)
         numbers["spacing"] = given.spacing
     if given.tries is not None:
         check_whole("--tries", given.tries, 1, MOST_COUNT)
@@ -253,8 +253,8 @@ def main() -> None:
             range_within(job_named(name).range_hz, numbers.get("range_hz"))
     except SystemModelError as error:
         parser.error(str(error))
+    beside = given.pseudo_orbits or given.crossover is not None
     for option in ("range", "periods", "spacing", "tries"):
-        beside = given.pseudo_orbits or given.crossover is not None
         if getattr(given, option) is not None and not beside:
             parser.error(f"argument --{option}: goes with --pseudo-orbits or --crossover only")
     try:
