@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from nldyn.basin_maps import Basins, Plane, basins
     from nldyn.branch import Branch, BranchPoint, SpecialPoint
     from nldyn.cascades import Cascade, cascade, cascades_in
+    from nldyn.closed_walks import by_closed_walks
     from nldyn.contacts import Impacts, impacts
     from nldyn.continuation import continue_branch
     from nldyn.convergence import Study, converge
@@ -86,6 +87,7 @@ _HOMES = {
     "basin_maps": "Basins Plane basins",
     "branch": "Branch BranchPoint SpecialPoint",
     "cascades": "Cascade cascade cascades_in",
+    "closed_walks": "by_closed_walks",
     "continuation": "continue_branch",
     "convergence": "Study converge",
     "crossover": "by_crossover",
@@ -183,6 +185,7 @@ __all__ = [
     "basin_edge",
     "basins",
     "brute_force",
+    "by_closed_walks",
     "by_crossover",
     "by_detour",
     "by_pseudo_orbits",

@@ -141,6 +141,7 @@ def search_beside(
     what: str,
     numbers: str,
     near: Callable[[int, Sequence[Branch]], Guesses],
+    from_others: str = " from others",
 ) -> Diagram:
     """Follow the orbits that lie on no branch, found near one frequency after the other.
 
@@ -160,6 +161,8 @@ def search_beside(
     near : callable
         Gives the guesses at the frequency of a number, and their orbits, from the branches that
         were known when it was begun.
+    from_others : str
+        How branches known are met: only by what was made of others, if of any.
     """
     max_period = wanted.periods[-1]
     with box.checkpoint:
@@ -169,7 +172,7 @@ def search_beside(
     new = counted(box.branches[len(wanted.known.branches) :])
     note = (
         f"{tally.came} of {tally.tried} {what} led to an orbit, and to {len(tally.met)} of the "
-        f"{tally.given} given from others, {new} beside those given"
+        f"{tally.given} given{from_others}, {new} beside those given"
     )
     return diagram_of(box, max_period, note)
 

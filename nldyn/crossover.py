@@ -170,13 +170,13 @@ class Loops:
 
         Of more that reach the frequency, some at random.
         """
-        away = [_distance(branch.frequency_hz, frequency_hz) for branch in branches]
+        away = [relative_distance(branch.frequency_hz, frequency_hz) for branch in branches]
         longer = [branch.period > longest for branch in branches]
         order = np.lexsort((rng.permutation(len(branches)).tolist(), away, longer))
         rows = [
             (index, nodes_of(orbit))
             for index in order[:NEIGHBOURS].tolist()
-            for orbit in _orbits_near(branches[index], frequency_hz)
+            for orbit in orbits_near(branches[index], frequency_hz)
         ]
         return cls(np.array([index for index, _ in rows]), [nodes for _, nodes in rows])
 
@@ -188,13 +188,13 @@ class Loops:
         return set(self.branch[chosen].tolist()), (1.0 - share) * first + share * last
 
 
-def _distance(reached: Real, frequency_hz: float) -> float:
+def relative_distance(reached: Real, frequency_hz: float) -> float:
     """How far, relatively, a branch ends from a frequency; zero if it does not."""
     low, high = math.log(reached.min() / frequency_hz), math.log(reached.max() / frequency_hz)
     return max(0.0, low, -high)
 
 
-def _orbits_near(branch: Branch, frequency_hz: float) -> list[Orbit]:
+def orbits_near(branch: Branch, frequency_hz: float) -> list[Orbit]:
     """A few orbits of a branch of about a frequency, or the nearest one."""
     away = np.abs(np.log(branch.frequency_hz / frequency_hz))
     near = np.flatnonzero(away <= max(WINDOW, float(away.min())))

@@ -5,12 +5,13 @@ kept with the package, it finds others, writes the starts of all into the direct
 many may be missing. With ``--detour damping=0.5 "natural_frequency_hz[1]=0.99"`` at the end, say,
 it does not simulate, but goes by way of a system with these factors, see `by_detour`; with
 ``--pseudo-orbits`` it puts pieces of known orbits together, see `by_pseudo_orbits`; with
-``--crossover 3`` it mixes known orbits, with the seed 3, see `by_crossover`; either at the
-frequencies and of the periods given: ``--range 18 20.5 --periods 3 3 --spacing 0.003 --tries 700``,
-say. The directory keeps
-what is found, and the same command goes on where it was interrupted (but for following the starts,
-and for a detour, which keeps its branches only); once it has ended, it looks for more beside what
-it has found, from other random states, with ``--crossover`` if the seed is another.
+``--crossover 3`` it mixes known orbits, with the seed 3, see `by_crossover`; with
+``--closed-walks 3`` it puts pieces of random motions together, see `by_closed_walks`; any of these
+three at the frequencies and of the periods given: ``--range 18 20.5 --periods 3 3 --spacing 0.003
+--tries 700``, say. The directory keeps what is found, and the same command goes on where it was
+interrupted (but for following the starts, and for a detour, which keeps its branches only); once it
+has ended, it looks for more beside what it has found, from other random states, with a seed if that
+is another.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from typing import Any
 
 from nldyn.beside import range_within
 from nldyn.cli import plain_errors, told_what_is_kept
+from nldyn.closed_walks import by_closed_walks
 from nldyn.command import answering
 from nldyn.crossover import by_crossover
 from nldyn.detour import checked_factors
@@ -92,6 +94,11 @@ def search_by_pseudo_orbits(name: str, folder: Path, **numbers: Any) -> Diagram:
 def search_by_crossover(name: str, folder: Path, **numbers: Any) -> Diagram:
     """Look for branches of a model with `by_crossover`, and write the starts of all."""
     return _search_beside(name, folder, "crossover", partial(by_crossover, **numbers))
+
+
+def search_by_closed_walks(name: str, folder: Path, **numbers: Any) -> Diagram:
+    """Look for branches of a model with `by_closed_walks`, and write the starts of all."""
+    return _search_beside(name, folder, "closed_walks", partial(by_closed_walks, **numbers))
 
 
 def _search_beside(name: str, folder: Path, way: str, look: Callable[..., Diagram]) -> Diagram:
@@ -219,7 +226,13 @@ def parser_of_command() -> argparse.ArgumentParser:
         metavar="SEED",
         help="mix known orbits; another seed tries others",
     )
-    beside = parser.add_argument_group("of either of the last two")
+    way.add_argument(
+        "--closed-walks",
+        type=seed_of,
+        metavar="SEED",
+        help="put pieces of random motions together; another seed tries others",
+    )
+    beside = parser.add_argument_group("of any of the last three")
     beside.add_argument(
         "--range", type=float, nargs=2, metavar=("LOW", "HIGH"), help="frequencies in Hz"
     )
@@ -253,10 +266,11 @@ def main() -> None:
             range_within(job_named(name).range_hz, numbers.get("range_hz"))
     except SystemModelError as error:
         parser.error(str(error))
-    beside = given.pseudo_orbits or given.crossover is not None
+    beside = given.pseudo_orbits or given.crossover is not None or given.closed_walks is not None
     for option in ("range", "periods", "spacing", "tries"):
         if getattr(given, option) is not None and not beside:
-            parser.error(f"argument --{option}: goes with --pseudo-orbits or --crossover only")
+            ways = "--pseudo-orbits, --crossover and --closed-walks"
+            parser.error(f"argument --{option}: goes only with {ways}")
     try:
         given.directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -280,6 +294,8 @@ def said(
         found = search_by_pseudo_orbits(name, folder, **numbers)
     elif given.crossover is not None:
         found = search_by_crossover(name, folder, seed=given.crossover, **numbers)
+    elif given.closed_walks is not None:
+        found = search_by_closed_walks(name, folder, seed=given.closed_walks, **numbers)
     else:
         return search(name, folder).report()
     return "\n".join(found.notes)

@@ -12,7 +12,7 @@ from one_dof import THREE_HZ
 
 from nldyn import SystemModelError, by_crossover, index_sum
 from nldyn.beside import collector_beside
-from nldyn.crossover import BEYOND, NEIGHBOURS, PLACES, WINDOW, Loops, _orbits_near, near_mixtures
+from nldyn.crossover import BEYOND, NEIGHBOURS, PLACES, WINDOW, Loops, near_mixtures, orbits_near
 from nldyn.exploration import steps_between
 from nldyn.pseudo_orbits import NODES
 
@@ -123,7 +123,7 @@ def loops_of(branches, frequency_hz, longest=3, seed=0):
 
 def test_loops_are_motions_over_the_period_of_the_orbit(three):
     for branch in three.branches:
-        loops, orbits = loops_of([branch], 36.5), _orbits_near(branch, 36.5)
+        loops, orbits = loops_of([branch], 36.5), orbits_near(branch, 36.5)
         assert len(loops.nodes) == len(orbits) > 1
         for nodes, orbit in zip(loops.nodes, orbits, strict=True):
             assert nodes.shape == (branch.period, NODES, 2)
@@ -152,7 +152,7 @@ def test_branches_of_longer_periods_than_wanted_are_mixed_last(three):
         assert set(mixed) == wanted
 
 
-def test_of_a_branch_its_orbits_near_the_frequency_are_mixed_or_else_the_nearest(three):
+def test_of_a_branch_itsorbits_near_the_frequency_are_mixed_or_else_the_nearest(three):
     (third,) = three.of_period(3)
     assert len(loops_of([third], 37.0).nodes) == PLACES
     far = third.frequency_hz.max() * (1.0 + 2.0 * WINDOW)

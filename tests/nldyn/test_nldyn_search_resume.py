@@ -13,6 +13,7 @@ from nldyn import (
     ContinuationOptions,
     Diagram,
     SystemModelError,
+    by_closed_walks,
     by_crossover,
     by_pseudo_orbits,
     load_branches,
@@ -20,6 +21,7 @@ from nldyn import (
 
 Search = Callable[..., Diagram]
 WAYS: dict[str, Search] = {
+    "closed walks": partial(by_closed_walks, states=50, tries=4, spacing=0.006, seed=1),
     "mixtures": partial(by_crossover, tries=4, spacing=0.006, seed=1),
     "pseudo-orbits": partial(by_pseudo_orbits, tries=2, spacing=0.006),
 }

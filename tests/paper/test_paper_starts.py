@@ -208,16 +208,20 @@ def test_pseudo_orbits_give_starts(two_known, monkeypatch, capsys):
     assert len(read_starts(name, folder)) == 2 + added > 2
 
 
-def test_mixtures_give_starts(two_known, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("way", "what"), [("crossover", "mixtures"), ("closed-walks", "closed walks")]
+)
+def test_guesses_give_starts(way, what, two_known, monkeypatch, capsys):
     name, folder = two_known
-    command = ["search", str(folder), name, "--crossover", "3", "--range", "35.6", "35.95"]
+    command = ["search", str(folder), name, f"--{way}", "3", "--range", "35.6", "35.95"]
     numbers = ["--periods", "1", "2", "--spacing", "0.005", "--tries", "30"]
     monkeypatch.setattr("sys.argv", command + numbers)
     main()
     last = capsys.readouterr().out.splitlines()[-1]
     tried = 2 * 30 * steps_between(35.6, 35.95, 0.005)
-    assert f" of {tried} mixtures led to an orbit" in last
-    added = int(re.search(r"others, (\d+) branch(es)? beside those given", last)[1])
+    assert f" {what} led to an orbit" in last
+    assert 0 < int(re.search(r" of (\d+) ", last)[1]) <= tried
+    added = int(re.search(r", (\d+) branch(es)? beside those given", last)[1])
     assert len(read_starts(name, folder)) == 2 + added > 2
 
 
@@ -278,7 +282,10 @@ def test_branches_of_another_model_are_refused(two_known):
         (["natural_frequency_hz[2]=2"], "there is no mode 2"),
         (["modal_damping[-1]=1"], "that of modal_damping of all modes must be a number"),
         (["nonsense=2"], "'nonsense' is none of damping, "),
-        (["damping=0.5", "--tries", "3"], "--tries: goes with --pseudo-orbits or --crossover only"),
+        (
+            ["damping=0.5", "--tries", "3"],
+            "--tries: goes only with --pseudo-orbits",
+        ),
     ],
 )
 def test_detours_that_make_no_sense_are_refused(two_known, given, message, monkeypatch, capsys):

@@ -1,0 +1,152 @@
+"""Orbits are found beside closed walks among random states."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from one_dof import make_one_dof
+
+from nldyn import SystemModelError, by_closed_walks, index_sum
+from nldyn.closed_walks import NEIGHBOURS, Cloud, StateGraph
+from nldyn.flow import FlowMap
+from nldyn.system import System
+
+OMEGA = 2.0 * np.pi * 37.0
+
+
+def test_from_one_branch_all_others_are_found(three):
+    """The harmonic tells where states lie, no more: the others resemble it in nothing."""
+    (harmonic,) = three.of_period(1)
+    done = by_closed_walks(replace(three, branches=(harmonic,)), states=1000, tries=50)
+    assert sorted(branch.period for branch in done.branches) == [1, 2, 3]
+    for wanted in three.branches:
+        (found,) = done.of_period(wanted.period)
+        assert all(wanted.contains(orbit) for orbit in found.points)
+    assert done.notes[-1].endswith("to 1 of the 1 given, 2 branches beside those given")
+    assert [index_sum(done.branches, 36.5, n) for n in (1, 2, 3)] == [1, 1, 1]
+
+
+def test_what_is_known_is_met_and_not_found_again(three):
+    done = by_closed_walks(three, states=1000, tries=50, spacing=0.02)
+    assert done.branches == three.branches
+    assert done.notes[-1].endswith("to 3 of the 3 given, 0 branches beside those given")
+
+
+def test_only_the_periods_and_frequencies_wanted_are_tried(three):
+    tried = set()
+    done = by_closed_walks(
+        three, min_period=2, max_period=2, range_hz=(37.2, 38.0), tries=3, spacing=0.005,
+        states=500, progress=lambda what, hz: tried.add(hz),
+    )  # fmt: skip
+    assert 37.2 < min(tried) < max(tried) < 38.0
+    assert f" of {3 * len(tried)} closed walks led to" in done.notes[-1]
+    assert " of the 1 given, " in done.notes[-1]  # period 3 ends below
+
+
+def test_the_same_seed_gives_the_same_and_another_one_other_walks(three):
+    notes = [by_closed_walks(three, states=200, tries=20, seed=n).notes[-1] for n in (1, 1, 2)]
+    assert notes[0] == notes[1] != notes[2]
+
+
+def graph_of(count=400, seed=0):
+    """Of the 1-DOF model, with its cloud."""
+    flow, rng = FlowMap(make_one_dof()), np.random.default_rng(seed)
+    cloud = Cloud.of(flow.system, 1e-5 * rng.standard_normal((50, 2)))
+    return flow, cloud, StateGraph.of(flow, OMEGA, cloud, count, rng)
+
+
+def test_edges_go_to_the_states_nearest_to_the_image():
+    flow, cloud, graph = graph_of()
+    for state, successors in zip(graph.states, graph.successors, strict=True):
+        image = flow.strobe(state, OMEGA, 1).ends[0]
+        off = np.linalg.norm(cloud.scaled(graph.states - image), axis=1)
+        assert set(successors) == set(np.argsort(off)[:NEIGHBOURS])
+
+
+def test_of_few_states_all_are_near():
+    _, _, graph = graph_of(count=3)
+    assert graph.successors.shape == (3, 3)
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 5])
+def test_walks_follow_edges_and_close(length):
+    """One through each state through which the powers of the matrix of the edges count any."""
+    graph = graph_of()[2]
+    walks = list(graph.closed_walks(length, np.random.default_rng(0)))
+    for walk in walks:
+        assert len(walk) == length
+        for at, after in zip(walk, walk[1:] + walk[:1], strict=True):
+            assert after in graph.successors[at]
+    edges = np.zeros((400, 400))
+    np.put_along_axis(edges, graph.successors, 1.0, axis=1)
+    through = np.diag(np.linalg.matrix_power(edges, length))
+    assert sorted(walk[0] for walk in walks) == np.flatnonzero(through).tolist()
+
+
+def test_each_closed_walk_through_a_state_is_as_likely_as_another():
+    """Of three edges; the scatter of 4000 of them is that of equal chances."""
+    successors = np.array([[0, 1], [2, 3], [0, 1], [0, 2]])
+    graph = StateGraph(np.zeros((4, 2)), successors)
+    rng = np.random.default_rng(0)
+    walks = [w for _ in range(4000) for w in graph.closed_walks(3, rng) if w[0] == 0]
+    counts = Counter(map(tuple, walks))
+    wanted = {(0, b, c) for b in successors[0] for c in successors[b] if 0 in successors[c]}
+    assert set(counts) == wanted
+    assert len(wanted) > 2
+    share = len(walks) / len(wanted)
+    assert max(abs(count - share) for count in counts.values()) < 5.0 * np.sqrt(share)
+
+
+def test_random_states_have_the_mean_and_covariance_of_those_known():
+    rng = np.random.default_rng(1)
+    mix = np.array([[3.0, 0.0, 0.0, 0.0], [2.0, 0.1, 0.0, 0.0], [0, 0, 1.0, 0], [0, 0, 0, 1e-2]])
+    known = rng.standard_normal((300, 4)) @ mix.T + np.array([1.0, -2.0, 0.0, 5.0])
+    system = System.from_modal([10.0, 20.0], {"tip": [1.0, 1.0]}, modal_damping=0.1)
+    cloud = Cloud.of(system, known)
+    states = cloud.scaled(cloud.states(40_000, rng) - known.mean(axis=0))
+    assert np.abs(states.mean(axis=0)).max() < 5.0 / np.sqrt(40_000)
+    assert np.abs(np.cov(states.T) - np.eye(4)).max() < 5.0 * np.sqrt(2.0 / 40_000)
+    inside = cloud.scaled(known - known.mean(axis=0))
+    assert np.abs(np.cov(inside.T, bias=True) - np.eye(4)).max() < 1e-3
+
+
+def test_random_states_are_no_deeper_in_a_stop_than_those_known():
+    system, rng = make_one_dof(), np.random.default_rng(0)
+    (stop,) = system.stops
+    row = system.displacement_row(system.stop_vector(stop))
+    known = 1e-5 * rng.standard_normal((100, 2))
+    for allowed in (known[known @ row < 0.0], known):
+        deepest = max(0.0, float((allowed @ row).max()))
+        reached = (Cloud.of(system, allowed).states(5000, rng) @ row).max()
+        assert 0.5 * deepest <= reached <= deepest or reached <= 0.0 == deepest
+
+
+@pytest.mark.parametrize("known", [np.zeros((5, 2)), np.ones((5, 2))])
+def test_states_that_are_all_alike_give_others_near_them(known):
+    states = Cloud.of(make_one_dof(), known).states(50, np.random.default_rng(0))
+    assert np.ptp(states, axis=0).min() > 0.0
+    assert np.abs(states - known[0]).max() < 1e-2 * (np.abs(known).max() or 1.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"states": 0}, "states must be"),
+        ({"states": 10.5}, "states must be"),
+        ({"tries": 0}, "tries must be"),
+        ({"seed": -1}, "seed must be"),
+        ({"max_period": 0}, "max_period must be"),
+        ({"range_hz": (30.0, 37.0)}, r"\(30, 37\) must lie within that of .*, \(36, 38.5\)"),
+        ({"spacing": 0.0}, "spacing must lie between 1e-06 and 1, got 0"),
+        ({"known": None}, "known must be a Diagram"),
+        ({"progress": 3}, "progress must be"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(three, change, message):
+    known = change.get("known", three)
+    options = {key: value for key, value in change.items() if key != "known"}
+    with pytest.raises(SystemModelError, match=message):
+        by_closed_walks(known, **options)
