@@ -29,8 +29,8 @@ FEWEST, UNDAMPED = 30, 600  # periods of it: at least, and where nothing decays
 FINEST_SPACING = 1e-6
 CAN_BE_MISSING = (
     "may be missing all the same: isolas that no motion came near, and what is stable in small "
-    "basins or between two frequencies; another seed, more rounds, by_crossover, "
-    "by_pseudo_orbits or by_detour may find them"
+    "basins or between two frequencies; another seed, more rounds, "
+    "by_closed_walks, by_crossover, by_pseudo_orbits or by_detour may find them"
 )
 LARGEST_FACTOR = 100.0  # by which a parameter is changed in search of folds
 
