@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,9 +17,13 @@ from nldyn.diagrams import Collector, Diagram, Progress, check_known, counted, m
 from nldyn.errors import SystemModelError, check_range, check_types, check_whole
 from nldyn.exploration import check_spacing, steps_between
 from nldyn.fixed_point_index import index_note, is_damped, without_index_note
+from nldyn.linear import Real
 from nldyn.orbit import LONGEST_PERIOD, Orbit
 from nldyn.step_control import ContinuationOptions
 from nldyn.tally import Tally
+
+PLACES = 6  # orbits of a branch near a frequency
+WINDOW = 0.03  # relative distance of their frequencies, unless a branch has none so near
 
 Guesses = Iterator[tuple[set[int], Sequence[Orbit]]]  # branches each was made of, its orbits
 
@@ -141,7 +146,6 @@ def search_beside(
     what: str,
     numbers: str,
     near: Callable[[int, Sequence[Branch]], Guesses],
-    from_others: str = " from others",
 ) -> Diagram:
     """Follow the orbits that lie on no branch, found near one frequency after the other.
 
@@ -161,8 +165,6 @@ def search_beside(
     near : callable
         Gives the guesses at the frequency of a number, and their orbits, from the branches that
         were known when it was begun.
-    from_others : str
-        How branches known are met: only by what was made of others, if of any.
     """
     max_period = wanted.periods[-1]
     with box.checkpoint:
@@ -172,7 +174,7 @@ def search_beside(
     new = counted(box.branches[len(wanted.known.branches) :])
     note = (
         f"{tally.came} of {tally.tried} {what} led to an orbit, and to {len(tally.met)} of the "
-        f"{tally.given} given{from_others}, {new} beside those given"
+        f"{tally.given} given, {new} beside those given"
     )
     return diagram_of(box, max_period, note)
 
@@ -221,6 +223,20 @@ def _digest(wanted: Wanted, options: ContinuationOptions) -> str:
     for branch in wanted.known.branches:
         digest.update(branch.frequency_hz.tobytes())
     return digest.hexdigest()[:16]
+
+
+def relative_distance(reached: Real, frequency_hz: float) -> float:
+    """How far, relatively, a branch ends from a frequency; zero if it does not."""
+    low, high = math.log(reached.min() / frequency_hz), math.log(reached.max() / frequency_hz)
+    return max(0.0, low, -high)
+
+
+def orbits_near(branch: Branch, frequency_hz: float) -> list[Orbit]:
+    """A few orbits of a branch of about a frequency, or the nearest one."""
+    away = np.abs(np.log(branch.frequency_hz / frequency_hz))
+    near = np.flatnonzero(away <= max(WINDOW, float(away.min())))
+    places = np.linspace(0.0, near.size - 1.0, min(PLACES, near.size))
+    return [branch.points[near[round(place)]] for place in places.tolist()]
 
 
 def inner_frequencies(range_hz: tuple[float, float], spacing: float) -> list[float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import islice
 from pathlib import Path
 
@@ -14,16 +15,23 @@ from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
 from cms.threads import one_thread
-from nldyn.beside import Guesses, Wanted, check_search, collector_beside, search_beside
+from nldyn.beside import (
+    WINDOW,
+    Guesses,
+    Wanted,
+    check_search,
+    collector_beside,
+    orbits_near,
+    relative_distance,
+    search_beside,
+)
 from nldyn.branch import Branch
-from nldyn.crossover import WINDOW, orbits_near, relative_distance
 from nldyn.diagrams import Collector, Diagram, Progress
-from nldyn.errors import check_whole
+from nldyn.errors import SystemModelError, check_whole
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
 from nldyn.orbit import (
     SEGMENTS_PER_PERIOD,
-    ConvergenceError,
     shooting_problem,
     spread,
     stroboscopic,
@@ -35,15 +43,18 @@ from nldyn.search import (
     random_states,
     reach,
     simulate,
+    stop_rows,
 )
 from nldyn.step_control import ContinuationOptions
 from nldyn.system import System
 
 NEIGHBOURS = 20  # states near an image to which a walk may go on
-MOTIONS = 10  # from random states, whose later states are like those looked for
+MOTIONS = 10  # from rest and from random states, that help to tell where states may lie
 MOTION_PERIODS = 10, 10  # before these, and of these
-NARROWEST = 1e-3  # least standard deviation in any direction, over that without correlation
+NARROWEST = 1e-3  # standard deviation added in each coordinate, over its own
+LEAST = 1e-6  # and over the size of all
 AT_ONCE = 32  # states from which walks are counted together
+MOST_NUMBERS = 10**8  # of their counts: states times the longest period
 
 
 @one_thread()
@@ -69,10 +80,12 @@ def by_closed_walks(
     hyperbolic set an orbit is near every one whose jumps are small [Bowen 1975]; from there the
     Gauss-Newton method [Allgower and Georg 1990, chapter 3] goes to the nearest orbit, at a
     frequency that it finds. If that lies on no known branch, its branch is followed, with what it
-    leads to. Known orbits, and a few motions, only tell where states may lie: these have their mean
-    and covariance, and are no deeper in a stop. So nothing has to resemble an orbit that is known,
-    nor to be near a motion that settles; orbits are met the less often the less stable they are,
-    and many modes need many states. Flips of the branches given are not followed.
+    leads to. Known orbits near the frequency, and ten motions of ten periods, only tell where
+    states may lie: these have their mean and covariance, by which nearness is measured, and are no
+    deeper in a stop than the deepest of them, or than a standard deviation beyond the mean. So an
+    orbit need not resemble a known one, nor need a motion come near it; orbits are met the less
+    often the less stable they are, and many modes need many states. Flips of the branches given are
+    not followed.
 
     Parameters
     ----------
@@ -105,9 +118,11 @@ def by_closed_walks(
     -------
     Diagram
         The branches known, then those found. The last note tells what was tried, and to how many of
-        the branches given, of these periods and frequencies, walks led: about so many it would have
-        found, had they been unknown. The note before tells, if every mode is damped, whether the
-        indices add up to one, see `index_sum`. What `known` notes of them is left out.
+        the branches given, of these periods and frequencies, walks led. Had they been unknown, it
+        would have found about so many, though their orbits have helped to place the states: that
+        all were met is no proof that there are no others. The note before tells, if every mode is
+        damped, whether the indices add up to one, see `index_sum`. What `known` notes of them is
+        left out.
 
     Raises
     ------
@@ -133,6 +148,10 @@ def by_closed_walks(
     check_whole("states", states, 1, MOST_COUNT)
     check_whole("tries", tries, 1, MOST_COUNT)
     check_whole("seed", seed, 0)
+    if states * max_period > MOST_NUMBERS:
+        raise SystemModelError(
+            f"states x max_period = {states} x {max_period} must be at most {MOST_NUMBERS}"
+        )
     box = collector_beside(known, options, progress, checkpoint)
 
     def near(place: int, branches: Sequence[Branch]) -> Guesses:
@@ -140,7 +159,7 @@ def by_closed_walks(
         return near_closed_walks(box, branches, frequency_hz, wanted.periods, states, tries, rng)
 
     numbers = f"{states} states, {tries} each, seed {seed}"
-    return search_beside(box, wanted, "closed walks", numbers, near, from_others="")
+    return search_beside(box, wanted, "closed walks", numbers, near)
 
 
 def near_closed_walks(
@@ -154,38 +173,34 @@ def near_closed_walks(
 ) -> Guesses:
     """Closed walks of each length at a frequency, made of no branch, and the orbit near by.
 
-    None of an orbit that is out of the range.
+    No orbit that is out of the range.
     """
     flow, omega = box.flow, 2.0 * math.pi * frequency_hz
     box.progress("closed walks", frequency_hz)
-    near = _states_near(flow, branches, frequency_hz, rng)
-    if not len(near):  # every motion failed, and no orbit is known
+    known = _known_states(flow, branches, frequency_hz, rng)
+    if not len(known):  # every motion failed, and no orbit is known
         return
-    cloud = Cloud.of(flow.system, near)
+    cloud = Cloud.of(flow.system, known)
     graph = StateGraph.of(flow, omega, cloud, states, rng)
     one_period = shooting_problem(flow, 1)
     for period in periods:
         for walk in islice(graph.closed_walks(period, rng), tries):
             box.progress("closed walks", frequency_hz)
-            try:
-                nodes = np.array([spread(one_period, graph.states[at], omega) for at in walk])
-            except ConvergenceError:
-                orbit = None
-            else:
-                nodes = nodes.reshape(period, SEGMENTS_PER_PERIOD, -1)
-                orbit = nearest_orbit(flow, nodes, omega, box.observe, SHORT_STEPS)
+            nodes = np.array([spread(one_period, graph.states[at], omega) for at in walk])
+            nodes = nodes.reshape(period, SEGMENTS_PER_PERIOD, -1)
+            orbit = nearest_orbit(flow, nodes, omega, box.observe, SHORT_STEPS)
             yield set(), box.within([orbit])
 
 
-def _states_near(
+def _known_states(
     flow: FlowMap, branches: Sequence[Branch], frequency_hz: float, rng: np.random.Generator
 ) -> Real:
     """States (k, 2n) at phase zero of some motions at a frequency, and of known orbits near it."""
     omega = 2.0 * math.pi * frequency_hz
     starts = random_states(flow, omega, MOTIONS, int(rng.integers(2**31)))
     runs = simulate(flow, omega, starts, *MOTION_PERIODS).runs
-    near = [b for b in branches if relative_distance(b.frequency_hz, frequency_hz) <= WINDOW]
-    orbits = [orbit for branch in near for orbit in orbits_near(branch, frequency_hz)]
+    reaching = [b for b in branches if relative_distance(b.frequency_hz, frequency_hz) <= WINDOW]
+    orbits = [orbit for branch in reaching for orbit in orbits_near(branch, frequency_hz)]
     return np.vstack([np.empty((0, 2 * flow.system.size)), *runs, *map(stroboscopic, orbits)])
 
 
@@ -198,11 +213,12 @@ class Cloud:
     mean : (2n,) array
         Of all.
     axes : (2n, 2n) array
-        Lower triangle of Cholesky of their covariance.
+        Lower Cholesky factor of their covariance, which is made a little wider, so that there is
+        one whatever states are known.
     rows : (m, 2n) array
         Give the displacement into each stop from a state.
     deepest : (m,) array
-        Largest of these.
+        Largest of these that are wanted.
     """
 
     mean: Real
@@ -212,17 +228,17 @@ class Cloud:
 
     @classmethod
     def of(cls, system: System, states: Real) -> Cloud:
-        """As some states (k, 2n) lie: their mean and covariance, no deeper in a stop than they."""
-        rows = np.empty((len(system.stops), states.shape[1]))
-        for index, stop in enumerate(system.stops):
-            rows[index] = system.displacement_row(system.stop_vector(stop))
-        gaps = np.array([stop.gap for stop in system.stops])
-        deepest = np.maximum(gaps, (states @ rows.T).max(axis=0))
-        covariance = np.cov(states.T, bias=True)
+        """As some states (k, 2n) lie: their mean and covariance, no deeper in a stop than they.
+
+        Or than a standard deviation beyond the mean, so that there is room whatever the stops.
+        """
+        mean, covariance = states.mean(axis=0), np.cov(states.T, bias=True)
         size = float(np.linalg.norm(states, axis=1).max()) or reach(system) or 1.0
-        narrow = NARROWEST**2 * (np.diag(covariance) + (NARROWEST * size) ** 2)
-        axes = np.asarray(np.linalg.cholesky(covariance + np.diag(narrow)), dtype=float)
-        return cls(states.mean(axis=0), axes, rows, deepest)
+        added = NARROWEST**2 * np.diag(covariance) + (LEAST * size) ** 2
+        axes = np.asarray(np.linalg.cholesky(covariance + np.diag(added)), dtype=float)
+        rows = stop_rows(system)
+        beyond = rows @ mean + np.linalg.norm(rows @ axes, axis=1)
+        return cls(mean, axes, rows, np.maximum((states @ rows.T).max(axis=0), beyond))
 
     def states(self, count: int, rng: np.random.Generator) -> Real:
         """Random states (count, 2n)."""
@@ -242,6 +258,8 @@ class Cloud:
 class StateGraph:
     """Random states, and from each an edge to those nearest to its image one period later.
 
+    Nearness is that of the metric of their covariance.
+
     Parameters
     ----------
     states : (m, 2n) array
@@ -260,32 +278,38 @@ class StateGraph:
         """Of so many random states at ω (rad/s); none of those that cannot be carried on."""
         states = cloud.states(count, rng)
         carried = [flow.strobe(state, omega, 1) for state in states]
-        reached = [not found.failure for found in carried]
-        images = np.array([found.ends[0] for found in carried])[reached]
-        states = states[reached]
+        states = states[[not found.failure for found in carried]]
         if not len(states):
             return cls(states, np.empty((0, 0), dtype=np.intp))
+        images = np.array([found.ends[0] for found in carried if not found.failure])
         tree = KDTree(cloud.scaled(states))
-        near = tree.query(cloud.scaled(images), k=range(1, min(NEIGHBOURS, len(states)) + 1))[1]
-        return cls(states, np.asarray(near))
+        nearest = range(1, min(NEIGHBOURS, len(states)) + 1)
+        return cls(states, np.asarray(tree.query(cloud.scaled(images), nearest)[1]))
+
+    @cached_property
+    def edges(self) -> csr_array:
+        """Matrix (m, m) with a one for each edge."""
+        count, out = self.successors.shape
+        places = self.successors.ravel(), np.arange(0, count * out + 1, max(out, 1))
+        return csr_array((np.ones(count * out), *places), shape=(count, count))
 
     def closed_walks(self, length: int, rng: np.random.Generator) -> Iterator[list[int]]:
         """A closed walk of so many edges through one state after the other, if there is one.
 
         The states come in random order, and each closed walk through one is as likely as another:
         the step to a state has a weight in proportion to the number of walks from there back to
-        the start, which powers of the matrix of the edges give.
+        the start, which powers of the matrix of the edges give. Only their ratios matter.
         """
-        count, out = self.successors.shape
-        places = self.successors.ravel(), np.arange(0, count * out + 1, out)
-        edges = csr_array((np.ones(count * out), *places), shape=(count, count))
+        count = len(self.states)
         order = rng.permutation(count)
-        for first in range(0, count, AT_ONCE):
-            starts = order[first : first + AT_ONCE]
+        at_once = max(1, min(AT_ONCE, MOST_NUMBERS // max(1, count * length)))
+        for first in range(0, count, at_once):
+            starts = order[first : first + at_once]
             back = np.zeros((length + 1, count, starts.size))  # walks of each length to each start
             back[0, starts, np.arange(starts.size)] = 1.0
             for steps in range(1, length + 1):
-                back[steps] = edges @ back[steps - 1] / out
+                ways = self.edges @ back[steps - 1]
+                back[steps] = ways / np.maximum(ways.max(axis=0), np.finfo(float).tiny)
             for column, start in enumerate(starts.tolist()):
                 if back[length, start, column]:
                     yield self._walk(start, back[:length, :, column], rng)

@@ -11,19 +11,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cms.threads import one_thread
-from nldyn.beside import Guesses, Wanted, check_search, collector_beside, search_beside
+from nldyn.beside import (
+    Guesses,
+    Wanted,
+    check_search,
+    collector_beside,
+    orbits_near,
+    relative_distance,
+    search_beside,
+)
 from nldyn.branch import Branch
 from nldyn.diagrams import Collector, Diagram, Progress
 from nldyn.errors import check_whole
 from nldyn.linear import Real
-from nldyn.orbit import Orbit
 from nldyn.pseudo_orbits import nodes_of
 from nldyn.search import MOST_COUNT, SHORT_STEPS, nearest_orbit
 from nldyn.step_control import ContinuationOptions
 
 NEIGHBOURS = 40  # branches whose orbits are mixed, the nearest in frequency
-PLACES = 6  # orbits of each
-WINDOW = 0.03  # relative distance of their frequencies, unless a branch has none so near
 BEYOND = 0.8  # part of the way between two orbits by which a mixture may lie beyond either
 
 
@@ -186,20 +191,6 @@ class Loops:
         chosen = rng.integers(len(self.nodes), size=2)
         first, last = (_stretch(self.nodes[i], period, rng) for i in chosen.tolist())
         return set(self.branch[chosen].tolist()), (1.0 - share) * first + share * last
-
-
-def relative_distance(reached: Real, frequency_hz: float) -> float:
-    """How far, relatively, a branch ends from a frequency; zero if it does not."""
-    low, high = math.log(reached.min() / frequency_hz), math.log(reached.max() / frequency_hz)
-    return max(0.0, low, -high)
-
-
-def orbits_near(branch: Branch, frequency_hz: float) -> list[Orbit]:
-    """A few orbits of a branch of about a frequency, or the nearest one."""
-    away = np.abs(np.log(branch.frequency_hz / frequency_hz))
-    near = np.flatnonzero(away <= max(WINDOW, float(away.min())))
-    places = np.linspace(0.0, near.size - 1.0, min(PLACES, near.size))
-    return [branch.points[near[round(place)]] for place in places.tolist()]
 
 
 def _stretch(nodes: Real, period: int, rng: np.random.Generator) -> Real:

@@ -200,9 +200,11 @@ def numbers_of(given: argparse.Namespace) -> dict[str, Any]:
     if given.spacing is not None:
         check_spacing("spacing", given.spacing)
         numbers["spacing"] = given.spacing
-    if given.tries is not None:
-        check_whole("--tries", given.tries, 1, MOST_COUNT)
-        numbers["tries"] = given.tries
+    for option in ("tries", "states"):
+        number = getattr(given, option)
+        if number is not None:
+            check_whole(f"--{option}", number, 1, MOST_COUNT)
+            numbers[option] = number
     return numbers
 
 
@@ -241,6 +243,7 @@ def parser_of_command() -> argparse.ArgumentParser:
     )
     beside.add_argument("--spacing", type=float, help="relative distance of the frequencies")
     beside.add_argument("--tries", type=int, help="guesses of each period at each frequency")
+    beside.add_argument("--states", type=int, help="of closed walks, at each frequency")
     return parser
 
 
@@ -271,6 +274,8 @@ def main() -> None:
         if getattr(given, option) is not None and not beside:
             ways = "--pseudo-orbits, --crossover and --closed-walks"
             parser.error(f"argument --{option}: goes only with {ways}")
+    if given.states is not None and given.closed_walks is None:
+        parser.error("argument --states: goes only with --closed-walks")
     try:
         given.directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:

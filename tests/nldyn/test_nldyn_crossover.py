@@ -11,8 +11,8 @@ from branches_alike import without
 from one_dof import THREE_HZ
 
 from nldyn import SystemModelError, by_crossover, index_sum
-from nldyn.beside import collector_beside
-from nldyn.crossover import BEYOND, NEIGHBOURS, PLACES, WINDOW, Loops, near_mixtures, orbits_near
+from nldyn.beside import PLACES, WINDOW, collector_beside, orbits_near
+from nldyn.crossover import BEYOND, NEIGHBOURS, Loops, near_mixtures
 from nldyn.exploration import steps_between
 from nldyn.pseudo_orbits import NODES
 
@@ -32,7 +32,7 @@ def test_a_branch_is_found_from_mixtures_of_the_others(three, period, tries):
 def test_what_is_known_is_met_and_not_found_again(three):
     done = by_crossover(three, tries=50, spacing=0.02)
     assert len(done.branches) == 3
-    met = re.search(r"to (\d) of the 3 given from others, 0 branches", done.notes[-1])
+    met = re.search(r"to (\d) of the 3 given, 0 branches", done.notes[-1])
     assert int(met[1]) >= 2
     assert done.notes[:-2] == tuple(n for n in three.notes if not n.startswith("indices"))
 
@@ -69,14 +69,14 @@ def test_only_the_periods_and_frequencies_wanted_are_tried(three):
     )  # fmt: skip
     assert 37.2 < min(tried) < max(tried) < 38.0
     assert f" of {3 * len(tried)} mixtures led to" in done.notes[-1]
-    assert " of the 1 given from others" in done.notes[-1]  # period 3 ends below
+    assert " of the 1 given" in done.notes[-1]  # period 3 ends below
 
 
 def test_no_longer_orbits_are_looked_for_than_wanted(three):
     (third,) = three.of_period(3)
     done = by_crossover(without(three, third), max_period=2, tries=5)
     assert len(done.branches) == 2
-    assert " of the 2 given from" in done.notes[-1]
+    assert " of the 2 given" in done.notes[-1]
 
 
 def test_as_many_are_tried_as_wanted(three):
@@ -152,7 +152,7 @@ def test_branches_of_longer_periods_than_wanted_are_mixed_last(three):
         assert set(mixed) == wanted
 
 
-def test_of_a_branch_itsorbits_near_the_frequency_are_mixed_or_else_the_nearest(three):
+def test_of_a_branch_its_orbits_near_the_frequency_are_mixed_or_else_the_nearest(three):
     (third,) = three.of_period(3)
     assert len(loops_of([third], 37.0).nodes) == PLACES
     far = third.frequency_hz.max() * (1.0 + 2.0 * WINDOW)
