@@ -331,6 +331,7 @@ def test_known_branches_are_met_from_others_where_they_join_there(found, damping
     assert met_from_others(done) == (met, 2)
 
 
+@pytest.mark.slow
 def test_as_many_are_met_from_others_as_are_found_with_each_left_out(three):
     """Orbits of the grid come back to two of them only, folds to the third as well."""
     found_again = 0
@@ -401,6 +402,7 @@ def test_a_branch_that_repeats_a_known_one_is_not_kept(
     assert not place.exists()
 
 
+@pytest.mark.slow
 def test_a_branch_that_repeats_a_known_one_does_not_stay_in_the_file(
     harmonic, all_repeated, monkeypatch, tmp_path
 ):
@@ -471,6 +473,7 @@ def test_another_factor_loses_nothing_that_the_file_has(harmonic, found, tmp_pat
         assert np.array_equal(isola.frequency_hz, found.branches[1].frequency_hz)
 
 
+@pytest.mark.slow
 def test_a_branch_of_a_wider_range_and_one_without_its_course_may_be_known(harmonic, tmp_path):
     whole = harmonic.branches[0]
     low, high = 7.3, 10.9

@@ -80,9 +80,13 @@ def family(system: System) -> list[Branch]:
     return branches
 
 
+CASES = [(modes, p, seed) for modes in (1, 2) for p in (1.0, 1.5) for seed in range(5)]
+LONG = [case for case in CASES if case[2] > 2 or case in ((1, 1.0, 0), (2, 1.5, 0))]
+
+
 @pytest.mark.parametrize(
     ("modes", "exponent", "seed"),
-    [(modes, p, seed) for modes in (1, 2) for p in (1.0, 1.5) for seed in range(5)],
+    [pytest.param(*case, marks=[pytest.mark.slow] * (case in LONG)) for case in CASES],
 )
 def test_changes_of_stability_have_special_points(modes, exponent, seed):
     for branch in family(random_system(seed, modes, exponent)):
