@@ -290,7 +290,7 @@ class StateGraph:
     def edges(self) -> csr_array:
         """Matrix (m, m) with a one for each edge."""
         count, out = self.successors.shape
-        places = self.successors.ravel(), np.arange(0, count * out + 1, max(out, 1))
+        places = self.successors.ravel(), np.arange(0, count * out + 1, out)
         return csr_array((np.ones(count * out), *places), shape=(count, count))
 
     def closed_walks(self, length: int, rng: np.random.Generator) -> Iterator[list[int]]:
