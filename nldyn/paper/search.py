@@ -54,6 +54,11 @@ from nldyn.survey import explore
 from nldyn.whole_file import write_whole
 
 EFFORT = ExploreOptions(spacing=0.01, starts=1, settling=200, rounds=24, passing=24)
+WAYS: dict[str, Callable[..., Diagram]] = {  # searches beside known branches, by their options
+    "pseudo_orbits": by_pseudo_orbits,
+    "crossover": by_crossover,
+    "closed_walks": by_closed_walks,
+}
 MODELS = tuple(job.name for job in JOBS if job.doubled)
 
 
@@ -84,21 +89,6 @@ def search_by_detour(name: str, folder: Path, factors: Mapping[str | Parameter, 
     """Look for branches of a model with `by_detour`, and write the starts of all."""
     way = partial(by_detour, factors=factors, max_period=LONGEST)
     return _search_beside(name, folder, "detour", way)
-
-
-def search_by_pseudo_orbits(name: str, folder: Path, **numbers: Any) -> Diagram:
-    """Look for branches of a model with `by_pseudo_orbits`, and write the starts of all."""
-    return _search_beside(name, folder, "pseudo_orbits", partial(by_pseudo_orbits, **numbers))
-
-
-def search_by_crossover(name: str, folder: Path, **numbers: Any) -> Diagram:
-    """Look for branches of a model with `by_crossover`, and write the starts of all."""
-    return _search_beside(name, folder, "crossover", partial(by_crossover, **numbers))
-
-
-def search_by_closed_walks(name: str, folder: Path, **numbers: Any) -> Diagram:
-    """Look for branches of a model with `by_closed_walks`, and write the starts of all."""
-    return _search_beside(name, folder, "closed_walks", partial(by_closed_walks, **numbers))
 
 
 def _search_beside(name: str, folder: Path, way: str, look: Callable[..., Diagram]) -> Diagram:
@@ -183,6 +173,11 @@ def seed_of(text: str) -> int:
     return int(text)
 
 
+def way_of(given: argparse.Namespace) -> str | None:
+    """Which of the searches beside known branches is asked for, if any."""
+    return next((way for way in WAYS if getattr(given, way) is not None), None)
+
+
 def numbers_of(given: argparse.Namespace) -> dict[str, Any]:
     """Of a search beside known branches: its periods, and what else was given.
 
@@ -195,6 +190,9 @@ def numbers_of(given: argparse.Namespace) -> dict[str, Any]:
     check_whole("--periods: the longest", longest, 1, LONGEST)
     check_whole("--periods: the shortest", shortest, 1, longest)
     numbers: dict[str, Any] = {"min_period": shortest, "max_period": longest}
+    seeds = [seed for seed in (given.crossover, given.closed_walks) if seed is not None]
+    if seeds:
+        numbers["seed"] = seeds[0]
     if given.range:
         numbers["range_hz"] = tuple(given.range)
     if given.spacing is not None:
@@ -220,7 +218,10 @@ def parser_of_command() -> argparse.ArgumentParser:
         "give it after the models",
     )  # fmt: skip
     way.add_argument(
-        "--pseudo-orbits", action="store_true", help="put pieces of known orbits together"
+        "--pseudo-orbits",
+        action="store_true",
+        default=None,
+        help="put pieces of known orbits together",
     )
     way.add_argument(
         "--crossover",
@@ -269,9 +270,8 @@ def main() -> None:
             range_within(job_named(name).range_hz, numbers.get("range_hz"))
     except SystemModelError as error:
         parser.error(str(error))
-    beside = given.pseudo_orbits or given.crossover is not None or given.closed_walks is not None
     for option in ("range", "periods", "spacing", "tries"):
-        if getattr(given, option) is not None and not beside:
+        if getattr(given, option) is not None and way_of(given) is None:
             ways = "--pseudo-orbits, --crossover and --closed-walks"
             parser.error(f"argument --{option}: goes only with {ways}")
     if given.states is not None and given.closed_walks is None:
@@ -292,15 +292,11 @@ def said(
     numbers: Mapping[str, Any],
 ) -> str:
     """What the search of a model has to say, once it is done."""
-    folder = given.directory
+    folder, way = given.directory, way_of(given)
     if factors:
         found = search_by_detour(name, folder, factors)
-    elif given.pseudo_orbits:
-        found = search_by_pseudo_orbits(name, folder, **numbers)
-    elif given.crossover is not None:
-        found = search_by_crossover(name, folder, seed=given.crossover, **numbers)
-    elif given.closed_walks is not None:
-        found = search_by_closed_walks(name, folder, seed=given.closed_walks, **numbers)
+    elif way:
+        found = _search_beside(name, folder, way, partial(WAYS[way], **numbers))
     else:
         return search(name, folder).report()
     return "\n".join(found.notes)
