@@ -53,6 +53,7 @@ MOTIONS = 10  # from rest and from random states, that help to tell where states
 MOTION_PERIODS = 10, 10  # before these, and of these
 NARROWEST = 1e-3  # standard deviation added in each coordinate, over its own
 LEAST = 1e-6  # and over the size of all
+MOST_DRAWS = 100  # of as many states as are wanted
 AT_ONCE = 32  # states from which walks are counted together
 MOST_NUMBERS = 10**8  # of their counts: states times the longest period
 
@@ -99,7 +100,7 @@ def by_closed_walks(
     spacing : float
         Relative distance of the frequencies at which walks are made.
     states : int
-        How many random states at each frequency.
+        How many random states at each frequency; fewer are found where hundreds of stops press.
     tries : int
         Most walks of each length at each frequency, one through each of so many states through
         which there is one.
@@ -241,9 +242,11 @@ class Cloud:
         return cls(mean, axes, rows, np.maximum((states @ rows.T).max(axis=0), beyond))
 
     def states(self, count: int, rng: np.random.Generator) -> Real:
-        """Random states (count, 2n)."""
+        """Random states (count, 2n); fewer where hardly any is shallow enough at all stops."""
         found = np.empty((0, self.mean.size))
-        while len(found) < count:
+        for _ in range(MOST_DRAWS):
+            if len(found) >= count:
+                break
             more = self.mean + rng.standard_normal((count, self.mean.size)) @ self.axes.T
             allowed = np.all(more @ self.rows.T <= self.deepest, axis=1)
             found = np.vstack([found, more[allowed]])

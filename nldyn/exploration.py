@@ -27,6 +27,7 @@ from nldyn.system import System
 DECAYS = 4.0  # time allowed for settling, over the slowest decay time of the linear part
 FEWEST, UNDAMPED = 30, 600  # periods of it: at least, and where nothing decays
 FINEST_SPACING = 1e-6
+MOST_STATES = 10**6  # at random, among which closed walks are made
 CAN_BE_MISSING = (
     "may be missing all the same: isolas that no motion came near, and what is stable in small "
     "basins or between two frequencies; another seed, more rounds, "
@@ -71,6 +72,11 @@ class ExploreOptions:
     mixtures : int
         Mixtures of two known orbits, of each length up to `unstable_period`, beside which orbits
         are looked for at each frequency on the way down, see `by_crossover`.
+    walks : int
+        Most closed walks among random states, of each length up to `unstable_period`, beside which
+        orbits are looked for at each frequency on the way down, see `by_closed_walks`.
+    walk_states : int
+        How many random states these are among.
     fold_factor : float
         After each round the folds found are followed in frequency and damping, or where the modes
         share no damping ratio in frequency and excitation, which are divided and multiplied by up
@@ -95,6 +101,8 @@ class ExploreOptions:
     passing: int = 0
     pseudo_orbits: int = 0
     mixtures: int = 10
+    walks: int = 10
+    walk_states: int = 500
     fold_factor: float = 1.0
     seed: int = 20
 
@@ -110,6 +118,8 @@ class ExploreOptions:
         check_whole("explore: passing", self.passing, 0, MOST_COUNT)
         check_whole("explore: pseudo_orbits", self.pseudo_orbits, 0, MOST_COUNT)
         check_whole("explore: mixtures", self.mixtures, 0, MOST_COUNT)
+        check_whole("explore: walks", self.walks, 0, MOST_COUNT)
+        check_whole("explore: walk_states", self.walk_states, 1, MOST_STATES)
         if not (is_finite(self.fold_factor) and 1.0 <= self.fold_factor <= LARGEST_FACTOR):
             raise SystemModelError(
                 f"explore: fold_factor must lie between 1 and {LARGEST_FACTOR:g}, "
@@ -435,6 +445,7 @@ class Exploration:
         guesses = {
             f"up to {effort.pseudo_orbits} pseudo-orbits": effort.pseudo_orbits,
             f"{effort.mixtures} mixtures": effort.mixtures,
+            f"up to {effort.walks} closed walks": effort.walks,
         }
         return [
             f"beside {what} of each length up to {longest} orbits were looked for at each "

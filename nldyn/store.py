@@ -484,7 +484,7 @@ def _read_exploration(
         for item in fields(ExploreOptions)
         if item.name == "spacing" or group.has_attribute(f"effort {item.name}")
     }
-    efforts = {"mixtures": 0, **efforts}  # what a file does not have was not done
+    efforts = {"mixtures": 0, "walks": 0, **efforts}  # what a file does not have was not done
     question = Question(
         _flow_of(group, flows),
         diagram.range_hz,

@@ -16,6 +16,7 @@ from cms.threads import one_thread
 from nldyn.beside import Guesses
 from nldyn.branch import Branch, is_at
 from nldyn.checkpoint import Checkpoint, begun_before
+from nldyn.closed_walks import near_closed_walks
 from nldyn.crossover import near_mixtures
 from nldyn.deflation import deflated_orbit
 from nldyn.diagrams import Collector, Diagram, Progress, check_known
@@ -284,6 +285,7 @@ class _Survey:
         if not up and self.effort.unstable_period:
             self._put_together(frequency)
             self._mix(frequency, (self.effort.seed, turn, place, AGAIN + 2))
+            self._walk(frequency, (self.effort.seed, turn, place, AGAIN + 3))
         both = {c.frequency_hz: c for c in stage.coverage}
         both[frequency] = both[frequency].with_more(here) if frequency in both else here
         met = self._met(turn + 1)
@@ -446,6 +448,17 @@ class _Survey:
             return
         rng = np.random.default_rng(seed)
         self._follow_all(near_mixtures(box, box.branches, frequency_hz, periods, tries, rng))
+
+    def _walk(self, frequency_hz: float, seed: Sequence[int]) -> None:
+        """Look for orbits beside closed walks among random states."""
+        if not self.effort.walks:
+            return
+        box, effort, periods = self.box, self.effort, self._unstable_periods()
+        found = near_closed_walks(
+            box, box.branches, frequency_hz, periods, effort.walk_states, effort.walks,
+            np.random.default_rng(seed),
+        )  # fmt: skip
+        self._follow_all(found)
 
     def _follow_all(self, guesses: Guesses) -> None:
         """Follow the orbits that guesses led to."""

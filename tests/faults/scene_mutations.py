@@ -95,6 +95,8 @@ doubled_points = 30
 passing = 2
 pseudo_orbits = 3
 mixtures = 3
+walks = 2
+walk_states = 20
 seed = 1
 """
 

@@ -150,6 +150,17 @@ def test_between_two_pressed_stops_there_is_room_for_states():
     assert depths.max(axis=0).min() > 0.0
 
 
+def test_where_hardly_any_state_is_shallow_enough_the_search_for_some_ends():
+    """A thousand bounds a standard deviation away, all independent."""
+    rows = np.eye(1000)
+    cloud = Cloud(np.zeros(1000), np.eye(1000), rows, np.ones(1000))
+    assert len(cloud.states(5, np.random.default_rng(0))) == 0
+    few = Cloud(np.zeros(1000), np.eye(1000), rows[:20], np.ones(20))  # 0.84^20 = 3 % allowed
+    states = few.states(5, np.random.default_rng(0))
+    assert len(states) == 5
+    assert states[:, :20].max() <= 1.0
+
+
 def test_known_orbits_near_a_frequency_tell_where_states_lie_and_no_others(three):
     flow = three.branches[0].points[0].problem.flow
     (harmonic,), (third,) = three.of_period(1), three.of_period(3)

@@ -119,7 +119,7 @@ def test_short_motions_pass_unstable_orbits_of_further_branches(monkeypatch):
     """Two modes from 29 to 29.3 Hz, where one motion of 30 periods comes to few of them."""
     monkeypatch.setattr(survey, "AGAIN", 0)
     system = system_of("two_dof_xi_0.01")
-    few = ExploreOptions(spacing=0.1, starts=1, settling=30, mixtures=0)
+    few = ExploreOptions(spacing=0.1, starts=1, settling=30, mixtures=0, walks=0)
     without, found = (
         explore(system, (29.0, 29.3), 2, effort=replace(few, passing=n)) for n in (0, 24)
     )
@@ -133,13 +133,14 @@ def test_short_motions_pass_unstable_orbits_of_further_branches(monkeypatch):
     [
         ({"pseudo_orbits": 200}, "beside up to 200 pseudo-orbits of each length up to 2 orbits"),
         ({"mixtures": 60}, "beside 60 mixtures of each length up to 2 orbits"),
+        ({"walks": 200}, "beside up to 200 closed walks of each length up to 2 orbits"),
     ],
 )
-def test_pieces_and_mixtures_of_known_orbits_lead_to_further_branches(guesses, said, monkeypatch):
+def test_further_guesses_on_the_way_down_lead_to_further_branches(guesses, said, monkeypatch):
     """Two modes from 29 to 29.3 Hz, where one motion of 30 periods comes to few of them."""
     monkeypatch.setattr(survey, "AGAIN", 0)
     system = system_of("two_dof_xi_0.01")
-    few = ExploreOptions(spacing=0.1, starts=1, settling=30, mixtures=0)
+    few = ExploreOptions(spacing=0.1, starts=1, settling=30, mixtures=0, walks=0)
     without, found = (
         explore(system, (29.0, 29.3), 2, effort=replace(few, **more)) for more in ({}, guesses)
     )
@@ -556,6 +557,9 @@ def test_long_doubled_branches_are_broken_off_where_told(whole):
         ({"passing": -1}, "explore: passing"),
         ({"pseudo_orbits": -1}, "explore: pseudo_orbits"),
         ({"mixtures": 1.5}, "explore: mixtures"),
+        ({"walks": -1}, "explore: walks"),
+        ({"walk_states": 0}, "explore: walk_states"),
+        ({"walk_states": 10**7}, "explore: walk_states"),
     ],
 )
 def test_bad_efforts_are_refused_by_name(given, says):
