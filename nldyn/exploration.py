@@ -516,7 +516,7 @@ def check_spacing(name: str, spacing: object) -> None:
     """Raise unless this may be a relative distance of frequencies."""
     if not (is_finite(spacing) and FINEST_SPACING <= spacing < 1.0):
         raise SystemModelError(
-            f"{name} must lie between {FINEST_SPACING:g} and 1, got {shown(spacing)}"
+            f"{name} must be at least {FINEST_SPACING:g} and less than 1, got {shown(spacing)}"
         )
 
 

@@ -222,10 +222,7 @@ def orbit_beside(
 
     See `nearest_orbit`.
     """
-    try:
-        nodes = spread(shooting_problem(flow, period), start, omega)
-    except ConvergenceError:
-        return None
+    nodes = spread(shooting_problem(flow, period), start, omega)
     nodes = nodes.reshape(period, SEGMENTS_PER_PERIOD, -1)
     return nearest_orbit(flow, nodes, omega, observe, SHORT_STEPS)
 

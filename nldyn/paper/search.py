@@ -187,8 +187,10 @@ def numbers_of(given: argparse.Namespace) -> dict[str, Any]:
         For what makes no sense.
     """
     shortest, longest = given.periods or (1, LONGEST)
-    check_whole("--periods: the longest", longest, 1, LONGEST)
-    check_whole("--periods: the shortest", shortest, 1, longest)
+    if not 1 <= shortest <= longest <= LONGEST:
+        raise SystemModelError(
+            f"--periods must be two, ascending, from 1 to {LONGEST}; got {shortest} {longest}"
+        )
     numbers: dict[str, Any] = {"min_period": shortest, "max_period": longest}
     seeds = [seed for seed in (given.crossover, given.closed_walks) if seed is not None]
     if seeds:
@@ -196,7 +198,7 @@ def numbers_of(given: argparse.Namespace) -> dict[str, Any]:
     if given.range:
         numbers["range_hz"] = tuple(given.range)
     if given.spacing is not None:
-        check_spacing("spacing", given.spacing)
+        check_spacing("--spacing", given.spacing)
         numbers["spacing"] = given.spacing
     for option in ("tries", "states"):
         number = getattr(given, option)

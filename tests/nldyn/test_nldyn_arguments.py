@@ -308,7 +308,8 @@ def test_places_of_which_the_branches_do_not_tell_are_refused(harmonic_branch, f
 def test_sizes_beyond_any_use_are_refused_before_any_work(one_dof, name):
     said = refused(lambda x: solve_orbit(one_dof, 20.0, **{name: x}), 10**6, 10**12)
     check_named(said, f"{name} must be a whole number from 1 to")
-    check_named(refused(lambda x: ExploreOptions(spacing=x), 1e-18, 0.0, 1.0), "spacing must lie")
+    spacings = refused(lambda x: ExploreOptions(spacing=x), 1e-18, 0.0, 1.0)
+    check_named(spacings, "spacing must be at least")
 
 
 def test_an_orbit_of_a_shorter_period_is_not_told_as_one_of_the_period_asked_for(one_dof):

@@ -231,7 +231,7 @@ def test_states_that_are_all_alike_give_others_near_them(known):
         ({"seed": -1}, "seed must be"),
         ({"max_period": 0}, "max_period must be"),
         ({"range_hz": (30.0, 37.0)}, r"\(30, 37\) must lie within that of .*, \(36, 38.5\)"),
-        ({"spacing": 0.0}, "spacing must lie between 1e-06 and 1, got 0"),
+        ({"spacing": 0.0}, "spacing must be at least 1e-06 and less than 1, got 0"),
         ({"known": None}, "known must be a Diagram"),
         ({"progress": 3}, "progress must be"),
     ],

@@ -170,7 +170,7 @@ def test_of_a_branch_its_orbits_near_the_frequency_are_mixed_or_else_the_nearest
         ({"min_period": 3, "max_period": 2}, "min_period must be"),
         ({"range_hz": (30.0, 37.0)}, r"\(30, 37\) must lie within that of .*, \(36, 38.5\)"),
         ({"range_hz": (37.0, 37.0)}, "range_hz must be two positive frequencies"),
-        ({"spacing": 0.0}, "spacing must lie between 1e-06 and 1, got 0"),
+        ({"spacing": 0.0}, "spacing must be at least 1e-06 and less than 1, got 0"),
         ({"known": None}, "known must be a Diagram"),
         ({"progress": 3}, "progress must be"),
     ],

@@ -510,7 +510,7 @@ def test_a_branch_of_a_wider_range_and_one_without_its_course_may_be_known(harmo
             {"factors": {Parameter("modal_damping"): 2.0, Parameter("modal_damping", -1): 2.0}},
             "different ratios",
         ),
-        ({"spacing": 0.0}, "spacing must lie between 1e-06 and 1, got 0"),
+        ({"spacing": 0.0}, "spacing must be at least 1e-06 and less than 1, got 0"),
         ({"max_period": 0}, "max_period must be"),
         ({"known": Diagram((), RANGE_HZ, "tip")}, "known: has no branches to begin with"),
         ({"known": Diagram((1,), RANGE_HZ, "tip")}, "known: branches must be a list of branches"),

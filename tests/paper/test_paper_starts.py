@@ -305,9 +305,9 @@ def test_detours_that_make_no_sense_are_refused(two_known, given, message, monke
     [
         (["--range", "30", "35.9"], "range_hz = (30, 35.9) must lie within that of the branches"),
         (["--range", "36", "35"], "range_hz must be two positive frequencies, ascending"),
-        (["--periods", "1", "4"], "--periods: the longest must be"),
-        (["--periods", "3", "2"], "--periods: the shortest must be"),
-        (["--spacing", "0"], "spacing must lie between"),
+        (["--periods", "1", "4"], "--periods must be two, ascending"),
+        (["--periods", "3", "2"], "--periods must be two, ascending"),
+        (["--spacing", "0"], "--spacing must be at least"),
         (["--tries", "0"], "--tries must be"),
         (["--states", "0"], "--states must be"),
         (["--states", "9"], "argument --states: goes only with --closed-walks"),
