@@ -23,7 +23,7 @@ from nldyn.step_control import ContinuationOptions
 from nldyn.tally import Tally
 
 PLACES = 6  # orbits of a branch near a frequency
-WINDOW = 0.03  # relative distance of their frequencies, unless a branch has none so near
+WINDOW = 0.03  # relative distance within which frequencies are near
 
 Guesses = Iterator[tuple[set[int], Sequence[Orbit]]]  # branches each was made of, its orbits
 
@@ -173,8 +173,8 @@ def search_beside(
         tally = _follow_new(box, wanted, question, near)
     new = counted(box.branches[len(wanted.known.branches) :])
     note = (
-        f"{tally.came} of {tally.tried} {what} led to an orbit, and to {len(tally.met)} of the "
-        f"{tally.given} given, {new} beside those given"
+        f"{tally.came} of {tally.tried} {what} led to an orbit, and, not made of them, to "
+        f"{len(tally.met)} of the {tally.given} given, {new} beside those given"
     )
     return diagram_of(box, max_period, note)
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import islice
 from pathlib import Path
 
@@ -27,7 +27,8 @@ from nldyn.beside import (
 )
 from nldyn.branch import Branch
 from nldyn.diagrams import Collector, Diagram, Progress
-from nldyn.errors import SystemModelError, check_whole
+from nldyn.errors import check_whole
+from nldyn.exploration import MOST_NUMBERS, check_walk_states
 from nldyn.flow import FlowMap
 from nldyn.linear import Real
 from nldyn.orbit import (
@@ -43,10 +44,8 @@ from nldyn.search import (
     random_states,
     reach,
     simulate,
-    stop_rows,
 )
 from nldyn.step_control import ContinuationOptions
-from nldyn.system import System
 
 NEIGHBOURS = 20  # states near an image to which a walk may go on
 MOTIONS = 10  # from rest and from random states, that help to tell where states may lie
@@ -55,7 +54,6 @@ NARROWEST = 1e-3  # standard deviation added in each coordinate, over its own
 LEAST = 1e-6  # and over the size of all
 MOST_DRAWS = 100  # of as many states as are wanted
 AT_ONCE = 32  # states from which walks are counted together
-MOST_NUMBERS = 10**8  # of their counts: states times the longest period
 
 
 @one_thread()
@@ -146,13 +144,9 @@ def by_closed_walks(
     """
     check_search(known, max_period, spacing, options, progress)
     wanted = Wanted.checked(known, min_period, max_period, range_hz, spacing)
-    check_whole("states", states, 1, MOST_COUNT)
+    check_walk_states("states", states, max_period)
     check_whole("tries", tries, 1, MOST_COUNT)
     check_whole("seed", seed, 0)
-    if states * max_period > MOST_NUMBERS:
-        raise SystemModelError(
-            f"states x max_period = {states} x {max_period} must be at most {MOST_NUMBERS}"
-        )
     box = collector_beside(known, options, progress, checkpoint)
 
     def near(place: int, branches: Sequence[Branch]) -> Guesses:
@@ -177,16 +171,17 @@ def near_closed_walks(
     No orbit that is out of the range.
     """
     flow, omega = box.flow, 2.0 * math.pi * frequency_hz
-    box.progress("closed walks", frequency_hz)
+    asked = partial(box.progress, "closed walks", frequency_hz)
+    asked()
     known = _known_states(flow, branches, frequency_hz, rng)
     if not len(known):  # every motion failed, and no orbit is known
         return
-    cloud = Cloud.of(flow.system, known)
-    graph = StateGraph.of(flow, omega, cloud, states, rng)
+    cloud = Cloud.of(flow, known)
+    graph = StateGraph.of(flow, omega, cloud, states, rng, asked)
     one_period = shooting_problem(flow, 1)
     for period in periods:
         for walk in islice(graph.closed_walks(period, rng), tries):
-            box.progress("closed walks", frequency_hz)
+            asked()
             nodes = np.array([spread(one_period, graph.states[at], omega) for at in walk])
             nodes = nodes.reshape(period, SEGMENTS_PER_PERIOD, -1)
             orbit = nearest_orbit(flow, nodes, omega, box.observe, SHORT_STEPS)
@@ -228,18 +223,18 @@ class Cloud:
     deepest: Real
 
     @classmethod
-    def of(cls, system: System, states: Real) -> Cloud:
+    def of(cls, flow: FlowMap, states: Real) -> Cloud:
         """As some states (k, 2n) lie: their mean and covariance, no deeper in a stop than they.
 
         Or than a standard deviation beyond the mean, so that there is room whatever the stops.
         """
-        mean, covariance = states.mean(axis=0), np.cov(states.T, bias=True)
-        size = float(np.linalg.norm(states, axis=1).max()) or reach(system) or 1.0
-        added = NARROWEST**2 * np.diag(covariance) + (LEAST * size) ** 2
+        size = float(np.abs(states).max()) or reach(flow.system) or 1.0
+        mean, covariance = states.mean(axis=0), np.cov(states.T / size, bias=True)
+        added = NARROWEST**2 * np.diag(covariance) + LEAST**2
         axes = np.asarray(np.linalg.cholesky(covariance + np.diag(added)), dtype=float)
-        rows = stop_rows(system)
-        beyond = rows @ mean + np.linalg.norm(rows @ axes, axis=1)
-        return cls(mean, axes, rows, np.maximum((states @ rows.T).max(axis=0), beyond))
+        rows = flow.rows[: len(flow.system.stops)]
+        beyond = rows @ mean + size * np.linalg.norm(rows @ axes, axis=1)
+        return cls(mean, size * axes, rows, np.maximum((states @ rows.T).max(axis=0), beyond))
 
     def states(self, count: int, rng: np.random.Generator) -> Real:
         """Random states (count, 2n); fewer where hardly any is shallow enough at all stops."""
@@ -276,18 +271,28 @@ class StateGraph:
 
     @classmethod
     def of(
-        cls, flow: FlowMap, omega: float, cloud: Cloud, count: int, rng: np.random.Generator
+        cls,
+        flow: FlowMap,
+        omega: float,
+        cloud: Cloud,
+        count: int,
+        rng: np.random.Generator,
+        asked: Callable[[], None] = lambda: None,
     ) -> StateGraph:
         """Of so many random states at ω (rad/s); none of those that cannot be carried on."""
-        states = cloud.states(count, rng)
-        carried = [flow.strobe(state, omega, 1) for state in states]
-        states = states[[not found.failure for found in carried]]
-        if not len(states):
-            return cls(states, np.empty((0, 0), dtype=np.intp))
-        images = np.array([found.ends[0] for found in carried if not found.failure])
-        tree = KDTree(cloud.scaled(states))
+        states, images = [], []
+        for state in cloud.states(count, rng):
+            asked()
+            found = flow.strobe(state, omega, 1)
+            if not found.failure:
+                states.append(state)
+                images.append(found.ends[0].copy())  # the whole has matrices, too
+        if not states:
+            return cls(np.empty((0, cloud.mean.size)), np.empty((0, 0), dtype=np.intp))
+        tree = KDTree(cloud.scaled(np.array(states)))
         nearest = range(1, min(NEIGHBOURS, len(states)) + 1)
-        return cls(states, np.asarray(tree.query(cloud.scaled(images), nearest)[1]))
+        successors = tree.query(cloud.scaled(np.array(images)), nearest)[1]
+        return cls(np.array(states), np.asarray(successors))
 
     @cached_property
     def edges(self) -> csr_array:
@@ -301,7 +306,8 @@ class StateGraph:
 
         The states come in random order, and each closed walk through one is as likely as another:
         the step to a state has a weight in proportion to the number of walks from there back to
-        the start, which powers of the matrix of the edges give. Only their ratios matter.
+        the start, which powers of the matrix of the edges give. Only their ratios matter; a walk
+        may be overlooked where other states have 1e300 times as many back to its start.
         """
         count = len(self.states)
         order = rng.permutation(count)

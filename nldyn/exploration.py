@@ -27,7 +27,7 @@ from nldyn.system import System
 DECAYS = 4.0  # time allowed for settling, over the slowest decay time of the linear part
 FEWEST, UNDAMPED = 30, 600  # periods of it: at least, and where nothing decays
 FINEST_SPACING = 1e-6
-MOST_STATES = 10**6  # at random, among which closed walks are made
+MOST_NUMBERS = 10**7  # of counts of closed walks: states times the longest period
 CAN_BE_MISSING = (
     "may be missing all the same: isolas that no motion came near, and what is stable in small "
     "basins or between two frequencies; another seed, more rounds, "
@@ -119,7 +119,7 @@ class ExploreOptions:
         check_whole("explore: pseudo_orbits", self.pseudo_orbits, 0, MOST_COUNT)
         check_whole("explore: mixtures", self.mixtures, 0, MOST_COUNT)
         check_whole("explore: walks", self.walks, 0, MOST_COUNT)
-        check_whole("explore: walk_states", self.walk_states, 1, MOST_STATES)
+        check_walk_states("explore: walk_states", self.walk_states, max(1, self.unstable_period))
         if not (is_finite(self.fold_factor) and 1.0 <= self.fold_factor <= LARGEST_FACTOR):
             raise SystemModelError(
                 f"explore: fold_factor must lie between 1 and {LARGEST_FACTOR:g}, "
@@ -518,6 +518,11 @@ def check_spacing(name: str, spacing: object) -> None:
         raise SystemModelError(
             f"{name} must be at least {FINEST_SPACING:g} and less than 1, got {shown(spacing)}"
         )
+
+
+def check_walk_states(name: str, states: object, longest: int) -> None:
+    """Raise unless closed walks up to a period may be made among so many states."""
+    check_whole(name, states, 1, MOST_NUMBERS // longest)
 
 
 def steps_between(low: float, high: float, spacing: float) -> int:

@@ -157,27 +157,10 @@ def reach(system: System) -> float:
     """
     needed = [
         max(stop.gap, 0.0) / float(np.linalg.norm(row))
-        for stop, row in zip(system.stops, stop_rows(system), strict=True)
-        if np.any(row)
+        for stop in system.stops
+        if np.any(row := system.displacement_row(system.stop_vector(stop)))
     ]
     return min(needed, default=0.0)
-
-
-def stop_rows(system: System) -> Real:
-    """Rows (m, 2n) that give the displacements into the stops from a state z.
-
-    Examples
-    --------
-    >>> from nldyn import Stop
-    >>> system = System.from_modal([10.0], {"tip": [2.0]}, modal_damping=0.1,
-    ...     stops=[Stop("tip", 1e9)])
-    >>> stop_rows(system).shape
-    (1, 2)
-    """
-    rows = np.empty((len(system.stops), 2 * system.size))
-    for index, stop in enumerate(system.stops):
-        rows[index] = system.displacement_row(system.stop_vector(stop))
-    return rows
 
 
 def orbits_from_strobe(

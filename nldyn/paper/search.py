@@ -34,7 +34,7 @@ from nldyn.detour import checked_factors
 from nldyn.detour_search import by_detour
 from nldyn.diagrams import Diagram, Progress
 from nldyn.errors import SystemModelError, check_whole
-from nldyn.exploration import Exploration, ExploreOptions, check_spacing
+from nldyn.exploration import Exploration, ExploreOptions, check_spacing, check_walk_states
 from nldyn.flow import flow_of, same_flow
 from nldyn.paper.jobs import JOBS, LONG, Job, job_named
 from nldyn.paper.starts import (
@@ -200,11 +200,12 @@ def numbers_of(given: argparse.Namespace) -> dict[str, Any]:
     if given.spacing is not None:
         check_spacing("--spacing", given.spacing)
         numbers["spacing"] = given.spacing
-    for option in ("tries", "states"):
-        number = getattr(given, option)
-        if number is not None:
-            check_whole(f"--{option}", number, 1, MOST_COUNT)
-            numbers[option] = number
+    if given.tries is not None:
+        check_whole("--tries", given.tries, 1, MOST_COUNT)
+        numbers["tries"] = given.tries
+    if given.states is not None:
+        check_walk_states("--states", given.states, longest)
+        numbers["states"] = given.states
     return numbers
 
 
@@ -221,8 +222,8 @@ def parser_of_command() -> argparse.ArgumentParser:
     )  # fmt: skip
     way.add_argument(
         "--pseudo-orbits",
-        action="store_true",
-        default=None,
+        action="store_const",
+        const=True,
         help="put pieces of known orbits together",
     )
     way.add_argument(

@@ -41,7 +41,7 @@ def test_what_its_own_orbits_lead_to_is_not_met_from_others(three):
     """The harmonic alone: every mixture is of two of its orbits."""
     (harmonic,) = three.of_period(1)
     done = by_crossover(replace(three, branches=(harmonic,)), max_period=1, tries=20)
-    came, met = re.search(r"^(\d+) of .* and to (\d+) of the 1 given", done.notes[-1]).groups()
+    came, met = re.search(r"^(\d+) of .*, to (\d+) of the 1 given", done.notes[-1]).groups()
     assert int(came) > 0
     assert met == "0"
 

@@ -499,6 +499,27 @@ def test_a_saved_exploration_is_read_with_its_coverage(whole, tmp_path):
     assert len(load_diagram(path).branches) == len(whole.diagram.branches)
 
 
+def test_what_a_file_does_not_tell_of_was_not_done(whole, tmp_path):
+    """One of a version that made neither mixtures nor walks goes on without them."""
+    path = tmp_path / "found.h5"
+    whole.save(path)
+    with h5py.File(path, "r+") as file:
+        efforts = [
+            (group, name)
+            for group in [file, *(file[key] for key in file if isinstance(file[key], h5py.Group))]
+            for name in ("effort mixtures", "effort walks", "effort walk_states")
+            if name in group.attrs
+        ]
+        for group, name in efforts:
+            del group.attrs[name]
+    assert len(efforts) == 3
+    without = replace(EFFORT, mixtures=0, walks=0)
+    assert load_exploration(path).question.effort == without
+    explore(system_of("one_dof"), **QUESTION, effort=without, checkpoint=path)
+    with pytest.raises(SystemModelError, match="holds another exploration"):
+        explore(system_of("one_dof"), **QUESTION, effort=EFFORT, checkpoint=path)
+
+
 def test_another_exploration_in_the_file_is_refused_and_kept(whole, tmp_path):
     path = tmp_path / "found.h5"
     whole.save(path)
@@ -559,7 +580,7 @@ def test_long_doubled_branches_are_broken_off_where_told(whole):
         ({"mixtures": 1.5}, "explore: mixtures"),
         ({"walks": -1}, "explore: walks"),
         ({"walk_states": 0}, "explore: walk_states"),
-        ({"walk_states": 10**7}, "explore: walk_states"),
+        ({"walk_states": 10**6, "unstable_period": 11}, "explore: walk_states must be"),
     ],
 )
 def test_bad_efforts_are_refused_by_name(given, says):

@@ -47,7 +47,7 @@ def test_a_branch_is_found_from_pieces_of_the_others(three, period):
 def test_what_is_known_is_met_and_not_found_again(three):
     done = by_pseudo_orbits(three, tries=50)
     assert len(done.branches) == 3
-    assert ", and to 3 of the 3 given, 0 branches" in done.notes[-1]
+    assert ", not made of them, to 3 of the 3 given, 0 branches" in done.notes[-1]
     assert done.notes[:-2] == tuple(n for n in three.notes if not n.startswith("indices"))
 
 
@@ -67,7 +67,7 @@ def test_different_orbits_of_one_branch_lead_to_others():
     assert index_gaps(known.branches, range_hz, 2)
     done = by_pseudo_orbits(known, max_period=2, tries=200)
     assert not index_gaps(done.branches, range_hz, 2)
-    assert ", and to 0 of the 1 given" in done.notes[-1]
+    assert ", and, not made of them, to 0 of the 1 given" in done.notes[-1]
 
 
 def test_no_longer_orbits_are_looked_for_than_wanted(three):
