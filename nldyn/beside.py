@@ -146,6 +146,8 @@ def search_beside(
     what: str,
     numbers: str,
     near: Callable[[int, Sequence[Branch]], Guesses],
+    *,
+    from_known: bool = True,
 ) -> Diagram:
     """Follow the orbits that lie on no branch, found near one frequency after the other.
 
@@ -165,6 +167,8 @@ def search_beside(
     near : callable
         Gives the guesses at the frequency of a number, and their orbits, from the branches that
         were known when it was begun.
+    from_known : bool
+        Whether guesses are made of known orbits, which are not counted as met by their own.
     """
     max_period = wanted.periods[-1]
     with box.checkpoint:
@@ -172,9 +176,10 @@ def search_beside(
         question = f"{what}, {numbers}, {_digest(wanted, box.options)}"
         tally = _follow_new(box, wanted, question, near)
     new = counted(box.branches[len(wanted.known.branches) :])
+    of_others = ", not made of them," if from_known else ""
     note = (
-        f"{tally.came} of {tally.tried} {what} led to an orbit, and, not made of them, to "
-        f"{len(tally.met)} of the {tally.given} given, {new} beside those given"
+        f"{tally.came} of {tally.tried} {what} led to an orbit, and{of_others} to "
+        f"{len(tally.met)} of the {tally.given} given there, {new} beside those given"
     )
     return diagram_of(box, max_period, note)
 

@@ -241,8 +241,14 @@ class Branch:
 
     @property
     def frequency_hz(self) -> Real:
-        """Frequencies of the points in Hz."""
+        """Frequencies of the points in Hz; folds lie between them, see `span_hz`."""
         return np.array([orbit.frequency_hz for orbit in self.points])
+
+    @property
+    def span_hz(self) -> tuple[float, float]:
+        """Lowest and highest frequency in Hz, also of the special points between the points."""
+        reached = [place.orbit.frequency_hz for place in self.places]
+        return min(reached), max(reached)
 
     @property
     def max_abs_displacement(self) -> Real:

@@ -154,7 +154,7 @@ def by_closed_walks(
         return near_closed_walks(box, branches, frequency_hz, wanted.periods, states, tries, rng)
 
     numbers = f"{states} states, {tries} each, seed {seed}"
-    return search_beside(box, wanted, "closed walks", numbers, near)
+    return search_beside(box, wanted, "closed walks", numbers, near, from_known=False)
 
 
 def near_closed_walks(

@@ -99,7 +99,7 @@ class ExploreOptions:
     doubled_period: int = 1
     doubled_points: int | None = None
     passing: int = 0
-    pseudo_orbits: int = 0
+    pseudo_orbits: int = 10
     mixtures: int = 10
     walks: int = 10
     walk_states: int = 500

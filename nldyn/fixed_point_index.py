@@ -243,7 +243,7 @@ def index_note(branches: Sequence[Branch], range_hz: tuple[float, float], longes
             ranges = f"in {len(gaps)} ranges " if len(gaps) > 1 else ""
             wrong.append(f"{_power(n)} {ranges}from {gaps[0][0]:.10g} to {gaps[-1][1]:.10g} Hz")
     if not wrong:
-        return told
+        return f"{told}; isolas that are missing as a whole would not change that"
     return f"{told} but for {', '.join(wrong)}: orbits are missing, or a branch was broken off"
 
 

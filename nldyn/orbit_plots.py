@@ -241,7 +241,9 @@ def _axes(ax: Axes | None, orbit: Orbit) -> Axes:
 
 
 def _draw_legend(ax: Axes) -> None:
-    ax.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    """Explain the lines, beside axes that are alone in their figure, else within them."""
+    beside = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0)}
+    ax.legend(fontsize="small", **(beside if len(ax.figure.axes) == 1 else {"loc": "best"}))
 
 
 def _style(orbit: Orbit) -> dict[str, Any]:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 
+import numpy as np
+
 from cms.threads import one_thread
 from nldyn.beside import Guesses, Wanted, check_search, collector_beside, search_beside
 from nldyn.branch import Branch
@@ -30,6 +32,7 @@ def by_pseudo_orbits(
     range_hz: tuple[float, float] | None = None,
     spacing: float = 0.01,
     tries: int = 2000,
+    seed: int = 0,
     options: ContinuationOptions | None = None,
     progress: Progress | None = None,
     checkpoint: str | Path | None = None,
@@ -62,6 +65,8 @@ def by_pseudo_orbits(
     tries : int
         Most pseudo-orbits of each length at each frequency from which an orbit is looked for; those
         of the same orbits, four at most, come after one of each choice of orbits.
+    seed : int
+        Of the random order; another one tries others first.
     options : ContinuationOptions, optional
         Step control.
     progress : callable, optional
@@ -104,13 +109,14 @@ def by_pseudo_orbits(
     check_search(known, max_period, spacing, options, progress)
     wanted = Wanted.checked(known, min_period, max_period, range_hz, spacing)
     check_whole("tries", tries, 1, MOST_COUNT)
+    check_whole("seed", seed, 0)
     box = collector_beside(known, options, progress, checkpoint)
 
     def near(place: int, branches: Sequence[Branch]) -> Guesses:
-        frequency_hz = wanted.frequencies[place]
-        return near_pseudo_orbits(box, branches, frequency_hz, spacing, wanted.periods, tries)
+        rng, frequency_hz = np.random.default_rng([seed, place]), wanted.frequencies[place]
+        return near_pseudo_orbits(box, branches, frequency_hz, spacing, wanted.periods, tries, rng)
 
-    return search_beside(box, wanted, "pseudo-orbits", f"{tries} each", near)
+    return search_beside(box, wanted, "pseudo-orbits", f"{tries} each, seed {seed}", near)
 
 
 def near_pseudo_orbits(
@@ -120,6 +126,7 @@ def near_pseudo_orbits(
     spacing: float,
     periods: Sequence[int],
     tries: int,
+    rng: np.random.Generator,
 ) -> Guesses:
     """Pseudo-orbits of each length at a frequency: their branches, and orbits near by.
 
@@ -129,7 +136,7 @@ def near_pseudo_orbits(
     pieces = Pieces.of(branches, frequency_hz, spacing)
     omega = 2.0 * math.pi * frequency_hz
     for period in periods:
-        for sequence in islice(pieces.pseudo_orbits(period, MOST_ALIKE), tries):
+        for sequence in islice(pieces.pseudo_orbits(period, MOST_ALIKE, rng), tries):
             box.progress("pseudo-orbits", frequency_hz)
             chosen = list(sequence)
             nodes = pieces.nodes[chosen]

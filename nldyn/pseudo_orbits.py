@@ -84,7 +84,9 @@ class Pieces:
         steps = np.roll(self.place[chosen], -1) - self.place[chosen] - 1
         return not np.any(steps % self.period[chosen])
 
-    def pseudo_orbits(self, period: int, most_alike: int) -> Iterator[tuple[int, ...]]:
+    def pseudo_orbits(
+        self, period: int, most_alike: int, rng: np.random.Generator
+    ) -> Iterator[tuple[int, ...]]:
         """Closed sequences of pieces, at random where the jumps are small, then by their size.
 
         Not those that are orbits, nor shorter sequences repeated. First is one of each choice of
@@ -98,13 +100,15 @@ class Pieces:
             Number of pieces.
         most_alike : int
             Most of the sequences made of the same orbits.
+        rng : Generator
+            Of the random order.
         """
         if not self.branch.size:
             return
         alike = Counter[tuple[int, ...]]()
         seen: set[tuple[int, ...]] = set()
         later: list[list[tuple[int, ...]]] = [[] for _ in range(1, most_alike)]
-        for sequence in _closed_paths(self.jumps, period):
+        for sequence in _closed_paths(self.jumps, period, rng):
             begun_elsewhere = [sequence[i:] + sequence[:i] for i in range(period)]
             first = min(begun_elsewhere)
             orbits = tuple(sorted(self.passage[list(first)].tolist()))
@@ -150,7 +154,7 @@ def _passages(orbits: Sequence[Real]) -> list[int]:
     return numbers
 
 
-def _closed_paths(jumps: Real, length: int) -> Iterator[tuple[int, ...]]:
+def _closed_paths(jumps: Real, length: int, rng: np.random.Generator) -> Iterator[tuple[int, ...]]:
     """Closed paths over places, some of them more than once: near ones at random, then in order."""
     near = np.argsort(jumps, axis=1)[:, :NEAREST]
     paths = np.arange(len(jumps))[:, None]
@@ -165,7 +169,7 @@ def _closed_paths(jumps: Real, length: int) -> Iterator[tuple[int, ...]]:
         paths = np.column_stack([paths[before], near[last[before], column]])
         ways = longer.flat[chosen]
     ways = ways + jumps[paths[:, -1], paths[:, 0]]
-    chance = np.random.default_rng(0).permutation(len(ways))
+    chance = rng.permutation(len(ways))
     order = np.lexsort([chance, np.maximum(ways, NEAR)])
     for path in paths[order[ways[order] < FARTHEST]]:
         yield tuple(path.tolist())

@@ -375,7 +375,7 @@ class ExploreTable(Table):
     doubled_period: Period = 1
     doubled_points: Annotated[int, Field(ge=2, le=1_000_000)] | None = None
     passing: Annotated[int, Field(ge=0, le=1000)] = 0
-    pseudo_orbits: Annotated[int, Field(ge=0, le=1_000_000)] = 0
+    pseudo_orbits: Annotated[int, Field(ge=0, le=1_000_000)] = 10
     mixtures: Annotated[int, Field(ge=0, le=1_000_000)] = 10
     walks: Annotated[int, Field(ge=0, le=1_000_000)] = 10
     walk_states: Annotated[int, Field(ge=1, le=100_000)] = 500

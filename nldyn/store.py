@@ -484,7 +484,8 @@ def _read_exploration(
         for item in fields(ExploreOptions)
         if item.name == "spacing" or group.has_attribute(f"effort {item.name}")
     }
-    efforts = {"mixtures": 0, "walks": 0, **efforts}  # what a file does not have was not done
+    guesses = dict.fromkeys(("pseudo_orbits", "mixtures", "walks"), 0)
+    efforts = {**guesses, **efforts}  # what a file does not have was not done
     question = Question(
         _flow_of(group, flows),
         diagram.range_hz,

@@ -284,9 +284,10 @@ class _Survey:
             starts = _at_random(flow, omega, self.effort.starts, seed)
             here = here.with_more(self._search(starts, known, also_unstable=True)[0])
         if not up and self.effort.unstable_period:
-            self._put_together(frequency)
-            self._mix(frequency, (self.effort.seed, turn, place, AGAIN + 2))
-            self._walk(frequency, (self.effort.seed, turn, place, AGAIN + 3))
+            place_of_seed = self.effort.seed, turn, place
+            self._put_together(frequency, (*place_of_seed, AGAIN + 4))
+            self._mix(frequency, (*place_of_seed, AGAIN + 2))
+            self._walk(frequency, (*place_of_seed, AGAIN + 3))
         both = {c.frequency_hz: c for c in stage.coverage}
         both[frequency] = both[frequency].with_more(here) if frequency in both else here
         met = self._met(turn + 1)
@@ -432,14 +433,15 @@ class _Survey:
         runs = [found.ends for found in motions if not found.failure]
         self._beside(runs, known, BESIDE_PASSING)
 
-    def _put_together(self, frequency_hz: float) -> None:
+    def _put_together(self, frequency_hz: float, seed: Sequence[int]) -> None:
         """Look for orbits beside pieces of known ones that nearly fit together."""
         if not self.effort.pseudo_orbits:
             return
         box, effort, periods = self.box, self.effort, self._unstable_periods()
         found = near_pseudo_orbits(
-            box, box.branches, frequency_hz, effort.spacing, periods, effort.pseudo_orbits
-        )
+            box, box.branches, frequency_hz, effort.spacing, periods, effort.pseudo_orbits,
+            np.random.default_rng(seed),
+        )  # fmt: skip
         self._follow_all(found)
 
     def _mix(self, frequency_hz: float, seed: Sequence[int]) -> None:

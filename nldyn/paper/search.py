@@ -4,7 +4,8 @@ Beside the branches of the starts that are known, those in the directory or else
 kept with the package, it finds others, writes the starts of all into the directory, and reports how
 many may be missing. With ``--detour damping=0.5 "natural_frequency_hz[1]=0.99"`` at the end, say,
 it does not simulate, but goes by way of a system with these factors, see `by_detour`; with
-``--pseudo-orbits`` it puts pieces of known orbits together, see `by_pseudo_orbits`; with
+``--pseudo-orbits 3`` it puts pieces of known orbits together, with the seed 3, see
+`by_pseudo_orbits`; with
 ``--crossover 3`` it mixes known orbits, with the seed 3, see `by_crossover`; with
 ``--closed-walks 3`` it puts pieces of random motions together, see `by_closed_walks`; any of these
 three at the frequencies and of the periods given: ``--range 18 20.5 --periods 3 3 --spacing 0.003
@@ -192,9 +193,9 @@ def numbers_of(given: argparse.Namespace) -> dict[str, Any]:
             f"--periods must be two, ascending, from 1 to {LONGEST}; got {shortest} {longest}"
         )
     numbers: dict[str, Any] = {"min_period": shortest, "max_period": longest}
-    seeds = [seed for seed in (given.crossover, given.closed_walks) if seed is not None]
-    if seeds:
-        numbers["seed"] = seeds[0]
+    way = way_of(given)
+    if way:
+        numbers["seed"] = getattr(given, way)
     if given.range:
         numbers["range_hz"] = tuple(given.range)
     if given.spacing is not None:
@@ -222,9 +223,9 @@ def parser_of_command() -> argparse.ArgumentParser:
     )  # fmt: skip
     way.add_argument(
         "--pseudo-orbits",
-        action="store_const",
-        const=True,
-        help="put pieces of known orbits together",
+        type=seed_of,
+        metavar="SEED",
+        help="put pieces of known orbits together; another seed tries others",
     )
     way.add_argument(
         "--crossover",

@@ -197,6 +197,7 @@ def test_isola_is_walked_round_once(one_dof):
         folds = [s.frequency_hz for s in branch.special_points if s.kind == "LP"]
         assert len(folds) % 2 == 0
         assert min(folds) <= frequencies.min() and max(folds) >= frequencies.max()
+        assert branch.span_hz == (min(folds), max(folds))
         assert all(minimal_period(orbit) == 2 for orbit in branch.points)
         assert branch.contains(branch.points[0])
     ends = [sorted(s.frequency_hz for s in b.special_points if s.kind == "LP") for b in isolas]

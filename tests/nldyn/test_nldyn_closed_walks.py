@@ -36,14 +36,14 @@ def test_from_one_branch_all_others_are_found(three):
     for wanted in three.branches:
         (found,) = done.of_period(wanted.period)
         assert all(wanted.contains(orbit) for orbit in found.points)
-    assert done.notes[-1].endswith("to 1 of the 1 given, 2 branches beside those given")
+    assert done.notes[-1].endswith("to 1 of the 1 given there, 2 branches beside those given")
     assert [index_sum(done.branches, 36.5, n) for n in (1, 2, 3)] == [1, 1, 1]
 
 
 def test_what_is_known_is_met_and_not_found_again(three):
     done = by_closed_walks(three, states=1000, tries=50, spacing=0.02)
     assert done.branches == three.branches
-    assert done.notes[-1].endswith("to 3 of the 3 given, 0 branches beside those given")
+    assert done.notes[-1].endswith("to 3 of the 3 given there, 0 branches beside those given")
 
 
 def test_only_the_periods_and_frequencies_wanted_are_tried(three):
@@ -54,7 +54,7 @@ def test_only_the_periods_and_frequencies_wanted_are_tried(three):
     )  # fmt: skip
     assert 37.2 < min(tried) < max(tried) < 38.0
     assert f" of {3 * len(tried)} closed walks led to" in done.notes[-1]
-    assert " of the 1 given, " in done.notes[-1]  # period 3 ends below
+    assert " of the 1 given there, " in done.notes[-1]  # period 3 ends below
 
 
 def test_the_same_seed_gives_the_same_and_another_one_other_walks(three):

@@ -32,7 +32,7 @@ def test_a_branch_is_found_from_mixtures_of_the_others(three, period, tries):
 def test_what_is_known_is_met_and_not_found_again(three):
     done = by_crossover(three, tries=50, spacing=0.02)
     assert len(done.branches) == 3
-    met = re.search(r"to (\d) of the 3 given, 0 branches", done.notes[-1])
+    met = re.search(r"to (\d) of the 3 given there, 0 branches", done.notes[-1])
     assert int(met[1]) >= 2
     assert done.notes[:-2] == tuple(n for n in three.notes if not n.startswith("indices"))
 

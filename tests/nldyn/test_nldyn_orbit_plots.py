@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from matplotlib.backend_bases import MouseEvent
+from matplotlib.figure import Figure
 
 from nldyn import (
     Stop,
@@ -43,6 +44,18 @@ def test_title_says_what_the_orbit_is_and_given_axes_are_used(plot, stable, unst
         ax = new_axes()
         assert plot(orbit, ax) is ax
         assert ax.get_title() == f"{word} harmonic orbit at {orbit.frequency_hz:.6g} Hz"
+
+
+@pytest.mark.parametrize("plot", PLOTS)
+def test_legends_of_several_axes_do_not_cover_each_other(plot, stable):
+    """Beside axes that are alone, within them else."""
+    for count in (1, 2):
+        figure = Figure(layout="constrained")
+        ax = figure.subplots(1, count, squeeze=False)[0, 0]
+        legend = plot(stable, ax).get_legend()
+        figure.draw_without_rendering()
+        within = legend.get_window_extent().x1 <= ax.get_window_extent().x1
+        assert within == (count > 1)
 
 
 @pytest.mark.parametrize("plot", [plot_history, plot_phase_portrait, plot_contact_force])
