@@ -22,7 +22,7 @@ SHARED_MEMORY = Path("/dev/shm")
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 
 RANGES = {"run": "[44.0, 46.0]\nsearch_points = 1", "explore": "[26.0, 28.0]"}
-EXPLORE = "[explore]\nmax_period = 2\nspacing = 0.03\nstarts = 2\n"
+EXPLORE = "[explore]\nmax_period = 2\nspacing = 0.03\nstarts = 2\nwalk_states = 100\n"
 
 
 @pytest.fixture(scope="module")

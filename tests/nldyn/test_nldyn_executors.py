@@ -376,7 +376,10 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_basins(plane, here, cluste
     assert found.wrong == here.wrong == 0
 
 
-@pytest.mark.parametrize("compute", [swept_both_ways, simulated, exponents, measured])
+@pytest.mark.parametrize(
+    "compute",
+    [swept_both_ways, simulated, exponents, pytest.param(measured, marks=pytest.mark.slow)],
+)
 def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(compute, alone, cluster):
     with one_worker_killed(cluster) as executor:
         found = compute(executor, None)

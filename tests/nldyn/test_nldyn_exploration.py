@@ -325,7 +325,10 @@ def test_chao_bound_is_low_where_some_are_met_rarely():
 # --- the way up and down, interruption and files -------------------------------------------------
 
 QUESTION = {"range_hz": (36.0, 38.0), "max_period": 3}
-EFFORT = ExploreOptions(spacing=0.02, starts=4, rounds=2, doubled_period=4)
+EFFORT = ExploreOptions(
+    spacing=0.02, starts=4, rounds=2, doubled_period=4,
+    pseudo_orbits=2, mixtures=3, walks=3, walk_states=100,
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -515,7 +518,7 @@ def test_what_a_file_does_not_tell_of_was_not_done(whole, tmp_path):
         for group, name in efforts:
             del group.attrs[name]
     assert len(efforts) == 4
-    without = replace(EFFORT, **NOTHING_MORE)
+    without = replace(EFFORT, **NOTHING_MORE, walk_states=ExploreOptions.walk_states)
     assert load_exploration(path).question.effort == without
     explore(system_of("one_dof"), **QUESTION, effort=without, checkpoint=path)
     with pytest.raises(SystemModelError, match="holds another exploration"):

@@ -232,7 +232,8 @@ def test_guesses_give_starts(way, what, two_known, monkeypatch, capsys):
 def test_a_search_is_kept_and_gives_starts_from_which_the_next_one_begins(two_known, monkeypatch):
     name, folder = two_known
     first = starts_path(name, folder).read_bytes()
-    effort = ExploreOptions(spacing=0.02, starts=1, settling=100)
+    nothing_more = {"pseudo_orbits": 0, "mixtures": 0, "walks": 0}
+    effort = ExploreOptions(spacing=0.02, starts=1, settling=100, **nothing_more)
     done = search(name, folder, effort)
     found = read_starts(name, folder)
     assert len(found) == len(done.diagram.branches) > done.stage.given == 2

@@ -63,7 +63,7 @@ def test_hook_of_gmsh_is_near_a_frame_of_deep_beams():
     [
         ("plate", "corner", 0.3, 1e-3, 0.02),
         ("portal", "push", 20.0, 2e-3, 0.02),
-        ("hook", "tip", 5.0, 5e-5, 0.02),
+        pytest.param("hook", "tip", 5.0, 5e-5, 0.02, marks=pytest.mark.slow),  # 17 s
     ],
 )
 def test_run_ends_and_the_stop_is_first_touched_where_the_linear_response_reaches_it(
