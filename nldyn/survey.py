@@ -80,9 +80,9 @@ def explore(
     from near returns of motions that wander, from Newton's method deflated by the known orbits
     [Farrell, Birkisson and Funke 2015], and from flips, at each of which the doubled branch is
     followed as long as its period is within `max_period`, and from branch points. On the way down,
-    others come from mixtures of known orbits and from closed walks among random states, see
-    `by_crossover` and `by_closed_walks`. The folds of all of these may be followed in damping or
-    excitation to further ones (`ExploreOptions.fold_factor`).
+    others come from pieces and mixtures of known orbits and from closed walks among random states,
+    see `by_pseudo_orbits`, `by_crossover` and `by_closed_walks`. The folds of all of these may be
+    followed in damping or excitation to further ones (`ExploreOptions.fold_factor`).
 
     Isolas of unstable orbits that no motion passes, attractors with small basins that exist
     between two of the frequencies only, and orbits of longer periods can still be missing.

@@ -5,8 +5,7 @@ kept with the package, it finds others, writes the starts of all into the direct
 many may be missing. With ``--detour damping=0.5 "natural_frequency_hz[1]=0.99"`` at the end, say,
 it does not simulate, but goes by way of a system with these factors, see `by_detour`; with
 ``--pseudo-orbits 3`` it puts pieces of known orbits together, with the seed 3, see
-`by_pseudo_orbits`; with
-``--crossover 3`` it mixes known orbits, with the seed 3, see `by_crossover`; with
+`by_pseudo_orbits`; with ``--crossover 3`` it mixes known orbits, see `by_crossover`; with
 ``--closed-walks 3`` it puts pieces of random motions together, see `by_closed_walks`; any of these
 three at the frequencies and of the periods given: ``--range 18 20.5 --periods 3 3 --spacing 0.003
 --tries 700``, say. The directory keeps what is found, and the same command goes on where it was
