@@ -259,6 +259,7 @@ def test_threads_give_the_same_numbers(compute, alone):
     assert counts[-1][0] == counts[-1][1] >= 2
 
 
+@pytest.mark.slow  # 20 s
 def test_processes_give_the_same_numbers(alone):
     with processes(2) as pool:
         for compute in LISTS:

@@ -158,6 +158,7 @@ def test_the_figure_shows_both_models_at_both_dampings(chaos, tmp_path, monkeypa
     assert "svg" in text
 
 
+@pytest.mark.slow  # 11 s; `make paper` does no less
 def test_all_models_are_swept_both_ways_on_processes(tmp_path):
     with worker_processes(2, tmp_path) as workers:
         sweeps = submit_sweeps(workers, points=2)
