@@ -280,19 +280,20 @@ class StateGraph:
         asked: Callable[[], None] = lambda: None,
     ) -> StateGraph:
         """Of so many random states at ω (rad/s); none of those that cannot be carried on."""
-        states, images = [], []
+        kept, images = [], []
         for state in cloud.states(count, rng):
             asked()
             found = flow.strobe(state, omega, 1)
             if not found.failure:
-                states.append(state)
+                kept.append(state)
                 images.append(found.ends[0].copy())  # the whole has matrices, too
-        if not states:
+        if not kept:
             return cls(np.empty((0, cloud.mean.size)), np.empty((0, 0), dtype=np.intp))
-        tree = KDTree(cloud.scaled(np.array(states)))
+        states = np.array(kept)
+        tree = KDTree(cloud.scaled(states))
         nearest = range(1, min(NEIGHBOURS, len(states)) + 1)
         successors = tree.query(cloud.scaled(np.array(images)), nearest)[1]
-        return cls(np.array(states), np.asarray(successors))
+        return cls(states, np.asarray(successors))
 
     @cached_property
     def edges(self) -> csr_array:

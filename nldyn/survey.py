@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -284,10 +284,7 @@ class _Survey:
             starts = _at_random(flow, omega, self.effort.starts, seed)
             here = here.with_more(self._search(starts, known, also_unstable=True)[0])
         if not up and self.effort.unstable_period:
-            place_of_seed = self.effort.seed, turn, place
-            self._put_together(frequency, (*place_of_seed, AGAIN + 4))
-            self._mix(frequency, (*place_of_seed, AGAIN + 2))
-            self._walk(frequency, (*place_of_seed, AGAIN + 3))
+            self._follow_guesses(frequency, (self.effort.seed, turn, place))
         both = {c.frequency_hz: c for c in stage.coverage}
         both[frequency] = both[frequency].with_more(here) if frequency in both else here
         met = self._met(turn + 1)
@@ -433,41 +430,30 @@ class _Survey:
         runs = [found.ends for found in motions if not found.failure]
         self._beside(runs, known, BESIDE_PASSING)
 
-    def _put_together(self, frequency_hz: float, seed: Sequence[int]) -> None:
-        """Look for orbits beside pieces of known ones that nearly fit together."""
-        if not self.effort.pseudo_orbits:
-            return
+    def _follow_guesses(self, frequency_hz: float, seed: Sequence[int]) -> None:
+        """Follow the orbits to which pieces, mixtures and closed walks lead."""
+        for guesses in self._guesses(frequency_hz, seed):
+            for _, orbits in guesses:
+                for orbit in orbits:
+                    self._follow(orbit)
+
+    def _guesses(self, frequency_hz: float, seed: Sequence[int]) -> Iterator[Guesses]:
+        """Pseudo-orbits, mixtures and closed walks at a frequency, each with its own numbers."""
         box, effort, periods = self.box, self.effort, self._unstable_periods()
-        found = near_pseudo_orbits(
-            box, box.branches, frequency_hz, effort.spacing, periods, effort.pseudo_orbits,
-            np.random.default_rng(seed),
-        )  # fmt: skip
-        self._follow_all(found)
-
-    def _mix(self, frequency_hz: float, seed: Sequence[int]) -> None:
-        """Look for orbits beside mixtures of known ones."""
-        box, tries, periods = self.box, self.effort.mixtures, self._unstable_periods()
-        if not (tries and box.branches):
-            return
-        rng = np.random.default_rng(seed)
-        self._follow_all(near_mixtures(box, box.branches, frequency_hz, periods, tries, rng))
-
-    def _walk(self, frequency_hz: float, seed: Sequence[int]) -> None:
-        """Look for orbits beside closed walks among random states."""
-        if not self.effort.walks:
-            return
-        box, effort, periods = self.box, self.effort, self._unstable_periods()
-        found = near_closed_walks(
-            box, box.branches, frequency_hz, periods, effort.walk_states, effort.walks,
-            np.random.default_rng(seed),
-        )  # fmt: skip
-        self._follow_all(found)
-
-    def _follow_all(self, guesses: Guesses) -> None:
-        """Follow the orbits that guesses led to."""
-        for _, orbits in guesses:
-            for orbit in orbits:
-                self._follow(orbit)
+        mixing, walking, ordering = (
+            np.random.default_rng((*seed, AGAIN + number)) for number in (2, 3, 4)
+        )
+        if effort.pseudo_orbits:
+            yield near_pseudo_orbits(
+                box, box.branches, frequency_hz, effort.spacing, periods, effort.pseudo_orbits,
+                ordering,
+            )  # fmt: skip
+        if effort.mixtures and box.branches:
+            yield near_mixtures(box, box.branches, frequency_hz, periods, effort.mixtures, mixing)
+        if effort.walks:
+            yield near_closed_walks(
+                box, box.branches, frequency_hz, periods, effort.walk_states, effort.walks, walking
+            )
 
     def _unstable_periods(self) -> range:
         return range(1, min(self.effort.unstable_period, self.max_period) + 1)
