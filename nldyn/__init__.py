@@ -8,72 +8,39 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from nldyn.attractors import Attractor, AttractorOptions, classify, find_attractors
-    from nldyn.basin_maps import Basins, Plane, basins
-    from nldyn.branch import Branch, BranchPoint, SpecialPoint
-    from nldyn.cascades import Cascade, cascade, cascades_in
-    from nldyn.closed_walks import by_closed_walks
-    from nldyn.contacts import Impacts, impacts
-    from nldyn.continuation import continue_branch
-    from nldyn.convergence import Study, converge
-    from nldyn.crossover import by_crossover
-    from nldyn.curve_marks import LocatedPoint, refine_special
-    from nldyn.curve_plots import plot_curves, plot_orbit_curve
-    from nldyn.curve_store import load_curve, load_curves, save_curves
-    from nldyn.curves import Curve, continue_constant, continue_in, continue_special
-    from nldyn.detour_search import by_detour
-    from nldyn.diagrams import Diagram, Seed, diagram
-    from nldyn.doubling import switch_at_flip
-    from nldyn.elements import (
-        Damper,
-        HarmonicForce,
-        Stop,
-        Unbalance,
-        dissipation_for,
-        hertz_stiffness,
+    from nldyn.base.errors import SceneError, SystemModelError
+    from nldyn.bifurcations.normal_forms import (
+        NormalForm,
+        describe,
+        normal_form,
+        switch_at_branch_point,
     )
-    from nldyn.errors import SceneError, SystemModelError
-    from nldyn.executors import Outcome, TaskError, run_all
-    from nldyn.exploration import Coverage, Exploration, ExploreOptions
-    from nldyn.fixed_point_index import index_gaps, index_sum
-    from nldyn.flow import FlowMap, FlowOptions
-    from nldyn.fourier import Spectrum, spectrum
-    from nldyn.lifetimes import ChaosLifetime, chaos_lifetime
-    from nldyn.long_term_plots import (
-        plot_basins,
-        plot_brute_force,
-        plot_section,
-        plot_spectra,
-        plot_sweep,
-        plot_wear,
+    from nldyn.bifurcations.period_doubling import switch_at_flip
+    from nldyn.bifurcations.roots import LocateError
+    from nldyn.branches.arclength import Walk
+    from nldyn.branches.branch import Branch, BranchPoint, SpecialPoint
+    from nldyn.branches.cascades import Cascade, cascade, cascades_in
+    from nldyn.branches.continuation import continue_branch
+    from nldyn.branches.options import ContinuationOptions
+    from nldyn.curves.curves import Curve, continue_constant, continue_in, continue_special
+    from nldyn.curves.marks import LocatedPoint, refine_special
+    from nldyn.flow.flow_map import FlowMap, FlowOptions
+    from nldyn.io.branches import load_branch, load_branches, load_diagram, load_exploration
+    from nldyn.io.curves import load_curve, load_curves, save_curves
+    from nldyn.longterm.attractors import Attractor, AttractorOptions, classify, find_attractors
+    from nldyn.longterm.basins import Basins, Plane, basins
+    from nldyn.longterm.impacts import Impacts, impacts
+    from nldyn.longterm.lifetimes import ChaosLifetime, chaos_lifetime
+    from nldyn.longterm.lyapunov import LyapunovSpectrum, lyapunov_exponents
+    from nldyn.longterm.manifolds import basin_edge, stable_manifold
+    from nldyn.longterm.poincare import (
+        BruteForce,
+        brute_force,
+        impact_section,
+        stroboscopic_section,
     )
-    from nldyn.lyapunov import LyapunovSpectrum, lyapunov_exponents
-    from nldyn.manifolds import basin_edge, stable_manifold
-    from nldyn.multipliers import Stability
-    from nldyn.normal_forms import NormalForm, describe, normal_form, switch_at_branch_point
-    from nldyn.orbit import ConvergenceError, History, Orbit, solve_orbit
-    from nldyn.orbit_plots import (
-        plot_contact_force,
-        plot_history,
-        plot_phase_portrait,
-        plot_spectrum,
-    )
-    from nldyn.parameters import Parameter
-    from nldyn.plot import plot_diagram
-    from nldyn.pseudo_orbit_search import by_pseudo_orbits
-    from nldyn.roots import LocateError
-    from nldyn.search import SearchOptions, find_orbits
-    from nldyn.sections import BruteForce, brute_force, impact_section, stroboscopic_section
-    from nldyn.selection import Selection, reduce_for
-    from nldyn.setting import Setting
-    from nldyn.simulation import Motion, simulate, sweep
-    from nldyn.step_control import ContinuationOptions
-    from nldyn.store import load_branch, load_branches, load_diagram, load_exploration
-    from nldyn.studies import study
-    from nldyn.survey import explore
-    from nldyn.system import System
-    from nldyn.walk import Walk
-    from nldyn.wear import (
+    from nldyn.longterm.simulation import Motion, simulate, sweep
+    from nldyn.longterm.wear import (
         ContactMeasures,
         SpectraMap,
         contact_measures,
@@ -81,57 +48,100 @@ if TYPE_CHECKING:
         spectra_map,
         spectra_table,
     )
+    from nldyn.orbits.harmonics import Spectrum, spectrum
+    from nldyn.orbits.multipliers import Stability
+    from nldyn.orbits.orbit import ConvergenceError, History, Orbit, solve_orbit
+    from nldyn.orbits.starts import SearchOptions, find_orbits
+    from nldyn.plot.curves import plot_curves, plot_orbit_curve
+    from nldyn.plot.diagram import plot_diagram
+    from nldyn.plot.longterm import (
+        plot_basins,
+        plot_brute_force,
+        plot_section,
+        plot_spectra,
+        plot_sweep,
+        plot_wear,
+    )
+    from nldyn.plot.orbit import (
+        plot_contact_force,
+        plot_history,
+        plot_phase_portrait,
+        plot_spectrum,
+    )
+    from nldyn.reduction.convergence import Study, converge
+    from nldyn.reduction.selection import Selection, reduce_for
+    from nldyn.reduction.setting import Setting
+    from nldyn.runtime.executors import Outcome, TaskError, run_all
+    from nldyn.scene.study import study
+    from nldyn.search.by_pseudo_orbits import by_pseudo_orbits
+    from nldyn.search.diagram import Diagram, Seed, diagram
+    from nldyn.search.exploration import Coverage, Exploration, ExploreOptions
+    from nldyn.search.explore import explore
+    from nldyn.search.fixed_point_index import index_gaps, index_sum
+    from nldyn.search.homotopy import by_detour
+    from nldyn.search.mixtures import by_crossover
+    from nldyn.search.random_walks import by_closed_walks
+    from nldyn.system.elements import (
+        Damper,
+        HarmonicForce,
+        Stop,
+        Unbalance,
+        dissipation_for,
+        hertz_stiffness,
+    )
+    from nldyn.system.parameters import Parameter
+    from nldyn.system.system import System
 
 _HOMES = {
-    "attractors": "Attractor AttractorOptions classify find_attractors",
-    "basin_maps": "Basins Plane basins",
-    "branch": "Branch BranchPoint SpecialPoint",
-    "cascades": "Cascade cascade cascades_in",
-    "closed_walks": "by_closed_walks",
-    "continuation": "continue_branch",
-    "convergence": "Study converge",
-    "crossover": "by_crossover",
-    "curve_marks": "LocatedPoint refine_special",
-    "curve_plots": "plot_curves plot_orbit_curve",
-    "curve_store": "load_curve load_curves save_curves",
-    "curves": "Curve continue_constant continue_in continue_special",
-    "detour_search": "by_detour",
-    "pseudo_orbit_search": "by_pseudo_orbits",
-    "diagrams": "Diagram Seed diagram",
-    "doubling": "switch_at_flip",
-    "elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
-    "errors": "SceneError SystemModelError",
-    "executors": "Outcome TaskError run_all",
-    "exploration": "Coverage Exploration ExploreOptions",
-    "fixed_point_index": "index_gaps index_sum",
-    "flow": "FlowMap FlowOptions",
-    "fourier": "Spectrum spectrum",
-    "contacts": "Impacts impacts",
-    "lifetimes": "ChaosLifetime chaos_lifetime",
-    "long_term_plots": (
+    "longterm.attractors": "Attractor AttractorOptions classify find_attractors",
+    "longterm.basins": "Basins Plane basins",
+    "branches.branch": "Branch BranchPoint SpecialPoint",
+    "branches.cascades": "Cascade cascade cascades_in",
+    "search.random_walks": "by_closed_walks",
+    "branches.continuation": "continue_branch",
+    "reduction.convergence": "Study converge",
+    "search.mixtures": "by_crossover",
+    "curves.marks": "LocatedPoint refine_special",
+    "plot.curves": "plot_curves plot_orbit_curve",
+    "io.curves": "load_curve load_curves save_curves",
+    "curves.curves": "Curve continue_constant continue_in continue_special",
+    "search.homotopy": "by_detour",
+    "search.by_pseudo_orbits": "by_pseudo_orbits",
+    "search.diagram": "Diagram Seed diagram",
+    "bifurcations.period_doubling": "switch_at_flip",
+    "system.elements": "Damper HarmonicForce Stop Unbalance dissipation_for hertz_stiffness",
+    "base.errors": "SceneError SystemModelError",
+    "runtime.executors": "Outcome TaskError run_all",
+    "search.exploration": "Coverage Exploration ExploreOptions",
+    "search.fixed_point_index": "index_gaps index_sum",
+    "flow.flow_map": "FlowMap FlowOptions",
+    "orbits.harmonics": "Spectrum spectrum",
+    "longterm.impacts": "Impacts impacts",
+    "longterm.lifetimes": "ChaosLifetime chaos_lifetime",
+    "plot.longterm": (
         "plot_basins plot_brute_force plot_section plot_spectra plot_sweep plot_wear"
     ),
-    "lyapunov": "LyapunovSpectrum lyapunov_exponents",
-    "manifolds": "basin_edge stable_manifold",
-    "multipliers": "Stability",
-    "normal_forms": "NormalForm describe normal_form switch_at_branch_point",
-    "orbit": "ConvergenceError History Orbit solve_orbit",
-    "orbit_plots": "plot_contact_force plot_history plot_phase_portrait plot_spectrum",
-    "parameters": "Parameter",
-    "plot": "plot_diagram",
-    "roots": "LocateError",
-    "search": "SearchOptions find_orbits",
-    "sections": "BruteForce brute_force impact_section stroboscopic_section",
-    "simulation": "Motion simulate sweep",
-    "selection": "Selection reduce_for",
-    "setting": "Setting",
-    "step_control": "ContinuationOptions",
-    "store": "load_branch load_branches load_diagram load_exploration",
-    "studies": "study",
-    "survey": "explore",
-    "system": "System",
-    "walk": "Walk",
-    "wear": "ContactMeasures SpectraMap contact_measures measures_table spectra_map spectra_table",
+    "longterm.lyapunov": "LyapunovSpectrum lyapunov_exponents",
+    "longterm.manifolds": "basin_edge stable_manifold",
+    "orbits.multipliers": "Stability",
+    "bifurcations.normal_forms": "NormalForm describe normal_form switch_at_branch_point",
+    "orbits.orbit": "ConvergenceError History Orbit solve_orbit",
+    "plot.orbit": "plot_contact_force plot_history plot_phase_portrait plot_spectrum",
+    "system.parameters": "Parameter",
+    "plot.diagram": "plot_diagram",
+    "bifurcations.roots": "LocateError",
+    "orbits.starts": "SearchOptions find_orbits",
+    "longterm.poincare": "BruteForce brute_force impact_section stroboscopic_section",
+    "longterm.simulation": "Motion simulate sweep",
+    "reduction.selection": "Selection reduce_for",
+    "reduction.setting": "Setting",
+    "branches.options": "ContinuationOptions",
+    "io.branches": "load_branch load_branches load_diagram load_exploration",
+    "scene.study": "study",
+    "search.explore": "explore",
+    "system.system": "System",
+    "branches.arclength": "Walk",
+    "longterm.wear": "ContactMeasures SpectraMap contact_measures measures_table spectra_map spectra_table",
 }
 
 __all__ = [

@@ -7,7 +7,7 @@ import os
 import sys
 from pathlib import Path
 
-from nldyn.command import answering
+from nldyn.app.command import answering
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -26,7 +26,7 @@ def main() -> None:
     out = parser.parse_args().out
     on_one_thread()
     from nldyn.bench.run import run
-    from nldyn.result_directory import OutputError
+    from nldyn.runtime.result_directory import OutputError
 
     try:
         print(f"written to {run(out)}")

@@ -8,7 +8,7 @@ from scipy.integrate import solve_bvp, solve_ivp
 from nldyn.bench import motion
 from nldyn.bench.job import EngineError, Job, Prepared
 from nldyn.bench.models import Case, Sensitivities
-from nldyn.linear import Real
+from nldyn.system.linear import Real
 
 
 def collocation(case: Case, tolerance: float) -> Prepared:

@@ -20,8 +20,8 @@ from nldyn.bench.adaptive import Advance, adaptive, cvode_advance, scipy_advance
 from nldyn.bench.collocation import collocation
 from nldyn.bench.job import Job, Prepared
 from nldyn.bench.models import Case
-from nldyn.flow import FlowMap, FlowOptions
-from nldyn.linear import Real
+from nldyn.flow.flow_map import FlowMap, FlowOptions
+from nldyn.system.linear import Real
 
 FLOW_OPTIONS = [FlowOptions(rtol) for rtol in (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)]
 TOLERANCES = [1e-4, 1e-6, 1e-8, 1e-10, 1e-12]

@@ -20,8 +20,8 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from nldyn.linear import Real
-from nldyn.system import System
+from nldyn.system.linear import Real
+from nldyn.system.system import System
 
 mp = mpmath.mp
 Number = Any  # mpmath has no type hints

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from nldyn.bench.models import Sensitivities
-from nldyn.linear import Real
+from nldyn.system.linear import Real
 
 
 class EngineError(RuntimeError):

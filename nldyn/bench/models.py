@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from nldyn.elements import Stop, Unbalance
-from nldyn.linear import Real
-from nldyn.system import System
+from nldyn.system.elements import Stop, Unbalance
+from nldyn.system.linear import Real
+from nldyn.system.system import System
 
 MODELS = ("one_dof", "two_dof", "four_dof", "sixteen_dof")
 

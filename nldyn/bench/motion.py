@@ -15,9 +15,9 @@ import numpy as np
 from numba import njit
 
 from nldyn.bench.models import Sensitivities
-from nldyn.elements import Unbalance
-from nldyn.linear import Real
-from nldyn.system import System
+from nldyn.system.elements import Unbalance
+from nldyn.system.linear import Real
+from nldyn.system.system import System
 
 FLIGHT, CONTACT = 0.0, 1.0
 PERIOD = 2.0 * math.pi

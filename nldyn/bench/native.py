@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from nldyn.bench.models import Case, Sensitivities
-from nldyn.flow import FlowMap, Segments
-from nldyn.linear import Real
+from nldyn.flow.flow_map import FlowMap, Segments
+from nldyn.system.linear import Real
 
 PERIOD = np.array([0.0, 2.0 * math.pi])
 

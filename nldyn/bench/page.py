@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from nldyn.output import write_table
-from nldyn.version import software_version
+from nldyn.base.version import software_version
+from nldyn.report.results import write_table
 
 Row = Mapping[str, str]
 PACKAGES = ("numpy", "scipy", "numba", "heyoka", "scikit-sundae")

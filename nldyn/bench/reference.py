@@ -21,12 +21,12 @@ import numpy as np
 from nldyn.bench.exact import ExactEnd, ExactFlow, Number, Precision, Series
 from nldyn.bench.models import MODELS, stored, to_system, to_table
 from nldyn.bench.native import sensitivities
-from nldyn.continuation import continue_branch
-from nldyn.elements import Stop
-from nldyn.flow import FlowMap, FlowOptions
-from nldyn.linear import Real
-from nldyn.orbit import solve_orbit
-from nldyn.system import System
+from nldyn.branches.continuation import continue_branch
+from nldyn.flow.flow_map import FlowMap, FlowOptions
+from nldyn.orbits.orbit import solve_orbit
+from nldyn.system.elements import Stop
+from nldyn.system.linear import Real
+from nldyn.system.system import System
 
 mp = mpmath.mp
 FILE = Path(__file__).with_name("data") / "reference.json"
@@ -51,8 +51,8 @@ GRAZING_DEPTHS = ("1e-2", "1e-4", "1e-6", "1e-8", "1e-10", "1e-12", "1e-14")
 def model_system(name: str) -> System:
     """The beam with 1, 2, 4 or 16 degrees of freedom, from the example scenes."""
     import cms
-    from nldyn.resources import example
-    from nldyn.scene import build_component, build_system, load_scene
+    from nldyn.base.resources import example
+    from nldyn.scene.build import build_component, build_system, load_scene
 
     if name == "one_dof":
         return build_system(load_scene(example("one_dof.toml")))

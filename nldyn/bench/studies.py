@@ -18,12 +18,12 @@ from nldyn.bench import native
 from nldyn.bench.engines import flow_map
 from nldyn.bench.measure import errors, median_seconds
 from nldyn.bench.models import Case, Sensitivities, load_case, load_grazing
-from nldyn.branch import Branch
-from nldyn.continuation import continue_branch
-from nldyn.flow import FlowMap, FlowOptions
-from nldyn.linear import Real
-from nldyn.orbit import solve_orbit
-from nldyn.system import System
+from nldyn.branches.branch import Branch
+from nldyn.branches.continuation import continue_branch
+from nldyn.flow.flow_map import FlowMap, FlowOptions
+from nldyn.orbits.orbit import solve_orbit
+from nldyn.system.linear import Real
+from nldyn.system.system import System
 
 DEFAULT = FlowOptions()
 TIGHT = FlowOptions(rtol=1e-13)
@@ -183,8 +183,8 @@ class ModesTime:
 def time_modes(numbers: Sequence[int] = MODES) -> list[ModesTime]:
     """One period of the beam with more and more modes; errors against the tightest setting."""
     import cms
-    from nldyn.resources import example
-    from nldyn.scene import build_component, build_system, load_scene
+    from nldyn.base.resources import example
+    from nldyn.scene.build import build_component, build_system, load_scene
 
     scene = load_scene(example("four_dof_xi_0.01.toml"))
     component = build_component(scene)

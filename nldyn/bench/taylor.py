@@ -14,8 +14,8 @@ import numpy as np
 
 from nldyn.bench import motion
 from nldyn.bench.models import Case
-from nldyn.elements import Unbalance
-from nldyn.linear import Real
+from nldyn.system.elements import Unbalance
+from nldyn.system.linear import Real
 
 OMEGA, SIZE = hy.par[0], hy.par[1]
 

@@ -23,9 +23,9 @@ from scipy.integrate import solve_ivp
 from nldyn.bench.models import load_case
 from nldyn.bench.page import markdown
 from nldyn.bench.ratios import seconds_at
-from nldyn.flow import FlowMap, FlowOptions
-from nldyn.linear import Real
-from nldyn.system import System
+from nldyn.flow.flow_map import FlowMap, FlowOptions
+from nldyn.system.linear import Real
+from nldyn.system.system import System
 
 WANTED = 1e-8  # error over a period
 STATES = 12  # along the motion, from which errors are measured

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from nldyn.command import answering
+from nldyn.app.command import answering
 
 
 def main() -> None:
@@ -20,7 +20,7 @@ def main() -> None:
     if chosen.workers < 1:
         parser.error(f"--workers must be at least 1, got {chosen.workers}")
     from nldyn.hard.run import run
-    from nldyn.result_directory import OutputError
+    from nldyn.runtime.result_directory import OutputError
 
     try:
         results = run(chosen.out, quick=chosen.quick, only=chosen.only, workers=chosen.workers)

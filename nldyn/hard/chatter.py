@@ -10,7 +10,6 @@ import numpy as np
 from scipy.optimize import brentq
 
 from nldyn.bench.exact import Precision
-from nldyn.elements import HarmonicForce, Stop
 from nldyn.hard.case import Case, Measured
 from nldyn.hard.multiprecision import (
     JACOBIAN,
@@ -21,8 +20,9 @@ from nldyn.hard.multiprecision import (
     orbit_flow_error,
 )
 from nldyn.hard.stiffness import beam_with_stop
-from nldyn.orbit import Orbit, solve_orbit
-from nldyn.system import System
+from nldyn.orbits.orbit import Orbit, solve_orbit
+from nldyn.system.elements import HarmonicForce, Stop
+from nldyn.system.system import System
 
 SUBJECT = "chatter and sustained contact"
 FEWER = Precision(24, 30, 16)  # a reference of minutes otherwise

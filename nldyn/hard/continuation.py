@@ -9,13 +9,13 @@ from functools import cache, partial
 
 import numpy as np
 
-from nldyn.branch import Branch, SpecialPoint
-from nldyn.continuation import continue_branch
+from nldyn.branches.branch import Branch, SpecialPoint
+from nldyn.branches.continuation import continue_branch
+from nldyn.branches.options import ContinuationOptions
 from nldyn.hard.case import Case, Measured
-from nldyn.orbit import Orbit, solve_orbit
+from nldyn.orbits.orbit import Orbit, solve_orbit
 from nldyn.paper.jobs import scene_system
-from nldyn.step_control import ContinuationOptions
-from nldyn.system import System
+from nldyn.system.system import System
 
 SUBJECT = "continuation at low damping"
 RANGE = (18.0, 90.0)

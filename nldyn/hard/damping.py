@@ -11,9 +11,7 @@ import numpy as np
 from scipy.special import gamma
 
 from nldyn.bench.exact import Precision
-from nldyn.contacts import Impacts, impacts
-from nldyn.elements import HarmonicForce, Stop
-from nldyn.flow import FlowMap, FlowOptions
+from nldyn.flow.flow_map import FlowMap, FlowOptions
 from nldyn.hard.case import Case, Measured
 from nldyn.hard.multiprecision import (
     DIGITS,
@@ -24,11 +22,13 @@ from nldyn.hard.multiprecision import (
     exact_orbit,
     orbit_flow_error,
 )
-from nldyn.linear import Real
-from nldyn.orbit import solve_orbit
+from nldyn.longterm.impacts import Impacts, impacts
+from nldyn.longterm.simulation import simulate
+from nldyn.orbits.orbit import solve_orbit
 from nldyn.paper.jobs import BILINEAR_ALPHA, STIFFNESS, scene_system
-from nldyn.simulation import simulate
-from nldyn.system import System
+from nldyn.system.elements import HarmonicForce, Stop
+from nldyn.system.linear import Real
+from nldyn.system.system import System
 
 mp = mpmath.mp
 SUBJECT = "damping"

@@ -13,16 +13,16 @@ from scipy.sparse.linalg import eigsh, spsolve
 
 import cms
 import fem
-from nldyn.branch import Branch
-from nldyn.continuation import continue_branch
-from nldyn.elements import Stop, Unbalance
+from nldyn.base.resources import example
+from nldyn.base.resources import mesh as mesh_file
+from nldyn.branches.branch import Branch
+from nldyn.branches.continuation import continue_branch
 from nldyn.hard.case import Case, Measured
 from nldyn.hard.multiprecision import DIGITS, mp
-from nldyn.orbit import solve_orbit
-from nldyn.resources import example
-from nldyn.resources import mesh as mesh_file
-from nldyn.scene import build_system, load_scene
-from nldyn.system import System
+from nldyn.orbits.orbit import solve_orbit
+from nldyn.scene.build import build_system, load_scene
+from nldyn.system.elements import Stop, Unbalance
+from nldyn.system.system import System
 
 SUBJECT = "finite elements and units"
 STEEL = fem.Material(2.1e11, 7800.0, 0.0)  # without lateral contraction beam theory is exact

@@ -8,15 +8,15 @@ from functools import partial
 import numpy as np
 
 from nldyn.bench.measure import median_seconds
-from nldyn.branch import Branch
-from nldyn.continuation import continue_branch
-from nldyn.elements import HarmonicForce, Stop
-from nldyn.flow import FlowMap
+from nldyn.branches.branch import Branch
+from nldyn.branches.continuation import continue_branch
+from nldyn.flow.flow_map import FlowMap
 from nldyn.hard.case import Case, Measured
 from nldyn.hard.multiprecision import JACOBIAN, ORIGIN, PROMISE, flow_error, orbit_flow_error
 from nldyn.hard.stiffness import beam_with_stop
-from nldyn.orbit import Orbit, solve_orbit
-from nldyn.system import System
+from nldyn.orbits.orbit import Orbit, solve_orbit
+from nldyn.system.elements import HarmonicForce, Stop
+from nldyn.system.system import System
 
 SUBJECT = "grazing"
 SPEEDS = (1.0, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 0.0)

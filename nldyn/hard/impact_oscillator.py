@@ -16,9 +16,9 @@ import numpy as np
 import scipy.linalg as sla
 from scipy.optimize import brentq
 
-from nldyn.elements import HarmonicForce, Stop
-from nldyn.linear import Real
-from nldyn.system import System
+from nldyn.system.elements import HarmonicForce, Stop
+from nldyn.system.linear import Real
+from nldyn.system.system import System
 
 mp = mpmath.mp
 

@@ -9,8 +9,6 @@ from functools import partial
 import numpy as np
 
 from nldyn.bench.exact import ExactFlow, Precision
-from nldyn.contacts import impacts
-from nldyn.elements import Damper, HarmonicForce, Stop
 from nldyn.hard.case import Case, Measured
 from nldyn.hard.multiprecision import (
     DIGITS,
@@ -23,10 +21,12 @@ from nldyn.hard.multiprecision import (
     orbit_flow_error,
     relative,
 )
-from nldyn.orbit import Orbit, solve_orbit
-from nldyn.search import find_orbits
-from nldyn.simulation import simulate
-from nldyn.system import System
+from nldyn.longterm.impacts import impacts
+from nldyn.longterm.simulation import simulate
+from nldyn.orbits.orbit import Orbit, solve_orbit
+from nldyn.orbits.starts import find_orbits
+from nldyn.system.elements import Damper, HarmonicForce, Stop
+from nldyn.system.system import System
 
 SUBJECT = "modes"
 FORCE = HarmonicForce("m", 1.0)

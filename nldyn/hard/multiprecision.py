@@ -10,11 +10,11 @@ import mpmath
 import numpy as np
 
 from nldyn.bench.exact import ExactEnd, ExactFlow, Number, Precision, Series
-from nldyn.flow import FlowMap
+from nldyn.flow.flow_map import FlowMap
 from nldyn.hard.case import Measured
-from nldyn.linear import Real
-from nldyn.orbit import Orbit
-from nldyn.system import System
+from nldyn.orbits.orbit import Orbit
+from nldyn.system.linear import Real
+from nldyn.system.system import System
 
 mp = mpmath.mp
 DIGITS = Precision(34, 34, 24)

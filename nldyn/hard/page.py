@@ -8,7 +8,7 @@ from pathlib import Path
 
 from nldyn.bench.page import Row, machine, markdown
 from nldyn.hard.case import Result
-from nldyn.output import write_table
+from nldyn.report.results import write_table
 
 
 def row(result: Result) -> Row:

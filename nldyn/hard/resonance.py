@@ -8,10 +8,11 @@ from functools import cache, partial
 import numpy as np
 
 from nldyn.bench.exact import Series
-from nldyn.branch import Branch, SpecialPoint
-from nldyn.continuation import continue_branch
-from nldyn.curves import continue_special
-from nldyn.elements import HarmonicForce, Stop, Unbalance
+from nldyn.bifurcations.normal_forms import normal_form, switch_at_branch_point
+from nldyn.branches.branch import Branch, SpecialPoint
+from nldyn.branches.continuation import continue_branch
+from nldyn.branches.options import ContinuationOptions
+from nldyn.curves.curves import continue_special
 from nldyn.hard.case import Case, Measured
 from nldyn.hard.multiprecision import (
     DIGITS,
@@ -24,12 +25,11 @@ from nldyn.hard.multiprecision import (
     orbit_flow_error,
 )
 from nldyn.hard.stiffness import beam_with_stop
-from nldyn.linear import Real
-from nldyn.normal_forms import normal_form, switch_at_branch_point
-from nldyn.orbit import Orbit, solve_orbit
-from nldyn.search import find_orbits
-from nldyn.step_control import ContinuationOptions
-from nldyn.system import System
+from nldyn.orbits.orbit import Orbit, solve_orbit
+from nldyn.orbits.starts import find_orbits
+from nldyn.system.elements import HarmonicForce, Stop, Unbalance
+from nldyn.system.linear import Real
+from nldyn.system.system import System
 
 SUBJECT = "resonances, folds and cusps"
 LOCATED = 1e-8

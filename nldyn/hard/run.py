@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from nldyn.executors import as_finished
 from nldyn.hard.case import Case, Measured, Result
 from nldyn.hard.cases import CASES
 from nldyn.hard.page import write_page
-from nldyn.result_directory import check_directory, result_directory
+from nldyn.runtime.executors import as_finished
+from nldyn.runtime.result_directory import check_directory, result_directory
 
 
 def run(folder: Path, *, quick: bool = False, only: str = "", workers: int = 1) -> list[Result]:

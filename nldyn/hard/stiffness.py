@@ -7,15 +7,15 @@ from functools import partial
 
 import numpy as np
 
-from nldyn.contacts import impacts
-from nldyn.continuation import continue_branch
-from nldyn.elements import Stop, Unbalance
-from nldyn.flow import FlowMap
+from nldyn.branches.continuation import continue_branch
+from nldyn.flow.flow_map import FlowMap
 from nldyn.hard.case import Case, Measured
 from nldyn.hard.impact_oscillator import ImpactOscillator
 from nldyn.hard.multiprecision import JACOBIAN, ORIGIN, PROMISE, STATE, orbit_flow_error
-from nldyn.orbit import Orbit, solve_orbit
-from nldyn.system import System
+from nldyn.longterm.impacts import impacts
+from nldyn.orbits.orbit import Orbit, solve_orbit
+from nldyn.system.elements import Stop, Unbalance
+from nldyn.system.system import System
 
 SUBJECT = "stiffness"
 OSCILLATOR = ImpactOscillator()

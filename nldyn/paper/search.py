@@ -25,17 +25,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from nldyn.beside import range_within
-from nldyn.cli import plain_errors, told_what_is_kept
-from nldyn.closed_walks import by_closed_walks
-from nldyn.command import answering
-from nldyn.crossover import by_crossover
-from nldyn.detour import checked_factors
-from nldyn.detour_search import by_detour
-from nldyn.diagrams import Diagram, Progress
-from nldyn.errors import SystemModelError, check_whole
-from nldyn.exploration import Exploration, ExploreOptions, check_spacing, check_walk_states
-from nldyn.flow import flow_of, same_flow
+from nldyn.app.cli import plain_errors, told_what_is_kept
+from nldyn.app.command import answering
+from nldyn.base.errors import SystemModelError, check_whole
+from nldyn.flow.flow_map import flow_of, same_flow
+from nldyn.io.branches import load_diagram
+from nldyn.orbits.homotopy import checked_factors
+from nldyn.orbits.starts import MOST_COUNT
 from nldyn.paper.jobs import JOBS, LONG, Job, job_named
 from nldyn.paper.starts import (
     LONGEST,
@@ -45,13 +41,17 @@ from nldyn.paper.starts import (
     starts_path,
     write_starts,
 )
-from nldyn.parameters import Parameter
-from nldyn.progress import progress_line
-from nldyn.pseudo_orbit_search import by_pseudo_orbits
-from nldyn.search import MOST_COUNT
-from nldyn.store import load_diagram
-from nldyn.survey import explore
-from nldyn.whole_file import write_whole
+from nldyn.runtime.files import write_whole
+from nldyn.runtime.progress import progress_line
+from nldyn.search.by_pseudo_orbits import by_pseudo_orbits
+from nldyn.search.diagram import Diagram, Progress
+from nldyn.search.exploration import Exploration, ExploreOptions, check_spacing, check_walk_states
+from nldyn.search.explore import explore
+from nldyn.search.extend import range_within
+from nldyn.search.homotopy import by_detour
+from nldyn.search.mixtures import by_crossover
+from nldyn.search.random_walks import by_closed_walks
+from nldyn.system.parameters import Parameter
 
 EFFORT = ExploreOptions(spacing=0.01, starts=1, settling=200, rounds=24, passing=24)
 WAYS: dict[str, Callable[..., Diagram]] = {  # searches beside known branches, by their options

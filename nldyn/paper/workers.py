@@ -13,9 +13,9 @@ from multiprocessing.queues import SimpleQueue
 from pathlib import Path
 from typing import TypeVar
 
-from nldyn.diagrams import Progress
 from nldyn.paper.kept import kept
-from nldyn.progress import progress_line
+from nldyn.runtime.progress import progress_line
+from nldyn.search.diagram import Progress
 
 Key = TypeVar("Key")
 Value = TypeVar("Value")

@@ -31,7 +31,7 @@ from nldyn.bench.throughput import (
     rate_at,
     scaling_table,
 )
-from nldyn.result_directory import OutputError
+from nldyn.runtime.result_directory import OutputError
 
 ENGINES = ("nldyn", "solve_ivp DOP853", "solve_ivp DOP853 in numpy")
 

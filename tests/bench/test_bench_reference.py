@@ -10,7 +10,7 @@ from nldyn.bench.exact import ExactFlow, Precision
 from nldyn.bench.measure import errors
 from nldyn.bench.models import MODELS, Case, load_case, load_grazing, stored, to_system, to_table
 from nldyn.bench.reference import model_system
-from nldyn.flow import FlowMap
+from nldyn.flow.flow_map import FlowMap
 from nldyn.hard.stiffness import beam_with_stop
 
 

@@ -14,9 +14,10 @@ from xml.etree import ElementTree
 
 from PIL import Image
 
-from nldyn import checkpoint, load_branches, load_diagram
-from nldyn.cli import main
-from nldyn.result_directory import MANIFEST
+from nldyn import load_branches, load_diagram
+from nldyn.app.cli import main
+from nldyn.io import checkpoint
+from nldyn.runtime.result_directory import MANIFEST
 
 TABLES = ("branches.csv", "special_points.csv", "ends.csv", "branches.h5", "summary.json")
 PICTURES = ("diagram.png", "diagram.svg")

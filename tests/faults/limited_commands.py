@@ -11,7 +11,7 @@ from pathlib import Path
 
 from click.testing import CliRunner, Result
 
-from nldyn.cli import main
+from nldyn.app.cli import main
 
 SECONDS = 10.0  # for one command
 MEMORY = 2_000_000_000  # bytes beyond what the process has at the start

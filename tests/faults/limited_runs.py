@@ -20,7 +20,7 @@ from typing import Any
 from killing import check_results
 
 from nldyn import load_diagram
-from nldyn.command import main
+from nldyn.app.command import main
 
 PROCESSOR_SECONDS = 20  # after which Ctrl-C comes
 PATIENCE = 60  # more of them, after which it counts as not answered

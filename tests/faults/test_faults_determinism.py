@@ -11,12 +11,12 @@ import pytest
 from killing import same_results
 
 from nldyn import Plane, basins, simulate, study, sweep
+from nldyn.base.resources import example
 from nldyn.paper.jobs import JOBS, joined, submit_diagrams
 from nldyn.paper.workers import worker_processes
-from nldyn.resources import example
-from nldyn.scene import build_system, load_scene
+from nldyn.scene.build import build_system, load_scene
 
-START = "from nldyn.command import main; main()"
+START = "from nldyn.app.command import main; main()"
 
 
 def test_two_processes_give_the_same_bytes(tmp_path):

@@ -12,10 +12,13 @@ import pytest
 from killing import check_whole, run, same_results
 from limited_commands import command, refusal
 
-from nldyn import Walk, checkpoint, output, plot
-from nldyn.resources import example
+from nldyn import Walk
+from nldyn.base.resources import example
+from nldyn.io import checkpoint
+from nldyn.plot import diagram as plot
+from nldyn.report import results as output
 
-START = "from nldyn.command import main; main()"
+START = "from nldyn.app.command import main; main()"
 
 
 @pytest.fixture(autouse=True)
@@ -105,7 +108,7 @@ LIMITED = """
 import resource, signal, sys
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # then the writing fails as on a full disk
 resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
-from nldyn.command import main
+from nldyn.app.command import main
 main()
 """
 
@@ -126,7 +129,7 @@ def test_files_that_the_system_refuses_to_grow(scene, tmp_path):
 
 
 def test_a_folder_that_cannot_be_written_to_is_told_before_the_work(scene, tmp_path, monkeypatch):
-    monkeypatch.setattr("nldyn.scene.compute", lambda *_: pytest.fail("computed"))
+    monkeypatch.setattr("nldyn.scene.build.compute", lambda *_: pytest.fail("computed"))
     (tmp_path / "closed").mkdir(mode=0o555)
     for place in (tmp_path / "closed" / "out", "/proc/out", tmp_path / ("x" * 300)):
         said = refusal(invoke(scene, place))
@@ -180,12 +183,12 @@ def stopped_at(monkeypatch, owner, name, call):
 
 
 STAGES = {
-    "scene": ("nldyn.scene", "load_scene", 1, False),
-    "search": ("nldyn.diagrams", "simulate_strobe", 1, False),
-    "walk": ("nldyn.walk.Walk", "_advance", 20, True),
-    "tables": ("nldyn.output", "write_table", 2, True),
-    "picture": ("nldyn.plot", "save_diagram", 1, True),
-    "exchange": ("nldyn.result_directory", "_swap", 1, True),
+    "scene": ("nldyn.scene.build", "load_scene", 1, False),
+    "search": ("nldyn.search.diagram", "simulate_strobe", 1, False),
+    "walk": ("nldyn.branches.arclength.Walk", "_advance", 20, True),
+    "tables": ("nldyn.report.results", "write_table", 2, True),
+    "picture": ("nldyn.plot.diagram", "save_diagram", 1, True),
+    "exchange": ("nldyn.runtime.result_directory", "_swap", 1, True),
 }
 
 
@@ -246,8 +249,8 @@ def test_ctrl_c_in_a_destructor_is_not_lost(after):
     """Python drops what a destructor or a callback from C raises; the compiler has many."""
     start = f"""
 import time
-import nldyn.cli
-from nldyn.command import main
+import nldyn.app.cli
+from nldyn.app.command import main
 
 class Swallower:
     def __del__(self):
@@ -257,7 +260,7 @@ def command(prog_name):
     Swallower()
     {after}
 
-nldyn.cli.main = command
+nldyn.app.cli.main = command
 main()
 """
     arguments = [sys.executable, "-c", start]
@@ -269,7 +272,7 @@ main()
 POOL = """
 import time
 from concurrent.futures import ProcessPoolExecutor
-from nldyn.executors import run_all
+from nldyn.runtime.executors import run_all
 
 def second(x):
     end = time.monotonic() + 1.0

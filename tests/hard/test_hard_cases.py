@@ -8,7 +8,7 @@ from nldyn.hard.case import Case, Measured
 from nldyn.hard.cases import CASES
 from nldyn.hard.page import row, write_page
 from nldyn.hard.run import measure, run
-from nldyn.result_directory import OutputError
+from nldyn.runtime.result_directory import OutputError
 
 QUICK = [
     pytest.param(

@@ -18,7 +18,7 @@ from nldyn import (
     Unbalance,
 )
 from nldyn.bench.models import load_case
-from nldyn.shooting import ShootingProblem
+from nldyn.orbits.shooting import ShootingProblem
 
 CASES = ["one_dof", "two_dof", "four_dof", "sixteen_dof"]
 

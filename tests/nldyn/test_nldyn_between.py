@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from nldyn import ContinuationOptions, continue_branch, solve_orbit
-from nldyn.between import Between
+from nldyn.bifurcations.hidden_pairs import Between
 from nldyn.hard.continuation import beam
 
 PLACES = (-0.8, 0.0, 1.0, 1.9)

@@ -13,7 +13,7 @@ import pytest
 from bilinear import Bilinear, PiecewiseOrbit
 
 from nldyn import continue_branch, continue_special, solve_orbit, switch_at_flip
-from nldyn.trail import trace
+from nldyn.branches.leg import trace
 
 OSCILLATOR = Bilinear(damping=0.04, stiffness=1.0, stop=40.0, gap=0.0, force=1.0)
 MULTIPLIER = {"LP": 1, "PD": -1}

@@ -28,10 +28,10 @@ from nldyn import (
     load_branches,
     load_diagram,
     solve_orbit,
-    store,
 )
-from nldyn.result_directory import OutputError
-from nldyn.whole_file import check_writable
+from nldyn.io import branches as store
+from nldyn.runtime.files import check_writable
+from nldyn.runtime.result_directory import OutputError
 
 
 def two_modes():

@@ -23,23 +23,23 @@ from nldyn import (
     continue_branch,
     diagram,
     solve_orbit,
-    special,
     switch_at_branch_point,
     switch_at_flip,
-    walk,
 )
-from nldyn.branch import BranchPoint
-from nldyn.continuation import _without_repeat, start_point
+from nldyn.base.resources import example
+from nldyn.bifurcations import locate as special
+from nldyn.bifurcations.branch_crossing import distance, lies_on_crossing
+from nldyn.bifurcations.normal_forms import is_symmetric
+from nldyn.bifurcations.roots import LocateError
+from nldyn.bifurcations.within_step import special_points_between
+from nldyn.branches import arclength as walk
+from nldyn.branches.arclength import BY_TOLERANCE
+from nldyn.branches.branch import BranchPoint
+from nldyn.branches.continuation import _without_repeat, start_point
+from nldyn.branches.leg import Leg
 from nldyn.hard.continuation import beam as four_modes
-from nldyn.near_crossing import distance, lies_on_crossing
-from nldyn.normal_forms import is_symmetric
-from nldyn.resources import example
-from nldyn.roots import LocateError
-from nldyn.scene import build_system, load_scene
-from nldyn.shooting import asymmetry, metric_length
-from nldyn.step_search import special_points_between
-from nldyn.trail import Leg
-from nldyn.walk import BY_TOLERANCE
+from nldyn.orbits.shooting import asymmetry, metric_length
+from nldyn.scene.build import build_system, load_scene
 
 SHORT = ContinuationOptions(first_step=0.005, max_step=0.005)
 LONG = ContinuationOptions(first_step=0.05)

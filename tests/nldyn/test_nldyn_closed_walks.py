@@ -11,8 +11,10 @@ import pytest
 from one_dof import make_one_dof
 
 from nldyn import Stop, SystemModelError, by_closed_walks, index_sum
-from nldyn.beside import WINDOW, orbits_near
-from nldyn.closed_walks import (
+from nldyn.flow.flow_map import FlowMap
+from nldyn.orbits.orbit import stroboscopic
+from nldyn.search.extend import WINDOW, orbits_near
+from nldyn.search.random_walks import (
     LEAST,
     NARROWEST,
     NEIGHBOURS,
@@ -21,9 +23,7 @@ from nldyn.closed_walks import (
     _known_states,
     near_closed_walks,
 )
-from nldyn.flow import FlowMap
-from nldyn.orbit import stroboscopic
-from nldyn.system import System
+from nldyn.system.system import System
 
 OMEGA = 2.0 * np.pi * 37.0
 

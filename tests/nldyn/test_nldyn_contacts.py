@@ -10,16 +10,7 @@ import pytest
 from independent import Motion, state_map
 from scipy.optimize import brentq
 
-from nldyn import (
-    Damper,
-    FlowMap,
-    FlowOptions,
-    HarmonicForce,
-    Stop,
-    System,
-    Unbalance,
-    solve_orbit,
-)
+from nldyn import Damper, FlowMap, FlowOptions, HarmonicForce, Stop, System, Unbalance, solve_orbit
 
 THREE = ([13.1, 117.5, 326.5], {"middle": [0.63, 0.8, -0.5], "end": [-0.4, 0.9, 0.7]})
 SHAKER = [Unbalance("middle", 5e-6)]

@@ -22,11 +22,12 @@ from nldyn import (
     SystemModelError,
     Unbalance,
     converge,
-    convergence,
     solve_orbit,
 )
-from nldyn.cli import main
-from nldyn.convergence import (
+from nldyn.app.cli import main
+from nldyn.base.resources import example
+from nldyn.reduction import convergence
+from nldyn.reduction.convergence import (
     contact_time,
     distance,
     harmonic_branch,
@@ -38,9 +39,8 @@ from nldyn.convergence import (
     receptance_bound,
     with_mesh,
 )
-from nldyn.convergence_output import write_study
-from nldyn.resources import example
-from nldyn.scene import build_component, load_scene
+from nldyn.report.convergence import write_study
+from nldyn.scene.build import build_component, load_scene
 
 
 @pytest.fixture(scope="module")

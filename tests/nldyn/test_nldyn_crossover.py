@@ -10,11 +10,12 @@ import pytest
 from branches_alike import without
 from one_dof import THREE_HZ
 
-from nldyn import SystemModelError, by_crossover, crossover, index_sum
-from nldyn.beside import PLACES, WINDOW, collector_beside, orbits_near
-from nldyn.crossover import BEYOND, NEIGHBOURS, Loops, near_mixtures
-from nldyn.exploration import steps_between
-from nldyn.pseudo_orbits import NODES
+from nldyn import SystemModelError, by_crossover, index_sum
+from nldyn.search import mixtures as crossover
+from nldyn.search.exploration import steps_between
+from nldyn.search.extend import PLACES, WINDOW, collector_beside, orbits_near
+from nldyn.search.mixtures import BEYOND, NEIGHBOURS, Loops, near_mixtures
+from nldyn.search.pseudo_orbits import NODES
 
 
 @pytest.mark.parametrize(("period", "tries"), [(1, 50), (2, 50), (3, 200)])

@@ -19,14 +19,14 @@ from nldyn import (
     continue_constant,
     continue_in,
     continue_special,
-    curves,
     load_branch,
     load_curve,
     load_curves,
     save_curves,
     solve_orbit,
 )
-from nldyn.conditions import peak_force
+from nldyn.curves import curves
+from nldyn.orbits.conditions import peak_force
 
 
 def symmetric() -> System:

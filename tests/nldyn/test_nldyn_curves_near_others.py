@@ -21,7 +21,7 @@ from nldyn import (
     plot_orbit_curve,
     solve_orbit,
 )
-from nldyn.curve_walk import CurvePoint, extremes_meet
+from nldyn.curves.walk import CurvePoint, extremes_meet
 
 SECOND = Parameter("natural_frequency_hz", 1)
 

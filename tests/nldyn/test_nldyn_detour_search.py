@@ -28,16 +28,16 @@ from nldyn import (
     load_diagram,
     solve_orbit,
 )
-from nldyn.branch import is_at
-from nldyn.checkpoint import Checkpoint
-from nldyn.detour import Detour, _far, checked_factors
-from nldyn.diagrams import Collector
-from nldyn.flow import flow_of
-from nldyn.orbit import Orbit
+from nldyn.branches.branch import is_at
+from nldyn.flow.flow_map import flow_of
+from nldyn.io.branches import save_branches
+from nldyn.io.checkpoint import Checkpoint
+from nldyn.orbits.homotopy import Detour, _far, checked_factors
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.starts import orbit_near
 from nldyn.paper.jobs import scene_system
 from nldyn.paper.starts import read_starts
-from nldyn.search import orbit_near
-from nldyn.store import save_branches
+from nldyn.search.diagram import Collector
 
 RANGE_HZ = (7.2, 11.0)
 HALF = {"damping": 0.5}
@@ -277,7 +277,7 @@ def test_an_orbit_far_from_where_it_was_expected_is_not_taken(harmonic):
 def test_what_is_no_fold_in_the_end_is_not_taken(found, monkeypatch):
     fold = folds_of(found)[0]
     monkeypatch.setattr(
-        "nldyn.detour.correct", lambda *_: SimpleNamespace(converged=False, orbit=fold)
+        "nldyn.orbits.homotopy.correct", lambda *_: SimpleNamespace(converged=False, orbit=fold)
     )
     detour = Detour(fold.problem.flow, checked_factors(two_modes(), HALF))
     assert detour.carried_fold(fold, 0.0, 1.0) is None
@@ -292,7 +292,7 @@ def test_all_folds_of_the_branches_there_and_no_other_points_are_carried_back(fo
 def test_folds_alone_lead_to_an_isola_that_lies_between_the_frequencies(
     harmonic, found, monkeypatch
 ):
-    monkeypatch.setattr("nldyn.beside.steps_between", lambda low, high, spacing: 0)
+    monkeypatch.setattr("nldyn.search.extend.steps_between", lambda low, high, spacing: 0)
     done = by_detour(harmonic, HALF, max_period=1)
     assert ", 0 of 0 orbits carried back, " in done.notes[-1]
     (isola,) = done.branches[1:]
@@ -386,7 +386,7 @@ def all_repeated(monkeypatch):
 
     Those of folds are left out: each would be followed anew.
     """
-    monkeypatch.setattr("nldyn.detour_search._folds_carried_back", lambda *_: "no folds")
+    monkeypatch.setattr("nldyn.search.homotopy._folds_carried_back", lambda *_: "no folds")
     repeats = Collector._repeats
     monkeypatch.setattr(
         Collector, "_repeats", lambda box, b: box.checkpoint._write is not None or repeats(box, b)
@@ -396,7 +396,7 @@ def all_repeated(monkeypatch):
 def test_a_branch_that_repeats_a_known_one_is_not_kept(
     harmonic, all_repeated, monkeypatch, tmp_path
 ):
-    monkeypatch.setattr("nldyn.checkpoint.PAUSE", 1e9)  # written at the end only
+    monkeypatch.setattr("nldyn.io.checkpoint.PAUSE", 1e9)  # written at the end only
     place = tmp_path / "found.h5"
     done = by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
     assert not re.search(r" 0 of \d+ orbits carried back", done.notes[-1])
@@ -408,8 +408,8 @@ def test_a_branch_that_repeats_a_known_one_is_not_kept(
 def test_a_branch_that_repeats_a_known_one_does_not_stay_in_the_file(
     harmonic, all_repeated, monkeypatch, tmp_path
 ):
-    monkeypatch.setattr("nldyn.checkpoint.PAUSE", 0.0)
-    monkeypatch.setattr("nldyn.checkpoint.SHARE", 0.0)
+    monkeypatch.setattr("nldyn.io.checkpoint.PAUSE", 0.0)
+    monkeypatch.setattr("nldyn.io.checkpoint.SHARE", 0.0)
     place = tmp_path / "found.h5"
     by_detour(harmonic, HALF, max_period=1, spacing=0.3, checkpoint=place)
     assert load_branches(place) == []

@@ -27,7 +27,6 @@ from nldyn import (
     brute_force,
     classify,
     contact_measures,
-    executors,
     find_attractors,
     impacts,
     lyapunov_exponents,
@@ -37,10 +36,11 @@ from nldyn import (
     stable_manifold,
     sweep,
 )
-from nldyn.executors import as_finished
-from nldyn.resources import example
-from nldyn.scene import build_system, load_scene
-from nldyn.wear import measures_table
+from nldyn.base.resources import example
+from nldyn.longterm.wear import measures_table
+from nldyn.runtime import executors
+from nldyn.runtime.executors import as_finished
+from nldyn.scene.build import build_system, load_scene
 
 
 def processes(workers: int) -> ProcessPoolExecutor:

@@ -22,9 +22,7 @@ from nldyn import (
     System,
     SystemModelError,
     Unbalance,
-    checkpoint,
     continue_branch,
-    crossings,
     describe,
     diagram,
     explore,
@@ -34,18 +32,20 @@ from nldyn import (
     load_diagram,
     load_exploration,
     solve_orbit,
-    survey,
     switch_at_branch_point,
     switch_at_flip,
 )
-from nldyn.deflation import deflated_orbit
-from nldyn.diagrams import Collector, middle_orbit
-from nldyn.exploration import chao_lower_bound, settling_periods
-from nldyn.orbit import stroboscopic
-from nldyn.resources import example
-from nldyn.roots import LocateError
-from nldyn.scene import build_system, load_scene
-from nldyn.search import random_states
+from nldyn.base.resources import example
+from nldyn.bifurcations.roots import LocateError
+from nldyn.branches import at_frequency as crossings
+from nldyn.io import checkpoint
+from nldyn.orbits.deflation import deflated_orbit
+from nldyn.orbits.orbit import stroboscopic
+from nldyn.orbits.starts import random_states
+from nldyn.scene.build import build_system, load_scene
+from nldyn.search import explore as survey
+from nldyn.search.diagram import Collector, middle_orbit
+from nldyn.search.exploration import chao_lower_bound, settling_periods
 
 NOTHING_MORE = {"pseudo_orbits": 0, "mixtures": 0, "walks": 0}  # beside motions and deflation
 

@@ -24,7 +24,7 @@ from nldyn import (
     index_sum,
     solve_orbit,
 )
-from nldyn.fixed_point_index import index, index_note
+from nldyn.search.fixed_point_index import index, index_note
 
 
 @pytest.fixture(scope="module")

@@ -26,15 +26,15 @@ from nldyn import (
     find_orbits,
     load_exploration,
     solve_orbit,
-    survey,
 )
-from nldyn.branch import is_at
-from nldyn.flow import flow_of
-from nldyn.fold_search import connected_folds, leading_parameter
+from nldyn.branches.branch import is_at
+from nldyn.flow.flow_map import flow_of
+from nldyn.orbits.starts import orbit_near
 from nldyn.paper.jobs import scene_system
 from nldyn.paper.starts import read_starts
-from nldyn.search import orbit_near
-from nldyn.survey import _Survey
+from nldyn.search import explore as survey
+from nldyn.search.explore import _Survey
+from nldyn.search.folds import connected_folds, leading_parameter
 
 
 def two_modes() -> System:

@@ -10,8 +10,8 @@ from one_dof import make_one_dof
 from scipy.stats import poisson
 
 from nldyn import ChaosLifetime, SystemModelError, chaos_lifetime, classify
-from nldyn.attractors import Attractor, AttractorOptions
-from nldyn.lifetimes import LOOK, _ended
+from nldyn.longterm.attractors import Attractor, AttractorOptions
+from nldyn.longterm.lifetimes import LOOK, _ended
 
 
 @pytest.fixture(scope="module")

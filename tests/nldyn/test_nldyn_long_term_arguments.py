@@ -34,9 +34,9 @@ from nldyn import (
     stroboscopic_section,
     sweep,
 )
-from nldyn.attractors import zero_one_test
-from nldyn.lyapunov import standard_errors
-from nldyn.wear import measures_table, power_spectrum
+from nldyn.longterm.attractors import zero_one_test
+from nldyn.longterm.lyapunov import standard_errors
+from nldyn.longterm.wear import measures_table, power_spectrum
 
 JUNK = (None, "nonsense", {"a": 1}, math.nan, -1, 10**400, object(), np.zeros(3), 1j)
 

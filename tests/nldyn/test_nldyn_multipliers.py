@@ -28,7 +28,7 @@ from nldyn import (
     find_orbits,
     solve_orbit,
 )
-from nldyn.multipliers import (
+from nldyn.orbits.multipliers import (
     MultiplierError,
     Stability,
     log_determinant,

@@ -28,9 +28,7 @@ from nldyn import (
     switch_at_branch_point,
     switch_at_flip,
 )
-from nldyn.branch import SpecialPoint
-from nldyn.cascades import FEIGENBAUM
-from nldyn.critical import (
+from nldyn.bifurcations.critical import (
     CoefficientError,
     Estimate,
     Loop,
@@ -42,9 +40,11 @@ from nldyn.critical import (
     loop_of,
     torus,
 )
-from nldyn.normal_forms import is_symmetric, resonance
-from nldyn.orbit import refine, shooting_problem
-from nldyn.trail import trace
+from nldyn.bifurcations.normal_forms import is_symmetric, resonance
+from nldyn.branches.branch import SpecialPoint
+from nldyn.branches.cascades import FEIGENBAUM
+from nldyn.branches.leg import trace
+from nldyn.orbits.orbit import refine, shooting_problem
 
 
 def of_kind(branch, kind):
@@ -321,7 +321,7 @@ def test_error_of_a_coefficient_covers_other_steps(harmonic_branch, monkeypatch,
             continue
         first = normal_form(special).coefficient
         with monkeypatch.context() as patch:
-            patch.setattr("nldyn.critical.LARGEST_STEP", longest)
+            patch.setattr("nldyn.bifurcations.critical.LARGEST_STEP", longest)
             other = normal_form(special).coefficient
         assert abs(other.value - first.value) <= first.error + other.error
         assert first.error < 1e-5 * abs(first.value)

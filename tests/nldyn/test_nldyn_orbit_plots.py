@@ -18,8 +18,8 @@ from nldyn import (
     solve_orbit,
     spectrum,
 )
-from nldyn.hover import show_labels
-from nldyn.plot import new_axes
+from nldyn.plot.diagram import new_axes
+from nldyn.plot.hover import show_labels
 
 PLOTS = (plot_history, plot_phase_portrait, plot_spectrum, plot_contact_force)
 

@@ -22,15 +22,15 @@ from nldyn import (
     index_sum,
     load_branches,
     load_diagram,
-    pseudo_orbits,
     solve_orbit,
 )
-from nldyn.branch import NOT_FINISHED
-from nldyn.exploration import steps_between
+from nldyn.branches.branch import NOT_FINISHED
+from nldyn.orbits.starts import nearest_orbit
 from nldyn.paper.jobs import scene_system
-from nldyn.pseudo_orbit_search import WAYS
-from nldyn.pseudo_orbits import FARTHEST, NEAR, NODES, Pieces
-from nldyn.search import nearest_orbit
+from nldyn.search import pseudo_orbits
+from nldyn.search.by_pseudo_orbits import WAYS
+from nldyn.search.exploration import steps_between
+from nldyn.search.pseudo_orbits import FARTHEST, NEAR, NODES, Pieces
 
 
 @pytest.mark.parametrize("period", [1, 2, 3])

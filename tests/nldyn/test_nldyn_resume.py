@@ -21,15 +21,15 @@ from nldyn import (
     SystemModelError,
     Unbalance,
     Walk,
-    checkpoint,
     continue_branch,
     diagram,
     load_branch,
     load_branches,
     solve_orbit,
 )
-from nldyn.branch import CLOSED, NOT_FINISHED
-from nldyn.result_directory import OutputError
+from nldyn.branches.branch import CLOSED, NOT_FINISHED
+from nldyn.io import checkpoint
+from nldyn.runtime.result_directory import OutputError
 
 AT = (12.2, 26.0, 45.0)
 
@@ -189,7 +189,8 @@ def test_every_checkpoint_on_the_way_goes_on_to_the_same_branch(
 
 KILLED = """
 import os, signal
-from nldyn import checkpoint, continue_branch, solve_orbit
+from nldyn import continue_branch, solve_orbit
+from nldyn.io import checkpoint
 from one_dof import RANGE_HZ, make_one_dof
 
 checkpoint.PAUSE = checkpoint.SHARE = 0.0

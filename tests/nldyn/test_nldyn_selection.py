@@ -13,12 +13,12 @@ from strings import MASSES, SETTING, string
 import cms
 import fem
 from nldyn import Setting, Stop, SystemModelError, Unbalance, reduce_for, solve_orbit
-from nldyn.convergence import harmonic_branch, largest_force, matched, special_points_of
-from nldyn.peaks import resonance_peaks
-from nldyn.resources import example
-from nldyn.scene import build_component, load_scene
-from nldyn.selection import contact_duration
-from nldyn.setting import setting_of
+from nldyn.base.resources import example
+from nldyn.branches.peaks import resonance_peaks
+from nldyn.reduction.convergence import harmonic_branch, largest_force, matched, special_points_of
+from nldyn.reduction.selection import contact_duration
+from nldyn.reduction.setting import setting_of
+from nldyn.scene.build import build_component, load_scene
 
 
 @pytest.fixture(scope="module")

@@ -23,8 +23,8 @@ from nldyn import (
     solve_orbit,
     sweep,
 )
-from nldyn.flow import BUNCH
-from nldyn.simulation import PIECE, chirp_steps, transient_end
+from nldyn.flow.flow_map import BUNCH
+from nldyn.longterm.simulation import PIECE, chirp_steps, transient_end
 
 
 def ball(speed: float = -0.2, stop: Stop | None = None) -> tuple[System, list[float]]:

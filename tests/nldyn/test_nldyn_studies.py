@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from nldyn import FlowMap, SceneError, Stop, SystemModelError, study
-from nldyn.resources import example
-from nldyn.study_keys import case_keys
+from nldyn.base.resources import example
+from nldyn.scene.study_keys import case_keys
 
 GAPS = [0.0, 5e-4, 1e-3]
 

@@ -31,8 +31,8 @@ from nldyn import (
     solve_orbit,
     switch_at_branch_point,
 )
-from nldyn.normal_forms import other_tangent
-from nldyn.orbit import Orbit
+from nldyn.bifurcations.normal_forms import other_tangent
+from nldyn.orbits.orbit import Orbit
 
 FORCE, DAMPING_X, DAMPING_Y = 9.0, 0.1, 0.02
 OWN_X, OWN_Y, PRELOAD = 20.0, 1.0, 1.0

@@ -7,23 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nldyn import (
-    ContinuationOptions,
-    ExploreOptions,
-    SystemModelError,
-    explore,
-    index_sum,
-)
-from nldyn.continuation import broken_off
-from nldyn.diagrams import middle_orbit
-from nldyn.exploration import steps_between
-from nldyn.fixed_point_index import index_note
-from nldyn.flow import FlowMap
-from nldyn.orbit import stroboscopic
+from nldyn import ContinuationOptions, ExploreOptions, SystemModelError, explore, index_sum
+from nldyn.branches.continuation import broken_off
+from nldyn.flow.flow_map import FlowMap
+from nldyn.orbits.orbit import stroboscopic
+from nldyn.orbits.starts import orbit_near
 from nldyn.paper.jobs import LONG, job_named, joined, scene_system
 from nldyn.paper.search import MODELS, known_branches, main, search, search_by_detour
 from nldyn.paper.starts import Start, follow_starts, read_starts, starts_path, write_starts
-from nldyn.search import orbit_near
+from nldyn.search.diagram import middle_orbit
+from nldyn.search.exploration import steps_between
+from nldyn.search.fixed_point_index import index_note
 
 WITHOUT_DOUBLED = (1, 50)
 

@@ -7,7 +7,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from fakes import FakeSpecialPoint
 
-from nldyn import normal_forms
+from nldyn.bifurcations import normal_forms
 
 
 @pytest.fixture(autouse=True)

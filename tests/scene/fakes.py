@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nldyn.critical import Estimate
-from nldyn.multipliers import Stability
-from nldyn.normal_forms import NormalForm
+from nldyn.bifurcations.critical import Estimate
+from nldyn.bifurcations.normal_forms import NormalForm
+from nldyn.orbits.multipliers import Stability
 
 SURE = Stability(0.5 + 0.2j, -0.62, 1e-7)
 

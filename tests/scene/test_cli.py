@@ -10,13 +10,14 @@ from click.testing import CliRunner
 from fakes import diagram
 
 import nldyn.paper
-import nldyn.progress
-import nldyn.scene
-from nldyn import Walk, load_branches, load_diagram, load_exploration, survey
-from nldyn.cli import main
+import nldyn.runtime.progress
+import nldyn.scene.build
+from nldyn import Walk, load_branches, load_diagram, load_exploration
+from nldyn.app.cli import main
+from nldyn.base.resources import example, mesh
+from nldyn.io.branches import save_branches
 from nldyn.paper.kept import kept, kept_folder
-from nldyn.resources import example, mesh
-from nldyn.store import save_branches
+from nldyn.search import explore as survey
 
 ONE_DOF = str(example("one_dof.toml"))
 
@@ -33,11 +34,11 @@ def computed(monkeypatch):
         progress("harmonic branch", 25.3)
         return replace(diagram(), notes=("no 1/5 orbit found near 62.2 Hz",))
 
-    monkeypatch.setattr(nldyn.scene, "compute", compute)
+    monkeypatch.setattr(nldyn.scene.build, "compute", compute)
 
 
 def test_run(tmp_path, computed, monkeypatch):
-    monkeypatch.setattr(nldyn.progress, "FILE_PAUSE", 0.0)
+    monkeypatch.setattr(nldyn.runtime.progress, "FILE_PAUSE", 0.0)
     result = invoke("run", ONE_DOF, "--out", tmp_path / "out")
     assert result.exit_code == 0
     assert result.stderr == "00:00  1 orbits, harmonic branch at 25.30 Hz\n"
@@ -76,7 +77,7 @@ def test_quiet_run_says_nothing_on_stderr(tmp_path, computed):
 
 
 def test_somebody_elses_directory_is_refused_before_the_work(tmp_path, monkeypatch):
-    monkeypatch.setattr(nldyn.scene, "compute", lambda *_: pytest.fail("computed"))
+    monkeypatch.setattr(nldyn.scene.build, "compute", lambda *_: pytest.fail("computed"))
     (tmp_path / "mine.txt").write_text("")
     result = invoke("run", ONE_DOF, "--out", tmp_path)
     assert result.exit_code == 2
@@ -95,7 +96,7 @@ def stop_in_compiled_code(*_):
 
 @pytest.mark.parametrize("interrupt", [stop, stop_in_compiled_code])
 def test_ctrl_c(tmp_path, monkeypatch, interrupt):
-    monkeypatch.setattr(nldyn.scene, "compute", interrupt)
+    monkeypatch.setattr(nldyn.scene.build, "compute", interrupt)
     result = invoke("run", ONE_DOF, "--out", tmp_path / "out", "--quiet")
     assert result.exit_code == 130
     assert result.stderr == "nldyn: stopped by Ctrl-C, nothing is written\n"
@@ -325,7 +326,7 @@ def test_orbit_cannot_be_drawn_without_a_range(tmp_path):
 
 
 def test_help_imports_nothing_heavy_of_its_own():
-    code = "import sys, nldyn; a = set(sys.modules); import nldyn.cli; print(*set(sys.modules) - a)"
+    code = "import sys, nldyn; a = set(sys.modules); import nldyn.app.cli; print(*set(sys.modules) - a)"
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()

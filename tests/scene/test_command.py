@@ -11,8 +11,9 @@ import types
 import numba
 import pytest
 
-from nldyn import command, progress
+from nldyn.app import command
 from nldyn.paper.workers import _ended_at_failure
+from nldyn.runtime import progress
 
 
 def stop_loading(_):
@@ -28,8 +29,8 @@ def stop_loading_an_extension(_):
 
 @pytest.mark.parametrize("load", [stop_loading, stop_loading_an_extension])
 def test_ctrl_c_while_the_package_is_loaded(monkeypatch, capsys, load):
-    unready = type("Unready", (types.ModuleType,), {"main": property(load)})("nldyn.cli")
-    monkeypatch.setitem(sys.modules, "nldyn.cli", unready)
+    unready = type("Unready", (types.ModuleType,), {"main": property(load)})("nldyn.app.cli")
+    monkeypatch.setitem(sys.modules, "nldyn.app.cli", unready)
     with pytest.raises(SystemExit) as end:
         command.main()
     assert end.value.code == 130
@@ -39,7 +40,7 @@ def test_ctrl_c_while_the_package_is_loaded(monkeypatch, capsys, load):
 def test_ctrl_c_in_executed_text_gives_the_exit_code_all_the_same(tmp_path):
     """As in the making of a dataclass; with ``-m`` Python would end by the signal."""
     (tmp_path / "work.py").write_text(
-        "from nldyn.command import answering\nanswering(lambda: exec('raise KeyboardInterrupt'))\n",
+        "from nldyn.app.command import answering\nanswering(lambda: exec('raise KeyboardInterrupt'))\n",
         encoding="utf-8",
     )
     done = subprocess.run([sys.executable, "-m", "work"], cwd=tmp_path, check=False)
@@ -47,8 +48,8 @@ def test_ctrl_c_in_executed_text_gives_the_exit_code_all_the_same(tmp_path):
 
 
 def test_other_errors_of_loading_are_not_hidden(monkeypatch):
-    broken = type("Broken", (types.ModuleType,), {"main": property(lambda _: 1 / 0)})("nldyn.cli")
-    monkeypatch.setitem(sys.modules, "nldyn.cli", broken)
+    broken = type("Broken", (types.ModuleType,), {"main": property(lambda _: 1 / 0)})("nldyn.app.cli")
+    monkeypatch.setitem(sys.modules, "nldyn.app.cli", broken)
     with pytest.raises(ZeroDivisionError):
         command.main()
 
@@ -57,7 +58,7 @@ def test_no_folder_for_compiled_code():
     """Without one, a temporary folder serves, one line says so, and nothing is left of it."""
     environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
     environment["NUMBA_CACHE_LOCATOR_CLASSES"] = "UserProvidedCacheLocator"
-    code = "import nldyn.flow, os; f = os.environ['NUMBA_CACHE_DIR']; print(f, os.listdir(f))"
+    code = "import nldyn.flow.flow_map, os; f = os.environ['NUMBA_CACHE_DIR']; print(f, os.listdir(f))"
     run = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
     )

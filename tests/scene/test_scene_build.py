@@ -7,10 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import nldyn.diagrams
-from nldyn.errors import SceneError
-from nldyn.resources import example, examples, mesh
-from nldyn.scene import (
+import nldyn.search.diagram
+from nldyn.base.errors import SceneError
+from nldyn.base.resources import example, examples, mesh
+from nldyn.reduction.setting import setting_of
+from nldyn.scene.build import (
     build_component,
     build_reduced,
     build_selection,
@@ -19,7 +20,6 @@ from nldyn.scene import (
     load_scene,
     parse_scene,
 )
-from nldyn.setting import setting_of
 
 MODAL = """
 [modal]
@@ -125,7 +125,7 @@ def test_a_tolerance_asks_for_a_selection_in_the_scenes_setting(monkeypatch, cap
         asked.update(range=setting.range_hz, tolerance=tolerance)
         return SimpleNamespace(reduced="the model", report=lambda: "modes kept: 1")
 
-    monkeypatch.setattr("nldyn.selection.reduce_for", reduce_for)
+    monkeypatch.setattr("nldyn.reduction.selection.reduce_for", reduce_for)
     with caplog.at_level("INFO", logger="nldyn"):
         assert build_reduced(with_tolerance()) == "the model"
     assert asked == {"range": (15.0, 90.0), "tolerance": 0.3}
@@ -140,7 +140,7 @@ def test_a_tolerance_asks_for_a_selection_in_the_scenes_setting(monkeypatch, cap
     ],
 )
 def test_a_tolerance_that_cannot_be_met_is_told(old, new, sentence, monkeypatch):
-    monkeypatch.setattr("nldyn.selection.MOST_MODES", 3)
+    monkeypatch.setattr("nldyn.reduction.selection.MOST_MODES", 3)
     with pytest.raises(SceneError, match=sentence):
         build_selection(with_tolerance((old, new)))
 
@@ -228,7 +228,7 @@ def test_tolerance_of_a_scene_is_that_of_its_flow_map(monkeypatch):
     scene = load_scene(example("one_dof.toml"))
     text = scene.text.replace("[continuation]", "[continuation]\nrtol = 1e-6")
     taken = []
-    monkeypatch.setattr(nldyn.diagrams, "diagram", lambda flow, *_, **__: taken.append(flow))
+    monkeypatch.setattr(nldyn.search.diagram, "diagram", lambda flow, *_, **__: taken.append(flow))
     compute(parse_scene(text, scene.file))
     assert taken[0].options.rtol == 1e-6
 

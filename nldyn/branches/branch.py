@@ -1,0 +1,448 @@
+"""Branches of periodic orbits: points, special points, and orbits between the points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nldyn.base.errors import SystemModelError, check_types, shown
+from nldyn.orbits.orbit import Orbit, same_orbit, shifted_alike, stroboscopic
+from nldyn.system.linear import Real
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas
+    import xarray
+
+    from nldyn.branches.options import ContinuationOptions
+    from nldyn.io.checkpoint import Checkpoint
+
+Part = Literal["points", "special_points", "requested"]
+
+# why a continuation stopped
+CLOSED = "closed branch"
+JOINS = "joins"  # the branch of half the period, at a flip
+RANGE_END = "end of the frequency range"
+NOT_FINISHED = "not finished"
+POINTS = " points"  # after their number
+SHORT_STEP = "step below "  # before its length
+
+
+@dataclass(frozen=True, eq=False)
+class BranchPoint:
+    """An orbit on a branch with the branch's direction there.
+
+    Parameters
+    ----------
+    orbit : Orbit
+        The orbit.
+    tangent : (N + 1,)
+        Unit tangent in the metric of the shooting problem.
+    arclength : float
+        Relative arclength from the branch's first computed point.
+    tests : dict of str to float
+        Test functions, filled when first asked for (see `nldyn.bifurcations.locate.tests`).
+    """
+
+    orbit: Orbit
+    tangent: Real
+    arclength: float
+    tests: dict[str, float] = field(default_factory=dict, repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class SpecialPoint:
+    """A located bifurcation or grazing point.
+
+    Parameters
+    ----------
+    kind : {"LP", "PD", "NS", "BP", "GR"}
+        Cyclic fold, flip, Neimark-Sacker, branch point, grazing.
+    point : BranchPoint
+        The orbit at which it happens.
+    frequency_error : float
+        Estimated error of the root in frequency and the last Newton step, relative.
+    """
+
+    kind: str
+    point: BranchPoint
+    frequency_error: float
+
+    @property
+    def orbit(self) -> Orbit:
+        """The orbit."""
+        return self.point.orbit
+
+    @property
+    def frequency_hz(self) -> float:
+        """Excitation frequency in Hz."""
+        return self.point.orbit.frequency_hz
+
+
+def check_special(caller: str, special: object, kind: str = "", *, of_branch: bool = True) -> None:
+    """Refuse anything but a special point, of a branch and of a kind where these are wanted.
+
+    Raises
+    ------
+    SystemModelError
+        As said.
+    """
+    found, orbit = getattr(special, "kind", None), getattr(special, "orbit", None)
+    if not (isinstance(found, str) and isinstance(orbit, Orbit)):
+        raise SystemModelError(f"{caller} needs a special point, got {shown(special)}")
+    if kind and found != kind:
+        raise SystemModelError(f"{caller} needs a {kind} point, got {found}")
+    if of_branch and not isinstance(getattr(special, "point", None), BranchPoint):
+        raise SystemModelError(
+            f"{caller} needs a special point of a branch, which knows the branch's direction; "
+            f"the {found} point at {orbit.frequency_hz:g} Hz was found otherwise"
+        )
+
+
+def check_branches(name: str, branches: object) -> None:
+    """Refuse anything but a list of branches, or what has their columns, under its name.
+
+    Raises
+    ------
+    SystemModelError
+        As said.
+    """
+    columns = ("period", "points", "special_points", "stop_reasons")
+    if not isinstance(branches, list | tuple) or not all(
+        isinstance(branch, Branch) or all(hasattr(branch, column) for column in columns)
+        for branch in branches
+    ):
+        raise SystemModelError(f"{name} must be a list of branches, got {shown(branches)}")
+
+
+@dataclass(frozen=True, eq=False)
+class WalkEnd:
+    """How a continuation would go on from one end of a branch as if it had not stopped.
+
+    Parameters
+    ----------
+    step : float
+        Arclength of the next step.
+    behind : (2, N + 1)
+        Shooting unknowns and tangent of the point before the one to go on from; no rows at a start.
+    count : int
+        Steps made.
+    node : int
+        Number of the point to go on from, counted from where the continuation started.
+    kept : int
+        Number of points before it that stay, whatever follows.
+    special_points, notes : int
+        How many belong to these.
+    """
+
+    step: float
+    behind: Real
+    count: int
+    node: int
+    kept: int
+    special_points: int
+    notes: int
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """How a branch was continued, as far as its extension depends on that.
+
+    Parameters
+    ----------
+    range_hz : (float, float)
+        Frequencies between which to stay.
+    options : ContinuationOptions
+        Step control.
+    open_ends : (m, N + 1) array
+        Where other branches were broken off.
+    at : sequence of float
+        Frequencies in Hz at which orbits were requested.
+    start : int
+        Point at which the continuation started; it went forward, then backward.
+    special_points_before, notes_before : int
+        How many of these were found on the way backward.
+    ends : pair of WalkEnd
+        How the ways backward and forward would go on; None for a way that there is not.
+    """
+
+    range_hz: tuple[float, float]
+    options: ContinuationOptions
+    open_ends: Real
+    at: Sequence[float] = ()
+    start: int = 0
+    special_points_before: int = 0
+    notes_before: int = 0
+    ends: tuple[WalkEnd | None, WalkEnd | None] = (None, None)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Branch:
+    """A curve of periodic orbits of one period multiple.
+
+    Parameters
+    ----------
+    name : str
+        Name in tables and legends.
+    period : int
+        Period multiple n.
+    nodes : tuple of BranchPoint
+        Computed points in order along the branch.
+    special_points : tuple of SpecialPoint
+        In the same order.
+    stop_reasons : tuple of str
+        Why the continuation stopped at the first and at the last point.
+    notes : tuple of str
+        What may be missing.
+    requested : tuple of BranchPoint
+        Points at the requested frequencies, in order along the branch.
+    course : Course, optional
+        How it was continued.
+    """
+
+    name: str
+    period: int
+    nodes: tuple[BranchPoint, ...]
+    special_points: tuple[SpecialPoint, ...]
+    stop_reasons: tuple[str, str]
+    notes: tuple[str, ...] = ()
+    requested: tuple[BranchPoint, ...] = ()
+    course: Course | None = None
+
+    def __repr__(self) -> str:
+        """One line, in place of all numbers of all orbits."""
+        hz = [node.orbit.frequency_hz for node in self.nodes]
+        return (
+            f"<Branch '{self.name}': period {self.period}, {len(hz)} points from {min(hz):.6g} to "
+            f"{max(hz):.6g} Hz, {len(self.special_points)} special points; {self.stop_reason}>"
+        )
+
+    @property
+    def points(self) -> list[Orbit]:
+        """The orbits, in order."""
+        return [node.orbit for node in self.nodes]
+
+    @property
+    def closed(self) -> bool:
+        """Whether the branch ends where it began: its last point lies just beyond its first."""
+        return CLOSED in self.stop_reasons
+
+    @property
+    def stop_reason(self) -> str:
+        """Why the continuation stopped at either end, in one line."""
+        return " / ".join(self.stop_reasons)
+
+    @property
+    def frequency_hz(self) -> Real:
+        """Frequencies of the points in Hz; folds lie between them, see `span_hz`."""
+        return np.array([orbit.frequency_hz for orbit in self.points])
+
+    @property
+    def span_hz(self) -> tuple[float, float]:
+        """Lowest and highest frequency in Hz, also of the special points between the points."""
+        reached = [place.orbit.frequency_hz for place in self.places]
+        return min(reached), max(reached)
+
+    @property
+    def max_abs_displacement(self) -> Real:
+        """Largest absolute displacements in m."""
+        return np.array([orbit.max_abs_displacement for orbit in self.points])
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Stability of the points."""
+        return np.array([orbit.stable for orbit in self.points])
+
+    @cached_property
+    def places(self) -> tuple[BranchPoint, ...]:
+        """Points and special points together, in order along the branch."""
+        points = [*self.nodes, *(special.point for special in self.special_points)]
+        return tuple(sorted(points, key=lambda point: point.arclength))
+
+    @cached_property
+    def log_frequencies(self) -> Real:
+        """Logarithms of ω (rad/s) at the `places`, in the order along the branch."""
+        return np.array([point.orbit.point[-1] for point in self.places])
+
+    @cached_property
+    def stroboscopic_states(self) -> Real:
+        """States (places, n, 2n_modes) at the start of each excitation period at the `places`."""
+        return np.array([stroboscopic(point.orbit) for point in self.places])
+
+    def at(self, frequency_hz: float) -> list[Orbit]:
+        """All orbits of the branch at one frequency, in order along it.
+
+        Parameters
+        ----------
+        frequency_hz : float
+            In Hz; that of the orbits differs from it by the rounding error of its logarithm only,
+            very near to the end of a doubled branch by up to 1e-12 of it.
+
+        Returns
+        -------
+        list of Orbit
+            One for each passage of the branch, also of both that are close to a fold; an orbit
+            passed again, if only shifted by whole periods of the excitation, counts once.
+
+        Raises
+        ------
+        SystemModelError
+            If the frequency is not a positive number.
+
+        Examples
+        --------
+        >>> from nldyn import System, Unbalance, continue_branch, solve_orbit
+        >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+        ...     excitation=[Unbalance("middle", 4.92e-6)])
+        >>> branch = continue_branch(solve_orbit(system, frequency_hz=10.0), (5.0, 20.0))
+        >>> [round(orbit.frequency_hz, 12) for orbit in branch.at(12.5)]
+        [12.5]
+        """
+        from nldyn.branches.at_frequency import crossings
+
+        found: list[Orbit] = []
+        for point in crossings(self, frequency_hz):
+            if not any(same_orbit(point.orbit, other) for other in found):
+                found.append(point.orbit)
+        return found
+
+    def extend(
+        self,
+        range_hz: tuple[float, float] | None = None,
+        *,
+        options: ContinuationOptions | None = None,
+        at: Sequence[float] | None = None,
+        progress: Callable[[float], None] | None = None,
+        checkpoint: str | Path | Checkpoint | None = None,
+    ) -> Branch:
+        """Finish what was interrupted, or follow the branch beyond the ends of its range.
+
+        The points are those of one continuation through the new range, to the last digit; those
+        at the ends of the old range are left out.
+
+        Parameters
+        ----------
+        range_hz : (float, float), optional
+            A range in Hz that contains the one of before, which is kept unless given.
+        options : ContinuationOptions, optional
+            Step control from here on, unless that of before. With more `max_points`, or a smaller
+            `min_step`, an end goes on that had come to the limit.
+        at : sequence of float, optional
+            Frequencies in Hz at which orbits are wanted; those of before unless given.
+        progress, checkpoint
+            As for `continue_branch`; the file may hold the branch, or part of this extension.
+
+        Returns
+        -------
+        Branch
+
+        Raises
+        ------
+        SystemModelError
+            If the new range does not contain the old one, the branch is one put together by
+            hand, without a course, or `checkpoint` holds something else.
+
+        Examples
+        --------
+        >>> from nldyn import System, Unbalance, continue_branch, solve_orbit
+        >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+        ...     excitation=[Unbalance("middle", 4.92e-6)])
+        >>> orbit = solve_orbit(system, frequency_hz=10.0)
+        >>> longer = continue_branch(orbit, (9.0, 12.0)).extend((5.0, 20.0))
+        >>> whole = continue_branch(orbit, (5.0, 20.0))
+        >>> longer.frequency_hz.tolist() == whole.frequency_hz.tolist()
+        True
+        """
+        from nldyn.branches.resume import extend
+
+        return extend(self, range_hz, options, at, progress, checkpoint)
+
+    def save(self, path: str | Path) -> None:
+        """Write the branch to an HDF5 file that `load_branch` reads, whole or not at all.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        SystemModelError
+            If the points are of different systems.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> from nldyn import System, Unbalance, continue_branch, load_branch, solve_orbit
+        >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+        ...     excitation=[Unbalance("middle", 4.92e-6)])
+        >>> branch = continue_branch(solve_orbit(system, frequency_hz=10.0), (9.0, 12.0))
+        >>> path = Path(tempfile.mkdtemp()) / "resonance.h5"
+        >>> branch.save(path)
+        >>> load_branch(path).frequency_hz.tolist() == branch.frequency_hz.tolist()
+        True
+        """
+        from nldyn.io.branches import save_branches
+
+        save_branches(path, [self])
+
+    def table(self, part: Part = "points") -> dict[str, NDArray[Any]]:
+        """Columns of numbers, one row per orbit; ``pandas.DataFrame`` takes them as they are.
+
+        Parameters
+        ----------
+        part : {"points", "special_points", "requested"}
+            Which orbits: row i belongs to ``branch.points[i]``, ``branch.special_points[i]`` or
+            ``branch.requested[i]``.
+
+        Returns
+        -------
+        dict of str to (n,) array
+            Units stand in the names; `largest_multiplier` is a modulus, `error` relative.
+
+        Raises
+        ------
+        SystemModelError
+            For an unknown part.
+        """
+        from nldyn.branches.tables import branch_table
+
+        return branch_table(self, part)
+
+    def to_pandas(self, part: Part = "points") -> pandas.DataFrame:
+        """As `table`, as a DataFrame (needs pandas)."""
+        from nldyn.branches.tables import to_pandas
+
+        return to_pandas(self, part)
+
+    def to_xarray(self, part: Part = "points") -> xarray.Dataset:
+        """As `table`, with the Floquet multipliers, as a Dataset over ``point`` (needs xarray)."""
+        from nldyn.branches.tables import to_xarray
+
+        return to_xarray(self, part)
+
+    def contains(self, orbit: Orbit) -> bool:
+        """Whether the branch passes through an orbit (up to a shift by whole periods)."""
+        from nldyn.branches.at_frequency import passes
+
+        check_types(orbit=(orbit, Orbit))
+        return orbit.period == self.period and passes(self, orbit)
+
+
+def is_at(orbit: Orbit, special: SpecialPoint, multiple: int = 1) -> bool:
+    """Whether an orbit is that of a special point, run through several times, up to a shift.
+
+    Mirror images are not the same.
+    """
+    other = special.orbit
+    if orbit.period != multiple * other.period:
+        return False
+    if not math.isclose(orbit.frequency_hz, special.frequency_hz, rel_tol=1e-6):
+        return False
+    states = np.tile(stroboscopic(other), (multiple, 1))
+    return shifted_alike(stroboscopic(orbit), states, 1e-3 * float(np.abs(states).max()))
