@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from nldyn.base.errors import SceneError, SystemModelError
+    from nldyn.base.errors import ConvergenceError, LocateError, SceneError, SystemModelError
     from nldyn.bifurcations.normal_forms import (
         NormalForm,
         describe,
@@ -16,15 +16,16 @@ if TYPE_CHECKING:
         switch_at_branch_point,
     )
     from nldyn.bifurcations.period_doubling import switch_at_flip
-    from nldyn.bifurcations.roots import LocateError
+    from nldyn.bifurcations.point import BranchPoint, SpecialPoint
     from nldyn.branches.arclength import Walk
-    from nldyn.branches.branch import Branch, BranchPoint, SpecialPoint
+    from nldyn.branches.branch import Branch
     from nldyn.branches.cascades import Cascade, cascade, cascades_in
     from nldyn.branches.continuation import continue_branch
     from nldyn.branches.options import ContinuationOptions
     from nldyn.curves.curves import Curve, continue_constant, continue_in, continue_special
     from nldyn.curves.marks import LocatedPoint, refine_special
-    from nldyn.flow.flow_map import FlowMap, FlowOptions
+    from nldyn.flow.flow_map import FlowMap
+    from nldyn.flow.options import FlowOptions
     from nldyn.io.branches import load_branch, load_branches, load_diagram, load_exploration
     from nldyn.io.curves import load_curve, load_curves, save_curves
     from nldyn.longterm.attractors import Attractor, AttractorOptions, classify, find_attractors
@@ -50,7 +51,8 @@ if TYPE_CHECKING:
     )
     from nldyn.orbits.harmonics import Spectrum, spectrum
     from nldyn.orbits.multipliers import Stability
-    from nldyn.orbits.orbit import ConvergenceError, History, Orbit, solve_orbit
+    from nldyn.orbits.orbit import History, Orbit
+    from nldyn.orbits.solve import solve_orbit
     from nldyn.orbits.starts import SearchOptions, find_orbits
     from nldyn.plot.curves import plot_curves, plot_orbit_curve
     from nldyn.plot.diagram import plot_diagram

@@ -115,3 +115,11 @@ def check_whole(name: str, value: object, least: int, most: int | None = None) -
     if not whole or value < least or (most is not None and value > most):  # type: ignore[operator]
         wanted = f"of at least {least}" if most is None else f"from {least} to {most}"
         raise SystemModelError(f"{name} must be a whole number {wanted}, got {shown(value)}")
+
+
+class ConvergenceError(RuntimeError):
+    """No orbit was found; the text says how far Newton's method came."""
+
+
+class LocateError(RuntimeError):
+    """An orbit between two points of a branch could not be corrected."""

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from nldyn.base.arrays import Real
 from nldyn.bench import motion
 from nldyn.bench.job import EngineError, Job, Prepared
 from nldyn.bench.models import Case
-from nldyn.system.linear import Real
 
 # (from phase, unknowns, parameters, direction of the switch to stop at or 0) -> phase, unknowns
 Advance = Callable[[float, Real, Real, int], tuple[float, Real]]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import solve_bvp, solve_ivp
 
+from nldyn.base.arrays import Real
 from nldyn.bench import motion
 from nldyn.bench.job import EngineError, Job, Prepared
 from nldyn.bench.models import Case, Sensitivities
-from nldyn.system.linear import Real
 
 
 def collocation(case: Case, tolerance: float) -> Prepared:

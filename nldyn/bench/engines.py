@@ -15,13 +15,14 @@ from typing import Any
 import numpy as np
 from scipy.integrate import DOP853
 
+from nldyn.base.arrays import Real
 from nldyn.bench import motion, native
 from nldyn.bench.adaptive import Advance, adaptive, cvode_advance, scipy_advance
 from nldyn.bench.collocation import collocation
 from nldyn.bench.job import Job, Prepared
 from nldyn.bench.models import Case
-from nldyn.flow.flow_map import FlowMap, FlowOptions
-from nldyn.system.linear import Real
+from nldyn.flow.flow_map import FlowMap
+from nldyn.flow.options import FlowOptions
 
 FLOW_OPTIONS = [FlowOptions(rtol) for rtol in (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)]
 TOLERANCES = [1e-4, 1e-6, 1e-8, 1e-10, 1e-12]

@@ -20,7 +20,7 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from nldyn.system.linear import Real
+from nldyn.base.arrays import Real
 from nldyn.system.system import System
 
 mp = mpmath.mp

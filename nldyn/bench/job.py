@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from nldyn.base.arrays import Real
 from nldyn.bench.models import Sensitivities
-from nldyn.system.linear import Real
 
 
 class EngineError(RuntimeError):

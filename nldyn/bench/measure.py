@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.bench.engines import Engine
 from nldyn.bench.job import EngineError, Prepared
 from nldyn.bench.models import Case, Flip, Sensitivities, load_orbit_start
-from nldyn.system.linear import Real
 
 CALM = 0.15  # seconds of repeats for one median
 SLOW = 0.4  # seconds of one run, beyond which it is not repeated

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.system.elements import Stop, Unbalance
-from nldyn.system.linear import Real
 from nldyn.system.system import System
 
 MODELS = ("one_dof", "two_dof", "four_dof", "sixteen_dof")

@@ -14,9 +14,9 @@ import math
 import numpy as np
 from numba import njit
 
+from nldyn.base.arrays import Real
 from nldyn.bench.models import Sensitivities
 from nldyn.system.elements import Unbalance
-from nldyn.system.linear import Real
 from nldyn.system.system import System
 
 FLIGHT, CONTACT = 0.0, 1.0

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.bench.models import Case, Sensitivities
 from nldyn.flow.flow_map import FlowMap, Segments
-from nldyn.system.linear import Real
 
 PERIOD = np.array([0.0, 2.0 * math.pi])
 

@@ -18,14 +18,15 @@ from typing import Any
 import mpmath
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.bench.exact import ExactEnd, ExactFlow, Number, Precision, Series
 from nldyn.bench.models import MODELS, stored, to_system, to_table
 from nldyn.bench.native import sensitivities
 from nldyn.branches.continuation import continue_branch
-from nldyn.flow.flow_map import FlowMap, FlowOptions
-from nldyn.orbits.orbit import solve_orbit
+from nldyn.flow.flow_map import FlowMap
+from nldyn.flow.options import FlowOptions
+from nldyn.orbits.solve import solve_orbit
 from nldyn.system.elements import Stop
-from nldyn.system.linear import Real
 from nldyn.system.system import System
 
 mp = mpmath.mp

@@ -17,7 +17,7 @@ from nldyn.bench.models import MODELS, load_flip
 from nldyn.bench.page import Row, write_page
 from nldyn.bench.studies import BranchTime
 from nldyn.bench.targets import all_targets, fastest_rows, ratio_rows, throughput_targets
-from nldyn.flow.flow_map import FlowOptions
+from nldyn.flow.options import FlowOptions
 from nldyn.runtime.result_directory import check_directory, result_directory
 
 WANTED = (1e-4, 1e-6, 1e-8, 1e-10)

@@ -14,15 +14,16 @@ from pathlib import Path
 
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.bench import native
 from nldyn.bench.engines import flow_map
 from nldyn.bench.measure import errors, median_seconds
 from nldyn.bench.models import Case, Sensitivities, load_case, load_grazing
 from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import continue_branch
-from nldyn.flow.flow_map import FlowMap, FlowOptions
-from nldyn.orbits.orbit import solve_orbit
-from nldyn.system.linear import Real
+from nldyn.flow.flow_map import FlowMap
+from nldyn.flow.options import FlowOptions
+from nldyn.orbits.solve import solve_orbit
 from nldyn.system.system import System
 
 DEFAULT = FlowOptions()

@@ -12,10 +12,10 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.bench import motion
 from nldyn.bench.models import Case
 from nldyn.system.elements import Unbalance
-from nldyn.system.linear import Real
 
 OMEGA, SIZE = hy.par[0], hy.par[1]
 

@@ -20,11 +20,12 @@ import numpy as np
 from numba import njit
 from scipy.integrate import solve_ivp
 
+from nldyn.base.arrays import Real
 from nldyn.bench.models import load_case
 from nldyn.bench.page import markdown
 from nldyn.bench.ratios import seconds_at
-from nldyn.flow.flow_map import FlowMap, FlowOptions
-from nldyn.system.linear import Real
+from nldyn.flow.flow_map import FlowMap
+from nldyn.flow.options import FlowOptions
 from nldyn.system.system import System
 
 WANTED = 1e-8  # error over a period

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nldyn.branches.branch import SpecialPoint
+from nldyn.bifurcations.point import SpecialPoint
 from nldyn.orbits.conditions import nearest_crossing
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import metric_length

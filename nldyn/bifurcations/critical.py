@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nldyn.base.arrays import Real
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import ShootingProblem
-from nldyn.system.linear import Real
 
 LARGEST_STEP = 0.1  # in ξ, of the differences
 SMALLEST_STEP = 1e-7

@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from nldyn.base.arrays import Complex
 from nldyn.bifurcations.hidden_pairs_kernels import (
     dips_towards_circle,
     doubtful,
@@ -24,7 +25,6 @@ from nldyn.bifurcations.hidden_pairs_kernels import (
     return_of_outside,
 )
 from nldyn.orbits.orbit import Orbit
-from nldyn.system.linear import Complex
 
 COARSE = 0.1  # part of a step down to which a multiplier near the circle is followed
 FINEST = 2.0**-12  # part of a step to which meeting multipliers are followed

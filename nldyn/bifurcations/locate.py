@@ -8,6 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
+from nldyn.base.arrays import Complex, Real
+from nldyn.base.errors import LocateError
 from nldyn.bifurcations.branch_crossing import (
     NEAR_CRITICAL,
     NEIGHBOUR,
@@ -17,14 +19,13 @@ from nldyn.bifurcations.branch_crossing import (
     true_crossing,
 )
 from nldyn.bifurcations.critical import correct_across, turns_near_crossing
-from nldyn.bifurcations.roots import LocateError, root
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.touching import Touch, changes_hidden_by_birth, touching_extremes
-from nldyn.branches.branch import BranchPoint, SpecialPoint
 from nldyn.orbits.conditions import TOUCH, depth_row
 from nldyn.orbits.extremes import branch_point_test, flip_test, number_outside, torus_test
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import metric_length
-from nldyn.system.linear import Complex, Real
 
 BESIDE = 1e-3  # in σ: the least distance of points that tell the direction of a branch
 CROSSING_ERROR = 1e-8  # relative, of an orbit where branches cross

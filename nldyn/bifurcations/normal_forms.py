@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nldyn.base.errors import SystemModelError, check_positive, check_types
+from nldyn.base.arrays import Complex, Real
+from nldyn.base.errors import LocateError, SystemModelError, check_positive, check_types
 from nldyn.bifurcations.critical import (
     CoefficientError,
     Coefficients,
@@ -25,11 +26,9 @@ from nldyn.bifurcations.critical import (
     loop_of,
     torus,
 )
-from nldyn.bifurcations.roots import LocateError
-from nldyn.branches.branch import BranchPoint, SpecialPoint, check_special
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special
 from nldyn.orbits.orbit import Orbit, minimal_period
 from nldyn.orbits.shooting import asymmetry, metric_length
-from nldyn.system.linear import Complex, Real
 
 CLOSE = 1e-3  # relative distance in frequency of a special point that counts as close
 NEAR_RESONANCE_DEG = 5.0

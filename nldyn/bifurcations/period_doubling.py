@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import brentq
 
-from nldyn.base.errors import check_positive
+from nldyn.base.arrays import Real
+from nldyn.base.errors import LocateError, check_positive
 from nldyn.bifurcations.locate import Chord
-from nldyn.bifurcations.roots import LocateError
-from nldyn.branches.branch import BranchPoint, SpecialPoint, check_special
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special
 from nldyn.orbits.conditions import nearest_flip
-from nldyn.orbits.orbit import Orbit, minimal_period, refine
+from nldyn.orbits.newton import refine
+from nldyn.orbits.orbit import Orbit, minimal_period
 from nldyn.orbits.shooting import ShootingProblem, metric_length
-from nldyn.system.linear import Real
 
 
 def passed_flip(a: Orbit, b: Orbit) -> bool:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from nldyn.base.errors import LocateError
+
 PRECISION = 1e-9  # of the distance of the two points, to which a root is found
 STALL = 1e-6  # a move, shorter than which a function should come nearer to zero
 
 
-class LocateError(RuntimeError):
-    """An orbit between two points of a branch could not be corrected."""
 
 
 def root(f: Callable[[float], float]) -> tuple[float, float]:

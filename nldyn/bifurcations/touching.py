@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nldyn.bifurcations.roots import LocateError
-from nldyn.branches.branch import BranchPoint
+from nldyn.base.errors import LocateError
+from nldyn.bifurcations.point import BranchPoint
 from nldyn.orbits.extremes import alone, nearest, sign_changes
 from nldyn.orbits.orbit import Orbit
 from nldyn.system.system import System

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 from itertools import islice, pairwise
 from operator import itemgetter
 
+from nldyn.base.errors import LocateError
 from nldyn.bifurcations.branch_crossing import ON_CROSSING, lies_on_crossing
 from nldyn.bifurcations.crossing_at_grazing import special_points_at_grazing
 from nldyn.bifurcations.hidden_pairs import Between
 from nldyn.bifurcations.locate import Chord, changed, leaves_circle, located_between, tests
-from nldyn.bifurcations.roots import LocateError
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.bifurcations.touching import touches_sharply, touching_extremes
-from nldyn.branches.branch import BranchPoint, SpecialPoint
 from nldyn.orbits.extremes import dip, extreme_dip, travel
 
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice

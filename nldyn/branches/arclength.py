@@ -10,7 +10,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.base.errors import check_types
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, check_types
+from nldyn.base.rows import Rows
 from nldyn.bifurcations.branch_crossing import (
     ON_CROSSING,
     SHORTEST_CROSSING,
@@ -20,20 +22,12 @@ from nldyn.bifurcations.branch_crossing import (
 )
 from nldyn.bifurcations.locate import crosses
 from nldyn.bifurcations.period_doubling import flip_between, half_difference, passed_flip
-from nldyn.branches.branch import (
-    CLOSED,
-    JOINS,
-    NOT_FINISHED,
-    POINTS,
-    RANGE_END,
-    SHORT_STEP,
-    BranchPoint,
-)
+from nldyn.bifurcations.point import BranchPoint
+from nldyn.branches.branch import CLOSED, JOINS, NOT_FINISHED, POINTS, RANGE_END, SHORT_STEP
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.conditions import TOUCH, depth_row
-from nldyn.orbits.orbit import ConvergenceError, Orbit
-from nldyn.orbits.shooting import ShootingProblem, asymmetry, metric_length
-from nldyn.system.linear import Real
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.shooting import ShootingProblem, asymmetry, metric_length, shifts
 
 KINK = TOUCH  # step below which a branch may bend by any angle where the number of contacts changes
 MEETS_OPEN_END = "meets another branch where that was broken off"
@@ -72,29 +66,6 @@ class Stride:
     count: int
 
 
-class Rows:
-    """A growing array: what was given out of it keeps its length and shares its memory.
-
-    Parameters
-    ----------
-    width : int
-        Of each row.
-    """
-
-    def __init__(self, width: int) -> None:
-        self._rows = np.empty((16, width))
-        self._count = 0
-
-    def add(self, row: Real) -> None:
-        """Append a row (width,)."""
-        if self._count == len(self._rows):
-            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
-        self._rows[self._count] = row
-        self._count += 1
-
-    def so_far(self) -> Real:
-        """All rows, (m, width)."""
-        return self._rows[: self._count]
 
 
 @dataclass
@@ -416,11 +387,6 @@ def _crossing_ahead(here: BranchPoint) -> BranchPoint | None:
     return BranchPoint(crossing, here.tangent, here.arclength + ahead)
 
 
-def shifts(problem: ShootingProblem, point: Real) -> list[Real]:
-    """Shooting unknowns (N + 1,) of an orbit shifted by each of its excitation periods."""
-    nodes = problem.nodes(point)
-    moves = range(0, problem.segments, problem.segments // problem.period)
-    return [np.append(np.roll(nodes, move, axis=0).ravel(), point[-1]) for move in moves]
 
 
 def _passed(a: BranchPoint, b: BranchPoint, places: Real) -> NDArray[np.bool_]:

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from nldyn.base.errors import SystemModelError, check_frequency, shown
+from nldyn.base.arrays import Real
+from nldyn.base.errors import LocateError, SystemModelError, check_frequency, shown
 from nldyn.bifurcations.locate import Chord
-from nldyn.bifurcations.roots import LocateError, root
-from nldyn.branches.branch import Branch, BranchPoint
+from nldyn.bifurcations.point import BranchPoint
+from nldyn.bifurcations.roots import root
+from nldyn.branches.branch import Branch
 from nldyn.orbits.orbit import Orbit, same_orbit, stroboscopic
-from nldyn.system.linear import Real
 
 SAME = 4e-15  # difference of two logarithms of a frequency that is rounding
 NEARLY_SAME = 1e-12  # the same, of an orbit solved for and not held there

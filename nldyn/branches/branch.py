@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, shown
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.orbits.orbit import Orbit, same_orbit, shifted_alike, stroboscopic
-from nldyn.system.linear import Real
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -35,75 +36,10 @@ POINTS = " points"  # after their number
 SHORT_STEP = "step below "  # before its length
 
 
-@dataclass(frozen=True, eq=False)
-class BranchPoint:
-    """An orbit on a branch with the branch's direction there.
-
-    Parameters
-    ----------
-    orbit : Orbit
-        The orbit.
-    tangent : (N + 1,)
-        Unit tangent in the metric of the shooting problem.
-    arclength : float
-        Relative arclength from the branch's first computed point.
-    tests : dict of str to float
-        Test functions, filled when first asked for (see `nldyn.bifurcations.locate.tests`).
-    """
-
-    orbit: Orbit
-    tangent: Real
-    arclength: float
-    tests: dict[str, float] = field(default_factory=dict, repr=False)
 
 
-@dataclass(frozen=True, eq=False)
-class SpecialPoint:
-    """A located bifurcation or grazing point.
-
-    Parameters
-    ----------
-    kind : {"LP", "PD", "NS", "BP", "GR"}
-        Cyclic fold, flip, Neimark-Sacker, branch point, grazing.
-    point : BranchPoint
-        The orbit at which it happens.
-    frequency_error : float
-        Estimated error of the root in frequency and the last Newton step, relative.
-    """
-
-    kind: str
-    point: BranchPoint
-    frequency_error: float
-
-    @property
-    def orbit(self) -> Orbit:
-        """The orbit."""
-        return self.point.orbit
-
-    @property
-    def frequency_hz(self) -> float:
-        """Excitation frequency in Hz."""
-        return self.point.orbit.frequency_hz
 
 
-def check_special(caller: str, special: object, kind: str = "", *, of_branch: bool = True) -> None:
-    """Refuse anything but a special point, of a branch and of a kind where these are wanted.
-
-    Raises
-    ------
-    SystemModelError
-        As said.
-    """
-    found, orbit = getattr(special, "kind", None), getattr(special, "orbit", None)
-    if not (isinstance(found, str) and isinstance(orbit, Orbit)):
-        raise SystemModelError(f"{caller} needs a special point, got {shown(special)}")
-    if kind and found != kind:
-        raise SystemModelError(f"{caller} needs a {kind} point, got {found}")
-    if of_branch and not isinstance(getattr(special, "point", None), BranchPoint):
-        raise SystemModelError(
-            f"{caller} needs a special point of a branch, which knows the branch's direction; "
-            f"the {found} point at {orbit.frequency_hz:g} Hz was found otherwise"
-        )
 
 
 def check_branches(name: str, branches: object) -> None:

@@ -8,21 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nldyn.base.errors import SystemModelError, check_range, check_types, check_whole
+from nldyn.base.errors import LocateError, SystemModelError, check_range, check_types, check_whole
 from nldyn.bifurcations.critical import CoefficientError, Estimate, doubled_parameter, flip, loop_of
 from nldyn.bifurcations.period_doubling import switch_at_flip
-from nldyn.bifurcations.roots import LocateError
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special
 from nldyn.bifurcations.within_step import special_points_between
 from nldyn.branches.arclength import Walk
-from nldyn.branches.branch import (
-    JOINS,
-    Branch,
-    BranchPoint,
-    SpecialPoint,
-    check_branches,
-    check_special,
-    is_at,
-)
+from nldyn.branches.branch import JOINS, Branch, check_branches, is_at
 from nldyn.branches.continuation import make_branch
 from nldyn.branches.options import ContinuationOptions
 

@@ -9,14 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from cms.threads import one_thread
-from nldyn.base.errors import SystemModelError, check_range, check_types, numbers
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, SystemModelError, check_range, check_types, numbers
 from nldyn.bifurcations.branch_crossing import (
     NEIGHBOUR,
     ON_CROSSING,
     lies_on_crossing,
     same_crossing,
 )
-from nldyn.branches.arclength import shifts
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.branches.at_frequency import check_requested, requested
 from nldyn.branches.branch import (
     CLOSED,
@@ -25,15 +26,13 @@ from nldyn.branches.branch import (
     RANGE_END,
     SHORT_STEP,
     Branch,
-    BranchPoint,
     Course,
-    SpecialPoint,
 )
 from nldyn.branches.leg import Leg, Trail
 from nldyn.branches.options import ContinuationOptions
 from nldyn.io.checkpoint import Checkpoint, checkpoint_at
-from nldyn.orbits.orbit import ConvergenceError, Orbit, check_minimal
-from nldyn.system.linear import Real
+from nldyn.orbits.orbit import Orbit, check_minimal
+from nldyn.orbits.shooting import shifts
 
 FROM_FOLD = 1e-4  # arclength from a fold to the point at which a branch through it begins
 MIDDLE = 0.1  # of that, within which it lies

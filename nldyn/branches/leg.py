@@ -9,16 +9,16 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from operator import attrgetter
 
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, LocateError
 from nldyn.bifurcations.branch_crossing import NEIGHBOUR, distance, same_crossing, without_repeats
 from nldyn.bifurcations.locate import Chord
-from nldyn.bifurcations.roots import LocateError
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.bifurcations.within_step import insert_dip, special_points_between
 from nldyn.branches.arclength import COMES_BACK, MEETS_OPEN_END, Stride, Walk
-from nldyn.branches.branch import CLOSED, JOINS, NOT_FINISHED, BranchPoint, SpecialPoint, WalkEnd
+from nldyn.branches.branch import CLOSED, JOINS, NOT_FINISHED, WalkEnd
 from nldyn.branches.options import ContinuationOptions
-from nldyn.orbits.orbit import ConvergenceError
 from nldyn.orbits.shooting import metric_length
-from nldyn.system.linear import Real
 
 AT_FLIP = 1e-5  # distance of a turn of a doubled branch from its end that may be the flip itself
 FLAT = 1e-4  # frequency part of tangents beside such a turn, below which it is

@@ -7,9 +7,10 @@ from itertools import pairwise
 
 from scipy.optimize import minimize_scalar
 
+from nldyn.base.errors import LocateError
 from nldyn.bifurcations.locate import Chord
-from nldyn.bifurcations.roots import LocateError
-from nldyn.branches.branch import Branch, BranchPoint
+from nldyn.bifurcations.point import BranchPoint
+from nldyn.branches.branch import Branch
 from nldyn.orbits.orbit import Orbit
 
 

@@ -13,9 +13,19 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.base.errors import SystemModelError, check_choice, check_types, is_finite, shown
-from nldyn.bifurcations.roots import LocateError, root
-from nldyn.branches.branch import NOT_FINISHED, check_special
+from nldyn.base.arrays import Real
+from nldyn.base.errors import (
+    ConvergenceError,
+    LocateError,
+    SystemModelError,
+    check_choice,
+    check_types,
+    is_finite,
+    shown,
+)
+from nldyn.bifurcations.point import check_special
+from nldyn.bifurcations.roots import root
+from nldyn.branches.branch import NOT_FINISHED
 from nldyn.branches.options import ContinuationOptions
 from nldyn.branches.tables import orbit_columns
 from nldyn.curves.marks import CurveChord, Located, LocatedPoint, marks_between
@@ -31,10 +41,9 @@ from nldyn.flow.flow_map import FlowMap, same_flow
 from nldyn.io.checkpoint import Keeper, begun_before
 from nldyn.orbits.bordered import Condition, Free, OrbitFamily, correct, gradient, tangent_surface
 from nldyn.orbits.conditions import Held, Monitor, defined_by
-from nldyn.orbits.orbit import ConvergenceError, Orbit, check_minimal, same_orbit
+from nldyn.orbits.orbit import Orbit, check_minimal, same_orbit
 from nldyn.runtime.files import check_writable
 from nldyn.system.chart import Chart, checked_parameter, value_of
-from nldyn.system.linear import Real
 from nldyn.system.parameters import Parameter
 
 CurvePart = Literal["points", "marks"]

@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 
+from nldyn.base.arrays import Complex, Real
+from nldyn.base.errors import ConvergenceError
 from nldyn.orbits.bordered import Condition, Evaluation, nearest_depth
 from nldyn.orbits.conditions import BranchPoint, Grazing, Singular
 from nldyn.orbits.extremes import branch_point_test, flip_test, torus_test
-from nldyn.orbits.orbit import ConvergenceError, Orbit
-from nldyn.system.linear import Complex, Real
+from nldyn.orbits.orbit import Orbit
 
 # Derivatives of the monodromy matrix are differences over at most 1e-3 of the orbit's size: its
 # error of 1e-10 then makes one of 1e-7 in the first and of 1e-4 in the second. They must not reach

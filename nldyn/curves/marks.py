@@ -8,18 +8,18 @@ from typing import Protocol
 
 import numpy as np
 
-from nldyn.base.errors import check_whole
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, LocateError, check_whole
 from nldyn.bifurcations.locate import leaves_circle
-from nldyn.bifurcations.roots import LocateError, root
+from nldyn.bifurcations.point import check_special
+from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.touching import Touch, touching_extremes
-from nldyn.branches.branch import check_special
 from nldyn.curves.events import is_torus, torus_pair
 from nldyn.curves.walk import UNFOLDED, CurvePoint, between, curve_point, is_torus_curve
 from nldyn.orbits.bordered import Condition, Free, OrbitFamily, correct, length_unit
 from nldyn.orbits.conditions import Both, BranchPoint, Grazing, Singular, defined_by
-from nldyn.orbits.orbit import ConvergenceError, Orbit
+from nldyn.orbits.orbit import Orbit
 from nldyn.system.chart import FREQUENCY, Chart, checked_parameter, value_of
-from nldyn.system.linear import Real
 from nldyn.system.parameters import Parameter
 
 POLE = 1e-3  # of its values beside it: what a test is not below where it has no root but a pole

@@ -10,7 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from nldyn.base.errors import SystemModelError
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, SystemModelError
 from nldyn.bifurcations.period_doubling import passed_flip
 from nldyn.branches.branch import NOT_FINISHED, SHORT_STEP
 from nldyn.branches.options import ContinuationOptions
@@ -28,10 +29,9 @@ from nldyn.orbits.bordered import (
 )
 from nldyn.orbits.conditions import Both, BranchPoint, Grazing, Held, Singular
 from nldyn.orbits.extremes import nearest
-from nldyn.orbits.orbit import ConvergenceError, Orbit
+from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import metric_length
 from nldyn.system.chart import Chart
-from nldyn.system.linear import Real
 
 RANGE_END = "end of the range of "
 RESONANCE_END = "becomes a curve of neutral saddles at a resonance"

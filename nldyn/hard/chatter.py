@@ -20,7 +20,8 @@ from nldyn.hard.multiprecision import (
     orbit_flow_error,
 )
 from nldyn.hard.stiffness import beam_with_stop
-from nldyn.orbits.orbit import Orbit, solve_orbit
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.solve import solve_orbit
 from nldyn.system.elements import HarmonicForce, Stop
 from nldyn.system.system import System
 

@@ -9,11 +9,13 @@ from functools import cache, partial
 
 import numpy as np
 
-from nldyn.branches.branch import Branch, SpecialPoint
+from nldyn.bifurcations.point import SpecialPoint
+from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import continue_branch
 from nldyn.branches.options import ContinuationOptions
 from nldyn.hard.case import Case, Measured
-from nldyn.orbits.orbit import Orbit, solve_orbit
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.solve import solve_orbit
 from nldyn.paper.jobs import scene_system
 from nldyn.system.system import System
 

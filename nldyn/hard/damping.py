@@ -10,8 +10,10 @@ import mpmath
 import numpy as np
 from scipy.special import gamma
 
+from nldyn.base.arrays import Real
 from nldyn.bench.exact import Precision
-from nldyn.flow.flow_map import FlowMap, FlowOptions
+from nldyn.flow.flow_map import FlowMap
+from nldyn.flow.options import FlowOptions
 from nldyn.hard.case import Case, Measured
 from nldyn.hard.multiprecision import (
     DIGITS,
@@ -24,10 +26,9 @@ from nldyn.hard.multiprecision import (
 )
 from nldyn.longterm.impacts import Impacts, impacts
 from nldyn.longterm.simulation import simulate
-from nldyn.orbits.orbit import solve_orbit
+from nldyn.orbits.solve import solve_orbit
 from nldyn.paper.jobs import BILINEAR_ALPHA, STIFFNESS, scene_system
 from nldyn.system.elements import HarmonicForce, Stop
-from nldyn.system.linear import Real
 from nldyn.system.system import System
 
 mp = mpmath.mp

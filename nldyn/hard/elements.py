@@ -19,7 +19,7 @@ from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import continue_branch
 from nldyn.hard.case import Case, Measured
 from nldyn.hard.multiprecision import DIGITS, mp
-from nldyn.orbits.orbit import solve_orbit
+from nldyn.orbits.solve import solve_orbit
 from nldyn.scene.build import build_system, load_scene
 from nldyn.system.elements import Stop, Unbalance
 from nldyn.system.system import System

@@ -14,7 +14,8 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.hard.case import Case, Measured
 from nldyn.hard.multiprecision import JACOBIAN, ORIGIN, PROMISE, flow_error, orbit_flow_error
 from nldyn.hard.stiffness import beam_with_stop
-from nldyn.orbits.orbit import Orbit, solve_orbit
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.solve import solve_orbit
 from nldyn.system.elements import HarmonicForce, Stop
 from nldyn.system.system import System
 

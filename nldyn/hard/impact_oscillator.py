@@ -16,8 +16,8 @@ import numpy as np
 import scipy.linalg as sla
 from scipy.optimize import brentq
 
+from nldyn.base.arrays import Real
 from nldyn.system.elements import HarmonicForce, Stop
-from nldyn.system.linear import Real
 from nldyn.system.system import System
 
 mp = mpmath.mp

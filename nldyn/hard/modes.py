@@ -23,7 +23,8 @@ from nldyn.hard.multiprecision import (
 )
 from nldyn.longterm.impacts import impacts
 from nldyn.longterm.simulation import simulate
-from nldyn.orbits.orbit import Orbit, solve_orbit
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.solve import solve_orbit
 from nldyn.orbits.starts import find_orbits
 from nldyn.system.elements import Damper, HarmonicForce, Stop
 from nldyn.system.system import System

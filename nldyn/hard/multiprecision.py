@@ -9,11 +9,11 @@ from functools import reduce
 import mpmath
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.bench.exact import ExactEnd, ExactFlow, Number, Precision, Series
 from nldyn.flow.flow_map import FlowMap
 from nldyn.hard.case import Measured
 from nldyn.orbits.orbit import Orbit
-from nldyn.system.linear import Real
 from nldyn.system.system import System
 
 mp = mpmath.mp

@@ -7,9 +7,11 @@ from functools import cache, partial
 
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.bench.exact import Series
 from nldyn.bifurcations.normal_forms import normal_form, switch_at_branch_point
-from nldyn.branches.branch import Branch, SpecialPoint
+from nldyn.bifurcations.point import SpecialPoint
+from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import continue_branch
 from nldyn.branches.options import ContinuationOptions
 from nldyn.curves.curves import continue_special
@@ -25,10 +27,10 @@ from nldyn.hard.multiprecision import (
     orbit_flow_error,
 )
 from nldyn.hard.stiffness import beam_with_stop
-from nldyn.orbits.orbit import Orbit, solve_orbit
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.solve import solve_orbit
 from nldyn.orbits.starts import find_orbits
 from nldyn.system.elements import HarmonicForce, Stop, Unbalance
-from nldyn.system.linear import Real
 from nldyn.system.system import System
 
 SUBJECT = "resonances, folds and cusps"

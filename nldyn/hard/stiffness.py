@@ -13,7 +13,8 @@ from nldyn.hard.case import Case, Measured
 from nldyn.hard.impact_oscillator import ImpactOscillator
 from nldyn.hard.multiprecision import JACOBIAN, ORIGIN, PROMISE, STATE, orbit_flow_error
 from nldyn.longterm.impacts import impacts
-from nldyn.orbits.orbit import Orbit, solve_orbit
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.solve import solve_orbit
 from nldyn.system.elements import Stop, Unbalance
 from nldyn.system.system import System
 

@@ -7,14 +7,16 @@ from functools import cache, partial
 
 import numpy as np
 
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError
 from nldyn.bench.exact import Precision
 from nldyn.flow.flow_map import FlowMap
 from nldyn.hard.case import Case, Measured
 from nldyn.hard.multiprecision import JACOBIAN, ORIGIN, ExactOrbit, exact_orbit
 from nldyn.hard.stiffness import beam_with_stop
-from nldyn.orbits.orbit import ConvergenceError, Orbit, refine, shooting_problem
-from nldyn.orbits.shooting import ShootingProblem
-from nldyn.system.linear import Real
+from nldyn.orbits.newton import refine
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.shooting import ShootingProblem, shooting_problem
 
 SUBJECT = "unstable orbits"
 HZ = 36.0  # the 1-DOF model is chaotic there

@@ -19,8 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError
-from nldyn.branches.branch import Branch, BranchPoint, Course, SpecialPoint, WalkEnd
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.branches.branch import Branch, Course, WalkEnd
 from nldyn.branches.continuation import alike
 from nldyn.branches.options import ContinuationOptions
 from nldyn.branches.tables import UNITS, orbit_columns
@@ -33,7 +35,6 @@ from nldyn.orbits.shooting import ShootingProblem
 from nldyn.search.diagram import Diagram
 from nldyn.search.exploration import Coverage, Exploration, ExploreOptions, Question, Stage
 from nldyn.search.tally import Tally
-from nldyn.system.linear import Real
 
 FORMAT = "nldyn branches"
 FORMAT_VERSION = 2

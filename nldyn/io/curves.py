@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, shown
 from nldyn.branches.tables import UNITS
 from nldyn.curves.curves import Curve
@@ -27,7 +28,6 @@ from nldyn.orbits.conditions import MONITORS, BranchPoint, Grazing, Held, Singul
 from nldyn.orbits.orbit import Orbit
 from nldyn.system.chart import UNITS as PARAMETER_UNITS
 from nldyn.system.chart import Chart, checked_parameter
-from nldyn.system.linear import Real
 from nldyn.system.parameters import Parameter
 
 FORMAT = "nldyn curves"

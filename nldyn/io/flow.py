@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from nldyn.base.errors import SystemModelError, check_types
-from nldyn.flow.flow_map import FlowMap, FlowOptions
+from nldyn.flow.flow_map import FlowMap
+from nldyn.flow.options import FlowOptions
 from nldyn.io.hdf5 import Group, put, set_attribute
 from nldyn.system.contact_law import ContactLaw
 from nldyn.system.elements import Damper, Excitation, HarmonicForce, Stop, Unbalance

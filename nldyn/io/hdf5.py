@@ -12,10 +12,10 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, shown
 from nldyn.base.version import software_version
 from nldyn.runtime.files import write_whole
-from nldyn.system.linear import Real
 
 
 @contextmanager

@@ -12,7 +12,15 @@ from typing import Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nldyn.base.errors import SystemModelError, check_frequency, check_types, check_whole, numbers
+from nldyn.base.arrays import Real
+from nldyn.base.errors import (
+    ConvergenceError,
+    SystemModelError,
+    check_frequency,
+    check_types,
+    check_whole,
+    numbers,
+)
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.longterm.lyapunov import LyapunovSpectrum, spectrum_from
 from nldyn.longterm.simulation import (
@@ -23,19 +31,11 @@ from nldyn.longterm.simulation import (
     starting_state,
     transient_end,
 )
-from nldyn.orbits.orbit import (
-    LONGEST_PERIOD,
-    ConvergenceError,
-    Orbit,
-    check_bounded,
-    check_observe,
-    same_orbit,
-    stroboscopic,
-)
-from nldyn.orbits.starts import orbit_near, random_states
+from nldyn.orbits.newton import check_bounded
+from nldyn.orbits.orbit import Orbit, check_observe, same_orbit, stroboscopic
+from nldyn.orbits.shooting import LONGEST_PERIOD
+from nldyn.orbits.starts import orbit_near, random_states, settling_periods
 from nldyn.runtime.executors import check_execution, values_of
-from nldyn.search.exploration import settling_periods
-from nldyn.system.linear import Real
 from nldyn.system.system import System
 
 Kind = Literal["periodic", "quasi-periodic", "chaotic", "drifting", "undecided", "failed"]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import (
     SystemModelError,
     check_frequency,
@@ -32,9 +33,9 @@ from nldyn.longterm.attractors import (
     find_attractors,
     same_attractor,
 )
-from nldyn.orbits.orbit import Orbit, check_bounded, check_observe, stroboscopic
+from nldyn.orbits.newton import check_bounded
+from nldyn.orbits.orbit import Orbit, check_observe, stroboscopic
 from nldyn.runtime.executors import check_execution, values_of
-from nldyn.system.linear import Real
 from nldyn.system.system import System, same_system
 
 CHUNK = 16  # periods between two looks at where a motion is

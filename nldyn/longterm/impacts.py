@@ -10,11 +10,11 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, check_whole
 from nldyn.flow.flow_map import FlowMap
 from nldyn.longterm.simulation import Motion, end_state, motion_of
 from nldyn.orbits.orbit import Orbit
-from nldyn.system.linear import Real
 from nldyn.system.system import System
 
 if TYPE_CHECKING:

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from nldyn.base.errors import SystemModelError, check_types, check_whole
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, SystemModelError, check_types, check_whole
 from nldyn.flow.flow_map import FlowMap
 from nldyn.longterm.attractors import Attractor, AttractorOptions, reached_orbit
 from nldyn.longterm.lyapunov import spectrum_from
 from nldyn.longterm.simulation import MOST_PERIODS
-from nldyn.orbits.orbit import ConvergenceError, check_observe
+from nldyn.orbits.orbit import check_observe
 from nldyn.runtime.executors import check_execution, values_of
-from nldyn.system.linear import Real
 
 LOOK = 250  # periods between two looks whether a motion has settled
 LAST = 500  # periods at the end over which exponents tell whether it is chaotic still

@@ -11,13 +11,13 @@ from typing import Any, overload
 
 import numpy as np
 
-from nldyn.base.errors import SystemModelError, check_whole, numbers
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, SystemModelError, check_whole, numbers
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.longterm.lyapunov_kernels import growth_rates
 from nldyn.longterm.simulation import MOST_PERIODS, cases_at, is_list, transient_end
-from nldyn.orbits.orbit import ConvergenceError, contact_damping
+from nldyn.orbits.orbit import contact_damping
 from nldyn.runtime.executors import check_execution, values_of
-from nldyn.system.linear import Real
 from nldyn.system.system import System
 
 BLOCK = 64  # periods in one call

@@ -9,13 +9,13 @@ from functools import partial
 
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.flow.flow_map import FlowMap
 from nldyn.longterm.basins import UNDECIDED, Basins, Plane, Target, settle, target_of
-from nldyn.orbits.orbit import Orbit, near_returns, same_orbit, stroboscopic
-from nldyn.orbits.starts import orbit_near
+from nldyn.orbits.orbit import Orbit, same_orbit, stroboscopic
+from nldyn.orbits.starts import near_returns, orbit_near
 from nldyn.runtime.executors import check_execution, values_of
-from nldyn.system.linear import Real
 
 NEWTON_STEPS = 12
 STEP_HALVINGS = 10

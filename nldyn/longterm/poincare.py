@@ -12,15 +12,16 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_choice, check_range, check_types, check_whole
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.longterm.attractors import Attractor, AttractorOptions, Kind, attractor_from
 from nldyn.longterm.impacts import check_stop, impacts
 from nldyn.longterm.simulation import Motion
-from nldyn.orbits.orbit import check_bounded, check_observe
+from nldyn.orbits.newton import check_bounded
+from nldyn.orbits.orbit import check_observe
 from nldyn.orbits.starts import random_states
 from nldyn.runtime.executors import check_execution, values_of
-from nldyn.system.linear import Real
 from nldyn.system.system import System
 
 Direction = Literal["up", "down", "random"]

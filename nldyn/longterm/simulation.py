@@ -11,7 +11,9 @@ from typing import Any, overload
 
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import (
+    ConvergenceError,
     SystemModelError,
     check_frequency,
     check_whole,
@@ -20,16 +22,9 @@ from nldyn.base.errors import (
     shown,
 )
 from nldyn.flow.flow_map import FlowMap, Trajectory, flow_of
-from nldyn.orbits.orbit import (
-    ConvergenceError,
-    History,
-    Orbit,
-    check_bounded,
-    check_observe,
-    history_of,
-)
+from nldyn.orbits.newton import check_bounded
+from nldyn.orbits.orbit import History, Orbit, check_observe, history_of
 from nldyn.runtime.executors import check_execution, values_of
-from nldyn.system.linear import Real
 from nldyn.system.system import System
 
 BLOCK = 64  # periods recorded in one call

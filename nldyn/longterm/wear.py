@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
+from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import SystemModelError, check_choice, check_types, check_whole
 from nldyn.branches.branch import Branch
 from nldyn.longterm.attractors import Attractor
@@ -22,7 +23,6 @@ from nldyn.longterm.simulation import MOST_RECORDED, Motion, motion_of
 from nldyn.orbits.harmonics import modal_row
 from nldyn.orbits.orbit import Orbit
 from nldyn.runtime.executors import check_execution, values_of
-from nldyn.system.linear import Complex, Real
 from nldyn.system.system import System
 
 MOST_SAMPLES = 10**6  # in a period

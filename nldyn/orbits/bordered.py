@@ -17,9 +17,11 @@ from typing import Protocol
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from nldyn.base.errors import SystemModelError
-from nldyn.flow.flow_map import FlowMap, FlowOptions, Segments
-from nldyn.orbits.orbit import ConvergenceError, Orbit
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, SystemModelError
+from nldyn.flow.flow_map import FlowMap, Segments
+from nldyn.flow.options import FlowOptions
+from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import ShootingProblem, metric_length
 from nldyn.system.chart import (
     FREQUENCY,
@@ -28,7 +30,6 @@ from nldyn.system.chart import (
     value_of,
     with_value,
 )
-from nldyn.system.linear import Real
 from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
 

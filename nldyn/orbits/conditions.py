@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nldyn.base.errors import SystemModelError, is_finite, shown
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, SystemModelError, is_finite, shown
 from nldyn.flow.flow_map import Segments
 from nldyn.orbits.bordered import (
     DIFFERENCE,
@@ -21,10 +22,9 @@ from nldyn.orbits.bordered import (
     reach_of_grazing,
 )
 from nldyn.orbits.extremes import nearest
-from nldyn.orbits.orbit import ConvergenceError, Orbit
+from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import metric_length
 from nldyn.system.chart import FREQUENCY, Chart
-from nldyn.system.linear import Real
 from nldyn.system.parameters import Parameter
 
 KINDS = ("LP", "PD", "NS", "BP", "GR")

@@ -7,18 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nldyn.branches.arclength import shifts
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError
 from nldyn.flow.flow_map import FlowMap
-from nldyn.orbits.orbit import (
-    ConvergenceError,
-    Orbit,
-    minimal_period,
-    refine,
-    same_orbit,
-    shooting_problem,
-    spread,
-)
-from nldyn.system.linear import Real
+from nldyn.orbits.newton import refine, spread
+from nldyn.orbits.orbit import Orbit, minimal_period, same_orbit
+from nldyn.orbits.shooting import shifts, shooting_problem
 
 LONGEST = 0.5  # step of an iteration, relative to the orbit
 ITERATIONS = 20

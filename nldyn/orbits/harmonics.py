@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import SystemModelError, check_types, check_whole, numbers, shown
 from nldyn.orbits.orbit import Orbit, check_observe
-from nldyn.system.linear import Complex, Real
 from nldyn.system.system import System
 
 MOST_SAMPLES = 2**18

@@ -10,11 +10,13 @@ from typing import Any, Final, Literal
 import numpy as np
 from scipy.interpolate import krogh_interpolate
 
-from nldyn.base.errors import SystemModelError, is_finite, shown
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, SystemModelError, is_finite, shown
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.bordered import OrbitFamily, correct
 from nldyn.orbits.conditions import Singular
-from nldyn.orbits.orbit import ConvergenceError, Orbit, solve_orbit
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.solve import solve_orbit
 from nldyn.system.chart import (
     EVERY_MODE,
     FREQUENCY,
@@ -25,7 +27,6 @@ from nldyn.system.chart import (
     with_value,
 )
 from nldyn.system.elements import Excitation
-from nldyn.system.linear import Real
 from nldyn.system.parameters import Parameter, size_of, strength
 from nldyn.system.system import System
 

@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from nldyn.base.arrays import Real
 from nldyn.orbits.periodic_schur import product_eigenvalues
-from nldyn.system.linear import Real
 
 EPS = float(np.finfo(float).eps)
 SAMPLES = 4  # perturbations: the uncertainty is off by a factor above 10 once in 6000 times

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from nldyn.base.errors import SystemModelError, check_frequency, check_types, check_whole, numbers
-from nldyn.flow.flow_map import FlowError, FlowMap, Solution, Trajectory, chain, flow_of
+from nldyn.base.arrays import Real
+from nldyn.base.errors import (
+    ConvergenceError,
+    SystemModelError,
+    check_types,
+    check_whole,
+    numbers,
+)
+from nldyn.flow.flow_map import FlowError, FlowMap, Solution, Trajectory, chain
 from nldyn.orbits.multipliers import (
     COARSE,
     MOST_PARTS,
@@ -27,22 +32,7 @@ from nldyn.orbits.multipliers import (
 )
 from nldyn.orbits.shooting import ShootingProblem
 from nldyn.system.elements import Stop
-from nldyn.system.linear import Real
-from nldyn.system.rest import at_rest, held_motion, rest
 from nldyn.system.system import System
-
-SEGMENTS_PER_PERIOD = 2
-LONGEST_PERIOD = 10**4  # excitation periods of an orbit
-MOST_SEGMENTS = 10**5
-# contact force over the excitation, and penetration over displacement, up to which a free body
-# counts as untouched
-TOUCH = 1e-7
-MORE_DAMPING = 7.0, 20.0, 55.0  # factors that may leave one orbit only
-NOT_HELD = "the structure is free to move in a way that no stop limits, and nothing tells its place"
-NO_PLACE = (
-    "the structure is free to move as a whole, and where the motion touches no stop, nothing tells "
-    "its place; give a guess that touches one"
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -470,264 +460,30 @@ def check_observe(system: System, observe: str | None) -> str:
     return observe
 
 
-def shooting_problem(flow: FlowMap, period: int, segments: int | None = None) -> ShootingProblem:
-    """Shooting equations with two segments per excitation period unless told otherwise."""
-    check_whole("period", period, 1, LONGEST_PERIOD)
-    if segments is None:
-        segments = SEGMENTS_PER_PERIOD * period
-    check_whole("segments", segments, 1, MOST_SEGMENTS)
-    if segments % period:
-        raise SystemModelError(f"segments must be a multiple of period {period}, got {segments}")
-    return ShootingProblem(flow, period, segments)
 
 
-class ConvergenceError(RuntimeError):
-    """No orbit was found; the text says how far Newton's method came."""
 
 
-def solve_orbit(
-    system: System | FlowMap,
-    frequency_hz: float,
-    period: int = 1,
-    *,
-    guess: Real | None = None,
-    observe: str | None = None,
-    segments: int | None = None,
-) -> Orbit:
-    """Find a periodic orbit at a given frequency by multiple shooting.
-
-    Parameters
-    ----------
-    system : System or FlowMap
-        What to solve.
-    frequency_hz : float
-        Excitation frequency in Hz.
-    period : int
-        Period multiple n.
-    guess : (2n,) or (k, 2n) array, optional
-        Modal displacements and velocities at phase zero, or at the k shooting phases. Without it
-        the system is simulated from rest for 200 periods; where the motion does not settle,
-        Newton's method starts where it nearly repeats, and from the small motion about a rest that
-        a stop holds. Where all that fails, an orbit of period 1 is carried here from up to 55 times
-        the modal damping.
-    observe : str, optional
-        Interface whose displacement is reported; the first unless given.
-    segments : int, optional
-        Number k of shooting segments; where given, the simulation from rest is cut as finely.
-
-    Returns
-    -------
-    Orbit
-
-    Raises
-    ------
-    SystemModelError
-        For input that makes no sense.
-    ConvergenceError
-        If the simulation fails, or Newton's method does not converge or comes to an orbit of a
-        shorter period; the text says why.
-
-    Examples
-    --------
-    >>> from nldyn import System, Unbalance
-    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
-    ...     excitation=[Unbalance("middle", 4.92e-6)])
-    >>> orbit = solve_orbit(system, frequency_hz=20.0)
-    >>> orbit.impacts
-    0
-    """
-    flow = flow_of(system)
-    check_frequency("frequency_hz", frequency_hz)
-    observe = check_observe(flow.system, observe)
-    problem = shooting_problem(flow, period, segments)
-    omega = 2.0 * math.pi * frequency_hz
-    check_bounded(flow.system, omega)
-    if guess is not None:
-        return _first_orbit(problem, [_guessed(problem, guess, omega)], omega, observe)
-    pieces = (segments or period) // period  # of one excitation period
-    try:
-        return _first_orbit(problem, _simulated(problem, omega, pieces), omega, observe)
-    except ConvergenceError:
-        orbit = _by_more_damping(problem, omega, observe, pieces) if period == 1 else None
-        if orbit is None:
-            raise
-        return orbit
 
 
-def _guessed(problem: ShootingProblem, guess: Real, omega: float) -> Real:
-    """States (k, 2n) at the shooting phases from a guess, checked."""
-    guess = np.atleast_2d(numbers("guess", guess))
-    if guess.shape not in ((1, problem.size), (problem.segments, problem.size)):
-        raise SystemModelError(
-            f"guess must have {problem.size} entries (or {problem.segments} such rows), "
-            f"got shape {guess.shape}"
-        )
-    if guess.shape[0] == problem.segments:
-        return problem.flow.to_state(guess)
-    return spread(problem, problem.flow.to_state(guess[0]), omega)
 
 
-def _simulated(problem: ShootingProblem, omega: float, pieces: int) -> Iterator[Real]:
-    """States at the shooting phases that a motion from rest comes near, the likeliest first.
-
-    It is simulated in pieces of the excitation period.
-    """
-    flow, period = problem.flow, problem.period
-    q = rest(flow.system)
-    start = flow.to_state(at_rest(q))
-    warm = np.linspace(0.0, 400.0 * np.pi, 200 * pieces + 1)
-    found = flow.shoot(start[None], warm, omega, sensitivities=False, chained=True)
-    if found.failure:
-        raise ConvergenceError(
-            f"the simulation from rest at {omega / (2.0 * math.pi):g} Hz failed: {found.failure}; "
-            "give a guess"
-        )
-    strobe = found.ends[pieces - 1 :: pieces][20:]
-    # beside a subharmonic attractor lies, in its middle, the orbit that it branched from
-    counts = (2, 3, 4, len(strobe)) if period == 1 else ()
-    middles = [strobe[-count:].mean(axis=0) for count in counts]
-    near = strobe[near_returns(strobe, period, 8)]
-    # at a sharp resonance the motion from rest takes too long to grow
-    linear = [] if flow.system.grows(omega) else [flow.system.steady(omega).real]
-    starts = (spread(problem, z, omega) for z in (strobe[-1], *near, *middles, *linear))
-    if not np.any(q):
-        return starts
-    held = held_motion(flow.system, q, omega, problem.phases[:-1])
-    return itertools.chain(starts, [flow.to_state(held)])
 
 
-def _first_orbit(
-    problem: ShootingProblem, starts: Iterable[Real], omega: float, observe: str
-) -> Orbit:
-    """The first orbit of the problem's own period that Newton's method finds from some states."""
-    failure = ConvergenceError()
-    for nodes in starts:
-        try:
-            orbit = refine(problem, nodes, omega, observe)
-        except ConvergenceError as error:
-            failure = error
-            continue
-        shortest = minimal_period(orbit)
-        if shortest == problem.period:
-            return orbit
-        failure = ConvergenceError(
-            f"no orbit of period {problem.period} found at {omega / (2.0 * math.pi):g} Hz: "
-            f"Newton's method came to one of period {shortest}; give a guess beside the orbit, or "
-            "try find_orbits"
-        )
-    raise failure
 
 
-def _by_more_damping(
-    problem: ShootingProblem, omega: float, observe: str, pieces: int
-) -> Orbit | None:
-    """Orbit at more damping, which a motion from rest comes near, carried back, or None."""
-    from nldyn.orbits.homotopy import DAMPING, Detour
-
-    if not np.any(problem.flow.system.total_damping):
-        return None
-    for factor in MORE_DAMPING:
-        detour = Detour(problem.flow, {DAMPING: factor})
-        try:
-            more = replace(problem, flow=detour.flow(1.0))
-            orbit = _first_orbit(more, _simulated(more, omega, pieces), omega, observe)
-        except (ConvergenceError, SystemModelError):
-            continue
-        found = detour.carried(orbit, 1.0, 0.0)
-        if found is not None:
-            return found
-    return None
 
 
-def check_bounded(system: System, omega: float) -> None:
-    """Refuse the resonance of an undamped mode where no stop can limit the motion."""
-    if not system.stops:
-        system.steady(omega)
 
 
-def near_returns(states: Real, period: int, count: int) -> list[int]:
-    """Indices where the state comes back after `period` more nearly than before and after.
-
-    A motion that settles on an attractor also lingers near the saddles that it passes. The
-    closest returns come first; states near a chosen one are left out.
-    """
-    if len(states) <= period:
-        return []
-    distance = np.linalg.norm(states[period:] - states[:-period], axis=1)
-    scale = float(np.linalg.norm(states, axis=1).max()) or 1.0
-    before, after = np.append(np.inf, distance[:-1]), np.append(distance[1:], np.inf)
-    returns = np.flatnonzero((distance <= before) & (distance <= after) & (distance < 0.3 * scale))
-    chosen: list[int] = []
-    for index in returns[np.argsort(distance[returns], kind="stable")]:
-        if len(chosen) == count:
-            break
-        apart = [np.linalg.norm(states[index] - states[c]) for c in chosen]
-        if all(a > 1e-2 * scale for a in apart):
-            chosen.append(int(index))
-    return chosen
 
 
-def _is_left_free(system: System) -> bool:
-    """Whether the stops leave a mode of zero frequency, or a combination of such modes, free."""
-    free = system.natural_frequencies == 0.0
-    held = np.array([system.stop_vector(stop)[free] for stop in system.stops])
-    held = held.reshape(-1, int(free.sum()))  # without stops, too
-    return int(np.linalg.matrix_rank(held)) < held.shape[1]
 
 
-def _touches_only(system: System, motion: Trajectory, omega: float) -> bool:
-    """Whether contacts push, but by no more than rounding of the drive and of the motion."""
-    force = float(motion.record.force.max(initial=0.0))
-    depth = float(motion.record.depth.max(initial=0.0))
-    drive = sum(abs(source.phasor) * omega**source.order for source in system.excitation)
-    reach = np.abs(motion.record.start @ motion.flow.rows[: len(system.stops)].T).max(initial=0.0)
-    return 0.0 < force <= TOUCH * drive and depth <= TOUCH * reach
 
 
-def refine(
-    problem: ShootingProblem,
-    nodes: Real,
-    omega: float,
-    observe: str,
-    max_iterations: int = 25,
-) -> Orbit:
-    """Newton's method at fixed frequency from states (k, 2n)."""
-    guess = np.append(nodes.ravel(), math.log(omega))
-    row = np.zeros(guess.size)
-    row[-1] = 1.0
-    found = problem.correct(guess, row, max_iterations=max_iterations)
-    where = f"no orbit of period {problem.period} found at {omega / (2 * math.pi):g} Hz"
-    drifts = bool(np.any(problem.flow.system.natural_frequencies == 0.0))
-    if drifts and _touches_only(problem.flow.system, found.motion, omega):
-        raise ConvergenceError(f"{where}: {NO_PLACE}")
-    if not found.converged:
-        contact = np.any(found.motion.record.kind >= 0)
-        if not contact and problem.flow.system.grows(omega):
-            raise ConvergenceError(
-                f"{where}: an undamped mode is excited at its own frequency, and its motion grows "
-                "without bound where it touches no stop"
-            )
-        if drifts and _is_left_free(problem.flow.system):
-            raise ConvergenceError(f"{where}: {NOT_HELD}")
-        if not contact and drifts:
-            raise ConvergenceError(f"{where}: {NO_PLACE}")
-        step = f", last relative step {found.last_step:.1e}" if found.last_step < math.inf else ""
-        raise ConvergenceError(
-            f"{where}: {found.failure}{step} after {found.iterations} "
-            f"iteration{'' if found.iterations == 1 else 's'}; another guess or find_orbits may "
-            f"find one{', or continue_branch from calm motion' if problem.period == 1 else ''}"
-        )
-    return Orbit.of(problem, found, observe)
 
 
-def spread(problem: ShootingProblem, start: Real, omega: float) -> Real:
-    """States at all shooting phases by integrating from the first."""
-    if problem.segments == 1:
-        return start[None]
-    ends = problem.flow.shoot(
-        start[None], problem.phases[:-1], omega, sensitivities=False, chained=True
-    ).ends
-    return np.vstack([start[None], ends])
 
 
 def stroboscopic(orbit: Orbit) -> Real:

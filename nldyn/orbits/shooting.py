@@ -12,8 +12,16 @@ from functools import cached_property
 
 import numpy as np
 
+from nldyn.base.arrays import Real
+from nldyn.base.errors import (
+    SystemModelError,
+    check_whole,
+)
 from nldyn.flow.flow_map import FlowMap, Solution
-from nldyn.system.linear import Real
+
+SEGMENTS_PER_PERIOD = 2
+LONGEST_PERIOD = 10**4  # excitation periods of an orbit
+MOST_SEGMENTS = 10**5
 
 AT_REST = 1e-6  # size of an orbit, relative to the guess, that may be rounding
 
@@ -136,3 +144,21 @@ def asymmetry(problem: ShootingProblem, point: Real) -> float:
     nodes = problem.nodes(point)
     sum_ = nodes + np.roll(nodes, problem.segments // 2, axis=0)
     return float(np.abs(sum_).max()) / problem.scale(point)
+
+
+def shifts(problem: ShootingProblem, point: Real) -> list[Real]:
+    """Shooting unknowns (N + 1,) of an orbit shifted by each of its excitation periods."""
+    nodes = problem.nodes(point)
+    moves = range(0, problem.segments, problem.segments // problem.period)
+    return [np.append(np.roll(nodes, move, axis=0).ravel(), point[-1]) for move in moves]
+
+
+def shooting_problem(flow: FlowMap, period: int, segments: int | None = None) -> ShootingProblem:
+    """Shooting equations with two segments per excitation period unless told otherwise."""
+    check_whole("period", period, 1, LONGEST_PERIOD)
+    if segments is None:
+        segments = SEGMENTS_PER_PERIOD * period
+    check_whole("segments", segments, 1, MOST_SEGMENTS)
+    if segments % period:
+        raise SystemModelError(f"segments must be a multiple of period {period}, got {segments}")
+    return ShootingProblem(flow, period, segments)

@@ -8,26 +8,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nldyn.base.errors import check_frequency, check_whole
-from nldyn.flow.flow_map import FlowMap, flow_of
-from nldyn.orbits.orbit import (
-    SEGMENTS_PER_PERIOD,
+from nldyn.base.arrays import Real
+from nldyn.base.errors import (
     ConvergenceError,
-    Orbit,
-    check_bounded,
-    check_observe,
-    minimal_period,
-    near_returns,
-    refine,
-    same_orbit,
-    shooting_problem,
-    spread,
-    stroboscopic,
+    check_frequency,
+    check_whole,
 )
-from nldyn.orbits.shooting import ShootingProblem, metric_length
-from nldyn.system.linear import Real
+from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.orbits.newton import check_bounded, refine, spread
+from nldyn.orbits.orbit import Orbit, check_observe, minimal_period, same_orbit, stroboscopic
+from nldyn.orbits.shooting import (
+    SEGMENTS_PER_PERIOD,
+    ShootingProblem,
+    metric_length,
+    shooting_problem,
+)
 from nldyn.system.rest import at_rest, rest
 from nldyn.system.system import System
+
+DECAYS = 4.0  # time allowed for settling, over the slowest decay time of the linear part
+FEWEST, UNDAMPED = 30, 600  # periods of it: at least, and where nothing decays
+
+
 
 MOST_COUNT = 10**7  # of starts, periods and candidates
 FREQUENCY_WEIGHT = 10.0  # of a relative change of the frequency against one of the states
@@ -352,3 +354,43 @@ def find_orbits(
             f"every simulation at {frequency_hz:g} Hz failed: {strobe.failures[0]}"
         )
     return orbits_from_strobe(flow, strobe, period, check_observe(flow.system, observe), options)
+
+
+def near_returns(states: Real, period: int, count: int) -> list[int]:
+    """Indices where the state comes back after `period` more nearly than before and after.
+
+    A motion that settles on an attractor also lingers near the saddles that it passes. The
+    closest returns come first; states near a chosen one are left out.
+    """
+    if len(states) <= period:
+        return []
+    distance = np.linalg.norm(states[period:] - states[:-period], axis=1)
+    scale = float(np.linalg.norm(states, axis=1).max()) or 1.0
+    before, after = np.append(np.inf, distance[:-1]), np.append(distance[1:], np.inf)
+    returns = np.flatnonzero((distance <= before) & (distance <= after) & (distance < 0.3 * scale))
+    chosen: list[int] = []
+    for index in returns[np.argsort(distance[returns], kind="stable")]:
+        if len(chosen) == count:
+            break
+        apart = [np.linalg.norm(states[index] - states[c]) for c in chosen]
+        if all(a > 1e-2 * scale for a in apart):
+            chosen.append(int(index))
+    return chosen
+
+
+def settling_periods(system: System, frequency_hz: float) -> int:
+    """Excitation periods after which the slowest linear motion has decayed to e^-4, at least 30.
+
+    A motion without damping does not settle; 600 periods show where it goes.
+
+    Examples
+    --------
+    >>> from nldyn import System
+    >>> system = System.from_modal([10.0], {"tip": [1.0]}, modal_damping=0.01)
+    >>> settling_periods(system, 10.0)
+    64
+    """
+    slowest = system.linear.slowest_decay
+    if slowest <= 0.0:
+        return UNDAMPED
+    return max(math.ceil(DECAYS * frequency_hz / slowest), FEWEST)

@@ -8,7 +8,8 @@ from functools import cache, partial
 
 import cms
 from nldyn.base.resources import example
-from nldyn.branches.branch import Branch, SpecialPoint
+from nldyn.bifurcations.point import SpecialPoint
+from nldyn.branches.branch import Branch
 from nldyn.branches.peaks import lowest_orbit, resonance_peaks
 from nldyn.paper.evidence import (
     READING_TOLERANCE,

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from nldyn.branches.branch import Branch, SpecialPoint
+from nldyn.bifurcations.point import SpecialPoint
+from nldyn.branches.branch import Branch
 from nldyn.branches.peaks import Peak, resonance_peaks
 from nldyn.orbits.orbit import Orbit
 from nldyn.search.diagram import Diagram

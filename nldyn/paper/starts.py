@@ -16,16 +16,17 @@ from pathlib import Path
 
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_frequency, check_whole, numbers
 from nldyn.branches.branch import Branch
 from nldyn.branches.options import ContinuationOptions
 from nldyn.flow.flow_map import flow_of
-from nldyn.orbits.orbit import LONGEST_PERIOD, Orbit, check_observe, stroboscopic
+from nldyn.orbits.orbit import Orbit, check_observe, stroboscopic
+from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.orbits.starts import orbit_near
 from nldyn.paper.kept import keep, read_kept
 from nldyn.runtime.files import write_whole
 from nldyn.search.diagram import Collector, Diagram, Progress, middle_orbit
-from nldyn.system.linear import Real
 from nldyn.system.system import System
 
 DATA = Path(__file__).parent / "data"

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.backend_bases import Event, MouseEvent
 from matplotlib.text import Annotation
 
-from nldyn.system.linear import Real
+from nldyn.base.arrays import Real
 
 REACH = 8.0  # pixels
 

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_choice, check_types, is_finite, numbers, shown
 from nldyn.branches.branch import Branch, check_branches
 from nldyn.longterm.attractors import Attractor
@@ -35,7 +36,6 @@ from nldyn.plot.diagram import (
     stability_runs,
 )
 from nldyn.search.diagram import Diagram
-from nldyn.system.linear import Real
 
 KIND_COLOURS = {
     "periodic": "#222222",

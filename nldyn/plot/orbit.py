@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import check_types, check_whole
 from nldyn.orbits.harmonics import spectrum
 from nldyn.orbits.orbit import Orbit, check_observe
@@ -19,7 +20,6 @@ from nldyn.plot.diagram import (
     period_name,
     stop_places,
 )
-from nldyn.system.linear import Real
 
 FORCE_PREFIXES = ((1e6, "MN"), (1e3, "kN"), (1.0, "N"), (1e-3, "mN"), (1e-6, "µN"))
 FLOOR = 1e-7  # amplitudes below this share of the largest are not shown

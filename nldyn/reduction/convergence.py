@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nldyn.base.errors import SystemModelError, check_choice
+from nldyn.base.arrays import Complex, Real
+from nldyn.base.errors import ConvergenceError, SystemModelError, check_choice
 from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import continue_branch
 from nldyn.branches.peaks import resonance_peaks
 from nldyn.flow.flow_map import FlowMap
-from nldyn.orbits.orbit import ConvergenceError, Orbit, refine, solve_orbit
+from nldyn.orbits.newton import refine
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.solve import solve_orbit
 from nldyn.reduction.setting import Setting
-from nldyn.system.linear import Complex, Real
 from nldyn.system.system import System
 
 if TYPE_CHECKING:

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import beta
 
-from nldyn.base.errors import SystemModelError, is_finite, shown
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, SystemModelError, is_finite, shown
 from nldyn.branches.branch import Branch
 from nldyn.branches.peaks import resonance_peaks
-from nldyn.orbits.orbit import ConvergenceError, Orbit, solve_orbit
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.solve import solve_orbit
 from nldyn.reduction.convergence import (
     harmonic_branch,
     largest_force,
@@ -23,7 +25,6 @@ from nldyn.reduction.convergence import (
 )
 from nldyn.reduction.setting import Setting
 from nldyn.system.elements import Stop
-from nldyn.system.linear import Real
 from nldyn.system.system import System
 
 if TYPE_CHECKING:

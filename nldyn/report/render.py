@@ -134,7 +134,8 @@ def orbit_to_draw(
     progress: Progress | None = None,
 ) -> Orbit:
     """Find the orbit to draw: at a frequency, or where the harmonic orbits are largest."""
-    from nldyn.orbits.orbit import ConvergenceError, solve_orbit
+    from nldyn.base.errors import ConvergenceError
+    from nldyn.orbits.solve import solve_orbit
     from nldyn.search.diagram import diagram
 
     if frequency_hz is not None:

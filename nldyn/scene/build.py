@@ -303,7 +303,7 @@ def build_selection(
         As for `build_component`, if there is nothing to compute, and if no model can be chosen.
     """
     import cms
-    from nldyn.orbits.orbit import ConvergenceError
+    from nldyn.base.errors import ConvergenceError
     from nldyn.reduction.selection import reduce_for
     from nldyn.reduction.setting import setting_of
 
@@ -516,7 +516,8 @@ def _to_follow(scene: Scene) -> tuple[FlowMap, ContinuationTable]:
     """Flow map of a scene that says what to compute."""
     check_computable(scene, scene.file)
     system = build_system(scene)
-    from nldyn.flow.flow_map import FlowMap, FlowOptions
+    from nldyn.flow.flow_map import FlowMap
+    from nldyn.flow.options import FlowOptions
 
     table = scene.continuation
     assert table is not None

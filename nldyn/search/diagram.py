@@ -13,37 +13,25 @@ import numpy as np
 
 from cms.threads import one_thread
 from nldyn.base.errors import (
+    ConvergenceError,
+    LocateError,
     SystemModelError,
     check_frequency,
     check_range,
     check_types,
     check_whole,
 )
+from nldyn.base.rows import Rows
 from nldyn.bifurcations.normal_forms import switch_at_branch_point
 from nldyn.bifurcations.period_doubling import switch_at_flip
-from nldyn.bifurcations.roots import LocateError
-from nldyn.branches.arclength import Rows
-from nldyn.branches.branch import (
-    JOINS,
-    Branch,
-    BranchPoint,
-    Course,
-    SpecialPoint,
-    check_branches,
-    is_at,
-)
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.branches.branch import JOINS, Branch, Course, check_branches, is_at
 from nldyn.branches.continuation import broken_off, complete, open_ends, start_point
 from nldyn.branches.options import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap, flow_of, same_flow
 from nldyn.io.checkpoint import Checkpoint, checkpoint_of_several
-from nldyn.orbits.orbit import (
-    ConvergenceError,
-    Orbit,
-    check_observe,
-    minimal_period,
-    solve_orbit,
-    stroboscopic,
-)
+from nldyn.orbits.orbit import Orbit, check_observe, minimal_period, stroboscopic
+from nldyn.orbits.solve import solve_orbit
 from nldyn.orbits.starts import (
     MOST_COUNT,
     SearchOptions,

@@ -13,19 +13,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_whole, is_finite, shown
 from nldyn.branches.options import MOST_POINTS, ContinuationOptions
 from nldyn.flow.flow_map import FlowMap, same_flow
-from nldyn.orbits.orbit import LONGEST_PERIOD
-from nldyn.orbits.starts import MOST_COUNT
+from nldyn.orbits.shooting import LONGEST_PERIOD
+from nldyn.orbits.starts import MOST_COUNT, settling_periods
 from nldyn.search.diagram import Diagram, counted
 from nldyn.search.fixed_point_index import index_note, is_damped
 from nldyn.search.folds import leading_parameter
-from nldyn.system.linear import Real
-from nldyn.system.system import System
 
-DECAYS = 4.0  # time allowed for settling, over the slowest decay time of the linear part
-FEWEST, UNDAMPED = 30, 600  # periods of it: at least, and where nothing decays
 FINEST_SPACING = 1e-6
 MOST_NUMBERS = 10**7  # of counts of closed walks: states times the longest period
 CAN_BE_MISSING = (
@@ -530,19 +527,3 @@ def steps_between(low: float, high: float, spacing: float) -> int:
     return math.ceil(math.log(high / low) / math.log1p(spacing))
 
 
-def settling_periods(system: System, frequency_hz: float) -> int:
-    """Excitation periods after which the slowest linear motion has decayed to e^-4, at least 30.
-
-    A motion without damping does not settle; 600 periods show where it goes.
-
-    Examples
-    --------
-    >>> from nldyn import System
-    >>> system = System.from_modal([10.0], {"tip": [1.0]}, modal_damping=0.01)
-    >>> settling_periods(system, 10.0)
-    64
-    """
-    slowest = system.linear.slowest_decay
-    if slowest <= 0.0:
-        return UNDAMPED
-    return max(math.ceil(DECAYS * frequency_hz / slowest), FEWEST)

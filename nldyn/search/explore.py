@@ -13,39 +13,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cms.threads import one_thread
-from nldyn.base.errors import SystemModelError, check_range, check_types, check_whole, shown
+from nldyn.base.arrays import Real
+from nldyn.base.errors import (
+    ConvergenceError,
+    SystemModelError,
+    check_range,
+    check_types,
+    check_whole,
+    shown,
+)
 from nldyn.branches.branch import Branch, is_at
 from nldyn.branches.options import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.io.checkpoint import Checkpoint, begun_before
 from nldyn.orbits.deflation import deflated_orbit
-from nldyn.orbits.orbit import (
-    LONGEST_PERIOD,
-    ConvergenceError,
-    Orbit,
-    check_observe,
+from nldyn.orbits.orbit import Orbit, check_observe, same_orbit, stroboscopic
+from nldyn.orbits.shooting import LONGEST_PERIOD
+from nldyn.orbits.starts import (
     near_returns,
-    same_orbit,
-    stroboscopic,
+    orbit_beside,
+    orbit_near,
+    random_states,
+    settling_periods,
 )
-from nldyn.orbits.starts import orbit_beside, orbit_near, random_states
 from nldyn.runtime.files import check_writable
 from nldyn.search.by_pseudo_orbits import near_pseudo_orbits
 from nldyn.search.diagram import Collector, Diagram, Progress, check_known
-from nldyn.search.exploration import (
-    Coverage,
-    Exploration,
-    ExploreOptions,
-    Question,
-    Stage,
-    settling_periods,
-)
+from nldyn.search.exploration import Coverage, Exploration, ExploreOptions, Question, Stage
 from nldyn.search.extend import Guesses
 from nldyn.search.fixed_point_index import is_damped, sum_of_indices, without_index_note
 from nldyn.search.folds import connected_folds, leading_parameter
 from nldyn.search.mixtures import near_mixtures
 from nldyn.search.random_walks import near_closed_walks
-from nldyn.system.linear import Real
 from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
 

@@ -11,16 +11,17 @@ from pathlib import Path
 
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_range, check_types, check_whole
 from nldyn.branches.branch import Branch, check_branches
 from nldyn.branches.options import ContinuationOptions
 from nldyn.io.checkpoint import checkpoint_of_several
-from nldyn.orbits.orbit import LONGEST_PERIOD, Orbit
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.search.diagram import Collector, Diagram, Progress, check_known, counted, middle_orbit
 from nldyn.search.exploration import check_spacing, steps_between
 from nldyn.search.fixed_point_index import index_note, is_damped, without_index_note
 from nldyn.search.tally import Tally
-from nldyn.system.linear import Real
 
 PLACES = 6  # orbits of a branch near a frequency
 WINDOW = 0.03  # relative distance within which frequencies are near

@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_frequency, check_range, check_whole
 from nldyn.branches.branch import CLOSED, Branch, check_branches
 from nldyn.flow.flow_map import same_flow
 from nldyn.orbits.orbit import Orbit
-from nldyn.system.linear import Real
 from nldyn.system.system import System
 
 RESOLVED = 1e-8  # relative width of a range of frequencies that counts

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from nldyn.base.errors import SystemModelError
-from nldyn.branches.branch import SpecialPoint
+from nldyn.bifurcations.point import SpecialPoint
 from nldyn.branches.options import ContinuationOptions
 from nldyn.curves.curves import special_start
 from nldyn.curves.walk import CLOSED_CURVE, RANGE_END, CurveWalk, passages

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cms.threads import one_thread
+from nldyn.base.arrays import Real
 from nldyn.base.errors import check_whole
 from nldyn.branches.branch import Branch
 from nldyn.branches.options import ContinuationOptions
@@ -26,7 +27,6 @@ from nldyn.search.extend import (
     search_beside,
 )
 from nldyn.search.pseudo_orbits import nodes_of
-from nldyn.system.linear import Real
 
 NEIGHBOURS = 40  # branches whose orbits are mixed, the nearest in frequency
 BEYOND = 0.8  # part of the way between two orbits by which a mixture may lie beyond either

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
+from nldyn.base.arrays import Real
 from nldyn.branches.branch import Branch
 from nldyn.orbits.orbit import Orbit
-from nldyn.system.linear import Real
 
 NODES = 8  # states of an orbit in each period
 PLACES = 3  # most frequencies at which a branch gives pieces

@@ -15,16 +15,14 @@ from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
 from cms.threads import one_thread
+from nldyn.base.arrays import Real
 from nldyn.base.errors import check_whole
 from nldyn.branches.branch import Branch
 from nldyn.branches.options import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
-from nldyn.orbits.orbit import (
-    SEGMENTS_PER_PERIOD,
-    shooting_problem,
-    spread,
-    stroboscopic,
-)
+from nldyn.orbits.newton import spread
+from nldyn.orbits.orbit import stroboscopic
+from nldyn.orbits.shooting import SEGMENTS_PER_PERIOD, shooting_problem
 from nldyn.orbits.starts import (
     MOST_COUNT,
     SHORT_STEPS,
@@ -45,7 +43,6 @@ from nldyn.search.extend import (
     relative_distance,
     search_beside,
 )
-from nldyn.system.linear import Real
 
 NEIGHBOURS = 20  # states near an image to which a walk may go on
 MOTIONS = 10  # from rest and from random states, that help to tell where states may lie

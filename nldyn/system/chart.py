@@ -16,8 +16,9 @@ from nldyn.base.errors import (
     is_finite,
     shown,
 )
+from nldyn.flow.packing import parameter_tables
 from nldyn.system.elements import LARGEST_EXPONENT
-from nldyn.system.parameters import SOURCES, Parameter, check_index, parameter_tables
+from nldyn.system.parameters import SOURCES, Parameter, check_index
 from nldyn.system.system import System
 
 FREQUENCY = "frequency_hz"

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, is_finite, shown
 from nldyn.system.contact_law import ContactLaw, check_law
-from nldyn.system.linear import Real
 
 LARGEST_EXPONENT = 4.0
 LARGEST_PHASE = 1e6  # in degrees: rounded to 1e-10 degrees

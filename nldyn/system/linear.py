@@ -11,11 +11,14 @@ import scipy.linalg as sla
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import SystemModelError
-from nldyn.flow.kernels.all import NEAR
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+# |λ - iω| below this share of ω makes an eigenvalue λ near: a steady response is at most 1/NEAR
+# times as large as what the excitation brings about in 1/ω, and so are its rounding errors; in the
+# derivative by ω they are up to 1/NEAR² times as large
+NEAR = 3e-3
+
 
 # Beyond this condition number of the basis a Jacobian has fewer than eight digits left: its error
 # is about 200 roundings times the condition (the cases of `nldyn.hard.modes`).
@@ -275,3 +278,6 @@ def _growth(block: Real) -> float:
     else:
         share = 0.0
     return float(1.0 + rest * np.exp(-share) / abs(fast))
+
+
+

@@ -2,26 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from nldyn.base.errors import SystemModelError, check_types, check_whole
-from nldyn.flow.kernels.all import DISSIPATION, EXPONENT, GAP, STIFFNESS
-from nldyn.system.elements import Excitation, turn
-from nldyn.system.linear import Complex
-from nldyn.system.system import System
+from nldyn.system.elements import Excitation
 
-_COLUMNS = {
-    "gap": GAP,
-    "stiffness": STIFFNESS,
-    "exponent": EXPONENT,
-    "dissipation": DISSIPATION,
-}
 SOURCES = ("amplitude", "mass_times_radius")
-_EXCITATION = -1
 
 
 def size_of(source: Excitation) -> str:
@@ -76,42 +62,6 @@ class Parameter:
         check_whole("Parameter: index", self.index, -1)
 
 
-def parameter_tables(
-    system: System, parameters: Sequence[Parameter]
-) -> tuple[NDArray[np.int64], Complex]:
-    """What the kernels need to know of parameters: see `_kernels.shoot`.
-
-    Raises
-    ------
-    SystemModelError
-        For a parameter that the system does not have.
-    """
-    check_types(parameters=(parameters, Sequence))
-    for parameter in parameters:
-        check_types(**{"parameters: entry": (parameter, Parameter)})
-    table = np.zeros((len(parameters), 2), dtype=np.int64)
-    drive_by = np.zeros((len(parameters), 2, 2 * system.size), dtype=complex)
-    for row, parameter in enumerate(parameters):
-        name, index = parameter.name, parameter.index
-        if name in _COLUMNS:
-            check_index(parameter, "stop", len(system.stops))
-            if name != "gap" and system.stops[index].law is not None:
-                raise SystemModelError(
-                    f"parameter '{name}': stop {index} has a law of its own, which knows no {name}"
-                )
-            table[row] = _COLUMNS[name], index
-        elif name in SOURCES:
-            check_index(parameter, "excitation", len(system.excitation))
-            source = system.excitation[index]
-            if not hasattr(source, name):
-                raise SystemModelError(f"parameter '{name}': excitation {index} has no {name}")
-            table[row] = _EXCITATION, index
-            column = system.force_column(system.participation[source.at])
-            drive_by[row, source.order // 2] = turn(source.phase_deg) * column
-        else:
-            known = ", ".join([*_COLUMNS, *SOURCES])
-            raise SystemModelError(f"unknown parameter '{name}'; there are: {known}")
-    return table, drive_by
 
 
 def check_index(parameter: Parameter, kind: str, count: int) -> None:

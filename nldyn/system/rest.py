@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from nldyn.base.arrays import Complex, Real
 from nldyn.system.elements import Stop
-from nldyn.system.linear import Complex, Real
 from nldyn.system.system import System
 
 MOST_STEPS = 200

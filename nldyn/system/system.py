@@ -12,9 +12,10 @@ import numpy as np
 import scipy.linalg as sla
 from numpy.typing import ArrayLike
 
+from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import SystemModelError, numbers, shown
 from nldyn.system.elements import Damper, Excitation, Stop
-from nldyn.system.linear import Complex, LinearPart, Real, at_resonance, linear_part
+from nldyn.system.linear import LinearPart, at_resonance, linear_part
 
 Element = TypeVar("Element")
 LARGEST_PARTICIPATION = 1e50  # its square is the mobility of a stop, and its fourth power occurs

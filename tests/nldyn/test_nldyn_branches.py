@@ -27,10 +27,10 @@ from nldyn import (
     solve_orbit,
     switch_at_flip,
 )
+from nldyn.base.errors import LocateError
 from nldyn.base.resources import example
-from nldyn.bifurcations.roots import LocateError
+from nldyn.bifurcations.point import BranchPoint
 from nldyn.bifurcations.within_step import special_points_between
-from nldyn.branches.branch import BranchPoint
 from nldyn.branches.continuation import start_point
 from nldyn.branches.leg import trace
 from nldyn.branches.peaks import lowest_orbit, resonance_peaks

@@ -26,15 +26,15 @@ from nldyn import (
     switch_at_branch_point,
     switch_at_flip,
 )
+from nldyn.base.errors import LocateError
 from nldyn.base.resources import example
 from nldyn.bifurcations import locate as special
 from nldyn.bifurcations.branch_crossing import distance, lies_on_crossing
 from nldyn.bifurcations.normal_forms import is_symmetric
-from nldyn.bifurcations.roots import LocateError
+from nldyn.bifurcations.point import BranchPoint
 from nldyn.bifurcations.within_step import special_points_between
 from nldyn.branches import arclength as walk
 from nldyn.branches.arclength import BY_TOLERANCE
-from nldyn.branches.branch import BranchPoint
 from nldyn.branches.continuation import _without_repeat, start_point
 from nldyn.branches.leg import Leg
 from nldyn.hard.continuation import beam as four_modes

@@ -39,7 +39,8 @@ from nldyn.curves.events import along_tori, flip_coefficient, is_torus
 from nldyn.curves.walk import OTHER_EXTREME
 from nldyn.orbits.bordered import OrbitFamily
 from nldyn.orbits.conditions import Singular, bialternate, max_abs_displacement, peak_force
-from nldyn.orbits.orbit import Orbit, shooting_problem
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.shooting import shooting_problem
 from nldyn.scene.build import build_system, load_scene
 from nldyn.system.chart import EVERY_MODE, Chart, value_of, with_value
 

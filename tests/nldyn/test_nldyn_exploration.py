@@ -35,17 +35,17 @@ from nldyn import (
     switch_at_branch_point,
     switch_at_flip,
 )
+from nldyn.base.errors import LocateError
 from nldyn.base.resources import example
-from nldyn.bifurcations.roots import LocateError
 from nldyn.branches import at_frequency as crossings
 from nldyn.io import checkpoint
 from nldyn.orbits.deflation import deflated_orbit
 from nldyn.orbits.orbit import stroboscopic
-from nldyn.orbits.starts import random_states
+from nldyn.orbits.starts import random_states, settling_periods
 from nldyn.scene.build import build_system, load_scene
 from nldyn.search import explore as survey
 from nldyn.search.diagram import Collector, middle_orbit
-from nldyn.search.exploration import chao_lower_bound, settling_periods
+from nldyn.search.exploration import chao_lower_bound
 
 NOTHING_MORE = {"pseudo_orbits": 0, "mixtures": 0, "walks": 0}  # beside motions and deflation
 

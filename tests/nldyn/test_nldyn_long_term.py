@@ -46,11 +46,11 @@ from nldyn import (
     stroboscopic_section,
     sweep,
 )
+from nldyn.base.errors import ConvergenceError
 from nldyn.longterm.attractors import Attractor, zero_one_test
 from nldyn.longterm.basins import settle, target_of
 from nldyn.longterm.poincare import BruteForce, Column
 from nldyn.longterm.wear import power_spectrum
-from nldyn.orbits.orbit import ConvergenceError
 from nldyn.plot.longterm import strobe_curves
 
 

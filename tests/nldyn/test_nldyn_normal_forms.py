@@ -41,10 +41,11 @@ from nldyn.bifurcations.critical import (
     torus,
 )
 from nldyn.bifurcations.normal_forms import is_symmetric, resonance
-from nldyn.branches.branch import SpecialPoint
+from nldyn.bifurcations.point import SpecialPoint
 from nldyn.branches.cascades import FEIGENBAUM
 from nldyn.branches.leg import trace
-from nldyn.orbits.orbit import refine, shooting_problem
+from nldyn.orbits.newton import refine
+from nldyn.orbits.shooting import shooting_problem
 
 
 def of_kind(branch, kind):

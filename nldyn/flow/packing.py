@@ -1,0 +1,61 @@
+"""A system's numbers as the compiled flow takes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nldyn.base.arrays import Complex
+from nldyn.base.errors import SystemModelError, check_types
+from nldyn.flow.kernels.all import DISSIPATION, EXPONENT, GAP, STIFFNESS
+from nldyn.system.elements import turn
+from nldyn.system.parameters import SOURCES, Parameter, check_index
+from nldyn.system.system import System
+
+_COLUMNS = {
+    "gap": GAP,
+    "stiffness": STIFFNESS,
+    "exponent": EXPONENT,
+    "dissipation": DISSIPATION,
+}
+_EXCITATION = -1
+
+
+def parameter_tables(
+    system: System, parameters: Sequence[Parameter]
+) -> tuple[NDArray[np.int64], Complex]:
+    """What the kernels need to know of parameters: see `_kernels.shoot`.
+
+    Raises
+    ------
+    SystemModelError
+        For a parameter that the system does not have.
+    """
+    check_types(parameters=(parameters, Sequence))
+    for parameter in parameters:
+        check_types(**{"parameters: entry": (parameter, Parameter)})
+    table = np.zeros((len(parameters), 2), dtype=np.int64)
+    drive_by = np.zeros((len(parameters), 2, 2 * system.size), dtype=complex)
+    for row, parameter in enumerate(parameters):
+        name, index = parameter.name, parameter.index
+        if name in _COLUMNS:
+            check_index(parameter, "stop", len(system.stops))
+            if name != "gap" and system.stops[index].law is not None:
+                raise SystemModelError(
+                    f"parameter '{name}': stop {index} has a law of its own, which knows no {name}"
+                )
+            table[row] = _COLUMNS[name], index
+        elif name in SOURCES:
+            check_index(parameter, "excitation", len(system.excitation))
+            source = system.excitation[index]
+            if not hasattr(source, name):
+                raise SystemModelError(f"parameter '{name}': excitation {index} has no {name}")
+            table[row] = _EXCITATION, index
+            column = system.force_column(system.participation[source.at])
+            drive_by[row, source.order // 2] = turn(source.phase_deg) * column
+        else:
+            known = ", ".join([*_COLUMNS, *SOURCES])
+            raise SystemModelError(f"unknown parameter '{name}'; there are: {known}")
+    return table, drive_by
