@@ -11,16 +11,7 @@ import numpy as np
 from fem.cells import KINDS, SPANS
 from fem.errors import ModelError, by_name, check_positive, listed, quoted
 from fem.mesh import FloatArray, FrameMesh, IntArray
-from fem.model import (
-    BeamPart,
-    Hinge,
-    Interface,
-    Material,
-    PointMass,
-    PointSpring,
-    Support,
-    vector,
-)
+from fem.model import BeamPart, Hinge, Interface, Material, PointMass, PointSpring, Support, vector
 from fem.structure_mesh import StructureMesh, structure_mesh
 
 AXES = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")

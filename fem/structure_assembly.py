@@ -13,25 +13,14 @@ from scipy import sparse
 
 from fem.beams import cross_matrix, element_matrices, element_rows, local_axes, to_nodes
 from fem.cells import KINDS, CellKind
-from fem.constraints import (
-    Constraints,
-    Numbering,
-    constrain,
-    facet_products,
-    number_blocks,
-)
+from fem.constraints import Constraints, Numbering, constrain, facet_products, number_blocks
 from fem.errors import ModelError
 from fem.locking import locking_warnings
 from fem.mesh import FloatArray, IntArray
 from fem.model import PointMass
 from fem.natural import NaturalForm, Rows, ground_rows, line_rows, natural_form, solid_rows
 from fem.scatter import SparseArray, block_pattern, dense_scatter, displacement_of
-from fem.solids import (
-    checked_volumes,
-    gradients_and_volumes,
-    mass_matrices,
-    stiffness_matrices,
-)
+from fem.solids import checked_volumes, gradients_and_volumes, mass_matrices, stiffness_matrices
 from fem.store import load_structure, save_structure
 from fem.structure import AXES, SolidPart, StructureModel, axis_index
 

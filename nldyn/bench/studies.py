@@ -5,6 +5,7 @@ from __future__ import annotations
 import cProfile
 import os
 import pstats
+import re
 import subprocess
 import sys
 import tempfile
@@ -128,24 +129,11 @@ def pair_up(a: Real, b: Real, rtol: float = 1e-5) -> tuple[Real, Real, int]:
 # Where the time of a branch goes
 
 SUBJECTS = {
-    "flow.py": "flow map",
-    "_kernels.py": "flow map",
-    "gauss.py": "flow map",
-    "system.py": "flow map (steady response)",
-    "shooting.py": "corrector and tangent",
-    "orbit.py": "extremes and multipliers",
-    "_sample.py": "extremes and multipliers",
-    "multipliers.py": "extremes and multipliers",
-    "_periodic_qr.py": "extremes and multipliers",
-    "special.py": "special points",
-    "_events.py": "special points",
-    "_between.py": "special points",
-    "between.py": "special points",
-    "branch.py": "special points",
-    "continuation.py": "walk",
-    "trail.py": "walk",
-    "walk.py": "walk",
-    "doubling.py": "walk",
+    "flow": "flow map",
+    "system": "flow map (steady response)",
+    "orbits": "corrector, extremes and multipliers",
+    "bifurcations": "special points",
+    "branches": "walk",
     "linalg": "linear algebra (numpy)",
 }
 
@@ -159,9 +147,8 @@ def profile_branch(task: BranchTask) -> dict[str, float]:
     shares: dict[str, float] = {}
     stats = pstats.Stats(profiler).stats  # type: ignore[attr-defined]
     for (file, _, _), (_, _, own, _, _) in stats.items():
-        path = Path(file)
-        in_package = path.parent.name == "nldyn"
-        key = path.name if in_package else "linalg" if "linalg" in file else ""
+        room = re.search(r"nldyn/(\w+)/", Path(file).as_posix())
+        key = room[1] if room else "linalg" if "linalg" in file else ""
         subject = SUBJECTS.get(key, "the rest (numpy, scipy, Python)")
         shares[subject] = shares.get(subject, 0.0) + own
     total = sum(shares.values())

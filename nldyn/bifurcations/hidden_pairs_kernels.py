@@ -6,16 +6,15 @@ import math
 
 import numpy as np
 
-from nldyn.flow.kernels import all as _kernels
-from nldyn.flow.kernels.all import njit
-from nldyn.orbits import extremes as _events
-from nldyn.orbits import periodic_schur as _periodic_qr
+from nldyn.flow.kernels import compiling
+from nldyn.flow.kernels.compiling import njit
+from nldyn.orbits import extremes, periodic_schur
 from nldyn.orbits.extremes import number_outside, travel
 from nldyn.orbits.periodic_schur import product_eigenvalues
 from nldyn.runtime.kernel_cache import resting_on
 
-_files = (_kernels.__file__, _events.__file__, _periodic_qr.__file__)
-inner = resting_on(_kernels.inner, *_files)
+_files = (extremes.__file__, periodic_schur.__file__)
+inner = resting_on(compiling.inner, *_files)
 compiled = resting_on(njit(cache=True, error_model="numpy"), *_files)
 
 

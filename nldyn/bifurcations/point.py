@@ -3,18 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, shown
 from nldyn.orbits.orbit import Orbit
-
-if TYPE_CHECKING:
-
-
-    pass
-
-
 
 
 @dataclass(frozen=True, eq=False)

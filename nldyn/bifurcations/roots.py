@@ -11,8 +11,6 @@ PRECISION = 1e-9  # of the distance of the two points, to which a root is found
 STALL = 1e-6  # a move, shorter than which a function should come nearer to zero
 
 
-
-
 def root(f: Callable[[float], float]) -> tuple[float, float]:
     """Root of a function on [0, 1] with opposite signs at the ends, and its estimated error.
 

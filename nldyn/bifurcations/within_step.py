@@ -219,7 +219,7 @@ def turned_over(
 def hidden_dips(z: BranchPoint, a: BranchPoint, b: BranchPoint) -> Iterator[float]:
     """Arclengths between z and b at which a test or an extreme may touch zero unseen.
 
-    See `_events.dip`; the extremes are those of the stops' penetrations.
+    See `orbits.extremes.dip`; the extremes are those of the stops' penetrations.
     """
     left, right = z.arclength - a.arclength, b.arclength - a.arclength
     for kind, value in tests(a).items():

@@ -66,8 +66,6 @@ class Stride:
     count: int
 
 
-
-
 @dataclass
 class Walk:
     """Iterator over the points of a branch in one direction.
@@ -385,8 +383,6 @@ def _crossing_ahead(here: BranchPoint) -> BranchPoint | None:
         return None
     ahead = float(way @ (weights * here.tangent)) / metric_length(weights, here.tangent)
     return BranchPoint(crossing, here.tangent, here.arclength + ahead)
-
-
 
 
 def _passed(a: BranchPoint, b: BranchPoint, places: Real) -> NDArray[np.bool_]:

@@ -36,12 +36,6 @@ POINTS = " points"  # after their number
 SHORT_STEP = "step below "  # before its length
 
 
-
-
-
-
-
-
 def check_branches(name: str, branches: object) -> None:
     """Refuse anything but a list of branches, or what has their columns, under its name.
 

@@ -29,14 +29,7 @@ from nldyn.branches.branch import NOT_FINISHED
 from nldyn.branches.options import ContinuationOptions
 from nldyn.branches.tables import orbit_columns
 from nldyn.curves.marks import CurveChord, Located, LocatedPoint, marks_between
-from nldyn.curves.walk import (
-    CLOSED_CURVE,
-    DISSOLVED,
-    CurvePoint,
-    CurveWalk,
-    curve_point,
-    passages,
-)
+from nldyn.curves.walk import CLOSED_CURVE, DISSOLVED, CurvePoint, CurveWalk, curve_point, passages
 from nldyn.flow.flow_map import FlowMap, same_flow
 from nldyn.io.checkpoint import Keeper, begun_before
 from nldyn.orbits.bordered import Condition, Free, OrbitFamily, correct, gradient, tangent_surface

@@ -26,7 +26,7 @@ from nldyn.base.errors import (
     shown,
 )
 from nldyn.flow.gauss import GaussTables, gauss_tables
-from nldyn.flow.kernels.all import (
+from nldyn.flow.kernels.layout import (
     CONTACT_FAILED,
     DIVERGED,
     NOT_CONVERGED,
@@ -36,11 +36,10 @@ from nldyn.flow.kernels.all import (
     SINGULAR,
     TOO_MANY_PIECES,
     TOO_MANY_STEPS,
-    Corrector,
     Record,
     SystemData,
-    newton,
 )
+from nldyn.flow.kernels.newton import Corrector, newton
 from nldyn.flow.kernels.sample import local_extremes, sample_states
 from nldyn.flow.options import FlowOptions, _floats, _nodes_for_switch
 from nldyn.flow.packing import parameter_tables
@@ -65,12 +64,6 @@ _REASONS = {
     SINGULAR: "singular Jacobian",
     NOT_CONVERGED: "Newton's method did not converge",
 }
-
-
-
-
-
-
 
 
 @dataclass(frozen=True)
@@ -423,7 +416,7 @@ class FlowMap:
         longest: float,
         max_iterations: int,
     ) -> Solution:
-        """Solve the shooting equations with ``row @ point = level``; see `_kernels.Corrector`.
+        """Solve the shooting equations with ``row @ point = level``; see `kernels.newton.Corrector`.
 
         Parameters
         ----------
@@ -480,7 +473,7 @@ class FlowMap:
         sensitivities: bool,
         parameters: Sequence[Parameter] = (),
     ) -> tuple[Any, ...]:
-        """The flow map alone; see `_kernels.newton` for what comes back."""
+        """The flow map alone; see `kernels.newton.newton` for what comes back."""
         nodes, phases = _floats("nodes", nodes), np.ascontiguousarray(_floats("phases", phases))
         self._check_segments(nodes, phases, omega, chained)
         return self._call(

@@ -10,16 +10,8 @@ import numpy as np
 from scipy.special import gamma, rgamma
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import (
-    SystemModelError,
-    check_whole,
-    is_finite,
-    numbers,
-    shown,
-)
-from nldyn.flow.kernels.all import (
-    ROUND,
-)
+from nldyn.base.errors import SystemModelError, check_whole, is_finite, numbers, shown
+from nldyn.flow.kernels.layout import ROUND
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Complex
 from nldyn.base.errors import SystemModelError, check_types
-from nldyn.flow.kernels.all import DISSIPATION, EXPONENT, GAP, STIFFNESS
+from nldyn.flow.kernels.layout import DISSIPATION, EXPONENT, GAP, STIFFNESS
 from nldyn.system.elements import turn
 from nldyn.system.parameters import SOURCES, Parameter, check_index
 from nldyn.system.system import System
@@ -26,7 +26,7 @@ _EXCITATION = -1
 def parameter_tables(
     system: System, parameters: Sequence[Parameter]
 ) -> tuple[NDArray[np.int64], Complex]:
-    """What the kernels need to know of parameters: see `_kernels.shoot`.
+    """What the kernels need to know of parameters: see `kernels.segments.shoot`.
 
     Raises
     ------

@@ -23,13 +23,7 @@ from nldyn.flow.flow_map import FlowMap, Segments
 from nldyn.flow.options import FlowOptions
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import ShootingProblem, metric_length
-from nldyn.system.chart import (
-    FREQUENCY,
-    Chart,
-    has_exact_derivatives,
-    value_of,
-    with_value,
-)
+from nldyn.system.chart import FREQUENCY, Chart, has_exact_derivatives, value_of, with_value
 from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
 

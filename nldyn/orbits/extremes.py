@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from nldyn.flow.kernels.all import inner, njit
+from nldyn.flow.kernels.compiling import inner, njit
 
 
 @njit(cache=True, error_model="numpy")

@@ -8,11 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import (
-    ConvergenceError,
-    SystemModelError,
-    numbers,
-)
+from nldyn.base.errors import ConvergenceError, SystemModelError, numbers
 from nldyn.flow.flow_map import Trajectory
 from nldyn.orbits.orbit import Orbit, minimal_period
 from nldyn.orbits.shooting import ShootingProblem

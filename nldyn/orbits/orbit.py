@@ -11,13 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import (
-    ConvergenceError,
-    SystemModelError,
-    check_types,
-    check_whole,
-    numbers,
-)
+from nldyn.base.errors import ConvergenceError, SystemModelError, check_types, check_whole, numbers
 from nldyn.flow.flow_map import FlowError, FlowMap, Solution, Trajectory, chain
 from nldyn.orbits.multipliers import (
     COARSE,
@@ -458,32 +452,6 @@ def check_observe(system: System, observe: str | None) -> str:
             f"observe: unknown interface '{observe}'; there are: {', '.join(system.interfaces)}"
         )
     return observe
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
 
 
 def stroboscopic(orbit: Orbit) -> Real:

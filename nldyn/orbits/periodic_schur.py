@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from nldyn.flow.kernels.all import inner, njit
+from nldyn.flow.kernels.compiling import inner, njit
 
 EPS = 2.0**-52
 MAX_STEPS = 150  # for one or two eigenvalues; three or four are usual, thirty at a triple one

@@ -13,10 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import (
-    SystemModelError,
-    check_whole,
-)
+from nldyn.base.errors import SystemModelError, check_whole
 from nldyn.flow.flow_map import FlowMap, Solution
 
 SEGMENTS_PER_PERIOD = 2

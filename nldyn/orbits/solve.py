@@ -10,11 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import (
-    ConvergenceError,
-    SystemModelError,
-    check_frequency,
-)
+from nldyn.base.errors import ConvergenceError, SystemModelError, check_frequency
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.orbits.newton import _first_orbit, _guessed, check_bounded, spread
 from nldyn.orbits.orbit import Orbit, check_observe

@@ -9,11 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import (
-    ConvergenceError,
-    check_frequency,
-    check_whole,
-)
+from nldyn.base.errors import ConvergenceError, check_frequency, check_whole
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.orbits.newton import check_bounded, refine, spread
 from nldyn.orbits.orbit import Orbit, check_observe, minimal_period, same_orbit, stroboscopic
@@ -28,7 +24,6 @@ from nldyn.system.system import System
 
 DECAYS = 4.0  # time allowed for settling, over the slowest decay time of the linear part
 FEWEST, UNDAMPED = 30, 600  # periods of it: at least, and where nothing decays
-
 
 
 MOST_COUNT = 10**7  # of starts, periods and candidates

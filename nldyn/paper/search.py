@@ -33,14 +33,7 @@ from nldyn.io.branches import load_diagram
 from nldyn.orbits.homotopy import checked_factors
 from nldyn.orbits.starts import MOST_COUNT
 from nldyn.paper.jobs import JOBS, LONG, Job, job_named
-from nldyn.paper.starts import (
-    LONGEST,
-    Start,
-    follow_starts,
-    read_starts,
-    starts_path,
-    write_starts,
-)
+from nldyn.paper.starts import LONGEST, Start, follow_starts, read_starts, starts_path, write_starts
 from nldyn.runtime.files import write_whole
 from nldyn.runtime.progress import progress_line
 from nldyn.search.by_pseudo_orbits import by_pseudo_orbits

@@ -473,5 +473,3 @@ def _unit_of(branches: Sequence[Branch], unit: str | None) -> tuple[float, str]:
         return length_unit(max(largest, default=1.0))
     check_choice("unit", unit, (name for _, name in PREFIXES))
     return next(prefix for prefix in PREFIXES if prefix[1] == unit)
-
-

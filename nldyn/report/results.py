@@ -52,7 +52,6 @@ SPECIAL_COLUMNS = (
     "meaning",
 )
 
-
 END_COLUMNS = (
     "branch",
     "end",

@@ -22,7 +22,6 @@ ADVICE = (
     "set NUMBA_CACHE_DIR to a folder to write in"
 )
 
-
 _save = FunctionCache.save_overload
 _told: set[str] = set()
 

@@ -525,5 +525,3 @@ def check_walk_states(name: str, states: object, longest: int) -> None:
 def steps_between(low: float, high: float, spacing: float) -> int:
     """Number of equal ratios, at most 1 + spacing, from a low frequency to a high one."""
     return math.ceil(math.log(high / low) / math.log1p(spacing))
-
-

@@ -278,6 +278,3 @@ def _growth(block: Real) -> float:
     else:
         share = 0.0
     return float(1.0 + rest * np.exp(-share) / abs(fast))
-
-
-

@@ -62,8 +62,6 @@ class Parameter:
         check_whole("Parameter: index", self.index, -1)
 
 
-
-
 def check_index(parameter: Parameter, kind: str, count: int) -> None:
     """Refuse the number of an element that there is not."""
     if not 0 <= parameter.index < count:

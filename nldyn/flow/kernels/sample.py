@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from nldyn.flow.kernels import all as _kernels
-from nldyn.flow.kernels.all import (
-    FLIGHT,
+from nldyn.flow.kernels.compiling import FILES, inner, njit
+from nldyn.flow.kernels.flights import (
     block_exponential,
     fastest_moved,
     fly_state,
     from_rest,
-    map_fraction,
-    njit,
     turned,
 )
+from nldyn.flow.kernels.layout import FLIGHT
+from nldyn.flow.kernels.resolution import map_fraction
 from nldyn.runtime.kernel_cache import resting_on
 
-inner = resting_on(_kernels.inner, _kernels.__file__)
-compiled = resting_on(njit(cache=True, error_model="numpy"), _kernels.__file__)
+compiled = resting_on(njit(cache=True, error_model="numpy"), *FILES)
 
 UNSEEN = 1e-14  # share of a displacement that rounding may be
 MOST_SAMPLES = 3_000_000  # of a piece, a tenth of a second, in which no more extremes are told
@@ -119,7 +117,7 @@ def without_steady(response, phase, state, w):
 def grown(rate, omega, phase, t):
     """Growth of a near eigenvalue a time t after rest, and its rate; the phase is that at its end.
 
-    See `_kernels.growth`.
+    See `flights.growth`.
     """
     turn = turned(phase)
     e = turn * from_rest(rate - 1j * omega, t)
