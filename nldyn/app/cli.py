@@ -301,11 +301,12 @@ def converge(
 ) -> None:
     """Compute the harmonic branch with more and more modes, and compare."""
     with plain_errors():
-        from nldyn.reduction.convergence import COUNTS, study_of_scene
+        from nldyn.reduction.convergence import COUNTS
         from nldyn.report.convergence import write_study
         from nldyn.runtime.progress import progress_line
         from nldyn.runtime.result_directory import check_directory
         from nldyn.scene.build import load_scene
+        from nldyn.scene.convergence import study_of_scene
 
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)

@@ -8,12 +8,12 @@ import numpy as np
 
 from nldyn.flow.kernels import compiling
 from nldyn.flow.kernels.compiling import njit
-from nldyn.orbits import extremes, periodic_schur
-from nldyn.orbits.extremes import number_outside, travel
+from nldyn.orbits import multiplier_tests, periodic_schur
+from nldyn.orbits.multiplier_tests import number_outside, travel
 from nldyn.orbits.periodic_schur import product_eigenvalues
 from nldyn.runtime.kernel_cache import resting_on
 
-_files = (extremes.__file__, periodic_schur.__file__)
+_files = (multiplier_tests.__file__, periodic_schur.__file__)
 inner = resting_on(compiling.inner, *_files)
 compiled = resting_on(njit(cache=True, error_model="numpy"), *_files)
 

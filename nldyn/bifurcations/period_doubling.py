@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import LocateError, check_positive
-from nldyn.bifurcations.locate import Chord
+from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special
 from nldyn.orbits.conditions import nearest_flip
 from nldyn.orbits.newton import refine

@@ -22,7 +22,7 @@ class BranchPoint:
     arclength : float
         Relative arclength from the branch's first computed point.
     tests : dict of str to float
-        Test functions, filled when first asked for (see `nldyn.bifurcations.locate.tests`).
+        Test functions, filled when first asked for (see `nldyn.bifurcations.events.tests`).
     """
 
     orbit: Orbit

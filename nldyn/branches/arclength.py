@@ -20,7 +20,7 @@ from nldyn.bifurcations.branch_crossing import (
     is_crossing,
     lies_on_crossing,
 )
-from nldyn.bifurcations.locate import crosses
+from nldyn.bifurcations.events import crosses
 from nldyn.bifurcations.period_doubling import flip_between, half_difference, passed_flip
 from nldyn.bifurcations.point import BranchPoint
 from nldyn.branches.branch import CLOSED, JOINS, NOT_FINISHED, POINTS, RANGE_END, SHORT_STEP

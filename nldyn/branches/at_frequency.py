@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import LocateError, SystemModelError, check_frequency, shown
-from nldyn.bifurcations.locate import Chord
+from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.point import BranchPoint
 from nldyn.bifurcations.roots import root
 from nldyn.branches.branch import Branch

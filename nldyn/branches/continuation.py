@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.threads import one_thread
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_range, check_types, numbers
 from nldyn.bifurcations.branch_crossing import (
@@ -33,6 +32,7 @@ from nldyn.branches.options import ContinuationOptions
 from nldyn.io.checkpoint import Checkpoint, checkpoint_at
 from nldyn.orbits.orbit import Orbit, check_minimal
 from nldyn.orbits.shooting import shifts
+from nldyn.runtime.threads import one_thread
 
 FROM_FOLD = 1e-4  # arclength from a fold to the point at which a branch through it begins
 MIDDLE = 0.1  # of that, within which it lies

@@ -12,7 +12,7 @@ from operator import attrgetter
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, LocateError
 from nldyn.bifurcations.branch_crossing import NEIGHBOUR, distance, same_crossing, without_repeats
-from nldyn.bifurcations.locate import Chord
+from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.bifurcations.within_step import insert_dip, special_points_between
 from nldyn.branches.arclength import COMES_BACK, MEETS_OPEN_END, Stride, Walk

@@ -8,7 +8,7 @@ from itertools import pairwise
 from scipy.optimize import minimize_scalar
 
 from nldyn.base.errors import LocateError
-from nldyn.bifurcations.locate import Chord
+from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.point import BranchPoint
 from nldyn.branches.branch import Branch
 from nldyn.orbits.orbit import Orbit

@@ -10,7 +10,7 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, LocateError, check_whole
-from nldyn.bifurcations.locate import leaves_circle
+from nldyn.bifurcations.events import leaves_circle
 from nldyn.bifurcations.point import check_special
 from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.touching import Touch, touching_extremes

@@ -12,6 +12,7 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_frequency
 from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.orbits.homotopy import DAMPING, Detour
 from nldyn.orbits.newton import _first_orbit, _guessed, check_bounded, spread
 from nldyn.orbits.orbit import Orbit, check_observe
 from nldyn.orbits.shooting import ShootingProblem, shooting_problem
@@ -124,8 +125,6 @@ def _by_more_damping(
     problem: ShootingProblem, omega: float, observe: str, pieces: int
 ) -> Orbit | None:
     """Orbit at more damping, which a motion from rest comes near, carried back, or None."""
-    from nldyn.orbits.homotopy import DAMPING, Detour
-
     if not np.any(problem.flow.system.total_damping):
         return None
     for factor in MORE_DAMPING:

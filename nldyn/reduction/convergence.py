@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+import cms
 from nldyn.base.arrays import Complex, Real
-from nldyn.base.errors import ConvergenceError, SystemModelError, check_choice
+from nldyn.base.errors import ConvergenceError, SystemModelError
 from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import continue_branch
 from nldyn.branches.peaks import resonance_peaks
@@ -23,7 +24,6 @@ from nldyn.system.system import System
 
 if TYPE_CHECKING:
     import cms
-    from nldyn.scene.schema import Scene
     from nldyn.search.diagram import Progress
 
 COUNTS = (*range(1, 11), 12, 16, 20, 30, 40)
@@ -356,76 +356,6 @@ def converge(
     return Study(setting, at_hz, tuple(models), errors, best, known)
 
 
-def study_of_scene(
-    scene: Scene,
-    *,
-    modes: Sequence[int] = COUNTS,
-    methods: Sequence[str] = ("rubin",),
-    refinements: Sequence[int] = (1,),
-    meshes: Sequence[str] = (),
-    at_hz: float | None = None,
-    full: bool = False,
-    progress: Progress | None = None,
-) -> Study:
-    """The convergence study of a scene with a mesh, see `converge`.
-
-    Parameters
-    ----------
-    scene : Scene
-        Its ``[reduction]`` is not used.
-    modes, methods, at_hz, full, progress
-        As for `converge`.
-    refinements : sequence of int
-        Meshes: every line is cut into so many.
-    meshes : sequence of str
-        Mesh files to compare instead of the scene's, from coarse to fine, as ``file`` in
-        ``[mesh]``.
-
-    Raises
-    ------
-    SceneError
-        As `build_component`, and if a model cannot be made or no branch is found.
-    """
-    import cms
-    from nldyn.reduction.setting import setting_of
-    from nldyn.scene.build import build_component
-    from nldyn.scene.messages import scene_error
-
-    setting = setting_of(scene)
-    if min(refinements) < 1:
-        raise SystemModelError("converge: a refinement must be 1 or more")
-    for method in methods:
-        check_choice("converge: each method", method, METHODS)
-    if meshes:
-        if tuple(refinements) != (1,):
-            raise SystemModelError("converge: give either refinements or meshes")
-        components = {file: build_component(with_mesh(scene, file)) for file in meshes}
-    else:
-        components = {
-            "" if len(refinements) == 1 else f"x{times}": build_component(scene, times)
-            for times in sorted(refinements)
-        }
-    try:
-        return converge(
-            components,
-            setting,
-            modes=modes,
-            methods=methods,
-            at_hz=at_hz,
-            full=full,
-            progress=progress,
-        )
-    except (cms.ReductionError, ConvergenceError) as error:
-        raise scene_error(scene.file, ("reduction",), str(error), sep=": ") from None
-
-
-def with_mesh(scene: Scene, file: str) -> Scene:
-    """The scene with another mesh file."""
-    if scene.mesh is None:
-        return scene
-    return scene.model_copy(update={"mesh": scene.mesh.model_copy(update={"file": file})})
-
-
 def best_of(models: Sequence[Measured], full: Measured) -> Measured:
     """Of the models whose branch was followed the largest, of several that with least error."""
     followed = [model for model in models if model.special_hz is not None]
@@ -491,8 +421,6 @@ def reductions(
     component: cms.ComponentLike, counts: Sequence[int], method: str
 ) -> list[cms.ReducedModel]:
     """Models by one method with ascending counts; those by Rubin's lie in the largest."""
-    import cms
-
     if method == "guyan":
         return [cms.reduce(component, method=method)]
     if method != "rubin":
@@ -504,8 +432,6 @@ def reductions(
 
 def reference_model(component: cms.ComponentLike, modes: int) -> cms.ReducedModel:
     """All modes of a component that an interface sees; of a large one more than a study's."""
-    import cms
-
     size = int(component.mass.shape[0])
     if size <= ALL_MODES_UP_TO:
         return visible_modes(cms.reduce(component, modes=size, method="truncation"))
@@ -521,8 +447,6 @@ def receptance_bound(
     component: cms.ComponentLike, whole: cms.ReducedModel, linear: Measured, setting: Setting
 ) -> float:
     """Bound of the error of a model's undamped receptance over the range, as in `Errors`."""
-    import cms
-
     observed = setting.observe or whole.interfaces[0]
     grid = np.linspace(*setting.range_hz, GRID)
     band = cms.accuracy(component, whole).receptance_error(grid, observed, observed)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import beta
 
+import cms
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, is_finite, shown
 from nldyn.branches.branch import Branch
@@ -216,8 +217,6 @@ def reduce_for(
     4. The error of the reference is judged by that of the model with all modes up to the cut-off;
        both differences together make the band. So it is for folds and flips.
     """
-    import cms
-
     if not (is_finite(tolerance) and 1e-6 <= tolerance < 1.0):
         raise SystemModelError(f"tolerance must lie in [1e-6, 1), got {shown(tolerance)}")
     first = cms.reduce(component, cutoff_hz=BEYOND * setting.range_hz[1])

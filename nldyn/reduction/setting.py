@@ -12,7 +12,6 @@ from nldyn.system.system import System
 
 if TYPE_CHECKING:
     import cms
-    from nldyn.scene.schema import Scene
 
 
 @dataclass(frozen=True)
@@ -97,37 +96,4 @@ def with_first(reduced: cms.ReducedModel, observed: str) -> cms.ReducedModel:
         changed,
         residual_flexibility=None if flexibility is None else flexibility[places][:, places],
         residual_shapes=None if shapes is None else shapes[:, places],
-    )
-
-
-def setting_of(scene: Scene) -> Setting:
-    """The setting of a scene.
-
-    Raises
-    ------
-    SceneError
-        If the scene has no mesh, nothing to compute, or damping ratios for a certain number of
-        modes.
-    """
-    from nldyn.scene.build import acting_elements
-    from nldyn.scene.checks import check_computable
-    from nldyn.scene.messages import scene_error
-
-    check_computable(scene, scene.file)
-    if scene.mesh is None:
-        raise scene_error(scene.file, ("mesh",), "is missing: nothing is reduced")
-    if isinstance(scene.damping.modal_ratio, list):
-        fault = "must be one number where the number of modes is open"
-        raise scene_error(scene.file, ("damping", "modal_ratio"), fault)
-    assert scene.continuation is not None
-    low, high = scene.continuation.range_hz
-    stops, dampers, excitation = acting_elements(scene)
-    return Setting(
-        (low, high),
-        stops,
-        dampers,
-        excitation,
-        scene.damping.modal_ratio,
-        scene.observed,
-        scene.damping.rayleigh,
     )

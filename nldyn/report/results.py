@@ -14,8 +14,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from nldyn.base.version import software_version
+from nldyn.bifurcations.normal_forms import normal_form
+from nldyn.branches.branch import NOT_FINISHED, POINTS, SHORT_STEP
+from nldyn.branches.cascades import cascades_in
 from nldyn.branches.tables import at_known, orbit_columns
+from nldyn.plot.diagram import save_diagram
 from nldyn.runtime.result_directory import result_directory
+from nldyn.search.exploration import Exploration
 
 if TYPE_CHECKING:
     from nldyn.branches.branch import Branch
@@ -107,9 +112,6 @@ def write_results(
     >>> (folder / "branches.csv").read_text()[:20]
     'branch,point,period,'
     """
-    from nldyn.plot.diagram import save_diagram
-    from nldyn.search.exploration import Exploration
-
     exploration = found if isinstance(found, Exploration) else None
     diagram = found.diagram if isinstance(found, Exploration) else found
     with result_directory(directory, "run") as folder:
@@ -139,8 +141,6 @@ def branch_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
 
 def end_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
     """Give the rows of ``ends.csv``: the last good points of each branch, and why it ends there."""
-    from nldyn.branches.branch import NOT_FINISHED, POINTS, SHORT_STEP
-
     for branch in diagram.branches:
         ends = zip(("first", "last"), branch.stop_reasons, (0, -1), strict=True)
         for name, reason, index in ends:
@@ -165,8 +165,6 @@ def if_known(value: object) -> object:
 
 def special_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
     """Give the rows of ``special_points.csv``, branch by branch; the normal forms take time."""
-    from nldyn.bifurcations.normal_forms import normal_form
-
     for branch in diagram.branches:
         for point in branch.special_points:
             orbit = point.orbit
@@ -197,8 +195,6 @@ def write_table(path: Path, columns: Iterable[str], rows: Iterable[Iterable[obje
 
 def summary(diagram: Diagram) -> Mapping[str, object]:
     """Say what was computed and how exactly, as plain numbers for ``summary.json``."""
-    from nldyn.branches.cascades import cascades_in
-
     orbits = [orbit for branch in diagram.branches for orbit in branch.points]
     return {
         "software": f"nldyn {software_version()}",

@@ -305,7 +305,7 @@ def build_selection(
     import cms
     from nldyn.base.errors import ConvergenceError
     from nldyn.reduction.selection import reduce_for
-    from nldyn.reduction.setting import setting_of
+    from nldyn.scene.setting import setting_of
 
     table = scene.reduction
     assert table is not None and table.tolerance is not None

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.threads import one_thread
 from nldyn.base.errors import check_whole
 from nldyn.branches.branch import Branch
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.shooting import SEGMENTS_PER_PERIOD
 from nldyn.orbits.starts import LONG_STEPS, MOST_COUNT, SHORT_STEPS, nearest_orbit
+from nldyn.runtime.threads import one_thread
 from nldyn.search.diagram import Collector, Diagram, Progress
 from nldyn.search.extend import Guesses, Wanted, check_search, collector_beside, search_beside
 from nldyn.search.pseudo_orbits import NODES, Pieces

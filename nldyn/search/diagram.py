@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.threads import one_thread
 from nldyn.base.errors import (
     ConvergenceError,
     LocateError,
@@ -41,6 +40,7 @@ from nldyn.orbits.starts import (
     reach,
     simulate_strobe,
 )
+from nldyn.runtime.threads import one_thread
 from nldyn.system.system import System
 
 MORE_STARTS = 4  # times as many in the second search, which looks for orbits with contact

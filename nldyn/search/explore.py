@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cms.threads import one_thread
 from nldyn.base.arrays import Real
 from nldyn.base.errors import (
     ConvergenceError,
@@ -37,6 +36,7 @@ from nldyn.orbits.starts import (
     settling_periods,
 )
 from nldyn.runtime.files import check_writable
+from nldyn.runtime.threads import one_thread
 from nldyn.search.by_pseudo_orbits import near_pseudo_orbits
 from nldyn.search.diagram import Collector, Diagram, Progress, check_known
 from nldyn.search.exploration import Coverage, Exploration, ExploreOptions, Question, Stage

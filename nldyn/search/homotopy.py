@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.threads import one_thread
 from nldyn.branches.branch import Branch
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.homotopy import Detour, checked_factors, named
 from nldyn.orbits.orbit import Orbit, minimal_period, same_orbit
+from nldyn.runtime.threads import one_thread
 from nldyn.search.diagram import Collector, Diagram, Progress, counted
 from nldyn.search.extend import (
     check_search,

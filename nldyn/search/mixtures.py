@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cms.threads import one_thread
 from nldyn.base.arrays import Real
 from nldyn.base.errors import check_whole
 from nldyn.branches.branch import Branch
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.starts import MOST_COUNT, SHORT_STEPS, nearest_orbit
+from nldyn.runtime.threads import one_thread
 from nldyn.search.diagram import Collector, Diagram, Progress
 from nldyn.search.extend import (
     Guesses,

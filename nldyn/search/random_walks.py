@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
-from cms.threads import one_thread
 from nldyn.base.arrays import Real
 from nldyn.base.errors import check_whole
 from nldyn.branches.branch import Branch
@@ -31,6 +30,7 @@ from nldyn.orbits.starts import (
     reach,
     simulate,
 )
+from nldyn.runtime.threads import one_thread
 from nldyn.search.diagram import Collector, Diagram, Progress
 from nldyn.search.exploration import MOST_NUMBERS, check_walk_states
 from nldyn.search.extend import (

@@ -37,10 +37,10 @@ from nldyn.reduction.convergence import (
     measured_linear,
     receptance,
     receptance_bound,
-    with_mesh,
 )
 from nldyn.report.convergence import write_study
 from nldyn.scene.build import build_component, load_scene
+from nldyn.scene.convergence import with_mesh
 
 
 @pytest.fixture(scope="module")

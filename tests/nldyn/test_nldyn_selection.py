@@ -17,8 +17,8 @@ from nldyn.base.resources import example
 from nldyn.branches.peaks import resonance_peaks
 from nldyn.reduction.convergence import harmonic_branch, largest_force, matched, special_points_of
 from nldyn.reduction.selection import contact_duration
-from nldyn.reduction.setting import setting_of
 from nldyn.scene.build import build_component, load_scene
+from nldyn.scene.setting import setting_of
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from nldyn import (
     switch_at_branch_point,
     switch_at_flip,
 )
-from nldyn.orbits.extremes import number_outside
+from nldyn.orbits.multiplier_tests import number_outside
 
 BESIDE = 1e-5  # of a multiplier to the unit circle: either side of it
 

@@ -10,7 +10,6 @@ import pytest
 import nldyn.search.diagram
 from nldyn.base.errors import SceneError
 from nldyn.base.resources import example, examples, mesh
-from nldyn.reduction.setting import setting_of
 from nldyn.scene.build import (
     build_component,
     build_reduced,
@@ -20,6 +19,7 @@ from nldyn.scene.build import (
     load_scene,
     parse_scene,
 )
+from nldyn.scene.setting import setting_of
 
 MODAL = """
 [modal]
