@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
@@ -17,13 +17,11 @@ from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.orbits.orbit import Orbit, same_orbit, shifted_alike, stroboscopic
 
 if TYPE_CHECKING:
-    from pathlib import Path
 
     import pandas
     import xarray
 
     from nldyn.branches.options import ContinuationOptions
-    from nldyn.io.checkpoint import Checkpoint
 
 Part = Literal["points", "special_points", "requested"]
 
@@ -242,84 +240,6 @@ class Branch:
             if not any(same_orbit(point.orbit, other) for other in found):
                 found.append(point.orbit)
         return found
-
-    def extend(
-        self,
-        range_hz: tuple[float, float] | None = None,
-        *,
-        options: ContinuationOptions | None = None,
-        at: Sequence[float] | None = None,
-        progress: Callable[[float], None] | None = None,
-        checkpoint: str | Path | Checkpoint | None = None,
-    ) -> Branch:
-        """Finish what was interrupted, or follow the branch beyond the ends of its range.
-
-        The points are those of one continuation through the new range, to the last digit; those
-        at the ends of the old range are left out.
-
-        Parameters
-        ----------
-        range_hz : (float, float), optional
-            A range in Hz that contains the one of before, which is kept unless given.
-        options : ContinuationOptions, optional
-            Step control from here on, unless that of before. With more `max_points`, or a smaller
-            `min_step`, an end goes on that had come to the limit.
-        at : sequence of float, optional
-            Frequencies in Hz at which orbits are wanted; those of before unless given.
-        progress, checkpoint
-            As for `continue_branch`; the file may hold the branch, or part of this extension.
-
-        Returns
-        -------
-        Branch
-
-        Raises
-        ------
-        SystemModelError
-            If the new range does not contain the old one, the branch is one put together by
-            hand, without a course, or `checkpoint` holds something else.
-
-        Examples
-        --------
-        >>> from nldyn import System, Unbalance, continue_branch, solve_orbit
-        >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
-        ...     excitation=[Unbalance("middle", 4.92e-6)])
-        >>> orbit = solve_orbit(system, frequency_hz=10.0)
-        >>> longer = continue_branch(orbit, (9.0, 12.0)).extend((5.0, 20.0))
-        >>> whole = continue_branch(orbit, (5.0, 20.0))
-        >>> longer.frequency_hz.tolist() == whole.frequency_hz.tolist()
-        True
-        """
-        from nldyn.branches.resume import extend
-
-        return extend(self, range_hz, options, at, progress, checkpoint)
-
-    def save(self, path: str | Path) -> None:
-        """Write the branch to an HDF5 file that `load_branch` reads, whole or not at all.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written.
-        SystemModelError
-            If the points are of different systems.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> from pathlib import Path
-        >>> from nldyn import System, Unbalance, continue_branch, load_branch, solve_orbit
-        >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
-        ...     excitation=[Unbalance("middle", 4.92e-6)])
-        >>> branch = continue_branch(solve_orbit(system, frequency_hz=10.0), (9.0, 12.0))
-        >>> path = Path(tempfile.mkdtemp()) / "resonance.h5"
-        >>> branch.save(path)
-        >>> load_branch(path).frequency_hz.tolist() == branch.frequency_hz.tolist()
-        True
-        """
-        from nldyn.io.branches import save_branches
-
-        save_branches(path, [self])
 
     def table(self, part: Part = "points") -> dict[str, NDArray[Any]]:
         """Columns of numbers, one row per orbit; ``pandas.DataFrame`` takes them as they are.

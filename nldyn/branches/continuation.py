@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -27,9 +26,9 @@ from nldyn.branches.branch import (
     Branch,
     Course,
 )
+from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_at
 from nldyn.branches.leg import Leg, Trail
 from nldyn.branches.options import ContinuationOptions
-from nldyn.io.checkpoint import Checkpoint, checkpoint_at
 from nldyn.orbits.orbit import Orbit, check_minimal
 from nldyn.orbits.shooting import shifts
 from nldyn.runtime.threads import one_thread
@@ -41,37 +40,43 @@ MET_AGAIN = 1e-6  # longest Newton step by which a solved orbit is met again acr
 
 
 def continue_branch(
-    orbit: Orbit,
-    range_hz: tuple[float, float],
+    start: Orbit | Branch,
+    range_hz: tuple[float, float] | None = None,
     *,
     name: str = "",
     options: ContinuationOptions | None = None,
     progress: Callable[[float], None] | None = None,
     open_ends: Sequence[Real] = (),
-    at: Sequence[float] = (),
-    checkpoint: str | Path | Checkpoint | None = None,
+    at: Sequence[float] | None = None,
+    checkpoint: BranchFile | Checkpoint | None = None,
 ) -> Branch:
-    """Continue an orbit in both directions through a range of frequencies.
+    """Continue an orbit in both directions through a range of frequencies, or go on with a branch.
+
+    A branch is finished where it was interrupted, and followed beyond the ends of its range. Its
+    points are those of one continuation through the new range, to the last digit; those at the
+    ends of the old range are left out.
 
     Parameters
     ----------
-    orbit : Orbit
-        Where to start; its frequency must lie in the range. From a fold the first point is 1e-4 of
-        arclength away.
+    start : Orbit or Branch
+        Where to start. The frequency of an orbit must lie in the range; from a fold the first
+        point is 1e-4 of arclength away.
     range_hz : (float, float)
-        Frequencies in Hz, ascending. The ends are met exactly.
+        Frequencies in Hz, ascending. The ends are met exactly. For a branch it contains the one of
+        before, which is kept unless given.
     name : str
-        Name of the branch.
+        Name of the branch; one that goes on keeps its own.
     options : ContinuationOptions, optional
-        Step control.
+        Step control; for a branch from here on. With more `max_points`, or a smaller `min_step`,
+        an end goes on that had come to the limit.
     progress : callable, optional
         Called with the frequency of every point.
     open_ends : sequence of (N + 1,) arrays
         Where other branches were broken off, see `Walk`.
-    at : sequence of float
+    at : sequence of float, optional
         Frequencies in Hz at which orbits are wanted: `Branch.requested` has all of them, at each
-        passage of the branch.
-    checkpoint : str or Path, optional
+        passage of the branch. For a branch those of before unless given.
+    checkpoint : CheckpointFile, optional
         File that keeps what is computed, written now and then, at the end, and when an exception
         such as Ctrl-C ends the computation. If it holds this very continuation, that one goes on
         and gives the points of an uninterrupted one.
@@ -83,8 +88,8 @@ def continue_branch(
     Raises
     ------
     SystemModelError
-        If the range is empty, the orbit or a requested frequency lies outside, or `checkpoint`
-        holds something else.
+        If the range is empty, the orbit, a requested frequency or the range of before lies
+        outside, the branch was put together by hand, or `checkpoint` holds something else.
     OutputError
         If `checkpoint` cannot be written.
     ConvergenceError
@@ -94,9 +99,38 @@ def continue_branch(
     References
     ----------
     H. B. Keller (1977), pseudo-arclength continuation; E. Doedel et al., AUTO-07p manual.
+
+    Examples
+    --------
+    >>> from nldyn import System, Unbalance, continue_branch, solve_orbit
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> orbit = solve_orbit(system, frequency_hz=10.0)
+    >>> longer = continue_branch(continue_branch(orbit, (9.0, 12.0)), (5.0, 20.0))
+    >>> whole = continue_branch(orbit, (5.0, 20.0))
+    >>> longer.frequency_hz.tolist() == whole.frequency_hz.tolist()
+    True
     """
+    if isinstance(start, Branch):
+        return extended(start, range_hz, options, at, progress, checkpoint)
+    return _from_orbit(
+        start, range_hz, name, options, progress, open_ends, () if at is None else at, checkpoint
+    )
+
+
+def _from_orbit(
+    orbit: Orbit,
+    range_hz: tuple[float, float] | None,
+    name: str,
+    options: ContinuationOptions | None,
+    progress: Callable[[float], None] | None,
+    open_ends: Sequence[Real],
+    at: Sequence[float],
+    checkpoint: BranchFile | Checkpoint | None,
+) -> Branch:
+    """The branch of an orbit; see `continue_branch`."""
     check_types(
-        orbit=(orbit, Orbit),
+        start=(orbit, Orbit),
         name=(name, str),
         options=(options, ContinuationOptions, None),
         progress=(progress, Callable, None),
@@ -118,8 +152,43 @@ def continue_branch(
     with checkpoint_at(checkpoint, orbit.system) as kept:
         known = kept.branch_from(start.orbit, course)
         if known is not None:
-            return known.extend(at=at, progress=progress, checkpoint=kept)
+            return extended(known, at=at, progress=progress, checkpoint=kept)
         return complete(name, None, None, start, course, progress, kept)
+
+
+def extended(
+    branch: Branch,
+    range_hz: tuple[float, float] | None = None,
+    options: ContinuationOptions | None = None,
+    at: Sequence[float] | None = None,
+    progress: Callable[[float], None] | None = None,
+    checkpoint: BranchFile | Checkpoint | None = None,
+) -> Branch:
+    """Finish or extend a branch; see `continue_branch`."""
+    course = branch.course
+    if course is None:
+        raise SystemModelError(
+            f"branch '{branch.name}' cannot be extended: it does not tell how it was continued"
+        )
+    low, high = check_range(course.range_hz if range_hz is None else range_hz)
+    if not low <= course.range_hz[0] < course.range_hz[1] <= high:
+        raise SystemModelError(
+            f"range_hz = ({low:g}, {high:g}) must contain the range of the branch, "
+            f"({course.range_hz[0]:g}, {course.range_hz[1]:g})"
+        )
+    new = replace(
+        course,
+        range_hz=(low, high),
+        options=options or course.options,
+        at=check_requested(course.at if at is None else at, (low, high)),
+    )
+    with checkpoint_at(checkpoint, branch.points[0].system) as kept:
+        known = kept.branch_from(branch.points[course.start], new, course)
+        if known is not None and known.course is not None and known.course.range_hz == (low, high):
+            branch, course = known, known.course  # this very extension was begun before
+        forward, backward = split(branch, course)
+        start = branch.nodes[course.start]
+        return complete(branch.name, forward, backward, start, new, progress, kept)
 
 
 @one_thread()

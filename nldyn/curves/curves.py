@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise, zip_longest
-from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,17 +29,40 @@ from nldyn.branches.tables import orbit_columns
 from nldyn.curves.marks import CurveChord, Located, LocatedPoint, marks_between
 from nldyn.curves.walk import CLOSED_CURVE, DISSOLVED, CurvePoint, CurveWalk, curve_point, passages
 from nldyn.flow.flow_map import FlowMap, same_flow
-from nldyn.io.checkpoint import Keeper, begun_before
 from nldyn.orbits.bordered import Condition, Free, OrbitFamily, correct, gradient, tangent_surface
 from nldyn.orbits.conditions import Held, Monitor, defined_by
 from nldyn.orbits.orbit import Orbit, check_minimal, same_orbit
-from nldyn.runtime.files import check_writable
+from nldyn.runtime.keeper import Keeper
 from nldyn.system.chart import Chart, checked_parameter, value_of
 from nldyn.system.parameters import Parameter
+from nldyn.system.system import System
 
 CurvePart = Literal["points", "marks"]
 CLOSE = 1e-3  # how far the defining condition of a start may be off
 CROSSES_END = 1e-3  # component of a unit tangent that leads to or from the end of a range
+
+
+class CurveFile(Protocol):
+    """A file that keeps a curve; `nldyn.CheckpointFile` is one."""
+
+    @property
+    def name(self) -> str:
+        """How messages call it."""
+
+    def exists(self) -> bool:
+        """Whether an earlier run has written it."""
+
+    def check_writable(self) -> None:
+        """Raise an `OutputError` if it cannot be written."""
+
+    def remove(self) -> None:
+        """Delete it, if it is there."""
+
+    def read_curves(self, system: System, monitor: Monitor | None) -> list[Curve]:
+        """The curves of a system that it holds."""
+
+    def write_curves(self, curves: Sequence[Curve]) -> None:
+        """Keep curves in place of what it holds."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -95,18 +116,6 @@ class Curve:
             f"{' / '.join(self.stop_reasons)}>"
         )
 
-    def save(self, path: str | Path) -> None:
-        """Write the curve to an HDF5 file that `load_curve` reads, whole or not at all.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written.
-        """
-        from nldyn.io.curves import save_curves
-
-        save_curves(path, [self])
-
     def table(self, part: CurvePart = "points") -> dict[str, NDArray[Any]]:
         """Columns of numbers, one row per orbit; ``pandas.DataFrame`` takes them as they are.
 
@@ -147,7 +156,7 @@ class Curve:
         *,
         options: ContinuationOptions | None = None,
         progress: Callable[[Real], None] | None = None,
-        checkpoint: str | Path | None = None,
+        checkpoint: CurveFile | None = None,
     ) -> Curve:
         """Follow the curve beyond its ends, or finish it; the points that it has are kept.
 
@@ -157,7 +166,7 @@ class Curve:
             Values between which to stay, which contain those of the curve.
         options, progress
             As for `continue_special`.
-        checkpoint : str or Path, optional
+        checkpoint : CheckpointFile, optional
             As for `continue_special`, but the file may be the one that holds this curve.
 
         Returns
@@ -231,7 +240,7 @@ def continue_in(
     *,
     options: ContinuationOptions | None = None,
     progress: Callable[[Real], None] | None = None,
-    checkpoint: str | Path | None = None,
+    checkpoint: CurveFile | None = None,
 ) -> Curve:
     """Continue an orbit in one parameter, all others held.
 
@@ -247,7 +256,7 @@ def continue_in(
         Step control.
     progress : callable, optional
         Called with the parameter's value at every point.
-    checkpoint : str or Path, optional
+    checkpoint : CheckpointFile, optional
         A new HDF5 file that keeps the curve, written now and then, at the end, and when an
         exception such as Ctrl-C ends the computation: `nldyn.load_curve` and `Curve.extend` go on.
 
@@ -286,7 +295,7 @@ def continue_special(
     *,
     options: ContinuationOptions | None = None,
     progress: Callable[[Real], None] | None = None,
-    checkpoint: str | Path | None = None,
+    checkpoint: CurveFile | None = None,
 ) -> Curve:
     """Continue a fold, flip, Neimark-Sacker, branch or grazing point in two parameters.
 
@@ -305,7 +314,7 @@ def continue_special(
         Step control.
     progress : callable, optional
         Called with the parameters' values at every point.
-    checkpoint : str or Path, optional
+    checkpoint : CheckpointFile, optional
         A new HDF5 file that keeps the curve, written now and then, at the end, and when an
         exception such as Ctrl-C ends the computation: `nldyn.load_curve` and `Curve.extend` go on.
 
@@ -332,7 +341,7 @@ def continue_special(
     curve = _curve(special.kind, special_start(special, charts), options, progress, keeper)
     if len(curve.points) == 1 and DISSOLVED in curve.stop_reasons:
         if checkpoint is not None:
-            Path(checkpoint).unlink(missing_ok=True)
+            checkpoint.remove()
         names = " or ".join(chart.parameter.name for chart in charts)
         raise SystemModelError(
             f"the BP at {special.orbit.frequency_hz:g} Hz is a single point: it dissolves when "
@@ -364,7 +373,7 @@ def continue_constant(
     value: float | None = None,
     options: ContinuationOptions | None = None,
     progress: Callable[[Real], None] | None = None,
-    checkpoint: str | Path | None = None,
+    checkpoint: CurveFile | None = None,
 ) -> Curve:
     """Continue an orbit in two parameters so that a monitored quantity stays constant.
 
@@ -494,30 +503,26 @@ def _curve(
     return _followed(begun, options, progress, keeper)
 
 
-def _keeper(place: str | Path | None, known: Curve | None = None) -> Keeper[Curve]:
+def _keeper(place: CurveFile | None, known: Curve | None = None) -> Keeper[Curve]:
     """What keeps a curve in a file, which must be new or hold a piece of a known curve."""
     if place is None:
         return Keeper()
-    from nldyn.io.curves import load_curves, save_curves
-    from nldyn.io.flow import laws_of
-
-    path = check_writable(place)
-    if path.exists():
+    place.check_writable()
+    if place.exists():
         if known is None:
             raise SystemModelError(
-                f"{path}: exists already; load_curve and Curve.extend go on from a curve that it "
+                f"{place.name}: exists already; load and Curve.extend go on from a curve that it "
                 "holds, or choose another file, or delete it"
             )
         condition = known.points[0].condition
-        laws = laws_of(known.orbits[0].system)
         monitor = condition.monitor if isinstance(condition, Held) else None
-        held = begun_before(partial(load_curves, laws=laws, monitor=monitor), path)
+        held = place.read_curves(known.orbits[0].system, monitor)
         if not (len(held) == 1 and _is_piece(held[0], known)):
             raise SystemModelError(
-                f"{path}: holds another curve, or more of this one; choose another file, or "
+                f"{place.name}: holds another curve, or more of this one; choose another file, or "
                 "delete it"
             )
-    return Keeper(partial(save_curves, path))
+    return Keeper(place.write_curves)
 
 
 def _is_piece(held: Curve, known: Curve) -> bool:

@@ -23,6 +23,7 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.branches.branch import Branch, Course, WalkEnd
+from nldyn.branches.checkpoint import Tally
 from nldyn.branches.continuation import alike
 from nldyn.branches.options import ContinuationOptions
 from nldyn.branches.tables import UNITS, orbit_columns
@@ -34,7 +35,6 @@ from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import ShootingProblem
 from nldyn.search.diagram import Diagram
 from nldyn.search.exploration import Coverage, Exploration, ExploreOptions, Question, Stage
-from nldyn.search.tally import Tally
 
 FORMAT = "nldyn branches"
 FORMAT_VERSION = 2

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 
 from nldyn.base.errors import check_whole
 from nldyn.branches.branch import Branch
+from nldyn.branches.checkpoint import BranchFile
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.shooting import SEGMENTS_PER_PERIOD
 from nldyn.orbits.starts import LONG_STEPS, MOST_COUNT, SHORT_STEPS, nearest_orbit
@@ -35,7 +35,7 @@ def by_pseudo_orbits(
     seed: int = 0,
     options: ContinuationOptions | None = None,
     progress: Progress | None = None,
-    checkpoint: str | Path | None = None,
+    checkpoint: BranchFile | None = None,
 ) -> Diagram:
     """Find further branches where pieces of known orbits nearly fit together.
 
@@ -71,7 +71,7 @@ def by_pseudo_orbits(
         Step control.
     progress : callable, optional
         Called as ``progress(what, frequency_hz)``.
-    checkpoint : str or Path, optional
+    checkpoint : CheckpointFile, optional
         File that keeps the branches found, also those of an earlier call: they count as known.
         The same call with the same file goes on after the frequencies done, and gives the same
         once all are; another search takes the place of this one in the file.

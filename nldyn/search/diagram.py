@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -25,10 +24,10 @@ from nldyn.bifurcations.normal_forms import switch_at_branch_point
 from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.branches.branch import JOINS, Branch, Course, check_branches, is_at
-from nldyn.branches.continuation import broken_off, complete, open_ends, start_point
+from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_of_several
+from nldyn.branches.continuation import broken_off, complete, extended, open_ends, start_point
 from nldyn.branches.options import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap, flow_of, same_flow
-from nldyn.io.checkpoint import Checkpoint, checkpoint_of_several
 from nldyn.orbits.orbit import Orbit, check_observe, minimal_period, stroboscopic
 from nldyn.orbits.solve import solve_orbit
 from nldyn.orbits.starts import (
@@ -97,18 +96,6 @@ class Diagram:
     def of_period(self, period: int) -> list[Branch]:
         """Branches of one period multiple."""
         return [b for b in self.branches if b.period == period]
-
-    def save(self, path: str | Path) -> None:
-        """Write all branches to one HDF5 file that `load_diagram` reads, whole or not at all.
-
-        Raises
-        ------
-        OutputError, SystemModelError
-            As `Branch.save`.
-        """
-        from nldyn.io.branches import save_diagram
-
-        save_diagram(path, self)
 
 
 def check_known(known: Diagram, flow: FlowMap) -> None:
@@ -342,7 +329,7 @@ class Collector:
         course = Course(self.range_hz, options or self.options, ends)
         branch = self.checkpoint.branch_from(start.orbit, course)
         if branch is not None:
-            branch = branch.extend(progress=progress, checkpoint=self.checkpoint)
+            branch = extended(branch, progress=progress, checkpoint=self.checkpoint)
         else:
             branch = complete("", None, None, start, course, progress, self.checkpoint)
         self.take_in(branch)
@@ -391,7 +378,7 @@ def diagram(
     options: ContinuationOptions | None = None,
     search: SearchOptions | None = None,
     progress: Progress | None = None,
-    checkpoint: str | Path | None = None,
+    checkpoint: BranchFile | None = None,
 ) -> Diagram:
     """Compute the branches of the wanted periods over a range of frequencies.
 
@@ -422,7 +409,7 @@ def diagram(
         Step control and search effort.
     progress : callable, optional
         Called as ``progress(what, frequency_hz)``.
-    checkpoint : str or Path, optional
+    checkpoint : CheckpointFile, optional
         File that keeps the branches computed so far, as for `continue_branch`. If it exists, the
         simulations are repeated, but of the branches only what is not in it is computed; those that
         were begun elsewhere stay in it. One of another system, accuracy or range is refused.

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -328,20 +327,6 @@ class Exploration:
         settled = sum(c.settled for c in self.coverage)
         total = sum(c.settled + c.unsettled + c.failed for c in self.coverage)
         return settled / total if total else math.nan
-
-    def save(self, path: str | Path) -> None:
-        """Write branches and coverage to one HDF5 file that `load_exploration` reads.
-
-        Also `load_diagram` and `load_branches` read it.
-
-        Raises
-        ------
-        OutputError, SystemModelError
-            As `Branch.save`.
-        """
-        from nldyn.io.branches import save_exploration
-
-        save_exploration(path, self)
 
     def report(self) -> str:
         """What was found, tried and left unexplained, in a few lines."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import product
-from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +21,9 @@ from nldyn.base.errors import (
     shown,
 )
 from nldyn.branches.branch import Branch, is_at
+from nldyn.branches.checkpoint import Checkpoint
 from nldyn.branches.options import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap, flow_of
-from nldyn.io.checkpoint import Checkpoint, begun_before
 from nldyn.orbits.deflation import deflated_orbit
 from nldyn.orbits.orbit import Orbit, check_observe, same_orbit, stroboscopic
 from nldyn.orbits.shooting import LONGEST_PERIOD
@@ -35,7 +34,6 @@ from nldyn.orbits.starts import (
     random_states,
     settling_periods,
 )
-from nldyn.runtime.files import check_writable
 from nldyn.runtime.threads import one_thread
 from nldyn.search.by_pseudo_orbits import near_pseudo_orbits
 from nldyn.search.diagram import Collector, Diagram, Progress, check_known
@@ -58,6 +56,26 @@ PIECE = 16  # periods simulated between two looks at the known orbits; later a q
 AGAIN = 12  # times that a frequency is searched again while its indices say that orbits are missing
 
 
+class ExplorationFile(Protocol):
+    """A file that keeps an exploration; `nldyn.CheckpointFile` is one."""
+
+    @property
+    def name(self) -> str:
+        """How messages call it."""
+
+    def exists(self) -> bool:
+        """Whether an earlier run has written it."""
+
+    def check_writable(self) -> None:
+        """Raise an `OutputError` if it cannot be written."""
+
+    def read_exploration(self, system: System) -> Exploration:
+        """The exploration of a system that it holds."""
+
+    def write_exploration(self, found: Exploration) -> None:
+        """Keep an exploration in place of what it holds."""
+
+
 @one_thread()
 def explore(
     system: System | FlowMap,
@@ -69,7 +87,7 @@ def explore(
     options: ContinuationOptions | None = None,
     known: Diagram | None = None,
     progress: Progress | None = None,
-    checkpoint: str | Path | None = None,
+    checkpoint: ExplorationFile | None = None,
 ) -> Exploration:
     """Find the branches of periodic orbits in a range of frequencies, without initial guesses.
 
@@ -105,7 +123,7 @@ def explore(
         branches are taken over, what they lead to is followed, and others are looked for.
     progress : callable, optional
         Called as ``progress(what, frequency_hz)``.
-    checkpoint : str or Path, optional
+    checkpoint : CheckpointFile, optional
         File that keeps what is found, written now and then, at the end, and when an exception such
         as Ctrl-C ends the exploration; `load_exploration` reads it at any time. If it holds this
         very exploration, that one goes on and gives what an uninterrupted one gives.
@@ -209,7 +227,7 @@ class _Survey:
         met = np.zeros((0, given), dtype=bool)
         self.stage = Stage(0, given, len(known.notes), nothing, (), met, (), given)
 
-    def goes_on_in(self, path: str | Path) -> bool:
+    def goes_on_in(self, place: ExplorationFile) -> bool:
         """Keep everything in a file, and begin where the exploration in it ended, if there is one.
 
         Raises
@@ -217,15 +235,11 @@ class _Survey:
         SystemModelError, OutputError
             As `explore`.
         """
-        from nldyn.io.branches import load_exploration, save_exploration
-        from nldyn.io.flow import laws_of
-
-        place = check_writable(path)
+        place.check_writable()
         earlier: Sequence[Branch] = ()
         begun = place.exists()
         if begun:
-            laws = laws_of(self.question.flow.system)
-            kept = begun_before(partial(load_exploration, laws=laws), place)
+            kept = place.read_exploration(self.question.flow.system)
             given = replace(
                 kept.diagram,
                 branches=kept.diagram.branches[: kept.stage.given],
@@ -233,7 +247,7 @@ class _Survey:
             )
             if not (self.question.same(kept.question) and _same_branches(given, self.known)):
                 raise SystemModelError(
-                    f"{path}: holds another exploration (other system, range, periods, effort, "
+                    f"{place.name}: holds another exploration (other system, range, periods, effort, "
                     "options or known branches); choose another file, or delete it"
                 )
             self.stage = kept.stage
@@ -244,7 +258,7 @@ class _Survey:
             )
             earlier = kept.diagram.branches[kept.stage.branches :]
         self.box.checkpoint = Checkpoint(
-            lambda branches: save_exploration(place, self.so_far(branches)),
+            lambda branches: place.write_exploration(self.so_far(branches)),
             self.box.branches,
             earlier,
         )

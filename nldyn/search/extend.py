@@ -7,21 +7,20 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_range, check_types, check_whole
 from nldyn.branches.branch import Branch, check_branches
+from nldyn.branches.checkpoint import BranchFile, Tally, checkpoint_of_several
+from nldyn.branches.continuation import extended
 from nldyn.branches.options import ContinuationOptions
-from nldyn.io.checkpoint import checkpoint_of_several
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.search.diagram import Collector, Diagram, Progress, check_known, counted, middle_orbit
 from nldyn.search.exploration import check_spacing, steps_between
 from nldyn.search.fixed_point_index import index_note, is_damped, without_index_note
-from nldyn.search.tally import Tally
 
 PLACES = 6  # orbits of a branch near a frequency
 WINDOW = 0.03  # relative distance within which frequencies are near
@@ -120,7 +119,7 @@ def collector_beside(
     known: Diagram,
     options: ContinuationOptions | None,
     progress: Progress | None,
-    checkpoint: str | Path | None,
+    checkpoint: BranchFile | None,
 ) -> Collector:
     """A collector that has the known branches, and a file for what is found beside them."""
     own, progress = known.branches[0].points[0].problem.flow, progress or (lambda what, hz: None)
@@ -137,7 +136,7 @@ def take_kept(box: Collector, max_period: int) -> None:
     count = len(box.branches)
     for branch in box.checkpoint.new_branches(lambda branch: box.known(middle_orbit(branch))):
         progress = partial(box.progress, f"1/{branch.period}")
-        box.take_in(branch.extend(progress=progress, checkpoint=box.checkpoint))
+        box.take_in(extended(branch, progress=progress, checkpoint=box.checkpoint))
     box.follow_up(count, max_period, max_period, None)
 
 

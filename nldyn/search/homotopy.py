@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
 from nldyn.branches.branch import Branch
+from nldyn.branches.checkpoint import BranchFile
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.homotopy import Detour, checked_factors, named
 from nldyn.orbits.orbit import Orbit, minimal_period, same_orbit
@@ -35,7 +35,7 @@ def by_detour(
     spacing: float = 0.002,
     options: ContinuationOptions | None = None,
     progress: Progress | None = None,
-    checkpoint: str | Path | None = None,
+    checkpoint: BranchFile | None = None,
 ) -> Diagram:
     """Find further branches by way of a system with other numbers, where known ones lead to them.
 
@@ -66,7 +66,7 @@ def by_detour(
         Step control.
     progress : callable, optional
         Called as ``progress(what, frequency_hz)``.
-    checkpoint : str or Path, optional
+    checkpoint : CheckpointFile, optional
         File that keeps the branches found, also those of an earlier call, whatever its factors:
         they count as known. Those of the changed system are not kept, and followed anew.
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from nldyn.base.arrays import Real
 from nldyn.base.errors import check_whole
 from nldyn.branches.branch import Branch
+from nldyn.branches.checkpoint import BranchFile
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.starts import MOST_COUNT, SHORT_STEPS, nearest_orbit
 from nldyn.runtime.threads import one_thread
@@ -44,7 +44,7 @@ def by_crossover(
     seed: int = 0,
     options: ContinuationOptions | None = None,
     progress: Progress | None = None,
-    checkpoint: str | Path | None = None,
+    checkpoint: BranchFile | None = None,
 ) -> Diagram:
     """Find further branches beside mixtures of two known orbits.
 
@@ -78,7 +78,7 @@ def by_crossover(
         Step control.
     progress : callable, optional
         Called as ``progress(what, frequency_hz)``.
-    checkpoint : str or Path, optional
+    checkpoint : CheckpointFile, optional
         File that keeps the branches found, also those of an earlier call: they count as known.
         The same call with the same file goes on after the frequencies done, and gives the same
         once all are; another search takes the place of this one in the file.

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from scipy.spatial import KDTree
 from nldyn.base.arrays import Real
 from nldyn.base.errors import check_whole
 from nldyn.branches.branch import Branch
+from nldyn.branches.checkpoint import BranchFile
 from nldyn.branches.options import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.newton import spread
@@ -66,7 +66,7 @@ def by_closed_walks(
     seed: int = 0,
     options: ContinuationOptions | None = None,
     progress: Progress | None = None,
-    checkpoint: str | Path | None = None,
+    checkpoint: BranchFile | None = None,
 ) -> Diagram:
     """Find further branches beside closed walks from one random state to the next.
 
@@ -105,7 +105,7 @@ def by_closed_walks(
         Step control.
     progress : callable, optional
         Called as ``progress(what, frequency_hz)``.
-    checkpoint : str or Path, optional
+    checkpoint : CheckpointFile, optional
         File that keeps the branches found, also those of an earlier call: they count as known.
         The same call with the same file goes on after the frequencies done, and gives the same
         once all are; another search takes the place of this one in the file.

@@ -29,9 +29,9 @@ from nldyn import (
     solve_orbit,
 )
 from nldyn.branches.branch import is_at
+from nldyn.branches.checkpoint import Checkpoint
 from nldyn.flow.flow_map import flow_of
 from nldyn.io.branches import save_branches
-from nldyn.io.checkpoint import Checkpoint
 from nldyn.orbits.homotopy import Detour, _far, checked_factors
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.starts import orbit_near
@@ -396,7 +396,7 @@ def all_repeated(monkeypatch):
 def test_a_branch_that_repeats_a_known_one_is_not_kept(
     harmonic, all_repeated, monkeypatch, tmp_path
 ):
-    monkeypatch.setattr("nldyn.io.checkpoint.PAUSE", 1e9)  # written at the end only
+    monkeypatch.setattr("nldyn.runtime.keeper.PAUSE", 1e9)  # written at the end only
     place = tmp_path / "found.h5"
     done = by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
     assert not re.search(r" 0 of \d+ orbits carried back", done.notes[-1])
@@ -408,8 +408,8 @@ def test_a_branch_that_repeats_a_known_one_is_not_kept(
 def test_a_branch_that_repeats_a_known_one_does_not_stay_in_the_file(
     harmonic, all_repeated, monkeypatch, tmp_path
 ):
-    monkeypatch.setattr("nldyn.io.checkpoint.PAUSE", 0.0)
-    monkeypatch.setattr("nldyn.io.checkpoint.SHARE", 0.0)
+    monkeypatch.setattr("nldyn.runtime.keeper.PAUSE", 0.0)
+    monkeypatch.setattr("nldyn.runtime.keeper.SHARE", 0.0)
     place = tmp_path / "found.h5"
     by_detour(harmonic, HALF, max_period=1, spacing=0.3, checkpoint=place)
     assert load_branches(place) == []

@@ -101,8 +101,8 @@ def test_what_it_has_found_is_not_lost_and_changes_nothing_where_it_goes_on(thre
                 raise KeyboardInterrupt
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("nldyn.io.checkpoint.PAUSE", 0.0)
-        patch.setattr("nldyn.io.checkpoint.SHARE", 0.0)
+        patch.setattr("nldyn.runtime.keeper.PAUSE", 0.0)
+        patch.setattr("nldyn.runtime.keeper.SHARE", 0.0)
         with pytest.raises(KeyboardInterrupt):
             search(known, progress=interrupt, checkpoint=place)
     rest = Frequencies(way)
