@@ -38,13 +38,9 @@ from nldyn.flow.flow_map import FlowMap as FlowMap
 from nldyn.flow.options import FlowOptions as FlowOptions
 
 # io
-from nldyn.io.branches import load_branch as load_branch
-from nldyn.io.branches import load_branches as load_branches
-from nldyn.io.branches import load_diagram as load_diagram
-from nldyn.io.branches import load_exploration as load_exploration
-from nldyn.io.curves import load_curve as load_curve
-from nldyn.io.curves import load_curves as load_curves
-from nldyn.io.curves import save_curves as save_curves
+from nldyn.io.checkpoint import CheckpointFile as CheckpointFile
+from nldyn.io.store import load as load
+from nldyn.io.store import save as save
 
 # longterm
 from nldyn.longterm.attractors import Attractor as Attractor

@@ -130,6 +130,7 @@ def run(
 ) -> None:
     """Compute the branches of a scene, and write tables and a diagram."""
     with plain_errors():
+        from nldyn.io.checkpoint import CheckpointFile
         from nldyn.runtime.progress import progress_line
         from nldyn.runtime.result_directory import check_directory
         from nldyn.scene.build import compute, explore_scene, load_scene
@@ -138,9 +139,10 @@ def run(
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)
         with kept_at_interrupt(out) as unfinished:
+            kept = CheckpointFile(unfinished)
             with progress_line(quiet) as report:
-                found = explore_scene(loaded, report, unfinished) if loaded.explore else None
-                diagram = found.diagram if found else compute(loaded, report, unfinished)
+                found = explore_scene(loaded, report, kept) if loaded.explore else None
+                diagram = found.diagram if found else compute(loaded, report, kept)
             from nldyn.report.results import write_results
 
             yscale: Literal["linear", "log"] = "log" if log else "linear"

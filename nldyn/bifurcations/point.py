@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, shown
-from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.orbit import Orbit, shifted_alike, stroboscopic
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,3 +81,17 @@ def check_special(caller: str, special: object, kind: str = "", *, of_branch: bo
             f"{caller} needs a special point of a branch, which knows the branch's direction; "
             f"the {found} point at {orbit.frequency_hz:g} Hz was found otherwise"
         )
+
+
+def is_at(orbit: Orbit, special: SpecialPoint, multiple: int = 1) -> bool:
+    """Whether an orbit is that of a special point, run through several times, up to a shift.
+
+    Mirror images are not the same.
+    """
+    other = special.orbit
+    if orbit.period != multiple * other.period:
+        return False
+    if not math.isclose(orbit.frequency_hz, special.frequency_hz, rel_tol=1e-6):
+        return False
+    states = np.tile(stroboscopic(other), (multiple, 1))
+    return shifted_alike(stroboscopic(orbit), states, 1e-3 * float(np.abs(states).max()))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +16,6 @@ from nldyn.base.errors import LocateError, SystemModelError, check_frequency, sh
 from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.point import BranchPoint
 from nldyn.bifurcations.roots import root
-from nldyn.branches.branch import Branch
 from nldyn.orbits.orbit import Orbit, same_orbit, stroboscopic
 
 SAME = 4e-15  # difference of two logarithms of a frequency that is rounding
@@ -22,7 +23,30 @@ NEARLY_SAME = 1e-12  # the same, of an orbit solved for and not held there
 BESIDE = 2.0  # an orbit further from a chord, in its lengths, is not on the branch between its ends
 
 
-def crossings(branch: Branch, frequency_hz: float) -> list[BranchPoint]:
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Points and special points of a branch together, in order along it.
+
+    Parameters
+    ----------
+    points : tuple of BranchPoint
+        In this order.
+    """
+
+    points: tuple[BranchPoint, ...]
+
+    @cached_property
+    def log_frequencies(self) -> Real:
+        """Logarithms of ω (rad/s)."""
+        return np.array([point.orbit.point[-1] for point in self.points])
+
+    @cached_property
+    def stroboscopic_states(self) -> Real:
+        """States (places, n, 2n_modes) at the start of each excitation period."""
+        return np.array([stroboscopic(point.orbit) for point in self.points])
+
+
+def crossings(places: Places, frequency_hz: float) -> list[BranchPoint]:
     """Points of a branch at one frequency, one for each passage, in order along the branch.
 
     A passage lies between two neighbours among the computed and the special points, so that on
@@ -33,21 +57,21 @@ def crossings(branch: Branch, frequency_hz: float) -> list[BranchPoint]:
     SystemModelError
         If the frequency is not a positive number.
     """
-    return _crossings(branch, frequency_hz)[0]
+    return _crossings(places, frequency_hz)[0]
 
 
-def passes(branch: Branch, orbit: Orbit) -> bool:
+def passes(places: Places, orbit: Orbit) -> bool:
     """Whether a branch passes through an orbit of its period (up to a shift by whole periods).
 
     The branch is solved for only where its chord comes near the orbit.
     """
     p = float(orbit.point[-1])
-    on, passed = _passages(branch, p)
-    if any(same_orbit(branch.places[i].orbit, orbit) for i in on):
+    on, passed = _passages(places, p)
+    if any(same_orbit(places.points[i].orbit, orbit) for i in on):
         return True
-    for i in passed[_chords_beside(branch, passed, orbit)]:
+    for i in passed[_chords_beside(places, passed, orbit)]:
         try:
-            found = _crossing(branch.places[i], branch.places[i + 1], p)
+            found = _crossing(places.points[i], places.points[i + 1], p)
         except LocateError:
             continue
         if same_orbit(found.orbit, orbit):
@@ -55,10 +79,10 @@ def passes(branch: Branch, orbit: Orbit) -> bool:
     return False
 
 
-def _chords_beside(branch: Branch, first: NDArray[np.intp], orbit: Orbit) -> NDArray[np.bool_]:
+def _chords_beside(places: Places, first: NDArray[np.intp], orbit: Orbit) -> NDArray[np.bool_]:
     """Which chords, given by the number of their first point, come near an orbit."""
-    level = branch.log_frequencies - orbit.point[-1]
-    states, target = branch.stroboscopic_states, stroboscopic(orbit)
+    level = places.log_frequencies - orbit.point[-1]
+    states, target = places.stroboscopic_states, stroboscopic(orbit)
     share = level[first] / (level[first] - level[first + 1])
     chords = states[first + 1] - states[first]
     line = states[first] + share[:, None, None] * chords
@@ -71,15 +95,15 @@ def _chords_beside(branch: Branch, first: NDArray[np.intp], orbit: Orbit) -> NDA
     return near
 
 
-def requested(branch: Branch) -> tuple[list[BranchPoint], list[str]]:
-    """Points of a branch at the frequencies that its course asks for, in order along it.
+def requested(places: Places, at: Sequence[float]) -> tuple[list[BranchPoint], list[str]]:
+    """Points of a branch at some frequencies, in order along it.
 
     With notes on passages whose orbit was not found.
     """
     points: list[BranchPoint] = []
     notes: list[str] = []
-    for frequency in branch.course.at if branch.course else ():
-        found, lost = _crossings(branch, frequency)
+    for frequency in at:
+        found, lost = _crossings(places, frequency)
         points += found
         notes += lost
     return sorted(points, key=_arclength), notes
@@ -105,27 +129,27 @@ def _arclength(point: BranchPoint) -> float:
     return point.arclength
 
 
-def _crossings(branch: Branch, frequency_hz: float) -> tuple[list[BranchPoint], list[str]]:
+def _crossings(places: Places, frequency_hz: float) -> tuple[list[BranchPoint], list[str]]:
     check_frequency("frequency_hz", frequency_hz)
     p = math.log(2.0 * math.pi * frequency_hz)
-    on, passed = _passages(branch, p)
-    places, exact = branch.places, set(on.tolist())
+    on, passed = _passages(places, p)
+    points, exact = places.points, set(on.tolist())
     found: list[BranchPoint] = []
     lost: list[str] = []
     for i in np.sort(np.append(on, passed)):
         if i in exact:
-            found.append(places[i])
+            found.append(points[i])
             continue
         try:
-            found.append(_crossing(places[i], places[i + 1], p))
+            found.append(_crossing(points[i], points[i + 1], p))
         except LocateError as error:
             lost.append(f"the orbit of the branch at {frequency_hz:.8g} Hz is missing: {error}")
     return found, lost
 
 
-def _passages(branch: Branch, p: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _passages(places: Places, p: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Numbers of the places at ln ω = p, and of those between which and the next one it lies."""
-    level = branch.log_frequencies - p
+    level = places.log_frequencies - p
     on = np.abs(level) <= SAME
     passed = (level[:-1] * level[1:] < 0.0) & ~on[:-1] & ~on[1:]
     return np.flatnonzero(on), np.flatnonzero(passed)

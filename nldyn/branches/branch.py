@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import SystemModelError, check_types, shown
+from nldyn.base.errors import SystemModelError, check_choice, check_types, shown
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint
-from nldyn.orbits.orbit import Orbit, same_orbit, shifted_alike, stroboscopic
+from nldyn.branches.at_frequency import Places, crossings, passes
+from nldyn.branches.tables import Part, point_columns, special_columns, to_pandas, to_xarray
+from nldyn.orbits.orbit import Orbit, same_orbit
 
 if TYPE_CHECKING:
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
     from nldyn.branches.options import ContinuationOptions
 
-Part = Literal["points", "special_points", "requested"]
 
 # why a continuation stopped
 CLOSED = "closed branch"
@@ -175,7 +175,7 @@ class Branch:
     @property
     def span_hz(self) -> tuple[float, float]:
         """Lowest and highest frequency in Hz, also of the special points between the points."""
-        reached = [place.orbit.frequency_hz for place in self.places]
+        reached = [place.orbit.frequency_hz for place in self.places.points]
         return min(reached), max(reached)
 
     @property
@@ -189,20 +189,10 @@ class Branch:
         return np.array([orbit.stable for orbit in self.points])
 
     @cached_property
-    def places(self) -> tuple[BranchPoint, ...]:
+    def places(self) -> Places:
         """Points and special points together, in order along the branch."""
         points = [*self.nodes, *(special.point for special in self.special_points)]
-        return tuple(sorted(points, key=lambda point: point.arclength))
-
-    @cached_property
-    def log_frequencies(self) -> Real:
-        """Logarithms of ω (rad/s) at the `places`, in the order along the branch."""
-        return np.array([point.orbit.point[-1] for point in self.places])
-
-    @cached_property
-    def stroboscopic_states(self) -> Real:
-        """States (places, n, 2n_modes) at the start of each excitation period at the `places`."""
-        return np.array([stroboscopic(point.orbit) for point in self.places])
+        return Places(tuple(sorted(points, key=lambda point: point.arclength)))
 
     def at(self, frequency_hz: float) -> list[Orbit]:
         """All orbits of the branch at one frequency, in order along it.
@@ -233,10 +223,8 @@ class Branch:
         >>> [round(orbit.frequency_hz, 12) for orbit in branch.at(12.5)]
         [12.5]
         """
-        from nldyn.branches.at_frequency import crossings
-
         found: list[Orbit] = []
-        for point in crossings(self, frequency_hz):
+        for point in crossings(self.places, frequency_hz):
             if not any(same_orbit(point.orbit, other) for other in found):
                 found.append(point.orbit)
         return found
@@ -260,39 +248,32 @@ class Branch:
         SystemModelError
             For an unknown part.
         """
-        from nldyn.branches.tables import branch_table
+        check_choice("table: part", part, get_args(Part))
+        course = self.course
+        known = (*course.range_hz, *course.at) if course else ()
+        columns = point_columns(self._part(part), known)
+        if part == "special_points":
+            return special_columns(self.special_points, columns)
+        return columns
 
-        return branch_table(self, part)
+    def _part(self, part: Part) -> Sequence[BranchPoint]:
+        """The points of which a table is made."""
+        if part == "special_points":
+            return [special.point for special in self.special_points]
+        return self.nodes if part == "points" else self.requested
 
     def to_pandas(self, part: Part = "points") -> pandas.DataFrame:
         """As `table`, as a DataFrame (needs pandas)."""
-        from nldyn.branches.tables import to_pandas
-
-        return to_pandas(self, part)
+        return to_pandas(self.table(part), {"branch": self.name})
 
     def to_xarray(self, part: Part = "points") -> xarray.Dataset:
         """As `table`, with the Floquet multipliers, as a Dataset over ``point`` (needs xarray)."""
-        from nldyn.branches.tables import to_xarray
-
-        return to_xarray(self, part)
+        size = self.nodes[0].orbit.problem.size
+        multipliers = np.array([point.orbit.multipliers for point in self._part(part)])
+        about = {"branch": self.name, "stop_reasons": list(self.stop_reasons)}
+        return to_xarray(self.table(part), multipliers.reshape(-1, size), about)
 
     def contains(self, orbit: Orbit) -> bool:
         """Whether the branch passes through an orbit (up to a shift by whole periods)."""
-        from nldyn.branches.at_frequency import passes
-
         check_types(orbit=(orbit, Orbit))
-        return orbit.period == self.period and passes(self, orbit)
-
-
-def is_at(orbit: Orbit, special: SpecialPoint, multiple: int = 1) -> bool:
-    """Whether an orbit is that of a special point, run through several times, up to a shift.
-
-    Mirror images are not the same.
-    """
-    other = special.orbit
-    if orbit.period != multiple * other.period:
-        return False
-    if not math.isclose(orbit.frequency_hz, special.frequency_hz, rel_tol=1e-6):
-        return False
-    states = np.tile(stroboscopic(other), (multiple, 1))
-    return shifted_alike(stroboscopic(orbit), states, 1e-3 * float(np.abs(states).max()))
+        return orbit.period == self.period and passes(self.places, orbit)

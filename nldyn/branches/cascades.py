@@ -11,10 +11,10 @@ import numpy as np
 from nldyn.base.errors import LocateError, SystemModelError, check_range, check_types, check_whole
 from nldyn.bifurcations.critical import CoefficientError, Estimate, doubled_parameter, flip, loop_of
 from nldyn.bifurcations.period_doubling import switch_at_flip
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special, is_at
 from nldyn.bifurcations.within_step import special_points_between
 from nldyn.branches.arclength import Walk
-from nldyn.branches.branch import JOINS, Branch, check_branches, is_at
+from nldyn.branches.branch import JOINS, Branch, check_branches
 from nldyn.branches.continuation import make_branch
 from nldyn.branches.options import ContinuationOptions
 

@@ -113,6 +113,8 @@ def continue_branch(
     """
     if isinstance(start, Branch):
         return extended(start, range_hz, options, at, progress, checkpoint)
+    if range_hz is None:
+        raise SystemModelError("continue_branch: an orbit needs a range_hz")
     return _from_orbit(
         start, range_hz, name, options, progress, open_ends, () if at is None else at, checkpoint
     )
@@ -120,7 +122,7 @@ def continue_branch(
 
 def _from_orbit(
     orbit: Orbit,
-    range_hz: tuple[float, float] | None,
+    range_hz: tuple[float, float],
     name: str,
     options: ContinuationOptions | None,
     progress: Callable[[float], None] | None,
@@ -237,7 +239,7 @@ def complete(
         done = forward
         backward = walked(backward, _reversed(start), lambda leg: join(name, done, leg, course))
     branch = join(name, forward, backward, course)
-    points, lost = requested(branch)
+    points, lost = requested(branch.places, course.at)
     lost = [note for note in lost if note not in branch.notes]
     branch = replace(branch, requested=tuple(points), notes=(*branch.notes, *lost))
     checkpoint.work = lambda: branch

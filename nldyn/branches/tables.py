@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, get_args
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.base.errors import SystemModelError, check_choice
+from nldyn.base.errors import SystemModelError
 from nldyn.base.version import software_version
-from nldyn.branches.branch import Branch, Part
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.orbits.orbit import Orbit
 
 if TYPE_CHECKING:
     import pandas
     import xarray
+
+Part = Literal["points", "special_points", "requested"]
 
 UNITS = {
     "period": "1",
@@ -86,62 +88,55 @@ def at_known(frequency_hz: float, known_hz: Sequence[float]) -> float:
     return float(next(met, frequency_hz))
 
 
-def branch_table(branch: Branch, part: Part = "points") -> dict[str, NDArray[Any]]:
-    """Give the columns of a part of a branch; see `Branch.table`."""
-    special = branch.special_points if part == "special_points" else ()
-    check_choice("table: part", part, get_args(Part))
-    if part == "points":
-        points = list(branch.nodes)
-    elif part == "special_points":
-        points = [s.point for s in special]
-    else:
-        points = list(branch.requested)
-    course = branch.course
-    known = (*course.range_hz, *course.at) if course else ()
-    columns = orbit_columns([point.orbit for point in points], known)
+def point_columns(
+    points: Sequence[BranchPoint], known_hz: Sequence[float] = ()
+) -> dict[str, NDArray[Any]]:
+    """Give the columns of `orbit_columns` and the arclength of points of a branch."""
+    columns = orbit_columns([point.orbit for point in points], known_hz)
     columns["arclength"] = np.array([point.arclength for point in points], dtype=float)
-    if part == "special_points":
-        columns["frequency_error"] = np.array([s.frequency_error for s in special], dtype=float)
-        columns = {"type": np.array([s.kind for s in special], dtype=str), **columns}
     return columns
 
 
-def to_pandas(branch: Branch, part: Part = "points") -> pandas.DataFrame:
-    """Give a part of a branch as a DataFrame; see `Branch.to_pandas`."""
+def special_columns(
+    special: Sequence[SpecialPoint], columns: dict[str, NDArray[Any]]
+) -> dict[str, NDArray[Any]]:
+    """Give the columns of special points: their type first, and the error of their frequency."""
+    errors = np.array([point.frequency_error for point in special], dtype=float)
+    return {
+        "type": np.array([point.kind for point in special], dtype=str),
+        **columns,
+        "frequency_error": errors,
+    }
+
+
+def to_pandas(columns: Mapping[str, NDArray[Any]], about: Mapping[str, Any]) -> pandas.DataFrame:
+    """Give columns as a DataFrame, with what they are about as its attributes."""
     try:
         import pandas
     except ImportError:
         raise SystemModelError("to_pandas needs pandas, which is not installed") from None
-    frame = pandas.DataFrame(branch_table(branch, part))
+    frame = pandas.DataFrame(columns)
     frame.index.name = "point"
-    frame.attrs = {"branch": branch.name, "software": f"nldyn {software_version()}"}
+    frame.attrs = {**about, "software": f"nldyn {software_version()}"}
     return frame
 
 
-def to_xarray(branch: Branch, part: Part = "points") -> xarray.Dataset:
-    """Give a part of a branch as a Dataset; see `Branch.to_xarray`."""
+def to_xarray(
+    columns: Mapping[str, NDArray[Any]],
+    multipliers: NDArray[np.complex128],
+    about: Mapping[str, Any],
+) -> xarray.Dataset:
+    """Give columns and multipliers (n, 2n_modes) as a Dataset over ``point``."""
     try:
         import xarray
     except ImportError:
         raise SystemModelError("to_xarray needs xarray, which is not installed") from None
-    columns = branch_table(branch, part)
-    orbits = {
-        "points": branch.points,
-        "special_points": [special.orbit for special in branch.special_points],
-        "requested": [point.orbit for point in branch.requested],
-    }[part]
-    size = branch.nodes[0].orbit.problem.size
-    multipliers = np.array([orbit.multipliers for orbit in orbits]).reshape(-1, size)
     data = {
         name: ("point", column, {"units": UNITS[name]} if name in UNITS else {})
         for name, column in columns.items()
     }
     return xarray.Dataset(
         {**data, "multipliers": (("point", "multiplier"), multipliers, {"units": "1"})},
-        coords={"point": np.arange(len(orbits))},
-        attrs={
-            "branch": branch.name,
-            "stop_reasons": list(branch.stop_reasons),
-            "software": f"nldyn {software_version()}",
-        },
+        coords={"point": np.arange(len(multipliers))},
+        attrs={**about, "software": f"nldyn {software_version()}"},
     )

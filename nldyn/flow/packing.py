@@ -8,18 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Complex
-from nldyn.base.errors import SystemModelError, check_types
+from nldyn.base.errors import check_types
 from nldyn.flow.kernels.layout import DISSIPATION, EXPONENT, GAP, STIFFNESS
 from nldyn.system.elements import turn
-from nldyn.system.parameters import SOURCES, Parameter, check_index
+from nldyn.system.parameters import OF_STOPS, Parameter, check_exact
 from nldyn.system.system import System
 
-_COLUMNS = {
-    "gap": GAP,
-    "stiffness": STIFFNESS,
-    "exponent": EXPONENT,
-    "dissipation": DISSIPATION,
-}
+_COLUMNS = dict(zip(OF_STOPS, (GAP, STIFFNESS, EXPONENT, DISSIPATION), strict=True))
 _EXCITATION = -1
 
 
@@ -39,23 +34,13 @@ def parameter_tables(
     table = np.zeros((len(parameters), 2), dtype=np.int64)
     drive_by = np.zeros((len(parameters), 2, 2 * system.size), dtype=complex)
     for row, parameter in enumerate(parameters):
+        check_exact(system, parameter)
         name, index = parameter.name, parameter.index
         if name in _COLUMNS:
-            check_index(parameter, "stop", len(system.stops))
-            if name != "gap" and system.stops[index].law is not None:
-                raise SystemModelError(
-                    f"parameter '{name}': stop {index} has a law of its own, which knows no {name}"
-                )
             table[row] = _COLUMNS[name], index
-        elif name in SOURCES:
-            check_index(parameter, "excitation", len(system.excitation))
+        else:
             source = system.excitation[index]
-            if not hasattr(source, name):
-                raise SystemModelError(f"parameter '{name}': excitation {index} has no {name}")
             table[row] = _EXCITATION, index
             column = system.force_column(system.participation[source.at])
             drive_by[row, source.order // 2] = turn(source.phase_deg) * column
-        else:
-            known = ", ".join([*_COLUMNS, *SOURCES])
-            raise SystemModelError(f"unknown parameter '{name}'; there are: {known}")
     return table, drive_by

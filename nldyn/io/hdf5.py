@@ -144,9 +144,8 @@ class Group:
         return [text if isinstance(text, str) else text.decode() for text in value.ravel().tolist()]
 
 
-@contextmanager
-def opened(path: str | Path, format_: str, version: int) -> Iterator[Group]:
-    """The root of a file of a format that this version can read."""
+def _file_of(path: str | Path) -> h5py.File:
+    """A file, read into memory."""
     try:
         content = Path(path).read_bytes()
     except TypeError:
@@ -157,9 +156,23 @@ def opened(path: str | Path, format_: str, version: int) -> Iterator[Group]:
         reason = (getattr(error, "strerror", None) or str(error)).lower()
         raise SystemModelError(f"{path}: cannot be read: {reason}") from None
     try:
-        file = h5py.File(io.BytesIO(content), "r")
+        return h5py.File(io.BytesIO(content), "r")
     except (OSError, RuntimeError, KeyError):
         raise SystemModelError(f"{path}: is not an HDF5 file, or is cut off or damaged") from None
+
+
+def kind_of(path: str | Path) -> tuple[str, set[str]]:
+    """The format of a file, and the names of its groups and attributes."""
+    with _file_of(path) as file:
+        root = Group(path, file)
+        format_ = root.text("format") if root.has_attribute("format") else ""
+        return format_, {*file, *file.attrs}
+
+
+@contextmanager
+def opened(path: str | Path, format_: str, version: int) -> Iterator[Group]:
+    """The root of a file of a format that this version can read."""
+    file = _file_of(path)
     with file:
         root = Group(path, file)
         try:

@@ -14,9 +14,9 @@ from nldyn.branches.continuation import broken_off
 from nldyn.branches.options import ContinuationOptions
 from nldyn.paper.starts import follow_starts, keep_numbers, longest_whole, read_starts
 from nldyn.paper.workers import Workers, tell
-from nldyn.runtime.progress import compilation_told
+from nldyn.runtime.progress import Progress, compilation_told
 from nldyn.scene.build import build_component, build_system, load_scene
-from nldyn.search.diagram import Diagram, Progress, Seed, diagram, notes_on_ends
+from nldyn.search.diagram import Diagram, Seed, diagram, notes_on_ends
 from nldyn.search.fixed_point_index import index_note
 from nldyn.system.elements import Stop
 from nldyn.system.system import System

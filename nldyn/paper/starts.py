@@ -26,7 +26,8 @@ from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.orbits.starts import orbit_near
 from nldyn.paper.kept import keep, read_kept
 from nldyn.runtime.files import write_whole
-from nldyn.search.diagram import Collector, Diagram, Progress, middle_orbit
+from nldyn.runtime.progress import Progress
+from nldyn.search.diagram import Collector, Diagram, middle_orbit
 from nldyn.system.system import System
 
 DATA = Path(__file__).parent / "data"

@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from nldyn.paper.kept import kept
-from nldyn.runtime.progress import progress_line
-from nldyn.search.diagram import Progress
+from nldyn.runtime.progress import Progress, progress_line
 
 Key = TypeVar("Key")
 Value = TypeVar("Value")

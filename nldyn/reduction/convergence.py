@@ -24,7 +24,7 @@ from nldyn.system.system import System
 
 if TYPE_CHECKING:
     import cms
-    from nldyn.search.diagram import Progress
+    from nldyn.runtime.progress import Progress
 
 COUNTS = (*range(1, 11), 12, 16, 20, 30, 40)
 GRID = 400

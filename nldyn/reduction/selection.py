@@ -30,7 +30,7 @@ from nldyn.system.system import System
 
 if TYPE_CHECKING:
     import cms
-    from nldyn.search.diagram import Progress
+    from nldyn.runtime.progress import Progress
 
 INVISIBLE = 1e-6
 SAMPLES = 9

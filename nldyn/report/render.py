@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     import fem
     from fem.render import StopSphere
     from nldyn.orbits.orbit import Impact, Orbit
+    from nldyn.runtime.progress import Progress
     from nldyn.scene.schema import Scene
-    from nldyn.search.diagram import Progress
     from nldyn.system.system import System
 
 DRAWN_RADIUS = 0.005

@@ -18,6 +18,7 @@ from nldyn.bifurcations.normal_forms import normal_form
 from nldyn.branches.branch import NOT_FINISHED, POINTS, SHORT_STEP
 from nldyn.branches.cascades import cascades_in
 from nldyn.branches.tables import at_known, orbit_columns
+from nldyn.io.store import save
 from nldyn.plot.diagram import save_diagram
 from nldyn.runtime.result_directory import result_directory
 from nldyn.search.exploration import Exploration
@@ -118,7 +119,7 @@ def write_results(
         write_table(folder / "branches.csv", BRANCH_COLUMNS, branch_rows(diagram))
         write_table(folder / "special_points.csv", SPECIAL_COLUMNS, special_rows(diagram))
         write_table(folder / "ends.csv", END_COLUMNS, end_rows(diagram))
-        found.save(folder / "branches.h5")
+        save(found, folder / "branches.h5")
         if exploration is not None:
             write_table(folder / "coverage.csv", COVERAGE_COLUMNS, coverage_rows(exploration))
         save_diagram(diagram, folder, title=scene.title if scene else "", yscale=yscale)

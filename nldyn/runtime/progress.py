@@ -6,12 +6,10 @@ import logging
 import shutil
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from nldyn.search.diagram import Progress
+Progress = Callable[[str, float], None]
 
 TERMINAL_PAUSE, FILE_PAUSE = 0.1, 60.0  # s
 COMPILING = "compiling, about 20 s the first time"

@@ -35,8 +35,10 @@ if TYPE_CHECKING:
     import cms
     import fem
     from nldyn.flow.flow_map import FlowMap
+    from nldyn.io.checkpoint import CheckpointFile
     from nldyn.reduction.selection import Selection
-    from nldyn.search.diagram import Diagram, Progress
+    from nldyn.runtime.progress import Progress
+    from nldyn.search.diagram import Diagram
     from nldyn.search.exploration import Exploration
     from nldyn.system.elements import Damper, Excitation, Stop
     from nldyn.system.system import System
@@ -378,7 +380,7 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
 
 
 def compute(
-    scene: Scene, progress: Progress | None = None, checkpoint: str | Path | None = None
+    scene: Scene, progress: Progress | None = None, checkpoint: CheckpointFile | None = None
 ) -> Diagram:
     """Compute all branches that a scene asks for.
 
@@ -390,7 +392,7 @@ def compute(
         A scene with an ``[[excitation]]`` and a ``[continuation]``.
     progress : callable, optional
         Called as ``progress(what, frequency_hz)`` at every orbit.
-    checkpoint : str or Path, optional
+    checkpoint : CheckpointFile, optional
         File that keeps what is computed, see `nldyn.diagram`.
 
     Returns
@@ -450,7 +452,7 @@ def _remarked(scene: Scene, flow: FlowMap, found: Diagram) -> Diagram:
 
 
 def explore_scene(
-    scene: Scene, progress: Progress | None = None, checkpoint: str | Path | None = None
+    scene: Scene, progress: Progress | None = None, checkpoint: CheckpointFile | None = None
 ) -> Exploration:
     """Find the branches of a scene with an ``[explore]`` table, and tell how well it was searched.
 

@@ -14,8 +14,8 @@ from nldyn.scene.setting import setting_of
 
 if TYPE_CHECKING:
     import cms
+    from nldyn.runtime.progress import Progress
     from nldyn.scene.schema import Scene
-    from nldyn.search.diagram import Progress
 
 
 def study_of_scene(

@@ -14,8 +14,9 @@ from nldyn.branches.checkpoint import BranchFile
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.shooting import SEGMENTS_PER_PERIOD
 from nldyn.orbits.starts import LONG_STEPS, MOST_COUNT, SHORT_STEPS, nearest_orbit
+from nldyn.runtime.progress import Progress
 from nldyn.runtime.threads import one_thread
-from nldyn.search.diagram import Collector, Diagram, Progress
+from nldyn.search.diagram import Collector, Diagram
 from nldyn.search.extend import Guesses, Wanted, check_search, collector_beside, search_beside
 from nldyn.search.pseudo_orbits import NODES, Pieces
 

@@ -22,8 +22,8 @@ from nldyn.base.errors import (
 from nldyn.base.rows import Rows
 from nldyn.bifurcations.normal_forms import switch_at_branch_point
 from nldyn.bifurcations.period_doubling import switch_at_flip
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint
-from nldyn.branches.branch import JOINS, Branch, Course, check_branches, is_at
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint, is_at
+from nldyn.branches.branch import JOINS, Branch, Course, check_branches
 from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_of_several
 from nldyn.branches.continuation import broken_off, complete, extended, open_ends, start_point
 from nldyn.branches.options import ContinuationOptions
@@ -39,12 +39,11 @@ from nldyn.orbits.starts import (
     reach,
     simulate_strobe,
 )
+from nldyn.runtime.progress import Progress
 from nldyn.runtime.threads import one_thread
 from nldyn.system.system import System
 
 MORE_STARTS = 4  # times as many in the second search, which looks for orbits with contact
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)

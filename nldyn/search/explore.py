@@ -20,7 +20,8 @@ from nldyn.base.errors import (
     check_whole,
     shown,
 )
-from nldyn.branches.branch import Branch, is_at
+from nldyn.bifurcations.point import is_at
+from nldyn.branches.branch import Branch
 from nldyn.branches.checkpoint import Checkpoint
 from nldyn.branches.options import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap, flow_of
@@ -34,9 +35,10 @@ from nldyn.orbits.starts import (
     random_states,
     settling_periods,
 )
+from nldyn.runtime.progress import Progress
 from nldyn.runtime.threads import one_thread
 from nldyn.search.by_pseudo_orbits import near_pseudo_orbits
-from nldyn.search.diagram import Collector, Diagram, Progress, check_known
+from nldyn.search.diagram import Collector, Diagram, check_known
 from nldyn.search.exploration import Coverage, Exploration, ExploreOptions, Question, Stage
 from nldyn.search.extend import Guesses
 from nldyn.search.fixed_point_index import is_damped, sum_of_indices, without_index_note

@@ -18,7 +18,8 @@ from nldyn.branches.continuation import extended
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import LONGEST_PERIOD
-from nldyn.search.diagram import Collector, Diagram, Progress, check_known, counted, middle_orbit
+from nldyn.runtime.progress import Progress
+from nldyn.search.diagram import Collector, Diagram, check_known, counted, middle_orbit
 from nldyn.search.exploration import check_spacing, steps_between
 from nldyn.search.fixed_point_index import index_note, is_damped, without_index_note
 

@@ -191,7 +191,7 @@ def _along(branch: Branch, times: int) -> tuple[Real, NDArray[np.int_]]:
     next to it along the branch. At a branch point it changes unless what is clear on both sides
     says that it does not: a branch that leaves there to one side only comes back with the same.
     """
-    places = list(branch.places)
+    places = list(branch.places.points)
     if branch.stop_reasons[1] == CLOSED:
         places[-1] = places[0]  # beyond which it lies
     changing = {"LP", "BP", "PD"} if times % 2 == 0 else {"LP", "BP"}

@@ -12,8 +12,9 @@ from nldyn.branches.checkpoint import BranchFile
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.homotopy import Detour, checked_factors, named
 from nldyn.orbits.orbit import Orbit, minimal_period, same_orbit
+from nldyn.runtime.progress import Progress
 from nldyn.runtime.threads import one_thread
-from nldyn.search.diagram import Collector, Diagram, Progress, counted
+from nldyn.search.diagram import Collector, Diagram, counted
 from nldyn.search.extend import (
     check_search,
     collector_beside,

@@ -15,8 +15,9 @@ from nldyn.branches.branch import Branch
 from nldyn.branches.checkpoint import BranchFile
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.starts import MOST_COUNT, SHORT_STEPS, nearest_orbit
+from nldyn.runtime.progress import Progress
 from nldyn.runtime.threads import one_thread
-from nldyn.search.diagram import Collector, Diagram, Progress
+from nldyn.search.diagram import Collector, Diagram
 from nldyn.search.extend import (
     Guesses,
     Wanted,

@@ -30,8 +30,9 @@ from nldyn.orbits.starts import (
     reach,
     simulate,
 )
+from nldyn.runtime.progress import Progress
 from nldyn.runtime.threads import one_thread
-from nldyn.search.diagram import Collector, Diagram, Progress
+from nldyn.search.diagram import Collector, Diagram
 from nldyn.search.exploration import MOST_NUMBERS, check_walk_states
 from nldyn.search.extend import (
     WINDOW,

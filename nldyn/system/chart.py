@@ -16,9 +16,8 @@ from nldyn.base.errors import (
     is_finite,
     shown,
 )
-from nldyn.flow.packing import parameter_tables
 from nldyn.system.elements import LARGEST_EXPONENT
-from nldyn.system.parameters import SOURCES, Parameter, check_index
+from nldyn.system.parameters import SOURCES, Parameter, check_exact, check_index
 from nldyn.system.system import System
 
 FREQUENCY = "frequency_hz"
@@ -76,7 +75,7 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
         name = parameter.name if isinstance(parameter, Parameter) else parameter
         raise SystemModelError(f"unknown parameter {shown(name)}; there are: {', '.join(NAMES)}")
     if has_exact_derivatives(parameter):
-        parameter_tables(system, [parameter])
+        check_exact(system, parameter)
     elif parameter.name in _OF_DAMPERS:
         check_index(parameter, "damper", len(system.dampers))
     elif parameter.name in _OF_MODES and parameter != Parameter("modal_damping", EVERY_MODE):

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 from nldyn.base.errors import SystemModelError, check_types, check_whole
 from nldyn.system.elements import Excitation
+from nldyn.system.system import System
 
+OF_STOPS = ("gap", "stiffness", "exponent", "dissipation")
 SOURCES = ("amplitude", "mass_times_radius")
 
 
@@ -60,6 +62,30 @@ class Parameter:
     def __post_init__(self) -> None:
         check_types(**{"Parameter: name": (self.name, str)})
         check_whole("Parameter: index", self.index, -1)
+
+
+def check_exact(system: System, parameter: Parameter) -> None:
+    """Refuse a parameter with exact derivatives that the system does not have.
+
+    Raises
+    ------
+    SystemModelError
+        As said.
+    """
+    name, index = parameter.name, parameter.index
+    if name in OF_STOPS:
+        check_index(parameter, "stop", len(system.stops))
+        if name != "gap" and system.stops[index].law is not None:
+            raise SystemModelError(
+                f"parameter '{name}': stop {index} has a law of its own, which knows no {name}"
+            )
+    elif name in SOURCES:
+        check_index(parameter, "excitation", len(system.excitation))
+        if not hasattr(system.excitation[index], name):
+            raise SystemModelError(f"parameter '{name}': excitation {index} has no {name}")
+    else:
+        known = ", ".join([*OF_STOPS, *SOURCES])
+        raise SystemModelError(f"unknown parameter '{name}'; there are: {known}")
 
 
 def check_index(parameter: Parameter, kind: str, count: int) -> None:

@@ -28,7 +28,7 @@ from nldyn import (
     load_diagram,
     solve_orbit,
 )
-from nldyn.branches.branch import is_at
+from nldyn.bifurcations.point import is_at
 from nldyn.branches.checkpoint import Checkpoint
 from nldyn.flow.flow_map import flow_of
 from nldyn.io.branches import save_branches

@@ -81,7 +81,7 @@ def test_a_crossing_found_from_the_other_branch_has_its_place_on_this_one():
     passed = 0
     for branch in found.branches:
         crossings = [id(s.point) for s in branch.special_points if s.kind == "BP"]
-        places = branch.places
+        places = branch.places.points
         for before, place, after in zip(places, places[1:], places[2:], strict=False):
             if id(place) in crossings and abs(place.tangent[-1]) > 0.1:
                 hz = [point.orbit.frequency_hz for point in (before, place, after)]

@@ -27,7 +27,7 @@ from nldyn import (
     load_exploration,
     solve_orbit,
 )
-from nldyn.branches.branch import is_at
+from nldyn.bifurcations.point import is_at
 from nldyn.flow.flow_map import flow_of
 from nldyn.orbits.starts import orbit_near
 from nldyn.paper.jobs import scene_system
