@@ -125,9 +125,7 @@ def main() -> None:
 @mesh_option
 @click.option("--log", is_flag=True, help="Draw the displacement on a logarithmic axis.")
 @quiet_option
-def run(
-    scene: Path, out: Path, mesh_folders: tuple[Path, ...], log: bool, quiet: bool
-) -> None:
+def run(scene: Path, out: Path, mesh_folders: tuple[Path, ...], log: bool, quiet: bool) -> None:
     """Compute the branches of a scene, and write tables and a diagram."""
     with plain_errors():
         from nldyn.io.checkpoint import CheckpointFile

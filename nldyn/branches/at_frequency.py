@@ -89,8 +89,8 @@ def _chords_beside(places: Places, first: NDArray[np.intp], orbit: Orbit) -> NDA
     shifts = range(orbit.period)
     away = [np.linalg.norm(line - np.roll(target, s, axis=0), axis=(1, 2)) for s in shifts]
     lengths = np.linalg.norm(chords, axis=(1, 2))
-    near: NDArray[np.bool_] = (
-        np.min(away, axis=0) <= BESIDE * lengths + 1e-5 * float(np.linalg.norm(target))
+    near: NDArray[np.bool_] = np.min(away, axis=0) <= BESIDE * lengths + 1e-5 * float(
+        np.linalg.norm(target)
     )
     return near
 

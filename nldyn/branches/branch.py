@@ -18,7 +18,6 @@ from nldyn.branches.tables import Part, point_columns, special_columns, to_panda
 from nldyn.orbits.orbit import Orbit, same_orbit
 
 if TYPE_CHECKING:
-
     import pandas
     import xarray
 

@@ -84,9 +84,7 @@ class CheckpointFile:
         """Keep an exploration in place of what it holds."""
         save_exploration(self.path, found)
 
-    def read_curves(
-        self, system: System, monitor: Callable[[Orbit], float] | None
-    ) -> list[Curve]:
+    def read_curves(self, system: System, monitor: Callable[[Orbit], float] | None) -> list[Curve]:
         """The curves of a system that it holds."""
         laws = laws_of(system)
         return begun_before(

@@ -160,9 +160,7 @@ def times(system: System, what: What, factor: float) -> System:
     return system.with_elements(excitation=sources)
 
 
-def checked_factors(
-    system: System, factors: Mapping[str | Parameter, float]
-) -> dict[What, float]:
+def checked_factors(system: System, factors: Mapping[str | Parameter, float]) -> dict[What, float]:
     """Factors of "damping", "excitation" and parameters, of which a name alone means index 0.
 
     Raises

@@ -14,9 +14,9 @@ from xml.etree import ElementTree
 
 from PIL import Image
 
-from nldyn import load_branches, load_diagram
 from nldyn.app.cli import main
 from nldyn.io import checkpoint
+from nldyn.io.branches import load_branches, load_diagram
 from nldyn.runtime.result_directory import MANIFEST
 
 TABLES = ("branches.csv", "special_points.csv", "ends.csv", "branches.h5", "summary.json")

@@ -33,7 +33,6 @@ from nldyn import (
     explore,
     find_orbits,
     index_sum,
-    load_curve,
     normal_form,
     plot_contact_force,
     plot_curves,
@@ -47,6 +46,7 @@ from nldyn import (
     switch_at_branch_point,
     switch_at_flip,
 )
+from nldyn.io.curves import load_curve
 
 JUNK = (None, "nonsense", [], {"a": 1}, math.nan, -1.0, 10**400, object())
 PAIR, WINDOW = ("frequency_hz", "gap"), ((20.0, 30.0), (-1e-6, 1e-6))
@@ -273,6 +273,7 @@ def test_other_arguments_of_a_wrong_kind_are_named(one_dof, orbit, harmonic_bran
         refused(lambda x: diagram(one_dof, (20.0, 30.0), [], seeds=[x])), "seeds: each must be"
     )
     for name in ("search_points", "doublings"):
+
         def call(x, name=name):
             return diagram(one_dof, (20.0, 30.0), [1], **{name: x})
 

@@ -11,6 +11,7 @@ import pytest
 from independent import Motion
 
 from nldyn import (
+    CheckpointFile,
     ContinuationOptions,
     Damper,
     Diagram,
@@ -24,14 +25,13 @@ from nldyn import (
     continue_branch,
     find_orbits,
     index_sum,
-    load_branches,
-    load_diagram,
+    save,
     solve_orbit,
 )
 from nldyn.bifurcations.point import is_at
 from nldyn.branches.checkpoint import Checkpoint
 from nldyn.flow.flow_map import flow_of
-from nldyn.io.branches import save_branches
+from nldyn.io.branches import load_branches, load_diagram, save_branches
 from nldyn.orbits.homotopy import Detour, _far, checked_factors
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.starts import orbit_near
@@ -371,10 +371,15 @@ def test_interrupted_it_goes_on_with_what_it_has_found(harmonic, found, tmp_path
     for _ in range(2):
         with pytest.raises(KeyboardInterrupt):
             by_detour(
-                harmonic, HALF, max_period=1, spacing=0.1, progress=interrupt, checkpoint=place
+                harmonic,
+                HALF,
+                max_period=1,
+                spacing=0.1,
+                progress=interrupt,
+                checkpoint=CheckpointFile(place),
             )
         assert len(load_branches(place)) == 1  # what is known is not kept
-    resumed = by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
+    resumed = by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=CheckpointFile(place))
     assert [len(b.nodes) for b in resumed.branches] == [len(b.nodes) for b in found.branches]
     assert np.array_equal(resumed.branches[1].frequency_hz, found.branches[1].frequency_hz)
     assert met_from_others(resumed) == met_from_others(found) == (0, 1)
@@ -398,7 +403,7 @@ def test_a_branch_that_repeats_a_known_one_is_not_kept(
 ):
     monkeypatch.setattr("nldyn.runtime.keeper.PAUSE", 1e9)  # written at the end only
     place = tmp_path / "found.h5"
-    done = by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
+    done = by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=CheckpointFile(place))
     assert not re.search(r" 0 of \d+ orbits carried back", done.notes[-1])
     assert len(done.branches) == 1
     assert not place.exists()
@@ -411,7 +416,7 @@ def test_a_branch_that_repeats_a_known_one_does_not_stay_in_the_file(
     monkeypatch.setattr("nldyn.runtime.keeper.PAUSE", 0.0)
     monkeypatch.setattr("nldyn.runtime.keeper.SHARE", 0.0)
     place = tmp_path / "found.h5"
-    by_detour(harmonic, HALF, max_period=1, spacing=0.3, checkpoint=place)
+    by_detour(harmonic, HALF, max_period=1, spacing=0.3, checkpoint=CheckpointFile(place))
     assert load_branches(place) == []
 
 
@@ -420,7 +425,9 @@ def test_a_branch_of_the_file_that_turns_out_to_be_known_is_not_added(
 ):
     place = tmp_path / "found.h5"
     save_branches(place, found.branches[1:])
-    done = by_detour(harmonic, {"damping": 0.95}, max_period=1, spacing=0.5, checkpoint=place)
+    done = by_detour(
+        harmonic, {"damping": 0.95}, max_period=1, spacing=0.5, checkpoint=CheckpointFile(place)
+    )
     assert len(done.branches) == 1
 
 
@@ -457,19 +464,21 @@ def test_some_orbits_are_carried_back_however_wide_the_spacing(found):
 def test_what_a_file_of_known_branches_holds_stays_there(harmonic, found, tmp_path):
     place = tmp_path / "known.h5"
     save_branches(place, harmonic.branches)
-    by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
+    by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=CheckpointFile(place))
     kept = load_branches(place)
     assert [len(b.nodes) for b in kept] == [len(b.nodes) for b in found.branches]
-    found.save(place)
+    save(found, place)
     with pytest.raises(SystemModelError, match="holds a diagram or exploration"):
-        by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
+        by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=CheckpointFile(place))
     assert len(load_diagram(place).branches) == 2
 
 
 def test_another_factor_loses_nothing_that_the_file_has(harmonic, found, tmp_path):
     place = tmp_path / "found.h5"
-    by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
-    again = by_detour(harmonic, {"damping": 0.95}, max_period=1, spacing=0.5, checkpoint=place)
+    by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=CheckpointFile(place))
+    again = by_detour(
+        harmonic, {"damping": 0.95}, max_period=1, spacing=0.5, checkpoint=CheckpointFile(place)
+    )
     for branches in (again.branches[1:], load_branches(place)):
         (isola,) = branches
         assert np.array_equal(isola.frequency_hz, found.branches[1].frequency_hz)
@@ -485,7 +494,9 @@ def test_a_branch_of_a_wider_range_and_one_without_its_course_may_be_known(harmo
         known = Diagram((branch,), [low, high], "tip")
         place = tmp_path / "found.h5"
         for _ in range(2):
-            done = by_detour(known, HALF, max_period=1, spacing=0.1, checkpoint=place)
+            done = by_detour(
+                known, HALF, max_period=1, spacing=0.1, checkpoint=CheckpointFile(place)
+            )
             assert len(done.branches) == 2
 
 

@@ -12,6 +12,7 @@ from branches_alike import assert_same_branches
 from one_dof import between_stops
 
 from nldyn import (
+    CheckpointFile,
     ContinuationOptions,
     ExploreOptions,
     FlowMap,
@@ -28,9 +29,7 @@ from nldyn import (
     explore,
     find_orbits,
     index_sum,
-    load_branches,
-    load_diagram,
-    load_exploration,
+    save,
     solve_orbit,
     switch_at_branch_point,
     switch_at_flip,
@@ -39,6 +38,7 @@ from nldyn.base.errors import LocateError
 from nldyn.base.resources import example
 from nldyn.branches import at_frequency as crossings
 from nldyn.io import checkpoint
+from nldyn.io.branches import load_branches, load_diagram, load_exploration
 from nldyn.orbits.deflation import deflated_orbit
 from nldyn.orbits.orbit import stroboscopic
 from nldyn.orbits.starts import random_states, settling_periods
@@ -297,7 +297,9 @@ def test_a_finished_exploration_goes_on_with_more_rounds(whole, tmp_path):
     path = tmp_path / "found.h5"
     for rounds in (1, 2):
         effort = replace(EFFORT, rounds=rounds)
-        found = explore(system_of("one_dof"), **QUESTION, effort=effort, checkpoint=path)
+        found = explore(
+            system_of("one_dof"), **QUESTION, effort=effort, checkpoint=CheckpointFile(path)
+        )
     assert_same_exploration(found, whole)
 
 
@@ -357,7 +359,7 @@ def interrupt(path, *place):
             **QUESTION,
             effort=EFFORT,
             progress=stopped_at(*place),
-            checkpoint=path,
+            checkpoint=CheckpointFile(path),
         )
 
 
@@ -397,7 +399,9 @@ def test_an_interrupted_exploration_goes_on_to_the_last_digit(whole, tmp_path, p
             assert len(part.diagram.branches) == len(load_branches(path)) > 0
             assert part.stage.steps >= place[0] - 1
             assert len(part.coverage) <= min(part.stage.steps, len(whole.coverage))
-    again = explore(system_of("one_dof"), **QUESTION, effort=EFFORT, checkpoint=path)
+    again = explore(
+        system_of("one_dof"), **QUESTION, effort=EFFORT, checkpoint=CheckpointFile(path)
+    )
     assert_same_exploration(again, whole)
     assert_same_exploration(load_exploration(path), whole)
 
@@ -410,7 +414,13 @@ def test_frequencies_that_are_done_are_not_simulated_again(whole, tmp_path):
     def report(what, hz):
         steps.extend([hz] if what == "explore" else [])
 
-    explore(system_of("one_dof"), **QUESTION, effort=EFFORT, progress=report, checkpoint=path)
+    explore(
+        system_of("one_dof"),
+        **QUESTION,
+        effort=EFFORT,
+        progress=report,
+        checkpoint=CheckpointFile(path),
+    )
     assert len(steps) == 2 * len(whole.coverage) - 5
 
 
@@ -451,13 +461,13 @@ def test_exploration_beside_known_branches_goes_on_to_the_last_digit(harmonic, t
     path = tmp_path / "found.h5"
     ask = partial(explore, system_of("one_dof"), **QUESTION, effort=EFFORT, known=harmonic)
     with pytest.raises(KeyboardInterrupt):
-        ask(progress=stopped_at(*place), checkpoint=path)
+        ask(progress=stopped_at(*place), checkpoint=CheckpointFile(path))
     assert load_exploration(path).stage.given == 1
-    assert_same_exploration(ask(checkpoint=path), ask())
+    assert_same_exploration(ask(checkpoint=CheckpointFile(path)), ask())
     with pytest.raises(SystemModelError, match=r"holds another .* or known branches"):
-        explore(system_of("one_dof"), **QUESTION, effort=EFFORT, checkpoint=path)
+        explore(system_of("one_dof"), **QUESTION, effort=EFFORT, checkpoint=CheckpointFile(path))
     with pytest.raises(SystemModelError, match=r"holds another .* or known branches"):
-        ask(known=replace(harmonic, notes=("some note",)), checkpoint=path)
+        ask(known=replace(harmonic, notes=("some note",)), checkpoint=CheckpointFile(path))
 
 
 def test_known_branches_of_something_else_are_refused(harmonic):
@@ -488,7 +498,7 @@ def test_coverage_is_kept_where_no_branch_is_found(tmp_path, monkeypatch):
     )  # fmt: skip
     path = tmp_path / "found.h5"
     effort = ExploreOptions(spacing=0.02, starts=2, settling=30, unstable_period=0)
-    found = explore(system, (20.0, 21.0), 1, effort=effort, checkpoint=path)
+    found = explore(system, (20.0, 21.0), 1, effort=effort, checkpoint=CheckpointFile(path))
     kept = load_exploration(path)
     assert kept.coverage == found.coverage and not kept.diagram.branches
     assert sum(c.unsettled + c.failed for c in kept.coverage) > 0
@@ -496,7 +506,7 @@ def test_coverage_is_kept_where_no_branch_is_found(tmp_path, monkeypatch):
 
 def test_a_saved_exploration_is_read_with_its_coverage(whole, tmp_path):
     path = tmp_path / "found.h5"
-    whole.save(path)
+    save(whole, path)
     loaded = load_exploration(path)
     assert_same_exploration(loaded, whole)
     assert loaded.report() == whole.report()
@@ -507,7 +517,7 @@ def test_a_saved_exploration_is_read_with_its_coverage(whole, tmp_path):
 def test_what_a_file_does_not_tell_of_was_not_done(whole, tmp_path):
     """One of a version that made no further guesses goes on without them."""
     path = tmp_path / "found.h5"
-    whole.save(path)
+    save(whole, path)
     with h5py.File(path, "r+") as file:
         efforts = [
             (group, name)
@@ -520,14 +530,14 @@ def test_what_a_file_does_not_tell_of_was_not_done(whole, tmp_path):
     assert len(efforts) == 4
     without = replace(EFFORT, **NOTHING_MORE, walk_states=ExploreOptions.walk_states)
     assert load_exploration(path).question.effort == without
-    explore(system_of("one_dof"), **QUESTION, effort=without, checkpoint=path)
+    explore(system_of("one_dof"), **QUESTION, effort=without, checkpoint=CheckpointFile(path))
     with pytest.raises(SystemModelError, match="holds another exploration"):
-        explore(system_of("one_dof"), **QUESTION, effort=EFFORT, checkpoint=path)
+        explore(system_of("one_dof"), **QUESTION, effort=EFFORT, checkpoint=CheckpointFile(path))
 
 
 def test_another_exploration_in_the_file_is_refused_and_kept(whole, tmp_path):
     path = tmp_path / "found.h5"
-    whole.save(path)
+    save(whole, path)
     before = path.read_bytes()
     other = replace(EFFORT, seed=21)
     asked = [
@@ -538,18 +548,20 @@ def test_another_exploration_in_the_file_is_refused_and_kept(whole, tmp_path):
     ]
     for question in asked:
         with pytest.raises(SystemModelError, match="holds another exploration"):
-            explore(system_of("one_dof"), **question, checkpoint=path)
+            explore(system_of("one_dof"), **question, checkpoint=CheckpointFile(path))
     with pytest.raises(SystemModelError, match="holds another exploration"):
-        explore(system_of("two_dof_xi_0.01"), **QUESTION, effort=EFFORT, checkpoint=path)
+        explore(
+            system_of("two_dof_xi_0.01"), **QUESTION, effort=EFFORT, checkpoint=CheckpointFile(path)
+        )
     assert path.read_bytes() == before
 
 
 def test_a_file_without_exploration_or_with_a_damaged_one_is_refused(whole, tmp_path):
     path = tmp_path / "found.h5"
-    whole.diagram.save(path)
+    save(whole.diagram, path)
     with pytest.raises(SystemModelError, match="holds no exploration"):
         load_exploration(path)
-    whole.save(path)
+    save(whole, path)
     with h5py.File(path, "r+") as file:
         file["exploration"].attrs["steps"] = 3
     with pytest.raises(SystemModelError, match="'/exploration/steps' is 3 with 7 frequencies"):

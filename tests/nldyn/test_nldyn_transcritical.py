@@ -170,7 +170,7 @@ def test_a_branch_begun_beside_a_branch_point_has_it_once(beside):
     more = replace(few, max_points=5)
     orbit = orbit_along(special, other_tangent(special), beside)
     branch = continue_branch(orbit, window, options=few)
-    longer = branch.extend(options=more)
+    longer = continue_branch(branch, options=more)
     for told in (branch, longer):
         assert [s.kind for s in told.special_points] == ["BP"]
     assert_same_branches(longer, continue_branch(orbit, window, options=more))

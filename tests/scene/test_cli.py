@@ -12,10 +12,10 @@ from fakes import diagram
 import nldyn.paper
 import nldyn.runtime.progress
 import nldyn.scene.build
-from nldyn import Walk, load_branches, load_diagram, load_exploration
+from nldyn import Walk
 from nldyn.app.cli import main
 from nldyn.base.resources import example, mesh
-from nldyn.io.branches import save_branches
+from nldyn.io.branches import load_branches, load_diagram, load_exploration, save_branches
 from nldyn.paper.kept import kept, kept_folder
 from nldyn.search import explore as survey
 

@@ -48,7 +48,9 @@ def test_ctrl_c_in_executed_text_gives_the_exit_code_all_the_same(tmp_path):
 
 
 def test_other_errors_of_loading_are_not_hidden(monkeypatch):
-    broken = type("Broken", (types.ModuleType,), {"main": property(lambda _: 1 / 0)})("nldyn.app.cli")
+    broken = type("Broken", (types.ModuleType,), {"main": property(lambda _: 1 / 0)})(
+        "nldyn.app.cli"
+    )
     monkeypatch.setitem(sys.modules, "nldyn.app.cli", broken)
     with pytest.raises(ZeroDivisionError):
         command.main()
@@ -58,7 +60,9 @@ def test_no_folder_for_compiled_code():
     """Without one, a temporary folder serves, one line says so, and nothing is left of it."""
     environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
     environment["NUMBA_CACHE_LOCATOR_CLASSES"] = "UserProvidedCacheLocator"
-    code = "import nldyn.flow.flow_map, os; f = os.environ['NUMBA_CACHE_DIR']; print(f, os.listdir(f))"
+    code = (
+        "import nldyn.flow.flow_map, os; f = os.environ['NUMBA_CACHE_DIR']; print(f, os.listdir(f))"
+    )
     run = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
     )

@@ -46,7 +46,9 @@ def test_without_graphics_the_rest_is_written(tmp_path, monkeypatch):
 
 def test_mp4_that_cannot_be_written_is_told_before_the_work(tmp_path, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    monkeypatch.setattr("nldyn.report.render.build_component", lambda scene: pytest.fail("computed"))
+    monkeypatch.setattr(
+        "nldyn.report.render.build_component", lambda scene: pytest.fail("computed")
+    )
     result, out = render(tmp_path, BEAM, "--frequency-hz", "23.0", "--video", "mp4")
     assert result.exit_code == 3
     assert result.stderr.startswith(f"nldyn: {out}/motion.mp4: writing .mp4 needs imageio-ffmpeg")

@@ -395,9 +395,7 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
         if found:
             decays = shows_decay(fl, tab, kind, h, panel)
             panel_end(fl, tab, kind, phase, w, h, panel, w_end)
-            event, where, doubtful = first_event(
-                fl, tab, kind, phase, w, h, closed, panel, w_end
-            )
+            event, where, doubtful = first_event(fl, tab, kind, phase, w, h, closed, panel, w_end)
             found = not far_off(fl, phase, w, h, tried, panel, event, where)
         if not found:
             limit = 0.4 * min(h, tried)
