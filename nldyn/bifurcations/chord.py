@@ -9,14 +9,21 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import LocateError
-from nldyn.bifurcations.branch_crossing import NEIGHBOUR, SHORTEST_CROSSING
+from nldyn.bifurcations.branch_crossing import (
+    NEIGHBOUR,
+    SHORTEST_CROSSING,
+)
 from nldyn.bifurcations.critical import correct_across
-from nldyn.bifurcations.events import crosses
-from nldyn.bifurcations.locate import BESIDE, CROSSING_ERROR
+from nldyn.bifurcations.events import (
+    crosses,
+)
 from nldyn.bifurcations.point import BranchPoint
 from nldyn.orbits.conditions import TOUCH, depth_row
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import metric_length
+
+BESIDE = 1e-3  # in σ: the least distance of points that tell the direction of a branch
+CROSSING_ERROR = 1e-8  # relative, of an orbit where branches cross
 
 STEEPEST = 0.5  # least cosine between a branch and the chord of a step, below which it is refused
 BEND = 1e-4  # arclength of a chord, above which a branch does not depart from it by more
@@ -180,3 +187,6 @@ class Chord:
         """Derivative of the shooting unknowns with respect to σ."""
         pace = float(self.row @ self._secant) / float(self.row @ point.tangent)
         return np.asarray(pace * point.tangent)
+
+
+

@@ -17,10 +17,9 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, LocateError
 from nldyn.bifurcations.branch_crossing import CROSSES, NEAR_CRITICAL
-from nldyn.bifurcations.chord import BEND, Chord
+from nldyn.bifurcations.chord import BEND, CROSSING_ERROR, Chord
 from nldyn.bifurcations.critical import correct_across
 from nldyn.bifurcations.events import accounted, changed
-from nldyn.bifurcations.locate import CROSSING_ERROR
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.touching import Touch, touches_sharply, touching_extremes

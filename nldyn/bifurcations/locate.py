@@ -15,7 +15,7 @@ from nldyn.bifurcations.branch_crossing import (
     distance,
     true_crossing,
 )
-from nldyn.bifurcations.chord import Chord
+from nldyn.bifurcations.chord import BESIDE, Chord
 from nldyn.bifurcations.critical import turns_near_crossing
 from nldyn.bifurcations.events import (
     CRITICAL,
@@ -30,8 +30,6 @@ from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.touching import Touch, changes_hidden_by_birth, touching_extremes
 from nldyn.orbits.orbit import Orbit
 
-BESIDE = 1e-3  # in σ: the least distance of points that tell the direction of a branch
-CROSSING_ERROR = 1e-8  # relative, of an orbit where branches cross
 PASSED = 1e-6  # least of a branch point's test on both sides of a fold that is no crossing
 MIXED = 1e-5  # distance from a crossing within which a tangent may be of both branches
 VANISHED = 1e-3  # an extreme at its root, relative to those beside it

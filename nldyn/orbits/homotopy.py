@@ -15,8 +15,9 @@ from nldyn.base.errors import ConvergenceError, SystemModelError, is_finite, sho
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.bordered import OrbitFamily, correct
 from nldyn.orbits.conditions import Singular
+from nldyn.orbits.newton import check_bounded, first_orbit, guessed_nodes
 from nldyn.orbits.orbit import Orbit
-from nldyn.orbits.solve import solve_orbit
+from nldyn.orbits.shooting import shooting_problem
 from nldyn.system.chart import (
     EVERY_MODE,
     FREQUENCY,
@@ -119,15 +120,13 @@ class Detour:
     def _near(self, orbit: Orbit, share: float, guess: Real) -> Orbit | None:
         """The orbit near a guess at a place, if it is of the same period."""
         segments = orbit.problem.segments
+        omega = 2.0 * math.pi * orbit.frequency_hz
         try:
-            return solve_orbit(
-                self.flow(share),
-                orbit.frequency_hz,
-                orbit.period,
-                guess=guess[:-1].reshape(segments, -1),
-                observe=orbit.observe,
-                segments=segments,
-            )
+            flow = self.flow(share)
+            check_bounded(flow.system, omega)
+            problem = shooting_problem(flow, orbit.period, segments)
+            nodes = guessed_nodes(problem, guess[:-1].reshape(segments, -1), omega)
+            return first_orbit(problem, [nodes], omega, orbit.observe)
         except (ConvergenceError, SystemModelError):
             return None
 
