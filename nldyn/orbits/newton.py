@@ -24,7 +24,7 @@ NO_PLACE = (
 )
 
 
-def _guessed(problem: ShootingProblem, guess: Real, omega: float) -> Real:
+def guessed_nodes(problem: ShootingProblem, guess: Real, omega: float) -> Real:
     """States (k, 2n) at the shooting phases from a guess, checked."""
     guess = np.atleast_2d(numbers("guess", guess))
     if guess.shape not in ((1, problem.size), (problem.segments, problem.size)):
@@ -37,7 +37,7 @@ def _guessed(problem: ShootingProblem, guess: Real, omega: float) -> Real:
     return spread(problem, problem.flow.to_state(guess[0]), omega)
 
 
-def _first_orbit(
+def first_orbit(
     problem: ShootingProblem, starts: Iterable[Real], omega: float, observe: str
 ) -> Orbit:
     """The first orbit of the problem's own period that Newton's method finds from some states."""

@@ -13,7 +13,7 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_frequency
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.orbits.homotopy import DAMPING, Detour
-from nldyn.orbits.newton import _first_orbit, _guessed, check_bounded, spread
+from nldyn.orbits.newton import first_orbit, guessed_nodes, check_bounded, spread
 from nldyn.orbits.orbit import Orbit, check_observe
 from nldyn.orbits.shooting import ShootingProblem, shooting_problem
 from nldyn.orbits.starts import near_returns
@@ -81,10 +81,10 @@ def solve_orbit(
     omega = 2.0 * math.pi * frequency_hz
     check_bounded(flow.system, omega)
     if guess is not None:
-        return _first_orbit(problem, [_guessed(problem, guess, omega)], omega, observe)
+        return first_orbit(problem, [guessed_nodes(problem, guess, omega)], omega, observe)
     pieces = (segments or period) // period  # of one excitation period
     try:
-        return _first_orbit(problem, _simulated(problem, omega, pieces), omega, observe)
+        return first_orbit(problem, _simulated(problem, omega, pieces), omega, observe)
     except ConvergenceError:
         orbit = _by_more_damping(problem, omega, observe, pieces) if period == 1 else None
         if orbit is None:
@@ -131,7 +131,7 @@ def _by_more_damping(
         detour = Detour(problem.flow, {DAMPING: factor})
         try:
             more = replace(problem, flow=detour.flow(1.0))
-            orbit = _first_orbit(more, _simulated(more, omega, pieces), omega, observe)
+            orbit = first_orbit(more, _simulated(more, omega, pieces), omega, observe)
         except (ConvergenceError, SystemModelError):
             continue
         found = detour.carried(orbit, 1.0, 0.0)
