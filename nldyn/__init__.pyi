@@ -1,6 +1,5 @@
 """The public names of nldyn, each with its home; `nldyn/__init__.py` loads them from this list."""
 
-
 # base
 from nldyn.base.errors import ConvergenceError as ConvergenceError
 from nldyn.base.errors import LocateError as LocateError
@@ -11,17 +10,13 @@ from nldyn.base.errors import SystemModelError as SystemModelError
 from nldyn.bifurcations.normal_forms import NormalForm as NormalForm
 from nldyn.bifurcations.normal_forms import describe as describe
 from nldyn.bifurcations.normal_forms import normal_form as normal_form
-from nldyn.bifurcations.normal_forms import switch_at_branch_point as switch_at_branch_point
-from nldyn.bifurcations.period_doubling import switch_at_flip as switch_at_flip
-from nldyn.bifurcations.point import BranchPoint as BranchPoint
 from nldyn.bifurcations.point import SpecialPoint as SpecialPoint
+from nldyn.bifurcations.switching import switch_branch as switch_branch
 
 # branches
-from nldyn.branches.arclength import Walk as Walk
 from nldyn.branches.branch import Branch as Branch
 from nldyn.branches.cascades import Cascade as Cascade
 from nldyn.branches.cascades import cascade as cascade
-from nldyn.branches.cascades import cascades_in as cascades_in
 from nldyn.branches.continuation import continue_branch as continue_branch
 from nldyn.branches.options import ContinuationOptions as ContinuationOptions
 
@@ -30,7 +25,6 @@ from nldyn.curves.curves import Curve as Curve
 from nldyn.curves.curves import continue_constant as continue_constant
 from nldyn.curves.curves import continue_in as continue_in
 from nldyn.curves.curves import continue_special as continue_special
-from nldyn.curves.marks import LocatedPoint as LocatedPoint
 from nldyn.curves.marks import refine_special as refine_special
 
 # flow
@@ -44,84 +38,55 @@ from nldyn.io.store import save as save
 
 # longterm
 from nldyn.longterm.attractors import Attractor as Attractor
-from nldyn.longterm.attractors import AttractorOptions as AttractorOptions
 from nldyn.longterm.attractors import classify as classify
 from nldyn.longterm.attractors import find_attractors as find_attractors
 from nldyn.longterm.basins import Basins as Basins
 from nldyn.longterm.basins import Plane as Plane
 from nldyn.longterm.basins import basins as basins
-from nldyn.longterm.impacts import Impacts as Impacts
 from nldyn.longterm.impacts import impacts as impacts
-from nldyn.longterm.lifetimes import ChaosLifetime as ChaosLifetime
 from nldyn.longterm.lifetimes import chaos_lifetime as chaos_lifetime
-from nldyn.longterm.lyapunov import LyapunovSpectrum as LyapunovSpectrum
 from nldyn.longterm.lyapunov import lyapunov_exponents as lyapunov_exponents
 from nldyn.longterm.manifolds import basin_edge as basin_edge
 from nldyn.longterm.manifolds import stable_manifold as stable_manifold
-from nldyn.longterm.poincare import BruteForce as BruteForce
 from nldyn.longterm.poincare import brute_force as brute_force
 from nldyn.longterm.poincare import impact_section as impact_section
 from nldyn.longterm.poincare import stroboscopic_section as stroboscopic_section
 from nldyn.longterm.simulation import Motion as Motion
 from nldyn.longterm.simulation import simulate as simulate
 from nldyn.longterm.simulation import sweep as sweep
-from nldyn.longterm.wear import ContactMeasures as ContactMeasures
-from nldyn.longterm.wear import SpectraMap as SpectraMap
 from nldyn.longterm.wear import contact_measures as contact_measures
-from nldyn.longterm.wear import measures_table as measures_table
 from nldyn.longterm.wear import spectra_map as spectra_map
-from nldyn.longterm.wear import spectra_table as spectra_table
 
 # orbits
-from nldyn.orbits.harmonics import Spectrum as Spectrum
-from nldyn.orbits.harmonics import spectrum as spectrum
+from nldyn.orbits.harmonics import Harmonics as Harmonics
+from nldyn.orbits.harmonics import harmonics as harmonics
 from nldyn.orbits.multipliers import Stability as Stability
-from nldyn.orbits.orbit import History as History
 from nldyn.orbits.orbit import Orbit as Orbit
 from nldyn.orbits.solve import solve_orbit as solve_orbit
 from nldyn.orbits.starts import SearchOptions as SearchOptions
 from nldyn.orbits.starts import find_orbits as find_orbits
 
-# plot
-from nldyn.plot.curves import plot_curves as plot_curves
-from nldyn.plot.curves import plot_orbit_curve as plot_orbit_curve
-from nldyn.plot.diagram import plot_diagram as plot_diagram
-from nldyn.plot.longterm import plot_basins as plot_basins
-from nldyn.plot.longterm import plot_brute_force as plot_brute_force
-from nldyn.plot.longterm import plot_section as plot_section
-from nldyn.plot.longterm import plot_spectra as plot_spectra
-from nldyn.plot.longterm import plot_sweep as plot_sweep
-from nldyn.plot.longterm import plot_wear as plot_wear
-from nldyn.plot.orbit import plot_contact_force as plot_contact_force
-from nldyn.plot.orbit import plot_history as plot_history
-from nldyn.plot.orbit import plot_phase_portrait as plot_phase_portrait
-from nldyn.plot.orbit import plot_spectrum as plot_spectrum
-
 # reduction
-from nldyn.reduction.convergence import Study as Study
-from nldyn.reduction.convergence import converge as converge
-from nldyn.reduction.selection import Selection as Selection
-from nldyn.reduction.selection import reduce_for as reduce_for
-from nldyn.reduction.setting import Setting as Setting
+from nldyn.reduction.convergence import ConvergenceStudy as ConvergenceStudy
+from nldyn.reduction.convergence import convergence_study as convergence_study
+from nldyn.reduction.load_case import LoadCase as LoadCase
+from nldyn.reduction.selection import ModeSelection as ModeSelection
+from nldyn.reduction.selection import select_modes as select_modes
 
 # runtime
-from nldyn.runtime.executors import Outcome as Outcome
-from nldyn.runtime.executors import TaskError as TaskError
 from nldyn.runtime.executors import run_all as run_all
 
 # scene
-from nldyn.scene.study import study as study
+from nldyn.scene.study import parameter_study as parameter_study
+from nldyn.search.by_pseudo_orbits import by_pseudo_orbits as by_pseudo_orbits
 
 # search
-from nldyn.search.by_pseudo_orbits import by_pseudo_orbits as by_pseudo_orbits
 from nldyn.search.diagram import Diagram as Diagram
 from nldyn.search.diagram import Seed as Seed
 from nldyn.search.diagram import diagram as diagram
-from nldyn.search.exploration import Coverage as Coverage
 from nldyn.search.exploration import Exploration as Exploration
 from nldyn.search.exploration import ExploreOptions as ExploreOptions
 from nldyn.search.explore import explore as explore
-from nldyn.search.fixed_point_index import index_gaps as index_gaps
 from nldyn.search.fixed_point_index import index_sum as index_sum
 from nldyn.search.homotopy import by_detour as by_detour
 from nldyn.search.mixtures import by_crossover as by_crossover

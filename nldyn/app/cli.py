@@ -306,12 +306,12 @@ def converge(
         from nldyn.runtime.progress import progress_line
         from nldyn.runtime.result_directory import check_directory
         from nldyn.scene.build import load_scene
-        from nldyn.scene.convergence import study_of_scene
+        from nldyn.scene.convergence import convergence_study_of
 
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)
         with progress_line(quiet) as report:
-            study = study_of_scene(
+            study = convergence_study_of(
                 loaded,
                 modes=modes or COUNTS,
                 methods=[name.strip() for name in methods.split(",")],

@@ -9,14 +9,9 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import LocateError
-from nldyn.bifurcations.branch_crossing import (
-    NEIGHBOUR,
-    SHORTEST_CROSSING,
-)
+from nldyn.bifurcations.branch_crossing import NEIGHBOUR, SHORTEST_CROSSING
 from nldyn.bifurcations.critical import correct_across
-from nldyn.bifurcations.events import (
-    crosses,
-)
+from nldyn.bifurcations.events import crosses
 from nldyn.bifurcations.point import BranchPoint
 from nldyn.orbits.conditions import TOUCH, depth_row
 from nldyn.orbits.orbit import Orbit
@@ -187,6 +182,3 @@ class Chord:
         """Derivative of the shooting unknowns with respect to σ."""
         pace = float(self.row @ self._secant) / float(self.row @ point.tangent)
         return np.asarray(pace * point.tangent)
-
-
-

@@ -45,7 +45,7 @@ TOO_NEAR = "on the way it left the branch for another one that lies too near"
 
 
 @dataclass(frozen=True, eq=False)
-class Stride:
+class StepperState:
     """Where a walk is, and its step control there: all that the next points depend on.
 
     Parameters
@@ -67,7 +67,7 @@ class Stride:
 
 
 @dataclass
-class Walk:
+class Stepper:
     """Iterator over the points of a branch in one direction.
 
     Yields `BranchPoint`s; when it ends, `stop_reason` says why. The caller may stop between any
@@ -83,7 +83,7 @@ class Walk:
         Step control.
     open_ends : (m, N + 1) array, optional
         Where other branches were broken off: the walk stops at the first of these that it passes.
-    stride : Stride, optional
+    stride : StepperState, optional
         Where to go on, if not at the start.
     visited : list of BranchPoint
         The points so far.
@@ -94,7 +94,7 @@ class Walk:
     options: ContinuationOptions
     open_ends: Real | None = None
     stop_reason: str = NOT_FINISHED
-    stride: Stride | None = None
+    stride: StepperState | None = None
     visited: list[BranchPoint] = field(default_factory=list, repr=False)
     _places: Rows | None = field(default=None, init=False, repr=False)  # unknowns of these
     _obstacle: str = field(default="", init=False, repr=False)
@@ -105,11 +105,11 @@ class Walk:
         check_types(start=(self.start, BranchPoint), options=(self.options, ContinuationOptions))
 
     def __iter__(self) -> Iterator[BranchPoint]:
-        """Walk along the branch."""
+        """Stepper along the branch."""
         problem = self.start.orbit.problem
         if self.stride is None:
             behind = np.empty((0, self.start.tangent.size))
-            self.stride = Stride(self.start, self.options.first_step, behind, 0)
+            self.stride = StepperState(self.start, self.options.first_step, behind, 0)
             yield self.start
         while self.stride.count < self.options.max_points:
             here, step, behind = self.stride.here, self.stride.step, self.stride.behind
@@ -155,7 +155,7 @@ class Walk:
             step = min(step * min(max(growth, 0.5), 1.6), self.options.max_step)
             behind = np.array([] if bent else [here.orbit.point, here.tangent])
             behind = behind.reshape(-1, here.tangent.size)
-            self.stride = Stride(point, step, behind, self.stride.count + 1)
+            self.stride = StepperState(point, step, behind, self.stride.count + 1)
             self.visited.append(point)
             yield point
         self.stop_reason = f"{self.options.max_points}{POINTS}"

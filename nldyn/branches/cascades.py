@@ -13,7 +13,7 @@ from nldyn.bifurcations.critical import CoefficientError, Estimate, doubled_para
 from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special, is_at
 from nldyn.bifurcations.within_step import special_points_between
-from nldyn.branches.arclength import Walk
+from nldyn.branches.arclength import Stepper
 from nldyn.branches.branch import JOINS, Branch, check_branches
 from nldyn.branches.continuation import make_branch
 from nldyn.branches.options import ContinuationOptions
@@ -208,7 +208,7 @@ def _up_to_flip(
 ) -> tuple[Branch, SpecialPoint | None]:
     """The branch born at the last flip, up to the flip where it loses its stability."""
     amplitude, options = _steps(flips, options)
-    walk = Walk(switch_at_flip(flips[-1], amplitude), window, options)
+    walk = Stepper(switch_at_flip(flips[-1], amplitude), window, options)
     nodes: list[BranchPoint] = []
     specials: list[SpecialPoint] = []
     following = None
@@ -225,7 +225,7 @@ def _up_to_flip(
     return make_branch("", nodes, specials, (first, reason), []), following
 
 
-def _with_special_points(walk: Walk) -> Iterator[tuple[BranchPoint, list[SpecialPoint]]]:
+def _with_special_points(walk: Stepper) -> Iterator[tuple[BranchPoint, list[SpecialPoint]]]:
     """Points of a walk with the special points between each and the one before."""
     before: BranchPoint | None = None
     for point in walk:

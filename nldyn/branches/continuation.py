@@ -27,7 +27,7 @@ from nldyn.branches.branch import (
     Course,
 )
 from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_at
-from nldyn.branches.leg import Leg, Trail
+from nldyn.branches.leg import Leg, LegBuilder
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.orbit import Orbit, check_minimal
 from nldyn.orbits.shooting import shifts
@@ -72,7 +72,7 @@ def continue_branch(
     progress : callable, optional
         Called with the frequency of every point.
     open_ends : sequence of (N + 1,) arrays
-        Where other branches were broken off, see `Walk`.
+        Where other branches were broken off, see `Stepper`.
     at : sequence of float, optional
         Frequencies in Hz at which orbits are wanted: `Branch.requested` has all of them, at each
         passage of the branch. For a branch those of before unless given.
@@ -203,7 +203,7 @@ def complete(
     progress: Callable[[float], None] | None,
     checkpoint: Checkpoint,
 ) -> Branch:
-    """Walk the legs of a branch that are missing or may go on, forward first, and join them.
+    """Stepper the legs of a branch that are missing or may go on, forward first, and join them.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def complete(
         if leg is not None and not goes_on(leg, course):
             return leg
         leg = leg or Leg([first], [], [], NOT_FINISHED, None)
-        trail = Trail.going_on(leg, course.range_hz, course.options, course.open_ends)
+        trail = LegBuilder.going_on(leg, course.range_hz, course.options, course.open_ends)
 
         checkpoint.work = lambda: whole(trail.so_far())
         return trail.follow(progress, checkpoint.offer)

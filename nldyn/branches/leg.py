@@ -15,7 +15,7 @@ from nldyn.bifurcations.branch_crossing import NEIGHBOUR, distance, same_crossin
 from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.bifurcations.within_step import insert_dip, special_points_between
-from nldyn.branches.arclength import COMES_BACK, MEETS_OPEN_END, Stride, Walk
+from nldyn.branches.arclength import COMES_BACK, MEETS_OPEN_END, Stepper, StepperState
 from nldyn.branches.branch import CLOSED, JOINS, NOT_FINISHED, WalkEnd
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.shooting import metric_length
@@ -51,7 +51,7 @@ class Leg:
 
 
 @dataclass
-class Trail:
+class LegBuilder:
     """A walk with what is found on the way.
 
     Special points of a pair of neighbouring points are located as soon as the next point is known,
@@ -59,14 +59,14 @@ class Trail:
 
     Parameters
     ----------
-    walk : Walk
+    walk : Stepper
         The walk.
     nodes, special_points, notes : list
         What was found before, if the walk goes on; of the pairs of nodes all but the last have
         been searched.
     """
 
-    walk: Walk
+    walk: Stepper
     nodes: list[BranchPoint] = field(default_factory=list)
     special_points: list[SpecialPoint] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -82,14 +82,14 @@ class Trail:
         range_hz: tuple[float, float],
         options: ContinuationOptions,
         open_ends: Real,
-    ) -> Trail:
+    ) -> LegBuilder:
         """The same walk with another end of its range or other options."""
-        walk = Walk(leg.nodes[0], range_hz, options, open_ends)
+        walk = Stepper(leg.nodes[0], range_hz, options, open_ends)
         end = leg.end
         if end is None:
             return cls(walk)
         here = leg.nodes[end.node]
-        walk.stride = Stride(here, end.step, end.behind, end.count)
+        walk.stride = StepperState(here, end.step, end.behind, end.count)
         walk.visited = list(leg.nodes[: end.kept])
         return cls(
             walk,
@@ -103,7 +103,7 @@ class Trail:
         progress: Callable[[float], None] | None = None,
         keep: Callable[[], None] | None = None,
     ) -> Leg:
-        """Walk to the end.
+        """Stepper to the end.
 
         Parameters
         ----------
@@ -184,11 +184,11 @@ class Trail:
         return point.arclength > here.arclength and self.walk.closes(here, point)
 
     @property
-    def _stride(self) -> Stride:
+    def _stride(self) -> StepperState:
         assert self.walk.stride is not None
         return self.walk.stride
 
-    def _here(self) -> tuple[int, int, int, Stride]:
+    def _here(self) -> tuple[int, int, int, StepperState]:
         """How much will stay as it is, whatever follows."""
         return len(self.nodes) - 1, len(self.special_points), len(self.notes), self._stride
 
@@ -288,7 +288,7 @@ def trace(
     options: ContinuationOptions | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[list[BranchPoint], list[SpecialPoint], str, list[str]]:
-    """Walk from a point in the direction of its tangent and collect special points.
+    """Stepper from a point in the direction of its tangent and collect special points.
 
     Parameters
     ----------
@@ -306,13 +306,13 @@ def trace(
     nodes, special_points, reason, notes
         As those of a `Leg`.
     """
-    trail = Trail(Walk(start, range_hz, options or ContinuationOptions()))
+    trail = LegBuilder(Stepper(start, range_hz, options or ContinuationOptions()))
     leg = trail.follow(progress)
     return leg.nodes, leg.special_points, leg.reason, leg.notes
 
 
 def _detour(
-    a: BranchPoint, b: BranchPoint, walk: Walk, range_hz: tuple[float, float]
+    a: BranchPoint, b: BranchPoint, walk: Stepper, range_hz: tuple[float, float]
 ) -> list[BranchPoint] | None:
     """Points of a walk with shorter steps from a that passes b in its direction, or None."""
     first_step = (b.arclength - a.arclength) / 64.0
@@ -321,7 +321,7 @@ def _detour(
     options = replace(
         walk.options, first_step=first_step, max_step=8.0 * first_step, max_points=MOST_DETOUR
     )
-    inner = Walk(a, range_hz, options, b.orbit.point[None])
+    inner = Stepper(a, range_hz, options, b.orbit.point[None])
     between = list(inner)[1:-1]
     if inner.stop_reason != MEETS_OPEN_END or not between:
         return None

@@ -258,7 +258,7 @@ def continue_in(
         Called with the parameter's value at every point.
     checkpoint : CheckpointFile, optional
         A new HDF5 file that keeps the curve, written now and then, at the end, and when an
-        exception such as Ctrl-C ends the computation: `nldyn.load_curve` and `Curve.extend` go on.
+        exception such as Ctrl-C ends the computation: `nldyn.load` and `Curve.extend` go on.
 
     Returns
     -------
@@ -316,7 +316,7 @@ def continue_special(
         Called with the parameters' values at every point.
     checkpoint : CheckpointFile, optional
         A new HDF5 file that keeps the curve, written now and then, at the end, and when an
-        exception such as Ctrl-C ends the computation: `nldyn.load_curve` and `Curve.extend` go on.
+        exception such as Ctrl-C ends the computation: `nldyn.load` and `Curve.extend` go on.
 
     Returns
     -------
@@ -497,7 +497,7 @@ def _curve(
     progress: Callable[[Real], None] | None,
     keeper: Keeper[Curve],
 ) -> Curve:
-    """Walk both ways from the start and mark what is met."""
+    """Stepper both ways from the start and mark what is met."""
     parameters = tuple(chart.parameter for chart in start.found.at.family.charts)
     begun = Curve(kind, parameters, (start,), (), (NOT_FINISHED, NOT_FINISHED))
     return _followed(begun, options, progress, keeper)

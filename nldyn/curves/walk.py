@@ -347,7 +347,7 @@ def _tangent_behind(at: Evaluation, condition: Condition, grazing: Grazing, deep
 
 @dataclass
 class CurveWalk:
-    """Iterator over the points of a curve in one direction, as `Walk` is over a branch's.
+    """Iterator over the points of a curve in one direction, as `Stepper` is over a branch's.
 
     Parameters
     ----------
@@ -367,7 +367,7 @@ class CurveWalk:
     _obstacle: str = field(default="", init=False, repr=False)
 
     def __iter__(self) -> Iterator[CurvePoint]:
-        """Walk along the curve."""
+        """Stepper along the curve."""
         here, step = self.start, self.options.first_step
         curvature = np.zeros(here.tangent.size)
         if is_torus_curve(here.condition):

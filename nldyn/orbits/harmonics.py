@@ -15,7 +15,7 @@ MOST_SAMPLES = 2**18
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrum:
+class Harmonics:
     """Lines of a periodic displacement, ``y(t) = Re Σ phasor_k exp(2πi frequency_hz_k t)``.
 
     Parameters
@@ -36,7 +36,7 @@ class Spectrum:
         return np.asarray(np.abs(self.phasor))
 
 
-def spectrum(orbit: Orbit, interface: str | Real | None = None, *, orders: int = 30) -> Spectrum:
+def harmonics(orbit: Orbit, interface: str | Real | None = None, *, orders: int = 30) -> Harmonics:
     """Fourier coefficients of a displacement over one period of an orbit.
 
     The trapezoidal rule with more and more samples, until the coefficients stay within 1e-9 of
@@ -54,7 +54,7 @@ def spectrum(orbit: Orbit, interface: str | Real | None = None, *, orders: int =
 
     Returns
     -------
-    Spectrum
+    Harmonics
 
     Raises
     ------
@@ -68,12 +68,12 @@ def spectrum(orbit: Orbit, interface: str | Real | None = None, *, orders: int =
     >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
     ...     excitation=[Unbalance("middle", 4.92e-6)])
     >>> orbit = solve_orbit(system, frequency_hz=20.0)
-    >>> lines = spectrum(orbit)           # a linear system answers at one frequency
+    >>> lines = harmonics(orbit)           # a linear system answers at one frequency
     >>> bool(abs(lines.amplitude[1] / orbit.max_abs_displacement - 1.0) < 1e-9)
     True
     """
     check_types(orbit=(orbit, Orbit))
-    check_whole("spectrum: orders", orders, 1, 10**4)
+    check_whole("harmonics: orders", orders, 1, 10**4)
     phi = modal_row(orbit.system, orbit.observe if interface is None else interface)
     lines = orders * orbit.period
     samples = 2 ** int(np.ceil(np.log2(8 * lines)))
@@ -84,7 +84,7 @@ def spectrum(orbit: Orbit, interface: str | Real | None = None, *, orders: int =
         if np.abs(found - coarser).max() <= 1e-9 * np.abs(found).max():
             break
     multiples = np.arange(lines + 1, dtype=float)
-    return Spectrum(multiples * (orbit.frequency_hz / orbit.period), found)
+    return Harmonics(multiples * (orbit.frequency_hz / orbit.period), found)
 
 
 def modal_row(system: System, point: str | Real | None) -> Real:

@@ -43,7 +43,7 @@ ROUNDING = 1e-6  # of an orbit, relative
 
 
 @dataclass(frozen=True)
-class Detour:
+class Homotopy:
     """A way from a system to one with other numbers; its places are shares of it.
 
     Parameters

@@ -25,7 +25,7 @@ class MultiplierError(RuntimeError):
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrum:
+class FloquetSpectrum:
     """Multipliers of a periodic orbit.
 
     Parameters
@@ -77,7 +77,7 @@ class Stability:
         return "stable" if self.log_modulus < 0.0 else "unstable"
 
 
-def spectrum(jacobians: Real) -> Spectrum:
+def floquet_spectrum(jacobians: Real) -> FloquetSpectrum:
     """Eigenvalues of the product ``jacobians[k-1] @ ... @ jacobians[0]``.
 
     The periodic QR algorithm [Bojanczyk, Golub and Van Dooren 1992] never forms the product: the
@@ -92,7 +92,7 @@ def spectrum(jacobians: Real) -> Spectrum:
 
     Returns
     -------
-    Spectrum
+    FloquetSpectrum
 
     Raises
     ------
@@ -103,17 +103,17 @@ def spectrum(jacobians: Real) -> Spectrum:
     --------
     >>> turn = np.array([[0.6, -0.8], [0.8, 0.6]])
     >>> quarters = [turn @ np.diag([1e3, 1e-3]) @ turn.T] * 4
-    >>> [float(f"{x:.6g}") for x in spectrum(np.array(quarters)).multipliers.real]
+    >>> [float(f"{x:.6g}") for x in floquet_spectrum(np.array(quarters)).multipliers.real]
     [1000000000000.0, 1e-12]
     """
     jacobians = np.ascontiguousarray(jacobians, dtype=float)
     values, logarithms, squeeze, converged = product_eigenvalues(jacobians)
     if not converged:
         raise MultiplierError("the multipliers of an orbit could not be computed")
-    return Spectrum(values, logarithms, squeeze)
+    return FloquetSpectrum(values, logarithms, squeeze)
 
 
-def uncertainties(jacobians: Real, found: Spectrum, error: float) -> Real:
+def uncertainties(jacobians: Real, found: FloquetSpectrum, error: float) -> Real:
     """Estimate of how far each log-modulus may be off when each matrix has a relative error.
 
     The matrices are perturbed in `SAMPLES` orthogonal random directions, always the same ones, and
@@ -125,7 +125,7 @@ def uncertainties(jacobians: Real, found: Spectrum, error: float) -> Real:
     ----------
     jacobians : (k, n, n) array
         The matrices.
-    found : Spectrum
+    found : FloquetSpectrum
         Their multipliers.
     error : float
         Relative error of each matrix, in the Frobenius norm.
@@ -138,7 +138,7 @@ def uncertainties(jacobians: Real, found: Spectrum, error: float) -> Real:
     Examples
     --------
     >>> matrix = np.diag([2.0, 1e-9])[None]
-    >>> unsure = uncertainties(matrix, spectrum(matrix), 1e-8)
+    >>> unsure = uncertainties(matrix, floquet_spectrum(matrix), 1e-8)
     >>> bool(unsure[0] < 1e-7), bool(unsure[1] > 1.0)
     (True, True)
     """
@@ -147,7 +147,7 @@ def uncertainties(jacobians: Real, found: Spectrum, error: float) -> Real:
     total = np.zeros(n)
     for direction in _directions(k, n):
         try:
-            moved = spectrum(jacobians + error * sizes * direction).log_moduli
+            moved = floquet_spectrum(jacobians + error * sizes * direction).log_moduli
         except MultiplierError:
             return np.full(n, math.inf)
         with np.errstate(invalid="ignore"):

@@ -16,12 +16,12 @@ from nldyn.flow.flow_map import FlowError, FlowMap, Solution, Trajectory, chain
 from nldyn.orbits.multipliers import (
     COARSE,
     MOST_PARTS,
+    FloquetSpectrum,
     MultiplierError,
-    Spectrum,
     Stability,
+    floquet_spectrum,
     log_determinant,
     parts_for,
-    spectrum,
     uncertainties,
 )
 from nldyn.orbits.shooting import ShootingProblem
@@ -187,19 +187,19 @@ class Orbit:
         return self._spectrum[0].log_moduli
 
     @cached_property
-    def _spectrum(self) -> tuple[Spectrum, Real]:
+    def _spectrum(self) -> tuple[FloquetSpectrum, Real]:
         """Multipliers and the Jacobians they come from.
 
         Segments that squeeze a direction almost to their own rounding error are cut into parts.
         """
         try:
-            found, jacobians = spectrum(self.jacobians), self.jacobians
+            found, jacobians = floquet_spectrum(self.jacobians), self.jacobians
             parts = parts_for(found.squeeze)
             while found.squeeze < COARSE and parts <= MOST_PARTS:
                 finer = self.problem.jacobians(self.point, parts)
                 if finer is None:
                     break
-                found, jacobians = spectrum(finer), finer
+                found, jacobians = floquet_spectrum(finer), finer
                 parts *= 2
         except MultiplierError as error:
             raise ConvergenceError(str(error)) from None

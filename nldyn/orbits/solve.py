@@ -12,8 +12,8 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_frequency
 from nldyn.flow.flow_map import FlowMap, flow_of
-from nldyn.orbits.homotopy import DAMPING, Detour
-from nldyn.orbits.newton import first_orbit, guessed_nodes, check_bounded, spread
+from nldyn.orbits.homotopy import DAMPING, Homotopy
+from nldyn.orbits.newton import check_bounded, first_orbit, guessed_nodes, spread
 from nldyn.orbits.orbit import Orbit, check_observe
 from nldyn.orbits.shooting import ShootingProblem, shooting_problem
 from nldyn.orbits.starts import near_returns
@@ -128,7 +128,7 @@ def _by_more_damping(
     if not np.any(problem.flow.system.total_damping):
         return None
     for factor in MORE_DAMPING:
-        detour = Detour(problem.flow, {DAMPING: factor})
+        detour = Homotopy(problem.flow, {DAMPING: factor})
         try:
             more = replace(problem, flow=detour.flow(1.0))
             orbit = first_orbit(more, _simulated(more, omega, pieces), omega, observe)

@@ -345,7 +345,8 @@ def plot_wear(
 
     Examples
     --------
-    >>> from nldyn import Stop, System, Unbalance, brute_force, measures_table
+    >>> from nldyn import Stop, System, Unbalance, brute_force
+    >>> from nldyn.longterm.wear import measures_table
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import check_types, check_whole
-from nldyn.orbits.harmonics import spectrum
+from nldyn.orbits.harmonics import harmonics
 from nldyn.orbits.orbit import Orbit, check_observe
 from nldyn.plot.diagram import (
     PERIOD_COLOURS,
@@ -141,7 +141,7 @@ def plot_spectrum(
         For an unknown interface, or if `orders` is not a whole number of at least 1.
     """
     name = _checked(orbit, ax, interface)
-    lines = spectrum(orbit, name, orders=orders)
+    lines = harmonics(orbit, name, orders=orders)
     factor, unit = length_unit(float(lines.amplitude.max()))
     height = lines.amplitude / factor
     shown = np.flatnonzero(height > FLOOR * height.max())

@@ -19,7 +19,7 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.newton import refine
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
-from nldyn.reduction.setting import Setting
+from nldyn.reduction.load_case import LoadCase
 from nldyn.system.system import System
 
 if TYPE_CHECKING:
@@ -130,12 +130,12 @@ class Errors:
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class ConvergenceStudy:
     """A convergence study.
 
     Parameters
     ----------
-    setting : Setting
+    setting : LoadCase
         What was asked.
     at_hz : float
         Frequency of the orbits that are compared.
@@ -150,7 +150,7 @@ class Study:
         relative as in `Errors`. 0 for the full model.
     """
 
-    setting: Setting
+    setting: LoadCase
     at_hz: float
     models: tuple[Measured, ...]
     errors: tuple[Errors, ...]
@@ -273,23 +273,23 @@ def counted_modes(model: Measured) -> str:
     return f"{model.modes} mode{'' if model.modes == 1 else 's'}"
 
 
-def converge(
+def convergence_study(
     components: Mapping[str, cms.ComponentLike] | cms.ComponentLike,
-    setting: Setting,
+    setting: LoadCase,
     *,
     modes: Sequence[int] = COUNTS,
     methods: Sequence[str] = ("rubin",),
     at_hz: float | None = None,
     full: bool = False,
     progress: Progress | None = None,
-) -> Study:
+) -> ConvergenceStudy:
     """Compute the same with more and more modes, and compare.
 
     Parameters
     ----------
     components : ComponentLike or mapping of str to ComponentLike
         The component, or the same on several meshes by name, the finest last.
-    setting : Setting
+    setting : LoadCase
         What acts on it and what range is asked for.
     modes : sequence of int
         Numbers of kept component modes.
@@ -306,7 +306,7 @@ def converge(
 
     Returns
     -------
-    Study
+    ConvergenceStudy
 
     Raises
     ------
@@ -353,7 +353,7 @@ def converge(
     models.append(linear)
     errors = tuple(errors_of(model, linear, best, full) for model in models)
     known = 0.0 if is_full(whole) else receptance_bound(finest, whole, linear, setting)
-    return Study(setting, at_hz, tuple(models), errors, best, known)
+    return ConvergenceStudy(setting, at_hz, tuple(models), errors, best, known)
 
 
 def best_of(models: Sequence[Measured], full: Measured) -> Measured:
@@ -367,11 +367,11 @@ def best_of(models: Sequence[Measured], full: Measured) -> Measured:
 def measured(
     mesh: str,
     reduced: cms.ReducedModel,
-    setting: Setting,
+    setting: LoadCase,
     at_hz: float,
     progress: Progress | None = None,
 ) -> Measured:
-    """Compute what a `Study` compares for one reduced model."""
+    """Compute what a `ConvergenceStudy` compares for one reduced model."""
     linear = measured_linear(mesh, reduced.method, reduced, setting)
     if reduced.has_massless_part:
         return replace(linear, note=MASSLESS)
@@ -396,7 +396,7 @@ def measured(
 
 
 def measured_linear(
-    mesh: str, method: str, reduced: cms.ReducedModel, setting: Setting
+    mesh: str, method: str, reduced: cms.ReducedModel, setting: LoadCase
 ) -> Measured:
     """Counts, visible eigenfrequencies and receptance of a model."""
     rows = np.array(list(reduced.participation.values()))
@@ -444,7 +444,7 @@ def is_full(reference: cms.ReducedModel) -> bool:
 
 
 def receptance_bound(
-    component: cms.ComponentLike, whole: cms.ReducedModel, linear: Measured, setting: Setting
+    component: cms.ComponentLike, whole: cms.ReducedModel, linear: Measured, setting: LoadCase
 ) -> float:
     """Bound of the error of a model's undamped receptance over the range, as in `Errors`."""
     observed = setting.observe or whole.interfaces[0]
@@ -456,7 +456,7 @@ def receptance_bound(
 def with_orbit(
     model: Measured,
     reduced: cms.ReducedModel,
-    setting: Setting,
+    setting: LoadCase,
     guess: Orbit,
     progress: Progress | None,
 ) -> Measured:
@@ -510,7 +510,7 @@ def transferred(guess: Orbit, system: System) -> Orbit:
     )
 
 
-def receptance(reduced: cms.ReducedModel, setting: Setting, frequency_hz: Real) -> Complex:
+def receptance(reduced: cms.ReducedModel, setting: LoadCase, frequency_hz: Real) -> Complex:
     """Linear receptance (f,) at the observed interface, with all dampers."""
     if reduced.has_massless_part:
         return massless_receptance(reduced, setting, frequency_hz)
@@ -527,7 +527,7 @@ def receptance(reduced: cms.ReducedModel, setting: Setting, frequency_hz: Real) 
     return np.array(found)
 
 
-def massless_receptance(reduced: cms.ReducedModel, setting: Setting, frequency_hz: Real) -> Complex:
+def massless_receptance(reduced: cms.ReducedModel, setting: LoadCase, frequency_hz: Real) -> Complex:
     """The same where part of the flexibility has no mass: dampers close R = P Z^-1 P^T + G."""
     if any(setting.rayleigh):  # not known where flexibility has no mass
         return np.full(len(frequency_hz), np.nan, dtype=complex)
@@ -547,7 +547,7 @@ def massless_receptance(reduced: cms.ReducedModel, setting: Setting, frequency_h
     return np.array(found)
 
 
-def harmonic_branch(system: System, setting: Setting, tell: Callable[[float], None]) -> Branch:
+def harmonic_branch(system: System, setting: LoadCase, tell: Callable[[float], None]) -> Branch:
     """The harmonic branch downwards from the upper end of the range."""
     low, high = setting.range_hz
     tell(high)

@@ -24,7 +24,7 @@ from nldyn.reduction.convergence import (
     special_points_of,
     told,
 )
-from nldyn.reduction.setting import Setting
+from nldyn.reduction.load_case import LoadCase
 from nldyn.system.elements import Stop
 from nldyn.system.system import System
 
@@ -59,8 +59,8 @@ class LeftOut:
 
 
 @dataclass(frozen=True, eq=False)
-class Selection:
-    """A component reduced to what a setting needs, by `reduce_for`.
+class ModeSelection:
+    """A component reduced to what a setting needs, by `select_modes`.
 
     Parameters
     ----------
@@ -164,21 +164,21 @@ def contact_duration(stop: Stop, mass: float, speed: float) -> float:
     return float(2.0 * depth / speed * beta(1.0 / power, 0.5) / power)
 
 
-def reduce_for(
+def select_modes(
     component: cms.ComponentLike,
-    setting: Setting,
+    setting: LoadCase,
     *,
     tolerance: float = 0.01,
     special_points: bool = False,
     progress: Progress | None = None,
-) -> Selection:
+) -> ModeSelection:
     """Reduce a component to the modes that its setting needs.
 
     Parameters
     ----------
     component : ComponentLike
         As for `cms.reduce`.
-    setting : Setting
+    setting : LoadCase
         What acts on it, and the frequency range.
     tolerance : float
         Largest relative change of the harmonic response that leaving modes out may make.
@@ -190,7 +190,7 @@ def reduce_for(
 
     Returns
     -------
-    Selection
+    ModeSelection
 
     Raises
     ------
@@ -265,7 +265,7 @@ def reduce_for(
         moved_by, missing, extra = judge.special_error(reduced, tell)
         uncertain, *lacking = judge.special_error(smaller, tell)
         special_error, doubtful = around(moved_by, uncertain), sum(lacking)
-    return Selection(
+    return ModeSelection(
         reduced,
         tuple(kept),
         tuple(reasons(whole, seen, kept)),
@@ -289,7 +289,7 @@ def around(error: float, doubt: float) -> tuple[float, float]:
 class Judge:
     """The orbits of a reference model, with which smaller models are compared."""
 
-    def __init__(self, setting: Setting, reference: cms.ReducedModel, branch: Branch) -> None:
+    def __init__(self, setting: LoadCase, reference: cms.ReducedModel, branch: Branch) -> None:
         self.setting, self.reference, self.branch = setting, reference, branch
         low, high = setting.range_hz
         places = np.geomspace(low, high, SAMPLES + 2)[1:-1]
@@ -348,7 +348,7 @@ def moved(
     )
 
 
-def in_use(model: cms.ReducedModel, setting: Setting) -> Real:
+def in_use(model: cms.ReducedModel, setting: LoadCase) -> Real:
     """Participations (m, r) of the interfaces where something acts or is observed."""
     names = {element.at for element in (*setting.stops, *setting.dampers, *setting.excitation)}
     names |= {stop.against for stop in setting.stops if stop.against is not None}
@@ -356,7 +356,7 @@ def in_use(model: cms.ReducedModel, setting: Setting) -> Real:
     return np.array([model.participation[name] for name in model.interfaces if name in names])
 
 
-def visible(model: cms.ReducedModel, setting: Setting) -> list[int]:
+def visible(model: cms.ReducedModel, setting: LoadCase) -> list[int]:
     """Numbers of the modes that an interface in use sees, and of all rigid-body modes."""
     rows = np.abs(in_use(model, setting))
     seen = np.any(rows > INVISIBLE * rows.max(axis=1, keepdims=True), axis=0)
@@ -369,7 +369,7 @@ def below(model: cms.ReducedModel, cutoff_hz: float) -> list[int]:
     return [i + 1 for i in range(model.modes) if model.frequencies_hz[i] <= cutoff_hz]
 
 
-def share(model: cms.ReducedModel, setting: Setting, number: int) -> float:
+def share(model: cms.ReducedModel, setting: LoadCase, number: int) -> float:
     """How much an interface in use sees a mode, relative to the one it sees best."""
     rows = np.abs(in_use(model, setting)[:, : model.modes])
     return float(np.max(rows[:, number - 1] / rows.max(axis=1)))
@@ -389,7 +389,7 @@ def reasons(model: cms.ReducedModel, seen: Sequence[int], kept: Sequence[int]) -
     return found
 
 
-def shortest_contact(setting: Setting, model: cms.ReducedModel) -> float:
+def shortest_contact(setting: LoadCase, model: cms.ReducedModel) -> float:
     """Duration in s of the shortest contact to be expected; infinite without a stop."""
     system = setting.system(model)
     omegas = 2.0 * np.pi * np.linspace(*setting.range_hz, 200)

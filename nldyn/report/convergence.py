@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from nldyn.plot.diagram import MARKERS, PERIOD_COLOURS, new_axes, save_figure
 from nldyn.reduction.convergence import (
     QUANTITIES,
-    Study,
+    ConvergenceStudy,
     contact_time,
     counted_modes,
     largest_force,
@@ -31,7 +31,7 @@ SMALLEST = 1e-14
 Series = Mapping[str, Sequence[int]]
 
 
-def write_study(study: Study, directory: str | Path, title: str = "") -> Path:
+def write_study(study: ConvergenceStudy, directory: str | Path, title: str = "") -> Path:
     """Write ``convergence.csv``, ``special_points_by_model.csv``, ``report.txt`` and pictures.
 
     Raises
@@ -56,12 +56,12 @@ def write_study(study: Study, directory: str | Path, title: str = "") -> Path:
     return Path(directory)
 
 
-def counts_vary(study: Study) -> bool:
+def counts_vary(study: ConvergenceStudy) -> bool:
     """Whether there are models that differ in nothing but their number of modes."""
     return any(len(indices) > 1 for indices in study.series().values())
 
 
-def model_rows(study: Study) -> Iterator[tuple[object, ...]]:
+def model_rows(study: ConvergenceStudy) -> Iterator[tuple[object, ...]]:
     """Rows of ``convergence.csv``, empty where nothing is known; the reference comes last."""
     for model, error in zip(study.models, study.errors, strict=True):
         peak, orbit, special = model.peak, model.orbit, model.special_hz
@@ -85,7 +85,7 @@ def model_rows(study: Study) -> Iterator[tuple[object, ...]]:
         yield tuple(map(if_known, row))
 
 
-def special_rows(study: Study) -> Iterator[tuple[object, ...]]:
+def special_rows(study: ConvergenceStudy) -> Iterator[tuple[object, ...]]:
     """Rows of ``special_points_by_model.csv``."""
     for model in study.models:
         for kind, places in (model.special_hz or {}).items():
@@ -93,13 +93,13 @@ def special_rows(study: Study) -> Iterator[tuple[object, ...]]:
                 yield model.label, model.modes, kind, hz
 
 
-def plot_errors(study: Study, title: str = "") -> Axes:
+def plot_errors(study: ConvergenceStudy, title: str = "") -> Axes:
     """Draw every error against the number of modes, one panel for each quantity."""
     places = [model.modes for model in study.models]
     return error_panels(study, study.series(), places, "kept modes", title)[0]
 
 
-def plot_errors_by_mesh(study: Study, title: str = "") -> Axes:
+def plot_errors_by_mesh(study: ConvergenceStudy, title: str = "") -> Axes:
     """Draw every error against the degrees of freedom of the meshes."""
     places = [model.dofs for model in study.models]
     panels = error_panels(study, study.mesh_series(), places, "degrees of freedom", title)
@@ -109,7 +109,7 @@ def plot_errors_by_mesh(study: Study, title: str = "") -> Axes:
 
 
 def error_panels(
-    study: Study, series: Series, places: list[int], along: str, title: str
+    study: ConvergenceStudy, series: Series, places: list[int], along: str, title: str
 ) -> list[Axes]:
     """Draw one panel for each quantity, and a legend of the series in the last one."""
     figure = Figure(figsize=(11.0, 6.5), layout="constrained")
@@ -130,7 +130,7 @@ def error_panels(
     return panels
 
 
-def plot_cost(study: Study, title: str = "") -> Axes:
+def plot_cost(study: ConvergenceStudy, title: str = "") -> Axes:
     """Draw the errors of the resonance peak and of the folds and flips against time per orbit."""
     ax = new_axes(8.0, 5.0)
     times = [1e3 * model.seconds_per_orbit for model in study.models]
@@ -154,7 +154,7 @@ def plot_cost(study: Study, title: str = "") -> Axes:
 
 def draw_series(
     ax: Axes,
-    study: Study,
+    study: ConvergenceStudy,
     series: Series,
     quantity: str,
     abscissa: Sequence[float],
@@ -186,7 +186,7 @@ def draw_series(
     ax.grid(True, which="major", linewidth=0.3)
 
 
-def plot_special_points(study: Study, title: str = "") -> Axes:
+def plot_special_points(study: ConvergenceStudy, title: str = "") -> Axes:
     """Draw the folds and flips of the harmonic branch of every model, one line for each."""
     followed = [model for model in study.models if model.special_hz]
     ax = new_axes(10.5, 1.5 + 0.22 * len(followed))

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     import fem
     from nldyn.flow.flow_map import FlowMap
     from nldyn.io.checkpoint import CheckpointFile
-    from nldyn.reduction.selection import Selection
+    from nldyn.reduction.selection import ModeSelection
     from nldyn.runtime.progress import Progress
     from nldyn.search.diagram import Diagram
     from nldyn.search.exploration import Exploration
@@ -284,7 +284,7 @@ def build_reduced(
 
 def build_selection(
     scene: Scene, component: fem.Component | fem.StructureComponent | None = None
-) -> Selection:
+) -> ModeSelection:
     """Choose the modes of a scene by the tolerance of its ``[reduction]``.
 
     Parameters
@@ -296,8 +296,8 @@ def build_selection(
 
     Returns
     -------
-    Selection
-        As `nldyn.reduce_for` gives it.
+    ModeSelection
+        As `nldyn.select_modes` gives it.
 
     Raises
     ------
@@ -306,16 +306,16 @@ def build_selection(
     """
     import cms
     from nldyn.base.errors import ConvergenceError
-    from nldyn.reduction.selection import reduce_for
-    from nldyn.scene.setting import setting_of
+    from nldyn.reduction.selection import select_modes
+    from nldyn.scene.load_case import load_case_of
 
     table = scene.reduction
     assert table is not None and table.tolerance is not None
-    setting = setting_of(scene)
+    setting = load_case_of(scene)
     component = component or build_component(scene)
     faults = (cms.ReductionError, ConvergenceError, SystemModelError)
     with _told_as(scene, ("reduction",), *faults):
-        return reduce_for(component, setting, tolerance=table.tolerance)
+        return select_modes(component, setting, tolerance=table.tolerance)
 
 
 def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> System:
@@ -344,7 +344,7 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
     >>> f"{build_system(load_scene(example('one_dof.toml'))).frequencies_hz[0]:.4f}"
     '13.1293'
     """
-    from nldyn.reduction.setting import with_first
+    from nldyn.reduction.load_case import with_first
     from nldyn.system.system import System
 
     with _told_as(scene, (), SystemModelError):

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import cms
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_choice
-from nldyn.reduction.convergence import COUNTS, METHODS, Study, converge
+from nldyn.reduction.convergence import COUNTS, METHODS, ConvergenceStudy, convergence_study
 from nldyn.scene.build import build_component
+from nldyn.scene.load_case import load_case_of
 from nldyn.scene.messages import scene_error
-from nldyn.scene.setting import setting_of
 
 if TYPE_CHECKING:
     import cms
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from nldyn.scene.schema import Scene
 
 
-def study_of_scene(
+def convergence_study_of(
     scene: Scene,
     *,
     modes: Sequence[int] = COUNTS,
@@ -28,15 +28,15 @@ def study_of_scene(
     at_hz: float | None = None,
     full: bool = False,
     progress: Progress | None = None,
-) -> Study:
-    """The convergence study of a scene with a mesh, see `converge`.
+) -> ConvergenceStudy:
+    """The convergence study of a scene with a mesh, see `convergence_study`.
 
     Parameters
     ----------
     scene : Scene
         Its ``[reduction]`` is not used.
     modes, methods, at_hz, full, progress
-        As for `converge`.
+        As for `convergence_study`.
     refinements : sequence of int
         Meshes: every line is cut into so many.
     meshes : sequence of str
@@ -48,7 +48,7 @@ def study_of_scene(
     SceneError
         As `build_component`, and if a model cannot be made or no branch is found.
     """
-    setting = setting_of(scene)
+    setting = load_case_of(scene)
     if min(refinements) < 1:
         raise SystemModelError("converge: a refinement must be 1 or more")
     for method in methods:
@@ -63,7 +63,7 @@ def study_of_scene(
             for times in sorted(refinements)
         }
     try:
-        return converge(
+        return convergence_study(
             components,
             setting,
             modes=modes,

@@ -43,7 +43,7 @@ Tables = dict[str, Any]
 MOST_CASES = 10**6
 
 
-def study(
+def parameter_study(
     scene: Scene | str | Path,
     parameters: Mapping[str, Sequence[Any]],
     measure: Measure,
@@ -105,11 +105,11 @@ def study(
 
     Examples
     --------
-    >>> from nldyn import study
+    >>> from nldyn import parameter_study
     >>> from nldyn.base.resources import example
     >>> def first_frequency(system):
     ...     return {"f1_hz": system.frequencies_hz[0]}
-    >>> found = study(example("one_dof.toml"), {"matrices.stiffness": [[[16877.0]], [[20000.0]]]},
+    >>> found = parameter_study(example("one_dof.toml"), {"matrices.stiffness": [[[16877.0]], [[20000.0]]]},
     ...     first_frequency)
     >>> found["f1_hz"].values.round(3).tolist()
     [13.129, 14.293]

@@ -109,7 +109,8 @@ def index_gaps(
     --------
     From a flip of the harmonic branch on, its doubled branch is not among those given.
 
-    >>> from nldyn import Stop, System, Unbalance, continue_branch, index_gaps, solve_orbit
+    >>> from nldyn import Stop, System, Unbalance, continue_branch, solve_orbit
+    >>> from nldyn.search.fixed_point_index import index_gaps
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])

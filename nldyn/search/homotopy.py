@@ -10,7 +10,7 @@ import numpy as np
 from nldyn.branches.branch import Branch
 from nldyn.branches.checkpoint import BranchFile
 from nldyn.branches.options import ContinuationOptions
-from nldyn.orbits.homotopy import Detour, checked_factors, named
+from nldyn.orbits.homotopy import Homotopy, checked_factors, named
 from nldyn.orbits.orbit import Orbit, minimal_period, same_orbit
 from nldyn.runtime.progress import Progress
 from nldyn.runtime.threads import one_thread
@@ -101,7 +101,7 @@ def by_detour(
     """
     check_search(known, max_period, spacing, options, progress)
     own = known.branches[0].points[0].problem.flow
-    detour = Detour(own, checked_factors(own.system, factors))
+    detour = Homotopy(own, checked_factors(own.system, factors))
     box = collector_beside(known, options, progress, checkpoint)
     with box.checkpoint:
         take_kept(box, max_period)
@@ -151,7 +151,7 @@ def _met_from_others(known: Diagram, there: Sequence[Via], max_period: int) -> s
     return f"{len(met)} of the {len(given)} given met from others"
 
 
-def _followed(known: Collector, detour: Detour, max_period: int) -> list[Via]:
+def _followed(known: Collector, detour: Homotopy, max_period: int) -> list[Via]:
     """Branches of the changed system to which those known lead."""
     progress = known.progress
     box = Collector(detour.flow(1.0), known.range_hz, known.observe, known.options, progress)
@@ -197,7 +197,7 @@ def _follow_new(box: Collector, back: Sequence[tuple[Via, Orbit]], max_period: i
 
 
 def _folds_carried_back(
-    box: Collector, detour: Detour, there: Sequence[Via], max_period: int
+    box: Collector, detour: Homotopy, there: Sequence[Via], max_period: int
 ) -> str:
     """Carry the folds back, follow the branches of those on none of the box; how many came back.
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from killing import TABLES, check_results, check_whole, forked, run, same_results
 
-from nldyn import study
+from nldyn import parameter_study
 from nldyn.base.resources import example
 
 QUICK, FULL = 12, 220
@@ -160,9 +160,9 @@ def test_a_killed_study_goes_on_with_the_cases_it_has(tmp_path):
     values = {"stops.0.gap": [1e-6 * k for k in range(150)]}
 
     def work():
-        study(example("one_dof.toml"), values, measured, keep=keep)
+        parameter_study(example("one_dof.toml"), values, measured, keep=keep)
 
-    work_once = study(example("one_dof.toml"), values, measured)
+    work_once = parameter_study(example("one_dof.toml"), values, measured)
     kept = 0
     for _ in range(6):
         assert forked(work, tmp_path / "log", chance.uniform(0.05, 0.3)) in (0, -signal.SIGKILL)
@@ -172,5 +172,5 @@ def test_a_killed_study_goes_on_with_the_cases_it_has(tmp_path):
                 json.loads(line)
             assert len(lines) >= kept
             kept = len(lines)
-    found = study(example("one_dof.toml"), values, measured, keep=keep)
+    found = parameter_study(example("one_dof.toml"), values, measured, keep=keep)
     assert found.identical(work_once)

@@ -12,8 +12,8 @@ import pytest
 from killing import check_whole, run, same_results
 from limited_commands import command, refusal
 
-from nldyn import Walk
 from nldyn.base.resources import example
+from nldyn.branches.arclength import Stepper
 from nldyn.io import checkpoint
 from nldyn.plot import diagram as plot
 from nldyn.report import results as output
@@ -185,7 +185,7 @@ def stopped_at(monkeypatch, owner, name, call):
 STAGES = {
     "scene": ("nldyn.scene.build", "load_scene", 1, False),
     "search": ("nldyn.search.diagram", "simulate_strobe", 1, False),
-    "walk": ("nldyn.branches.arclength.Walk", "_advance", 20, True),
+    "walk": ("nldyn.branches.arclength.Stepper", "_advance", 20, True),
     "tables": ("nldyn.report.results", "write_table", 2, True),
     "picture": ("nldyn.plot.diagram", "save_diagram", 1, True),
     "exchange": ("nldyn.runtime.result_directory", "_swap", 1, True),
@@ -195,7 +195,7 @@ STAGES = {
 @pytest.mark.parametrize("stage", STAGES)
 def test_ctrl_c_at_every_stage(scene, whole, tmp_path, monkeypatch, stage):
     place, name, call, kept = STAGES[stage]
-    owner = sys.modules.get(place) or Walk
+    owner = sys.modules.get(place) or Stepper
     out = tmp_path / "out"
     with monkeypatch.context() as pressed:
         stopped_at(pressed, owner, name, call)

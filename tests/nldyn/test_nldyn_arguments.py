@@ -21,9 +21,7 @@ from nldyn import (
     System,
     SystemModelError,
     Unbalance,
-    Walk,
     cascade,
-    cascades_in,
     continue_branch,
     continue_constant,
     continue_in,
@@ -34,19 +32,17 @@ from nldyn import (
     find_orbits,
     index_sum,
     normal_form,
-    plot_contact_force,
-    plot_curves,
-    plot_diagram,
-    plot_history,
-    plot_phase_portrait,
-    plot_spectrum,
     refine_special,
     solve_orbit,
-    spectrum,
-    switch_at_branch_point,
-    switch_at_flip,
 )
+from nldyn.bifurcations.normal_forms import switch_at_branch_point
+from nldyn.bifurcations.period_doubling import switch_at_flip
+from nldyn.branches.arclength import Stepper
+from nldyn.branches.cascades import cascades_in
 from nldyn.io.curves import load_curve
+from nldyn.plot.curves import plot_curves
+from nldyn.plot.diagram import plot_diagram
+from nldyn.plot.orbit import plot_contact_force, plot_history, plot_phase_portrait, plot_spectrum
 
 JUNK = (None, "nonsense", [], {"a": 1}, math.nan, -1.0, 10**400, object())
 PAIR, WINDOW = ("frequency_hz", "gap"), ((20.0, 30.0), (-1e-6, 1e-6))
@@ -287,7 +283,7 @@ def test_other_arguments_of_a_wrong_kind_are_named(one_dof, orbit, harmonic_bran
     for name in ("laws", "monitor"):
         said = refused(lambda x, name=name: load_curve(curve, **{name: x}), 3, "text", [1])
         check_named(said, f"{name} must be")
-    check_named(refused(lambda x: Walk(x, (25.0, 27.0), ContinuationOptions())), "start must be")
+    check_named(refused(lambda x: Stepper(x, (25.0, 27.0), ContinuationOptions())), "start must be")
     check_named(refused(lambda x: one_dof.with_elements(stops=x), 3, [3]), "stop")
 
 

@@ -20,17 +20,17 @@ from nldyn import (
     System,
     SystemModelError,
     Unbalance,
-    Walk,
     continue_branch,
     diagram,
     find_orbits,
     solve_orbit,
-    switch_at_flip,
 )
 from nldyn.base.errors import LocateError
 from nldyn.base.resources import example
+from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.bifurcations.point import BranchPoint
 from nldyn.bifurcations.within_step import special_points_between
+from nldyn.branches.arclength import Stepper
 from nldyn.branches.continuation import start_point
 from nldyn.branches.leg import trace
 from nldyn.branches.peaks import lowest_orbit, resonance_peaks
@@ -379,12 +379,12 @@ def test_both_orbits_close_to_a_fold_are_given(harmonic_branch, index):
 
 def test_walk_can_be_stopped_between_two_points_and_taken_up_again(one_dof):
     start = start_point(solve_orbit(one_dof, 45.0), 1.0, RANGE_HZ)
-    walk = Walk(start, (40.0, 60.0), ContinuationOptions())
+    walk = Stepper(start, (40.0, 60.0), ContinuationOptions())
     some = list(itertools.islice(walk, 4))
     assert [p.arclength for p in some] == sorted(p.arclength for p in some)
     assert some[0] is start
     assert walk.stop_reason == "not finished"
-    rest = Walk(some[-1], (40.0, 60.0), ContinuationOptions())
+    rest = Stepper(some[-1], (40.0, 60.0), ContinuationOptions())
     points = list(rest)
     assert rest.stop_reason == "end of the frequency range"
     assert points[-1].orbit.frequency_hz == pytest.approx(60.0, rel=1e-14)

@@ -23,14 +23,13 @@ from nldyn import (
     continue_branch,
     diagram,
     solve_orbit,
-    switch_at_branch_point,
-    switch_at_flip,
 )
 from nldyn.base.errors import LocateError
 from nldyn.base.resources import example
 from nldyn.bifurcations import locate as special
 from nldyn.bifurcations.branch_crossing import distance, lies_on_crossing
-from nldyn.bifurcations.normal_forms import is_symmetric
+from nldyn.bifurcations.normal_forms import is_symmetric, switch_at_branch_point
+from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.bifurcations.point import BranchPoint
 from nldyn.bifurcations.within_step import special_points_between
 from nldyn.branches import arclength as walk

@@ -30,9 +30,9 @@ from nldyn import (
     normal_form,
     refine_special,
     solve_orbit,
-    switch_at_flip,
 )
 from nldyn.base.resources import example
+from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.branches.leg import trace
 from nldyn.curves import events as codimension
 from nldyn.curves.events import along_tori, flip_coefficient, is_torus

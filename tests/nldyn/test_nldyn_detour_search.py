@@ -32,7 +32,7 @@ from nldyn.bifurcations.point import is_at
 from nldyn.branches.checkpoint import Checkpoint
 from nldyn.flow.flow_map import flow_of
 from nldyn.io.branches import load_branches, load_diagram, save_branches
-from nldyn.orbits.homotopy import Detour, _far, checked_factors
+from nldyn.orbits.homotopy import Homotopy, _far, checked_factors
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.starts import orbit_near
 from nldyn.paper.jobs import scene_system
@@ -135,7 +135,7 @@ SECOND = Parameter("natural_frequency_hz", 1)
 def test_carried_by_a_detour_and_back_an_orbit_is_the_same(factors):
     system = replace(two_modes(), dampers=(Damper("tip", 0.3),))
     orbit = solve_orbit(system, 10.0)
-    detour = Detour(orbit.problem.flow, checked_factors(system, factors))
+    detour = Homotopy(orbit.problem.flow, checked_factors(system, factors))
     other = detour.carried(orbit, 0.0, 1.0)
     there, tiny = other.system, {"rtol": 1e-12}
     all_damping = factors.get("damping", 1.0)
@@ -162,7 +162,7 @@ def three(harmonic) -> Diagram:
 @pytest.mark.parametrize("factors", [{"damping": 0.9}, {"excitation": 1.02}, {SECOND: 1.003}])
 def test_a_fold_carried_there_and_back_is_the_same_and_moves_meanwhile(found, factors):
     (first, *_) = [s for s in found.branches[1].special_points if s.kind == "LP"]
-    detour = Detour(first.orbit.problem.flow, checked_factors(two_modes(), factors))
+    detour = Homotopy(first.orbit.problem.flow, checked_factors(two_modes(), factors))
     there = detour.carried_fold(first.orbit, 0.0, 1.0)
     assert runge_kutta_gap(there, detour.flow(1.0).system) < 1e-8
     assert np.abs(there.multipliers - 1.0).min() < 1e-6
@@ -179,13 +179,13 @@ def folds_of(diagram: Diagram) -> list[Orbit]:
 def asked(monkeypatch) -> list[tuple[float, bytes]]:
     """Places on its way at which a fold is looked for, and from which guesses."""
     asked: list[tuple[float, bytes]] = []
-    near = Detour._fold_near
+    near = Homotopy._fold_near
 
     def noted(self, fold, share, guess):
         asked.append((share, guess.tobytes()))
         return near(self, fold, share, guess)
 
-    monkeypatch.setattr(Detour, "_fold_near", noted)
+    monkeypatch.setattr(Homotopy, "_fold_near", noted)
     return asked
 
 
@@ -195,7 +195,7 @@ def test_every_fold_gets_to_a_natural_frequency_a_little_off(three, index, facto
     """Newton's method finds some from nowhere but near by: steps below 1e-3 are needed at first."""
     factors = checked_factors(two_modes(), {Parameter("natural_frequency_hz", index): factor})
     folds = folds_of(three)
-    detour = Detour(folds[0].problem.flow, factors)
+    detour = Homotopy(folds[0].problem.flow, factors)
     assert len(folds) == 9
     for fold in folds:
         asked.clear()
@@ -208,7 +208,7 @@ def test_every_fold_gets_to_a_natural_frequency_a_little_off(three, index, facto
 def test_a_fold_whose_way_is_smooth_takes_steps_each_longer_than_the_one_before(three, asked):
     fold = folds_of(three)[0]
     factors = checked_factors(two_modes(), {"excitation": 1.1})
-    assert Detour(fold.problem.flow, factors).carried_fold(fold, 0.0, 1.0) is not None
+    assert Homotopy(fold.problem.flow, factors).carried_fold(fold, 0.0, 1.0) is not None
     places = [place for place, _ in asked]
     steps = np.diff([0.0, *places])
     assert places[-1] == 1.0 and len(places) <= 8
@@ -228,7 +228,7 @@ def test_a_fold_is_not_changed_for_another_one_near_by_on_its_way(start_hz, fold
     orbit = orbit_near(flow_of(system), start.state, 3, omega, "middle")
     branch = continue_branch(orbit, (18.0, 90.0), options=ContinuationOptions(max_points=250))
     (fold,) = (s for s in branch.special_points if abs(s.frequency_hz - fold_hz) < 2e-6)
-    detour = Detour(orbit.problem.flow, checked_factors(system, factors))
+    detour = Homotopy(orbit.problem.flow, checked_factors(system, factors))
     there = detour.carried_fold(fold.orbit, 0.0, 1.0)
     back = there and detour.carried_fold(there, 1.0, 0.0)
     assert back is None or is_at(back, fold)
@@ -240,7 +240,7 @@ def test_folds_of_small_motions_are_carried_as_those_of_large_ones():
     for size in (1.0, 1e-6):
         system = two_modes(size=size)
         branch = continue_branch(solve_orbit(system, 10.99), RANGE_HZ)
-        detour = Detour(branch.points[0].problem.flow, checked_factors(system, HALF))
+        detour = Homotopy(branch.points[0].problem.flow, checked_factors(system, HALF))
         folds = folds_of(Diagram((branch,), RANGE_HZ, "tip"))
         ends.append([detour.carried_fold(fold, 0.0, 1.0).frequency_hz for fold in folds])
     assert len(ends[0]) == 4
@@ -263,7 +263,7 @@ def test_far_is_told_of_states_and_of_frequencies(size, states, frequency, first
 
 def test_an_orbit_far_from_where_it_was_expected_is_not_taken(harmonic):
     orbit, other = (solve_orbit(two_modes(), hz) for hz in (10.0, 7.5))
-    detour = Detour(orbit.problem.flow, checked_factors(two_modes(), HALF))
+    detour = Homotopy(orbit.problem.flow, checked_factors(two_modes(), HALF))
     asked = []
 
     def near(here, share, guess):
@@ -279,7 +279,7 @@ def test_what_is_no_fold_in_the_end_is_not_taken(found, monkeypatch):
     monkeypatch.setattr(
         "nldyn.orbits.homotopy.correct", lambda *_: SimpleNamespace(converged=False, orbit=fold)
     )
-    detour = Detour(fold.problem.flow, checked_factors(two_modes(), HALF))
+    detour = Homotopy(fold.problem.flow, checked_factors(two_modes(), HALF))
     assert detour.carried_fold(fold, 0.0, 1.0) is None
 
 

@@ -21,7 +21,6 @@ from nldyn import (
     Plane,
     Stop,
     SystemModelError,
-    TaskError,
     basin_edge,
     basins,
     brute_force,
@@ -39,7 +38,7 @@ from nldyn import (
 from nldyn.base.resources import example
 from nldyn.longterm.wear import measures_table
 from nldyn.runtime import executors
-from nldyn.runtime.executors import as_finished
+from nldyn.runtime.executors import TaskError, as_finished
 from nldyn.scene.build import build_system, load_scene
 
 

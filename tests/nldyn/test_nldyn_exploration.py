@@ -31,11 +31,11 @@ from nldyn import (
     index_sum,
     save,
     solve_orbit,
-    switch_at_branch_point,
-    switch_at_flip,
 )
 from nldyn.base.errors import LocateError
 from nldyn.base.resources import example
+from nldyn.bifurcations.normal_forms import switch_at_branch_point
+from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.branches import at_frequency as crossings
 from nldyn.io import checkpoint
 from nldyn.io.branches import load_branches, load_diagram, load_exploration

@@ -20,11 +20,10 @@ from nldyn import (
     continue_branch,
     diagram,
     explore,
-    index_gaps,
     index_sum,
     solve_orbit,
 )
-from nldyn.search.fixed_point_index import index, index_note
+from nldyn.search.fixed_point_index import index, index_gaps, index_note
 
 
 @pytest.fixture(scope="module")

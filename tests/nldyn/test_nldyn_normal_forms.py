@@ -19,14 +19,11 @@ from nldyn import (
     SystemModelError,
     Unbalance,
     cascade,
-    cascades_in,
     continue_branch,
     describe,
     diagram,
     normal_form,
     solve_orbit,
-    switch_at_branch_point,
-    switch_at_flip,
 )
 from nldyn.bifurcations.critical import (
     CoefficientError,
@@ -40,9 +37,10 @@ from nldyn.bifurcations.critical import (
     loop_of,
     torus,
 )
-from nldyn.bifurcations.normal_forms import is_symmetric, resonance
+from nldyn.bifurcations.normal_forms import is_symmetric, resonance, switch_at_branch_point
+from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.bifurcations.point import SpecialPoint
-from nldyn.branches.cascades import FEIGENBAUM
+from nldyn.branches.cascades import FEIGENBAUM, cascades_in
 from nldyn.branches.leg import trace
 from nldyn.orbits.newton import refine
 from nldyn.orbits.shooting import shooting_problem

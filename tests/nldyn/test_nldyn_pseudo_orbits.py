@@ -19,7 +19,6 @@ from nldyn import (
     SystemModelError,
     by_pseudo_orbits,
     continue_branch,
-    index_gaps,
     index_sum,
     save,
     solve_orbit,
@@ -31,6 +30,7 @@ from nldyn.paper.jobs import scene_system
 from nldyn.search import pseudo_orbits
 from nldyn.search.by_pseudo_orbits import WAYS
 from nldyn.search.exploration import steps_between
+from nldyn.search.fixed_point_index import index_gaps
 from nldyn.search.pseudo_orbits import FARTHEST, NEAR, NODES, Pieces
 
 

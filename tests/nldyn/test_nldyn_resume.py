@@ -21,12 +21,12 @@ from nldyn import (
     System,
     SystemModelError,
     Unbalance,
-    Walk,
     continue_branch,
     diagram,
     save,
     solve_orbit,
 )
+from nldyn.branches.arclength import Stepper
 from nldyn.branches.branch import CLOSED, NOT_FINISHED
 from nldyn.io import checkpoint
 from nldyn.io.branches import load_branch, load_branches
@@ -328,13 +328,13 @@ def test_a_continuation_begun_at_a_fold_goes_on(whole, tmp_path, often):
 def points_computed(monkeypatch):
     """Count the points that walks compute."""
     made = []
-    advance = Walk._advance
+    advance = Stepper._advance
 
     def counted(*arguments):
         made.append(None)
         return advance(*arguments)
 
-    monkeypatch.setattr(Walk, "_advance", counted)
+    monkeypatch.setattr(Stepper, "_advance", counted)
     return made
 
 

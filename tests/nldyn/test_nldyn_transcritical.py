@@ -29,9 +29,8 @@ from nldyn import (
     describe,
     refine_special,
     solve_orbit,
-    switch_at_branch_point,
 )
-from nldyn.bifurcations.normal_forms import other_tangent
+from nldyn.bifurcations.normal_forms import other_tangent, switch_at_branch_point
 from nldyn.orbits.orbit import Orbit
 
 FORCE, DAMPING_X, DAMPING_Y = 9.0, 0.1, 0.02

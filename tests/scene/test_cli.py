@@ -12,9 +12,9 @@ from fakes import diagram
 import nldyn.paper
 import nldyn.runtime.progress
 import nldyn.scene.build
-from nldyn import Walk
 from nldyn.app.cli import main
 from nldyn.base.resources import example, mesh
+from nldyn.branches.arclength import Stepper
 from nldyn.io.branches import load_branches, load_diagram, load_exploration, save_branches
 from nldyn.paper.kept import kept, kept_folder
 from nldyn.search import explore as survey
@@ -115,7 +115,7 @@ def short_scene(folder):
 def test_a_run_goes_on_after_ctrl_c(tmp_path, monkeypatch):
     scene, out = short_scene(tmp_path), tmp_path / "new" / "out"
     assert invoke("run", scene, "--out", tmp_path / "whole", "--quiet").exit_code == 0
-    advance = Walk._advance
+    advance = Stepper._advance
     steps = []
 
     def counted(*arguments):
@@ -124,7 +124,7 @@ def test_a_run_goes_on_after_ctrl_c(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return advance(*arguments)
 
-    monkeypatch.setattr(Walk, "_advance", counted)
+    monkeypatch.setattr(Stepper, "_advance", counted)
     limit = 60
     stopped = invoke("run", scene, "--out", out, "--quiet")
     unfinished = tmp_path / "new" / "out.unfinished.h5"

@@ -19,7 +19,7 @@ from nldyn.scene.build import (
     load_scene,
     parse_scene,
 )
-from nldyn.scene.setting import setting_of
+from nldyn.scene.load_case import load_case_of
 
 MODAL = """
 [modal]
@@ -36,7 +36,7 @@ def test_rayleighs_damping_of_a_mesh_is_that_of_its_matrices():
     squares = build_system(scene).natural_frequencies ** 2
     added = build_system(damped).total_damping - build_system(scene).total_damping
     np.testing.assert_allclose(added, np.diag(2.0 + 1e-5 * squares), rtol=1e-10, atol=1e-9)
-    asked = setting_of(damped).system(build_reduced(scene)).total_damping
+    asked = load_case_of(damped).system(build_reduced(scene)).total_damping
     np.testing.assert_allclose(asked, build_system(damped).total_damping, rtol=1e-12)
     with pytest.raises(SceneError, match=r"Rayleigh's damping, which needs a \[mesh\]"):
         build_system(parse_scene(MODAL + "[damping]\nrayleigh_mass = 1.0"))
@@ -120,12 +120,12 @@ def with_tolerance(*changes):
 def test_a_tolerance_asks_for_a_selection_in_the_scenes_setting(monkeypatch, caplog):
     asked = {}
 
-    def reduce_for(component, setting, *, tolerance):
+    def select_modes(component, setting, *, tolerance):
         assert set(component.interfaces) == {"middle"}
         asked.update(range=setting.range_hz, tolerance=tolerance)
         return SimpleNamespace(reduced="the model", report=lambda: "modes kept: 1")
 
-    monkeypatch.setattr("nldyn.reduction.selection.reduce_for", reduce_for)
+    monkeypatch.setattr("nldyn.reduction.selection.select_modes", select_modes)
     with caplog.at_level("INFO", logger="nldyn"):
         assert build_reduced(with_tolerance()) == "the model"
     assert asked == {"range": (15.0, 90.0), "tolerance": 0.3}

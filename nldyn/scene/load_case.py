@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nldyn.reduction.setting import Setting
+from nldyn.reduction.load_case import LoadCase
 from nldyn.scene.build import acting_elements
 from nldyn.scene.checks import check_computable
 from nldyn.scene.messages import scene_error
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from nldyn.scene.schema import Scene
 
 
-def setting_of(scene: Scene) -> Setting:
+def load_case_of(scene: Scene) -> LoadCase:
     """The setting of a scene.
 
     Raises
@@ -31,7 +31,7 @@ def setting_of(scene: Scene) -> Setting:
     assert scene.continuation is not None
     low, high = scene.continuation.range_hz
     stops, dampers, excitation = acting_elements(scene)
-    return Setting(
+    return LoadCase(
         (low, high),
         stops,
         dampers,

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Setting:
+class LoadCase:
     """Stops, dampers and excitation of a component whose reduction is still open.
 
     Parameters
@@ -39,7 +39,7 @@ class Setting:
     Examples
     --------
     >>> from nldyn import Unbalance
-    >>> Setting((15.0, 90.0), excitation=(Unbalance("middle", 4.92e-6),)).modal_damping
+    >>> LoadCase((15.0, 90.0), excitation=(Unbalance("middle", 4.92e-6),)).modal_damping
     0.0
     """
 
