@@ -95,17 +95,17 @@ def test_what_is_no_special_point_is_refused(function, arguments):
 
 
 @pytest.mark.parametrize(
-    "plot", [plot_history, plot_phase_portrait, plot_spectrum, plot_contact_force, spectrum]
+    "plot", [plot_history, plot_phase_portrait, plot_spectrum, plot_contact_force, harmonics]
 )
 def test_what_is_no_orbit_cannot_be_drawn(plot, orbit):
     check_named(refused(plot), "orbit must be an Orbit, got")
-    if plot is not spectrum:
+    if plot is not harmonics:
         axes = [junk for junk in JUNK if junk is not None]
         check_named(refused(lambda junk: plot(orbit, junk), *axes), "ax must be an Axes or None")
     if plot is not plot_contact_force:
         said = refused(lambda junk: plot(orbit, interface=junk), [], 3, math.nan)
         check_named(said, "interface must be a str or None")
-    word = "orders" if plot in (plot_spectrum, spectrum) else "samples"
+    word = "orders" if plot in (plot_spectrum, harmonics) else "samples"
     said = refused(lambda junk: plot(orbit, **{word: junk}))
     check_named(said, f"{word} must be a whole number")
 
