@@ -33,6 +33,10 @@ class BranchPoint:
     arclength: float
     tests: dict[str, float] = field(default_factory=dict, repr=False)
 
+    def __repr__(self) -> str:
+        """One line: the orbit and where it is along the branch."""
+        return f"<BranchPoint at arclength {self.arclength:.4g}: {self.orbit!r}>"
+
 
 @dataclass(frozen=True, eq=False)
 class SpecialPoint:
@@ -51,6 +55,14 @@ class SpecialPoint:
     kind: str
     point: BranchPoint
     frequency_error: float
+
+    def __repr__(self) -> str:
+        """One line: kind, frequency with its error, the orbit's period and size."""
+        orbit = self.orbit
+        return (
+            f"<{self.kind} at {self.frequency_hz:.9g} Hz (error {self.frequency_error:.1g}): "
+            f"period {orbit.period}, {orbit.max_abs_displacement:.4g} m>"
+        )
 
     @property
     def orbit(self) -> Orbit:

@@ -40,6 +40,11 @@ class Cascade:
     branches: tuple[Branch, ...]
     stop_reason: str
 
+    def __repr__(self) -> str:
+        """One line: the flips and why there are no more."""
+        hz = ", ".join(f"{flip.frequency_hz:.8g}" for flip in self.flips) or "none"
+        return f"<Cascade of flips at {hz} Hz; {self.stop_reason}>"
+
     @property
     def ratios(self) -> list[Estimate]:
         r"""Ratios :math:`\delta_n = (f_n - f_{n-1}) / (f_{n+1} - f_n)` with their errors.

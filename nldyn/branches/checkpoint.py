@@ -188,8 +188,8 @@ def checkpoint_of_several(
         same_range = branch.course is not None and branch.course.range_hz == range_hz
         if not (same_range and same_flow(branch.points[0].problem.flow, flow)):
             raise SystemModelError(
-                f"{place.name}: holds branches of another system, accuracy or range; choose another "
-                "file, or delete it"
+                f"{place.name}: holds branches of another system, accuracy or range; choose "
+                "another file, or delete it"
             )
     known = len(finished)
     held: list[Branch] = []

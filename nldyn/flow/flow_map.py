@@ -191,6 +191,10 @@ class FlowMap:
     True
     """
 
+    def __repr__(self) -> str:
+        """One line: the system and the accuracy."""
+        return f"<FlowMap to {self.options.rtol:g} of {self.system!r}>"
+
     def __init__(self, system: System, options: FlowOptions | None = None) -> None:
         check_types(system=(system, System), options=(options, FlowOptions, None))
         self.system = system
@@ -416,7 +420,7 @@ class FlowMap:
         longest: float,
         max_iterations: int,
     ) -> Solution:
-        """Solve the shooting equations with ``row @ point = level``; see `kernels.newton.Corrector`.
+        """Solve the shooting equations with ``row @ point = level``; see `newton.Corrector`.
 
         Parameters
         ----------

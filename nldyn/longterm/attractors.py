@@ -136,6 +136,15 @@ class Attractor:
     returns_after: int = 0
     _cache: dict[int, Motion] = field(default_factory=dict, repr=False)
 
+    def __repr__(self) -> str:
+        """One line: kind, frequency, and the orbit or the largest exponent."""
+        what = (
+            f": {self.orbit!r}" if self.orbit else f": {self.exponents!r}" if self.exponents else ""
+        )
+        return (
+            f"<Attractor, {self.kind}, at {self.frequency_hz:.6g} Hz{what or ': ' + self.failure}>"
+        )
+
     @property
     def period(self) -> int:
         """Period multiple of the orbit; 0 if there is none."""

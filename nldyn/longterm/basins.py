@@ -75,6 +75,11 @@ class Plane:
     x_label: str = "x"
     y_label: str = "y"
 
+    def __repr__(self) -> str:
+        """One line: what is on the axes, and how far they reach."""
+        (a, b), (c, d) = self.x_range, self.y_range
+        return f"<Plane: {self.x_label} {a:g} to {b:g}, {self.y_label} {c:g} to {d:g}>"
+
     def __post_init__(self) -> None:
         for name in ("origin", "x", "y"):
             object.__setattr__(self, name, numbers(f"plane: {name}", getattr(self, name)))
@@ -234,6 +239,14 @@ class Basins:
     checked: int
     wrong: int
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """One line: cells, frequency, attractors."""
+        rows, columns = self.labels.shape
+        kinds = ", ".join(attractor.kind for attractor in self.attractors) or "none"
+        return (
+            f"<Basins: {columns} x {rows} cells at {self.frequency_hz:.6g} Hz, attractors: {kinds}>"
+        )
 
     @property
     def undecided(self) -> float:

@@ -57,6 +57,13 @@ class LyapunovSpectrum:
     periods: int
     end: Real
 
+    def __repr__(self) -> str:
+        """One line: the largest exponent with its standard error."""
+        return (
+            f"<LyapunovSpectrum at {self.frequency_hz:.6g} Hz: largest {self.exponents[0]:.4g} +- "
+            f"{self.errors[0]:.1g} 1/s over {self.periods} periods>"
+        )
+
     @property
     def largest(self) -> float:
         """Largest exponent in 1/s."""

@@ -71,6 +71,12 @@ class Motion:
     failure: str = ""
     rate_hz_per_s: float = 0.0
 
+    def __repr__(self) -> str:
+        """One line: duration, frequencies, what ended it."""
+        ended = f"; ended early: {self.failure}" if self.failure else ""
+        rate = f", {self.rate_hz_per_s:+.4g} Hz/s" if self.rate_hz_per_s else ""
+        return f"<Motion of {self.begins[-1] - self.begins[0]:.6g} s{rate}{ended}>"
+
     @property
     def system(self) -> System:
         """The system."""

@@ -30,6 +30,15 @@ class Harmonics:
     frequency_hz: Real
     phasor: Complex
 
+    def __repr__(self) -> str:
+        """One line: how many lines, and the largest."""
+        size = np.abs(self.phasor)
+        most = int(np.argmax(size))
+        return (
+            f"<Harmonics: {size.size} lines, the largest {size[most]:.4g} at "
+            f"{self.frequency_hz[most]:.6g} Hz>"
+        )
+
     @property
     def amplitude(self) -> Real:
         """Amplitudes of the lines in m, (m + 1,)."""

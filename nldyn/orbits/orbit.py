@@ -47,6 +47,13 @@ class Extremes:
     values: Real
     is_maximum: NDArray[np.bool_]
 
+    def __repr__(self) -> str:
+        """One line: how many, and between which values."""
+        if not self.values.size:
+            return "<Extremes: none>"
+        low, high = self.values.min(), self.values.max()
+        return f"<Extremes: {self.values.size} from {low:.4g} to {high:.4g} m>"
+
 
 @dataclass(frozen=True, eq=False)
 class History:
@@ -72,6 +79,11 @@ class History:
     displacement: dict[str, Real]
     penetration: Real
     force: Real
+
+    def __repr__(self) -> str:
+        """One line: samples, duration, interfaces."""
+        names = ", ".join(map(repr, self.displacement)) or "no interface"
+        return f"<History: {self.time.size} samples up to {self.time[-1]:.4g} s of {names}>"
 
 
 @dataclass(frozen=True)
@@ -133,6 +145,15 @@ class Orbit:
     error: float
     observe: str
     motion: Trajectory | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        """One line: period, frequency, amplitude, impacts, stability."""
+        try:
+            size = f"{self.max_abs_displacement:.4g} m at '{self.observe}', {self.impacts} impacts"
+            stability: str = self.stability.verdict
+        except ConvergenceError as error:
+            size, stability = str(error), "stability unknown"
+        return f"<Orbit of period {self.period} at {self.frequency_hz:.6g} Hz: {size}, {stability}>"
 
     @classmethod
     def of(cls, problem: ShootingProblem, found: Solution, observe: str) -> Orbit:

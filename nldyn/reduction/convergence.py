@@ -157,6 +157,10 @@ class ConvergenceStudy:
     best: Measured
     reference_error: float = 0.0
 
+    def __repr__(self) -> str:
+        """One line: how many models, and at which frequency their orbits are compared."""
+        return f"<ConvergenceStudy of {len(self.models)} models, orbits at {self.at_hz:.6g} Hz>"
+
     @property
     def reference(self) -> Measured:
         """The model with which eigenfrequencies and receptance are compared: the full one if
@@ -527,7 +531,9 @@ def receptance(reduced: cms.ReducedModel, setting: LoadCase, frequency_hz: Real)
     return np.array(found)
 
 
-def massless_receptance(reduced: cms.ReducedModel, setting: LoadCase, frequency_hz: Real) -> Complex:
+def massless_receptance(
+    reduced: cms.ReducedModel, setting: LoadCase, frequency_hz: Real
+) -> Complex:
     """The same where part of the flexibility has no mass: dampers close R = P Z^-1 P^T + G."""
     if any(setting.rayleigh):  # not known where flexibility has no mass
         return np.full(len(frequency_hz), np.nan, dtype=complex)

@@ -105,6 +105,14 @@ class ModeSelection:
     extra: int = 0
     doubtful: int = 0
 
+    def __repr__(self) -> str:
+        """One line: the modes that are kept, and the error of the response."""
+        low, high = self.error
+        return (
+            f"<ModeSelection: modes {', '.join(map(str, self.kept)) or '(none)'} up to "
+            f"{self.cutoff_hz:.4g} Hz, error {low:.1g} to {high:.1g} of {self.tolerance:g} wanted>"
+        )
+
     def report(self) -> str:
         """What was kept and left out, and the estimated error."""
         hz = self.reduced.frequencies_hz

@@ -109,8 +109,8 @@ def parameter_study(
     >>> from nldyn.base.resources import example
     >>> def first_frequency(system):
     ...     return {"f1_hz": system.frequencies_hz[0]}
-    >>> found = parameter_study(example("one_dof.toml"), {"matrices.stiffness": [[[16877.0]], [[20000.0]]]},
-    ...     first_frequency)
+    >>> found = parameter_study(example("one_dof.toml"),
+    ...     {"matrices.stiffness": [[[16877.0]], [[20000.0]]]}, first_frequency)
     >>> found["f1_hz"].values.round(3).tolist()
     [13.129, 14.293]
 

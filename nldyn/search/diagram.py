@@ -92,6 +92,16 @@ class Diagram:
     observe: str
     notes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        """One line: range, branches, special points."""
+        low, high = self.range_hz
+        special = sum(len(branch.special_points) for branch in self.branches)
+        periods = ", ".join(map(str, sorted({branch.period for branch in self.branches})))
+        return (
+            f"<Diagram of {low:g} to {high:g} Hz at '{self.observe}': {counted(self.branches)} of "
+            f"period {periods or '(none)'}, {special} special points>"
+        )
+
     def of_period(self, period: int) -> list[Branch]:
         """Branches of one period multiple."""
         return [b for b in self.branches if b.period == period]

@@ -249,8 +249,8 @@ class _Survey:
             )
             if not (self.question.same(kept.question) and _same_branches(given, self.known)):
                 raise SystemModelError(
-                    f"{place.name}: holds another exploration (other system, range, periods, effort, "
-                    "options or known branches); choose another file, or delete it"
+                    f"{place.name}: holds another exploration (other system, range, periods, "
+                    "effort, options or known branches); choose another file, or delete it"
                 )
             self.stage = kept.stage
             take = self.box.take_back if kept.stage.steps else self.box.take

@@ -72,6 +72,17 @@ class System:
     dampers: tuple[Damper, ...] = ()
     excitation: tuple[Excitation, ...] = ()
 
+    def __repr__(self) -> str:
+        """One line: modes, interfaces, and what acts."""
+        hz = ", ".join(f"{value:.6g}" for value in self.frequencies_hz[:4])
+        more = ", ..." if self.size > 4 else ""
+        names = ", ".join(map(repr, self.interfaces)) or "none"
+        return (
+            f"<System of {self.size} modes at {hz}{more} Hz; interfaces {names}; "
+            f"{len(self.stops)} stops, {len(self.dampers)} dampers, "
+            f"{len(self.excitation)} excitations>"
+        )
+
     def __post_init__(self) -> None:
         self._check_shapes()
         self._check_interfaces()

@@ -14,9 +14,9 @@ from limited_commands import command, refusal
 
 from nldyn.base.resources import example
 from nldyn.branches.arclength import Stepper
-from nldyn.io import checkpoint
 from nldyn.plot import diagram as plot
 from nldyn.report import results as output
+from nldyn.runtime import keeper
 
 START = "from nldyn.app.command import main; main()"
 
@@ -84,8 +84,8 @@ def test_a_disk_that_is_full_on_the_way_does_not_end_the_computation(
     scene, whole, tmp_path, monkeypatch
 ):
     """Only the file for going on is missing meanwhile; the results come as ever."""
-    monkeypatch.setattr(checkpoint, "PAUSE", 0.05)
-    monkeypatch.setattr(checkpoint, "SHARE", 0.0)
+    monkeypatch.setattr(keeper, "PAUSE", 0.05)
+    monkeypatch.setattr(keeper, "SHARE", 0.0)
     fsync, calls = os.fsync, []
 
     def sometimes(handle):

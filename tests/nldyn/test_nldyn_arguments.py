@@ -30,6 +30,7 @@ from nldyn import (
     diagram,
     explore,
     find_orbits,
+    harmonics,
     index_sum,
     normal_form,
     refine_special,

@@ -197,13 +197,14 @@ def test_every_checkpoint_on_the_way_goes_on_to_the_same_branch(
 KILLED = """
 import os, signal
 from nldyn import continue_branch, solve_orbit
-from nldyn.io import checkpoint
+from nldyn.runtime import keeper
 from one_dof import RANGE_HZ, make_one_dof
 
-checkpoint.PAUSE = checkpoint.SHARE = 0.0
+keeper.PAUSE = keeper.SHARE = 0.0
 seen = iter(range(25))
 die = lambda _: next(seen, None) is None and os.kill(os.getpid(), signal.SIGKILL)
-continue_branch(solve_orbit(make_one_dof(), 26.0), RANGE_HZ, progress=die, checkpoint=CheckpointFile("run.h5"))
+kept = CheckpointFile("run.h5")
+continue_branch(solve_orbit(make_one_dof(), 26.0), RANGE_HZ, progress=die, checkpoint=kept)
 """
 
 

@@ -52,7 +52,9 @@ def test_a_study_goes_on_where_it_was(tmp_path):
 def test_another_scene_does_not_use_the_cases_of_this_one(tmp_path):
     keep = tmp_path / "study.jsonl"
     grid(keep=keep)
-    parameter_study(example("one_dof.toml"), {"stops.0.gap": [2e-4]}, cluster_tasks.frequencies, keep=keep)
+    parameter_study(
+        example("one_dof.toml"), {"stops.0.gap": [2e-4]}, cluster_tasks.frequencies, keep=keep
+    )
     assert len(keep.read_text().splitlines()) == 7
 
 

@@ -326,7 +326,10 @@ def test_orbit_cannot_be_drawn_without_a_range(tmp_path):
 
 
 def test_help_imports_nothing_heavy_of_its_own():
-    code = "import sys, nldyn; a = set(sys.modules); import nldyn.app.cli; print(*set(sys.modules) - a)"
+    code = (
+        "import sys, nldyn; a = set(sys.modules); import nldyn.app.cli; "
+        "print(*set(sys.modules) - a)"
+    )
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()

@@ -40,7 +40,8 @@ def test_ctrl_c_while_the_package_is_loaded(monkeypatch, capsys, load):
 def test_ctrl_c_in_executed_text_gives_the_exit_code_all_the_same(tmp_path):
     """As in the making of a dataclass; with ``-m`` Python would end by the signal."""
     (tmp_path / "work.py").write_text(
-        "from nldyn.app.command import answering\nanswering(lambda: exec('raise KeyboardInterrupt'))\n",
+        "from nldyn.app.command import answering\n"
+        "answering(lambda: exec('raise KeyboardInterrupt'))\n",
         encoding="utf-8",
     )
     done = subprocess.run([sys.executable, "-m", "work"], cwd=tmp_path, check=False)
