@@ -21,7 +21,7 @@ NEAR = 3e-3
 
 
 # Beyond this condition number of the basis a Jacobian has fewer than eight digits left: its error
-# is about 200 roundings times the condition (the cases of `nldyn.hard.modes`).
+# is about 200 roundings times the condition (the cases of `hard.modes`).
 _MAX_CONDITION = 2e5
 # Shares by which a frequency is moved where damping makes modes inseparable: the condition goes
 # with the inverse root of the share, and what a share of 1e-10 changes in a period of the mode is

@@ -229,7 +229,7 @@ def test_ctrl_c_from_the_terminal(tmp_path):
 
 @pytest.mark.parametrize(
     "arguments",
-    [["nldyn.hard", "--only", "continuation at low damping"], ["nldyn.bench"]],
+    [["hard", "--only", "continuation at low damping"], ["bench"]],
     ids=["hard", "bench"],
 )
 def test_ctrl_c_while_a_suite_is_computed(tmp_path, arguments):

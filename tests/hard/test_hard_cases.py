@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from nldyn.hard.case import Case, Measured
-from nldyn.hard.cases import CASES
-from nldyn.hard.page import row, write_page
-from nldyn.hard.run import measure, run
+from hard.case import Case, Measured
+from hard.cases import CASES
+from hard.page import row, write_page
+from hard.run import measure, run
 from nldyn.runtime.result_directory import OutputError
 
 QUICK = [

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from hard.continuation import beam as four_modes
 from one_dof import between_stops, make_one_dof
 from test_nldyn_uncoupled import oscillator
 
@@ -36,7 +37,6 @@ from nldyn.branches import arclength as walk
 from nldyn.branches.arclength import BY_TOLERANCE
 from nldyn.branches.continuation import _without_repeat, start_point
 from nldyn.branches.leg import Leg
-from nldyn.hard.continuation import beam as four_modes
 from nldyn.orbits.shooting import asymmetry, metric_length
 from nldyn.scene.build import build_system, load_scene
 
