@@ -53,8 +53,8 @@ class NormalForm:
         The same in plain words.
     coefficient : Estimate, optional
         Of the normal form, for ξ in units of the orbit's size (see
-        `nldyn.bifurcations.critical`): a of a fold, c of a flip or pitchfork, the first Lyapunov coefficient of a torus, ⟨p, B(q, q)⟩ of a
-        transcritical point.
+        `nldyn.bifurcations.critical`): a of a fold, c of a flip or pitchfork, the first Lyapunov
+        coefficient of a torus, ⟨p, B(q, q)⟩ of a transcritical point.
     frequency_shift : Estimate, optional
         (f - f₀)/(f₀ ξ²) of the orbits that meet or are born here.
     side : int
