@@ -13,6 +13,7 @@ import meshio
 import numpy as np
 from numpy.typing import ArrayLike
 
+import fem.meshio_kinds  # noqa: F401  (completes meshio's tables)
 from fem.abaqus import read_abaqus
 from fem.cells import KINDS
 from fem.errors import ModelError, quoted

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from fem.cells import KINDS
+from fem.cells import CUBE, KINDS, PYRAMID, TETRAHEDRON, TRIANGLE, WEDGE
 from fem.errors import ModelError, quoted
 from fem.mesh import FloatArray, FrameMesh, IntArray, index_sets, numbers
 
@@ -313,8 +313,9 @@ def box_mesh(
     lengths
         Along x and y (a rectangle in the plane), or x, y and z, in m.
     counts
-        Number of cells in each direction; for triangles and tetrahedra, of the boxes that are
-        cut into 2 and 6.
+        Number of cells in each direction; for other kinds than quadrilaterals and hexahedra, of
+        the boxes that are cut into 2 triangles, 2 wedges along z, 6 tetrahedra, or 6 pyramids
+        with their apex in the middle.
     origin
         The corner with the lowest coordinates.
     kind
@@ -346,12 +347,12 @@ def box_mesh(
     boxes = corner.reshape(-1, dimension)
     unit = _unit_cells(name)
     places = (boxes[:, None, None, :] + unit).reshape(-1, *unit.shape[1:])
-    doubled = np.rint(2 * places.reshape(-1, dimension)).astype(np.int64)
-    grid, inverse = np.unique(doubled, axis=0, return_inverse=True)
+    quarters = np.rint(4 * places.reshape(-1, dimension)).astype(np.int64)
+    grid, inverse = np.unique(quarters, axis=0, return_inverse=True)
     points = np.zeros((len(grid), 3))
-    points[:, :dimension] = grid / 2.0 * (np.asarray(lengths) / np.asarray(counts))
+    points[:, :dimension] = grid / 4.0 * (np.asarray(lengths) / np.asarray(counts))
     sets = {
-        f"{axis}{side}": np.flatnonzero(grid[:, i] == 2 * side * counts[i])
+        f"{axis}{side}": np.flatnonzero(grid[:, i] == 4 * side * counts[i])
         for i, axis in enumerate("xyz"[:dimension])
         for side in (0, 1)
     }
@@ -368,17 +369,25 @@ def box_mesh(
 def _unit_cells(name: str) -> FloatArray:
     """Nodes of the cells that fill the unit box, shape (cells, b, d)."""
     kind = KINDS[name]
-    if kind.facet_kind in ("quad", "quad8", "quad9") or name.startswith("quad"):
-        return kind.nodes[None]
-    if kind.dimension == 2:
-        corners = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], dtype=np.float64)
-    else:
-        # Kuhn's six tetrahedra around the diagonal: they match from box to box
-        steps = np.eye(3)
-        orders = ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2))
-        paths = [np.cumsum([np.zeros(3), *steps[list(order)]], axis=0) for order in orders]
-        corners = np.array([p if i < 3 else p[[0, 2, 1, 3]] for i, p in enumerate(paths)])
-    if kind.order == 1:
-        return corners
-    middles = np.stack([corners[:, list(edge)].mean(axis=1) for edge in kind.edges], axis=1)
-    return np.concatenate([corners, middles], axis=1)
+    return kind.filled(_UNIT_CORNERS.get(kind.shape, kind.corners[None]))
+
+
+_HALVES = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], dtype=np.float64)
+_ALONG = ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2))
+
+
+def _kuhn() -> FloatArray:
+    """Corners of Kuhn's six tetrahedra around the diagonal: they match from box to box."""
+    paths = [np.cumsum([np.zeros(3), *np.eye(3)[list(order)]], axis=0) for order in _ALONG]
+    return np.array([p if i < 3 else p[[0, 2, 1, 3]] for i, p in enumerate(paths)])
+
+
+_UNIT_CORNERS = {
+    TRIANGLE: _HALVES,
+    TETRAHEDRON: _kuhn(),
+    WEDGE: np.stack([np.vstack([np.insert(t, 2, z, axis=1) for z in (0, 1)]) for t in _HALVES]),
+    PYRAMID: np.stack(
+        [np.vstack([CUBE.corners[list(face[::-1])], np.full(3, 0.5)]) for face in CUBE.faces]
+    ),
+}
+"""Corners of the cells (cells, c, d) that fill the unit box, by their shape."""
