@@ -182,8 +182,9 @@ class CellKind:
 
         Examples
         --------
-        >>> {kind: len(nodes) for kind, nodes in KINDS["wedge"].facets_of(np.arange(6)[None]).items()}
-        {'triangle': 2, 'quad': 3}
+        >>> facets = KINDS["wedge"].facets_of(np.arange(6)[None])
+        >>> {kind: nodes.shape for kind, nodes in facets.items()}
+        {'triangle': (2, 3), 'quad': (3, 4)}
         """
         return {
             kind: cells[:, local].reshape(-1, local.shape[1])

@@ -49,8 +49,8 @@ class SolidPart:
     material
         With a Poisson's ratio.
     plane
-        None for tetrahedra, pyramids, wedges and hexahedra; for triangles and quadrilaterals in the x-y plane,
-        "stress" (a sheet) or "strain" (a slice of a long body).
+        None for tetrahedra, pyramids, wedges and hexahedra; for triangles and quadrilaterals in
+        the x-y plane, "stress" (a sheet) or "strain" (a slice of a long body).
     thickness
         In m, of a plane part.
 
