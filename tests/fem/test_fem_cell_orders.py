@@ -202,7 +202,7 @@ def test_blocks_of_gmsh_have_their_volume_and_frequencies(gmsh_files, name, kind
     if name[-2] == "2":
         finer = frequencies(fem.box_mesh("body", (1.0, 0.5, 0.4), (6, 4, 4)))[6:]
         # five edges along the block: tetrahedra alone twist 1.25 % too high
-        np.testing.assert_allclose(found[0], finer, rtol=0.015 if "pyramid" in name else 0.002)
+        np.testing.assert_allclose(found[0], finer, rtol=0.015 if "pyramid" in name else 0.004)
 
 
 def test_the_wedges_of_a_vtk_file_are_all_there(tmp_path):
