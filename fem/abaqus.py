@@ -27,6 +27,7 @@ THREE_NODE_LINES = ("B22", "B32", "B32OS", "PIPE22", "PIPE32", "T2D3", "T3D3")
 _PLANE_SOLIDS = {"3": "triangle", "4": "quad", "6": "triangle6", "8": "quad8"}
 SOLIDS = {f"{p}{count}": kind for p in ("CPS", "CPE") for count, kind in _PLANE_SOLIDS.items()}
 SOLIDS |= {"C3D4": "tetra", "C3D8": "hexahedron", "C3D10": "tetra10", "C3D20": "hexahedron20"}
+SOLIDS |= {"C3D6": "wedge", "C3D15": "wedge15", "C3D5": "pyramid", "C3D13": "pyramid13"}
 """Solid elements by the kind of their cells; a suffix for another integration changes nothing."""
 
 LONGEST_RANGE = 10_000_000  # numbers, of all ranges of a file together

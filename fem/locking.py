@@ -48,8 +48,9 @@ def thickness_ratio(points: FloatArray, kind: str, nodes: IntArray) -> float:
     cell = KINDS[kind]
     ends = points[nodes[:, np.array(cell.edges)]]
     longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
-    local = np.array(cell.facets)
-    facets = once(nodes[:, local].reshape(-1, local.shape[1]), cell.facet_kind)
-    surface = float(facet_products(cell.facet_kind, points[facets]).sum())
+    surface = sum(
+        float(facet_products(facet_kind, points[once(facets, facet_kind)]).sum())
+        for facet_kind, facets in cell.facets_of(nodes).items()
+    )
     volume = float(facet_products(kind, points[nodes]).sum())
     return 2.0 * volume / surface / float(np.median(longest))

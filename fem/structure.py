@@ -40,8 +40,8 @@ class SolidPart:
     material
         With a Poisson's ratio.
     plane
-        None for tetrahedra and hexahedra; for triangles and quadrilaterals in the x-y plane,
-        "stress" (a sheet) or "strain" (a slice of a long body).
+        None for tetrahedra, pyramids, wedges and hexahedra; for triangles and quadrilaterals in
+        the x-y plane, "stress" (a sheet) or "strain" (a slice of a long body).
     thickness
         In m, of a plane part.
 
@@ -285,10 +285,8 @@ class StructureModel:
         found: dict[str, list[IntArray]] = {}
         for _, cells in self.solids.values():
             for kind, nodes in cells.items():
-                local = np.array(KINDS[kind].facets)
-                found.setdefault(KINDS[kind].facet_kind, []).append(
-                    nodes[:, local].reshape(-1, local.shape[1])
-                )
+                for facet_kind, facets in KINDS[kind].facets_of(nodes).items():
+                    found.setdefault(facet_kind, []).append(facets)
         return {kind: once(np.concatenate(blocks), kind) for kind, blocks in found.items()}
 
     def facets_on(self, name: str) -> dict[str, IntArray]:
