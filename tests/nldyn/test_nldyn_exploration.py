@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from branches_alike import assert_same_branches
-from one_dof import between_stops
+from one_dof import THREE_HZ, between_stops
 
 from nldyn import (
     ContinuationOptions,
@@ -131,24 +131,29 @@ def test_short_motions_pass_unstable_orbits_of_further_branches(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("guesses", "said"),
+    ("given", "left_out", "guesses", "said"),
     [
-        ({"pseudo_orbits": 200}, "beside up to 200 pseudo-orbits of each length up to 2 orbits"),
-        ({"mixtures": 60}, "beside 60 mixtures of each length up to 2 orbits"),
-        ({"walks": 200}, "beside up to 200 closed walks of each length up to 2 orbits"),
+        ((1, 2), 3, {"pseudo_orbits": 50}, "up to 50 pseudo-orbits of each length up to 3 orbits"),
+        ((1, 3), 2, {"mixtures": 50}, "beside 50 mixtures of each length up to 3 orbits"),
+        ((1,), 3, {"walks": 50}, "beside up to 50 closed walks of each length up to 3 orbits"),
     ],
 )
-def test_further_guesses_on_the_way_down_lead_to_further_branches(guesses, said, monkeypatch):
-    """Two modes from 29 to 29.3 Hz, where one motion of 30 periods comes to few of them."""
+def test_further_guesses_on_the_way_down_lead_to_further_branches(
+    three, given, left_out, guesses, said, monkeypatch
+):
+    """Some branches are given, and no motion is followed; those left out meet none of them."""
+    monkeypatch.setattr(survey._Survey, "_motion", lambda *_: (None, None))
     monkeypatch.setattr(survey, "AGAIN", 0)
-    system = system_of("two_dof_xi_0.01")
-    few = ExploreOptions(spacing=0.1, starts=1, settling=30, **NOTHING_MORE)
+    known = replace(three, branches=tuple(b for b in three.branches if b.period in given))
+    few = ExploreOptions(spacing=0.02, starts=1, passing=0, walk_states=1000, **NOTHING_MORE)
     without, found = (
-        explore(system, (29.0, 29.3), 2, effort=replace(few, **more)) for more in ({}, guesses)
+        explore(three.branches[0].points[0].problem.flow, THREE_HZ, 3, known=known, effort=effort)
+        for effort in (few, replace(few, **guesses))
     )
-    assert len(without.diagram.branches) < len(found.diagram.branches)
-    for orbit in (b.points[len(b.points) // 2] for b in without.diagram.branches):
-        assert any(branch.contains(orbit) for branch in found.diagram.branches)
+    assert without.diagram.branches == known.branches
+    assert found.diagram.branches[: len(known.branches)] == known.branches
+    (wanted,), (more,) = three.of_period(left_out), found.diagram.of_period(left_out)
+    assert all(wanted.contains(orbit) for orbit in more.points)
     assert said in found.report()
     assert " of each length" not in without.report()
     way_up = replace(found, stage=replace(found.stage, steps=1, ends=()))
