@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from branches_alike import assert_same_branches
-from one_dof import between_stops
+from one_dof import THREE_HZ, between_stops
 
 from nldyn import (
     CheckpointFile,
@@ -101,54 +101,88 @@ def test_every_simulation_is_accounted_for(around_37):
         assert bool(c.periods) == (c.settled > 0)
 
 
-def test_a_frequency_is_searched_until_the_indices_of_its_orbits_add_up(monkeypatch):
-    """Branches that pass a short range may be missed; their indices are missed, too."""
-    system, effort = system_of("two_dof_xi_0.01"), ExploreOptions(spacing=0.01, starts=3)
-    sums, reports = [], []
-    for again in (0, survey.AGAIN):
-        monkeypatch.setattr(survey, "AGAIN", again)
-        found = explore(system, (36.0, 37.0), 3, effort=effort)
-        branches = found.diagram.branches
-        sums.append([index_sum(branches, hz, n) for hz in (36.2, 36.8) for n in (1, 2, 3)])
-        reports.append(found.report())
-    assert set(sums[0]) != {1}
-    assert "orbits are missing" in reports[0]
-    assert set(sums[1]) == {1}
-    assert "P to P^3 add up to one from 36 to 37 Hz; isolas that are missing" in reports[1]
+@pytest.mark.parametrize("found_by", [3, None])
+def test_a_frequency_is_searched_until_the_indices_of_its_orbits_add_up(
+    three, found_by, monkeypatch
+):
+    """The harmonic is given; the other branches are found by the third search, or never."""
+    searched, search = [], survey._Survey._search
+
+    def given_in_the_end(self, starts, known, **others):
+        searched.append(known.frequency_hz)
+        if len(searched) == found_by:
+            self.box.from_orbits(map(middle_orbit, three.branches))
+            known.take()
+        return search(self, starts[:0], known, **others)
+
+    monkeypatch.setattr(survey._Survey, "_search", given_in_the_end)
+    known = replace(three, branches=tuple(three.of_period(1)))
+    effort = ExploreOptions(spacing=0.02, starts=1, passing=0, **NOTHING_MORE)
+    flow = three.branches[0].points[0].problem.flow
+    found = explore(flow, THREE_HZ, 3, effort=effort, known=known)
+    counts = [searched.count(c.frequency_hz) for c in found.coverage]
+    branches, report = found.diagram.branches, found.report()
+    sums = {index_sum(branches, hz, n) for hz in (36.2, 36.8) for n in (1, 2, 3)}
+    if found_by is None:
+        assert counts == [2 + survey.AGAIN] * len(counts)
+        assert sums != {1} and "orbits are missing" in report
+    else:
+        assert counts == [found_by + 1] + [2] * (len(counts) - 1)  # on the way up and down
+        assert sums == {1}
+        assert "P to P^3 add up to one from 36 to 38.5 Hz; isolas that are missing" in report
 
 
-def test_short_motions_pass_unstable_orbits_of_further_branches(monkeypatch):
-    """Two modes from 29 to 29.3 Hz, where one motion of 30 periods comes to few of them."""
+def test_unstable_orbits_that_short_motions_pass_are_found(three, monkeypatch):
+    """Motions that begin a millionth off them; nothing else is tried."""
+    monkeypatch.setattr(survey._Survey, "_motion", lambda *_: (None, None))
     monkeypatch.setattr(survey, "AGAIN", 0)
-    system = system_of("two_dof_xi_0.01")
-    few = ExploreOptions(spacing=0.1, starts=1, settling=30, **NOTHING_MORE)
-    without, found = (
-        explore(system, (29.0, 29.3), 2, effort=replace(few, passing=n)) for n in (0, 24)
-    )
-    assert len(without.diagram.branches) < len(found.diagram.branches)
-    for hz in (29.1, 29.2):
-        assert [index_sum(found.diagram.branches, hz, n) for n in (1, 2)] == [1, 1]
+    effort = ExploreOptions(spacing=0.02, starts=1, passing=3, **NOTHING_MORE)
+    flow = three.branches[0].points[0].problem.flow
+    given = []
+
+    def beside_orbits(flow, omega, count, seed):
+        hz = omega / (2.0 * math.pi)
+        orbits = [o for n in (2, 3) for b in three.of_period(n) for o in b.at(hz) if not o.stable]
+        given.append((hz, count, seed))
+        return np.array([(1.0 + 1e-6) * stroboscopic(orbit)[0] for orbit in orbits])
+
+    monkeypatch.setattr(survey, "_at_random", beside_orbits)
+    known = replace(three, branches=tuple(three.of_period(1)))
+    without = explore(flow, THREE_HZ, 3, effort=replace(effort, passing=0), known=known)
+    assert without.diagram.branches == known.branches and not given
+    found = explore(flow, THREE_HZ, 3, effort=effort, known=known)
+    assert sorted(branch.period for branch in found.diagram.branches) == [1, 2, 3]
+    for wanted in three.branches:
+        (branch,) = found.diagram.of_period(wanted.period)
+        assert all(wanted.contains(orbit) for orbit in branch.points)
+    assert [(hz, count) for hz, count, _ in given] == [(c.frequency_hz, 3) for c in found.coverage]
+    assert len({seed for _, _, seed in given}) == len(given)
 
 
 @pytest.mark.parametrize(
-    ("guesses", "said"),
+    ("given", "left_out", "guesses", "said"),
     [
-        ({"pseudo_orbits": 200}, "beside up to 200 pseudo-orbits of each length up to 2 orbits"),
-        ({"mixtures": 60}, "beside 60 mixtures of each length up to 2 orbits"),
-        ({"walks": 200}, "beside up to 200 closed walks of each length up to 2 orbits"),
+        ((1, 2), 3, {"pseudo_orbits": 50}, "up to 50 pseudo-orbits of each length up to 3 orbits"),
+        ((1, 3), 2, {"mixtures": 50}, "beside 50 mixtures of each length up to 3 orbits"),
+        ((1,), 3, {"walks": 50}, "beside up to 50 closed walks of each length up to 3 orbits"),
     ],
 )
-def test_further_guesses_on_the_way_down_lead_to_further_branches(guesses, said, monkeypatch):
-    """Two modes from 29 to 29.3 Hz, where one motion of 30 periods comes to few of them."""
+def test_further_guesses_on_the_way_down_lead_to_further_branches(
+    three, given, left_out, guesses, said, monkeypatch
+):
+    """Some branches are given, and no motion is followed; those left out meet none of them."""
+    monkeypatch.setattr(survey._Survey, "_motion", lambda *_: (None, None))
     monkeypatch.setattr(survey, "AGAIN", 0)
-    system = system_of("two_dof_xi_0.01")
-    few = ExploreOptions(spacing=0.1, starts=1, settling=30, **NOTHING_MORE)
+    known = replace(three, branches=tuple(b for b in three.branches if b.period in given))
+    few = ExploreOptions(spacing=0.02, starts=1, passing=0, walk_states=1000, **NOTHING_MORE)
     without, found = (
-        explore(system, (29.0, 29.3), 2, effort=replace(few, **more)) for more in ({}, guesses)
+        explore(three.branches[0].points[0].problem.flow, THREE_HZ, 3, known=known, effort=effort)
+        for effort in (few, replace(few, **guesses))
     )
-    assert len(without.diagram.branches) < len(found.diagram.branches)
-    for orbit in (b.points[len(b.points) // 2] for b in without.diagram.branches):
-        assert any(branch.contains(orbit) for branch in found.diagram.branches)
+    assert without.diagram.branches == known.branches
+    assert found.diagram.branches[: len(known.branches)] == known.branches
+    (wanted,), (more,) = three.of_period(left_out), found.diagram.of_period(left_out)
+    assert all(wanted.contains(orbit) for orbit in more.points)
     assert said in found.report()
     assert " of each length" not in without.report()
     way_up = replace(found, stage=replace(found.stage, steps=1, ends=()))
