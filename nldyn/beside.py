@@ -13,12 +13,13 @@ import numpy as np
 
 from nldyn.branch import Branch, check_branches
 from nldyn.checkpoint import checkpoint_of_several
-from nldyn.diagrams import Collector, Diagram, Progress, check_known, counted, middle_orbit
+from nldyn.diagrams import Collector, Diagram, check_known, counted, middle_orbit
 from nldyn.errors import SystemModelError, check_range, check_types, check_whole
 from nldyn.exploration import check_spacing, steps_between
 from nldyn.fixed_point_index import index_note, is_damped, without_index_note
 from nldyn.linear import Real
 from nldyn.orbit import LONGEST_PERIOD, Orbit
+from nldyn.progress import Progress, silent
 from nldyn.step_control import ContinuationOptions
 from nldyn.tally import Tally
 
@@ -122,7 +123,7 @@ def collector_beside(
     checkpoint: str | Path | None,
 ) -> Collector:
     """A collector that has the known branches, and a file for what is found beside them."""
-    own, progress = known.branches[0].points[0].problem.flow, progress or (lambda what, hz: None)
+    own, progress = known.branches[0].points[0].problem.flow, progress or silent
     options = options or ContinuationOptions()
     low, high = known.range_hz
     box = Collector(own, (low, high), known.observe, options, progress)
@@ -135,7 +136,7 @@ def take_kept(box: Collector, max_period: int) -> None:
     """Finish the branches that the file holds, and follow what they lead to."""
     count = len(box.branches)
     for branch in box.checkpoint.new_branches(lambda branch: box.known(middle_orbit(branch))):
-        progress = partial(box.progress, f"1/{branch.period}")
+        progress = partial(box.tell, f"1/{branch.period}")
         box.take_in(branch.extend(progress=progress, checkpoint=box.checkpoint))
     box.follow_up(count, max_period, max_period, None)
 
@@ -197,6 +198,7 @@ def _follow_new(
     if tally is None or tally.question != question:
         tally = Tally(question, len(to_meet), len(box.branches))
     for place in range(tally.done, len(wanted.frequencies)):
+        box.done = place / len(wanted.frequencies)
         box.checkpoint.tally = tally
         box.checkpoint.offer()
         tried, came, met = 0, 0, set[int]()

@@ -26,7 +26,7 @@ from nldyn.beside import (
     search_beside,
 )
 from nldyn.branch import Branch
-from nldyn.diagrams import Collector, Diagram, Progress
+from nldyn.diagrams import Collector, Diagram
 from nldyn.errors import check_whole
 from nldyn.exploration import MOST_NUMBERS, check_walk_states
 from nldyn.flow import FlowMap
@@ -37,6 +37,7 @@ from nldyn.orbit import (
     spread,
     stroboscopic,
 )
+from nldyn.progress import Progress
 from nldyn.search import (
     MOST_COUNT,
     SHORT_STEPS,
@@ -107,7 +108,7 @@ def by_closed_walks(
     options : ContinuationOptions, optional
         Step control.
     progress : callable, optional
-        Called as ``progress(what, frequency_hz)``.
+        Called as ``progress(what, frequency_hz, done)``.
     checkpoint : str or Path, optional
         File that keeps the branches found, also those of an earlier call: they count as known.
         The same call with the same file goes on after the frequencies done, and gives the same
@@ -171,7 +172,7 @@ def near_closed_walks(
     No orbit that is out of the range.
     """
     flow, omega = box.flow, 2.0 * math.pi * frequency_hz
-    asked = partial(box.progress, "closed walks", frequency_hz)
+    asked = partial(box.tell, "closed walks", frequency_hz)
     asked()
     known = _known_states(flow, branches, frequency_hz, rng)
     if not len(known):  # every motion failed, and no orbit is known

@@ -21,9 +21,10 @@ from nldyn.beside import (
     search_beside,
 )
 from nldyn.branch import Branch
-from nldyn.diagrams import Collector, Diagram, Progress
+from nldyn.diagrams import Collector, Diagram
 from nldyn.errors import check_whole
 from nldyn.linear import Real
+from nldyn.progress import Progress
 from nldyn.pseudo_orbits import nodes_of
 from nldyn.search import MOST_COUNT, SHORT_STEPS, nearest_orbit
 from nldyn.step_control import ContinuationOptions
@@ -77,7 +78,7 @@ def by_crossover(
     options : ContinuationOptions, optional
         Step control.
     progress : callable, optional
-        Called as ``progress(what, frequency_hz)``.
+        Called as ``progress(what, frequency_hz, done)``.
     checkpoint : str or Path, optional
         File that keeps the branches found, also those of an earlier call: they count as known.
         The same call with the same file goes on after the frequencies done, and gives the same
@@ -142,7 +143,7 @@ def near_mixtures(
     omega = 2.0 * math.pi * frequency_hz
     for period in periods:
         for _ in range(tries):
-            box.progress("mixtures", frequency_hz)
+            box.tell("mixtures", frequency_hz)
             used, nodes = loops.mixture(period, rng)
             orbit = nearest_orbit(box.flow, nodes, omega, box.observe, SHORT_STEPS)
             yield used, box.within([orbit])

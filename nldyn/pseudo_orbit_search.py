@@ -12,9 +12,10 @@ import numpy as np
 from cms.threads import one_thread
 from nldyn.beside import Guesses, Wanted, check_search, collector_beside, search_beside
 from nldyn.branch import Branch
-from nldyn.diagrams import Collector, Diagram, Progress
+from nldyn.diagrams import Collector, Diagram
 from nldyn.errors import check_whole
 from nldyn.orbit import SEGMENTS_PER_PERIOD
+from nldyn.progress import Progress
 from nldyn.pseudo_orbits import NODES, Pieces
 from nldyn.search import LONG_STEPS, MOST_COUNT, SHORT_STEPS, nearest_orbit
 from nldyn.step_control import ContinuationOptions
@@ -70,7 +71,7 @@ def by_pseudo_orbits(
     options : ContinuationOptions, optional
         Step control.
     progress : callable, optional
-        Called as ``progress(what, frequency_hz)``.
+        Called as ``progress(what, frequency_hz, done)``.
     checkpoint : str or Path, optional
         File that keeps the branches found, also those of an earlier call: they count as known.
         The same call with the same file goes on after the frequencies done, and gives the same
@@ -137,7 +138,7 @@ def near_pseudo_orbits(
     omega = 2.0 * math.pi * frequency_hz
     for period in periods:
         for sequence in islice(pieces.pseudo_orbits(period, MOST_ALIKE, rng), tries):
-            box.progress("pseudo-orbits", frequency_hz)
+            box.tell("pseudo-orbits", frequency_hz)
             chosen = list(sequence)
             nodes = pieces.nodes[chosen]
             orbits = [

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from nldyn.errors import SceneError, SystemModelError
+from nldyn.progress import Progress
 from nldyn.resources import data_directory
 from nldyn.scene_checks import (
     check_computable,
@@ -34,7 +35,7 @@ from nldyn.scene_schema import ContinuationTable, ExcitationTable, PartTable, Sc
 if TYPE_CHECKING:
     import cms
     import fem
-    from nldyn.diagrams import Diagram, Progress
+    from nldyn.diagrams import Diagram
     from nldyn.elements import Damper, Excitation, Stop
     from nldyn.exploration import Exploration
     from nldyn.flow import FlowMap
@@ -389,7 +390,7 @@ def compute(
     scene : Scene
         A scene with an ``[[excitation]]`` and a ``[continuation]``.
     progress : callable, optional
-        Called as ``progress(what, frequency_hz)`` at every orbit.
+        Called as ``progress(what, frequency_hz, done)`` at every orbit.
     checkpoint : str or Path, optional
         File that keeps what is computed, see `nldyn.diagram`.
 

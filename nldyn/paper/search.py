@@ -32,7 +32,7 @@ from nldyn.command import answering
 from nldyn.crossover import by_crossover
 from nldyn.detour import checked_factors
 from nldyn.detour_search import by_detour
-from nldyn.diagrams import Diagram, Progress
+from nldyn.diagrams import Diagram
 from nldyn.errors import SystemModelError, check_whole
 from nldyn.exploration import Exploration, ExploreOptions, check_spacing, check_walk_states
 from nldyn.flow import flow_of, same_flow
@@ -46,7 +46,7 @@ from nldyn.paper.starts import (
     write_starts,
 )
 from nldyn.parameters import Parameter
-from nldyn.progress import progress_line
+from nldyn.progress import Progress, progress_line
 from nldyn.pseudo_orbit_search import by_pseudo_orbits
 from nldyn.search import MOST_COUNT
 from nldyn.store import load_diagram
