@@ -14,7 +14,7 @@ from nldyn.branches.continuation import broken_off
 from nldyn.branches.options import ContinuationOptions
 from nldyn.paper.starts import follow_starts, keep_numbers, longest_whole, read_starts
 from nldyn.paper.workers import Workers, tell
-from nldyn.runtime.progress import Progress, compilation_told
+from nldyn.runtime.progress import Progress
 from nldyn.scene.build import build_component, build_system, load_scene
 from nldyn.search.diagram import Diagram, Seed, diagram, notes_on_ends
 from nldyn.search.fixed_point_index import index_note
@@ -210,11 +210,10 @@ def run_job(name: str, family: int, folder: Path) -> Diagram:
     """
     job = job_named(name)
 
-    def progress(what: str, frequency_hz: float) -> None:
+    def progress(what: str, frequency_hz: float, done: float) -> None:
         tell(f"{name}: {what}", frequency_hz)
 
-    with compilation_told(progress):
-        return job.run(family, folder, progress)
+    return job.run(family, folder, progress)
 
 
 def submit_diagrams(

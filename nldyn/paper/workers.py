@@ -33,7 +33,7 @@ class Workers:
     messages : SimpleQueue
         What each of them is at, with a frequency in Hz.
     report : callable
-        Called as ``report(what, frequency_hz)``.
+        Called as ``report(what, frequency_hz, done)``.
     folder : Path
         Keeps what is computed.
     """
@@ -59,9 +59,9 @@ class Workers:
             done = f"{len(futures) - len(waiting)} of {len(futures)} {what}"
             while not self.messages.empty():
                 at, frequency_hz = self.messages.get()
-                self.report(f"{done}, {at}", frequency_hz)
+                self.report(f"{done}, {at}", frequency_hz, 0.0)
             if ended:
-                self.report(done, 0.0)
+                self.report(done, 0.0, 1.0 - len(waiting) / max(len(futures), 1))
         return {key: future.result() for key, future in futures.items()}
 
 

@@ -25,11 +25,16 @@ from nldyn.system.system import System
 if TYPE_CHECKING:
     import cms
     from nldyn.runtime.progress import Progress
+from nldyn.runtime.progress import Progress, Shares, silent
+
+if TYPE_CHECKING:
+    import cms
 
 COUNTS = (*range(1, 11), 12, 16, 20, 30, 40)
 GRID = 400
 EIGENFREQUENCIES = 3
 SPECIAL_KINDS = ("LP", "PD")
+ONE_MODE = 4.0  # part of the cost of a branch that does not grow with its modes, in modes
 MATCH = 0.02  # special points of one kind farther apart are not the same
 INVISIBLE = 1e-9
 FULL = "full"
@@ -306,7 +311,7 @@ def convergence_study(
         Also find the orbit at ``at_hz`` in the full model, with all modes that an interface can
         see, and compare with that; this takes minutes for some hundred modes.
     progress : callable, optional
-        Called as ``progress(what, frequency_hz)``.
+        Called as ``progress(what, frequency_hz, done)``.
 
     Returns
     -------
@@ -347,13 +352,26 @@ def convergence_study(
     whole = reference_model(finest, max(modes))
     linear = measured_linear("", FULL if is_full(whole) else REFERENCE, whole, setting)
     models: list[Measured] = []
+    counts = sorted(set(modes))
+    cases = [
+        (name, method, count)
+        for name in components
+        for method in methods
+        for count in (counts[:1] if method == "guyan" else counts)
+    ]
+    shares = Shares(progress or silent)
+    for number, (_, _, count) in enumerate(cases):
+        shares.weigh(str(number), ONE_MODE + count)
     for name, component in components.items():
         for method in methods:
-            for reduced in reductions(component, sorted(set(modes)), method):
-                models.append(measured(name, reduced, setting, at_hz, progress))
+            for reduced in reductions(component, counts, method):
+                part = str(len(models))
+                models.append(measured(name, reduced, setting, at_hz, shares.part(part)))
+                shares.end(part)
     best = best_of([model for model in models if model.mesh == mesh], linear)
     if full and best.orbit is not None:
-        linear = with_orbit(linear, whole, setting, best.orbit, progress)
+        shares.weigh(FULL, 0.0)
+        linear = with_orbit(linear, whole, setting, best.orbit, shares.part(FULL))
     models.append(linear)
     errors = tuple(errors_of(model, linear, best, full) for model in models)
     known = 0.0 if is_full(whole) else receptance_bound(finest, whole, linear, setting)
@@ -373,7 +391,7 @@ def measured(
     reduced: cms.ReducedModel,
     setting: LoadCase,
     at_hz: float,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Measured:
     """Compute what a `ConvergenceStudy` compares for one reduced model."""
     linear = measured_linear(mesh, reduced.method, reduced, setting)
@@ -381,7 +399,8 @@ def measured(
         return replace(linear, note=MASSLESS)
     start = time.perf_counter()
     try:
-        tell = told(progress, f"{linear.label}, {counted_modes(linear)}")
+        what = f"{linear.label}, {counted_modes(linear)}"
+        tell = told(progress, what, setting.range_hz)
         branch = harmonic_branch(setting.system(reduced), setting, tell)
     except ConvergenceError as error:
         return replace(linear, note=str(error))
@@ -462,10 +481,10 @@ def with_orbit(
     reduced: cms.ReducedModel,
     setting: LoadCase,
     guess: Orbit,
-    progress: Progress | None,
+    progress: Progress,
 ) -> Measured:
     """The full model with its orbit, found from that of a reduced one."""
-    told(progress, f"full model, {reduced.size} modes")(guess.frequency_hz)
+    progress(f"full model, {reduced.size} modes", guess.frequency_hz, 0.0)
     try:
         orbit = transferred(guess, setting.system(reduced))
     except ConvergenceError as error:
@@ -565,15 +584,20 @@ def harmonic_branch(system: System, setting: LoadCase, tell: Callable[[float], N
             raise
         modes = f"{rigid} mode{'' if rigid == 1 else 's'} at 0 Hz"
         raise ConvergenceError(f"{error}; nothing holds the structure: it has {modes}") from None
-    return continue_branch(orbit, (low, high))
+    return continue_branch(orbit, (low, high), progress=tell)
 
 
-def told(progress: Progress | None, what: str) -> Callable[[float], None]:
-    """Tell a progress line what is being computed."""
+def told(
+    progress: Progress, what: str, range_hz: tuple[float, float]
+) -> Callable[[float], None]:
+    """Tell how much of a range a branch covers that comes down from its upper end."""
+    low, high = range_hz
+    lowest = high
 
     def tell(frequency_hz: float) -> None:
-        if progress is not None:
-            progress(what, frequency_hz)
+        nonlocal lowest
+        lowest = min(lowest, frequency_hz)
+        progress(what, frequency_hz, (high - lowest) / (high - low))
 
     return tell
 

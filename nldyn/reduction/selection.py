@@ -31,6 +31,10 @@ from nldyn.system.system import System
 if TYPE_CHECKING:
     import cms
     from nldyn.runtime.progress import Progress
+from nldyn.runtime.progress import Progress, Shares, silent
+
+if TYPE_CHECKING:
+    import cms
 
 INVISIBLE = 1e-6
 SAMPLES = 9
@@ -194,7 +198,7 @@ def select_modes(
         Also follow the branches of the chosen model and of that with all modes up to the cut-off,
         and compare their folds and flips with the reference's.
     progress : callable, optional
-        Called as ``progress(what, frequency_hz)``.
+        Called as ``progress(what, frequency_hz, done)``.
 
     Returns
     -------
@@ -244,24 +248,26 @@ def select_modes(
             f"{len(seen)} modes up to {BEYOND * cutoff:.4g} Hz may matter, more than {MOST_MODES}; "
             "reduce by hand"
         )
-    tell = told(progress, "reference")
+    shares = Shares(progress or silent, {"reference": 3.0, "modes": 1.0})
+    tell = told(shares.part("reference"), "reference", setting.range_hz)
     reference = cms.keep_modes(whole, seen)
     judge = Judge(setting, reference, harmonic_branch(setting.system(reference), setting, tell))
-    tell = told(progress, "selection")
     candidates = [n for n in seen if whole.frequencies_hz[n - 1] <= cutoff]
     rigid = [n for n in candidates if whole.frequencies_hz[n - 1] == 0.0]
     kept, error = list(rigid), math.inf if len(seen) > len(rigid) else 0.0
+    shares.end("reference")
+    choose = shares.part("modes")
     for number in [n for n in seen if n not in rigid]:
         kept.append(number)
-        tell(whole.frequencies_hz[number - 1])
+        choose(f"mode {number}", 0.0, 0.5 * len(kept) / len(seen))
         error = judge.error(cms.keep_modes(whole, kept))
         if error <= tolerance:
             break
-    for number in sorted(kept, key=lambda n: share(whole, setting, n)):
+    for tried, number in enumerate(sorted(kept, key=lambda n: share(whole, setting, n))):
         fewer = [n for n in kept if n != number]
         if number in rigid or not fewer:
             continue
-        tell(whole.frequencies_hz[number - 1])
+        choose(f"mode {number}", 0.0, 0.5 + 0.5 * tried / len(seen))
         without = judge.error(cms.keep_modes(whole, fewer))
         if without <= tolerance:
             kept, error = fewer, without
@@ -270,7 +276,12 @@ def select_modes(
     reduced = cms.keep_modes(whole, kept)
     special_error, missing, extra, doubtful = (math.nan, math.nan), 0, 0, 0
     if special_points:
+        for part in ("chosen model", "model up to the cut-off"):
+            shares.weigh(part, 3.0)
+        tell = told(shares.part("chosen model"), "chosen model", setting.range_hz)
         moved_by, missing, extra = judge.special_error(reduced, tell)
+        shares.end("chosen model")
+        tell = told(shares.part("model up to the cut-off"), "cut-off", setting.range_hz)
         uncertain, *lacking = judge.special_error(smaller, tell)
         special_error, doubtful = around(moved_by, uncertain), sum(lacking)
     return ModeSelection(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from nldyn.base.errors import SceneError
 from nldyn.report.results import write_table
+from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.runtime.result_directory import result_directory
 from nldyn.scene.build import build_component, build_reduced, build_system
 from nldyn.scene.checks import check_computable
@@ -76,7 +77,7 @@ def render_scene(
     video : {"gif", "mp4"}
         Kind of animation.
     progress : callable, optional
-        Called as ``progress(what, frequency_hz)``; the frequency is 0 where none applies.
+        Called as ``progress(what, frequency_hz, done)``; the frequency is 0 where none applies.
 
     Returns
     -------
@@ -109,18 +110,21 @@ def render_scene(
         check_computable(scene, scene.file)
     if scene.continuation is not None:
         check_video(Path(directory) / f"motion.{video}")
-    tell = progress or (lambda what, frequency_hz: None)
-    tell("model", 0.0)
+    shares = Shares(progress or silent, {"model": 1.0, "orbit": 5.0, "pictures": 10.0})
+    shares.part("model")("model", 0.0, 0.0)
     component = build_component(scene)
     reduced = build_reduced(scene, component)
+    shares.end("model")
     orbit = None
     if scene.continuation is not None:
+        tell = shares.part("orbit")
         orbit = orbit_to_draw(scene, build_system(scene, reduced), frequency_hz, period, tell)
+    shares.end("orbit")
     with result_directory(directory, "render") as folder:
         write_modes(reduced, folder / "modes.csv")
         if orbit is not None:
             save_orbit(orbit, folder)
-        drawing = _Drawing(scene, component, reduced, folder, tell)
+        drawing = _Drawing(scene, component, reduced, folder, shares.part("pictures"))
         drawing.pages(orbit)
         missing = drawing.draw(orbit, video)
     return Rendering(Path(directory), orbit, missing)
@@ -275,7 +279,7 @@ class _Drawing:
         """Draw a sheet with all modes of the reduced model."""
         from fem.render import render_modes
 
-        self.tell("mode shapes", 0.0)
+        self.tell("mode shapes", 0.0, 0.1)
         path = self.folder / "mode_shapes.png"
         mirror = _mirror(self.scene)
         render_modes(self.component, self.reduced.basis, self.mode_titles, path, mirror=mirror)
@@ -284,7 +288,7 @@ class _Drawing:
         """Draw the structure at the instant of deepest contact: displacement, then stress."""
         from fem.render import render_shape
 
-        self.tell("deepest contact", 0.0)
+        self.tell("deepest contact", 0.0, 0.3)
         impact = deepest_impact(self.scene, orbit)
         what = "largest deflection" if impact is None else "deepest contact"
         state = self.reduced.expand(deepest_state(orbit, impact))
@@ -316,7 +320,7 @@ class _Drawing:
         """Animate one period of the orbit, with the stop of the deepest contact."""
         from fem.render import animate
 
-        self.tell("animation", 0.0)
+        self.tell("animation", 0.0, 0.5)
         history = orbit.history(FRAMES)
         animate(
             self.component,

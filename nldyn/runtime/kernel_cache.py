@@ -13,8 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import event
 from numba.core.caching import FunctionCache
 
+from nldyn.runtime.compilation import compilations
 from nldyn.runtime.interruption import deferred_interruption
 
 ADVICE = (
@@ -24,14 +26,34 @@ ADVICE = (
 
 _save = FunctionCache.save_overload
 _told: set[str] = set()
+_watching: list[event.Listener] = []
+
+
+class _Watch(event.Listener):
+    """Tells of the compilations of this package's kernels; code from the cache needs none."""
+
+    def on_start(self, event: Any) -> None:
+        if _is_own(event):
+            compilations.begin()
+
+    def on_end(self, event: Any) -> None:
+        if _is_own(event):
+            compilations.end()
+
+
+def _is_own(event: Any) -> bool:
+    return str(event.data["dispatcher"].py_func.__module__).startswith("nldyn.")
 
 
 def ensure_cache() -> None:
     """Give numba a folder for this process and its children where it finds none by itself.
 
     From then on code that cannot be kept in its folder, on a full disk for instance, is used all
-    the same.
+    the same, and compilations are told.
     """
+    if not _watching:
+        _watching.append(_Watch())
+        event.register("numba:compile", _watching[0])  # type: ignore[no-untyped-call]
     FunctionCache.save_overload = _save_if_possible  # type: ignore[method-assign, assignment]
     try:
         numba.njit(cache=True)(_probe)

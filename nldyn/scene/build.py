@@ -20,6 +20,7 @@ from pydantic import ValidationError
 
 from nldyn.base.errors import SceneError, SystemModelError
 from nldyn.base.resources import data_directory
+from nldyn.runtime.progress import Progress
 from nldyn.scene.checks import (
     check_computable,
     check_mesh_names,
@@ -391,7 +392,7 @@ def compute(
     scene : Scene
         A scene with an ``[[excitation]]`` and a ``[continuation]``.
     progress : callable, optional
-        Called as ``progress(what, frequency_hz)`` at every orbit.
+        Called as ``progress(what, frequency_hz, done)`` at every orbit.
     checkpoint : CheckpointFile, optional
         File that keeps what is computed, see `nldyn.diagram`.
 

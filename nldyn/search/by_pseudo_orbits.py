@@ -71,7 +71,7 @@ def by_pseudo_orbits(
     options : ContinuationOptions, optional
         Step control.
     progress : callable, optional
-        Called as ``progress(what, frequency_hz)``.
+        Called as ``progress(what, frequency_hz, done)``.
     checkpoint : CheckpointFile, optional
         File that keeps the branches found, also those of an earlier call: they count as known.
         The same call with the same file goes on after the frequencies done, and gives the same
@@ -138,7 +138,7 @@ def near_pseudo_orbits(
     omega = 2.0 * math.pi * frequency_hz
     for period in periods:
         for sequence in islice(pieces.pseudo_orbits(period, MOST_ALIKE, rng), tries):
-            box.progress("pseudo-orbits", frequency_hz)
+            box.tell("pseudo-orbits", frequency_hz)
             chosen = list(sequence)
             nodes = pieces.nodes[chosen]
             orbits = [

@@ -39,7 +39,7 @@ from nldyn.orbits.starts import (
     reach,
     simulate_strobe,
 )
-from nldyn.runtime.progress import Progress
+from nldyn.runtime.progress import Progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.system.system import System
 
@@ -141,6 +141,11 @@ class Collector:
     open_ends: dict[tuple[int, int], Rows] = field(default_factory=dict)
     flip_ends: list[Orbit] = field(default_factory=list)
     crossings: list[SpecialPoint] = field(default_factory=list)
+    done: float = 0.0  # share of the whole computation
+
+    def tell(self, what: str, frequency_hz: float) -> None:
+        """Say what is being computed."""
+        self.progress(what, frequency_hz, self.done)
 
     def known(self, orbit: Orbit) -> bool:
         return self.branch_of(orbit) is not None
@@ -333,7 +338,7 @@ class Collector:
         low, high = self.range_hz
         if not low <= start.orbit.frequency_hz <= high or self.known(start.orbit):
             return
-        progress = partial(self.progress, f"1/{start.orbit.period}")
+        progress = partial(self.tell, f"1/{start.orbit.period}")
         ends = self._open_ends_like(start.orbit).so_far()
         course = Course(self.range_hz, options or self.options, ends)
         branch = self.checkpoint.branch_from(start.orbit, course)
@@ -417,7 +422,7 @@ def diagram(
     options, search : optional
         Step control and search effort.
     progress : callable, optional
-        Called as ``progress(what, frequency_hz)``.
+        Called as ``progress(what, frequency_hz, done)``.
     checkpoint : CheckpointFile, optional
         File that keeps the branches computed so far, as for `continue_branch`. If it exists, the
         simulations are repeated, but of the branches only what is not in it is computed; those that
@@ -472,7 +477,7 @@ def diagram(
         (low, high),
         check_observe(flow.system, observe),
         options or ContinuationOptions(),
-        progress or (lambda what, frequency_hz: None),
+        progress or silent,
     )
     box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flow, (low, high))
     with box.checkpoint:
@@ -508,7 +513,7 @@ def _search(
     """Follow what simulations at some frequencies come near, one period after the other."""
     strobes = []
     for frequency in frequencies:
-        box.progress("search", frequency)
+        box.tell("search", frequency)
         strobes.append(_simulate(box, frequency, effort))
     for period in periods:
         if period % 2 == 0 and period // 2 in periods:
@@ -539,7 +544,7 @@ def _follow_seed(box: Collector, seed: Seed, effort: SearchOptions) -> None:
         frequency = seed.near_hz * (1.0 + shift)
         if not box.range_hz[0] <= frequency <= box.range_hz[1]:
             continue
-        box.progress(f"search 1/{seed.period}", frequency)
+        box.tell(f"search 1/{seed.period}", frequency)
         strobe = _simulate(box, frequency, effort)
         orbits = orbits_from_strobe(box.flow, strobe, seed.period, box.observe, effort)
         if orbits:

@@ -35,7 +35,7 @@ from nldyn.orbits.starts import (
     random_states,
     settling_periods,
 )
-from nldyn.runtime.progress import Progress
+from nldyn.runtime.progress import Progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.search.by_pseudo_orbits import near_pseudo_orbits
 from nldyn.search.diagram import Collector, Diagram, check_known
@@ -55,6 +55,7 @@ CANDIDATES = 5  # near returns of each motion and period from which Newton's met
 TRANSIENT = 5  # periods of a motion beside which no orbits are looked for
 PASSING, BESIDE_PASSING = 60, 10  # periods of a short motion, and candidates as above
 PIECE = 16  # periods simulated between two looks at the known orbits; later a quarter of all
+LIKELY_ROUNDS = 2  # after which, mostly, a round has found nothing new
 AGAIN = 12  # times that a frequency is searched again while its indices say that orbits are missing
 
 
@@ -124,7 +125,7 @@ def explore(
         Of this system in this range, from `diagram` or an exploration with less effort. Its
         branches are taken over, what they lead to is followed, and others are looked for.
     progress : callable, optional
-        Called as ``progress(what, frequency_hz)``.
+        Called as ``progress(what, frequency_hz, done)``.
     checkpoint : CheckpointFile, optional
         File that keeps what is found, written now and then, at the end, and when an exception such
         as Ctrl-C ends the exploration; `load_exploration` reads it at any time. If it holds this
@@ -173,7 +174,7 @@ def explore(
         question.range_hz,
         question.observe,
         question.options,
-        progress or (lambda what, frequency_hz: None),
+        progress or silent,
     )
     if known is None:
         known = Diagram((), question.range_hz, question.observe, ())
@@ -278,7 +279,8 @@ class _Survey:
         turn, place, length = self.question.place(stage.steps)
         up, last = place < length // 2, place == length - 1
         frequency = self.question.frequencies(turn)[place if up else length - 1 - place]
-        box.progress("explore", frequency)
+        box.done = self._share_done()
+        box.tell("explore", frequency)
         omega = 2.0 * math.pi * frequency
         if stage.steps == 0:
             box.follow_up(0, *self._depth)
@@ -319,6 +321,12 @@ class _Survey:
             box.checkpoint.work = lambda: None  # the coverage is worth keeping without a branch too
         box.checkpoint.offer()
 
+    def _share_done(self) -> float:
+        """Share of the work that the steps done make; a second round may be the last."""
+        rounds = min(self.effort.rounds, LIKELY_ROUNDS)
+        lengths = [2 * len(self.question.frequencies(turn)) for turn in range(rounds)]
+        return min(self.stage.steps / sum(lengths), 1.0)
+
     def _met(self, rounds: int) -> NDArray[np.bool_]:
         """Which branches each round came to, with those found since the last step."""
         met = np.zeros((rounds, len(self.box.branches)), dtype=bool)
@@ -349,7 +357,7 @@ class _Survey:
         for fold in branch.special_points:
             if fold.kind != "LP" or any(is_at(orbit, fold) for orbit in passed):
                 continue
-            box.progress("folds", fold.frequency_hz)
+            box.tell("folds", fold.frequency_hz)
             which = f"the fold of branch {branch.name} at {fold.frequency_hz:.6g} Hz"
             try:
                 found, broken = connected_folds(fold, parameter, factor, box.range_hz, box.options)
@@ -405,7 +413,7 @@ class _Survey:
         left = settling + math.ceil(RETURNS * self.max_period) + 1
         states = np.array([start])
         while left > 0:
-            self.box.progress("search", known.frequency_hz)
+            self.box.tell("search", known.frequency_hz)
             count = min(left, max(PIECE, len(states) // 4))
             found = flow.strobe(states[-1], known.omega, count)
             if found.failure:

@@ -18,7 +18,7 @@ from nldyn.branches.continuation import extended
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import LONGEST_PERIOD
-from nldyn.runtime.progress import Progress
+from nldyn.runtime.progress import Progress, silent
 from nldyn.search.diagram import Collector, Diagram, check_known, counted, middle_orbit
 from nldyn.search.exploration import check_spacing, steps_between
 from nldyn.search.fixed_point_index import index_note, is_damped, without_index_note
@@ -123,7 +123,7 @@ def collector_beside(
     checkpoint: BranchFile | None,
 ) -> Collector:
     """A collector that has the known branches, and a file for what is found beside them."""
-    own, progress = known.branches[0].points[0].problem.flow, progress or (lambda what, hz: None)
+    own, progress = known.branches[0].points[0].problem.flow, progress or silent
     options = options or ContinuationOptions()
     low, high = known.range_hz
     box = Collector(own, (low, high), known.observe, options, progress)
@@ -136,7 +136,7 @@ def take_kept(box: Collector, max_period: int) -> None:
     """Finish the branches that the file holds, and follow what they lead to."""
     count = len(box.branches)
     for branch in box.checkpoint.new_branches(lambda branch: box.known(middle_orbit(branch))):
-        progress = partial(box.progress, f"1/{branch.period}")
+        progress = partial(box.tell, f"1/{branch.period}")
         box.take_in(extended(branch, progress=progress, checkpoint=box.checkpoint))
     box.follow_up(count, max_period, max_period, None)
 
@@ -198,6 +198,7 @@ def _follow_new(
     if tally is None or tally.question != question:
         tally = Tally(question, len(to_meet), len(box.branches))
     for place in range(tally.done, len(wanted.frequencies)):
+        box.done = place / len(wanted.frequencies)
         box.checkpoint.tally = tally
         box.checkpoint.offer()
         tried, came, met = 0, 0, set[int]()

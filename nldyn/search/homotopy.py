@@ -24,6 +24,7 @@ from nldyn.search.extend import (
 )
 from nldyn.system.parameters import Parameter
 
+THERE, BACK = 0.3, 0.8  # shares of the work done when all orbits are there, and back
 PLACES = 3  # orbits of each branch that are carried there, in case some get lost
 
 
@@ -66,7 +67,7 @@ def by_detour(
     options : ContinuationOptions, optional
         Step control.
     progress : callable, optional
-        Called as ``progress(what, frequency_hz)``.
+        Called as ``progress(what, frequency_hz, done)``.
     checkpoint : CheckpointFile, optional
         File that keeps the branches found, also those of an earlier call, whatever its factors:
         they count as known. Those of the changed system are not kept, and followed anew.
@@ -107,8 +108,10 @@ def by_detour(
         take_kept(box, max_period)
         there = _followed(box, detour, max_period)
         tried = came = 0
-        for frequency in inner_frequencies(box.range_hz, spacing):
-            box.progress("back", frequency)
+        places = inner_frequencies(box.range_hz, spacing)
+        for number, frequency in enumerate(places):
+            box.done = THERE + (BACK - THERE) * number / len(places)
+            box.tell("back", frequency)
             orbits = [(via, orbit) for via in there for orbit in via.branch.at(frequency)]
             carriages = ((via, detour.carried(orbit, 1.0, 0.0)) for via, orbit in orbits)
             back = [(via, orbit) for via, orbit in carriages if orbit is not None]
@@ -153,14 +156,16 @@ def _met_from_others(known: Diagram, there: Sequence[Via], max_period: int) -> s
 
 def _followed(known: Collector, detour: Homotopy, max_period: int) -> list[Via]:
     """Branches of the changed system to which those known lead."""
-    progress = known.progress
-    box = Collector(detour.flow(1.0), known.range_hz, known.observe, known.options, progress)
+    box = Collector(
+        detour.flow(1.0), known.range_hz, known.observe, known.options, known.progress
+    )
     there: list[Via] = []
     for index, branch in enumerate(known.branches):
         if branch.period > max_period:
             continue
+        box.done = THERE * index / len(known.branches)
         for orbit in _spread(branch.points, known.range_hz):
-            progress("there", orbit.frequency_hz)
+            box.tell("there", orbit.frequency_hz)
             other = detour.carried(orbit, 0.0, 1.0)
             if other is not None:
                 box.follow(other, max_period, max_period, None)
@@ -204,11 +209,12 @@ def _folds_carried_back(
     Where the others lie is noted.
     """
     tried = came = 0
-    for via in there:
+    for number, via in enumerate(there):
+        box.done = BACK + (1.0 - BACK) * number / len(there)
         for special in via.branch.special_points:
             if special.kind != "LP":
                 continue
-            box.progress("folds", special.frequency_hz)
+            box.tell("folds", special.frequency_hz)
             fold = detour.carried_fold(special.orbit, 1.0, 0.0)
             tried += 1
             if fold is None:

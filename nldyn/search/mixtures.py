@@ -78,7 +78,7 @@ def by_crossover(
     options : ContinuationOptions, optional
         Step control.
     progress : callable, optional
-        Called as ``progress(what, frequency_hz)``.
+        Called as ``progress(what, frequency_hz, done)``.
     checkpoint : CheckpointFile, optional
         File that keeps the branches found, also those of an earlier call: they count as known.
         The same call with the same file goes on after the frequencies done, and gives the same
@@ -143,7 +143,7 @@ def near_mixtures(
     omega = 2.0 * math.pi * frequency_hz
     for period in periods:
         for _ in range(tries):
-            box.progress("mixtures", frequency_hz)
+            box.tell("mixtures", frequency_hz)
             used, nodes = loops.mixture(period, rng)
             orbit = nearest_orbit(box.flow, nodes, omega, box.observe, SHORT_STEPS)
             yield used, box.within([orbit])

@@ -105,7 +105,7 @@ def by_closed_walks(
     options : ContinuationOptions, optional
         Step control.
     progress : callable, optional
-        Called as ``progress(what, frequency_hz)``.
+        Called as ``progress(what, frequency_hz, done)``.
     checkpoint : CheckpointFile, optional
         File that keeps the branches found, also those of an earlier call: they count as known.
         The same call with the same file goes on after the frequencies done, and gives the same
@@ -169,7 +169,7 @@ def near_closed_walks(
     No orbit that is out of the range.
     """
     flow, omega = box.flow, 2.0 * math.pi * frequency_hz
-    asked = partial(box.progress, "closed walks", frequency_hz)
+    asked = partial(box.tell, "closed walks", frequency_hz)
     asked()
     known = _known_states(flow, branches, frequency_hz, rng)
     if not len(known):  # every motion failed, and no orbit is known

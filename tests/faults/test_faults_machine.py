@@ -14,9 +14,9 @@ from limited_commands import command, refusal
 
 from nldyn.base.resources import example
 from nldyn.branches.arclength import Stepper
-from nldyn.plot import diagram as plot
 from nldyn.report import results as output
 from nldyn.runtime import keeper
+from nldyn.search.diagram import diagram as plot
 
 START = "from nldyn.app.command import main; main()"
 

@@ -50,7 +50,7 @@ def test_only_the_periods_and_frequencies_wanted_are_tried(three):
     tried = set()
     done = by_closed_walks(
         three, min_period=2, max_period=2, range_hz=(37.2, 38.0), tries=3, spacing=0.005,
-        states=500, progress=lambda what, hz: tried.add(hz),
+        states=500, progress=lambda what, hz, done: tried.add(hz),
     )  # fmt: skip
     assert 37.2 < min(tried) < max(tried) < 38.0
     assert f" of {3 * len(tried)} closed walks led to" in done.notes[-1]

@@ -66,7 +66,7 @@ def test_only_the_periods_and_frequencies_wanted_are_tried(three):
     tried = set()
     done = by_crossover(
         three, min_period=2, max_period=2, range_hz=(37.2, 38.0), tries=3, spacing=0.005,
-        progress=lambda what, hz: tried.add(hz),
+        progress=lambda what, hz, done: tried.add(hz),
     )  # fmt: skip
     assert 37.2 < min(tried) < max(tried) < 38.0
     assert f" of {3 * len(tried)} mixtures led to" in done.notes[-1]

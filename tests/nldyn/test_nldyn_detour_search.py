@@ -363,7 +363,7 @@ def test_branches_of_longer_periods_than_wanted_do_not_count_as_given():
 def test_interrupted_it_goes_on_with_what_it_has_found(harmonic, found, tmp_path):
     place, seen = tmp_path / "found.h5", []
 
-    def interrupt(what: str, frequency_hz: float) -> None:
+    def interrupt(what: str, frequency_hz: float, done: float) -> None:
         seen.append(what)
         if seen.count("back") in (3, 4):
             raise KeyboardInterrupt

@@ -42,10 +42,11 @@ from nldyn.io.branches import load_branches, load_diagram, load_exploration
 from nldyn.orbits.deflation import deflated_orbit
 from nldyn.orbits.orbit import stroboscopic
 from nldyn.orbits.starts import random_states, settling_periods
+from nldyn.runtime.progress import silent
 from nldyn.scene.build import build_system, load_scene
-from nldyn.search import explore as survey
 from nldyn.search.diagram import Collector, middle_orbit
 from nldyn.search.exploration import chao_lower_bound
+from nldyn.search.explore import explore as survey
 
 NOTHING_MORE = {"pseudo_orbits": 0, "mixtures": 0, "walks": 0}  # beside motions and deflation
 
@@ -376,7 +377,7 @@ def stopped_at(step, orbits=0):
     """Progress that stops as Ctrl-C does, some orbits after a step has begun."""
     steps, seen = 0, 0
 
-    def report(what, hz):
+    def report(what, hz, done):
         nonlocal steps, seen
         steps += what == "explore"
         seen += steps >= step
@@ -445,7 +446,7 @@ def test_frequencies_that_are_done_are_not_simulated_again(whole, tmp_path):
     interrupt(path, 6)
     steps = []
 
-    def report(what, hz):
+    def report(what, hz, done):
         steps.extend([hz] if what == "explore" else [])
 
     explore(
@@ -655,7 +656,7 @@ def test_bad_questions_are_refused_before_any_simulation(range_hz, period, says)
 def test_a_doubled_branch_begins_at_its_flip():
     """What lies between the flip and the orbit from which the branch is followed belongs to it."""
     flow = FlowMap(system_of("one_dof"))
-    box = Collector(flow, (28.0, 60.0), "middle", ContinuationOptions(), lambda what, hz: None)
+    box = Collector(flow, (28.0, 60.0), "middle", ContinuationOptions(), silent)
     box.from_orbits([solve_orbit(flow, 50.0)])
     flip = next(s for s in box.branches[0].special_points if s.kind == "PD")
     box.from_flip(flip)
@@ -671,7 +672,7 @@ def test_where_a_doubled_branch_comes_to_its_flip_the_other_one_has_half_the_per
     """Followed on as a branch of the doubled period it would be the same orbits twice."""
     flow = FlowMap(system_of("one_dof"))
     box, other = (
-        Collector(flow, (28.0, 60.0), "middle", ContinuationOptions(), lambda what, hz: None)
+        Collector(flow, (28.0, 60.0), "middle", ContinuationOptions(), silent)
         for _ in range(2)
     )
     box.from_orbits([solve_orbit(flow, 50.0)])
@@ -709,7 +710,7 @@ def test_orbits_of_a_branch_are_known_where_newtons_method_at_their_frequency_fa
 def test_orbits_beside_the_ends_of_a_doubled_branch_are_known():
     """At the frequency of one beside a flip, Newton's method may come to the single period."""
     flow = FlowMap(system_of("two_dof_xi_0.01"))
-    box = Collector(flow, (17.9, 18.9), "middle", ContinuationOptions(), lambda what, hz: None)
+    box = Collector(flow, (17.9, 18.9), "middle", ContinuationOptions(), silent)
     box.from_orbits([solve_orbit(flow, 18.4), *find_orbits(flow, 18.6, 2)])
     harmonic = box.branches[0]
     flips = [s for s in harmonic.special_points if s.kind == "PD"]

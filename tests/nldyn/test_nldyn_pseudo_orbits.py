@@ -224,7 +224,7 @@ def test_a_branch_that_was_begun_is_finished(three, tmp_path):
     save(without(three, left_out), known)
     seen = []
 
-    def interrupt(what: str, frequency_hz: float) -> None:
+    def interrupt(what: str, frequency_hz: float, done: float) -> None:
         seen.append(what)
         if seen.count("1/3") == 5:
             raise KeyboardInterrupt

@@ -35,7 +35,7 @@ class Frequencies:
         self.way, self.last = way, last
         self.tried: list[float] = []
 
-    def __call__(self, what: str, frequency_hz: float) -> None:
+    def __call__(self, what: str, frequency_hz: float, done: float) -> None:
         if what == self.way and frequency_hz not in self.tried:
             self.tried.append(frequency_hz)
             if len(self.tried) == self.last:
@@ -95,7 +95,7 @@ def test_what_it_has_found_is_not_lost_and_changes_nothing_where_it_goes_on(thre
     wanted = search(known, progress=whole)
     tried: list[float] = []
 
-    def interrupt(what: str, frequency_hz: float) -> None:
+    def interrupt(what: str, frequency_hz: float, done: float) -> None:
         if what == way:
             tried.append(frequency_hz)
             if place.exists() and load_branches(place):
