@@ -10,22 +10,22 @@ import sys
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
-from nldyn.app.command import INTERRUPTED, STOPPED
-from nldyn.runtime.interruption import interrupted
+from nldyn.base.exit_codes import BAD_INPUT, INTERRUPTED, NO_GRAPHICS, NOTHING_FOUND
+from nldyn.report.console import kept_at_interrupt, plain_errors, told_what_is_kept
+from nldyn.runtime.interruption import STOPPED, interrupted
 
 if TYPE_CHECKING:
     from nldyn.search.diagram import Diagram
     from nldyn.system.elements import Stop
     from nldyn.system.system import System
 
-NOTHING_FOUND, BAD_INPUT, NO_GRAPHICS = 1, 2, 3
 
 any_path = click.Path(path_type=Path, readable=False)  # what is wrong with it is said later
 scene_argument = click.argument("scene", type=any_path, metavar="SCENE.toml")
@@ -336,57 +336,6 @@ def paper(out: Path) -> None:
 
         with told_what_is_kept(unfinished_folder(out), has_values):
             reproduce(out)
-
-
-@contextmanager
-def plain_errors() -> Iterator[None]:
-    """Tell the user's errors in one line on stderr, without a traceback, and exit."""
-    from nldyn.base.errors import SceneError, SystemModelError
-    from nldyn.runtime.result_directory import OutputError
-    from nldyn.scene.messages import printable
-
-    try:
-        yield
-    except (SceneError, SystemModelError, OutputError) as error:
-        click.echo(f"nldyn: {printable(str(error))}", err=True)
-        sys.exit(BAD_INPUT)
-    except MemoryError:
-        click.echo("nldyn: the memory does not suffice for this", err=True)
-        sys.exit(BAD_INPUT)
-
-
-@contextmanager
-def kept_at_interrupt(out: Path) -> Iterator[Path]:
-    """Give the file that keeps what is computed, and name it if the end is not reached."""
-    from nldyn.runtime.unfinished import unfinished_file
-
-    with unfinished_file(out) as unfinished, told_what_is_kept(unfinished):
-        yield unfinished
-
-
-@contextmanager
-def told_what_is_kept(
-    unfinished: Path, holds_work: Callable[[Path], bool] = Path.exists
-) -> Iterator[None]:
-    """Name the place of unfinished work where an error of the output or Ctrl-C ends it."""
-    from nldyn.runtime.result_directory import OutputError
-
-    try:
-        yield
-    except OutputError as error:
-        if not holds_work(unfinished):
-            raise
-        fault = f"{error}; {unfinished} keeps what was computed, and the same command goes on"
-        raise OutputError(f"{fault} from there") from error
-    except (KeyboardInterrupt, Exception) as error:
-        if not (interrupted(error) and holds_work(unfinished)):
-            raise
-        click.echo(
-            f"nldyn: stopped by Ctrl-C; {unfinished} keeps what was computed, and the same "
-            "command goes on from there",
-            err=True,
-        )
-        sys.exit(INTERRUPTED)
 
 
 def describe(diagram: Diagram, seconds: float, out: Path) -> str:

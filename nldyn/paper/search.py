@@ -25,8 +25,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from nldyn.app.cli import plain_errors, told_what_is_kept
-from nldyn.app.command import answering
 from nldyn.base.errors import SystemModelError, check_whole
 from nldyn.flow.flow_map import flow_of, same_flow
 from nldyn.io.branches import load_diagram
@@ -36,7 +34,9 @@ from nldyn.orbits.homotopy import checked_factors
 from nldyn.orbits.starts import MOST_COUNT
 from nldyn.paper.jobs import JOBS, LONG, Job, job_named
 from nldyn.paper.starts import LONGEST, Start, follow_starts, read_starts, starts_path, write_starts
+from nldyn.report.console import plain_errors, told_what_is_kept
 from nldyn.runtime.files import write_whole
+from nldyn.runtime.interruption import answering
 from nldyn.runtime.progress import Progress, progress_line
 from nldyn.search.by_pseudo_orbits import by_pseudo_orbits
 from nldyn.search.diagram import Diagram

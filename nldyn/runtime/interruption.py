@@ -10,6 +10,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from nldyn.base.exit_codes import INTERRUPTED
+
+STOPPED = "nldyn: stopped by Ctrl-C, nothing is written"
+
 SOON = 0.2
 """Seconds after which a Ctrl-C that was swallowed is tried again."""
 
@@ -117,3 +121,22 @@ def heed_swallowed() -> None:
         again.start()
 
     sys.unraisablehook = hook
+
+
+def answering(work: Callable[[], None]) -> None:
+    """Do the work of a process; Ctrl-C ends it with one line and exit code 130."""
+    heed_swallowed()
+    try:
+        work()
+    except SystemExit:
+        raise
+    except BaseException as error:
+        if not interrupted(error):
+            raise
+        print(STOPPED, file=sys.stderr)
+        sys.exit(INTERRUPTED)
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is to end
+        # a Ctrl-C that left an exec of text, as in the making of a dataclass, lets ``python -m``
+        # end by the signal whatever the exit code; another exec makes it forget that
+        exec("")

@@ -7,7 +7,7 @@ import os
 import sys
 from pathlib import Path
 
-from nldyn.app.command import answering
+from nldyn.runtime.interruption import answering
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 

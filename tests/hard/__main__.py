@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from nldyn.app.command import answering
+from nldyn.runtime.interruption import answering
 
 
 def main() -> None:

@@ -11,14 +11,7 @@ from bench.exact import Precision
 from scipy.optimize import brentq
 
 from hard.case import Case, Measured
-from hard.multiprecision import (
-    JACOBIAN,
-    ORIGIN,
-    PROMISE,
-    STATE,
-    newton_step,
-    orbit_flow_error,
-)
+from hard.multiprecision import JACOBIAN, ORIGIN, PROMISE, STATE, newton_step, orbit_flow_error
 from hard.stiffness import beam_with_stop
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
