@@ -126,3 +126,17 @@ def test_the_thickness_of_a_part_is_that_of_all_its_cells():
     """Faces between cells of different kinds are inside: twice volume over surface."""
     mesh = mixed_block("first order")
     assert thickness(mesh.points, mesh.cells) == pytest.approx(2.0 * 8.0 / 24.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["quad9", "pyramid14", "wedge18", "hexahedron27"])
+def test_nodes_on_faces_in_another_order_are_found_out(kind):
+    dimension = KINDS[kind].dimension
+    mesh = fem.box_mesh("b", (3.0, 1.0, 0.1)[:dimension], (1, 1, 1)[:dimension], kind=kind)
+    points = mesh.points.copy()
+    points[:, 2 if dimension == 3 else 1] += 0.3 * np.sin(points[:, 0])
+    curved = mesh.with_points(points)
+    order = np.arange(KINDS[kind].node_count)
+    first = order[-1] if kind in ("quad9", "pyramid14") else order[-2]
+    order[[first, first - 1]] = order[[first - 1, first]]
+    with pytest.raises(fem.ModelError, match=rf"{kind} 0 at .* not (near|in) the middle"):
+        fem.StructureMesh(curved.points, {kind: curved.cells[kind][:, order]})
