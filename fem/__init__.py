@@ -19,7 +19,7 @@ from fem.model import (
 from fem.read import from_meshio, read_mesh, read_structure, structure_from_meshio
 from fem.sections import CircularSection, CrossSection, RectangularSection, Section
 from fem.structure import Coupling, Foundation, SolidPart, StructureModel, symmetry
-from fem.structure_assembly import LockingWarning, StructureComponent
+from fem.structure_assembly import DistortionWarning, LockingWarning, StructureComponent
 from fem.structure_mesh import StructureMesh, box_mesh, joined, structure_mesh
 from fem.write import write_mesh
 
@@ -30,6 +30,7 @@ __all__ = [
     "Component",
     "Coupling",
     "CrossSection",
+    "DistortionWarning",
     "Foundation",
     "FrameMesh",
     "FrameModel",

@@ -18,6 +18,7 @@ from itertools import permutations
 
 import numpy as np
 
+from fem.cell_checks import cell_at, has_repeated_nodes
 from fem.cells import KINDS, CellKind
 from fem.errors import ModelError
 from fem.mesh import FloatArray, IntArray
@@ -121,12 +122,6 @@ def uncollapsed(
     return {kind: nodes for kind, nodes in joined.items() if len(nodes)}, renumbered, notes
 
 
-def has_repeated_nodes(cells: IntArray) -> np.ndarray:
-    """Which of the cells (e, b) name a node twice, shape (e,)."""
-    ordered = np.sort(cells, axis=1)
-    return np.asarray((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
-
-
 def _renumbered(
     group: Mapping[str, IntArray],
     cells: Mapping[str, IntArray],
@@ -156,11 +151,10 @@ def _meant(
         meaning = _meaning(kind, tuple(pattern.tolist()))
         if meaning is None:
             cell = int(of_pattern[0])
-            x, y, z = points[nodes[cell]].mean(axis=0)
+            first = cell_at(kind, cell, points[nodes[cell]])
             raise ModelError(
-                f"{source}: {kind} {cell} at ({x:.6g}, {y:.6g}, {z:.6g}) has repeated nodes, but is"
-                " no wedge, pyramid, tetrahedron or triangle by them"
-                f" ({len(of_pattern)} such cells)"
+                f"{source}: {first} has repeated nodes, but is no wedge, pyramid, tetrahedron or"
+                f" triangle by them ({len(of_pattern)} such cells)"
             )
         target, local = meaning
         found.append((target, of_pattern, nodes[of_pattern][:, list(local)]))

@@ -363,7 +363,7 @@ def _elements_41(numbers: _Numbers, groups: Groups) -> list[_Block]:
 
 def _kind(code: int) -> str:
     if code not in _gmsh_to_meshio_type:
-        raise ValueError(f"an element has the type {code}, which Gmsh does not write")
+        raise ValueError(f"an element has the type {code}, which is not read")
     return str(_gmsh_to_meshio_type[code])
 
 

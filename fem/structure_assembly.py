@@ -13,7 +13,9 @@ from scipy import sparse
 
 from fem.beams import cross_matrix, element_matrices, element_rows, local_axes, to_nodes
 from fem.cells import KINDS, CellKind
+from fem.conforming import check_conforming
 from fem.constraints import Constraints, Numbering, constrain, facet_products, number_blocks
+from fem.distorted import distortion_warnings
 from fem.errors import ModelError
 from fem.locking import locking_warnings
 from fem.mesh import FloatArray, IntArray
@@ -30,6 +32,10 @@ BATCH_BYTES = 1e8
 
 class LockingWarning(UserWarning):
     """First-order solids on a part that is thin: they are too stiff in bending."""
+
+
+class DistortionWarning(UserWarning):
+    """Cells that are out of shape: their part may be too stiff, and its stresses wrong there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,16 +119,21 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     Raises
     ------
     ModelError
-        If the supports leave nothing free, a cell is flat or folded, or a support, mass, spring
-        or interface is where there is nothing to hold, load or move.
+        If the supports leave nothing free, a cell is flat or folded, cells do not fit together,
+        or a support, mass, spring or interface is where there is nothing to hold, load or move.
 
     Warns
     -----
     LockingWarning
         If a part of first-order cells is so thin that it is much too stiff in bending.
+    DistortionWarning
+        If cells are out of shape.
     """
+    check_conforming(model)
     for text in locking_warnings(model):
         warnings.warn(text, LockingWarning, stacklevel=3)
+    for text in distortion_warnings(model):
+        warnings.warn(text, DistortionWarning, stacklevel=3)
     numbering = number_blocks(model)
     constraints = constrain(model, numbering)
     stiffness, mass = solid_matrices(model, numbering)
@@ -243,7 +254,7 @@ def weighted_gradients(
     """Gradients (e, q, b, d) at the places of integration and the volumes (e, q) there."""
     places, weights = kind.quadrature
     gradients, volumes = gradients_and_volumes(kind, coordinates[..., : kind.dimension], places)
-    weighted = checked_volumes(volumes, what, first) * weights
+    weighted = checked_volumes(volumes, coordinates, what, first) * weights
     return gradients, weighted if part.thickness is None else weighted * part.thickness
 
 

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from fem.cell_checks import cell_at, check_cells
 from fem.cells import CUBE, KINDS, PYRAMID, TETRAHEDRON, TRIANGLE, WEDGE
-from fem.collapsed import has_repeated_nodes
 from fem.errors import ModelError, quoted
 from fem.mesh import FloatArray, FrameMesh, IntArray, index_sets, numbers
 
@@ -194,31 +194,7 @@ class StructureMesh:
             raise ModelError(
                 f"{self.source}: a cell of kind {kind!r} has {count} nodes, not {cells.shape[1]}"
             )
-        self._check_doubled(kind, cells)
-        if KINDS[kind].order == 2:
-            self._check_middles(kind, cells)
-
-    def _check_doubled(self, kind: str, cells: IntArray) -> None:
-        """Each node once, and edges that have a length; beams are looked at in their model."""
-        twice = np.flatnonzero(has_repeated_nodes(cells))
-        if len(twice):
-            raise ModelError(
-                f"{self.source}: {self.where(kind, twice[0])} has a node twice ({len(twice)} such"
-                " cells)"
-            )
-        if KINDS[kind].dimension == 1:
-            return
-        edges = np.array(KINDS[kind].edges)
-        ends = self.points[cells[:, edges]]
-        length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
-        bad = np.argwhere(length <= 1e-12 * self.size)
-        if len(bad):
-            cell, edge = bad[0]
-            first, second = cells[cell, edges[edge]]
-            raise ModelError(
-                f"{self.source}: {self.where(kind, cell)} has its nodes {first} and {second} at one"
-                f" place ({len(set(bad[:, 0]))} such cells); make them one node"
-            )
+        check_cells(self.source, kind, cells, self.points)
 
     def where(self, kind: str, cell: int) -> str:
         """A cell by its kind, number and place, for error texts.
@@ -228,24 +204,7 @@ class StructureMesh:
         >>> box_mesh("plate", (1.0, 1.0), (2, 2), kind="quad").where("quad", 3)
         'quad 3 at (0.75, 0.75, 0)'
         """
-        x, y, z = self.points[self.cells[kind][cell]].mean(axis=0)
-        return f"{kind} {cell} at ({x:.6g}, {y:.6g}, {z:.6g})"
-
-    def _check_middles(self, kind: str, cells: IntArray) -> None:
-        """Nodes between corners must be nearer to the middle than to either end."""
-        edges = np.array(KINDS[kind].edges)
-        ends = self.points[cells[:, edges]]
-        first = len(KINDS[kind].corners)
-        middle = self.points[cells[:, first : first + len(edges)]]
-        off = np.linalg.norm(middle - ends.mean(axis=2), axis=2)
-        length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
-        bad = np.flatnonzero((off > 0.35 * length).any(axis=1))
-        if len(bad):
-            raise ModelError(
-                f"{self.source}: the nodes on the edges of {self.where(kind, bad[0])} are not near"
-                f" the middle of their edges ({len(bad)} such cells; they must be in the order of"
-                " meshio and VTK)"
-            )
+        return cell_at(kind, cell, self.points[self.cells[kind][cell]])
 
     def _check_range(self, what: str, indices: IntArray, count: int) -> None:
         if indices.size and not (indices.min() >= 0 and indices.max() < count):

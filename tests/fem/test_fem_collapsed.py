@@ -10,7 +10,7 @@ from structures import CLAMP, STEEL, lowest_hz
 
 import fem
 from fem.cells import KINDS
-from fem.collapsed import SECOND_ORDER, uncollapsed
+from fem.collapsed import SECOND_ORDER, _symmetries, uncollapsed
 from fem.solids import gradients_and_volumes, stiffness_matrices
 from fem.wedges import pyramid_rule
 
@@ -70,6 +70,25 @@ def test_a_collapsed_hexahedron_is_exactly_what_it_is_taken_as(kind, pattern):
     taken = finely_integrated(kind, points[cells[kind][0]])
     there = summed(collapsed, pattern, 8), summed(taken, cells[kind][0], 8)
     assert np.abs(there[0] - there[1]).max() < 1e-8 * np.abs(there[1]).max()
+
+
+@pytest.mark.parametrize(("kind", "pattern"), CASES)
+def test_it_does_not_matter_where_a_hexahedron_begins(kind, pattern):
+    """All 48 ways to number it, also mirrored, and those with twenty nodes, give one cell."""
+    points = CUBE.corners @ (np.eye(3) + np.random.default_rng(2).uniform(-0.2, 0.2, (3, 3)))
+    found = []
+    for turned in _symmetries("hexahedron"):
+        cell = np.array([[pattern[i] for i in turned]])
+        cells, _, _ = uncollapsed(points, {"hexahedron": cell}, {}, "mesh")
+        assert list(cells) == [kind]
+        own = points[cells[kind][0]]
+        found.append(summed(finely_integrated(kind, own, 4), cells[kind][0], 8))
+        names = twenty(cell[0])
+        number = {name: n for n, name in enumerate(dict.fromkeys(names))}
+        of_twenty = np.array([[number[name] for name in names]])
+        found_20, _, _ = uncollapsed(np.zeros((20, 3)), {"hexahedron20": of_twenty}, {}, "mesh")
+        assert list(found_20) == [SECOND_ORDER[kind]]
+    assert np.abs(np.array(found) - found[0]).max() < 1e-12 * np.abs(found[0]).max()
 
 
 def twenty(cell):
@@ -181,8 +200,6 @@ def test_nodes_at_one_place_are_told_by_cell_and_place():
 
 
 def test_there_are_as_many_ways_to_number_a_shape_as_it_has_symmetries():
-    from fem.collapsed import _symmetries
-
     counts = {shape: len(_symmetries(shape)) for shape in SECOND_ORDER}
     assert counts == {"triangle": 6, "quad": 8, "tetra": 24, "pyramid": 8, "wedge": 12,
                       "hexahedron": 48}  # fmt: skip

@@ -62,6 +62,8 @@ MODELS = {
     "beams with an offset": beams("timoshenko", offset=(0.02, 0.03)),
     "hexahedra": block("hexahedron"),
     "hexahedra, 20 nodes": block("hexahedron20"),
+    "wedges, 15 nodes": block("wedge15"),
+    "pyramids, 13 nodes": block("pyramid13"),
     "tetrahedra, 10 nodes, negative Poisson's ratio": block("tetra10", poisson=-0.3),
     "quadrilaterals in plane stress": block("quad8", (1.0, 0.05), thickness=0.01, plane="stress"),
 }

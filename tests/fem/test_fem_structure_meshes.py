@@ -249,7 +249,7 @@ UP = {"orientation": (1.0, 0.0, 0.0)}
             ),
             "interface 'i': a plane structure has no direction 'z'",
         ),
-        (lambda: fem.assemble(folded()), "f.msh: part 'block': hexahedron: cell 1 is flat or fol"),
+        (lambda: fem.assemble(folded()), "f.msh: part 'block': hexahedron: cell 1 of the part, at"),
         (lambda: fem.assemble(upright()), "part 'mast': line 0 runs along z, so it needs an orie"),
         (
             lambda: fem.assemble(upright(orientation=(0.0, 0.0, 2.0))),
