@@ -244,14 +244,15 @@ def test_grazing_point_beside_a_flip_is_found_where_the_contact_is_too_slight_to
         ]
 
 
-def test_end_of_a_doubled_branch_is_told_as_no_fold():
+@pytest.mark.parametrize("every", [18, pytest.param(6, marks=pytest.mark.slow)])
+def test_end_of_a_doubled_branch_is_told_as_no_fold(every):
     """The branch turns at its flip; from this start rounding put two folds there."""
     ratio, stop = 0.037775752970254865, Stop("m", 24402899.633555975, gap=0.00028860699650216725)
     system = on_springs(ratio, 7.065386225652446, stop)
     found = diagram(system, (6.5, 16.0), (1, 2), doublings=1, search_points=4)
     branch = next(b for b in found.branches if b.period == 2 and b.frequency_hz.min() < 9.7)
     expected = sorted(special_points(branch))
-    for start in branch.points[6:-6:6]:
+    for start in branch.points[6:-6:every]:
         again = continue_branch(start, (6.5, 16.0))
         assert sorted(special_points(again)) == [
             (kind, pytest.approx(hz, rel=1e-8)) for kind, hz in expected
@@ -352,16 +353,26 @@ def test_a_test_that_jumps_where_no_multiplier_is_critical_tells_of_no_point(
         special._located(kind, special.Chord(first, last))
 
 
-@pytest.mark.parametrize("index", [0, 1])
-@pytest.mark.parametrize("amplitude", [1e-5, 1e-6, 4.1630532849205377e-07])
-@pytest.mark.parametrize("side", [0, 1])
-def test_a_closed_half_begun_beside_its_pitchfork_has_that_once(facing, index, amplitude, side):
-    """The first step or the last may tell it, or both; as many as one begun far from it has."""
+def half_of(facing, index, side, amplitude):
+    """A half of the branch that is born at one of two pitchforks, begun at a distance from it."""
     special = [s for s in facing.special_points if s.kind == "BP"][index]
-    far, near = (
-        continue_branch(switch_at_branch_point(special, a)[side].orbit, (6.5, 8.5))
-        for a in (1e-2, amplitude)
-    )
+    return continue_branch(switch_at_branch_point(special, amplitude)[side].orbit, (6.5, 8.5))
+
+
+HALVES = [(0, 0), (1, 1), *(pytest.param(at, marks=pytest.mark.slow) for at in [(0, 1), (1, 0)])]
+
+
+@pytest.fixture(scope="module", params=HALVES)
+def far_half(facing, request):
+    """Begun far from its pitchfork, with its place."""
+    return half_of(facing, *request.param, 1e-2), *request.param
+
+
+@pytest.mark.parametrize("amplitude", [1e-5, 1e-6, 4.1630532849205377e-07])
+def test_a_closed_half_begun_beside_its_pitchfork_has_that_once(facing, far_half, amplitude):
+    """The first step or the last may tell it, or both; as many as one begun far from it has."""
+    far, index, side = far_half
+    near = half_of(facing, index, side, amplitude)
     for branch in (far, near):
         assert branch.closed and not branch.notes
     kinds, hz = zip(*[told_by(branch) for branch in (far, near)], strict=True)
