@@ -194,16 +194,25 @@ def on_springs(ratio: float, force: float, *stops: Stop) -> System:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("place", [2, 9, 20, 30])
-def test_flips_on_both_sides_of_a_grazing_point_within_a_step_are_found(place):
-    """Between 8.8543 and 8.8578 Hz two pairs of flips lie around the grazing points of a branch."""
+@pytest.fixture(scope="module")
+def flips_around_grazing():
+    """A branch of period 4, and its special points with short steps."""
     system = on_springs(0.02, 5.0, *(Stop("m", 1e7, gap=1e-3, direction=side) for side in (1, -1)))
     guess = np.array([0.00096285, -0.00178918])
     start = solve_orbit(system, 8.856826796779755, 4, guess=guess)
     fine = ContinuationOptions(max_step=0.0005, first_step=0.0005)
     expected = special_points(continue_branch(start, (8.8, 8.9), options=fine))
     assert [kind for kind, _ in expected].count("PD") == 4
-    usual = continue_branch(continue_branch(start, (8.8, 8.9)).points[place], (8.8, 8.9))
+    return continue_branch(start, (8.8, 8.9)), expected
+
+
+@pytest.mark.parametrize("place", [2, 9, 20, 30])
+def test_flips_on_both_sides_of_a_grazing_point_within_a_step_are_found(
+    flips_around_grazing, place
+):
+    """Between 8.8543 and 8.8578 Hz two pairs of flips lie around the grazing points of a branch."""
+    branch, expected = flips_around_grazing
+    usual = continue_branch(branch.points[place], (8.8, 8.9))
     assert sorted(special_points(usual)) == [
         (kind, pytest.approx(hz, rel=1e-9)) for kind, hz in sorted(expected)
     ]
@@ -467,18 +476,23 @@ def test_ill_conditioned_pitchforks_are_crossed_and_located_from_any_step(first_
     assert met == pytest.approx([s.frequency_hz for s in crossings[-2:]], rel=1e-10)
 
 
-@pytest.mark.parametrize("first_step", [0.01, 0.002])
-@pytest.mark.parametrize("beside", [-1e-5, -3e-6, -1e-6, 1e-6, 3e-6, 1e-5])
-def test_walk_that_begins_beside_a_pitchfork_crosses_it(beside, first_step):
-    """The way from its start to where Newton's method ends is too short to tell where to go on."""
+@pytest.fixture(scope="module")
+def with_pitchfork():
+    """A symmetric branch that ends behind a pitchfork."""
     stops = [Stop("a", stiffness=1.07e9, direction=side) for side in (1, -1)]
     system = System.from_modal(
         [18.98], {"a": [0.597]}, modal_damping=0.00647, stops=stops,
         excitation=[Unbalance("a", 2.49e-5)],
     )  # fmt: skip
-    whole = continue_branch(solve_orbit(system, 20.0), (20.0, 26.8))
-    pitchfork = [s for s in whole.special_points if s.kind == "BP"][-1]
-    start = whole.at(pitchfork.frequency_hz * (1.0 + beside))[0]
+    return continue_branch(solve_orbit(system, 20.0), (20.0, 26.8))
+
+
+@pytest.mark.parametrize("first_step", [0.01, 0.002])
+@pytest.mark.parametrize("beside", [-1e-5, -3e-6, -1e-6, 1e-6, 3e-6, 1e-5])
+def test_walk_that_begins_beside_a_pitchfork_crosses_it(with_pitchfork, beside, first_step):
+    """The way from its start to where Newton's method ends is too short to tell where to go on."""
+    pitchfork = [s for s in with_pitchfork.special_points if s.kind == "BP"][-1]
+    start = with_pitchfork.at(pitchfork.frequency_hz * (1.0 + beside))[0]
     options = ContinuationOptions(first_step=first_step)
     branch = continue_branch(start, (25.0, 26.8), options=options)
     assert branch.stop_reasons == ("end of the frequency range",) * 2
