@@ -168,7 +168,7 @@ def meshes():
         )
         components[f"{count} elements"] = fem.assemble(model)
     setting = Setting(
-        (20.0, 60.0),
+        (30.0, 40.0),
         stops=(Stop("tip", stiffness=1e8),),
         excitation=(Unbalance("tip", 1e-4),),
         dampers=(Damper("tip", 1.0),),

@@ -104,7 +104,7 @@ def crossed():
 
 
 @pytest.mark.parametrize("beside", [9e-6, 2e-6, -5e-6])
-@pytest.mark.parametrize("step", [0.01, 0.02, 0.05])
+@pytest.mark.parametrize("step", [0.01, pytest.param(0.02, marks=pytest.mark.slow), 0.05])
 def test_a_fold_beyond_a_branch_point_beside_the_start_is_told(crossed, beside, step):
     """There the tangent may be of both branches, and its sign that of no fold."""
     special = crossed
