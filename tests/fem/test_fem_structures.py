@@ -1,6 +1,5 @@
 """Structures of solids and beams against closed forms, scikit-fem's own forms and each other."""
 
-import time
 import warnings
 from dataclasses import replace
 
@@ -440,11 +439,9 @@ def test_second_order_cells_are_not_warned_of():
 
 
 @pytest.mark.slow
-def test_a_solid_of_1e5_dofs_takes_seconds_and_has_the_energy_of_a_uniform_strain():
+def test_a_solid_of_1e5_dofs_has_the_energy_of_a_uniform_strain():
     mesh = fem.box_mesh("block", (1.0, 0.5, 0.25), (40, 20, 10))
-    start = time.process_time()
     component = fem.assemble(fem.StructureModel(mesh, {"block": fem.SolidPart(STEEL)}))
-    assert time.process_time() - start < 15.0
     assert len(component.free) > 1e5
     strain = np.array([[1.0, 0.2, -0.3], [0.2, -0.5, 0.1], [-0.3, 0.1, 0.7]])
     u = (mesh.points @ strain).ravel()

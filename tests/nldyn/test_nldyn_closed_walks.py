@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -31,7 +32,8 @@ OMEGA = 2.0 * np.pi * 37.0
 def test_from_one_branch_all_others_are_found(three):
     """The harmonic, and a few motions, tell where states lie, no more."""
     (harmonic,) = three.of_period(1)
-    done = by_closed_walks(replace(three, branches=(harmonic,)), states=1000, tries=50)
+    known = replace(three, branches=(harmonic,))
+    done = by_closed_walks(known, states=1000, tries=50, spacing=0.02)
     assert sorted(branch.period for branch in done.branches) == [1, 2, 3]
     for wanted in three.branches:
         (found,) = done.of_period(wanted.period)
@@ -58,7 +60,8 @@ def test_only_the_periods_and_frequencies_wanted_are_tried(three):
 
 
 def test_the_same_seed_gives_the_same_and_another_one_other_walks(three):
-    notes = [by_closed_walks(three, states=200, tries=20, seed=n).notes[-1] for n in (1, 1, 2)]
+    search = partial(by_closed_walks, three, states=200, tries=20, spacing=0.02)
+    notes = [search(seed=n).notes[-1] for n in (1, 1, 2)]
     assert notes[0] == notes[1] != notes[2]
 
 

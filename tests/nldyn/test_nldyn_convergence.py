@@ -167,8 +167,8 @@ def meshes():
             interfaces={"tip": fem.Interface("tip", "y")},
         )
         components[f"{count} elements"] = fem.assemble(model)
-    setting = LoadCase(
-        (20.0, 60.0),
+    setting = Setting(
+        (30.0, 40.0),
         stops=(Stop("tip", stiffness=1e8),),
         excitation=(Unbalance("tip", 1e-4),),
         dampers=(Damper("tip", 1.0),),
