@@ -2,6 +2,15 @@
 
 from fem.abaqus import read_abaqus
 from fem.assemble import assemble
+from fem.attachments import (
+    Attachments,
+    Coupling,
+    LeftOut,
+    LinearEquation,
+    Link,
+    PointMass,
+    PointSpring,
+)
 from fem.calibrate import Calibration, calibrate
 from fem.errors import ModelError
 from fem.frame import Component
@@ -12,18 +21,17 @@ from fem.model import (
     Hinge,
     Interface,
     Material,
-    PointMass,
-    PointSpring,
     Support,
 )
 from fem.read import from_meshio, read_mesh, read_structure, structure_from_meshio
 from fem.sections import CircularSection, CrossSection, RectangularSection, Section
-from fem.structure import Coupling, Foundation, SolidPart, StructureModel, symmetry
+from fem.structure import Foundation, SolidPart, StructureModel, symmetry
 from fem.structure_assembly import LockingWarning, StructureComponent
 from fem.structure_mesh import StructureMesh, box_mesh, joined, structure_mesh
 from fem.write import write_mesh
 
 __all__ = [
+    "Attachments",
     "BeamPart",
     "Calibration",
     "CircularSection",
@@ -35,6 +43,9 @@ __all__ = [
     "FrameModel",
     "Hinge",
     "Interface",
+    "LeftOut",
+    "LinearEquation",
+    "Link",
     "LockingWarning",
     "Material",
     "ModelError",

@@ -591,21 +591,24 @@ def refined_mesh(mesh: fem.FrameMesh, times: int) -> fem.FrameMesh:
     >>> len(refined_mesh(mesh, 3).lines)
     6
     """
-    import fem
-
     points, lines, pieces = cut_lines(mesh.points, mesh.lines, times)
     parts = {name: pieces[elements].ravel() for name, elements in mesh.parts.items()}
-    return fem.FrameMesh(points, lines, parts, mesh.point_sets, mesh.source)
+    types = {name: pieces[elements].ravel() for name, elements in mesh.element_types.items()}
+    return replace(mesh, points=points, lines=lines, parts=parts, element_types=types)
 
 
 def refined_structure(mesh: fem.StructureMesh, times: int) -> fem.StructureMesh:
     """The same for the lines of a structure."""
     points, lines, pieces = cut_lines(mesh.points, mesh.cells["line"], times)
-    groups = {
-        name: {k: pieces[at].ravel() if k == "line" else at for k, at in group.items()}
-        for name, group in mesh.groups.items()
-    }
-    return replace(mesh, points=points, cells={**mesh.cells, "line": lines}, groups=groups)
+    groups, types = (
+        {
+            name: {k: pieces[at].ravel() if k == "line" else at for k, at in group.items()}
+            for name, group in named.items()
+        }
+        for named in (mesh.groups, mesh.element_types)
+    )
+    cells = {**mesh.cells, "line": lines}
+    return replace(mesh, points=points, cells=cells, groups=groups, element_types=types)
 
 
 def cut_lines(
