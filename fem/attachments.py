@@ -124,7 +124,7 @@ class Coupling:
     def __post_init__(self) -> None:
         owner = f"coupling of {self.face!r} to {self.point!r}"
         if self.weighting not in ("area", "nodes"):
-            raise ModelError(f"{owner}: weighting must be 'area' or 'nodes', not {self.weighting!r}")
+            raise ModelError(f"{owner}: weighting is 'area' or 'nodes', not {self.weighting!r}")
         if self.kind not in ("rigid", "averaging"):
             raise ModelError(f"{owner}: kind must be 'rigid' or 'averaging', not {self.kind!r}")
         if self.at is not None:
@@ -257,7 +257,8 @@ class Attachments:
     def points(self) -> tuple[str, ...]:
         """The names of all points and faces that something is attached to."""
         names = [mass.point for mass in self.point_masses]
-        names += [point for item in (*self.links, *self.equations) for point in item.points]
+        names += [point for link in self.links for point in link.points]
+        names += [point for equation in self.equations for point in equation.points]
         names += [name for item in self.couplings for name in (item.point, item.face)]
         return tuple(dict.fromkeys(names))
 

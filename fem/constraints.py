@@ -73,7 +73,8 @@ def _number_attached(
     for coupling in model.attached.couplings:
         turns[model.mesh.node(coupling.point)] = True
     brought = model.mesh.attachments
-    used = [(m.point, bool(np.any(m.rotary_inertia) or any(m.offset))) for m in brought.point_masses]
+    masses = brought.point_masses
+    used = [(m.point, bool(np.any(m.rotary_inertia) or any(m.offset))) for m in masses]
     used += [
         (point, way.startswith("rotation"))
         for link in brought.links

@@ -246,8 +246,10 @@ class StructureModel:
             nodes = self.mesh.nodes(coupling.face)
             point = np.full(len(nodes), self.mesh.node(coupling.point))
             pairs.append(np.stack([point, nodes], axis=1))
-        for item in (*self.attached.links, *self.attached.equations):
-            joined = [self.mesh.node(point) for point in item.points]
+        names = [link.points for link in self.attached.links]
+        names += [equation.points for equation in self.attached.equations]
+        for points in names:
+            joined = [self.mesh.node(point) for point in points]
             pairs.append(np.array([[joined[0], node] for node in joined], dtype=np.int64))
         return np.concatenate(pairs)
 

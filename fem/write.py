@@ -9,7 +9,7 @@ import meshio
 import numpy as np
 import numpy.typing as npt
 
-from fem.abaqus import SOLIDS
+from fem.abaqus.types import SOLIDS
 from fem.errors import ModelError, quoted
 from fem.files import plain_write_errors
 from fem.mesh import FloatArray, FrameMesh, IntArray
