@@ -239,7 +239,7 @@ class Attachments:
     Examples
     --------
     >>> Attachments(links=[Link("node 2", None, ("x",), 1e4)])
-    <Attachments: 1 links>
+    <Attachments: links: 1>
     >>> bool(Attachments())
     False
     """
@@ -265,10 +265,12 @@ class Attachments:
     def __bool__(self) -> bool:
         return any(getattr(self, each.name) for each in fields(self))
 
-    def __repr__(self) -> str:
+    def __str__(self) -> str:
         counts = [(len(getattr(self, f.name)), f.name.replace("_", " ")) for f in fields(self)]
-        told = ", ".join(f"{count} {name}" for count, name in counts if count)
-        return f"<Attachments: {told or 'none'}>"
+        return ", ".join(f"{name}: {count}" for count, name in counts if count) or "none"
+
+    def __repr__(self) -> str:
+        return f"<Attachments: {self}>"
 
     def __add__(self, other: Attachments) -> Attachments:
         return Attachments(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))

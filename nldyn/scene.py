@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from nldyn.described_parts import with_described_parts
 from nldyn.errors import SceneError, SystemModelError
 from nldyn.resources import data_directory
 from nldyn.scene_checks import (
@@ -207,6 +208,7 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
     if scene.mesh.model == "structure":
         with _told_as(scene, ("mesh", "file"), fem.ModelError):
             structure = fem.read_structure(path, _mesh_places(scene))
+        scene = with_described_parts(scene, structure)
         check_structure_names(scene, structure, scene.file)
         if refinement > 1:
             if set(structure.cells) - {"line", "vertex"}:
@@ -217,6 +219,7 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
             return fem.assemble(_structure_model(scene, structure))
     with _told_as(scene, ("mesh", "file"), fem.ModelError):
         mesh = fem.read_mesh(path, _mesh_places(scene))
+    scene = with_described_parts(scene, mesh)
     check_mesh_names(scene, mesh, scene.file)
     with _told_as(scene, (), fem.ModelError):
         if refinement > 1:

@@ -69,6 +69,8 @@ class Keyword:
     def whole(self, word: str, row: int | None) -> int:
         """A word as a whole number."""
         try:
+            if "_" in word:  # Python would take 1_0 for 10
+                raise ValueError
             return int(word)
         except ValueError:
             raise self.fail(f"{word!r} is not a whole number{_commas(word)}", row) from None
@@ -76,6 +78,8 @@ class Keyword:
     def number(self, word: str, row: int | None) -> float:
         """A word as a number; an empty one is 0, and D stands for E."""
         try:
+            if "_" in word:
+                raise ValueError
             return float(word.upper().replace("D", "E") or 0.0) if word else 0.0
         except ValueError:
             raise self.fail(f"{word!r} is not a number{_commas(word)}", row) from None
