@@ -102,6 +102,7 @@ def read_abaqus(path: str | Path, include_folders: Iterable[str | Path] = ()) ->
     surfaces = Surfaces(resolver)
     gathered = Gathered(deck, resolver)
     cells = collected_cells(deck, resolver, position)
+    deck.raise_problems()
     if not cells.nodes:
         raise deck.fail(_no_cells(deck))
     read_transforms(gathered)

@@ -13,6 +13,7 @@ from fem.abaqus.keywords import Keyword
 from fem.abaqus.known import ADVICE, LEFT_OUT, READ, UNKNOWN
 from fem.abaqus.nodes import read_ncopy, read_nfill, read_ngen, read_nodes, read_system, turning
 from fem.abaqus.sets import read_set
+from fem.errors import ModelError
 
 Action = Callable[[Deck, Scope, Keyword], None]
 AT_ONCE: dict[str, Action] = {
@@ -58,7 +59,11 @@ def read_scopes(deck: Deck, keywords: Iterable[Keyword]) -> None:
             advice = ADVICE.get(name, UNKNOWN)
             deck.refuse(_canonical(keyword), keyword.place(), advice)
         elif name in AT_ONCE:
-            AT_ONCE[name](deck, at.scope, keyword)
+            try:
+                AT_ONCE[name](deck, at.scope, keyword)
+            except ModelError:
+                if not deck.problems:  # else it may follow from what is refused already
+                    raise
         elif name in ("PART", "ENDPART", "INSTANCE", "ENDINSTANCE", "ASSEMBLY", "ENDASSEMBLY"):
             _enter(deck, at, keyword)
         else:

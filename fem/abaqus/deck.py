@@ -46,6 +46,11 @@ class NamedSet:
     keyword: Keyword | None = None
     elements: list[Member] = field(default_factory=list)
 
+    @property
+    def unsorted(self) -> bool:
+        """Whether its members keep the order in which they are written."""
+        return self.keyword is not None and "UNSORTED" in self.keyword.parameters
+
 
 @dataclass
 class Scope:
@@ -67,9 +72,12 @@ class Scope:
         return found
 
     def add_node(self, keyword: Keyword, row: int | None, label: int, place: FloatArray) -> None:
-        """A new node; a number that is taken already is an error."""
+        """A new node; a number that is taken already by one at another place is an error."""
         if label in self.nodes:
-            raise keyword.fail(f"node {label} is defined twice", row)
+            size = max(float(np.abs(place).max()), 1e-30)
+            if float(np.abs(place - np.array(self.nodes[label])).max()) > 1e-9 * size:
+                raise keyword.fail(f"node {label} is defined twice, at two places", row)
+            return
         self.nodes[label] = (float(place[0]), float(place[1]), float(place[2]))
 
     def add_element(self, keyword: Keyword, row: int, label: int, element: Element) -> None:

@@ -168,7 +168,7 @@ class Joints:
     def rigid_body(self, body: Body, keyword: Keyword) -> None:
         """``*RIGID BODY``: nodes, or those of elements, move as one with a reference node."""
         keyword.only(
-            *("NSET", "ELSET", "REF NODE", "REFNODE", "ROT NODE", "ROTNODE"),
+            *("NSET", "ELSET", "REF NODE", "ROT NODE"),
             *("TIE NSET", "PIN NSET", "POSITION"),
         )
         if keyword.parameters.get("POSITION", "INPUT").upper() != "INPUT":
@@ -186,19 +186,19 @@ class Joints:
             name = keyword.name_of("ELSET")
             for element in self.resolver.reference("ELSET", body, name, place, keyword.shown):
                 nodes += self.resolver.nodes_of(element)
-        reference = keyword.name_of("REF NODE", "REFNODE")
+        reference = keyword.name_of("REF NODE")
         point = self.resolver.one("NSET", body, reference, keyword, None)
-        turn = keyword.parameters.get("ROT NODE", keyword.parameters.get("ROTNODE", ""))
+        turn = keyword.parameters.get("ROT NODE", "")
         if turn:
             self.rotation_nodes[self.resolver.one("NSET", body, turn, keyword, None)] = keyword
         self._rigid(list(dict.fromkeys(nodes)), point, keyword, None)
 
     def _coupling(self, body: Body, keyword: Keyword, following: Keyword | None) -> None:
         """``*COUPLING`` with ``*KINEMATIC`` or ``*DISTRIBUTING``."""
-        keyword.only("CONSTRAINT NAME", "REF NODE", "REFNODE", "SURFACE")
+        keyword.only("CONSTRAINT NAME", "REF NODE", "SURFACE")
         if following is None or following.name not in ("KINEMATIC", "DISTRIBUTING"):
             raise keyword.fail("is followed by neither *KINEMATIC nor *DISTRIBUTING")
-        reference = keyword.name_of("REF NODE", "REFNODE")
+        reference = keyword.name_of("REF NODE")
         point = self.resolver.one("NSET", body, reference, keyword, None)
         surface = keyword.name_of("SURFACE")
         nodes = self.surfaces.nodes(body, surface, keyword)
@@ -267,8 +267,8 @@ class Joints:
 
     def kinematic_coupling(self, body: Body, keyword: Keyword) -> None:
         """``*KINEMATIC COUPLING``: rows of a node or set, the first and the last direction."""
-        keyword.only("REF NODE", "REFNODE")
-        reference = keyword.name_of("REF NODE", "REFNODE")
+        keyword.only("REF NODE")
+        reference = keyword.name_of("REF NODE")
         point = self.resolver.one("NSET", body, reference, keyword, None)
         place = keyword.place()
         groups: dict[tuple[int, ...], list[Label]] = {}

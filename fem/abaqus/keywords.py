@@ -61,10 +61,20 @@ class Keyword:
         return found
 
     def only(self, *known: str) -> None:
-        """Refuse parameters that are not known, as they may change what the keyword means."""
-        unknown = sorted(set(self.parameters) - set(known))
-        if unknown:
-            raise self.fail(f"its parameter {unknown[0]!r} is not read")
+        """Take the parameters by their full names; refuse those that are not known.
+
+        A parameter may be cut short to three letters or more, and its blanks do not count.
+        """
+        found = {}
+        for given, value in self.parameters.items():
+            short = given.replace(" ", "")
+            full = [name for name in known if name.replace(" ", "") == short] or [
+                name for name in known if len(short) > 2 and name.replace(" ", "").startswith(short)
+            ]
+            if len(full) != 1:
+                raise self.fail(f"its parameter {given!r} is not read")
+            found[full[0]] = value
+        self.parameters = found
 
     def whole(self, word: str, row: int | None) -> int:
         """A word as a whole number."""
@@ -153,7 +163,7 @@ class Reading:
         if keyword.name == "ENDSTEP":
             self.in_step = False
         if keyword.name == "INCLUDE":
-            keyword.only("INPUT")
+            keyword.only("INPUT", "FILE")
             yield from self._of(self._other(keyword))
             return
         if keyword.name in ("NODE", "ELEMENT", "NSET", "ELSET", "EQUATION") and (
@@ -169,7 +179,7 @@ class Reading:
 
     def _other(self, keyword: Keyword) -> Path:
         """The file that a keyword names with INPUT, if it may be read."""
-        name = keyword.parameters.get("INPUT", "").replace("\\", "/")
+        name = keyword.name_of("INPUT", "FILE").replace("\\", "/")
         other = keyword.file.parent / name
         if not any(other.resolve().is_relative_to(folder) for folder in self.folders):
             raise keyword.fail(f"the included file {other} is in a folder that is not allowed")

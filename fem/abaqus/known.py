@@ -49,7 +49,8 @@ _LEFT_OUT = {
         MAGNETICPERMEABILITY ELECTRICALCONDUCTIVITY VISCOELASTIC VISCOSITY CONCRETE
         CONCRETEDAMAGEDPLASTICITY CONCRETECOMPRESSIONHARDENING CONCRETETENSIONSTIFFENING
         CONCRETECOMPRESSIONDAMAGE CONCRETETENSIONDAMAGE TENSIONSTIFFENING DRUCKERPRAGER
-        DRUCKERPRAGERHARDENING CAPPLASTICITY CAPHARDENING PLANE FAILSTRESS FAILSTRAIN NOTENSION
+        DRUCKERPRAGERHARDENING DRUCKERPRAGERCREEP FAILURERATIOS SHEARRETENTION CAPPLASTICITY
+        CAPHARDENING PLANE FAILSTRESS FAILSTRAIN NOTENSION
         NOCOMPRESSION EOS POROUSELASTIC PERMEABILITY UNIAXIALTESTDATA BIAXIALTESTDATA
         PLANARTESTDATA VOLUMETRICTESTDATA SIMPLESHEARTESTDATA POTENTIAL SHEARFAILURE TENSILEFAILURE
         JOULEHEATFRACTION INELASTICHEATFRACTION HYSTERESIS MULLINSEFFECT REGULARIZATION
@@ -104,10 +105,12 @@ ELEMENT_ADVICE: tuple[tuple[str, str], ...] = (
     (r"(R2D|R3D|RB|RAX).*", "rigid; leave it out and couple what it moves with [[couplings]]"),
     (r"SC[68].*|CSS.*", "a continuum shell; mesh it with C3D20R, or its middle face with S8R"),
     (r"COH.*|GK.*", "a layer between bodies; " + PARTS),
-    (r"F[23]D.*|D|AC.*|DC.*|C3D\d+[PE].*", "of a fluid, of heat or of another field"),
+    (r"F[23]D.*|D|AC.*|DC.*", "of a fluid, of heat or of another field"),
+    (r"(C3D|CPE|CPS)\d+[RH]*[PE].*", "of solids with another field"),
     (r"U\d.*|US\d.*|VU\d.*|Z.*", "a user's element, which only its code knows"),
     (r"CIN.*", "an infinite element"),
-    (r"HEATCAP|POINTMASS", "of another field"),
+    (r"HEATCAP", "of another field"),
+    (r"SFM3D.*", "a surface without stiffness; leave it out"),
 )
 """What is said of types of elements that are refused, by a pattern of their names."""
 OTHER_ELEMENT = "not known; convert it to elements of docs/fem.md"

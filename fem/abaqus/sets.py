@@ -66,7 +66,8 @@ def labels_now(
                     found += of(item, (*above, key))
                 else:
                     found += [item] if isinstance(item, int) else list(item)
-            known[key] = list(dict.fromkeys(found))
+            unique = list(dict.fromkeys(found))
+            known[key] = unique if scope.sets[kind][key].unsorted else sorted(unique)
         return known[key]
 
     return of(word, ())
@@ -81,7 +82,7 @@ class Resolver:
         self._open: set[tuple[str, str, str]] = set()
 
     def labels(self, kind: str, body: Body, name: str, place: str) -> list[Label]:
-        """All nodes or elements of a set of a body, in their order, each once."""
+        """All nodes or elements of a set of a body, each once, sorted unless it is UNSORTED."""
         found = body.set_of(kind, name)
         if found is None:
             raise self._unknown(kind, name, place)
@@ -118,7 +119,7 @@ class Resolver:
             owner = self.body(member.instance, member.place) if member.instance else body
             for element in self.reference("ELSET", owner, str(member.item), member.place, "*NSET"):
                 labels.update(dict.fromkeys(self.nodes_of(element)))
-        return list(labels)
+        return list(labels) if named.unsorted else sorted(labels)
 
     def reference(
         self, kind: str, body: Body, word: str, place: str, what: str = ""

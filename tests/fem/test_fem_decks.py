@@ -441,7 +441,7 @@ def test_couplings_of_the_deck_are_those_of_the_model(tmp_path, how):
         ("*EQUATION\n2\n1, 1, 1., 2\n", "line 22: .*an equation of 2 terms needs 6 words"),
         ("*TRANSFORM, NSET=TIP\n1, 0, 0, 0, 1, 0\n*EQUATION\n2\n11, 1, 1., 2, 1, 1.\n",
          r"line 24: .*node 11 has axes of its own by \*TRANSFORM in line 21"),
-        ("*RIGID BODY, NSET=TIP\n", "line 21: .*has no name"),
+        ("*RIGID BODY, NSET=TIP\n", "line 21: .*has no REF NODE"),
         ("*RELEASE\n1, S1, ALLM\n", r"\*RELEASE .*\[\[hinges\]\]"),
         ("*NODE\n77, 1, 1, 0\n*SURFACE, NAME=A, TYPE=NODE\n77\n*SURFACE, NAME=B, TYPE=NODE\nTIP\n"
          "*TIE, NAME=T\nA, B\n", r"\*TIE \(1, first in line 28\): surfaces whose nodes are"),
