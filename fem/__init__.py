@@ -2,6 +2,15 @@
 
 from fem.abaqus import read_abaqus
 from fem.assemble import assemble
+from fem.attachments import (
+    Attachments,
+    Coupling,
+    LeftOut,
+    LinearEquation,
+    Link,
+    PointMass,
+    PointSpring,
+)
 from fem.calibrate import Calibration, calibrate
 from fem.errors import ModelError
 from fem.frame import Component
@@ -12,8 +21,6 @@ from fem.model import (
     Hinge,
     Interface,
     Material,
-    PointMass,
-    PointSpring,
     Support,
 )
 from fem.read import from_meshio, read_mesh, read_structure, structure_from_meshio
@@ -24,6 +31,7 @@ from fem.structure_mesh import StructureMesh, box_mesh, joined, structure_mesh
 from fem.write import write_mesh
 
 __all__ = [
+    "Attachments",
     "BeamPart",
     "Calibration",
     "CircularSection",
@@ -36,6 +44,9 @@ __all__ = [
     "FrameModel",
     "Hinge",
     "Interface",
+    "LeftOut",
+    "LinearEquation",
+    "Link",
     "LockingWarning",
     "Material",
     "ModelError",

@@ -9,13 +9,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
+from fem.attachments import Coupling
 from fem.beams import cross_matrix
 from fem.cells import KINDS
 from fem.errors import ModelError
 from fem.mesh import FloatArray, IntArray
 from fem.model import Support
 from fem.scatter import SparseArray, dense_scatter
-from fem.structure import AXES, IN_PLANE, Coupling, StructureModel, axis_index
+from fem.structure import AXES, IN_PLANE, StructureModel, axis_index
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -55,8 +56,7 @@ def number_blocks(model: StructureModel) -> Numbering:
             moves[nodes] = True
     for _, lines in model.beams.values():
         turns[lines] = True
-    for coupling in model.couplings:
-        turns[model.mesh.node(coupling.point)] = True
+    _number_attached(model, moves | turns, moves, turns)
     moves |= turns
     translation = np.where(moves, np.cumsum(moves) - 1, -1)
     first = int(moves.sum())
@@ -64,6 +64,27 @@ def number_blocks(model: StructureModel) -> Numbering:
     first += int(turns.sum())
     hinged = first + np.arange(len(model.hinges))
     return Numbering(translation, rotation, hinged, first + len(model.hinges))
+
+
+def _number_attached(
+    model: StructureModel, on_parts: BoolArray, moves: BoolArray, turns: BoolArray
+) -> None:
+    """Coupled points turn; nodes on no part move, and turn where what the file attaches does."""
+    for coupling in model.attached.couplings:
+        turns[model.mesh.node(coupling.point)] = True
+    brought = model.mesh.attachments
+    masses = brought.point_masses
+    used = [(m.point, bool(np.any(m.rotary_inertia) or any(m.offset))) for m in masses]
+    used += [
+        (point, way.startswith("rotation"))
+        for link in brought.links
+        for point, way in zip(link.points, link.directions or ("x", "x"), strict=True)
+    ]
+    used += [(p, way.startswith("rotation")) for e in brought.equations for p, way, _ in e.terms]
+    for point, turning in used:
+        node = model.mesh.node(point)
+        moves[node] = True
+        turns[node] |= turning and not on_parts[node]
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,12 +140,13 @@ def constrain(model: StructureModel, numbering: Numbering) -> Constraints:
         If nothing is left free, or a coupled direction is held, joined twice or joined in a
         circle.
     """
+    couplings = model.attached.couplings
     size = 3 * numbering.count
     held = np.zeros(size, dtype=np.bool_)
     held[_held(model, numbering)] = True
     owner = np.full(size, -1)
     rows, columns, values = [], [], []
-    for index, coupling in enumerate(model.couplings):
+    for index, coupling in enumerate(couplings):
         slaves, masters, matrix = coupled(model, coupling, numbering)
         _check_coupling(model, index, slaves, held, owner)
         owner[slaves] = index
@@ -132,33 +154,116 @@ def constrain(model: StructureModel, numbering: Numbering) -> Constraints:
         rows.append(slaves[at[0]])
         columns.append(masters[at[1]])
         values.append(matrix[at])
-    free = np.flatnonzero(~held & (owner < 0))
-    dependent = np.flatnonzero(owner >= 0)
-    if len(free) == 0:
-        raise ModelError(f"{model.mesh.source}: the supports hold every degree of freedom")
-    if not len(dependent):
-        none = sparse.csr_array((0, len(free)), dtype=np.float64)
-        return Constraints(free, dependent, none, size)
-    used = np.concatenate(columns)
+    entries = [np.concatenate([*each, np.zeros(0, kind)])
+               for each, kind in ((values, np.float64), (rows, np.int64), (columns, np.int64))]
+    whole = sparse.csr_array((entries[0], (entries[1], entries[2])), shape=(size, size))
+    used = entries[2]
     circle = np.flatnonzero(owner[used] >= 0)
     if len(circle):
-        first = model.couplings[owner[np.concatenate(rows)[circle[0]]]]
-        other = model.couplings[owner[used[circle[0]]]]
+        first = couplings[owner[entries[1][circle[0]]]]
+        other = couplings[owner[used[circle[0]]]]
         raise ModelError(
             f"{model.mesh.source}: coupling of {first.face!r} to {first.point!r} rests on nodes"
             f" that the coupling of {other.face!r} to {other.point!r} moves; couple one of them to"
             " other nodes"
         )
-    whole = sparse.csr_array(
-        (np.concatenate(values), (np.concatenate(rows), used)), shape=(size, size)
-    )
-    return Constraints(free, dependent, sparse.csr_array(whole[dependent][:, free]), size)
+    solved = solved_equations(model, numbering, held, owner, whole)
+    owner[list(solved)] = len(couplings)
+    free = np.flatnonzero(~held & (owner < 0))
+    dependent = np.flatnonzero(owner >= 0)
+    if len(free) == 0:
+        raise ModelError(f"{model.mesh.source}: the supports hold every degree of freedom")
+    whole = sparse.csr_array(whole + equation_rows(solved, size))
+    return Constraints(free, dependent, _relation(whole, free, dependent), size)
+
+
+def _relation(whole: SparseArray, free: IntArray, dependent: IntArray) -> SparseArray:
+    """The dependent degrees of freedom from the free ones, where some rest on others."""
+    found = whole[dependent]
+    while len(dependent) and found[:, dependent].nnz:
+        chained = sparse.csr_array(found[:, dependent] @ whole[dependent])
+        kept = np.ones(whole.shape[1])
+        kept[dependent] = 0.0
+        found = sparse.csr_array(found @ sparse.diags_array(kept) + chained)
+        found.eliminate_zeros()
+    return sparse.csr_array(found[:, free])
+
+
+Form = dict[int, float]
+
+
+def solved_equations(
+    model: StructureModel,
+    numbering: Numbering,
+    held: BoolArray,
+    owner: IntArray,
+    coupled_rows: SparseArray,
+) -> dict[int, Form]:
+    """Every equation of the mesh solved for one degree of freedom, in terms of others.
+
+    What earlier equations and the couplings determine is put in, and what is held is zero. An
+    equation that then says nothing is fulfilled already.
+    """
+    solved: dict[int, Form] = {}
+    for equation in model.attached.equations:
+        given: Form = {}
+        for point, direction, coefficient in equation.terms:
+            dof = point_dof(model, numbering, point, direction)
+            given[dof] = given.get(dof, 0.0) + coefficient
+        size = max(map(abs, given.values()))
+        form = _put_in(given, solved, owner, coupled_rows)
+        form = {d: c for d, c in form.items() if not held[d] and abs(c) > 1e-12 * size}
+        if form:
+            first = next(iter(given))
+            pivot = first if first in form else max(form, key=lambda dof: abs(form[dof]))
+            divisor = -form.pop(pivot)
+            solved[pivot] = {dof: value / divisor for dof, value in form.items()}
+    return solved
+
+
+def _put_in(
+    form: Form, solved: dict[int, Form], owner: IntArray, coupled_rows: SparseArray
+) -> Form:
+    """A linear form without the degrees of freedom that are determined already."""
+    found: Form = {}
+    pending = list(form.items())
+    while pending:
+        dof, factor = pending.pop()
+        if dof in solved:
+            pending += [(other, factor * value) for other, value in solved[dof].items()]
+        elif owner[dof] >= 0:
+            row = slice(coupled_rows.indptr[dof], coupled_rows.indptr[dof + 1])
+            columns, values = coupled_rows.indices[row], coupled_rows.data[row]
+            pending += zip(columns.tolist(), (factor * values).tolist(), strict=True)
+        else:
+            found[dof] = found.get(dof, 0.0) + factor
+    return found
+
+
+def equation_rows(solved: dict[int, Form], size: int) -> SparseArray:
+    """Solved equations as a sparse matrix (size, size), one row for each."""
+    entries = [(row, column, v) for row, form in solved.items() for column, v in form.items()]
+    at = np.array([entry[:2] for entry in entries], dtype=np.int64).reshape(-1, 2)
+    values = np.array([entry[2] for entry in entries], dtype=np.float64)
+    return sparse.csr_array((values, (at[:, 0], at[:, 1])), shape=(size, size))
+
+
+def point_dof(model: StructureModel, numbering: Numbering, point: str, direction: str) -> int:
+    """The degree of freedom of a named point, or a ModelError where it has none."""
+    dof = int(numbering.dofs(np.array([model.mesh.node(point)]))[0, axis_index(direction)])
+    if dof < 0:
+        moved = "does not turn" if axis_index(direction) > 2 else "is on no part of the model"
+        raise ModelError(
+            f"{model.mesh.source}: {point!r} has no direction {direction!r}: it {moved}; couple a"
+            " face to it"
+        )
+    return dof
 
 
 def _check_coupling(
     model: StructureModel, index: int, slaves: IntArray, held: BoolArray, owner: IntArray
 ) -> None:
-    coupling = model.couplings[index]
+    coupling = model.attached.couplings[index]
     what = f"{model.mesh.source}: coupling of {coupling.face!r} to {coupling.point!r}"
     if held[slaves].any():
         moved = "face" if coupling.kind == "rigid" else "point"
@@ -168,7 +273,7 @@ def _check_coupling(
         )
     taken = owner[slaves]
     if (taken >= 0).any():
-        other = model.couplings[int(taken[taken >= 0][0])]
+        other = model.attached.couplings[int(taken[taken >= 0][0])]
         raise ModelError(
             f"{what}: the coupling of {other.face!r} to {other.point!r} moves some of the same"
             " nodes already"
@@ -271,7 +376,10 @@ def averaging(
     carry no facet (as on beams) all count the same.
     """
     R = rigid[:, translations][:, :, axes]
-    WR = (face_products(model, coupling.face, nodes) @ R.reshape(len(nodes), -1)).reshape(R.shape)
+    products = face_products(model, coupling.face, nodes)
+    if coupling.weighting == "nodes":
+        products = sparse.csr_array(sparse.eye_array(len(nodes)))
+    WR = (products @ R.reshape(len(nodes), -1)).reshape(R.shape)
     normal = np.einsum("mij,mik->jk", R, WR)
     scale = np.sqrt(np.diag(normal))
     if not (scale > 0.0).all() or np.linalg.cond(normal / np.outer(scale, scale)) > 1e10:

@@ -10,12 +10,21 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
+from fem.attachments import DIRECTIONS, plane_direction
 from fem.beams import plane_matrices, plane_rows
 from fem.elements import rotations, turn
 from fem.errors import ModelError
+from fem.links import link_terms
 from fem.mesh import FloatArray, IntArray
-from fem.model import DIRECTIONS, FrameModel
-from fem.natural import NaturalForm, chosen_rows, ground_rows, line_rows, natural_form
+from fem.model import FrameModel
+from fem.natural import (
+    MatrixRows,
+    NaturalForm,
+    chosen_rows,
+    ground_rows,
+    line_rows,
+    natural_form,
+)
 from fem.scatter import displacement_of
 from fem.store import load_model, save_model
 
@@ -41,6 +50,8 @@ class Component:
         Indices among all degrees of freedom of (ux, uy, rotation) at the first and the second
         end of every element, shape (e, 6). Node i has 3i, 3i + 1, 3i + 2; the own rotations of
         hinged parts follow after the nodes.
+    damping
+        Matrix in N s/m of the dampers that the file of the mesh holds; None without any.
     """
 
     stiffness: SparseArray
@@ -49,6 +60,7 @@ class Component:
     model: FrameModel
     free: IntArray
     element_dofs: IntArray
+    damping: SparseArray | None = None
 
     @cached_property
     def natural_form(self) -> NaturalForm:
@@ -96,9 +108,13 @@ def assemble_frame(model: FrameModel) -> Component:
     element_dofs = number_dofs(model)
     free = _free_dofs(model)
     stiffness, mass = _element_matrices(model)
-    K = _scatter(stiffness, element_dofs, _spring_diagonal(model), free)
-    M = _scatter(mass, element_dofs, _mass_diagonal(model), free)
-    return Component(K, M, _interface_vectors(model, free), model, free, element_dofs)
+    springs = sparse.diags_array(_spring_diagonal(model), format="csr")
+    elongations, given, damping = _link_rows(model)
+    K = _scatter(stiffness, element_dofs, springs + _squares(elongations, given), free)
+    lumps = sparse.diags_array(_mass_diagonal(model), format="csr")
+    M = _scatter(mass, element_dofs, lumps, free)
+    C = _squares(elongations, damping)[free][:, free] if damping.any() else None
+    return Component(K, M, _interface_vectors(model, free), model, free, element_dofs, C)
 
 
 def number_dofs(model: FrameModel) -> IntArray:
@@ -160,6 +176,9 @@ def frame_form(model: FrameModel, element_dofs: IntArray, free: IntArray) -> Nat
     springs = _spring_diagonal(model)
     held = np.flatnonzero(springs)
     parts.append(ground_rows(springs[held, None, None], held[:, None], size))
+    elongations, given, _ = _link_rows(model)
+    if given.any():
+        parts.append(MatrixRows(given, sparse.eye_array(len(given), format="csr"), elongations))
     return natural_form(parts, sparse.csr_array(chosen_rows(free, size).T))
 
 
@@ -170,24 +189,43 @@ def _spring_diagonal(model: FrameModel) -> FloatArray:
     return diagonal
 
 
+def _link_rows(model: FrameModel) -> tuple[SparseArray, FloatArray, FloatArray]:
+    """Elongations (m, n) of all links, and their stiffness and damping, shape (m,)."""
+    links = model.attached.links
+    rows, columns, values = [], [], []
+    for row, link in enumerate(links):
+        for point, direction, value in link_terms(model.mesh, link):
+            rows.append(row)
+            columns.append(_dof(model, point, plane_direction(direction)))
+            values.append(value)
+    shape = len(links), _dof_count(model)
+    elongations = sparse.csr_array((np.array(values, dtype=np.float64), (rows, columns)), shape)
+    stiffness, damping = np.array([(k.stiffness, k.damping) for k in links]).reshape(-1, 2).T
+    return elongations, stiffness, damping
+
+
+def _squares(rows: SparseArray, weights: FloatArray) -> SparseArray:
+    """The sparse matrix BᵀwB."""
+    return sparse.csr_array(rows.T @ sparse.diags_array(weights) @ rows)
+
+
 def _mass_diagonal(model: FrameModel) -> FloatArray:
     diagonal = np.zeros(_dof_count(model))
-    for lump in model.point_masses:
-        for direction, value in zip(
-            DIRECTIONS, (lump.mass, lump.mass, lump.rotary_inertia), strict=True
-        ):
+    for lump in model.attached.point_masses:
+        about_z = float(np.broadcast_to(lump.rotary_inertia, 3)[2])
+        for direction, value in zip(DIRECTIONS, (lump.mass, lump.mass, about_z), strict=True):
             diagonal[_dof(model, lump.point, direction)] += value
     return diagonal
 
 
 def _scatter(
-    matrices: FloatArray, element_dofs: IntArray, diagonal: FloatArray, free: IntArray
+    matrices: FloatArray, element_dofs: IntArray, attached: SparseArray, free: IntArray
 ) -> SparseArray:
     rows = np.repeat(element_dofs, 6, axis=1).ravel()
     columns = np.tile(element_dofs, (1, 6)).ravel()
-    count = len(diagonal)
-    full = sparse.coo_array((matrices.ravel(), (rows, columns)), shape=(count, count)).tocsr()
-    full = sparse.csr_array(full + sparse.diags_array(diagonal, format="csr"))
+    shape = attached.shape
+    full = sparse.coo_array((matrices.ravel(), (rows, columns)), shape=shape).tocsr()
+    full = sparse.csr_array(full + attached)
     part = sparse.csr_array(full[free][:, free])
     part.eliminate_zeros()
     return part

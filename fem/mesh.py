@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from fem.attachments import Attachments, LeftOut
 from fem.errors import ModelError, quoted
 
 FloatArray = npt.NDArray[np.float64]
@@ -33,6 +34,14 @@ class FrameMesh:
         Node indices by name. A set that a model uses as a point holds one node.
     source
         Where the mesh comes from; error texts begin with it.
+    attachments
+        Masses, springs, couplings and equations that the file holds beside its cells.
+    element_types
+        Elements by the type that the file gives them, such as "B31" or "S8R".
+    described
+        Material and section of parts, by the name of the part, as far as the file gives them.
+    left_out
+        What the file holds and the mesh, by intention, does not.
 
     Raises
     ------
@@ -54,6 +63,10 @@ class FrameMesh:
     parts: Mapping[str, IntArray] = field(default_factory=dict)
     point_sets: Mapping[str, IntArray] = field(default_factory=dict)
     source: str = "mesh"
+    attachments: Attachments = field(default_factory=Attachments)
+    element_types: Mapping[str, IntArray] = field(default_factory=dict)
+    described: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    left_out: Sequence[LeftOut] = ()
 
     def __post_init__(self) -> None:
         points = numbers(f"{self.source}: points", self.points, np.float64)
@@ -63,6 +76,8 @@ class FrameMesh:
         object.__setattr__(self, "parts", index_sets(f"{self.source}: part", self.parts))
         sets = index_sets(f"{self.source}: point", self.point_sets)
         object.__setattr__(self, "point_sets", sets)
+        types = index_sets(f"{self.source}: type", self.element_types)
+        object.__setattr__(self, "element_types", types)
         self._check_arrays()
         self._check_elements()
 

@@ -3,41 +3,27 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
+from fem.attachments import (
+    DIRECTIONS,
+    Attachments,
+    PointMass,
+    PointSpring,
+    known_direction,
+    plane_direction,
+    vector,
+)
+from fem.element_types import check_family, counted
 from fem.errors import ModelError, by_name, check_positive, is_finite, listed, quoted
 from fem.mesh import FrameMesh, IntArray
 from fem.sections import CrossSection
 
-DIRECTIONS = ("x", "y", "rotation")
-"""Of a plane frame; "rotation" is about z."""
-SPATIAL_DIRECTIONS = (*DIRECTIONS, "z", "rotation_x", "rotation_y", "rotation_z")
 THEORIES = ("euler-bernoulli", "timoshenko")
-
-
-def known_direction(owner: str, direction: str) -> None:
-    if direction not in SPATIAL_DIRECTIONS:
-        raise ModelError(
-            f"{owner}: there is no direction {direction!r}; use {quoted(DIRECTIONS)}, and in space"
-            f" {quoted(SPATIAL_DIRECTIONS[3:])}"
-        )
-
-
-def vector(what: str, values: Sequence[float], length: int) -> tuple[float, ...]:
-    """The values as a tuple of finite floats, or a ModelError.
-
-    Examples
-    --------
-    >>> vector("offset", [0, 1], 2)
-    (0.0, 1.0)
-    """
-    given = list(values) if isinstance(values, Iterable) else []
-    if len(given) != length or not all(is_finite(value) for value in given):
-        raise ModelError(f"{what} must be {length} finite numbers, not {values!r}")
-    return tuple(float(value) for value in given)
 
 
 @dataclass(frozen=True)
@@ -159,54 +145,6 @@ class Support:
 
 
 @dataclass(frozen=True)
-class PointMass:
-    """A lumped mass in kg at a point, with an optional rotary inertia in kg m².
-
-    In space the inertia is about the centre of mass and the same about all axes, or given as
-    three principal values about x, y and z; `offset` (x, y, z) in m is the place of the centre of
-    mass as seen from the point, with which it is joined rigidly.
-    """
-
-    point: str
-    mass: float
-    rotary_inertia: float | Sequence[float] = 0.0
-    offset: Sequence[float] = (0.0, 0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        owner = f"point mass at {self.point!r}"
-        object.__setattr__(self, "offset", vector(f"{owner}: offset", self.offset, 3))
-        inertias: Sequence[float]
-        if not isinstance(self.rotary_inertia, Sequence):
-            inertias = (self.rotary_inertia,)
-        else:
-            inertias = vector(f"{owner}: rotary inertia", self.rotary_inertia, 3)
-            object.__setattr__(self, "rotary_inertia", inertias)
-        for name, value in (("mass", self.mass), *(("rotary inertia", i) for i in inertias)):
-            if not (is_finite(value) and value >= 0.0):
-                raise ModelError(
-                    f"point mass at {self.point!r}: {name} must be finite and not negative,"
-                    f" not {value!r}"
-                )
-        if self.mass == 0.0 and not any(inertias):
-            raise ModelError(f"point mass at {self.point!r}: mass and rotary inertia are both zero")
-        if self.mass == 0.0 and any(self.offset):
-            raise ModelError(f"{owner}: an offset needs a mass")
-
-
-@dataclass(frozen=True)
-class PointSpring:
-    """A spring from a point to the ground: N/m along "x" or "y", N m/rad for "rotation"."""
-
-    point: str
-    direction: str
-    stiffness: float
-
-    def __post_init__(self) -> None:
-        known_direction(f"spring at {self.point!r}", self.direction)
-        check_positive(f"spring at {self.point!r}", stiffness=self.stiffness)
-
-
-@dataclass(frozen=True)
 class Hinge:
     """A rotary joint: the named part keeps its own rotation at the point.
 
@@ -292,6 +230,11 @@ class FrameModel:
         self._check_hinges()
         self._check_interfaces()
 
+    @cached_property
+    def attached(self) -> Attachments:
+        """Masses and links: of the mesh's file, and the model's own."""
+        return self.mesh.attachments + Attachments(self.point_masses)
+
     def element_parts(self) -> dict[str, IntArray]:
         """Element indices of every part of the model."""
         return {name: self.mesh.part(name) for name in self.parts}
@@ -299,7 +242,9 @@ class FrameModel:
     @property
     def links(self) -> IntArray:
         """Pairs of nodes that are joined, shape (m, 2)."""
-        return self.mesh.lines
+        joined = [link.points for link in self.attached.links if link.second is not None]
+        pairs = [[self.mesh.node(point) for point in points] for points in joined]
+        return np.concatenate([self.mesh.lines, np.array(pairs, dtype=np.int64).reshape(-1, 2)])
 
     def _check_plane(self) -> None:
         z = self.mesh.points[:, 2]
@@ -320,6 +265,7 @@ class FrameModel:
                     f"{self.mesh.source}: {owner}: a plane frame has no direction {direction!r};"
                     f" use {quoted(DIRECTIONS)}, or a StructureModel"
                 )
+        self._check_attached()
         for name, part in self.parts.items():
             if part.orientation is not None or any(part.offset):
                 raise ModelError(
@@ -333,10 +279,28 @@ class FrameModel:
                     " rotary inertias, which a plane frame does not have; use a StructureModel"
                 )
 
+    def _check_attached(self) -> None:
+        """Refuse what the file of the mesh attaches and a plane frame does not have."""
+        brought = self.mesh.attachments
+        for what, items in (("coupling", brought.couplings), ("equation", brought.equations)):
+            if items:
+                raise ModelError(
+                    f"{self.mesh.source}: the file has couplings or linear equations ({len(items)}"
+                    f" of the kind {what}), which a plane frame does not have; use a StructureModel"
+                )
+        for link in brought.links:
+            for direction in link.directions or ():
+                if plane_direction(direction) not in DIRECTIONS:
+                    raise ModelError(
+                        f"{self.mesh.source}: the link at {link.first!r} acts in direction"
+                        f" {direction!r}, which a plane frame does not have; use a StructureModel"
+                    )
+
     def _check_points(self) -> None:
         for support in self.supports:
             self.mesh.nodes(support.point)
-        names = [lump.point for lump in self.point_masses]
+        names = [lump.point for lump in self.attached.point_masses]
+        names += [point for link in self.attached.links for point in link.points]
         names += [spring.point for spring in self.springs]
         names += [hinge.point for hinge in self.hinges]
         names += [interface.point for interface in self.interfaces.values()]
@@ -346,8 +310,10 @@ class FrameModel:
     def _check_parts(self) -> None:
         groups = self.element_parts()
         owners = np.zeros(len(self.mesh.lines), dtype=np.int64)
-        for elements in groups.values():
+        for name, elements in groups.items():
             owners[elements] += 1
+            what = f"{self.mesh.source}: part {name!r}"
+            check_family(what, self.parts[name], counted(self.mesh.element_types, elements))
         bare = np.flatnonzero(owners == 0)
         if len(bare):
             raise ModelError(

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import redirect_stderr
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -15,6 +16,7 @@ from numpy.typing import ArrayLike
 
 import fem.meshio_kinds  # noqa: F401  (completes meshio's tables)
 from fem.abaqus import read_abaqus
+from fem.abaqus.mesh import TYPE_PREFIX
 from fem.cells import KINDS
 from fem.collapsed import uncollapsed
 from fem.errors import ModelError, quoted
@@ -51,8 +53,10 @@ def read_vtu(path: Path) -> meshio.Mesh:
 READERS: dict[str, tuple[str, Callable[[Path], meshio.Mesh]]] = {
     ".msh": ("Gmsh", read_gmsh),
     ".vtu": ("VTK", read_vtu),
-    ".inp": ("Abaqus", read_abaqus),
 }
+DECK = ".inp"
+"""The extension of files that hold more than a mesh."""
+EXTENSIONS = (*READERS, DECK)
 
 
 def read_mesh(path: str | Path, include_folders: Iterable[str | Path] = ()) -> FrameMesh:
@@ -136,26 +140,41 @@ def _read(
     include_folders: Iterable[str | Path],
 ) -> Mesh:
     path = Path(path)
-    if path.suffix.lower() not in READERS:
+    extension = path.suffix.lower()
+    if extension not in EXTENSIONS:
         raise ModelError(
-            f"{path}: unknown mesh extension {path.suffix!r}; known are {quoted(READERS)};"
+            f"{path}: unknown mesh extension {path.suffix!r}; known are {quoted(EXTENSIONS)};"
             " convert it in the mesher, so that its names stay, or by 'meshio convert'"
         )
     if not path.is_file():
         raise ModelError(f"{path}: there is no such mesh file")
     if path.stat().st_size == 0:
         raise ModelError(f"{path}: the mesh file is empty")
-    kind, read = READERS[path.suffix.lower()]
     try:
-        content = read_abaqus(path, include_folders) if read is read_abaqus else read(path)
-        return build(content, str(path))
+        if extension == DECK:
+            return _deck_mesh(path, build, include_folders)
+        return build(READERS[extension][1](path), str(path))
     except ModelError:
         raise
     except (Exception, SystemExit) as error:
         reason = _reason(error)
         if "zero-size array" in reason:
             raise ModelError(f"{path}: the mesh is empty, it has no elements") from error
+        kind = "Abaqus" if extension == DECK else READERS[extension][0]
         raise ModelError(f"{path}: cannot be read as {kind} mesh ({reason})") from error
+
+
+def _deck_mesh(
+    path: Path, build: Callable[[meshio.Mesh, str], Mesh], include_folders: Iterable[str | Path]
+) -> Mesh:
+    """The mesh of an Abaqus file, with what the file attaches to it."""
+    found = read_abaqus(path, include_folders)
+    return replace(
+        build(found.content, str(path)),
+        attachments=found.attachments,
+        described=found.described,
+        left_out=found.left_out,
+    )
 
 
 def _reason(error: BaseException) -> str:
@@ -189,12 +208,14 @@ def from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> FrameMesh:
     number = np.full(len(points), -1)
     number[used] = np.arange(len(used))
     sets = {name: number[nodes] for name, nodes in _point_sets(content, source).items()}
+    parts = {name: elements for name, elements in parts.items() if len(elements)}
     return FrameMesh(
         points[used],
         number[lines],
-        {name: elements for name, elements in parts.items() if len(elements)},
+        _names(parts),
         {name: nodes[nodes >= 0] for name, nodes in sets.items()},
         source,
+        element_types=_types(parts),
     )
 
 
@@ -243,7 +264,9 @@ def structure_from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> 
         source,
     )
     sets = {name: nodes for name, nodes in _point_sets(content, source).items() if len(nodes)}
-    return StructureMesh(points, whole, named, sets, source, notes=notes)
+    return StructureMesh(
+        points, whole, _names(named), sets, source, notes=notes, element_types=_types(named)
+    )
 
 
 def _check_kinds(content: meshio.Mesh, taken: set[str], source: str, advice: str) -> None:
@@ -263,6 +286,23 @@ def _check_kinds(content: meshio.Mesh, taken: set[str], source: str, advice: str
         number = ", ".join(map(str, blocks[:5])) + (", ..." if len(blocks) > 5 else "")
         told.append(f"{count} {kind} ({group}; block {number} of the file, counted from 0)")
     raise ModelError(f"{source}: the mesh has cells that are not read: {'; '.join(told)}; {advice}")
+
+
+Named = TypeVar("Named")
+
+
+def _names(groups: Mapping[str, Named]) -> dict[str, Named]:
+    """The groups that a file names."""
+    return {name: found for name, found in groups.items() if not name.startswith(TYPE_PREFIX)}
+
+
+def _types(groups: Mapping[str, Named]) -> dict[str, Named]:
+    """The groups that hold the elements of one type, by the name of the type."""
+    return {
+        name.removeprefix(TYPE_PREFIX): found
+        for name, found in groups.items()
+        if name.startswith(TYPE_PREFIX)
+    }
 
 
 def _check_far(points: FloatArray, source: str) -> None:

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from fem.attachments import PointMass
 from fem.errors import ModelError
 from fem.frame import Component
 from fem.mesh import FloatArray
-from fem.model import PointMass, Support
+from fem.model import Support
 from fem.sweep import FrameSurface, nodes_on, outline, reflected, symmetry_normal
 
 BLOCK_DENSITY = 7800.0

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from fem.attachments import Attachments, Coupling, LinearEquation, Link, PointMass
 from fem.errors import ModelError
 from fem.files import draft_of, plain_write_errors
 from fem.mesh import FrameMesh
@@ -27,6 +28,12 @@ STRUCTURE_FORMAT = "fem structure 1"
 Arrays = dict[str, npt.NDArray[Any]]
 Lists = Mapping[str, type]
 Model = TypeVar("Model")
+BROUGHT: Lists = {
+    "point_masses": PointMass,
+    "links": Link,
+    "couplings": Coupling,
+    "equations": LinearEquation,
+}
 SECTIONS = {kind.__name__: kind for kind in (RectangularSection, CircularSection, Section)}
 
 
@@ -53,6 +60,7 @@ def save_model(model: FrameModel, path: str | os.PathLike[str]) -> None:
     mesh = model.mesh
     arrays: dict[str, npt.NDArray[Any]] = {"points": mesh.points, "lines": mesh.lines}
     arrays |= {f"part {name}": elements for name, elements in mesh.parts.items()}
+    arrays |= {f"type {name}": elements for name, elements in mesh.element_types.items()}
     arrays |= {f"point {name}": nodes for name, nodes in mesh.point_sets.items()}
     _write(path, FORMAT, _attached(model, FRAME_LISTS), arrays)
 
@@ -78,6 +86,8 @@ def save_structure(model: StructureModel, path: str | os.PathLike[str]) -> None:
     arrays |= {f"cells {kind}": nodes for kind, nodes in mesh.cells.items()}
     for name, group in mesh.groups.items():
         arrays |= {f"group {kind} {name}": cells for kind, cells in group.items()}
+    for name, found in mesh.element_types.items():
+        arrays |= {f"type {kind} {name}": cells for kind, cells in found.items()}
     arrays |= {f"point {name}": nodes for name, nodes in mesh.point_sets.items()}
     _write(path, STRUCTURE_FORMAT, _attached(model, STRUCTURE_LISTS), arrays)
 
@@ -98,6 +108,8 @@ def load_model(path: str | os.PathLike[str]) -> FrameModel:
             _named(arrays, "part "),
             _named(arrays, "point "),
             attached["source"],
+            _from_file(attached),
+            _named(arrays, "type "),
         )
         return FrameModel(mesh, **_items(attached, FRAME_LISTS))
 
@@ -114,16 +126,14 @@ def load_structure(path: str | os.PathLike[str]) -> StructureModel:
     """
 
     def build(arrays: Arrays, attached: dict[str, Any]) -> StructureModel:
-        groups: dict[str, dict[str, npt.NDArray[Any]]] = {}
-        for key, cells in _named(arrays, "group ").items():
-            kind, _, name = key.partition(" ")
-            groups.setdefault(name, {})[kind] = cells
         mesh = StructureMesh(
             arrays["points"],
             _named(arrays, "cells "),
-            groups,
+            _named_by_kind(arrays, "group "),
             _named(arrays, "point "),
             attached["source"],
+            _from_file(attached),
+            _named_by_kind(arrays, "type "),
         )
         items = _items(attached, STRUCTURE_LISTS)
         # the mesh that was saved has the points of the couplings
@@ -165,10 +175,21 @@ def _read(
 def _attached(model: FrameModel | StructureModel, lists: Lists) -> dict[str, Any]:
     return {
         "source": model.mesh.source,
+        "from file": {
+            item.name: [asdict(each) for each in getattr(model.mesh.attachments, item.name)]
+            for item in fields(Attachments)
+        },
         "parts": {name: _part(part) for name, part in model.parts.items()},
         "interfaces": {name: asdict(item) for name, item in model.interfaces.items()},
         **{name: [asdict(item) for item in getattr(model, name)] for name in lists},
     }
+
+
+def _from_file(attached: dict[str, Any]) -> Attachments:
+    given = attached["from file"]
+    return Attachments(
+        **{name: [kind(**item) for item in given[name]] for name, kind in BROUGHT.items()}
+    )
 
 
 def _items(attached: dict[str, Any], lists: Lists) -> dict[str, Any]:
@@ -218,3 +239,14 @@ def _plain_section(section: CrossSection, poissons_ratio: float | None) -> Secti
 def _named(arrays: dict[str, npt.NDArray[Any]], prefix: str) -> dict[str, npt.NDArray[Any]]:
     named = {name: array for name, array in arrays.items() if name.startswith(prefix)}
     return {name.removeprefix(prefix): array for name, array in named.items()}
+
+
+def _named_by_kind(
+    arrays: dict[str, npt.NDArray[Any]], prefix: str
+) -> dict[str, dict[str, npt.NDArray[Any]]]:
+    """Arrays whose names are a kind of cell and a name, by name and kind."""
+    found: dict[str, dict[str, npt.NDArray[Any]]] = {}
+    for key, cells in _named(arrays, prefix).items():
+        kind, _, name = key.partition(" ")
+        found.setdefault(name, {})[kind] = cells
+    return found

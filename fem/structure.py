@@ -8,7 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
+from fem.attachments import Attachments, Coupling, PointMass, PointSpring, vector
 from fem.cells import KINDS, SPANS
+from fem.element_types import check_family, counted
 from fem.errors import ModelError, by_name, check_positive, listed, quoted
 from fem.mesh import FloatArray, FrameMesh, IntArray
 from fem.model import BeamPart, Hinge, Interface, Material, PointMass, PointSpring, Support, vector
@@ -77,51 +79,6 @@ class SolidPart:
         if self.plane == "stress":
             first = 2.0 * first * mu / (first + 2.0 * mu)
         return first, mu
-
-
-@dataclass(frozen=True)
-class Coupling:
-    """Joins the nodes of a face to a point that has rotations.
-
-    Parameters
-    ----------
-    point
-        Name of the point: one of the mesh, or a new one.
-    face
-        Point set or group whose nodes are joined to it.
-    kind
-        "rigid": the nodes move with the point as one rigid body (RBE2). "averaging": the point
-        moves with the face in the mean and does not stiffen it (RBE3): its motion is the rigid
-        one nearest to the face's, in the sense of least squares over the area.
-    at
-        Place (x, y, z) in m of a new point; by default the centre of the face.
-    directions
-        Of a rigid coupling: the translations of the face that follow, by default all.
-
-    Examples
-    --------
-    >>> Coupling("hub", "bore").kind
-    'rigid'
-    """
-
-    point: str
-    face: str
-    kind: str = "rigid"
-    at: Sequence[float] | None = None
-    directions: Sequence[str] = ("x", "y", "z")
-
-    def __post_init__(self) -> None:
-        owner = f"coupling of {self.face!r} to {self.point!r}"
-        if self.kind not in ("rigid", "averaging"):
-            raise ModelError(f"{owner}: kind must be 'rigid' or 'averaging', not {self.kind!r}")
-        if self.at is not None:
-            object.__setattr__(self, "at", vector(f"{owner}: at", self.at, 3))
-        given = (self.directions,) if isinstance(self.directions, str) else tuple(self.directions)
-        if not given or not set(given) <= {"x", "y", "z"} or len(set(given)) < len(given):
-            raise ModelError(f"{owner}: directions must be out of 'x', 'y', 'z', not {given!r}")
-        if self.kind == "averaging" and len(given) < 3:
-            raise ModelError(f"{owner}: an averaging coupling has all directions")
-        object.__setattr__(self, "directions", given)
 
 
 @dataclass(frozen=True)
@@ -266,17 +223,28 @@ class StructureModel:
             if isinstance(part, SolidPart)
         }
 
+    @cached_property
+    def attached(self) -> Attachments:
+        """Masses, links, couplings and equations: of the mesh's file, and the model's own."""
+        own = Attachments(self.point_masses, couplings=self.couplings)
+        return self.mesh.attachments + own
+
     @property
     def links(self) -> IntArray:
-        """Pairs of nodes that are joined by cells of parts and by couplings, shape (m, 2)."""
+        """Pairs of nodes that cells of parts, couplings, springs or equations join, (m, 2)."""
         pairs = [
             np.stack([np.repeat(cells[:, 0], cells.shape[1]), cells.ravel()], axis=1)
             for cells in self._part_cells()
         ]
-        for coupling in self.couplings:
+        for coupling in self.attached.couplings:
             nodes = self.mesh.nodes(coupling.face)
             point = np.full(len(nodes), self.mesh.node(coupling.point))
             pairs.append(np.stack([point, nodes], axis=1))
+        names = [link.points for link in self.attached.links]
+        names += [equation.points for equation in self.attached.equations]
+        for points in names:
+            joined = [self.mesh.node(point) for point in points]
+            pairs.append(np.array([[joined[0], node] for node in joined], dtype=np.int64))
         return np.concatenate(pairs)
 
     @cached_property
@@ -310,6 +278,8 @@ class StructureModel:
                 )
             for kind, cells in group.items():
                 owners[kind][cells] += 1
+                types = {t: at[kind] for t, at in mesh.element_types.items() if kind in at}
+                check_family(f"{mesh.source}: part {name!r}", part, counted(types, cells))
         highest = max(KINDS[kind].dimension for kind in mesh.cells if kind in KINDS)
         for kind, count in owners.items():
             bare = np.flatnonzero(count == 0)
@@ -389,13 +359,15 @@ class StructureModel:
     def _check_names(self) -> None:
         for support in self.supports:
             self.mesh.nodes(support.point)
-        points = [item.point for item in self.point_masses]
+        points = [item.point for item in self.attached.point_masses]
+        points += [p for item in self.attached.links for p in item.points]
+        points += [p for item in self.attached.equations for p in item.points]
         points += [item.point for item in self.springs]
         points += [item.point for item in self.hinges]
         points += [item.point for item in self.interfaces.values()]
         for name in points:
             self.mesh.node(name)
-        for name in [item.face for item in self.couplings] + [f.face for f in self.foundations]:
+        for name in [c.face for c in self.attached.couplings] + [f.face for f in self.foundations]:
             self.mesh.nodes(name)
         for hinge in self.hinges:
             if hinge.part not in self.beams:

@@ -11,20 +11,36 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
+from fem.attachments import PointMass
 from fem.beams import cross_matrix, element_matrices, element_rows, local_axes, to_nodes
 from fem.cells import KINDS, CellKind
 from fem.conforming import check_conforming
-from fem.constraints import Constraints, Numbering, constrain, facet_products, number_blocks
+from fem.constraints import (
+    Constraints,
+    Numbering,
+    constrain,
+    facet_products,
+    number_blocks,
+    point_dof,
+)
 from fem.distorted import distortion_warnings
 from fem.errors import ModelError
+from fem.links import link_terms
 from fem.locking import locking_warnings
 from fem.mesh import FloatArray, IntArray
-from fem.model import PointMass
-from fem.natural import NaturalForm, Rows, ground_rows, line_rows, natural_form, solid_rows
+from fem.natural import (
+    MatrixRows,
+    NaturalForm,
+    Rows,
+    ground_rows,
+    line_rows,
+    natural_form,
+    solid_rows,
+)
 from fem.scatter import SparseArray, block_pattern, dense_scatter, displacement_of
 from fem.solids import checked_volumes, gradients_and_volumes, mass_matrices, stiffness_matrices
 from fem.store import load_structure, save_structure
-from fem.structure import AXES, SolidPart, StructureModel, axis_index
+from fem.structure import AXES, SolidPart, StructureModel
 
 BATCH_BYTES = 1e8
 """Size of the element matrices that are made at a time."""
@@ -53,6 +69,8 @@ class StructureComponent:
         The structure that was assembled.
     numbering, constraints
         Which degrees of freedom there are, and how they follow from the free ones.
+    damping
+        Matrix in N s/m of the dampers that the file of the mesh holds; None without any.
     """
 
     stiffness: SparseArray
@@ -61,6 +79,7 @@ class StructureComponent:
     model: StructureModel
     numbering: Numbering
     constraints: Constraints
+    damping: SparseArray | None = None
 
     @property
     def free(self) -> IntArray:
@@ -143,7 +162,8 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     M = constraints.reduced(_sum(mass, beam_mass))
     _check_nothing_empty(K, M, model, numbering, constraints)
     interfaces = _interface_vectors(model, numbering, constraints)
-    return StructureComponent(K, M, interfaces, model, numbering, constraints)
+    damping = _damping(model, numbering, constraints)
+    return StructureComponent(K, M, interfaces, model, numbering, constraints, damping)
 
 
 def _check_nothing_empty(
@@ -217,6 +237,9 @@ def attached_rows(model: StructureModel, numbering: Numbering) -> Iterator[Rows]
         spans = model.mesh.points[lines[:, 1]] - model.mesh.points[lines[:, 0]]
         rows, stiffness = element_rows(part, spans, f"{model.mesh.source}: part {name!r}")
         yield line_rows(rows, stiffness, beam_dofs(model, numbering, name), size, 3)
+    elongations, given, _ = link_rows(model, numbering)
+    if given.any():
+        yield MatrixRows(given, sparse.eye_array(len(given), format="csr"), elongations)
     for matrices, dofs in (*_foundations(model, numbering), *_springs(model, numbering)):
         yield ground_rows(matrices, dofs, size)
 
@@ -271,9 +294,11 @@ def attached_matrices(
         dofs = beam_dofs(model, numbering, name)
         stiffness = _sum(stiffness, dense_scatter(K, dofs, size))
         mass = _sum(mass, dense_scatter(M, dofs, size))
+    elongations, given, _ = link_rows(model, numbering)
+    stiffness = _sum(stiffness, _squares(elongations, given))
     for matrices, dofs in (*_foundations(model, numbering), *_springs(model, numbering)):
         stiffness = _sum(stiffness, dense_scatter(matrices, dofs, size))
-    for lump in model.point_masses:
+    for lump in model.attached.point_masses:
         matrix, dofs = _lumped(model, numbering, lump)
         mass = _sum(mass, dense_scatter(matrix, dofs, size))
     return stiffness, mass
@@ -289,22 +314,40 @@ def beam_dofs(model: StructureModel, numbering: Numbering, name: str) -> IntArra
     return np.asarray(dofs.reshape(-1, 12), dtype=np.int64)
 
 
-def point_dof(model: StructureModel, numbering: Numbering, point: str, direction: str) -> int:
-    """The degree of freedom of a named point, or a ModelError where it has none."""
-    dof = int(numbering.dofs(np.array([model.mesh.node(point)]))[0, axis_index(direction)])
-    if dof < 0:
-        moved = "does not turn" if axis_index(direction) > 2 else "is on no part of the model"
-        raise ModelError(
-            f"{model.mesh.source}: {point!r} has no direction {direction!r}: it {moved}; couple a"
-            " face to it"
-        )
-    return dof
-
-
 def _springs(model: StructureModel, numbering: Numbering) -> Iterator[tuple[FloatArray, IntArray]]:
     for spring in model.springs:
         dof = point_dof(model, numbering, spring.point, spring.direction)
         yield np.array([[[spring.stiffness]]]), np.array([[dof]])
+
+
+def link_rows(
+    model: StructureModel, numbering: Numbering
+) -> tuple[SparseArray, FloatArray, FloatArray]:
+    """Elongations (m, n) of all links, and their stiffness and damping, shape (m,)."""
+    links = model.attached.links
+    rows, columns, values = [], [], []
+    for row, link in enumerate(links):
+        for point, direction, value in link_terms(model.mesh, link):
+            rows.append(row)
+            columns.append(point_dof(model, numbering, point, direction))
+            values.append(value)
+    shape = len(links), 3 * numbering.count
+    elongations = sparse.csr_array((np.array(values, dtype=np.float64), (rows, columns)), shape)
+    stiffness, damping = np.array([(k.stiffness, k.damping) for k in links]).reshape(-1, 2).T
+    return elongations, stiffness, damping
+
+
+def _squares(rows: SparseArray, weights: FloatArray) -> SparseArray:
+    """The sparse matrix BᵀwB."""
+    return sparse.csr_array(rows.T @ sparse.diags_array(weights) @ rows)
+
+
+def _damping(
+    model: StructureModel, numbering: Numbering, constraints: Constraints
+) -> SparseArray | None:
+    """Damping matrix of the links, if one has any."""
+    elongations, _, damping = link_rows(model, numbering)
+    return constraints.reduced(_squares(elongations, damping)) if damping.any() else None
 
 
 def _lumped(

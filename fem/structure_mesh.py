@@ -11,6 +11,8 @@ import numpy.typing as npt
 
 from fem.cell_checks import cell_at, check_cells
 from fem.cells import CUBE, KINDS, PYRAMID, TETRAHEDRON, TRIANGLE, WEDGE
+from fem.attachments import Attachments, LeftOut
+from fem.cells import KINDS
 from fem.errors import ModelError, quoted
 from fem.mesh import FloatArray, FrameMesh, IntArray, index_sets, numbers
 
@@ -35,6 +37,14 @@ class StructureMesh:
         Where the mesh comes from; error texts begin with it.
     notes
         What a reader took otherwise than it stands in the file, a sentence each.
+    attachments
+        Masses, springs, couplings and equations that the file holds beside its cells.
+    element_types
+        Cells by the type that the file gives them, such as "B31" or "S8R".
+    described
+        Material and section of parts, by the name of the part, as far as the file gives them.
+    left_out
+        What the file holds and the mesh, by intention, does not.
 
     Raises
     ------
@@ -62,6 +72,10 @@ class StructureMesh:
     point_sets: Mapping[str, IntArray] = field(default_factory=dict)
     source: str = "mesh"
     notes: Sequence[str] = ()
+    attachments: Attachments = field(default_factory=Attachments)
+    element_types: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)
+    described: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    left_out: Sequence[LeftOut] = ()
 
     def __post_init__(self) -> None:
         points = numbers(f"{self.source}: points", self.points, np.float64)
@@ -81,6 +95,11 @@ class StructureMesh:
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "cells", cells)
         object.__setattr__(self, "groups", groups)
+        types = {
+            str(name): index_sets(f"{self.source}: type {name!r}", found)
+            for name, found in self.element_types.items()
+        }
+        object.__setattr__(self, "element_types", types)
         sets = index_sets(f"{self.source}: point", self.point_sets)
         object.__setattr__(self, "point_sets", sets)
         object.__setattr__(self, "notes", tuple(self.notes))
@@ -227,6 +246,10 @@ def structure_mesh(frame: FrameMesh) -> StructureMesh:
         {name: {"line": elements} for name, elements in frame.parts.items()},
         frame.point_sets,
         frame.source,
+        frame.attachments,
+        {name: {"line": elements} for name, elements in frame.element_types.items()},
+        frame.described,
+        frame.left_out,
     )
 
 
@@ -253,30 +276,56 @@ def joined(meshes: Sequence[StructureMesh], tolerance: float | None = None) -> S
     number, kept = _merged(points, tolerance)
     cells: dict[str, list[IntArray]] = {}
     groups: dict[str, dict[str, list[IntArray]]] = {}
+    types: dict[str, dict[str, list[IntArray]]] = {}
+    _check_attached_names(meshes)
     sets: dict[str, list[IntArray]] = {}
     first = 0
     for mesh in meshes:
         before = {kind: sum(len(block) for block in blocks) for kind, blocks in cells.items()}
         for kind, nodes in mesh.cells.items():
             cells.setdefault(kind, []).append(number[nodes + first])
-        for name, group in mesh.groups.items():
-            for kind, found in group.items():
-                blocks = groups.setdefault(name, {}).setdefault(kind, [])
-                blocks.append(found + before.get(kind, 0))
+        for named, into in ((mesh.groups, groups), (mesh.element_types, types)):
+            for name, group in named.items():
+                for kind, found in group.items():
+                    blocks = into.setdefault(name, {}).setdefault(kind, [])
+                    blocks.append(found + before.get(kind, 0))
         for name, nodes in mesh.point_sets.items():
             sets.setdefault(name, []).append(number[nodes + first])
         first += len(mesh.points)
     return StructureMesh(
         points[kept],
         {kind: np.concatenate(blocks) for kind, blocks in cells.items()},
-        {
-            name: {kind: np.concatenate(blocks) for kind, blocks in group.items()}
-            for name, group in groups.items()
-        },
+        _in_one(groups),
         {name: np.concatenate(nodes) for name, nodes in sets.items()},
         " + ".join(dict.fromkeys(mesh.source for mesh in meshes)),
         notes=[note for mesh in meshes for note in mesh.notes],
+        attachments=sum((mesh.attachments for mesh in meshes), Attachments()),
+        element_types=_in_one(types),
+        described={name: keys for mesh in meshes for name, keys in mesh.described.items()},
+        left_out=[item for mesh in meshes for item in mesh.left_out],
     )
+
+
+def _in_one(
+    named: Mapping[str, Mapping[str, Sequence[IntArray]]],
+) -> dict[str, dict[str, IntArray]]:
+    return {
+        name: {kind: np.concatenate(blocks) for kind, blocks in group.items()}
+        for name, group in named.items()
+    }
+
+
+def _check_attached_names(meshes: Sequence[StructureMesh]) -> None:
+    """Refuse points of attachments that another mesh has a name for, too."""
+    for mesh in meshes:
+        names = set(mesh.attachments.points)
+        for other in meshes:
+            both = sorted(names & set(other.names)) if other is not mesh else []
+            if both:
+                raise ModelError(
+                    f"{mesh.source}: something is attached to {both[0]!r}, and {other.source} has"
+                    " this name, too; rename one of them before they are joined"
+                )
 
 
 def _merged(points: FloatArray, tolerance: float | None) -> tuple[IntArray, IntArray]:

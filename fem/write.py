@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from meshio._vtk_common import meshio_to_vtk_type
 
-from fem.abaqus import SOLIDS
+from fem.abaqus.types import SOLIDS
 from fem.errors import ModelError, quoted
 from fem.files import plain_write_errors
 from fem.mesh import FloatArray, FrameMesh, IntArray

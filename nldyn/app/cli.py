@@ -160,13 +160,18 @@ def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
     """Check a scene, and print the modes of its structure."""
     with plain_errors():
         from nldyn.runtime.progress import messages_shown
-        from nldyn.scene.build import build_reduced, build_system, load_scene
+        from nldyn.scene.build import build_component, build_reduced, build_system, load_scene
         from nldyn.scene.checks import check_computable, range_remark
 
         loaded = load_scene(scene, mesh_folders)
         with messages_shown():
-            reduced = None if loaded.mesh is None else build_reduced(loaded)
+            component = None if loaded.mesh is None else build_component(loaded)
+            reduced = None if component is None else build_reduced(loaded, component)
             system = build_system(loaded, reduced)
+        for item in () if component is None else component.model.mesh.left_out:
+            click.echo(f"left out of the mesh file: {item}")
+        if component is not None and (brought := component.model.mesh.attachments):
+            click.echo(f"taken from the mesh file: {brought}")
         click.echo(describe_system(system, 0 if reduced is None else reduced.residual_modes))
         check_computable(loaded, scene)
         if remark := range_remark(loaded, float(system.frequencies_hz.max())):

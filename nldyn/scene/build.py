@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from nldyn.scene.described_parts import with_described_parts
 from nldyn.base.errors import SceneError, SystemModelError
 from nldyn.base.resources import data_directory
 from nldyn.runtime.progress import Progress
@@ -210,6 +211,7 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
     if scene.mesh.model == "structure":
         with _told_as(scene, ("mesh", "file"), fem.ModelError):
             structure = fem.read_structure(path, _mesh_places(scene))
+        scene = with_described_parts(scene, structure)
         check_structure_names(scene, structure, scene.file)
         if refinement > 1:
             if set(structure.cells) - {"line", "vertex"}:
@@ -220,6 +222,7 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
             return fem.assemble(_structure_model(scene, structure))
     with _told_as(scene, ("mesh", "file"), fem.ModelError):
         mesh = fem.read_mesh(path, _mesh_places(scene))
+    scene = with_described_parts(scene, mesh)
     check_mesh_names(scene, mesh, scene.file)
     with _told_as(scene, (), fem.ModelError):
         if refinement > 1:
@@ -595,21 +598,24 @@ def refined_mesh(mesh: fem.FrameMesh, times: int) -> fem.FrameMesh:
     >>> len(refined_mesh(mesh, 3).lines)
     6
     """
-    import fem
-
     points, lines, pieces = cut_lines(mesh.points, mesh.lines, times)
     parts = {name: pieces[elements].ravel() for name, elements in mesh.parts.items()}
-    return fem.FrameMesh(points, lines, parts, mesh.point_sets, mesh.source)
+    types = {name: pieces[elements].ravel() for name, elements in mesh.element_types.items()}
+    return replace(mesh, points=points, lines=lines, parts=parts, element_types=types)
 
 
 def refined_structure(mesh: fem.StructureMesh, times: int) -> fem.StructureMesh:
     """The same for the lines of a structure."""
     points, lines, pieces = cut_lines(mesh.points, mesh.cells["line"], times)
-    groups = {
-        name: {k: pieces[at].ravel() if k == "line" else at for k, at in group.items()}
-        for name, group in mesh.groups.items()
-    }
-    return replace(mesh, points=points, cells={**mesh.cells, "line": lines}, groups=groups)
+    groups, types = (
+        {
+            name: {k: pieces[at].ravel() if k == "line" else at for k, at in group.items()}
+            for name, group in named.items()
+        }
+        for named in (mesh.groups, mesh.element_types)
+    )
+    cells = {**mesh.cells, "line": lines}
+    return replace(mesh, points=points, cells=cells, groups=groups, element_types=types)
 
 
 def cut_lines(

@@ -199,8 +199,12 @@ def _check_structure(scene: Scene, report: Report) -> None:
                     (key,), f"describes a mesh, but the structure is given by [{kinds[0]}]"
                 )
         return
+    twice = [name for name in scene.mesh.parts_from_file if name in scene.parts]
+    if twice:
+        fault = f"names '{twice[0]}', which [parts] gives, too; keep one of them"
+        raise report(("mesh", "parts_from_file"), fault)
     for key in ("parts", "interfaces", "reduction"):
-        if not getattr(scene, key):
+        if not getattr(scene, key) and not (key == "parts" and scene.mesh.parts_from_file):
             raise report((key,), "is missing: a mesh needs it")
     if scene.mesh.model == "structure":
         if scene.mesh.mirror is not None:

@@ -56,6 +56,7 @@ class MeshTable(Table):
     file: str
     model: Literal["frame", "structure"] = "frame"
     mirror: str | None = None
+    parts_from_file: list[str] = []
 
 
 class PartTable(Table):

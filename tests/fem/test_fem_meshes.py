@@ -185,14 +185,16 @@ ABAQUS = """*HEADING
  9, 30, 40
 *Element, type=MASS, elset=lump
  11, 20
+*Mass, elset=lump
+ 2.5,
 *Elset, elset=both
  bar, 9
 *ELSET, ELSET=odd, GENERATE
  1, 9, 2
-*Nset, nset=tip
- 30,
 *NSET, NSET=ends
  10, tip
+*Nset, nset=tip
+ 30,
 *Nset, nset=ends
  40
 *STEP
@@ -215,6 +217,13 @@ def test_abaqus_sets_grow_nest_and_ignore_case(tmp_path):
         "all": [0, 1],
         "tip": [2],
         "ends": [0, 2, 3],
+        "node 20": [1],
+    }
+    assert mesh.attachments.point_masses == (fem.PointMass("node 20", 2.5),)
+    assert {name: found.tolist() for name, found in mesh.element_types.items()} == {
+        "B31": [0],
+        "B21H": [1],
+        "T2D2": [2],
     }
 
 
@@ -256,18 +265,18 @@ NODES = "*NODE\n1, 0, 0\n2, 1, 0\n3, 2, 0\n"
     [
         (NODES, "no line elements"),
         ("", "the mesh file is empty"),
-        (NODES + "*ELEMENT, TYPE=B22\n1, 1, 2, 3\n", "'B22' are not straight two-node lines"),
+        (NODES + "*ELEMENT, TYPE=B22\n1, 1, 2\n", "element 1 of type B22 has 2 nodes where 3"),
         (NODES + "*ELEMENT, TYPE=B21\n1, 1, 8\n", "element 1 ends at node 8, which is not defined"),
         (NODES + "*ELEMENT, TYPE=B21\n1, 1, 2\n1, 2, 3\n", "element 1 is defined twice"),
         (NODES + "*NODE\n1, 5, 5\n", "node 1 is defined twice"),
         (NODES + "*ELEMENT, TYPE=B21\n1, 1, 2\n*NSET, NSET=a\n9\n", "'a' holds node 9"),
-        (NODES + "*ELEMENT, TYPE=B21\n1, 1, 2\n*ELSET, ELSET=a\nb\n", "set 'b', which is not"),
-        (NODES + "*NSET\n1\n", r"a \*NSET has no name"),
-        (NODES + "*INSTANCE, NAME=i\n1., 0., 0.\n", "instance 'i' is moved"),
+        (NODES + "*ELEMENT, TYPE=B21\n1, 1, 2\n*ELSET, ELSET=a\nb\n", "which is not defined"),
+        (NODES + "*NSET\n1\n", r"line 5: \*NSET: has no name"),
+        (NODES + "*INSTANCE, NAME=i, PART=p\n", "line 5: .* part 'p', which is not defined"),
         ("*INCLUDE, INPUT=no.inp\n", "included file .* does not exist"),
-        (NODES + "*ELEMENT, TYPE=B21\n1, 1\n", r"cannot be read .* \(numbers are missing\)"),
-        ("*NODE\n1, zero, 0\n", r"as Abaqus mesh \('zero' is not a number\)"),
-        ("*NODE\none, 0, 0\n", r"as Abaqus mesh \('one' is not a whole number\)"),
+        (NODES + "*ELEMENT, TYPE=B21\n1, 1\n", "element 1 of type B21 has 1 nodes where"),
+        ("*NODE\n1, zero, 0\n", r"line 2: \*NODE: 'zero' is not a number"),
+        ("*NODE\none, 0, 0\n", r"line 2: \*NODE: 'one' is not a whole number"),
         (NODES + "*ELEMENT, TYPE=B21\n1, 1, 1\n", "element 0 has zero length"),
         (NODES + "*ELEMENT, TYPE=B21\n1, 1, 2\n2, 2, 1\n", "appears twice"),
         ("*NODE\n1, nan, 0\n2, 1, 0\n*ELEMENT, TYPE=B21\n1, 1, 2\n", "node 0 .* not finite"),

@@ -167,7 +167,7 @@ def meshes():
             interfaces={"tip": fem.Interface("tip", "y")},
         )
         components[f"{count} elements"] = fem.assemble(model)
-    setting = Setting(
+    setting = LoadCase(
         (30.0, 40.0),
         stops=(Stop("tip", stiffness=1e8),),
         excitation=(Unbalance("tip", 1e-4),),
