@@ -9,10 +9,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from fem.attachments import Attachments, LeftOut
 from fem.cell_checks import cell_at, check_cells
 from fem.cells import CUBE, KINDS, PYRAMID, TETRAHEDRON, TRIANGLE, WEDGE
-from fem.attachments import Attachments, LeftOut
-from fem.cells import KINDS
 from fem.errors import ModelError, quoted
 from fem.mesh import FloatArray, FrameMesh, IntArray, index_sets, numbers
 

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from nldyn.scene.described_parts import with_described_parts
 from nldyn.base.errors import SceneError, SystemModelError
 from nldyn.base.resources import data_directory
 from nldyn.runtime.progress import Progress
@@ -30,6 +29,7 @@ from nldyn.scene.checks import (
     check_structure_names,
     range_remark,
 )
+from nldyn.scene.described_parts import with_described_parts
 from nldyn.scene.messages import KeyPath, from_validation, scene_error, table_at
 from nldyn.scene.schema import ContinuationTable, ExcitationTable, PartTable, Scene, StopTable
 
