@@ -1,4 +1,4 @@
-"""Frames and structures of beams and solids: from a mesh to stiffness, mass and interfaces."""
+"""Frames and structures: from a mesh to stiffness, mass and interfaces."""
 
 from fem.abaqus import read_abaqus
 from fem.assemble import assemble
@@ -18,8 +18,9 @@ from fem.model import (
 )
 from fem.read import from_meshio, read_mesh, read_structure, structure_from_meshio
 from fem.sections import CircularSection, CrossSection, RectangularSection, Section
+from fem.shells import ShellPart
 from fem.structure import Coupling, Foundation, SolidPart, StructureModel, symmetry
-from fem.structure_assembly import LockingWarning, StructureComponent
+from fem.structure_assembly import JointWarning, LockingWarning, StructureComponent
 from fem.structure_mesh import StructureMesh, box_mesh, joined, structure_mesh
 from fem.write import write_mesh
 
@@ -35,6 +36,7 @@ __all__ = [
     "FrameModel",
     "Hinge",
     "Interface",
+    "JointWarning",
     "LockingWarning",
     "Material",
     "ModelError",
@@ -42,6 +44,7 @@ __all__ = [
     "PointSpring",
     "RectangularSection",
     "Section",
+    "ShellPart",
     "SolidPart",
     "StructureComponent",
     "StructureMesh",

@@ -1,4 +1,4 @@
-"""Assembly of structures of solids and beams."""
+"""Assembly of structures of solids, shells and beams."""
 
 from __future__ import annotations
 
@@ -21,11 +21,13 @@ from fem.constraints import (
     number_blocks,
 )
 from fem.errors import ModelError
+from fem.joints import hinge_warnings
 from fem.locking import locking_warnings
 from fem.mesh import FloatArray, IntArray
 from fem.model import PointMass
 from fem.natural import NaturalForm, Rows, ground_rows, line_rows, natural_form, solid_rows
 from fem.scatter import SparseArray, block_pattern, dense_scatter, displacement_of
+from fem.shell_assembly import facet_matrices, facet_rows
 from fem.solids import (
     checked_volumes,
     gradients_and_volumes,
@@ -41,6 +43,10 @@ BATCH_BYTES = 1e8
 
 class LockingWarning(UserWarning):
     """First-order solids on a part that is thin: they are too stiff in bending."""
+
+
+class JointWarning(UserWarning):
+    """Parts that share nodes but can turn against each other there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +84,8 @@ class StructureComponent:
 
         Made when it is first asked for; it keeps the gradients of all solids' shape functions.
         """
-        rows = [*cell_rows(self.model, self.numbering), *attached_rows(self.model, self.numbering)]
+        sorts = (cell_rows, facet_rows, attached_rows)
+        rows = [row for sort in sorts for row in sort(self.model, self.numbering)]
         return natural_form(rows, self.constraints.transformation)
 
     def shape(self, u: FloatArray) -> FloatArray:
@@ -131,16 +138,21 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     -----
     LockingWarning
         If a part of first-order cells is so thin that it is much too stiff in bending.
+    JointWarning
+        If a shell meets solids at an edge only, about which it can turn.
     """
+    for text in hinge_warnings(model):
+        warnings.warn(text, JointWarning, stacklevel=3)
     for text in locking_warnings(model):
         warnings.warn(text, LockingWarning, stacklevel=3)
     numbering = number_blocks(model)
     constraints = constrain(model, numbering)
     stiffness, mass = solid_matrices(model, numbering)
-    beam_stiffness, beam_mass = attached_matrices(model, numbering)
-    K = constraints.reduced(_sum(stiffness, beam_stiffness))
+    for more in (facet_matrices(model, numbering), attached_matrices(model, numbering)):
+        stiffness, mass = _sum(stiffness, more[0]), _sum(mass, more[1])
+    K = constraints.reduced(stiffness)
     del stiffness
-    M = constraints.reduced(_sum(mass, beam_mass))
+    M = constraints.reduced(mass)
     _check_nothing_empty(K, M, model, numbering, constraints)
     interfaces = _interface_vectors(model, numbering, constraints)
     return StructureComponent(K, M, interfaces, model, numbering, constraints)

@@ -1,4 +1,4 @@
-"""The surface of a structure: outer faces of solids, and cross-sections swept along its beams."""
+"""The surface of a structure: faces of solids, shells, and cross-sections swept along beams."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ class StructureSurface:
     """The surface of a whole structure, made by `structure_surface`.
 
     It offers what a `FrameSurface` does: `place`, `faces` and `edges`. The points are first the
-    nodes of the solids' faces, then the middles of their faces with eight nodes, then those of the
-    beams, part by part.
+    nodes of the solids' faces and of shells, then the middles of the faces with eight nodes, then
+    those of the beams, part by part.
 
     Parameters
     ----------
     component
         The assembled structure.
     nodes
-        Nodes of the mesh on the solids' faces, shape (p,).
+        Nodes of the mesh on the solids' faces and on shells, shape (p,).
     eights
         Faces with eight nodes, as positions among `nodes`, shape (c, 8).
     polygons, sharp
@@ -164,6 +164,8 @@ def section_frames(slope: FloatArray, twist: FloatArray) -> FloatArray:
 def structure_surface(component: StructureComponent, places: int | None = None) -> StructureSurface:
     """The surface of a structure, with the true sections of its beams.
 
+    A shell is drawn as the surface through its nodes, without its thickness.
+
     Examples
     --------
     >>> import fem
@@ -207,12 +209,11 @@ def _beams(component: StructureComponent, s: FloatArray) -> Iterator[tuple[str, 
 
 
 def drawn_facets(component: StructureComponent) -> dict[str, IntArray]:
-    """The outer faces of solids, or the cells themselves of solids in the plane."""
+    """The outer faces of solids, or the cells themselves of solids in the plane and of shells."""
     model = component.model
-    if not model.is_plane:
-        return model.facets
+    flat = [*(model.solids.values() if model.is_plane else ()), *model.shells.values()]
     found: dict[str, list[IntArray]] = {}
-    for _, kinds in model.solids.values():
+    for kinds in ({} if model.is_plane else model.facets, *(kinds for _, kinds in flat)):
         for kind, cells in kinds.items():
             found.setdefault(kind, []).append(cells)
     return {kind: np.concatenate(blocks) for kind, blocks in found.items()}
