@@ -132,12 +132,16 @@ def flat_cells(corners: FloatArray) -> FlatCells:
     else:
         first, second = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
         normal, x = np.cross(first, second), first - second
-    with np.errstate(divide="ignore", invalid="ignore"):
-        z = normal / np.linalg.norm(normal, axis=1)[:, None]
-        x = x / np.linalg.norm(x, axis=1)[:, None]
+    z, x = unit(normal), unit(x)
     axes = np.stack([x, np.cross(z, x), z], axis=1)
     local = np.einsum("eij,ebj->ebi", axes, corners - corners.mean(axis=1, keepdims=True))
     return FlatCells(axes, local[..., :2], local[..., 2])
+
+
+def unit(vectors: FloatArray) -> FloatArray:
+    """Vectors (e, 3) of length 1, or of zeros."""
+    length = np.linalg.norm(vectors, axis=1)[:, None]
+    return np.asarray(vectors / np.where(length > 0.0, length, 1.0), dtype=np.float64)
 
 
 def check_shape(kind: CellKind, cells: FlatCells, nodes: IntArray, what: str) -> None:
@@ -251,7 +255,7 @@ def corner_normals(points: FloatArray, kinds: Sequence[IntArray]) -> list[FloatA
     cosine = np.einsum("pi,pi->p", normal[one], normal[other])
     weight = np.sign(cosine) * (np.abs(cosine) > np.cos(np.radians(SMOOTH_DEGREES)))
     mean = sparse.csr_array((weight, (one, other)), shape=pairs.shape) @ normal
-    mean = mean / np.linalg.norm(mean, axis=1)[:, None]
+    mean = unit(mean)
     ends = np.cumsum([n.size for n in kinds])[:-1]
     return [
         part.reshape(*n.shape, 3) for part, n in zip(np.split(mean, ends), kinds, strict=True)

@@ -51,6 +51,17 @@ def block(kind, lengths=(1.0, 0.05, 0.02), poisson=0.3, thickness=None, plane=No
     )
 
 
+def shell(kind, offset=0.0):
+    mesh = fem.box_mesh("s", (1.0, 0.5), (4, 3), kind=kind)
+    x, y, _ = mesh.points.T
+    points = np.column_stack([x, y, 0.2 * x**2 - 0.3 * x * y])
+    return fem.StructureModel(
+        mesh.with_points(points),
+        parts={"s": fem.ShellPart(STEEL, 1e-3, offset)},
+        supports=[fem.Support("x0", ("x", "y", "z"))],
+    )
+
+
 MODELS = {
     "frame": frame(),
     "Timoshenko's frame": frame("timoshenko"),
@@ -63,6 +74,8 @@ MODELS = {
     "hexahedra": block("hexahedron"),
     "hexahedra, 20 nodes": block("hexahedron20"),
     "tetrahedra, 10 nodes, negative Poisson's ratio": block("tetra10", poisson=-0.3),
+    "shell of quadrilaterals": shell("quad"),
+    "shell of triangles with an offset": shell("triangle", 0.01),
     "quadrilaterals in plane stress": block("quad8", (1.0, 0.05), thickness=0.01, plane="stress"),
 }
 
