@@ -3,7 +3,7 @@
 from fem.abaqus import read_abaqus
 from fem.assemble import assemble
 from fem.calibrate import Calibration, calibrate
-from fem.errors import ModelError
+from fem.errors import JointWarning, ModelError
 from fem.frame import Component
 from fem.mesh import FrameMesh, frame_mesh
 from fem.model import (
@@ -15,12 +15,13 @@ from fem.model import (
     PointMass,
     PointSpring,
     Support,
+    TrussPart,
 )
 from fem.read import from_meshio, read_mesh, read_structure, structure_from_meshio
 from fem.sections import CircularSection, CrossSection, RectangularSection, Section
 from fem.shells import ShellPart
 from fem.structure import Coupling, Foundation, SolidPart, StructureModel, symmetry
-from fem.structure_assembly import JointWarning, LockingWarning, StructureComponent
+from fem.structure_assembly import LockingWarning, StructureComponent
 from fem.structure_mesh import StructureMesh, box_mesh, joined, structure_mesh
 from fem.write import write_mesh
 
@@ -50,6 +51,7 @@ __all__ = [
     "StructureMesh",
     "StructureModel",
     "Support",
+    "TrussPart",
     "assemble",
     "box_mesh",
     "calibrate",

@@ -18,7 +18,7 @@ from fem.shells import facet_batches
 from fem.solids import gradients_and_volumes, strains
 from fem.structure import SolidPart
 from fem.structure_assembly import StructureComponent
-from fem.structure_surface import StructureSurface
+from fem.structure_surface import StructureSurface, swept_parts
 from fem.sweep import FrameSurface, outline
 
 COLOURS = {"displacement": "m", "stress": "Pa", "moment": "N m"}
@@ -148,6 +148,11 @@ def _frame_values(drawing: FrameSurface, u: FloatArray, colour: str) -> Iterator
 def _beam_values(drawing: StructureSurface, u: FloatArray, colour: str) -> Iterator[FloatArray]:
     model = drawing.component.model
     for name, swept in drawing.beams:
+        if name in model.trusses:
+            force = truss_forces(drawing.component, u, name)
+            area = model.trusses[name][0].area if colour == "stress" else np.inf
+            yield np.repeat(np.abs(force) / area, len(swept.places) * len(swept.outline))
+            continue
         part, lines = model.beams[name]
         spans = model.mesh.points[lines[:, 1]] - model.mesh.points[lines[:, 0]]
         what = f"{model.mesh.source}: part {name!r}"
@@ -163,6 +168,16 @@ def _beam_values(drawing: StructureSurface, u: FloatArray, colour: str) -> Itera
                 part, about_z, about_y
             )
         yield np.repeat(values[..., None], len(swept.outline), axis=-1).ravel()
+
+
+def truss_forces(component: StructureComponent, u: FloatArray, name: str) -> FloatArray:
+    """Mean axial force (e,) in N of the lines of a truss, tension positive."""
+    points = component.model.mesh.points
+    part, lines = component.model.trusses[name][0], swept_parts(component.model)[name][1]
+    span = points[lines[:, 1]] - points[lines[:, 0]]
+    moved = component.shape(u)[lines][:, 1, :3] - component.shape(u)[lines][:, 0, :3]
+    strain = np.sum(span * moved, axis=1) / np.sum(span**2, axis=1)
+    return np.asarray(part.material.youngs_modulus * part.area * strain, dtype=np.float64)
 
 
 def _bending_stress(part: BeamPart, about_z: FloatArray, about_y: FloatArray) -> FloatArray:

@@ -55,7 +55,7 @@ def number_blocks(model: StructureModel) -> Numbering:
     """Translations for all nodes of parts and coupled points; rotations where something turns."""
     count = len(model.mesh.points)
     moves, turns = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
-    for _, kinds in model.solids.values():
+    for _, kinds in (*model.solids.values(), *model.trusses.values()):
         for nodes in kinds.values():
             moves[nodes] = True
     for _, lines in model.beams.values():

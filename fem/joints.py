@@ -1,4 +1,4 @@
-"""Where a shell meets a solid at an edge only, so that it can turn there as on a hinge."""
+"""Where parts can move against each other though they share nodes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fem.structure import StructureModel
+from fem.structure import StructureModel, axis_index
+from fem.trusses import loose_nodes, loose_sentences
 
 
 def hinge_warnings(model: StructureModel) -> Iterator[str]:
@@ -49,3 +50,27 @@ def hinge_warnings(model: StructureModel) -> Iterator[str]:
                 " their place only, so that the shell turns there as on a hinge; let it go on by a"
                 " cell along the face or into the solid, or couple these nodes rigidly to a point"
             )
+
+
+def mechanism_warnings(model: StructureModel) -> Iterator[str]:
+    """One sentence for nodes that trusses do not hold in all directions, nor anything else."""
+    held = np.zeros((len(model.mesh.points), 3), dtype=np.int64)
+    for _, kinds in (*model.solids.values(), *model.shells.values()):
+        for nodes in kinds.values():
+            held[nodes] = 1
+    for _, lines in model.beams.values():
+        held[lines] = 1
+    for coupling in model.couplings:
+        held[model.mesh.nodes(coupling.face)] = held[model.mesh.node(coupling.point)] = 1
+    for foundation in model.foundations:
+        held[model.mesh.nodes(foundation.face)] |= np.array(foundation.stiffness) > 0.0
+    ties = [(support.point, d) for support in model.supports for d in support.directions]
+    ties += [(spring.point, spring.direction) for spring in model.springs]
+    for point, direction in ties:
+        if axis_index(direction) < 3:
+            held[model.mesh.nodes(point), axis_index(direction)] = 1
+    trusses = [nodes for _, kinds in model.trusses.values() for nodes in kinds.values()]
+    dimension = 2 if model.is_plane else 3
+    yield from loose_sentences(
+        model.mesh, loose_nodes(model.mesh.points, trusses, held, dimension)
+    )

@@ -10,7 +10,7 @@ from scipy import sparse
 from fem.cells import KINDS, CellKind
 from fem.constraints import Numbering
 from fem.mesh import FloatArray, IntArray
-from fem.natural import Rows
+from fem.natural import Rows, node_rows
 from fem.scatter import SparseArray, block_pattern
 from fem.shells import (
     ShellPart,
@@ -19,7 +19,6 @@ from fem.shells import (
     corner_normals,
     facet_batches,
     flat_cells,
-    natural_rows,
     shell_matrices,
     shell_rows,
 )
@@ -76,5 +75,5 @@ def facet_rows(model: StructureModel, numbering: Numbering) -> Iterator[Rows]:
     for part, kind, nodes, normals in shell_pieces(model):
         for batch in facet_batches(kind, len(nodes)):
             rows, stiffness = shell_rows(part, kind, points, nodes[batch], normals[batch])
-            dofs = numbering.dofs(nodes[batch]).reshape(len(rows), -1)
-            yield natural_rows(rows, stiffness, dofs, 3 * numbering.count)
+            dofs = numbering.dofs(nodes[batch])
+            yield node_rows(rows, stiffness, dofs, 3 * numbering.count)

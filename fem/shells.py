@@ -15,7 +15,6 @@ from fem.errors import ModelError, check_positive, is_finite
 from fem.membranes import areas, membrane_rows, plane_law
 from fem.mesh import FloatArray, IntArray
 from fem.model import Material
-from fem.natural import MatrixRows, block_diagonal
 from fem.plates import SHEAR_FACTOR, jacobians, plate_rows
 
 FACETS: dict[str, dict[str, tuple[tuple[int, ...], ...]]] = {
@@ -317,30 +316,6 @@ def facet_batches(kind: CellKind, count: int) -> Iterator[slice]:
     step = max(int(BATCH_BYTES / (8 * 6 * (6 * kind.node_count) ** 2)), 1)
     for first in range(0, count, step):
         yield slice(first, min(first + step, count))
-
-
-def natural_rows(
-    rows: FloatArray, stiffness: FloatArray, dofs: IntArray, size: int
-) -> MatrixRows:
-    """Rows (e, r, 6 b) for displacements from the first node's, see `fem.natural`.
-
-    Parameters
-    ----------
-    rows, stiffness
-        As `shell_rows` gives them.
-    dofs
-        Six of every node, shape (e, 6 b).
-    size
-        Number of all degrees of freedom.
-    """
-    kept = dofs[:, 3:]
-    at = np.arange(kept.size).reshape(kept.shape)
-    moves = np.concatenate([np.arange(6 * n - 3, 6 * n) for n in range(1, dofs.shape[1] // 6)])
-    first = np.tile(dofs[:, :3], (1, len(moves) // 3))
-    entries = np.append(np.ones(kept.size), -np.ones(first.size))
-    places = (np.append(at.ravel(), at[:, moves].ravel()), np.append(kept.ravel(), first.ravel()))
-    differences = sparse.csr_array(sparse.coo_array((entries, places), shape=(kept.size, size)))
-    return MatrixRows(stiffness.ravel(), block_diagonal(rows[:, :, 3:]), differences)
 
 
 def shell_kinds() -> set[str]:

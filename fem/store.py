@@ -16,7 +16,7 @@ from fem.errors import ModelError
 from fem.files import draft_of, plain_write_errors
 from fem.mesh import FrameMesh
 from fem.model import LISTS as FRAME_LISTS
-from fem.model import BeamPart, FrameModel, Interface, Material
+from fem.model import BeamPart, FrameModel, Interface, Material, TrussPart
 from fem.sections import CircularSection, CrossSection, RectangularSection, Section
 from fem.shells import ShellPart
 from fem.structure import LISTS as STRUCTURE_LISTS
@@ -28,7 +28,7 @@ STRUCTURE_FORMAT = "fem structure 2"
 Arrays = dict[str, npt.NDArray[Any]]
 Lists = Mapping[str, type]
 Model = TypeVar("Model")
-PARTS = {kind.__name__: kind for kind in (BeamPart, SolidPart, ShellPart)}
+PARTS = {kind.__name__: kind for kind in (BeamPart, TrussPart, SolidPart, ShellPart)}
 SECTIONS = {kind.__name__: kind for kind in (RectangularSection, CircularSection, Section)}
 
 

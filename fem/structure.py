@@ -19,6 +19,7 @@ from fem.model import (
     PointMass,
     PointSpring,
     Support,
+    TrussPart,
     vector,
 )
 from fem.shells import ShellPart, facets_of, shell_kinds
@@ -163,7 +164,7 @@ class Foundation:
             raise ModelError(f"{owner}: stiffness must not be negative and not all zero")
 
 
-Part = BeamPart | SolidPart | ShellPart
+Part = BeamPart | TrussPart | SolidPart | ShellPart
 
 LISTS = {
     "supports": Support,
@@ -174,7 +175,7 @@ LISTS = {
     "foundations": Foundation,
 }
 TABLES: tuple[tuple[str, object, str], ...] = (
-    ("parts", Part, "BeamPart, SolidPart and ShellPart"),
+    ("parts", Part, "BeamPart, TrussPart, SolidPart and ShellPart"),
     ("interfaces", Interface, "Interface"),
 )
 
@@ -189,8 +190,8 @@ class StructureModel:
         A mesh with all kinds of cells; of a `FrameMesh` the lines are taken.
     parts
         By the name of the group of cells: `SolidPart` for bodies, `ShellPart` for triangles and
-        quadrilaterals in space, `BeamPart` for lines. With plane solids everything lies and moves
-        in the plane: x, y and the rotation about z.
+        quadrilaterals in space, `BeamPart` and `TrussPart` for lines. With plane solids everything
+        lies and moves in the plane: x, y and the rotation about z.
     supports, point_masses, springs, hinges
         As in a `FrameModel`, in up to six directions. The point of a support may be a face.
     couplings
@@ -279,6 +280,15 @@ class StructureModel:
         }
 
     @property
+    def trusses(self) -> dict[str, tuple[TrussPart, dict[str, IntArray]]]:
+        """Truss parts with the nodes (e, 2) and (e, 3) of their lines by kind."""
+        return {
+            name: (part, {k: self.mesh.cells[k][at] for k, at in self.mesh.part(name).items()})
+            for name, part in self.parts.items()
+            if isinstance(part, TrussPart)
+        }
+
+    @property
     def shells(self) -> dict[str, tuple[ShellPart, dict[str, IntArray]]]:
         """Shell parts with the nodes (e, 3) and (e, 4) of their facets by kind."""
         return {
@@ -362,7 +372,7 @@ class StructureModel:
 
     @staticmethod
     def _kinds_for(part: Part) -> set[str]:
-        if isinstance(part, BeamPart):
+        if isinstance(part, BeamPart | TrussPart):
             return set(SPANS)
         if isinstance(part, ShellPart):
             return shell_kinds()
@@ -421,7 +431,7 @@ class StructureModel:
 
     def _part_cells(self) -> list[IntArray]:
         cells = [lines for _, lines in self.beams.values()]
-        bodies = (*self.solids.values(), *self.shells.values())
+        bodies = (*self.trusses.values(), *self.solids.values(), *self.shells.values())
         return cells + [nodes for _, kinds in bodies for nodes in kinds.values()]
 
     def _check_names(self) -> None:

@@ -20,8 +20,8 @@ from fem.constraints import (
     facet_products,
     number_blocks,
 )
-from fem.errors import ModelError
-from fem.joints import hinge_warnings
+from fem.errors import JointWarning, ModelError
+from fem.joints import hinge_warnings, mechanism_warnings
 from fem.locking import locking_warnings
 from fem.mesh import FloatArray, IntArray
 from fem.model import PointMass
@@ -36,6 +36,7 @@ from fem.solids import (
 )
 from fem.store import load_structure, save_structure
 from fem.structure import AXES, SolidPart, StructureModel, axis_index
+from fem.truss_assembly import truss_form, truss_matrices
 
 BATCH_BYTES = 1e8
 """Size of the element matrices that are made at a time."""
@@ -43,10 +44,6 @@ BATCH_BYTES = 1e8
 
 class LockingWarning(UserWarning):
     """First-order solids on a part that is thin: they are too stiff in bending."""
-
-
-class JointWarning(UserWarning):
-    """Parts that share nodes but can turn against each other there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +81,7 @@ class StructureComponent:
 
         Made when it is first asked for; it keeps the gradients of all solids' shape functions.
         """
-        sorts = (cell_rows, facet_rows, attached_rows)
+        sorts = (cell_rows, facet_rows, truss_form, attached_rows)
         rows = [row for sort in sorts for row in sort(self.model, self.numbering)]
         return natural_form(rows, self.constraints.transformation)
 
@@ -139,16 +136,18 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     LockingWarning
         If a part of first-order cells is so thin that it is much too stiff in bending.
     JointWarning
-        If a shell meets solids at an edge only, about which it can turn.
+        If a shell meets solids at an edge only, about which it can turn, or a truss has a node
+        that is not held in all directions.
     """
-    for text in hinge_warnings(model):
+    for text in (*hinge_warnings(model), *mechanism_warnings(model)):
         warnings.warn(text, JointWarning, stacklevel=3)
     for text in locking_warnings(model):
         warnings.warn(text, LockingWarning, stacklevel=3)
     numbering = number_blocks(model)
     constraints = constrain(model, numbering)
     stiffness, mass = solid_matrices(model, numbering)
-    for more in (facet_matrices(model, numbering), attached_matrices(model, numbering)):
+    for others in (facet_matrices, truss_matrices, attached_matrices):
+        more = others(model, numbering)
         stiffness, mass = _sum(stiffness, more[0]), _sum(mass, more[1])
     K = constraints.reduced(stiffness)
     del stiffness

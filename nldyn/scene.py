@@ -541,7 +541,10 @@ def acting_elements(
 def _frame_model(scene: Scene, mesh: fem.FrameMesh) -> fem.FrameModel:
     import fem
 
-    parts = {name: _beam(table) for name, table in scene.parts.items()}
+    parts = {
+        name: _truss(table) if table.kind == "truss" else _beam(table)
+        for name, table in scene.parts.items()
+    }
     return fem.FrameModel(mesh, parts, **_attached(scene))
 
 
@@ -631,7 +634,15 @@ def _count_pieces(count: int, links: NDArray[np.int64]) -> int:
     return len(np.unique(piece[links]))
 
 
-def _part(table: PartTable) -> fem.BeamPart | fem.SolidPart | fem.ShellPart:
+def _truss(table: PartTable) -> fem.TrussPart:
+    import fem
+
+    assert table.area is not None
+    material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
+    return fem.TrussPart(material, table.area)
+
+
+def _part(table: PartTable) -> fem.BeamPart | fem.TrussPart | fem.SolidPart | fem.ShellPart:
     import fem
 
     material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
@@ -640,7 +651,7 @@ def _part(table: PartTable) -> fem.BeamPart | fem.SolidPart | fem.ShellPart:
     if table.kind == "shell":
         assert table.thickness is not None and not isinstance(table.offset, list)
         return fem.ShellPart(material, table.thickness, table.offset or 0.0)
-    return _beam(table)
+    return _truss(table) if table.kind == "truss" else _beam(table)
 
 
 def _beam(table: PartTable) -> fem.BeamPart:

@@ -61,7 +61,7 @@ class MeshTable(Table):
 class PartTable(Table):
     """``[parts.NAME]``: material of one part of the mesh, and what it is: a beam, a shell, ..."""
 
-    kind: Literal["beam", "solid", "shell"] = "beam"
+    kind: Literal["beam", "truss", "solid", "shell"] = "beam"
     youngs_modulus: Positive
     density: Positive
     poissons_ratio: Annotated[float, Field(gt=-1, lt=0.5)] | None = None
@@ -96,12 +96,17 @@ class PartTable(Table):
             if isinstance(self.offset, float):
                 raise ValueError("needs two numbers in 'offset' (along the height and the width)")
             return self._one_section()
-        own = {"solid": ("plane", "thickness"), "shell": ("thickness", "offset")}[self.kind]
+        own = {
+            "truss": ("area",),
+            "solid": ("plane", "thickness"),
+            "shell": ("thickness", "offset"),
+        }[self.kind]
         common = ("kind", "youngs_modulus", "density", "poissons_ratio")
         others = (name for name in type(self).model_fields if name not in own + common)
         _refuse(self, tuple(others), f"a part of kind '{self.kind}'")
-        if self.poissons_ratio is None:
-            raise ValueError(f"needs 'poissons_ratio', as it is of kind '{self.kind}'")
+        needed = "area" if self.kind == "truss" else "poissons_ratio"
+        if getattr(self, needed) is None:
+            raise ValueError(f"needs '{needed}', as it is of kind '{self.kind}'")
         return self._one_thickness()
 
     def _one_thickness(self) -> PartTable:

@@ -405,3 +405,40 @@ def test_a_fault_in_a_scene_of_shells_is_told(old, new, sentence):
     with pytest.raises(SceneError, match=sentence) as caught:
         parse_scene(SHELL.replace(old, new))
     assert "\n" not in str(caught.value)
+
+
+def test_a_scene_of_trusses(tmp_path):
+    import fem
+
+    ends = {"a": (0, 1), "b": (0, -1), "tip": (1, 0)}
+    frame = fem.frame_mesh(ends, [("bars", "a", "tip", 1), ("bars", "b", "tip", 1)])
+    fem.write_mesh(frame, tmp_path / "bars.msh")
+    text = """
+    [mesh]
+    file = "bars.msh"
+    [parts.bars]
+    kind = "truss"
+    youngs_modulus = 2.1e11
+    density = 7800.0
+    area = 1e-4
+    [[supports]]
+    at = "a"
+    fixed = ["x", "y"]
+    [[supports]]
+    at = "b"
+    fixed = ["x", "y"]
+    [interfaces.tip]
+    at = "tip"
+    direction = "y"
+    [reduction]
+    modes = 2
+    """
+    component = build_component(parse_scene(text, tmp_path / "bars.toml"))
+    assert component.model.parts == {"bars": fem.TrussPart(fem.Material(2.1e11, 7800.0), 1e-4)}
+    assert component.stiffness.shape == (2, 2)
+    for old, new, sentence in (
+        ("area = 1e-4", "", "needs 'area', as it is of kind 'truss'"),
+        ("area = 1e-4", "area = 1e-4\nwidth = 0.1", "'width', which is not a key of a part of kin"),
+    ):
+        with pytest.raises(SceneError, match=sentence):
+            parse_scene(text.replace(old, new), tmp_path / "bars.toml")
