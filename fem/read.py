@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 import fem.meshio_kinds  # noqa: F401  (completes meshio's tables)
 from fem.abaqus import read_abaqus
 from fem.abaqus.mesh import TYPE_PREFIX
-from fem.cells import KINDS
+from fem.cells import KINDS, SPANS
 from fem.collapsed import uncollapsed
 from fem.errors import ModelError, quoted
 from fem.gmsh import read_gmsh
@@ -80,13 +80,14 @@ def read_mesh(path: str | Path, include_folders: Iterable[str | Path] = ()) -> F
     Returns
     -------
     FrameMesh
-        All coordinates as in the file. The nodes that are on no line are left out.
+        All coordinates as in the file. A straight line of three nodes becomes two elements. The
+        nodes that are on no line are left out.
 
     Raises
     ------
     ModelError
         If the file does not exist, has another extension or another content, or if it has no
-        line elements, second-order lines, surfaces or volumes, coordinates that are not finite, or
+        line elements, curved lines, surfaces or volumes, coordinates that are not finite, or
         whatever `FrameMesh` refuses.
 
     Examples
@@ -329,28 +330,53 @@ def _three_coordinates(content: meshio.Mesh, source: str) -> FloatArray:
 
 
 def _lines_and_parts(content: meshio.Mesh, source: str) -> tuple[IntArray, dict[str, IntArray]]:
-    curved = sorted({b.type for b in content.cells if b.type.startswith("line")} - {"line"})
+    curved = sorted({b.type for b in content.cells if b.type.startswith("line")} - set(SPANS))
     if curved:
         raise ModelError(
             f"{source}: elements of type {quoted(curved)} are not straight two-node lines;"
             " make the mesh of first order"
         )
     advice = "a frame has lines only; read it as a structure, or leave these out by their groups"
-    if any(block.type == "line" and len(block.data) for block in content.cells):
-        _check_kinds(content, {"line", "vertex"}, source, advice)
+    if any(block.type in SPANS and len(block.data) for block in content.cells):
+        _check_kinds(content, {*SPANS, "vertex"}, source, advice)
     lines: list[IntArray] = []
     parts: dict[str, list[IntArray]] = {}
     first = 0
     for index, block in enumerate(content.cells):
-        if block.type == "line" and len(block.data):
+        if block.type in SPANS and len(block.data):
+            pieces = straight_pieces(content, block.type, block.data, source)
+            count = len(SPANS[block.type])
             for name, elements in _groups(content, index, 1, source):
-                parts.setdefault(name, []).append(elements + first)
-            lines.append(np.asarray(block.data, dtype=np.int64))
-            first += len(block.data)
+                halves = count * elements[:, None] + np.arange(count)
+                parts.setdefault(name, []).append(halves.ravel() + first)
+            lines.append(pieces)
+            first += len(pieces)
     if not lines:
         found = sorted({block.type for block in content.cells if len(block.data)})
         raise ModelError(f"{source}: the mesh has no line elements (its cells are {quoted(found)})")
     return np.concatenate(lines), {name: np.concatenate(p) for name, p in parts.items()}
+
+
+def straight_pieces(
+    content: meshio.Mesh, kind: str, cells: ArrayLike, source: str
+) -> IntArray:
+    """Two-node lines (e, 2) of lines with two or three nodes; a curved one is refused."""
+    nodes = np.asarray(cells, dtype=np.int64)
+    _check_nodes(kind, nodes, len(content.points), source)
+    if kind == "line3":
+        points = _three_coordinates(content, source)[nodes]
+        span, arm = points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]
+        square = np.sum(span**2, axis=1)
+        share = np.sum(span * arm, axis=1) / np.where(square > 0.0, square, np.inf)
+        aside = np.linalg.norm(arm - share[:, None] * span, axis=1)
+        bad = np.flatnonzero((aside > 1e-6 * np.sqrt(square)) | (np.abs(share - 0.5) >= 0.5))
+        if len(bad):
+            raise ModelError(
+                f"{source}: line3 {bad[0]} (counted from 0) is not straight; a frame has straight"
+                " beams: make the mesh of first order, or use a structure, where a line of three"
+                " nodes is two beams"
+            )
+    return np.stack([nodes[:, list(ends)] for ends in SPANS[kind]], axis=1).reshape(-1, 2)
 
 
 def _point_sets(content: meshio.Mesh, source: str) -> dict[str, IntArray]:

@@ -548,7 +548,10 @@ def acting_elements(
 def _frame_model(scene: Scene, mesh: fem.FrameMesh) -> fem.FrameModel:
     import fem
 
-    parts = {name: _beam(table) for name, table in scene.parts.items()}
+    parts = {
+        name: _truss(table) if table.kind == "truss" else _beam(table)
+        for name, table in scene.parts.items()
+    }
     return fem.FrameModel(mesh, parts, **_attached(scene))
 
 
@@ -557,10 +560,7 @@ def _structure_model(scene: Scene, mesh: fem.StructureMesh) -> fem.StructureMode
 
     return fem.StructureModel(
         mesh,
-        parts={
-            name: _beam(table) if table.kind == "beam" else _solid(table)
-            for name, table in scene.parts.items()
-        },
+        parts={name: _part(table) for name, table in scene.parts.items()},
         couplings=[
             fem.Coupling(c.at, c.face, c.kind, c.place, tuple(c.directions))
             for c in scene.couplings
@@ -644,11 +644,24 @@ def _count_pieces(count: int, links: NDArray[np.int64]) -> int:
     return len(np.unique(piece[links]))
 
 
-def _solid(table: PartTable) -> fem.SolidPart:
+def _truss(table: PartTable) -> fem.TrussPart:
+    import fem
+
+    assert table.area is not None
+    material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
+    return fem.TrussPart(material, table.area)
+
+
+def _part(table: PartTable) -> fem.BeamPart | fem.TrussPart | fem.SolidPart | fem.ShellPart:
     import fem
 
     material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
-    return fem.SolidPart(material, table.plane, table.thickness)
+    if table.kind == "solid":
+        return fem.SolidPart(material, table.plane, table.thickness)
+    if table.kind == "shell":
+        assert table.thickness is not None and not isinstance(table.offset, list)
+        return fem.ShellPart(material, table.thickness, table.offset or 0.0)
+    return _truss(table) if table.kind == "truss" else _beam(table)
 
 
 def _beam(table: PartTable) -> fem.BeamPart:
@@ -676,7 +689,7 @@ def _beam(table: PartTable) -> fem.BeamPart:
         table.theory or "euler-bernoulli",
         table.axial_force or 0.0,
         table.orientation,
-        table.offset or (0.0, 0.0),
+        table.offset if isinstance(table.offset, list) else (0.0, 0.0),
     )
 
 

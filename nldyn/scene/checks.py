@@ -214,8 +214,9 @@ def _check_structure(scene: Scene, report: Report) -> None:
         if getattr(scene, key):
             raise report((key,), "needs [mesh] with model = 'structure'")
     for name, part in scene.parts.items():
-        if part.kind == "solid":
-            raise report(("parts", name, "kind"), "'solid' needs [mesh] with model = 'structure'")
+        if part.kind in ("solid", "shell"):
+            fault = f"'{part.kind}' needs [mesh] with model = 'structure'"
+            raise report(("parts", name, "kind"), fault)
 
 
 def _check_modal(scene: Scene, report: Report) -> None:

@@ -60,9 +60,9 @@ class MeshTable(Table):
 
 
 class PartTable(Table):
-    """``[parts.NAME]``: material of one part of the mesh, and what it is: a beam or a solid."""
+    """``[parts.NAME]``: material of one part of the mesh, and what it is: a beam, a shell, ..."""
 
-    kind: Literal["beam", "solid"] = "beam"
+    kind: Literal["beam", "truss", "solid", "shell"] = "beam"
     youngs_modulus: Positive
     density: Positive
     poissons_ratio: Annotated[float, Field(gt=-1, lt=0.5)] | None = None
@@ -81,19 +81,42 @@ class PartTable(Table):
     theory: Literal["euler-bernoulli", "timoshenko"] | None = None
     axial_force: Number | None = None
     orientation: Triple | None = None
-    offset: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
+    offset: Number | Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
+
+    @field_validator("offset", mode="before")
+    @classmethod
+    def _one_or_two(cls, value: Any) -> Any:
+        if isinstance(value, list) and len(value) != 2:
+            raise ValueError(f"must be two numbers (of a beam) or one (of a shell), not {value}")
+        return value
 
     @model_validator(mode="after")
     def _what_it_is(self) -> PartTable:
         if self.kind == "beam":
-            _refuse(self, ("plane", "thickness"), "a beam; a part of kind 'solid' has it")
+            _refuse(self, ("plane", "thickness"), "a beam; use kind 'solid' or 'shell'")
+            if isinstance(self.offset, float):
+                raise ValueError("needs two numbers in 'offset' (along the height and the width)")
             return self._one_section()
-        own = ("kind", "youngs_modulus", "density", "poissons_ratio", "plane", "thickness")
-        _refuse(self, tuple(set(type(self).model_fields) - set(own)), "a part of kind 'solid'")
-        if self.poissons_ratio is None:
-            raise ValueError("needs 'poissons_ratio', as it is of kind 'solid'")
-        if (self.plane is None) != (self.thickness is None):
+        own = {
+            "truss": ("area",),
+            "solid": ("plane", "thickness"),
+            "shell": ("thickness", "offset"),
+        }[self.kind]
+        common = ("kind", "youngs_modulus", "density", "poissons_ratio")
+        others = (name for name in type(self).model_fields if name not in own + common)
+        _refuse(self, tuple(others), f"a part of kind '{self.kind}'")
+        needed = "area" if self.kind == "truss" else "poissons_ratio"
+        if getattr(self, needed) is None:
+            raise ValueError(f"needs '{needed}', as it is of kind '{self.kind}'")
+        return self._one_thickness()
+
+    def _one_thickness(self) -> PartTable:
+        if self.kind == "solid" and (self.plane is None) != (self.thickness is None):
             raise ValueError("needs both 'plane' and 'thickness' (in the plane), or neither")
+        if self.kind == "shell" and self.thickness is None:
+            raise ValueError("needs 'thickness', as it is of kind 'shell'")
+        if self.kind == "shell" and isinstance(self.offset, list):
+            raise ValueError("needs one number in 'offset' (along the normal)")
         return self
 
     def _one_section(self) -> PartTable:

@@ -295,12 +295,20 @@ def test_a_bad_abaqus_file_is_one_sentence_with_its_name(tmp_path, text, sentenc
     ("name", "sentence"),
     [
         ("gmsh22_groups.msh", "appears twice .*two physical groups"),
-        ("gmsh41_second_order.msh", "'line3' are not straight two-node lines"),
     ],
 )
 def test_unusable_files_of_gmsh_are_one_sentence(name, sentence):
     with pytest.raises(fem.ModelError, match=sentence):
         fem.read_mesh(DATA / name)
+
+
+def test_straight_lines_of_second_order_are_cut_at_their_middle_nodes():
+    path = DATA / "gmsh41_second_order.msh"
+    frame, whole = fem.read_mesh(path), fem.read_structure(path)
+    threes = whole.cells["line3"]
+    assert len(frame.lines) == 2 * len(threes)
+    pieces = np.stack([threes[:, [0, 2]], threes[:, [2, 1]]], axis=1).reshape(-1, 2)
+    assert np.array_equal(frame.points[frame.lines], whole.points[pieces])
 
 
 @pytest.mark.parametrize("name", ["missing.msh", "missing.vtu", "missing.inp"])

@@ -351,3 +351,94 @@ def test_a_scene_of_beams_in_space(tmp_path):
     assert abs(component.stiffness - direct.stiffness).max() == 0.0
     assert abs(component.mass - direct.mass).max() == 0.0
     assert len(build_reduced(scene, component).frequencies_hz) == 5
+
+
+SHELL = """
+[mesh]
+file = "plate.vtu"
+model = "structure"
+[parts.plate]
+kind = "shell"
+youngs_modulus = 2.1e11
+density = 7800.0
+poissons_ratio = 0.3
+thickness = 0.002
+offset = 0.001
+[[supports]]
+at = "x0"
+fixed = ["x", "y", "z", "rotation_x", "rotation_y", "rotation_z"]
+[interfaces.tip]
+at = "tip"
+direction = "z"
+[[couplings]]
+at = "tip"
+face = "x1"
+[reduction]
+modes = 4
+"""
+
+
+def test_a_scene_of_shells(tmp_path):
+    import fem
+
+    plate = fem.box_mesh("plate", (0.3, 0.1), (6, 2), kind="quad")
+    fem.write_mesh(plate, tmp_path / "plate.vtu")
+    scene = parse_scene(SHELL, tmp_path / "plate.toml")
+    component = build_component(scene)
+    part = fem.ShellPart(fem.Material(2.1e11, 7800.0, 0.3), 0.002, 0.001)
+    assert component.model.parts == {"plate": part}
+    assert len(build_reduced(scene, component).frequencies_hz) == 5
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("thickness = 0.002", "", r"parts\.plate needs 'thickness', as it is of kind 'shell'"),
+        ("poissons_ratio = 0.3", "", "needs 'poissons_ratio', as it is of kind 'shell'"),
+        ("offset = 0.001", "offset = [0.1, 0.0]", "needs one number in 'offset'"),
+        ("offset = 0.001", "offset = [0.1]", "must be two numbers .of a beam. or one"),
+        ("offset = 0.001", "width = 0.1", "'width', which is not a key of a part of kind 'shell'"),
+        ('model = "structure"', "", r"parts\.plate\.kind 'shell' needs \[mesh\]|couplings needs"),
+    ],
+)
+def test_a_fault_in_a_scene_of_shells_is_told(old, new, sentence):
+    with pytest.raises(SceneError, match=sentence) as caught:
+        parse_scene(SHELL.replace(old, new))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_scene_of_trusses(tmp_path):
+    import fem
+
+    ends = {"a": (0, 1), "b": (0, -1), "tip": (1, 0)}
+    frame = fem.frame_mesh(ends, [("bars", "a", "tip", 1), ("bars", "b", "tip", 1)])
+    fem.write_mesh(frame, tmp_path / "bars.msh")
+    text = """
+    [mesh]
+    file = "bars.msh"
+    [parts.bars]
+    kind = "truss"
+    youngs_modulus = 2.1e11
+    density = 7800.0
+    area = 1e-4
+    [[supports]]
+    at = "a"
+    fixed = ["x", "y"]
+    [[supports]]
+    at = "b"
+    fixed = ["x", "y"]
+    [interfaces.tip]
+    at = "tip"
+    direction = "y"
+    [reduction]
+    modes = 2
+    """
+    component = build_component(parse_scene(text, tmp_path / "bars.toml"))
+    assert component.model.parts == {"bars": fem.TrussPart(fem.Material(2.1e11, 7800.0), 1e-4)}
+    assert component.stiffness.shape == (2, 2)
+    for old, new, sentence in (
+        ("area = 1e-4", "", "needs 'area', as it is of kind 'truss'"),
+        ("area = 1e-4", "area = 1e-4\nwidth = 0.1", "'width', which is not a key of a part of kin"),
+    ):
+        with pytest.raises(SceneError, match=sentence):
+            parse_scene(text.replace(old, new), tmp_path / "bars.toml")
