@@ -6,6 +6,7 @@ animation needs something that is not installed, 130 stopped with Ctrl-C.
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 import warnings
@@ -24,6 +25,13 @@ if TYPE_CHECKING:
     from nldyn.diagrams import Diagram
     from nldyn.elements import Stop
     from nldyn.system import System
+
+def usable_cores() -> int:
+    """How many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
 
 NOTHING_FOUND, BAD_INPUT, NO_GRAPHICS = 1, 2, 3
 
@@ -45,6 +53,14 @@ mesh_option = click.option(
     help="Folder from which the mesh may come, beside those of the scene and the current one.",
 )
 quiet_option = click.option("--quiet", is_flag=True, help="Show no progress.")
+jobs_option = click.option(
+    "--jobs",
+    type=click.IntRange(1, 1000),
+    default=usable_cores,
+    show_default="all cores",
+    metavar="N",
+    help="Processes that share the work; the results do not depend on it.",
+)
 
 
 def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
@@ -125,8 +141,9 @@ def main() -> None:
 @mesh_option
 @click.option("--log", is_flag=True, help="Draw the displacement on a logarithmic axis.")
 @quiet_option
+@jobs_option
 def run(
-    scene: Path, out: Path, mesh_folders: tuple[Path, ...], log: bool, quiet: bool
+    scene: Path, out: Path, mesh_folders: tuple[Path, ...], log: bool, quiet: bool, jobs: int
 ) -> None:
     """Compute the branches of a scene, and write tables and a diagram."""
     with plain_errors():
@@ -139,8 +156,8 @@ def run(
         check_directory(out)
         with kept_at_interrupt(out) as unfinished:
             with progress_line(quiet) as report:
-                found = explore_scene(loaded, report, unfinished) if loaded.explore else None
-                diagram = found.diagram if found else compute(loaded, report, unfinished)
+                found = explore_scene(loaded, report, unfinished, jobs) if loaded.explore else None
+                diagram = found.diagram if found else compute(loaded, report, unfinished, jobs)
             from nldyn.output import write_results
 
             yscale: Literal["linear", "log"] = "log" if log else "linear"

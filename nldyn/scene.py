@@ -379,7 +379,10 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
 
 
 def compute(
-    scene: Scene, progress: Progress | None = None, checkpoint: str | Path | None = None
+    scene: Scene,
+    progress: Progress | None = None,
+    checkpoint: str | Path | None = None,
+    jobs: int = 1,
 ) -> Diagram:
     """Compute all branches that a scene asks for.
 
@@ -393,6 +396,8 @@ def compute(
         Called as ``progress(what, frequency_hz, done)`` at every orbit.
     checkpoint : str or Path, optional
         File that keeps what is computed, see `nldyn.diagram`.
+    jobs : int
+        Processes that share the work, see `nldyn.diagram`.
 
     Returns
     -------
@@ -424,7 +429,7 @@ def compute(
     1
     """
     if scene.explore is not None:
-        return explore_scene(scene, progress, checkpoint).diagram
+        return explore_scene(scene, progress, checkpoint, jobs).diagram
     flow, table = _to_follow(scene)
     from nldyn.diagrams import Seed, diagram
     from nldyn.step_control import ContinuationOptions
@@ -440,6 +445,7 @@ def compute(
             options=ContinuationOptions(max_step=table.max_step),
             progress=progress,
             checkpoint=checkpoint,
+            jobs=jobs,
         )
     return _remarked(scene, flow, found)
 
@@ -451,7 +457,10 @@ def _remarked(scene: Scene, flow: FlowMap, found: Diagram) -> Diagram:
 
 
 def explore_scene(
-    scene: Scene, progress: Progress | None = None, checkpoint: str | Path | None = None
+    scene: Scene,
+    progress: Progress | None = None,
+    checkpoint: str | Path | None = None,
+    jobs: int = 1,
 ) -> Exploration:
     """Find the branches of a scene with an ``[explore]`` table, and tell how well it was searched.
 
@@ -459,7 +468,7 @@ def explore_scene(
     ----------
     scene : Scene
         A scene with an ``[[excitation]]``, a ``[continuation]`` and an ``[explore]``.
-    progress, checkpoint
+    progress, checkpoint, jobs
         As for `nldyn.explore`.
 
     Returns
@@ -509,6 +518,7 @@ def explore_scene(
             options=ContinuationOptions(max_step=table.max_step),
             progress=progress,
             checkpoint=checkpoint,
+            jobs=jobs,
         )
     return replace(found, diagram=_remarked(scene, flow, found.diagram))
 

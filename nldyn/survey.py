@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -13,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cms.threads import one_thread
+from nldyn.ahead import computing_ahead
 from nldyn.beside import Guesses
 from nldyn.branch import Branch, is_at
 from nldyn.checkpoint import Checkpoint, begun_before
 from nldyn.closed_walks import near_closed_walks
 from nldyn.crossover import near_mixtures
 from nldyn.deflation import deflated_orbit
-from nldyn.diagrams import Collector, Diagram, check_known
+from nldyn.diagrams import MOST_JOBS, Collector, Diagram, check_known
 from nldyn.errors import SystemModelError, check_range, check_types, check_whole, shown
 from nldyn.exploration import (
     Coverage,
@@ -73,6 +75,8 @@ def explore(
     known: Diagram | None = None,
     progress: Progress | None = None,
     checkpoint: str | Path | None = None,
+    jobs: int = 1,
+    executor: Executor | None = None,
 ) -> Exploration:
     """Find the branches of periodic orbits in a range of frequencies, without initial guesses.
 
@@ -112,6 +116,8 @@ def explore(
         File that keeps what is found, written now and then, at the end, and when an exception such
         as Ctrl-C ends the exploration; `load_exploration` reads it at any time. If it holds this
         very exploration, that one goes on and gives what an uninterrupted one gives.
+    jobs, executor
+        As for `diagram`: they share the branches, and change nothing in what is found.
 
     Returns
     -------
@@ -140,7 +146,9 @@ def explore(
         options=(options, ContinuationOptions, None),
         known=(known, Diagram, None),
         progress=(progress, Callable, None),
+        executor=(executor, Executor, None),
     )
+    check_whole("jobs", jobs, 1, MOST_JOBS)
     low, high = check_range(range_hz)
     check_whole("max_period", max_period, 1, LONGEST_PERIOD)
     question = Question(
@@ -165,7 +173,7 @@ def explore(
     survey = _Survey(box, question, known)
     if checkpoint is None or not survey.goes_on_in(checkpoint):
         box.take(known.branches, known.notes)
-    with box.checkpoint:
+    with box.checkpoint, computing_ahead(flow, jobs, executor) as box.ahead:
         while not (found := survey.so_far(box.branches)).finished:
             if found.folds_due:
                 survey.follow_folds()
