@@ -34,7 +34,9 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from nldyn.kernel_cache import ensure_cache
+from nldyn import nearness
+from nldyn.kernel_cache import ensure_cache, resting_on
+from nldyn.nearness import NEAR
 
 ensure_cache()
 
@@ -52,10 +54,6 @@ inlined = njit(cache=True, error_model="numpy", inline="always")
     TOO_MANY_STEPS,
 ) = range(9)  # fmt: skip
 FLIGHT = -1
-# |λ - iω| below this share of ω makes an eigenvalue λ near: a steady response is at most 1/NEAR
-# times as large as what the excitation brings about in 1/ω, and so are its rounding errors; in the
-# derivative by ω they are up to 1/NEAR² times as large
-NEAR = 3e-3
 
 
 # share of the speed at a stop that rounding of the penetration may cost in one contact, and share
@@ -2301,7 +2299,7 @@ class Corrector(NamedTuple):
     max_iterations: int
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@resting_on(njit(cache=True, nogil=True, error_model="numpy"), nearness.__file__)
 def newton(
     system, tab, rec, recording, omega, point, phases, chained, with_columns, parameters, drive_by,
     corrector,

@@ -177,15 +177,25 @@ def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
     """Check a scene, and print the modes of its structure."""
     with plain_errors():
         from nldyn.progress import messages_shown
-        from nldyn.scene import build_reduced, build_system, load_scene
+        from nldyn.scene import build_candidates, build_reduced, build_system, load_scene
         from nldyn.scene_checks import check_computable, range_remark
 
         loaded = load_scene(scene, mesh_folders)
         with messages_shown():
-            reduced = None if loaded.mesh is None else build_reduced(loaded)
+            reduced = candidates = None
+            if loaded.reduction is not None and loaded.reduction.tolerance is not None:
+                candidates = build_candidates(loaded)
+                reduced = candidates.reduced()
+            elif loaded.mesh is not None:
+                reduced = build_reduced(loaded)
             system = build_system(loaded, reduced)
         click.echo(describe_system(system, 0 if reduced is None else reduced.residual_modes))
         check_computable(loaded, scene)
+        if candidates is not None and loaded.reduction is not None:
+            click.echo(
+                f"modes up to {candidates.cutoff_hz:.4g} Hz may matter; of these, 'nldyn run' "
+                f"keeps as many as tolerance = {loaded.reduction.tolerance:g} needs"
+            )
         if remark := range_remark(loaded, float(system.frequencies_hz.max())):
             click.echo(f"note: {remark}")
         click.echo(f"{scene}: no fault found")
@@ -229,14 +239,15 @@ def render(
     if period != 1 and frequency_hz is None:
         raise click.UsageError("'--period' needs '--frequency-hz'")
     with plain_errors():
-        from fem.gl import RenderError
         from nldyn.progress import progress_line
-        from nldyn.render import render_scene
         from nldyn.result_directory import check_directory
         from nldyn.scene import load_scene
 
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)
+        from fem.gl import RenderError
+        from nldyn.render import render_scene
+
         try:
             with progress_line(quiet) as report:
                 made = render_scene(
@@ -318,14 +329,15 @@ def converge(
 ) -> None:
     """Compute the harmonic branch with more and more modes, and compare."""
     with plain_errors():
-        from nldyn.convergence import COUNTS, study_of_scene
-        from nldyn.convergence_output import write_study
         from nldyn.progress import progress_line
         from nldyn.result_directory import check_directory
         from nldyn.scene import load_scene
 
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)
+        from nldyn.convergence import COUNTS, study_of_scene
+        from nldyn.convergence_output import write_study
+
         with progress_line(quiet) as report:
             study = study_of_scene(
                 loaded,

@@ -11,8 +11,8 @@ import scipy.linalg as sla
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from nldyn._kernels import NEAR
 from nldyn.errors import SystemModelError
+from nldyn.nearness import NEAR
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -35,6 +35,7 @@ from nldyn.scene_schema import ContinuationTable, ExcitationTable, PartTable, Sc
 if TYPE_CHECKING:
     import cms
     import fem
+    from nldyn.candidates import Candidates
     from nldyn.diagrams import Diagram
     from nldyn.elements import Damper, Excitation, Stop
     from nldyn.exploration import Exploration
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Scene",
     "SceneError",
+    "build_candidates",
     "build_component",
     "build_reduced",
     "build_selection",
@@ -279,6 +281,35 @@ def build_reduced(
             modes = f"{count} rigid-body mode{'s' if count > 1 else ''}"
             raise cms.ReductionError(f"the component floats ({modes})")
         return reduced
+
+
+def build_candidates(
+    scene: Scene, component: fem.Component | fem.StructureComponent | None = None
+) -> Candidates:
+    """The modes among which a scene with a tolerance chooses, by its linear response alone.
+
+    Parameters
+    ----------
+    scene, component
+        As for `build_selection`.
+
+    Returns
+    -------
+    Candidates
+
+    Raises
+    ------
+    SceneError
+        As for `build_selection`, as far as the linear response tells.
+    """
+    import cms
+    from nldyn.candidates import candidate_modes
+    from nldyn.setting import setting_of
+
+    setting = setting_of(scene)
+    component = component or build_component(scene)
+    with _told_as(scene, ("reduction",), cms.ReductionError, SystemModelError):
+        return candidate_modes(component, setting)
 
 
 def build_selection(

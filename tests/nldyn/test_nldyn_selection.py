@@ -13,11 +13,11 @@ from strings import MASSES, SETTING, string
 import cms
 import fem
 from nldyn import Setting, Stop, SystemModelError, Unbalance, reduce_for, solve_orbit
+from nldyn.candidates import contact_duration
 from nldyn.convergence import harmonic_branch, largest_force, matched, special_points_of
 from nldyn.peaks import resonance_peaks
 from nldyn.resources import example
 from nldyn.scene import build_component, load_scene
-from nldyn.selection import contact_duration
 from nldyn.setting import setting_of
 
 
