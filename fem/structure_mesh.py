@@ -245,10 +245,10 @@ def structure_mesh(frame: FrameMesh) -> StructureMesh:
         {name: {"line": elements} for name, elements in frame.parts.items()},
         frame.point_sets,
         frame.source,
-        frame.attachments,
-        {name: {"line": elements} for name, elements in frame.element_types.items()},
-        frame.described,
-        frame.left_out,
+        attachments=frame.attachments,
+        element_types={name: {"line": cells} for name, cells in frame.element_types.items()},
+        described=frame.described,
+        left_out=frame.left_out,
     )
 
 

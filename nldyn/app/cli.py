@@ -6,6 +6,7 @@ animation needs something that is not installed, 130 stopped with Ctrl-C.
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 import warnings
@@ -26,6 +27,12 @@ if TYPE_CHECKING:
     from nldyn.system.elements import Stop
     from nldyn.system.system import System
 
+def usable_cores() -> int:
+    """How many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
 
 any_path = click.Path(path_type=Path, readable=False)  # what is wrong with it is said later
 scene_argument = click.argument("scene", type=any_path, metavar="SCENE.toml")
@@ -45,6 +52,14 @@ mesh_option = click.option(
     help="Folder from which the mesh may come, beside those of the scene and the current one.",
 )
 quiet_option = click.option("--quiet", is_flag=True, help="Show no progress.")
+jobs_option = click.option(
+    "--jobs",
+    type=click.IntRange(1, 1000),
+    default=usable_cores,
+    show_default="all cores",
+    metavar="N",
+    help="Processes that share the work; the results do not depend on it.",
+)
 
 
 def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
@@ -125,7 +140,10 @@ def main() -> None:
 @mesh_option
 @click.option("--log", is_flag=True, help="Draw the displacement on a logarithmic axis.")
 @quiet_option
-def run(scene: Path, out: Path, mesh_folders: tuple[Path, ...], log: bool, quiet: bool) -> None:
+@jobs_option
+def run(
+    scene: Path, out: Path, mesh_folders: tuple[Path, ...], log: bool, quiet: bool, jobs: int
+) -> None:
     """Compute the branches of a scene, and write tables and a diagram."""
     with plain_errors():
         from nldyn.io.checkpoint import CheckpointFile
@@ -139,8 +157,8 @@ def run(scene: Path, out: Path, mesh_folders: tuple[Path, ...], log: bool, quiet
         with kept_at_interrupt(out) as unfinished:
             kept = CheckpointFile(unfinished)
             with progress_line(quiet) as report:
-                found = explore_scene(loaded, report, kept) if loaded.explore else None
-                diagram = found.diagram if found else compute(loaded, report, kept)
+                found = explore_scene(loaded, report, kept, jobs) if loaded.explore else None
+                diagram = found.diagram if found else compute(loaded, report, kept, jobs)
             from nldyn.report.results import write_results
 
             yscale: Literal["linear", "log"] = "log" if log else "linear"
@@ -160,13 +178,24 @@ def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
     """Check a scene, and print the modes of its structure."""
     with plain_errors():
         from nldyn.runtime.progress import messages_shown
-        from nldyn.scene.build import build_component, build_reduced, build_system, load_scene
+        from nldyn.scene.build import (
+            build_candidates,
+            build_component,
+            build_reduced,
+            build_system,
+            load_scene,
+        )
         from nldyn.scene.checks import check_computable, range_remark
 
         loaded = load_scene(scene, mesh_folders)
         with messages_shown():
+            reduced = candidates = None
             component = None if loaded.mesh is None else build_component(loaded)
-            reduced = None if component is None else build_reduced(loaded, component)
+            if loaded.reduction is not None and loaded.reduction.tolerance is not None:
+                candidates = build_candidates(loaded, component)
+                reduced = candidates.reduced()
+            elif component is not None:
+                reduced = build_reduced(loaded, component)
             system = build_system(loaded, reduced)
         for item in () if component is None else component.model.mesh.left_out:
             click.echo(f"left out of the mesh file: {item}")
@@ -174,6 +203,11 @@ def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
             click.echo(f"taken from the mesh file: {brought}")
         click.echo(describe_system(system, 0 if reduced is None else reduced.residual_modes))
         check_computable(loaded, scene)
+        if candidates is not None and loaded.reduction is not None:
+            click.echo(
+                f"modes up to {candidates.cutoff_hz:.4g} Hz may matter; of these, 'nldyn run' "
+                f"keeps as many as tolerance = {loaded.reduction.tolerance:g} needs"
+            )
         if remark := range_remark(loaded, float(system.frequencies_hz.max())):
             click.echo(f"note: {remark}")
         click.echo(f"{scene}: no fault found")
@@ -225,6 +259,7 @@ def render(
 
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)
+
         try:
             with progress_line(quiet) as report:
                 made = render_scene(
@@ -315,6 +350,7 @@ def converge(
 
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)
+
         with progress_line(quiet) as report:
             study = convergence_study_of(
                 loaded,

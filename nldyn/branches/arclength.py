@@ -105,7 +105,7 @@ class Stepper:
         check_types(start=(self.start, BranchPoint), options=(self.options, ContinuationOptions))
 
     def __iter__(self) -> Iterator[BranchPoint]:
-        """Stepper along the branch."""
+        """Walk along the branch."""
         problem = self.start.orbit.problem
         if self.stride is None:
             behind = np.empty((0, self.start.tangent.size))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -29,6 +30,8 @@ from nldyn.branches.branch import (
 from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_at
 from nldyn.branches.leg import Leg, LegBuilder
 from nldyn.branches.options import ContinuationOptions
+from nldyn.flow.ahead import Ahead
+from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.orbit import Orbit, check_minimal
 from nldyn.orbits.shooting import shifts
 from nldyn.runtime.threads import one_thread
@@ -202,8 +205,9 @@ def complete(
     course: Course,
     progress: Callable[[float], None] | None,
     checkpoint: Checkpoint,
+    ahead: Ahead | None = None,
 ) -> Branch:
-    """Stepper the legs of a branch that are missing or may go on, forward first, and join them.
+    """Walk the legs of a branch that are missing or may go on, forward first, and join them.
 
     Parameters
     ----------
@@ -219,21 +223,38 @@ def complete(
         Called with the frequency of every point.
     checkpoint : Checkpoint
         Keeps what is computed.
+    ahead : Ahead, optional
+        May have walked legs already, and walks the one backward while that forward is walked here.
     """
+    ahead = ahead or Ahead(start.orbit.problem.flow)
 
     def walked(
         leg: Leg | None, first: BranchPoint, whole: Callable[[Leg | None], Branch | None]
     ) -> Leg:
         if leg is not None and not goes_on(leg, course):
             return leg
+        key = leg_key(first, course)
+        if leg is None and ahead.is_begun(key):
+            checkpoint.work = lambda: whole(None)
+            here = first.orbit.frequency_hz
+            waiting = partial(progress, here) if progress else None
+            return ahead.value(key, walked_leg, first, course, meanwhile=waiting)
+        ahead.forget(key)
         leg = leg or Leg([first], [], [], NOT_FINISHED, None)
         trail = LegBuilder.going_on(leg, course.range_hz, course.options, course.open_ends)
 
         checkpoint.work = lambda: whole(trail.so_far())
-        return trail.follow(progress, checkpoint.offer)
+        return trail.follow(progress, kept)
 
+    def kept() -> None:
+        checkpoint.offer()
+        ahead.look()
+
+    if forward is None:
+        offer_leg(ahead, _reversed(start), course, first=True)
     forward = walked(forward, start, lambda leg: join(name, leg, backward, course) if leg else None)
     if forward.reason == CLOSED:
+        ahead.forget(leg_key(_reversed(start), course))
         backward = None
     else:
         done = forward
@@ -245,6 +266,45 @@ def complete(
     checkpoint.work = lambda: branch
     checkpoint.offer()
     return branch
+
+
+def walked_leg(
+    flow: FlowMap, first: BranchPoint, course: Course, look: Callable[[], None] | None = None
+) -> Leg:
+    """The leg of a branch from a point on, whole; ``look`` is called on the way."""
+    leg = Leg([first], [], [], NOT_FINISHED, None)
+    trail = LegBuilder.going_on(leg, course.range_hz, course.options, course.open_ends)
+    return trail.follow(keep=look)
+
+
+def leg_key(first: BranchPoint, course: Course) -> Hashable:
+    """What a leg depends on, beside the flow map and how orbits are told."""
+    orbit = first.orbit
+    return (
+        orbit.period, orbit.problem.segments, orbit.observe, orbit.point.tobytes(),
+        first.tangent.tobytes(), course.range_hz, course.options, course.open_ends.tobytes(),
+    )  # fmt: skip
+
+
+def offer_leg(
+    ahead: Ahead,
+    start: BranchPoint,
+    course: Course,
+    *,
+    group: Hashable = None,
+    member: Hashable = None,
+    first: bool = False,
+) -> None:
+    """Let a leg be walked ahead."""
+    key = leg_key(start, course)
+    ahead.offer(key, walked_leg, start, course, group=group, member=member, first=first)
+
+
+def offer_branch(ahead: Ahead, start: BranchPoint, course: Course, group: Hashable = None) -> None:
+    """Let both legs of a branch be walked ahead."""
+    member = leg_key(start, course)
+    for point in (start, _reversed(start)):
+        offer_leg(ahead, point, course, group=group, member=member)
 
 
 def start_point(orbit: Orbit, direction: float, range_hz: tuple[float, float]) -> BranchPoint:

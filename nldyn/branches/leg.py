@@ -103,7 +103,7 @@ class LegBuilder:
         progress: Callable[[float], None] | None = None,
         keep: Callable[[], None] | None = None,
     ) -> Leg:
-        """Stepper to the end.
+        """Walk to the end.
 
         Parameters
         ----------
@@ -288,7 +288,7 @@ def trace(
     options: ContinuationOptions | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[list[BranchPoint], list[SpecialPoint], str, list[str]]:
-    """Stepper from a point in the direction of its tangent and collect special points.
+    """Walk from a point in the direction of its tangent and collect special points.
 
     Parameters
     ----------

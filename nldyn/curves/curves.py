@@ -497,7 +497,7 @@ def _curve(
     progress: Callable[[Real], None] | None,
     keeper: Keeper[Curve],
 ) -> Curve:
-    """Stepper both ways from the start and mark what is met."""
+    """Walk both ways from the start and mark what is met."""
     parameters = tuple(chart.parameter for chart in start.found.at.family.charts)
     begun = Curve(kind, parameters, (start,), (), (NOT_FINISHED, NOT_FINISHED))
     return _followed(begun, options, progress, keeper)

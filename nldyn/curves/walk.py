@@ -367,7 +367,7 @@ class CurveWalk:
     _obstacle: str = field(default="", init=False, repr=False)
 
     def __iter__(self) -> Iterator[CurvePoint]:
-        """Stepper along the curve."""
+        """Walk along the curve."""
         here, step = self.start, self.options.first_step
         curvature = np.zeros(here.tangent.size)
         if is_torus_curve(here.condition):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,15 +19,8 @@ from nldyn.orbits.newton import refine
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
 from nldyn.reduction.load_case import LoadCase
-from nldyn.system.system import System
-
-if TYPE_CHECKING:
-    import cms
-    from nldyn.runtime.progress import Progress
 from nldyn.runtime.progress import Progress, Shares, silent
-
-if TYPE_CHECKING:
-    import cms
+from nldyn.system.system import System
 
 COUNTS = (*range(1, 11), 12, 16, 20, 30, 40)
 GRID = 400

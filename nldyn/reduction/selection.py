@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import beta
 
 import cms
-from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, is_finite, shown
 from nldyn.branches.branch import Branch
 from nldyn.branches.peaks import resonance_peaks
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
+from nldyn.reduction.candidates import BEYOND, candidate_modes, share
 from nldyn.reduction.convergence import (
     harmonic_branch,
     largest_force,
@@ -25,22 +23,10 @@ from nldyn.reduction.convergence import (
     told,
 )
 from nldyn.reduction.load_case import LoadCase
-from nldyn.system.elements import Stop
+from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.system.system import System
 
-if TYPE_CHECKING:
-    import cms
-    from nldyn.runtime.progress import Progress
-from nldyn.runtime.progress import Progress, Shares, silent
-
-if TYPE_CHECKING:
-    import cms
-
-INVISIBLE = 1e-6
 SAMPLES = 9
-MOST_MODES = 60
-PULSE = 1.5  # a half sine of duration T has its first spectral zero at 1.5 / T
-BEYOND = 2.0
 
 
 @dataclass(frozen=True)
@@ -147,35 +133,6 @@ class ModeSelection:
         return "\n".join(lines)
 
 
-def contact_duration(stop: Stop, mass: float, speed: float) -> float:
-    r"""Duration in s of the impact of a free mass on a stop without loss.
-
-    .. math:: T = \frac{2\delta}{v}\int_0^1\frac{dx}{\sqrt{1 - x^{p+1}}}, \qquad
-              \delta = \left(\frac{(p + 1) m v^2}{2k}\right)^{1/(p+1)}
-
-    Parameters
-    ----------
-    stop : Stop
-        With stiffness k and exponent p.
-    mass, speed : float
-        In kg and m/s.
-
-    References
-    ----------
-    K. L. Johnson (1985), *Contact Mechanics*, eq. 11.24: :math:`T = 2.94\,\delta/v` for p = 1.5.
-
-    Examples
-    --------
-    >>> t = contact_duration(Stop("middle", 5.17e9), 2.48, 0.05)
-    >>> depth = (1.25 * 2.48 * 0.05**2 / 5.17e9) ** 0.4
-    >>> round(t * 0.05 / depth, 3)
-    2.943
-    """
-    power = stop.exponent + 1.0
-    depth = (power * mass * speed**2 / (2.0 * stop.stiffness)) ** (1.0 / power)
-    return float(2.0 * depth / speed * beta(1.0 / power, 0.5) / power)
-
-
 def select_modes(
     component: cms.ComponentLike,
     setting: LoadCase,
@@ -231,28 +188,13 @@ def select_modes(
     """
     if not (is_finite(tolerance) and 1e-6 <= tolerance < 1.0):
         raise SystemModelError(f"tolerance must lie in [1e-6, 1), got {shown(tolerance)}")
-    first = cms.reduce(component, cutoff_hz=BEYOND * setting.range_hz[1])
-    contact = shortest_contact(setting, first)
-    cutoff = max(setting.range_hz[1], PULSE / contact)
-    whole = first
-    for _ in range(8):
-        whole = cms.reduce(component, cutoff_hz=BEYOND * cutoff)
-        contact = shortest_contact(setting, cms.keep_modes(whole, below(whole, cutoff)))
-        longer = max(setting.range_hz[1], PULSE / contact)
-        if longer <= 1.1 * cutoff or whole.modes > MOST_MODES:
-            break
-        cutoff = longer
-    seen = visible(whole, setting)
-    if len(seen) > MOST_MODES:
-        raise SystemModelError(
-            f"{len(seen)} modes up to {BEYOND * cutoff:.4g} Hz may matter, more than {MOST_MODES}; "
-            "reduce by hand"
-        )
+    visible = candidate_modes(component, setting)
+    whole, seen, cutoff = visible.whole, visible.seen, visible.cutoff_hz
     shares = Shares(progress or silent, {"reference": 3.0, "modes": 1.0})
     tell = told(shares.part("reference"), "reference", setting.range_hz)
     reference = cms.keep_modes(whole, seen)
     judge = Judge(setting, reference, harmonic_branch(setting.system(reference), setting, tell))
-    candidates = [n for n in seen if whole.frequencies_hz[n - 1] <= cutoff]
+    candidates = visible.numbers
     rigid = [n for n in candidates if whole.frequencies_hz[n - 1] == 0.0]
     kept, error = list(rigid), math.inf if len(seen) > len(rigid) else 0.0
     shares.end("reference")
@@ -290,7 +232,7 @@ def select_modes(
         tuple(reasons(whole, seen, kept)),
         cutoff,
         BEYOND * cutoff,
-        contact,
+        visible.contact_s,
         tolerance,
         around(error, doubt),
         special_error,
@@ -367,33 +309,6 @@ def moved(
     )
 
 
-def in_use(model: cms.ReducedModel, setting: LoadCase) -> Real:
-    """Participations (m, r) of the interfaces where something acts or is observed."""
-    names = {element.at for element in (*setting.stops, *setting.dampers, *setting.excitation)}
-    names |= {stop.against for stop in setting.stops if stop.against is not None}
-    names.add(setting.observe or model.interfaces[0])
-    return np.array([model.participation[name] for name in model.interfaces if name in names])
-
-
-def visible(model: cms.ReducedModel, setting: LoadCase) -> list[int]:
-    """Numbers of the modes that an interface in use sees, and of all rigid-body modes."""
-    rows = np.abs(in_use(model, setting))
-    seen = np.any(rows > INVISIBLE * rows.max(axis=1, keepdims=True), axis=0)
-    seen |= model.frequencies_hz == 0.0
-    return [int(i) + 1 for i in np.flatnonzero(seen[: model.modes])]
-
-
-def below(model: cms.ReducedModel, cutoff_hz: float) -> list[int]:
-    """Numbers of the modes up to a frequency."""
-    return [i + 1 for i in range(model.modes) if model.frequencies_hz[i] <= cutoff_hz]
-
-
-def share(model: cms.ReducedModel, setting: LoadCase, number: int) -> float:
-    """How much an interface in use sees a mode, relative to the one it sees best."""
-    rows = np.abs(in_use(model, setting)[:, : model.modes])
-    return float(np.max(rows[:, number - 1] / rows.max(axis=1)))
-
-
 def reasons(model: cms.ReducedModel, seen: Sequence[int], kept: Sequence[int]) -> list[LeftOut]:
     """Why each mode that is not kept was left out."""
     found = []
@@ -406,17 +321,3 @@ def reasons(model: cms.ReducedModel, seen: Sequence[int], kept: Sequence[int]) -
             reason = "the response changes by less than asked"
         found.append(LeftOut(number, float(model.frequencies_hz[index]), reason))
     return found
-
-
-def shortest_contact(setting: LoadCase, model: cms.ReducedModel) -> float:
-    """Duration in s of the shortest contact to be expected; infinite without a stop."""
-    system = setting.system(model)
-    omegas = 2.0 * np.pi * np.linspace(*setting.range_hz, 200)
-    shortest = math.inf
-    for stop in setting.stops:
-        c = system.stop_vector(stop)
-        row = system.displacement_row(c)
-        speed = max(w * abs(row @ system.steady(float(w))) for w in omegas)
-        if speed > 0.0:
-            shortest = min(shortest, contact_duration(stop, 1.0 / float(c @ c), speed))
-    return shortest

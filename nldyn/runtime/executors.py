@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -226,6 +228,29 @@ def _end_processes(executor: Executor | None) -> None:
     with ignored_interruption():
         for process in list((getattr(executor, "_processes", None) or {}).values()):
             process.terminate()
+
+
+def stop_processes(pool: ProcessPoolExecutor) -> None:
+    """End a pool and its processes at once, whatever they are at."""
+    processes = list((getattr(pool, "_processes", None) or {}).values())
+    pool.shutdown(wait=False, cancel_futures=True)
+    with ignored_interruption():
+        for process in processes:
+            process.terminate()
+        for process in processes:
+            process.join()
+
+
+def ended_with_parent() -> None:
+    """Let this process end when the one that started it ends, however that is killed."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 def _broken(future: Future[Value]) -> bool:

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     import fem
     from nldyn.flow.flow_map import FlowMap
     from nldyn.io.checkpoint import CheckpointFile
+    from nldyn.reduction.candidates import Candidates
     from nldyn.reduction.selection import ModeSelection
     from nldyn.runtime.progress import Progress
     from nldyn.search.diagram import Diagram
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Scene",
     "SceneError",
+    "build_candidates",
     "build_component",
     "build_reduced",
     "build_selection",
@@ -286,6 +288,35 @@ def build_reduced(
         return reduced
 
 
+def build_candidates(
+    scene: Scene, component: fem.Component | fem.StructureComponent | None = None
+) -> Candidates:
+    """The modes among which a scene with a tolerance chooses, by its linear response alone.
+
+    Parameters
+    ----------
+    scene, component
+        As for `build_selection`.
+
+    Returns
+    -------
+    Candidates
+
+    Raises
+    ------
+    SceneError
+        As for `build_selection`, as far as the linear response tells.
+    """
+    import cms
+    from nldyn.reduction.candidates import candidate_modes
+    from nldyn.scene.load_case import load_case_of
+
+    setting = load_case_of(scene)
+    component = component or build_component(scene)
+    with _told_as(scene, ("reduction",), cms.ReductionError, SystemModelError):
+        return candidate_modes(component, setting)
+
+
 def build_selection(
     scene: Scene, component: fem.Component | fem.StructureComponent | None = None
 ) -> ModeSelection:
@@ -384,7 +415,10 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
 
 
 def compute(
-    scene: Scene, progress: Progress | None = None, checkpoint: CheckpointFile | None = None
+    scene: Scene,
+    progress: Progress | None = None,
+    checkpoint: CheckpointFile | None = None,
+    jobs: int = 1,
 ) -> Diagram:
     """Compute all branches that a scene asks for.
 
@@ -398,6 +432,8 @@ def compute(
         Called as ``progress(what, frequency_hz, done)`` at every orbit.
     checkpoint : CheckpointFile, optional
         File that keeps what is computed, see `nldyn.diagram`.
+    jobs : int
+        Processes that share the work, see `nldyn.diagram`.
 
     Returns
     -------
@@ -429,7 +465,7 @@ def compute(
     1
     """
     if scene.explore is not None:
-        return explore_scene(scene, progress, checkpoint).diagram
+        return explore_scene(scene, progress, checkpoint, jobs).diagram
     flow, table = _to_follow(scene)
     from nldyn.branches.options import ContinuationOptions
     from nldyn.search.diagram import Seed, diagram
@@ -445,6 +481,7 @@ def compute(
             options=ContinuationOptions(max_step=table.max_step),
             progress=progress,
             checkpoint=checkpoint,
+            jobs=jobs,
         )
     return _remarked(scene, flow, found)
 
@@ -456,7 +493,10 @@ def _remarked(scene: Scene, flow: FlowMap, found: Diagram) -> Diagram:
 
 
 def explore_scene(
-    scene: Scene, progress: Progress | None = None, checkpoint: CheckpointFile | None = None
+    scene: Scene,
+    progress: Progress | None = None,
+    checkpoint: CheckpointFile | None = None,
+    jobs: int = 1,
 ) -> Exploration:
     """Find the branches of a scene with an ``[explore]`` table, and tell how well it was searched.
 
@@ -464,7 +504,7 @@ def explore_scene(
     ----------
     scene : Scene
         A scene with an ``[[excitation]]``, a ``[continuation]`` and an ``[explore]``.
-    progress, checkpoint
+    progress, checkpoint, jobs
         As for `nldyn.explore`.
 
     Returns
@@ -514,6 +554,7 @@ def explore_scene(
             options=ContinuationOptions(max_step=table.max_step),
             progress=progress,
             checkpoint=checkpoint,
+            jobs=jobs,
         )
     return replace(found, diagram=_remarked(scene, flow, found.diagram))
 

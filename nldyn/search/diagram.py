@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -25,15 +27,24 @@ from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint, is_at
 from nldyn.branches.branch import JOINS, Branch, Course, check_branches
 from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_of_several
-from nldyn.branches.continuation import broken_off, complete, extended, open_ends, start_point
+from nldyn.branches.continuation import (
+    broken_off,
+    complete,
+    extended,
+    leg_key,
+    offer_branch,
+    open_ends,
+    start_point,
+    walked_leg,
+)
 from nldyn.branches.options import ContinuationOptions
+from nldyn.flow.ahead import Ahead, Task, computing_ahead
 from nldyn.flow.flow_map import FlowMap, flow_of, same_flow
 from nldyn.orbits.orbit import Orbit, check_observe, minimal_period, stroboscopic
 from nldyn.orbits.solve import solve_orbit
 from nldyn.orbits.starts import (
     MOST_COUNT,
     SearchOptions,
-    Strobe,
     orbit_near,
     orbits_from_strobe,
     reach,
@@ -41,8 +52,12 @@ from nldyn.orbits.starts import (
 )
 from nldyn.runtime.progress import Progress, silent
 from nldyn.runtime.threads import one_thread
+from nldyn.search.outlook import Outlook
 from nldyn.system.system import System
 
+Found = tuple[tuple[str, ...], dict[int, list[Orbit]]]  # failures, and orbits by their periods
+
+MOST_JOBS = 1000
 MORE_STARTS = 4  # times as many in the second search, which looks for orbits with contact
 
 
@@ -142,10 +157,23 @@ class Collector:
     flip_ends: list[Orbit] = field(default_factory=list)
     crossings: list[SpecialPoint] = field(default_factory=list)
     done: float = 0.0  # share of the whole computation
+    ahead: Ahead | None = None
+    outlook: Outlook = field(default_factory=Outlook)
+    doubled: Callable[[int], bool] = lambda period: False  # whether to follow the flips of one
+    starts: dict[int, tuple[SpecialPoint, BranchPoint | LocateError]] = field(
+        default_factory=dict
+    )  # of the branches born at flips, by the flips' ids
 
     def tell(self, what: str, frequency_hz: float) -> None:
         """Say what is being computed."""
         self.progress(what, frequency_hz, self.done)
+        if self.ahead is not None:
+            self.ahead.look()
+
+    def reach(self, part: str, count: int) -> None:
+        """Count what is done of a part of the `outlook`."""
+        self.outlook.reach(part, count)
+        self.done = self.outlook.done
 
     def known(self, orbit: Orbit) -> bool:
         return self.branch_of(orbit) is not None
@@ -234,6 +262,51 @@ class Collector:
             else:
                 self.from_start(start, options)
 
+    def offer_orbits(self, orbits: Iterable[Orbit]) -> None:
+        """Let branches be followed ahead, of each period one at a time: most will be the same."""
+        if self.ahead is None or self.ahead.executor is None:
+            return
+        for orbit in orbits:
+            try:
+                start = start_point(orbit, 1.0, self.range_hz)
+            except ConvergenceError:
+                continue
+            group = "period", orbit.period
+            offer_branch(self.ahead, start, self._course(start, None), group)
+
+    def offer_flips(
+        self, branch: Branch, options: ContinuationOptions | None = None
+    ) -> None:
+        """Let the branches be followed ahead that are born at the flips of a branch.
+
+        A branch mostly leads from one flip to the next; so only every other one is tried.
+        """
+        if self.ahead is None or self.ahead.executor is None:
+            return
+        flips = [special for special in branch.special_points if special.kind == "PD"]
+        for special in flips[::2]:
+            start = self._start_at(special)
+            if isinstance(start, BranchPoint) and self._is_within(start.orbit):
+                offer_branch(self.ahead, start, self._course(start, options))
+
+    def _start_at(self, special: SpecialPoint) -> BranchPoint | LocateError:
+        """The start of the branch that is born at a flip, or why there is none; computed once."""
+        if id(special) not in self.starts:
+            try:
+                start: BranchPoint | LocateError = switch_at_flip(special)
+            except LocateError as error:
+                start = error
+            self.starts[id(special)] = special, start
+        return self.starts[id(special)][1]
+
+    def _course(self, start: BranchPoint, options: ContinuationOptions | None) -> Course:
+        ends = self._open_ends_like(start.orbit).so_far()
+        return Course(self.range_hz, options or self.options, ends)
+
+    def _is_within(self, orbit: Orbit) -> bool:
+        low, high = self.range_hz
+        return low <= orbit.frequency_hz <= high
+
     def follow(self, orbit: Orbit, longest: int, wanted: int, most: int | None) -> None:
         """Follow an orbit's branch unless it is known, and what it leads to; see `follow_up`."""
         count = len(self.branches)
@@ -250,6 +323,8 @@ class Collector:
         while count < len(self.branches):
             branch = self.branches[count]
             count += 1
+            if 2 * branch.period <= longest:
+                self.offer_flips(branch, self.options if 2 * branch.period <= wanted else shorter)
             for special in branch.special_points:
                 if special.kind not in ("PD", "BP"):
                     continue
@@ -298,10 +373,9 @@ class Collector:
         """Follow the branch that is born at a flip, unless it is known."""
         if any(is_at(end, special, 2) for end in self.flip_ends):
             return
-        try:
-            start = switch_at_flip(special)
-        except LocateError as error:
-            self.notes.append(str(error))
+        start = self._start_at(special)
+        if isinstance(start, LocateError):
+            self.notes.append(str(start))
         else:
             self.from_start(start, options)
 
@@ -335,23 +409,32 @@ class Collector:
 
     def from_start(self, start: BranchPoint, options: ContinuationOptions | None = None) -> None:
         """Follow a branch from a point both ways, unless it is known or out of range."""
-        low, high = self.range_hz
-        if not low <= start.orbit.frequency_hz <= high or self.known(start.orbit):
+        if not self._is_within(start.orbit) or self.known(start.orbit):
             return
         progress = partial(self.tell, f"1/{start.orbit.period}")
-        ends = self._open_ends_like(start.orbit).so_far()
-        course = Course(self.range_hz, options or self.options, ends)
+        course = self._course(start, options)
+        ahead = self.ahead or Ahead(self.flow)
+        group = "period", start.orbit.period
+        ahead.take(group, leg_key(start, course))
         branch = self.checkpoint.branch_from(start.orbit, course)
         if branch is not None:
             branch = extended(branch, progress=progress, checkpoint=self.checkpoint)
         else:
-            branch = complete("", None, None, start, course, progress, self.checkpoint)
+            branch = complete("", None, None, start, course, progress, self.checkpoint, ahead)
         self.take_in(branch)
+        ahead.release(group)
+        ahead.drop(self._is_followed)
+
+    def _is_followed(self, task: Task) -> bool:
+        """Whether the leg of a task is one of a branch that is known by now."""
+        return task.function is walked_leg and self.known(task.arguments[0].orbit)
 
     def take_in(self, branch: Branch) -> None:
         """Add the branch that was at work, unless it is a known one."""
         if not self._repeats(branch):
             self._add(branch)
+            if self.doubled(branch.period):
+                self.offer_flips(branch)
         self.checkpoint.work = None
 
 
@@ -393,6 +476,8 @@ def diagram(
     search: SearchOptions | None = None,
     progress: Progress | None = None,
     checkpoint: BranchFile | None = None,
+    jobs: int = 1,
+    executor: Executor | None = None,
 ) -> Diagram:
     """Compute the branches of the wanted periods over a range of frequencies.
 
@@ -427,6 +512,12 @@ def diagram(
         File that keeps the branches computed so far, as for `continue_branch`. If it exists, the
         simulations are repeated, but of the branches only what is not in it is computed; those that
         were begun elsewhere stay in it. One of another system, accuracy or range is refused.
+    jobs : int
+        Processes that share the work, this one included. Their number changes nothing in the
+        result. A program that asks for several begins with ``if __name__ == "__main__":``, as for
+        `multiprocessing`.
+    executor : concurrent.futures.Executor, optional
+        Takes part in the work instead of processes of its own.
 
     Returns
     -------
@@ -457,7 +548,9 @@ def diagram(
         options=(options, ContinuationOptions, None),
         search=(search, SearchOptions, None),
         progress=(progress, Callable, None),
+        executor=(executor, Executor, None),
     )
+    check_whole("jobs", jobs, 1, MOST_JOBS)
     for seed in seeds:
         check_types(**{"seeds: each": (seed, Seed)})
     for period in periods:
@@ -480,8 +573,10 @@ def diagram(
         progress or silent,
     )
     box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flow, (low, high))
-    with box.checkpoint:
+    box.doubled = lambda period: 2 * period in wanted
+    with box.checkpoint, computing_ahead(flow, jobs, executor) as box.ahead:
         effort = search or SearchOptions()
+        box.outlook = Outlook(wanted, search_points if wanted else 0, len(seeds))
         edges = np.geomspace(low, high, search_points + 1)
         places = np.sqrt(edges[:-1] * edges[1:])[::-1].tolist() if wanted else []
         _search(box, places, wanted, effort)
@@ -489,7 +584,11 @@ def diagram(
             more = replace(effort, starts=MORE_STARTS * effort.starts, seed=effort.seed + 1)
             _search(box, places, wanted, more)
         for seed in seeds:
+            key, given = _seed_task(box, seed, seed.near_hz, effort)
+            box.ahead.offer(key, search_at, *given)
+        for number, seed in enumerate(seeds, 1):
             _follow_seed(box, seed, effort)
+            box.reach("seeds", number)
         _follow_branch_points(box)
         _follow_flips_of_new(box, wanted, doublings)
         _follow_branch_points(box)
@@ -511,25 +610,63 @@ def _search(
     box: Collector, frequencies: Sequence[float], periods: Sequence[int], effort: SearchOptions
 ) -> None:
     """Follow what simulations at some frequencies come near, one period after the other."""
-    strobes = []
-    for frequency in frequencies:
-        box.tell("search", frequency)
-        strobes.append(_simulate(box, frequency, effort))
+    found = _searched(box, frequencies, periods, effort)
+    for frequency, (failures, _) in zip(frequencies, found, strict=True):
+        _note_failures(box, frequency, failures, effort)
+    at_flips = [period for period in periods if period % 2 == 0 and period // 2 in periods]
     for period in periods:
-        if period % 2 == 0 and period // 2 in periods:
+        orbits = [orbit for _, of_period in found for orbit in of_period[period]]
+        box.outlook.orbits(period, len(orbits))
+        if period not in at_flips:
+            box.offer_orbits(orbits)
+    for period in periods:
+        if period in at_flips:
+            box.outlook.flips(period, 0)
             _follow_flips(box, box.of_period(period // 2))
-        for strobe in strobes:
-            box.from_orbits(orbits_from_strobe(box.flow, strobe, period, box.observe, effort))
+        for _, of_period in found:
+            for orbit in of_period[period]:
+                box.from_orbits([orbit])
+                box.reach(*box.outlook.orbit_done(period))
 
 
-def _simulate(box: Collector, frequency: float, effort: SearchOptions) -> Strobe:
-    """Simulations at one frequency; those that fail are noted."""
-    strobe = simulate_strobe(box.flow, frequency, effort)
-    for reason, count in Counter(strobe.failures).items():
+def _searched(
+    box: Collector, frequencies: Sequence[float], periods: Sequence[int], effort: SearchOptions
+) -> list[Found]:
+    """What simulations at some frequencies come near, on all processes."""
+    ahead = box.ahead or Ahead(box.flow)
+
+    def told(done: int) -> None:
+        box.reach("search", done)
+        box.tell("search", frequencies[done - 1])
+
+    if frequencies:
+        box.tell("search", frequencies[0])
+    arguments = [(frequency, tuple(periods), box.observe, effort) for frequency in frequencies]
+    keys = [("search", *given) for given in arguments]
+    return ahead.values(keys, search_at, arguments, told)
+
+
+def search_at(
+    flow: FlowMap,
+    frequency_hz: float,
+    periods: Sequence[int],
+    observe: str,
+    effort: SearchOptions,
+    look: Callable[[], None] | None = None,
+) -> Found:
+    """Why simulations at a frequency failed, and the orbits of some periods that others pass."""
+    strobe = simulate_strobe(flow, frequency_hz, effort)
+    orbits = {p: orbits_from_strobe(flow, strobe, p, observe, effort) for p in periods}
+    return strobe.failures, orbits
+
+
+def _note_failures(
+    box: Collector, frequency_hz: float, failures: Sequence[str], effort: SearchOptions
+) -> None:
+    for reason, count in Counter(failures).items():
         box.notes.append(
-            f"{count} of {effort.starts} simulations at {frequency:.6g} Hz failed: {reason}"
+            f"{count} of {effort.starts} simulations at {frequency_hz:.6g} Hz failed: {reason}"
         )
-    return strobe
 
 
 def _contact_is_missing(box: Collector) -> bool:
@@ -545,19 +682,31 @@ def _follow_seed(box: Collector, seed: Seed, effort: SearchOptions) -> None:
         if not box.range_hz[0] <= frequency <= box.range_hz[1]:
             continue
         box.tell(f"search 1/{seed.period}", frequency)
-        strobe = _simulate(box, frequency, effort)
-        orbits = orbits_from_strobe(box.flow, strobe, seed.period, box.observe, effort)
-        if orbits:
+        key, given = _seed_task(box, seed, frequency, effort)
+        ahead = box.ahead or Ahead(box.flow)
+        failures, found = ahead.value(key, search_at, *given)
+        _note_failures(box, frequency, failures, effort)
+        if orbits := found[seed.period]:
             box.from_orbits(orbits)
             return
     box.notes.append(f"no 1/{seed.period} orbit found near {seed.near_hz:g} Hz")
 
 
+def _seed_task(
+    box: Collector, seed: Seed, frequency_hz: float, effort: SearchOptions
+) -> tuple[Hashable, tuple[Any, ...]]:
+    given = (frequency_hz, (seed.period,), box.observe, effort)
+    return ("search", *given), given
+
+
 def _follow_flips(box: Collector, branches: Sequence[Branch]) -> None:
-    for branch in branches:
-        for special in branch.special_points:
-            if special.kind == "PD":
-                box.from_flip(special)
+    flips = [s for branch in branches for s in branch.special_points if s.kind == "PD"]
+    if not flips:
+        return
+    what = box.outlook.flips(2 * flips[0].orbit.period, len(flips))
+    for number, special in enumerate(flips, 1):
+        box.from_flip(special)
+        box.reach(what, number)
 
 
 def _follow_branch_points(box: Collector) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 from itertools import product
 from typing import Protocol
@@ -24,6 +25,7 @@ from nldyn.bifurcations.point import is_at
 from nldyn.branches.branch import Branch
 from nldyn.branches.checkpoint import Checkpoint
 from nldyn.branches.options import ContinuationOptions
+from nldyn.flow.ahead import computing_ahead
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.orbits.deflation import deflated_orbit
 from nldyn.orbits.orbit import Orbit, check_observe, same_orbit, stroboscopic
@@ -38,7 +40,7 @@ from nldyn.orbits.starts import (
 from nldyn.runtime.progress import Progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.search.by_pseudo_orbits import near_pseudo_orbits
-from nldyn.search.diagram import Collector, Diagram, check_known
+from nldyn.search.diagram import MOST_JOBS, Collector, Diagram, check_known
 from nldyn.search.exploration import Coverage, Exploration, ExploreOptions, Question, Stage
 from nldyn.search.extend import Guesses
 from nldyn.search.fixed_point_index import is_damped, sum_of_indices, without_index_note
@@ -91,6 +93,8 @@ def explore(
     known: Diagram | None = None,
     progress: Progress | None = None,
     checkpoint: ExplorationFile | None = None,
+    jobs: int = 1,
+    executor: Executor | None = None,
 ) -> Exploration:
     """Find the branches of periodic orbits in a range of frequencies, without initial guesses.
 
@@ -130,6 +134,8 @@ def explore(
         File that keeps what is found, written now and then, at the end, and when an exception such
         as Ctrl-C ends the exploration; `load_exploration` reads it at any time. If it holds this
         very exploration, that one goes on and gives what an uninterrupted one gives.
+    jobs, executor
+        As for `diagram`: they share the branches, and change nothing in what is found.
 
     Returns
     -------
@@ -158,7 +164,9 @@ def explore(
         options=(options, ContinuationOptions, None),
         known=(known, Diagram, None),
         progress=(progress, Callable, None),
+        executor=(executor, Executor, None),
     )
+    check_whole("jobs", jobs, 1, MOST_JOBS)
     low, high = check_range(range_hz)
     check_whole("max_period", max_period, 1, LONGEST_PERIOD)
     question = Question(
@@ -183,7 +191,7 @@ def explore(
     survey = _Survey(box, question, known)
     if checkpoint is None or not survey.goes_on_in(checkpoint):
         box.take(known.branches, known.notes)
-    with box.checkpoint:
+    with box.checkpoint, computing_ahead(flow, jobs, executor) as box.ahead:
         while not (found := survey.so_far(box.branches)).finished:
             if found.folds_due:
                 survey.follow_folds()

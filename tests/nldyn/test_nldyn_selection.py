@@ -15,8 +15,8 @@ import fem
 from nldyn import LoadCase, Stop, SystemModelError, Unbalance, select_modes, solve_orbit
 from nldyn.base.resources import example
 from nldyn.branches.peaks import resonance_peaks
+from nldyn.reduction.candidates import contact_duration
 from nldyn.reduction.convergence import harmonic_branch, largest_force, matched, special_points_of
-from nldyn.reduction.selection import contact_duration
 from nldyn.scene.build import build_component, load_scene
 from nldyn.scene.load_case import load_case_of
 
