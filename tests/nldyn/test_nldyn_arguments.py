@@ -168,14 +168,14 @@ def test_numbers_of_a_parameter_are_checked():
     check_named(said, "Parameter: index must be a whole number")
 
 
-@pytest.mark.parametrize("name", ["orbit", "range_hz", "at", "options", "progress", "name"])
+@pytest.mark.parametrize("name", ["start", "range_hz", "at", "options", "progress", "name"])
 def test_arguments_of_a_continuation_are_named(name, orbit):
-    good = {"orbit": orbit, "range_hz": (25.0, 27.0)}
+    good = {"start": orbit, "range_hz": (25.0, 27.0)}
     junk = {
         "options": [x for x in JUNK if x is not None],
         "progress": [x for x in JUNK if x is not None],
         "name": [x for x in JUNK if x != "nonsense"],
-        "at": [None, "nonsense", math.nan, -1.0, [None], [math.nan], [-26.0], ["26"], [99.0], 26.0],
+        "at": ["nonsense", math.nan, -1.0, [None], [math.nan], [-26.0], ["26"], [99.0], 26.0],
     }.get(name, JUNK)
     said = refused(lambda value: continue_branch(**{**good, name: value}), *junk)
     check_named(said, name)
@@ -280,7 +280,7 @@ def test_other_arguments_of_a_wrong_kind_are_named(one_dof, orbit, harmonic_bran
         said = refused(lambda x, kind=kind: kind(x, 1e9), 3, [], math.nan)
         check_named(said, f"{name}: at must be a str")
     curve = tmp_path / "curve.h5"
-    continue_in(orbit, "frequency_hz", (25.5, 26.5)).save(curve)
+    save(continue_in(orbit, "frequency_hz", (25.5, 26.5)), curve)
     for name in ("laws", "monitor"):
         said = refused(lambda x, name=name: load_curve(curve, **{name: x}), 3, "text", [1])
         check_named(said, f"{name} must be")
@@ -353,5 +353,5 @@ def test_element_that_a_system_does_not_have_is_told_apart_from_none_at_all():
     ):
         with pytest.raises(SystemModelError, match=told):
             continue_in(orbit, Parameter(name, index), (1.0, 2.0))
-    with pytest.raises(SystemModelError, match="range_hz must hold numbers only"):
+    with pytest.raises(SystemModelError, match="continue_branch: an orbit needs a range_hz"):
         continue_branch(orbit, None)

@@ -166,7 +166,7 @@ def test_an_interrupted_curve_is_kept_and_finished(tmp_path, share):
     assert kept.stop_reasons == ("not finished", "not finished") and not kept.marks
     assert len(kept.points) >= len(seen) - 1
     assert (kept.points[0].arclength < 0.0) is (share > 0.5)
-    with pytest.raises(SystemModelError, match="exists already; load_curve and"):
+    with pytest.raises(SystemModelError, match="exists already; load and"):
         continue_special(found, pair, ranges, checkpoint=CheckpointFile(path))
     done = kept.extend(ranges, checkpoint=CheckpointFile(path))
     assert done.stop_reasons == whole.stop_reasons

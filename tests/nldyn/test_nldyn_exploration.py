@@ -37,11 +37,11 @@ from nldyn.base.resources import example
 from nldyn.bifurcations.normal_forms import switch_at_branch_point
 from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.branches import at_frequency as crossings
-from nldyn.io import checkpoint
 from nldyn.io.branches import load_branches, load_diagram, load_exploration
 from nldyn.orbits.deflation import deflated_orbit
 from nldyn.orbits.orbit import stroboscopic
 from nldyn.orbits.starts import random_states, settling_periods
+from nldyn.runtime import keeper
 from nldyn.runtime.progress import silent
 from nldyn.scene.build import build_system, load_scene
 from nldyn.search.diagram import Collector, middle_orbit
@@ -526,7 +526,7 @@ def test_known_branches_of_something_else_are_refused(harmonic):
 
 def test_coverage_is_kept_where_no_branch_is_found(tmp_path, monkeypatch):
     """Undamped free flight between impacts settles on nothing."""
-    monkeypatch.setattr(checkpoint, "PAUSE", 0.0)
+    monkeypatch.setattr(keeper, "PAUSE", 0.0)
     system = System.from_modal(
         [10.0], {"tip": [1.0]}, stops=[Stop("tip", 1e9, gap=1e-3)],
         excitation=[HarmonicForce("tip", 1.0)],

@@ -28,8 +28,8 @@ from nldyn import (
 )
 from nldyn.branches.arclength import Stepper
 from nldyn.branches.branch import CLOSED, NOT_FINISHED
-from nldyn.io import checkpoint
 from nldyn.io.branches import load_branch, load_branches
+from nldyn.runtime import keeper
 from nldyn.runtime.result_directory import OutputError
 
 AT = (12.2, 26.0, 45.0)
@@ -48,8 +48,8 @@ def whole(start):
 @pytest.fixture
 def often(monkeypatch):
     """Checkpoints are written at every point."""
-    monkeypatch.setattr(checkpoint, "PAUSE", 0.0)
-    monkeypatch.setattr(checkpoint, "SHARE", 0.0)
+    monkeypatch.setattr(keeper, "PAUSE", 0.0)
+    monkeypatch.setattr(keeper, "SHARE", 0.0)
 
 
 def stopper(count, error=RuntimeError):
@@ -302,13 +302,13 @@ def test_checkpoints_are_not_written_more_often_than_a_share_of_the_time(monkeyp
         written.append(now[0])
         now[0] += 1.0
 
-    monkeypatch.setattr(checkpoint.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(keeper.time, "monotonic", lambda: now[0])
     kept = checkpoint.Checkpoint(write)
     for _ in range(1000):
         now[0] += 0.1
         kept.offer()
-    assert checkpoint.PAUSE <= written[0] < checkpoint.PAUSE + 0.2
-    assert np.diff(written).min() >= checkpoint.SHARE
+    assert keeper.PAUSE <= written[0] < keeper.PAUSE + 0.2
+    assert np.diff(written).min() >= keeper.SHARE
     assert len(written) >= 4
 
 

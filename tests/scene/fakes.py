@@ -91,9 +91,6 @@ class FakeDiagram:
     notes: tuple = ()
     range_hz: tuple = (5.0, 90.0)
 
-    def save(self, path):
-        path.write_bytes(b"branches")
-
     def of_period(self, period):
         return [branch for branch in self.branches if branch.period == period]
 
