@@ -34,6 +34,7 @@ from nldyn import (
     index_sum,
     normal_form,
     refine_special,
+    save,
     solve_orbit,
 )
 from nldyn.bifurcations.normal_forms import switch_at_branch_point

@@ -303,7 +303,7 @@ def test_checkpoints_are_not_written_more_often_than_a_share_of_the_time(monkeyp
         now[0] += 1.0
 
     monkeypatch.setattr(keeper.time, "monotonic", lambda: now[0])
-    kept = checkpoint.Checkpoint(write)
+    kept = keeper.Checkpoint(write)
     for _ in range(1000):
         now[0] += 0.1
         kept.offer()

@@ -27,6 +27,7 @@ def fakes_are_saved(monkeypatch):
     real = results.save
 
     def either(found, path):
-        return path.write_bytes(b"branches") if isinstance(found, FakeDiagram) else real(found, path)
+        made_up = isinstance(found, FakeDiagram)
+        return path.write_bytes(b"branches") if made_up else real(found, path)
 
     monkeypatch.setattr(results, "save", either)
