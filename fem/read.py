@@ -85,7 +85,7 @@ def read_mesh(path: str | Path, include_folders: Iterable[str | Path] = ()) -> F
     ------
     ModelError
         If the file does not exist, has another extension or another content, or if it has no
-        line elements, second-order lines, coordinates that are not finite, or whatever
+        line elements, curved lines of three nodes, coordinates that are not finite, or whatever
         `FrameMesh` refuses.
 
     Examples
@@ -303,25 +303,48 @@ def _three_coordinates(content: meshio.Mesh, source: str) -> FloatArray:
 
 
 def _lines_and_parts(content: meshio.Mesh, source: str) -> tuple[IntArray, dict[str, IntArray]]:
-    curved = sorted({b.type for b in content.cells if b.type.startswith("line")} - {"line"})
+    known = {"line", "line3"}
+    curved = sorted({b.type for b in content.cells if b.type.startswith("line")} - known)
     if curved:
         raise ModelError(
-            f"{source}: elements of type {quoted(curved)} are not straight two-node lines;"
+            f"{source}: elements of type {quoted(curved)} are not lines of two or three nodes;"
             " make the mesh of first order"
         )
     lines: list[IntArray] = []
     parts: dict[str, list[IntArray]] = {}
     first = 0
     for index, block in enumerate(content.cells):
-        if block.type == "line" and len(block.data):
+        if block.type in known and len(block.data):
+            nodes = np.asarray(block.data, dtype=np.int64)
+            pieces = 1 if block.type == "line" else 2
             for name, elements in _groups(content, index, 1, source):
-                parts.setdefault(name, []).append(elements + first)
-            lines.append(np.asarray(block.data, dtype=np.int64))
-            first += len(block.data)
+                cut = pieces * np.asarray(elements)[:, None] + np.arange(pieces)
+                parts.setdefault(name, []).append(cut.ravel() + first)
+            lines.append(nodes if pieces == 1 else _halves(nodes, content, source))
+            first += len(lines[-1])
     if not lines:
         found = sorted({block.type for block in content.cells if len(block.data)})
         raise ModelError(f"{source}: the mesh has no line elements (its cells are {quoted(found)})")
     return np.concatenate(lines), {name: np.concatenate(p) for name, p in parts.items()}
+
+
+def _halves(cells: IntArray, content: meshio.Mesh, source: str) -> IntArray:
+    """Straight lines of three nodes (e, 3) as two lines each, (2 e, 2)."""
+    _check_nodes("line", cells, len(content.points), source)
+    points = _three_coordinates(content, source)[cells]
+    span = points[:, 1] - points[:, 0]
+    length = np.linalg.norm(span, axis=1)
+    middle = points[:, 2] - points[:, 0]
+    share = np.einsum("ei,ei->e", middle, span) / np.maximum(length, 1e-300) ** 2
+    off = np.linalg.norm(middle - share[:, None] * span, axis=1)
+    bad = np.flatnonzero((off > 1e-6 * length) | (share <= 0.0) | (share >= 1.0))
+    if len(bad):
+        raise ModelError(
+            f"{source}: line3 {bad[0]} (counted from 0) is not straight: its middle node is"
+            f" {off[bad[0]]:.3g} m off the line of its ends; a frame has straight lines; make the"
+            " mesh of first order, or of more elements"
+        )
+    return cells[:, [[0, 2], [2, 1]]].reshape(-1, 2)
 
 
 def _point_sets(content: meshio.Mesh, source: str) -> dict[str, IntArray]:

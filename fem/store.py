@@ -108,8 +108,8 @@ def load_model(path: str | os.PathLike[str]) -> FrameModel:
             _named(arrays, "part "),
             _named(arrays, "point "),
             attached["source"],
-            _from_file(attached),
-            _named(arrays, "type "),
+            attachments=_from_file(attached),
+            element_types=_named(arrays, "type "),
         )
         return FrameModel(mesh, **_items(attached, FRAME_LISTS))
 
@@ -132,8 +132,8 @@ def load_structure(path: str | os.PathLike[str]) -> StructureModel:
             _named_by_kind(arrays, "group "),
             _named(arrays, "point "),
             attached["source"],
-            _from_file(attached),
-            _named_by_kind(arrays, "type "),
+            attachments=_from_file(attached),
+            element_types=_named_by_kind(arrays, "type "),
         )
         items = _items(attached, STRUCTURE_LISTS)
         # the mesh that was saved has the points of the couplings

@@ -245,10 +245,12 @@ def structure_mesh(frame: FrameMesh) -> StructureMesh:
         {name: {"line": elements} for name, elements in frame.parts.items()},
         frame.point_sets,
         frame.source,
-        frame.attachments,
-        {name: {"line": elements} for name, elements in frame.element_types.items()},
-        frame.described,
-        frame.left_out,
+        attachments=frame.attachments,
+        element_types={
+            name: {"line": elements} for name, elements in frame.element_types.items()
+        },
+        described=frame.described,
+        left_out=frame.left_out,
     )
 
 
@@ -297,10 +299,10 @@ def joined(meshes: Sequence[StructureMesh], tolerance: float | None = None) -> S
         _in_one(groups),
         {name: np.concatenate(nodes) for name, nodes in sets.items()},
         " + ".join(dict.fromkeys(mesh.source for mesh in meshes)),
-        sum((mesh.attachments for mesh in meshes), Attachments()),
-        _in_one(types),
-        {name: keys for mesh in meshes for name, keys in mesh.described.items()},
-        [item for mesh in meshes for item in mesh.left_out],
+        attachments=sum((mesh.attachments for mesh in meshes), Attachments()),
+        element_types=_in_one(types),
+        described={name: keys for mesh in meshes for name, keys in mesh.described.items()},
+        left_out=[item for mesh in meshes for item in mesh.left_out],
     )
 
 

@@ -55,6 +55,17 @@ def test_a_cantilever_of_elgen_has_all_its_elements(tmp_path):
     assert frame_frequencies(path)[1][0] == pytest.approx(bending_hz(), rel=1e-4)
 
 
+def test_straight_lines_of_three_nodes_are_two_in_a_frame(tmp_path):
+    rows = "".join(f"{i}, {2 * i - 1}, {2 * i}, {2 * i + 1}\n" for i in range(1, 6))
+    text = cantilever_deck(f"*ELEMENT, TYPE=B22, ELSET=BEAM\n{rows}")
+    mesh = fem.read_mesh(deck(tmp_path, text))
+    plain = fem.read_mesh(deck(tmp_path, cantilever_deck()))
+    assert np.array_equal(mesh.lines, plain.lines) and mesh.part("BEAM").tolist() == list(range(10))
+    curved = text.replace("4, 0.3, 0.0", "4, 0.3, 0.01")
+    with pytest.raises(fem.ModelError, match=r"line3 1 .* is not straight: .* 0.01 m off"):
+        fem.read_mesh(deck(tmp_path, curved))
+
+
 def test_elgen_makes_rows_and_layers(tmp_path):
     nodes = "".join(
         f"{100 * k + 10 * j + i}, {i}, {j}, {k}\n"

@@ -291,7 +291,6 @@ def test_a_bad_abaqus_file_is_one_sentence_with_its_name(tmp_path, text, sentenc
     ("name", "sentence"),
     [
         ("gmsh22_groups.msh", "appears twice .*two physical groups"),
-        ("gmsh41_second_order.msh", "'line3' are not straight two-node lines"),
     ],
 )
 def test_unusable_files_of_gmsh_are_one_sentence(name, sentence):
