@@ -2,6 +2,7 @@
 
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -549,3 +550,17 @@ def test_materials_and_sections_of_the_deck_are_described(tmp_path):
         assert text.replace(*change) != text
         told = fem.read_mesh(deck(tmp_path, text.replace(*change))).described["BEAM"]["refused"]
         assert re.search(reason, told), told
+
+
+def test_the_docs_list_every_keyword_where_it_belongs():
+    text = (Path(__file__).parents[2] / "docs" / "decks.md").read_text(encoding="utf-8")
+    known = fem.abaqus.known
+    read, rest = text.split("**Read:**")[1].split("**Left out by intention:**")
+    left, refused = rest.split("**Refused with advice**")
+
+    def words(part):
+        return set(re.findall(r"`([A-Z0-9-]+)`", part))
+
+    assert set(known.READ) <= words(read)
+    assert {word for word in known.LEFT_OUT if word} == words(left)
+    assert set(known.ADVICE) <= words(refused)
