@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from fem.abaqus import read_abaqus
 from fem.abaqus.mesh import TYPE_PREFIX
-from fem.cells import KINDS
+from fem.cells import KINDS, SPANS
 from fem.errors import ModelError, quoted
 from fem.gmsh import read_gmsh
 from fem.mesh import FloatArray, FrameMesh, IntArray
@@ -78,15 +78,15 @@ def read_mesh(path: str | Path, include_folders: Iterable[str | Path] = ()) -> F
     Returns
     -------
     FrameMesh
-        All coordinates as in the file. Surfaces, volumes and the nodes that are on no line are
-        left out.
+        All coordinates as in the file. A straight line of three nodes becomes two elements.
+        Surfaces, volumes and the nodes that are on no line are left out.
 
     Raises
     ------
     ModelError
         If the file does not exist, has another extension or another content, or if it has no
-        line elements, curved lines of three nodes, coordinates that are not finite, or whatever
-        `FrameMesh` refuses.
+        line elements, curved lines, coordinates that are not finite, or whatever `FrameMesh`
+        refuses.
 
     Examples
     --------
@@ -303,48 +303,50 @@ def _three_coordinates(content: meshio.Mesh, source: str) -> FloatArray:
 
 
 def _lines_and_parts(content: meshio.Mesh, source: str) -> tuple[IntArray, dict[str, IntArray]]:
-    known = {"line", "line3"}
-    curved = sorted({b.type for b in content.cells if b.type.startswith("line")} - known)
+    curved = sorted({b.type for b in content.cells if b.type.startswith("line")} - set(SPANS))
     if curved:
         raise ModelError(
-            f"{source}: elements of type {quoted(curved)} are not lines of two or three nodes;"
+            f"{source}: elements of type {quoted(curved)} are not straight two-node lines;"
             " make the mesh of first order"
         )
     lines: list[IntArray] = []
     parts: dict[str, list[IntArray]] = {}
     first = 0
     for index, block in enumerate(content.cells):
-        if block.type in known and len(block.data):
-            nodes = np.asarray(block.data, dtype=np.int64)
-            pieces = 1 if block.type == "line" else 2
+        if block.type in SPANS and len(block.data):
+            pieces = straight_pieces(content, block.type, block.data, source)
+            count = len(SPANS[block.type])
             for name, elements in _groups(content, index, 1, source):
-                cut = pieces * np.asarray(elements)[:, None] + np.arange(pieces)
-                parts.setdefault(name, []).append(cut.ravel() + first)
-            lines.append(nodes if pieces == 1 else _halves(nodes, content, source))
-            first += len(lines[-1])
+                halves = count * elements[:, None] + np.arange(count)
+                parts.setdefault(name, []).append(halves.ravel() + first)
+            lines.append(pieces)
+            first += len(pieces)
     if not lines:
         found = sorted({block.type for block in content.cells if len(block.data)})
         raise ModelError(f"{source}: the mesh has no line elements (its cells are {quoted(found)})")
     return np.concatenate(lines), {name: np.concatenate(p) for name, p in parts.items()}
 
 
-def _halves(cells: IntArray, content: meshio.Mesh, source: str) -> IntArray:
-    """Straight lines of three nodes (e, 3) as two lines each, (2 e, 2)."""
-    _check_nodes("line", cells, len(content.points), source)
-    points = _three_coordinates(content, source)[cells]
-    span = points[:, 1] - points[:, 0]
-    length = np.linalg.norm(span, axis=1)
-    middle = points[:, 2] - points[:, 0]
-    share = np.einsum("ei,ei->e", middle, span) / np.maximum(length, 1e-300) ** 2
-    off = np.linalg.norm(middle - share[:, None] * span, axis=1)
-    bad = np.flatnonzero((off > 1e-6 * length) | (share <= 0.0) | (share >= 1.0))
-    if len(bad):
-        raise ModelError(
-            f"{source}: line3 {bad[0]} (counted from 0) is not straight: its middle node is"
-            f" {off[bad[0]]:.3g} m off the line of its ends; a frame has straight lines; make the"
-            " mesh of first order, or of more elements"
-        )
-    return cells[:, [[0, 2], [2, 1]]].reshape(-1, 2)
+def straight_pieces(
+    content: meshio.Mesh, kind: str, cells: ArrayLike, source: str
+) -> IntArray:
+    """Two-node lines (e, 2) of lines with two or three nodes; a curved one is refused."""
+    nodes = np.asarray(cells, dtype=np.int64)
+    _check_nodes(kind, nodes, len(content.points), source)
+    if kind == "line3":
+        points = _three_coordinates(content, source)[nodes]
+        span, arm = points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]
+        square = np.sum(span**2, axis=1)
+        share = np.sum(span * arm, axis=1) / np.where(square > 0.0, square, np.inf)
+        aside = np.linalg.norm(arm - share[:, None] * span, axis=1)
+        bad = np.flatnonzero((aside > 1e-6 * np.sqrt(square)) | (np.abs(share - 0.5) >= 0.5))
+        if len(bad):
+            raise ModelError(
+                f"{source}: line3 {bad[0]} (counted from 0) is not straight; a frame has straight"
+                " beams: make the mesh of first order, or use a structure, where a line of three"
+                " nodes is two beams"
+            )
+    return np.stack([nodes[:, list(ends)] for ends in SPANS[kind]], axis=1).reshape(-1, 2)
 
 
 def _point_sets(content: meshio.Mesh, source: str) -> dict[str, IntArray]:
