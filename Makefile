@@ -26,10 +26,10 @@ check: $(VENV)/.installed
 
 bench: $(VENV)/.installed
 	-$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[bench]"
-	$(BIN)/python -m nldyn.bench --out results/bench
+	PYTHONPATH=tests $(BIN)/python -m bench --out results/bench
 
 hard: $(VENV)/.installed
-	$(BIN)/python -m nldyn.hard --out results/hard
+	PYTHONPATH=tests $(BIN)/python -m hard --out results/hard
 
 # what no input and no machine may do to a run: docs/faults.md
 faults: $(VENV)/.installed

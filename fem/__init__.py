@@ -1,4 +1,4 @@
-"""Frames and structures of beams and solids: from a mesh to stiffness, mass and interfaces."""
+"""Frames and structures: from a mesh to stiffness, mass and interfaces."""
 
 from fem.abaqus import read_abaqus
 from fem.assemble import assemble
@@ -12,7 +12,7 @@ from fem.attachments import (
     PointSpring,
 )
 from fem.calibrate import Calibration, calibrate
-from fem.errors import ModelError
+from fem.errors import JointWarning, ModelError
 from fem.frame import Component
 from fem.mesh import FrameMesh, frame_mesh
 from fem.model import (
@@ -22,11 +22,13 @@ from fem.model import (
     Interface,
     Material,
     Support,
+    TrussPart,
 )
 from fem.read import from_meshio, read_mesh, read_structure, structure_from_meshio
 from fem.sections import CircularSection, CrossSection, RectangularSection, Section
+from fem.shells import ShellPart
 from fem.structure import Foundation, SolidPart, StructureModel, symmetry
-from fem.structure_assembly import LockingWarning, StructureComponent
+from fem.structure_assembly import DistortionWarning, LockingWarning, StructureComponent
 from fem.structure_mesh import StructureMesh, box_mesh, joined, structure_mesh
 from fem.write import write_mesh
 
@@ -38,11 +40,13 @@ __all__ = [
     "Component",
     "Coupling",
     "CrossSection",
+    "DistortionWarning",
     "Foundation",
     "FrameMesh",
     "FrameModel",
     "Hinge",
     "Interface",
+    "JointWarning",
     "LeftOut",
     "LinearEquation",
     "Link",
@@ -53,11 +57,13 @@ __all__ = [
     "PointSpring",
     "RectangularSection",
     "Section",
+    "ShellPart",
     "SolidPart",
     "StructureComponent",
     "StructureMesh",
     "StructureModel",
     "Support",
+    "TrussPart",
     "assemble",
     "box_mesh",
     "calibrate",

@@ -9,8 +9,9 @@ import numpy as np
 from fem.elements import bending_matrices, congruent, stretching_matrices
 from fem.errors import ModelError
 from fem.mesh import FloatArray
-from fem.model import BeamPart
+from fem.model import BeamPart, TrussPart
 from fem.sections import CircularSection, section_number, shear_areas
+from fem.trusses import plane_truss_matrices
 
 UPRIGHT = np.array([0, 0, 1.0])
 IN_PLANE = np.array([1, 5, 7, 11])
@@ -71,8 +72,12 @@ def shear_modulus(part: BeamPart, what: str) -> float:
     return part.material.youngs_modulus / (2.0 * (1.0 + part.material.poissons_ratio_for(what)))
 
 
-def plane_matrices(part: BeamPart, lengths: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
+def plane_matrices(
+    part: BeamPart | TrussPart, lengths: FloatArray, what: str
+) -> tuple[FloatArray, FloatArray]:
     """Stiffness and mass (e, 6, 6) along the axis, for (u, w, rotation) at both ends."""
+    if isinstance(part, TrussPart):
+        return plane_truss_matrices(part, lengths)
     pairs = _stretching(part, lengths), _bending(part, lengths, plane_bending(part, what))
     return _composed(6, [(np.array([0, 3]), pairs[0]), (np.array([1, 2, 4, 5]), pairs[1])])
 
@@ -106,11 +111,17 @@ def spatial_matrices(
     )
 
 
-def plane_rows(part: BeamPart, lengths: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
+def plane_rows(
+    part: BeamPart | TrussPart, lengths: FloatArray, what: str
+) -> tuple[FloatArray, FloatArray]:
     """Rows (e, 4, 4) of the natural form and their stiffness (e, 4), see `fem.natural.line_rows`.
 
     Along the axis, for (u2 - u1, w2 - w1) and the rotations of both ends.
     """
+    if isinstance(part, TrussPart):
+        only = np.zeros((len(lengths), 4))
+        only[:, 0] = part.material.youngs_modulus * part.area / lengths
+        return np.tile(np.diag([1.0, 0.0, 0.0, 0.0]), (len(lengths), 1, 1)), only
     bending, stiffness = bending_rows(plane_bending(part, what), lengths, part.axial_force)
     stretching = part.material.youngs_modulus * part.section.area / lengths
     rows = np.zeros((len(lengths), 4, 4))

@@ -12,10 +12,13 @@ from fem.elements import rotations
 from fem.errors import ModelError, quoted
 from fem.mesh import FloatArray
 from fem.model import BeamPart
+from fem.shell_assembly import shell_pieces
+from fem.shell_stress import outer_stress
+from fem.shells import facet_batches
 from fem.solids import gradients_and_volumes, strains
 from fem.structure import SolidPart
 from fem.structure_assembly import StructureComponent
-from fem.structure_surface import StructureSurface
+from fem.structure_surface import StructureSurface, swept_parts
 from fem.sweep import FrameSurface, outline
 
 COLOURS = {"displacement": "m", "stress": "Pa", "moment": "N m"}
@@ -35,8 +38,8 @@ def surface_values(
         Displacements of the free degrees of freedom, shape (N,).
     colour
         "displacement" in m; "stress" in Pa: von Mises' in solids, averaged over the cells that
-        meet at a node, and in beams |N|/A + |M| y/I of the outermost fibre; "moment": the bending
-        moment of beams in N m.
+        meet at a node, in shells that on the outer face of the facets, and in beams
+        |N|/A + |M| y/I of the outermost fibre; "moment": the bending moment of beams in N m.
 
     Raises
     ------
@@ -52,7 +55,8 @@ def surface_values(
         return found if drawing.mirror is None else np.tile(found, 2)
     nodal = np.zeros(len(drawing.nodes))
     if colour == "stress" and len(drawing.nodes):
-        nodal = von_mises(drawing.component, u)[drawing.nodes]
+        nodal = von_mises(drawing.component, u)
+        nodal = np.maximum(nodal, shell_stresses(drawing.component, u))[drawing.nodes]
     nodal = np.maximum(drawing.with_middles(nodal), 0.0)
     return np.concatenate([nodal, *_beam_values(drawing, u, colour)])
 
@@ -90,6 +94,19 @@ def von_mises(component: StructureComponent, u: FloatArray) -> FloatArray:
     mean = total / np.maximum(count, 1.0)[:, None, None]
     deviator = mean - np.trace(mean, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
     return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=(1, 2))), dtype=np.float64)
+
+
+def shell_stresses(component: StructureComponent, u: FloatArray) -> FloatArray:
+    """Von Mises' stress in Pa at every node of shells, the mean over the facets there, (n,)."""
+    model, shape = component.model, component.shape(u)
+    total, count = np.zeros(len(model.mesh.points)), np.zeros(len(model.mesh.points))
+    for part, kind, nodes, normals in shell_pieces(model):
+        for batch in facet_batches(kind, len(nodes)):
+            at = nodes[batch]
+            found = outer_stress(part, kind, model.mesh.points, at, normals[batch], shape)
+            np.add.at(total, at.ravel(), np.repeat(found, at.shape[1]))
+            np.add.at(count, at.ravel(), 1.0)
+    return np.asarray(total / np.maximum(count, 1.0), dtype=np.float64)
 
 
 def cell_stresses(
@@ -131,6 +148,11 @@ def _frame_values(drawing: FrameSurface, u: FloatArray, colour: str) -> Iterator
 def _beam_values(drawing: StructureSurface, u: FloatArray, colour: str) -> Iterator[FloatArray]:
     model = drawing.component.model
     for name, swept in drawing.beams:
+        if name in model.trusses:
+            force = truss_forces(drawing.component, u, name)
+            area = model.trusses[name][0].area if colour == "stress" else np.inf
+            yield np.repeat(np.abs(force) / area, len(swept.places) * len(swept.outline))
+            continue
         part, lines = model.beams[name]
         spans = model.mesh.points[lines[:, 1]] - model.mesh.points[lines[:, 0]]
         what = f"{model.mesh.source}: part {name!r}"
@@ -146,6 +168,16 @@ def _beam_values(drawing: StructureSurface, u: FloatArray, colour: str) -> Itera
                 part, about_z, about_y
             )
         yield np.repeat(values[..., None], len(swept.outline), axis=-1).ravel()
+
+
+def truss_forces(component: StructureComponent, u: FloatArray, name: str) -> FloatArray:
+    """Mean axial force (e,) in N of the lines of a truss, tension positive."""
+    points = component.model.mesh.points
+    part, lines = component.model.trusses[name][0], swept_parts(component.model)[name][1]
+    span = points[lines[:, 1]] - points[lines[:, 0]]
+    moved = component.shape(u)[lines][:, 1, :3] - component.shape(u)[lines][:, 0, :3]
+    strain = np.sum(span * moved, axis=1) / np.sum(span**2, axis=1)
+    return np.asarray(part.material.youngs_modulus * part.area * strain, dtype=np.float64)
 
 
 def _bending_stress(part: BeamPart, about_z: FloatArray, about_y: FloatArray) -> FloatArray:

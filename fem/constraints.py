@@ -40,6 +40,11 @@ class Numbering:
     hinged: IntArray
     count: int
 
+    def blocks(self, nodes: IntArray) -> IntArray:
+        """Blocks (e, 2 b) of cells' nodes (e, b): moves and turns of the first, then the next."""
+        found = np.stack([self.translation[nodes], self.rotation[nodes]], axis=-1)
+        return np.asarray(found.reshape(len(nodes), -1), dtype=np.int64)
+
     def dofs(self, nodes: IntArray) -> IntArray:
         """The six degrees of freedom of nodes, (m, 6); -1 for those that they do not have."""
         blocks = np.stack([self.translation[nodes], self.rotation[nodes]], axis=-1)
@@ -48,14 +53,17 @@ class Numbering:
 
 
 def number_blocks(model: StructureModel) -> Numbering:
-    """Translations for all nodes of parts and coupled points, rotations for beams and points."""
+    """Translations for all nodes of parts and coupled points; rotations where something turns."""
     count = len(model.mesh.points)
     moves, turns = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
-    for _, kinds in model.solids.values():
+    for _, kinds in (*model.solids.values(), *model.trusses.values()):
         for nodes in kinds.values():
             moves[nodes] = True
     for _, lines in model.beams.values():
         turns[lines] = True
+    for _, kinds in model.shells.values():
+        for nodes in kinds.values():
+            turns[nodes] = True
     _number_attached(model, moves | turns, moves, turns)
     moves |= turns
     translation = np.where(moves, np.cumsum(moves) - 1, -1)

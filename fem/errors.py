@@ -1,4 +1,4 @@
-"""The one exception of the package."""
+"""The one exception of the package, and a warning."""
 
 from __future__ import annotations
 
@@ -10,6 +10,10 @@ from typing import TypeGuard
 
 class ModelError(ValueError):
     """A mesh or model that cannot be used; the text is one sentence that names item and place."""
+
+
+class JointWarning(UserWarning):
+    """Parts that share nodes but can move against each other there."""
 
 
 def is_finite(value: object) -> TypeGuard[float]:

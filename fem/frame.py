@@ -1,9 +1,10 @@
-"""Assembly of a plane frame of Euler-Bernoulli beams."""
+"""Assembly of a plane frame of beams and trusses."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,10 +14,10 @@ from scipy import sparse
 from fem.attachments import DIRECTIONS, plane_direction
 from fem.beams import plane_matrices, plane_rows
 from fem.elements import rotations, turn
-from fem.errors import ModelError
+from fem.errors import JointWarning, ModelError
 from fem.links import link_terms
 from fem.mesh import FloatArray, IntArray
-from fem.model import FrameModel
+from fem.model import FrameModel, TrussPart
 from fem.natural import (
     MatrixRows,
     NaturalForm,
@@ -27,6 +28,7 @@ from fem.natural import (
 )
 from fem.scatter import displacement_of
 from fem.store import load_model, save_model
+from fem.trusses import loose_nodes, loose_sentences
 
 SparseArray = sparse.csr_array
 
@@ -105,6 +107,8 @@ class Component:
 
 def assemble_frame(model: FrameModel) -> Component:
     """Assemble a plane frame; `fem.assemble` calls it."""
+    for text in mechanism_warnings(model):
+        warnings.warn(text, JointWarning, stacklevel=3)
     element_dofs = number_dofs(model)
     free = _free_dofs(model)
     stiffness, mass = _element_matrices(model)
@@ -115,6 +119,22 @@ def assemble_frame(model: FrameModel) -> Component:
     M = _scatter(mass, element_dofs, lumps, free)
     C = _squares(elongations, damping)[free][:, free] if damping.any() else None
     return Component(K, M, _interface_vectors(model, free), model, free, element_dofs, C)
+
+
+def mechanism_warnings(model: FrameModel) -> Iterator[str]:
+    """One sentence for nodes that trusses do not hold in the plane."""
+    trusses = [
+        model.mesh.lines[elements]
+        for name, elements in model.element_parts().items()
+        if isinstance(model.parts[name], TrussPart)
+    ]
+    held = np.repeat(model.turning[:, None], 3, axis=1).astype(np.int64)
+    ties = [(s.point, d) for s in model.supports for d in s.directions]
+    ties += [(spring.point, spring.direction) for spring in model.springs]
+    for point, direction in ties:
+        if direction != "rotation":
+            held[model.mesh.nodes(point), DIRECTIONS.index(direction)] = 1
+    yield from loose_sentences(model.mesh, loose_nodes(model.mesh.points, trusses, held, 2))
 
 
 def number_dofs(model: FrameModel) -> IntArray:
@@ -144,7 +164,8 @@ def _free_dofs(model: FrameModel) -> IntArray:
         for support in model.supports
         for direction in support.directions
     ]
-    free = np.setdiff1d(np.arange(_dof_count(model)), np.concatenate([*held, np.zeros(0)]))
+    held.append(3 * np.flatnonzero(~model.turning) + 2)
+    free = np.setdiff1d(np.arange(_dof_count(model)), np.concatenate(held))
     if len(free) == 0:
         raise ModelError(f"{model.mesh.source}: the supports hold every degree of freedom")
     return free

@@ -16,7 +16,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 from meshio._common import num_nodes_per_cell
-from meshio.gmsh.common import _gmsh_to_meshio_order, _gmsh_to_meshio_type
+from meshio.gmsh.common import _gmsh_to_meshio_type
 
 from fem.errors import ModelError
 from fem.mesh import FloatArray, IntArray
@@ -24,6 +24,19 @@ from fem.mesh import FloatArray, IntArray
 VERSIONS = {"2": "2.2", "2.2": "2.2", "4": "4.1", "4.1": "4.1"}
 _DIMENSIONS = {"vert": 0, "line": 1, "tria": 2, "quad": 2}  # by the beginning of a kind's name
 DIMENSION = {kind: _DIMENSIONS.get(kind[:4], 3) for kind in _gmsh_to_meshio_type.values()}
+NODES = {
+    "tetra10": (*range(8), 9, 8),
+    "pyramid13": (*range(5), 5, 8, 10, 6, 7, 9, 11, 12),
+    "pyramid14": (*range(5), 5, 8, 10, 6, 7, 9, 11, 12, 13),
+    "wedge15": (*range(6), 6, 9, 7, 12, 14, 13, 8, 10, 11),
+    "wedge18": (*range(6), 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16),
+    "hexahedron20": (*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15),
+    "hexahedron27": (
+        *(*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15),
+        *(22, 23, 21, 24, 20, 25, 26),
+    ),
+}
+"""Where Gmsh has the nodes of a cell in VTK's order; meshio 5.3 leaves out two of the kinds."""
 Groups = dict[tuple[int, int], IntArray]
 SECTION = re.compile(rb"^[ \t]*\$(\w+)[ \t\r]*$", re.MULTILINE)
 
@@ -149,7 +162,7 @@ def _mesh(content: bytes) -> meshio.Mesh:
     if (np.diff(labels[order]) == 0).any():
         raise ValueError("two nodes have the same number")
     cells = [
-        (block.kind, _gmsh_to_meshio_order(block.kind, _positions(block.nodes, labels, order)))
+        (block.kind, _in_order_of_vtk(block.kind, _positions(block.nodes, labels, order)))
         for block in blocks
     ]
     names = _names(sections.get("PhysicalNames", b"0"))
@@ -350,8 +363,12 @@ def _elements_41(numbers: _Numbers, groups: Groups) -> list[_Block]:
 
 def _kind(code: int) -> str:
     if code not in _gmsh_to_meshio_type:
-        raise ValueError(f"an element has the type {code}, which Gmsh does not write")
+        raise ValueError(f"an element has the type {code}, which is not read")
     return str(_gmsh_to_meshio_type[code])
+
+
+def _in_order_of_vtk(kind: str, nodes: IntArray) -> IntArray:
+    return nodes[:, NODES[kind]] if kind in NODES else nodes
 
 
 def _positions(nodes: IntArray, labels: IntArray, order: IntArray) -> IntArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -26,16 +26,17 @@ def locking_warnings(model: StructureModel) -> Iterator[str]:
     estimated as twice its volume over its surface, which is that of a plate or a thin beam.
     """
     for name, (part, kinds) in model.solids.items():
-        for kind, nodes in kinds.items():
-            if KINDS[kind].order == 1:
-                ratio = thickness_ratio(model.mesh.points, kind, nodes)
-                excess = stiffening(part, ratio)
-                if excess > TOLERABLE:
-                    yield (
-                        f"{model.mesh.source}: part {name!r} is of first-order cells ({kind}) and"
-                        f" its thickness is {ratio:.2g} of their length; where it bends along them"
-                        f" it is about {1.0 + excess:.3g} times too stiff; use second-order cells"
-                    )
+        linear = [kind for kind in kinds if KINDS[kind].order == 1]
+        thick = thickness(model.mesh.points, kinds) if linear else 0.0
+        for kind in linear:
+            ratio = thick / typical_length(model.mesh.points, kind, kinds[kind])
+            excess = stiffening(part, ratio)
+            if excess > TOLERABLE:
+                yield (
+                    f"{model.mesh.source}: part {name!r} is of first-order cells ({kind}) and"
+                    f" its thickness is {ratio:.2g} of their length; where it bends along them"
+                    f" it is about {1.0 + excess:.3g} times too stiff; use second-order cells"
+                )
 
 
 def stiffening(part: SolidPart, ratio: float) -> float:
@@ -43,13 +44,21 @@ def stiffening(part: SolidPart, ratio: float) -> float:
     return 1.0 / (2.0 * (1.0 + part.material.poissons_ratio_for("solid part")) * ratio**2)
 
 
-def thickness_ratio(points: FloatArray, kind: str, nodes: IntArray) -> float:
-    """Thickness of a part over the longest edge of its cells (the median of them)."""
-    cell = KINDS[kind]
-    ends = points[nodes[:, np.array(cell.edges)]]
+def thickness(points: FloatArray, kinds: Mapping[str, IntArray]) -> float:
+    """Of a part in m: twice the volume of its cells over the surface around all of them."""
+    facets: dict[str, list[IntArray]] = {}
+    volume = 0.0
+    for kind, nodes in kinds.items():
+        volume += float(facet_products(kind, points[nodes]).sum())
+        for facet_kind, found in KINDS[kind].facets_of(nodes).items():
+            facets.setdefault(facet_kind, []).append(found)
+    outer = {kind: once(np.concatenate(found), kind) for kind, found in facets.items()}
+    surface = sum(float(facet_products(kind, points[nodes]).sum()) for kind, nodes in outer.items())
+    return 2.0 * volume / surface
+
+
+def typical_length(points: FloatArray, kind: str, nodes: IntArray) -> float:
+    """The longest edge of a cell in m, the median over the cells."""
+    ends = points[nodes[:, np.array(KINDS[kind].edges)]]
     longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
-    local = np.array(cell.facets)
-    facets = once(nodes[:, local].reshape(-1, local.shape[1]), cell.facet_kind)
-    surface = float(facet_products(cell.facet_kind, points[facets]).sum())
-    volume = float(facet_products(kind, points[nodes]).sum())
-    return 2.0 * volume / surface / float(np.median(longest))
+    return float(np.median(longest))

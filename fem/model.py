@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from fem.attachments import (
     DIRECTIONS,
@@ -21,7 +23,7 @@ from fem.attachments import (
 from fem.element_types import check_family, counted
 from fem.errors import ModelError, by_name, check_positive, is_finite, listed, quoted
 from fem.mesh import FrameMesh, IntArray
-from fem.sections import CrossSection
+from fem.sections import CircularSection, CrossSection
 
 THEORIES = ("euler-bernoulli", "timoshenko")
 
@@ -112,6 +114,40 @@ class BeamPart:
 
 
 @dataclass(frozen=True)
+class TrussPart:
+    """A part of the mesh that is a truss: its lines stretch, and neither bend nor twist.
+
+    Its nodes have no rotation. A line of three nodes has a quadratic displacement; its middle node
+    is held across it by nothing.
+
+    Parameters
+    ----------
+    material
+        What it is made of; a Poisson's ratio is not needed.
+    area
+        Of the cross-section, in m².
+
+    Examples
+    --------
+    >>> TrussPart(Material(2.1e11, 7800.0), area=1e-4).section
+    CircularSection(diameter=0.011283791670955126, bore=0.0)
+    """
+
+    material: Material
+    area: float
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.material, Material):
+            raise ModelError(f"part: material must be a Material, not {self.material!r}")
+        check_positive("truss part", area=self.area)
+
+    @property
+    def section(self) -> CircularSection:
+        """The round bar of this area, as which it is drawn."""
+        return CircularSection(2.0 * math.sqrt(self.area / math.pi))
+
+
+@dataclass(frozen=True)
 class Support:
     """Directions of a point that are held: any of "x", "y", "rotation".
 
@@ -168,7 +204,10 @@ class Interface:
 
 
 LISTS = {"supports": Support, "point_masses": PointMass, "springs": PointSpring, "hinges": Hinge}
-TABLES = {"parts": BeamPart, "interfaces": Interface}
+TABLES: dict[str, tuple[object, str]] = {
+    "parts": (BeamPart | TrussPart, "BeamPart and TrussPart"),
+    "interfaces": (Interface, "Interface"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +246,7 @@ class FrameModel:
     """
 
     mesh: FrameMesh
-    parts: Mapping[str, BeamPart]
+    parts: Mapping[str, BeamPart | TrussPart]
     supports: Sequence[Support] = ()
     point_masses: Sequence[PointMass] = ()
     springs: Sequence[PointSpring] = ()
@@ -220,14 +259,15 @@ class FrameModel:
         for name, kind in LISTS.items():
             given = getattr(self, name)
             object.__setattr__(self, name, listed(self.mesh.source, name, given, kind))
-        for name, kind in TABLES.items():
-            given, words = getattr(self, name), f"of {kind.__name__} by name"
-            object.__setattr__(self, name, by_name(self.mesh.source, name, given, kind, words))
+        for name, (sort, words) in TABLES.items():
+            given, words = getattr(self, name), f"of {words} by name"
+            object.__setattr__(self, name, by_name(self.mesh.source, name, given, sort, words))
         self._check_plane()
         self._check_spatial()
         self._check_points()
         self._check_parts()
         self._check_hinges()
+        self._check_turns()
         self._check_interfaces()
 
     @cached_property
@@ -238,6 +278,15 @@ class FrameModel:
     def element_parts(self) -> dict[str, IntArray]:
         """Element indices of every part of the model."""
         return {name: self.mesh.part(name) for name in self.parts}
+
+    @cached_property
+    def turning(self) -> npt.NDArray[np.bool_]:
+        """Whether each node has a rotation, because a beam meets it, shape (n,)."""
+        found = np.zeros(len(self.mesh.points), dtype=np.bool_)
+        for name, elements in self.element_parts().items():
+            if isinstance(self.parts[name], BeamPart):
+                found[self.mesh.lines[elements]] = True
+        return found
 
     @property
     def links(self) -> IntArray:
@@ -267,7 +316,7 @@ class FrameModel:
                 )
         self._check_attached()
         for name, part in self.parts.items():
-            if part.orientation is not None or any(part.offset):
+            if isinstance(part, BeamPart) and (part.orientation is not None or any(part.offset)):
                 raise ModelError(
                     f"{self.mesh.source}: part {name!r} has an orientation or an offset, which a"
                     " plane frame does not have; use a StructureModel"
@@ -337,7 +386,36 @@ class FrameModel:
         for hinge in self.hinges:
             self._check_hinge(hinge)
 
+    def _check_turns(self) -> None:
+        """Refuse what acts on a rotation where only trusses meet."""
+        named = [
+            (f"point mass at {lump.point!r}", lump.point)
+            for lump in self.point_masses
+            if lump.rotary_inertia
+        ]
+        named += [
+            (f"spring at {spring.point!r}", spring.point)
+            for spring in self.springs
+            if spring.direction == "rotation"
+        ]
+        named += [
+            (f"interface {name!r}", interface.point)
+            for name, interface in self.interfaces.items()
+            if interface.direction == "rotation"
+        ]
+        for owner, point in named:
+            if not self.turning[self.mesh.node(point)]:
+                raise ModelError(
+                    f"{self.mesh.source}: {owner} acts on a rotation, but only trusses meet at"
+                    f" {point!r}, which have none"
+                )
+
     def _check_hinge(self, hinge: Hinge) -> None:
+        if isinstance(self.parts.get(hinge.part), TrussPart):
+            raise ModelError(
+                f"{self.mesh.source}: the hinge at {hinge.point!r} is of part {hinge.part!r}, a"
+                " truss, which turns freely at its ends without one"
+            )
         meeting = self._parts_at(hinge.point)
         if hinge.part not in meeting:
             raise ModelError(
@@ -356,7 +434,8 @@ class FrameModel:
         return [
             name
             for name, elements in self.element_parts().items()
-            if (self.mesh.lines[elements] == node).any()
+            if isinstance(self.parts[name], BeamPart)
+            and (self.mesh.lines[elements] == node).any()
         ]
 
     def _check_interfaces(self) -> None:

@@ -148,6 +148,36 @@ def line_rows(
     return MatrixRows(stiffness.ravel(), block_diagonal(rows), sparse.csr_array(differences))
 
 
+def node_rows(
+    rows: FloatArray, stiffness: FloatArray, dofs: IntArray, size: int
+) -> MatrixRows:
+    """Rows (e, r, b m) of cells, by the moves of their nodes from that of the first one.
+
+    Parameters
+    ----------
+    rows
+        For m degrees of freedom of each of b nodes, of which the first three are translations:
+        a common one of all nodes deforms nothing.
+    stiffness
+        Of the rows, shape (e, r).
+    dofs
+        Degrees of freedom, shape (e, b, m).
+    size
+        Number of all degrees of freedom.
+    """
+    count, b, m = dofs.shape
+    kept = dofs.reshape(count, -1)[:, 3:]
+    at = np.arange(kept.size).reshape(kept.shape)
+    moves = (m * np.arange(1, b)[:, None] - 3 + np.arange(3)).ravel()
+    first = np.tile(dofs[:, 0, :3], (1, b - 1))
+    entries = np.append(np.ones(kept.size), -np.ones(first.size))
+    places = np.append(at.ravel(), at[:, moves].ravel()), np.append(kept.ravel(), first.ravel())
+    differences = sparse.coo_array((entries, places), shape=(kept.size, size))
+    return MatrixRows(
+        stiffness.ravel(), block_diagonal(rows[:, :, 3:]), sparse.csr_array(differences)
+    )
+
+
 def ground_rows(matrices: FloatArray, dofs: IntArray, size: int) -> MatrixRows:
     """Rows of matrices (e, m, m) that resist all motions, such as those of foundations."""
     squares, vectors = np.linalg.eigh(matrices)

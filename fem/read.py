@@ -14,9 +14,11 @@ import meshio
 import numpy as np
 from numpy.typing import ArrayLike
 
+import fem.meshio_kinds  # noqa: F401  (completes meshio's tables)
 from fem.abaqus import read_abaqus
 from fem.abaqus.mesh import TYPE_PREFIX
 from fem.cells import KINDS, SPANS
+from fem.collapsed import uncollapsed
 from fem.errors import ModelError, quoted
 from fem.gmsh import read_gmsh
 from fem.mesh import FloatArray, FrameMesh, IntArray
@@ -78,15 +80,15 @@ def read_mesh(path: str | Path, include_folders: Iterable[str | Path] = ()) -> F
     Returns
     -------
     FrameMesh
-        All coordinates as in the file. A straight line of three nodes becomes two elements.
-        Surfaces, volumes and the nodes that are on no line are left out.
+        All coordinates as in the file. A straight line of three nodes becomes two elements. The
+        nodes that are on no line are left out.
 
     Raises
     ------
     ModelError
         If the file does not exist, has another extension or another content, or if it has no
-        line elements, curved lines, coordinates that are not finite, or whatever `FrameMesh`
-        refuses.
+        line elements, curved lines, surfaces or volumes, coordinates that are not finite, or
+        whatever `FrameMesh` refuses.
 
     Examples
     --------
@@ -115,12 +117,14 @@ def read_structure(
     Returns
     -------
     StructureMesh
-        All cells of all kinds that `fem` knows.
+        All cells. Hexahedra, wedges, pyramids and quadrilaterals some of whose nodes are repeated
+        are the wedges, pyramids, tetrahedra and triangles that they mean; `notes` tell how many.
 
     Raises
     ------
     ModelError
-        As for `read_mesh`, and for whatever `StructureMesh` refuses.
+        As for `read_mesh`, for cells of a kind that `fem` does not know, which it names, and for
+        whatever `StructureMesh` refuses.
 
     Examples
     --------
@@ -230,10 +234,11 @@ def structure_from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> 
     {'triangle': array([0])}
     """
     points = _three_coordinates(content, source)
+    _check_kinds(content, {*KINDS, "vertex"}, source, f"known are {quoted(KINDS)}")
     cells: dict[str, list[IntArray]] = {}
     groups: dict[str, dict[str, list[IntArray]]] = {}
     for index, block in enumerate(content.cells):
-        if block.type not in KINDS or not len(block.data):
+        if block.type == "vertex" or not len(block.data):
             continue
         blocks = cells.setdefault(block.type, [])
         first = sum(len(data) for data in blocks)
@@ -241,25 +246,47 @@ def structure_from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> 
             groups.setdefault(name, {}).setdefault(block.type, []).append(found + first)
         blocks.append(np.asarray(block.data, dtype=np.int64))
     if not cells:
-        found_kinds = sorted({block.type for block in content.cells if len(block.data)})
+        vertices = sum(len(block.data) for block in content.cells)
         raise ModelError(
-            f"{source}: the mesh has no cells of a known kind (it has {quoted(found_kinds)};"
-            f" known are {quoted(KINDS)})"
+            f"{source}: the mesh has no cells (it has {len(points)} nodes and {vertices} vertices)"
         )
     _check_far(points, source)
-    filled = {
-        name: {kind: np.concatenate(found) for kind, found in group.items()}
-        for name, group in groups.items()
-        if any(len(cells) for found in group.values() for cells in found)
-    }
-    return StructureMesh(
+    nodes_of = {kind: np.concatenate(blocks) for kind, blocks in cells.items()}
+    for kind, nodes in nodes_of.items():
+        _check_nodes(kind, nodes, len(points), source)
+    whole, named, notes = uncollapsed(
         points,
-        {kind: np.concatenate(blocks) for kind, blocks in cells.items()},
-        _names(filled),
-        {name: nodes for name, nodes in _point_sets(content, source).items() if len(nodes)},
+        nodes_of,
+        {
+            name: {kind: np.concatenate(found) for kind, found in group.items()}
+            for name, group in groups.items()
+            if any(len(cells) for found in group.values() for cells in found)
+        },
         source,
-        element_types=_types(filled),
     )
+    sets = {name: nodes for name, nodes in _point_sets(content, source).items() if len(nodes)}
+    return StructureMesh(
+        points, whole, _names(named), sets, source, notes=notes, element_types=_types(named)
+    )
+
+
+def _check_kinds(content: meshio.Mesh, taken: set[str], source: str, advice: str) -> None:
+    """Refuse cells that would be left out, by their kinds, blocks and groups."""
+    found: dict[str, list[int]] = {}
+    for index, block in enumerate(content.cells):
+        if block.type not in taken and len(block.data):
+            found.setdefault(block.type, []).append(index)
+    if not found:
+        return
+    told = []
+    for kind, blocks in found.items():
+        count = sum(len(content.cells[index].data) for index in blocks)
+        dimension = content.cells[blocks[0]].dim
+        names = {n for i in blocks for n, at in _groups(content, i, dimension, source) if len(at)}
+        group = f"in {quoted(sorted(names))}" if names else "in no group"
+        number = ", ".join(map(str, blocks[:5])) + (", ..." if len(blocks) > 5 else "")
+        told.append(f"{count} {kind} ({group}; block {number} of the file, counted from 0)")
+    raise ModelError(f"{source}: the mesh has cells that are not read: {'; '.join(told)}; {advice}")
 
 
 Named = TypeVar("Named")
@@ -309,6 +336,9 @@ def _lines_and_parts(content: meshio.Mesh, source: str) -> tuple[IntArray, dict[
             f"{source}: elements of type {quoted(curved)} are not straight two-node lines;"
             " make the mesh of first order"
         )
+    advice = "a frame has lines only; read it as a structure, or leave these out by their groups"
+    if any(block.type in SPANS and len(block.data) for block in content.cells):
+        _check_kinds(content, {*SPANS, "vertex"}, source, advice)
     lines: list[IntArray] = []
     parts: dict[str, list[IntArray]] = {}
     first = 0

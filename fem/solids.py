@@ -54,14 +54,17 @@ def adjugate(matrices: FloatArray) -> FloatArray:
     return np.stack(rows, axis=-1)
 
 
-def checked_volumes(volumes: FloatArray, what: str, first: int = 0) -> FloatArray:
+def checked_volumes(
+    volumes: FloatArray, coordinates: FloatArray, what: str, first: int = 0
+) -> FloatArray:
     """Absolute determinants (e, q), or a ModelError for a cell that is folded or flat."""
     sign = np.sign(volumes[:, :1])
     bad = np.flatnonzero(~((volumes * sign > 0.0).all(axis=1)))
     if len(bad):
+        x, y, z = coordinates[bad[0]].mean(axis=0)
         raise ModelError(
-            f"{what}: cell {first + bad[0]} is flat or folded (its mapping has no positive volume"
-            " everywhere)"
+            f"{what}: cell {first + bad[0]} of the part, at ({x:.6g}, {y:.6g}, {z:.6g}), is flat or"
+            " folded (its mapping has no positive volume everywhere)"
         )
     return np.asarray(np.abs(volumes), dtype=np.float64)
 

@@ -17,14 +17,15 @@ from fem.errors import ModelError
 from fem.files import draft_of, plain_write_errors
 from fem.mesh import FrameMesh
 from fem.model import LISTS as FRAME_LISTS
-from fem.model import BeamPart, FrameModel, Interface, Material
+from fem.model import BeamPart, FrameModel, Interface, Material, TrussPart
 from fem.sections import CircularSection, CrossSection, RectangularSection, Section
+from fem.shells import ShellPart
 from fem.structure import LISTS as STRUCTURE_LISTS
-from fem.structure import SolidPart, StructureModel
+from fem.structure import Part, SolidPart, StructureModel
 from fem.structure_mesh import StructureMesh
 
-FORMAT = "fem frame 1"
-STRUCTURE_FORMAT = "fem structure 1"
+FORMAT = "fem frame 2"
+STRUCTURE_FORMAT = "fem structure 2"
 Arrays = dict[str, npt.NDArray[Any]]
 Lists = Mapping[str, type]
 Model = TypeVar("Model")
@@ -34,6 +35,7 @@ BROUGHT: Lists = {
     "couplings": Coupling,
     "equations": LinearEquation,
 }
+PARTS = {kind.__name__: kind for kind in (BeamPart, TrussPart, SolidPart, ShellPart)}
 SECTIONS = {kind.__name__: kind for kind in (RectangularSection, CircularSection, Section)}
 
 
@@ -200,19 +202,19 @@ def _items(attached: dict[str, Any], lists: Lists) -> dict[str, Any]:
     }
 
 
-def _part(part: BeamPart | SolidPart) -> dict[str, Any]:
-    plain = asdict(part)
+def _part(part: Part) -> dict[str, Any]:
+    plain = {"part": type(part).__name__, **asdict(part)}
     if isinstance(part, BeamPart):
         plain.update(_section(part))
     return plain
 
 
-def _part_from(plain: dict[str, Any]) -> BeamPart | SolidPart:
+def _part_from(plain: dict[str, Any]) -> Any:
     plain = {**plain, "material": Material(**plain["material"])}
-    if "kind" not in plain:
-        return SolidPart(**plain)
-    section = SECTIONS[plain.pop("kind")](**plain.pop("section"))
-    return BeamPart(section=section, **plain)
+    sort = PARTS[plain.pop("part")]
+    if sort is BeamPart:
+        plain["section"] = SECTIONS[plain.pop("kind")](**plain["section"])
+    return sort(**plain)
 
 
 def _section(part: BeamPart) -> dict[str, Any]:

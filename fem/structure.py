@@ -1,4 +1,4 @@
-"""What a structure is made of: solids and beams in space or in the plane, and what joins them."""
+"""What a structure is made of: solids, shells and beams, and what joins them."""
 
 from __future__ import annotations
 
@@ -13,13 +13,8 @@ from fem.cells import KINDS, SPANS
 from fem.element_types import check_family, counted
 from fem.errors import ModelError, by_name, check_positive, listed, quoted
 from fem.mesh import FloatArray, FrameMesh, IntArray
-from fem.model import (
-    BeamPart,
-    Hinge,
-    Interface,
-    Material,
-    Support,
-)
+from fem.model import BeamPart, Hinge, Interface, Material, Support, TrussPart
+from fem.shells import ShellPart, facets_of, shell_kinds
 from fem.structure_mesh import StructureMesh, structure_mesh
 
 AXES = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")
@@ -48,8 +43,8 @@ class SolidPart:
     material
         With a Poisson's ratio.
     plane
-        None for tetrahedra and hexahedra; for triangles and quadrilaterals in the x-y plane,
-        "stress" (a sheet) or "strain" (a slice of a long body).
+        None for tetrahedra, pyramids, wedges and hexahedra; for triangles and quadrilaterals in
+        the x-y plane, "stress" (a sheet) or "strain" (a slice of a long body).
     thickness
         In m, of a plane part.
 
@@ -94,7 +89,8 @@ class Foundation:
     Parameters
     ----------
     face
-        Point set or group: a face of solids, an edge of plane solids, or lines of beams.
+        Point set or group: a face of solids, an edge of plane solids, cells of shells, or lines of
+        beams.
     stiffness
         (x, y, z): N/m³ under a face (force per area and displacement), N/m² along an edge or a
         beam (force per length and displacement).
@@ -115,7 +111,7 @@ class Foundation:
             raise ModelError(f"{owner}: stiffness must not be negative and not all zero")
 
 
-Part = BeamPart | SolidPart
+Part = BeamPart | TrussPart | SolidPart | ShellPart
 
 LISTS = {
     "supports": Support,
@@ -126,22 +122,23 @@ LISTS = {
     "foundations": Foundation,
 }
 TABLES: tuple[tuple[str, object, str], ...] = (
-    ("parts", Part, "BeamPart and SolidPart"),
+    ("parts", Part, "BeamPart, TrussPart, SolidPart and ShellPart"),
     ("interfaces", Interface, "Interface"),
 )
 
 
 @dataclass(frozen=True, eq=False)
 class StructureModel:
-    """A structure of solids and beams: a mesh and everything attached to it.
+    """A structure of solids, shells and beams: a mesh and everything attached to it.
 
     Parameters
     ----------
     mesh
         A mesh with all kinds of cells; of a `FrameMesh` the lines are taken.
     parts
-        By the name of the group of cells: `SolidPart` for bodies, `BeamPart` for lines. With
-        plane solids everything lies and moves in the plane: x, y and the rotation about z.
+        By the name of the group of cells: `SolidPart` for bodies, `ShellPart` for triangles and
+        quadrilaterals in space, `BeamPart` and `TrussPart` for lines. With plane solids everything
+        lies and moves in the plane: x, y and the rotation about z.
     supports, point_masses, springs, hinges
         As in a `FrameModel`, in up to six directions. The point of a support may be a face.
     couplings
@@ -236,6 +233,27 @@ class StructureModel:
         return self.mesh.attachments + own
 
     @property
+    def trusses(self) -> dict[str, tuple[TrussPart, dict[str, IntArray]]]:
+        """Truss parts with the nodes (e, 2) and (e, 3) of their lines by kind."""
+        return {
+            name: (part, {k: self.mesh.cells[k][at] for k, at in self.mesh.part(name).items()})
+            for name, part in self.parts.items()
+            if isinstance(part, TrussPart)
+        }
+
+    @property
+    def shells(self) -> dict[str, tuple[ShellPart, dict[str, IntArray]]]:
+        """Shell parts with the nodes (e, 3) and (e, 4) of their facets by kind."""
+        return {
+            name: (
+                part,
+                facets_of({k: self.mesh.cells[k][at] for k, at in self.mesh.part(name).items()}),
+            )
+            for name, part in self.parts.items()
+            if isinstance(part, ShellPart)
+        }
+
+    @property
     def links(self) -> IntArray:
         """Pairs of nodes that cells of parts, couplings, springs or equations join, (m, 2)."""
         pairs = [
@@ -259,17 +277,19 @@ class StructureModel:
         found: dict[str, list[IntArray]] = {}
         for _, cells in self.solids.values():
             for kind, nodes in cells.items():
-                local = np.array(KINDS[kind].facets)
-                found.setdefault(KINDS[kind].facet_kind, []).append(
-                    nodes[:, local].reshape(-1, local.shape[1])
-                )
+                for facet_kind, facets in KINDS[kind].facets_of(nodes).items():
+                    found.setdefault(facet_kind, []).append(facets)
         return {kind: once(np.concatenate(blocks), kind) for kind, blocks in found.items()}
 
     def facets_on(self, name: str) -> dict[str, IntArray]:
-        """The outer facets all of whose nodes are in a point set or group."""
+        """The outer facets, and those of shells, all of whose nodes are in a point set or group."""
         inside = np.zeros(len(self.mesh.points), dtype=np.bool_)
         inside[self.mesh.nodes(name)] = True
-        on = {kind: facets[inside[facets].all(axis=1)] for kind, facets in self.facets.items()}
+        found: dict[str, list[IntArray]] = {}
+        for kinds in (self.facets, *(kinds for _, kinds in self.shells.values())):
+            for kind, facets in kinds.items():
+                found.setdefault(kind, []).append(facets[inside[facets].all(axis=1)])
+        on = {kind: np.concatenate(blocks) for kind, blocks in found.items()}
         return {kind: facets for kind, facets in on.items() if len(facets)}
 
     def _check_parts(self) -> None:
@@ -310,8 +330,10 @@ class StructureModel:
 
     @staticmethod
     def _kinds_for(part: Part) -> set[str]:
-        if isinstance(part, BeamPart):
+        if isinstance(part, BeamPart | TrussPart):
             return set(SPANS)
+        if isinstance(part, ShellPart):
+            return shell_kinds()
         dimension = 2 if part.plane else 3
         return {name for name, kind in KINDS.items() if kind.dimension == dimension}
 
@@ -340,6 +362,11 @@ class StructureModel:
     def _check_plane(self) -> None:
         if not self.is_plane:
             return
+        if self.shells:
+            raise ModelError(
+                f"{self.mesh.source}: shells and solids in the plane do not mix; make the plane"
+                " part a shell, too"
+            )
         solid = [part for part in self.parts.values() if isinstance(part, SolidPart)]
         if not all(part.plane for part in solid):
             raise ModelError(f"{self.mesh.source}: plane and three-dimensional parts do not mix")
@@ -362,7 +389,8 @@ class StructureModel:
 
     def _part_cells(self) -> list[IntArray]:
         cells = [lines for _, lines in self.beams.values()]
-        return cells + [nodes for _, kinds in self.solids.values() for nodes in kinds.values()]
+        bodies = (*self.trusses.values(), *self.solids.values(), *self.shells.values())
+        return cells + [nodes for _, kinds in bodies for nodes in kinds.values()]
 
     def _check_names(self) -> None:
         for support in self.supports:

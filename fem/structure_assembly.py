@@ -1,4 +1,4 @@
-"""Assembly of structures of solids and beams."""
+"""Assembly of structures of solids, shells and beams."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from scipy import sparse
 from fem.attachments import PointMass
 from fem.beams import cross_matrix, element_matrices, element_rows, local_axes, to_nodes
 from fem.cells import KINDS, CellKind
+from fem.conforming import check_conforming
 from fem.constraints import (
     Constraints,
     Numbering,
@@ -22,7 +23,9 @@ from fem.constraints import (
     number_blocks,
     point_dof,
 )
-from fem.errors import ModelError
+from fem.distorted import distortion_warnings
+from fem.errors import JointWarning, ModelError
+from fem.joints import hinge_warnings, mechanism_warnings
 from fem.links import link_terms
 from fem.locking import locking_warnings
 from fem.mesh import FloatArray, IntArray
@@ -36,14 +39,11 @@ from fem.natural import (
     solid_rows,
 )
 from fem.scatter import SparseArray, block_pattern, dense_scatter, displacement_of
-from fem.solids import (
-    checked_volumes,
-    gradients_and_volumes,
-    mass_matrices,
-    stiffness_matrices,
-)
+from fem.shell_assembly import facet_matrices, facet_rows
+from fem.solids import checked_volumes, gradients_and_volumes, mass_matrices, stiffness_matrices
 from fem.store import load_structure, save_structure
 from fem.structure import AXES, SolidPart, StructureModel
+from fem.truss_assembly import truss_form, truss_matrices
 
 BATCH_BYTES = 1e8
 """Size of the element matrices that are made at a time."""
@@ -51,6 +51,10 @@ BATCH_BYTES = 1e8
 
 class LockingWarning(UserWarning):
     """First-order solids on a part that is thin: they are too stiff in bending."""
+
+
+class DistortionWarning(UserWarning):
+    """Cells that are out of shape: their part may be too stiff, and its stresses wrong there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +95,8 @@ class StructureComponent:
 
         Made when it is first asked for; it keeps the gradients of all solids' shape functions.
         """
-        rows = [*cell_rows(self.model, self.numbering), *attached_rows(self.model, self.numbering)]
+        sorts = (cell_rows, facet_rows, truss_form, attached_rows)
+        rows = [row for sort in sorts for row in sort(self.model, self.numbering)]
         return natural_form(rows, self.constraints.transformation)
 
     def shape(self, u: FloatArray) -> FloatArray:
@@ -137,23 +142,35 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     Raises
     ------
     ModelError
-        If the supports leave nothing free, a cell is flat or folded, or a support, mass, spring
-        or interface is where there is nothing to hold, load or move.
+        If the supports leave nothing free, a cell is flat or folded, cells do not fit together,
+        or a support, mass, spring or interface is where there is nothing to hold, load or move.
 
     Warns
     -----
     LockingWarning
         If a part of first-order cells is so thin that it is much too stiff in bending.
+    DistortionWarning
+        If cells are out of shape.
+    JointWarning
+        If a shell meets solids at an edge only, about which it can turn, or a truss has a node
+        that is not held in all directions.
     """
+    check_conforming(model)
+    for text in (*hinge_warnings(model), *mechanism_warnings(model)):
+        warnings.warn(text, JointWarning, stacklevel=3)
     for text in locking_warnings(model):
         warnings.warn(text, LockingWarning, stacklevel=3)
+    for text in distortion_warnings(model):
+        warnings.warn(text, DistortionWarning, stacklevel=3)
     numbering = number_blocks(model)
     constraints = constrain(model, numbering)
     stiffness, mass = solid_matrices(model, numbering)
-    beam_stiffness, beam_mass = attached_matrices(model, numbering)
-    K = constraints.reduced(_sum(stiffness, beam_stiffness))
+    for others in (facet_matrices, truss_matrices, attached_matrices):
+        more = others(model, numbering)
+        stiffness, mass = _sum(stiffness, more[0]), _sum(mass, more[1])
+    K = constraints.reduced(stiffness)
     del stiffness
-    M = constraints.reduced(_sum(mass, beam_mass))
+    M = constraints.reduced(mass)
     _check_nothing_empty(K, M, model, numbering, constraints)
     interfaces = _interface_vectors(model, numbering, constraints)
     damping = _damping(model, numbering, constraints)
@@ -271,7 +288,7 @@ def weighted_gradients(
     """Gradients (e, q, b, d) at the places of integration and the volumes (e, q) there."""
     places, weights = kind.quadrature
     gradients, volumes = gradients_and_volumes(kind, coordinates[..., : kind.dimension], places)
-    weighted = checked_volumes(volumes, what, first) * weights
+    weighted = checked_volumes(volumes, coordinates, what, first) * weights
     return gradients, weighted if part.thickness is None else weighted * part.thickness
 
 

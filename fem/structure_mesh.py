@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fem.attachments import Attachments, LeftOut
-from fem.cells import KINDS
+from fem.cell_checks import cell_at, check_cells
+from fem.cells import CUBE, KINDS, PYRAMID, TETRAHEDRON, TRIANGLE, WEDGE
 from fem.errors import ModelError, quoted
 from fem.mesh import FloatArray, FrameMesh, IntArray, index_sets, numbers
 
@@ -33,6 +34,8 @@ class StructureMesh:
         Node indices by name.
     source
         Where the mesh comes from; error texts begin with it.
+    notes
+        What a reader took otherwise than it stands in the file, a sentence each.
     attachments
         Masses, springs, couplings and equations that the file holds beside its cells.
     element_types
@@ -46,7 +49,8 @@ class StructureMesh:
     ------
     ModelError
         For an empty mesh, coordinates that are not finite, indices out of range, cells with the
-        wrong number of nodes, or second-order cells whose nodes are in another order.
+        wrong number of nodes, with a node twice or with two nodes at one place, or second-order
+        cells whose nodes are in another order.
 
     Examples
     --------
@@ -66,6 +70,7 @@ class StructureMesh:
     groups: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)
     point_sets: Mapping[str, IntArray] = field(default_factory=dict)
     source: str = "mesh"
+    notes: Sequence[str] = ()
     attachments: Attachments = field(default_factory=Attachments)
     element_types: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)
     described: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
@@ -96,6 +101,7 @@ class StructureMesh:
         object.__setattr__(self, "element_types", types)
         sets = index_sets(f"{self.source}: point", self.point_sets)
         object.__setattr__(self, "point_sets", sets)
+        object.__setattr__(self, "notes", tuple(self.notes))
         self._check()
 
     def __repr__(self) -> str:
@@ -206,23 +212,17 @@ class StructureMesh:
             raise ModelError(
                 f"{self.source}: a cell of kind {kind!r} has {count} nodes, not {cells.shape[1]}"
             )
-        if KINDS[kind].order == 2:
-            self._check_middles(kind, cells)
+        check_cells(self.source, kind, cells, self.points)
 
-    def _check_middles(self, kind: str, cells: IntArray) -> None:
-        """Nodes between corners must be nearer to the middle than to either end."""
-        edges = np.array(KINDS[kind].edges)
-        ends = self.points[cells[:, edges]]
-        first = len(KINDS[kind].corners)
-        middle = self.points[cells[:, first : first + len(edges)]]
-        off = np.linalg.norm(middle - ends.mean(axis=2), axis=2)
-        length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
-        bad = np.flatnonzero((off > 0.35 * length).any(axis=1))
-        if len(bad):
-            raise ModelError(
-                f"{self.source}: the nodes on the edges of {kind} {bad[0]} are not near the middle"
-                " of their edges (they must be in the order of meshio and VTK)"
-            )
+    def where(self, kind: str, cell: int) -> str:
+        """A cell by its kind, number and place, for error texts.
+
+        Examples
+        --------
+        >>> box_mesh("plate", (1.0, 1.0), (2, 2), kind="quad").where("quad", 3)
+        'quad 3 at (0.75, 0.75, 0)'
+        """
+        return cell_at(kind, cell, self.points[self.cells[kind][cell]])
 
     def _check_range(self, what: str, indices: IntArray, count: int) -> None:
         if indices.size and not (indices.min() >= 0 and indices.max() < count):
@@ -246,9 +246,7 @@ def structure_mesh(frame: FrameMesh) -> StructureMesh:
         frame.point_sets,
         frame.source,
         attachments=frame.attachments,
-        element_types={
-            name: {"line": elements} for name, elements in frame.element_types.items()
-        },
+        element_types={name: {"line": cells} for name, cells in frame.element_types.items()},
         described=frame.described,
         left_out=frame.left_out,
     )
@@ -299,6 +297,7 @@ def joined(meshes: Sequence[StructureMesh], tolerance: float | None = None) -> S
         _in_one(groups),
         {name: np.concatenate(nodes) for name, nodes in sets.items()},
         " + ".join(dict.fromkeys(mesh.source for mesh in meshes)),
+        notes=[note for mesh in meshes for note in mesh.notes],
         attachments=sum((mesh.attachments for mesh in meshes), Attachments()),
         element_types=_in_one(types),
         described={name: keys for mesh in meshes for name, keys in mesh.described.items()},
@@ -363,8 +362,9 @@ def box_mesh(
     lengths
         Along x and y (a rectangle in the plane), or x, y and z, in m.
     counts
-        Number of cells in each direction; for triangles and tetrahedra, of the boxes that are
-        cut into 2 and 6.
+        Number of cells in each direction; for other kinds than quadrilaterals and hexahedra, of
+        the boxes that are cut into 2 triangles, 2 wedges along z, 6 tetrahedra, or 6 pyramids
+        with their apex in the middle.
     origin
         The corner with the lowest coordinates.
     kind
@@ -396,12 +396,12 @@ def box_mesh(
     boxes = corner.reshape(-1, dimension)
     unit = _unit_cells(name)
     places = (boxes[:, None, None, :] + unit).reshape(-1, *unit.shape[1:])
-    doubled = np.rint(2 * places.reshape(-1, dimension)).astype(np.int64)
-    grid, inverse = np.unique(doubled, axis=0, return_inverse=True)
+    quarters = np.rint(4 * places.reshape(-1, dimension)).astype(np.int64)
+    grid, inverse = np.unique(quarters, axis=0, return_inverse=True)
     points = np.zeros((len(grid), 3))
-    points[:, :dimension] = grid / 2.0 * (np.asarray(lengths) / np.asarray(counts))
+    points[:, :dimension] = grid / 4.0 * (np.asarray(lengths) / np.asarray(counts))
     sets = {
-        f"{axis}{side}": np.flatnonzero(grid[:, i] == 2 * side * counts[i])
+        f"{axis}{side}": np.flatnonzero(grid[:, i] == 4 * side * counts[i])
         for i, axis in enumerate("xyz"[:dimension])
         for side in (0, 1)
     }
@@ -418,17 +418,25 @@ def box_mesh(
 def _unit_cells(name: str) -> FloatArray:
     """Nodes of the cells that fill the unit box, shape (cells, b, d)."""
     kind = KINDS[name]
-    if kind.facet_kind in ("quad", "quad8", "quad9") or name.startswith("quad"):
-        return kind.nodes[None]
-    if kind.dimension == 2:
-        corners = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], dtype=np.float64)
-    else:
-        # Kuhn's six tetrahedra around the diagonal: they match from box to box
-        steps = np.eye(3)
-        orders = ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2))
-        paths = [np.cumsum([np.zeros(3), *steps[list(order)]], axis=0) for order in orders]
-        corners = np.array([p if i < 3 else p[[0, 2, 1, 3]] for i, p in enumerate(paths)])
-    if kind.order == 1:
-        return corners
-    middles = np.stack([corners[:, list(edge)].mean(axis=1) for edge in kind.edges], axis=1)
-    return np.concatenate([corners, middles], axis=1)
+    return kind.filled(_UNIT_CORNERS.get(kind.shape, kind.corners[None]))
+
+
+_HALVES = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], dtype=np.float64)
+_ALONG = ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2))
+
+
+def _kuhn() -> FloatArray:
+    """Corners of Kuhn's six tetrahedra around the diagonal: they match from box to box."""
+    paths = [np.cumsum([np.zeros(3), *np.eye(3)[list(order)]], axis=0) for order in _ALONG]
+    return np.array([p if i < 3 else p[[0, 2, 1, 3]] for i, p in enumerate(paths)])
+
+
+_UNIT_CORNERS = {
+    TRIANGLE: _HALVES,
+    TETRAHEDRON: _kuhn(),
+    WEDGE: np.stack([np.vstack([np.insert(t, 2, z, axis=1) for z in (0, 1)]) for t in _HALVES]),
+    PYRAMID: np.stack(
+        [np.vstack([CUBE.corners[list(face[::-1])], np.full(3, 0.5)]) for face in CUBE.faces]
+    ),
+}
+"""Corners of the cells (cells, c, d) that fill the unit box, by their shape."""

@@ -1,4 +1,4 @@
-"""The surface of a structure: outer faces of solids, and cross-sections swept along its beams."""
+"""The surface of a structure: faces of solids, shells, and cross-sections swept along beams."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ from fem.beams import local_axes, to_nodes
 from fem.cells import KINDS, SPANS
 from fem.errors import ModelError
 from fem.mesh import FloatArray, IntArray
+from fem.model import BeamPart
+from fem.structure import StructureModel
 from fem.structure_assembly import StructureComponent
 from fem.sweep import PartSurface, hermite, hermite_slope, open_ends, outline
+from fem.trusses import chords
 
 SHARP_DEGREES = 30.0
 PIECES: dict[str, tuple[tuple[int, ...], ...]] = {
@@ -34,15 +37,15 @@ class StructureSurface:
     """The surface of a whole structure, made by `structure_surface`.
 
     It offers what a `FrameSurface` does: `place`, `faces` and `edges`. The points are first the
-    nodes of the solids' faces, then the middles of their faces with eight nodes, then those of the
-    beams, part by part.
+    nodes of the solids' faces and of shells, then the middles of the faces with eight nodes, then
+    those of the beams, part by part.
 
     Parameters
     ----------
     component
         The assembled structure.
     nodes
-        Nodes of the mesh on the solids' faces, shape (p,).
+        Nodes of the mesh on the solids' faces and on shells, shape (p,).
     eights
         Faces with eight nodes, as positions among `nodes`, shape (c, 8).
     polygons, sharp
@@ -113,11 +116,11 @@ class StructureSurface:
         self, name: str, swept: PartSurface, u: FloatArray, scale: float, shrinkage: float
     ) -> tuple[FloatArray, FloatArray]:
         model = self.component.model
-        part, lines = model.beams[name]
+        part, lines = swept_parts(model)[name]
         start = model.mesh.points[lines[:, 0]]
         spans = model.mesh.points[lines[:, 1]] - start
         axes = local_axes(part, spans, f"{model.mesh.source}: part {name!r}")
-        ends = self.component.element_shape(u, name).reshape(-1, 12)
+        ends = line_shape(self.component, u, name).reshape(-1, 12)
         local = np.einsum("eij,ej->ei", to_nodes(part, axes), ends)
         moved, slope, twist = local_deflection(local, np.linalg.norm(spans, axis=1), swept.places)
         offset = np.array([0.0, *part.offset])
@@ -130,6 +133,31 @@ class StructureSurface:
         points = start[:, None, None, :] + np.einsum("emkj,ejx->emkx", local_points, axes)
         size = np.repeat(np.linalg.norm(moved, axis=-1)[..., None], len(corners), axis=-1)
         return points.reshape(-1, 3), size.ravel()
+
+
+def swept_parts(model: StructureModel) -> dict[str, tuple[BeamPart, IntArray]]:
+    """Beam parts, and trusses as round bars, with the node pairs (e, 2) of their lines."""
+    bars = {
+        name: (
+            BeamPart(part.material, part.section),
+            np.concatenate([chords(nodes) for nodes in kinds.values()]),
+        )
+        for name, (part, kinds) in model.trusses.items()
+    }
+    return {**model.beams, **bars}
+
+
+def line_shape(component: StructureComponent, u: FloatArray, name: str) -> FloatArray:
+    """Six displacements at both ends of lines, (e, 2, 6); a truss turns as its ends move."""
+    model = component.model
+    if name in model.beams:
+        return component.element_shape(u, name)
+    lines = swept_parts(model)[name][1]
+    ends = component.shape(u)[lines]
+    span = model.mesh.points[lines[:, 1]] - model.mesh.points[lines[:, 0]]
+    turn = np.cross(span, ends[:, 1, :3] - ends[:, 0, :3])
+    ends[:, :, 3:] = (turn / np.sum(span**2, axis=1)[:, None])[:, None]
+    return ends
 
 
 def local_deflection(
@@ -164,6 +192,9 @@ def section_frames(slope: FloatArray, twist: FloatArray) -> FloatArray:
 def structure_surface(component: StructureComponent, places: int | None = None) -> StructureSurface:
     """The surface of a structure, with the true sections of its beams.
 
+    A shell is drawn as the surface through its nodes, without its thickness; a truss as a round
+    bar.
+
     Examples
     --------
     >>> import fem
@@ -192,7 +223,7 @@ def structure_surface(component: StructureComponent, places: int | None = None) 
         for piece in PIECES[kind]
     )
     sharp = position[sharp_edges(facets, model.mesh.points)]
-    lines = sum(len(pairs) for _, pairs in model.beams.values())
+    lines = sum(len(pairs) for _, pairs in swept_parts(model).values())
     if places is None:
         places = int(np.clip(600 // max(lines, 1), 4, 32)) + 1
     s = np.linspace(0.0, 1.0, places)
@@ -201,18 +232,17 @@ def structure_surface(component: StructureComponent, places: int | None = None) 
 
 def _beams(component: StructureComponent, s: FloatArray) -> Iterator[tuple[str, PartSurface]]:
     nobody = np.zeros(len(component.model.mesh.points), dtype=np.bool_)
-    for name, (part, lines) in component.model.beams.items():
+    for name, (part, lines) in swept_parts(component.model).items():
         shape = outline(part.section)
         yield name, PartSurface(np.arange(len(lines)), shape, s, open_ends(lines, nobody))
 
 
 def drawn_facets(component: StructureComponent) -> dict[str, IntArray]:
-    """The outer faces of solids, or the cells themselves of solids in the plane."""
+    """The outer faces of solids, or the cells themselves of solids in the plane and of shells."""
     model = component.model
-    if not model.is_plane:
-        return model.facets
+    flat = [*(model.solids.values() if model.is_plane else ()), *model.shells.values()]
     found: dict[str, list[IntArray]] = {}
-    for _, kinds in model.solids.values():
+    for kinds in ({} if model.is_plane else model.facets, *(kinds for _, kinds in flat)):
         for kind, cells in kinds.items():
             found.setdefault(kind, []).append(cells)
     return {kind: np.concatenate(blocks) for kind, blocks in found.items()}

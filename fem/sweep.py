@@ -11,6 +11,7 @@ import numpy.typing as npt
 from fem.errors import ModelError
 from fem.frame import Component
 from fem.mesh import FloatArray, IntArray
+from fem.model import TrussPart
 from fem.sections import CircularSection, CrossSection, RectangularSection
 
 CIRCLE_POINTS = 32
@@ -178,7 +179,7 @@ class FrameSurface:
             In m, shape (P, 3), and the length of the displacement of the axis in m, not
             scaled, shape (P,).
         """
-        ends = self.component.element_shape(u)
+        ends = straight_ends(self.component, self.component.element_shape(u))
         swept = [self._place_part(part, ends, scale, shrinkage) for part in self.parts]
         points = np.concatenate([points for points, _ in swept])
         size = np.concatenate([size for _, size in swept])
@@ -223,6 +224,17 @@ class FrameSurface:
         if self.mirror is None:
             return found
         return found + [array + counts.sum() for array in found]
+
+
+def straight_ends(component: Component, ends: FloatArray) -> FloatArray:
+    """Displacements at both ends (e, 2, 3) with the rotations of straight lines for trusses."""
+    model, found = component.model, ends.copy()
+    for name, elements in model.element_parts().items():
+        if isinstance(model.parts[name], TrussPart):
+            span, moved = model.mesh.spans[elements], ends[elements, 1] - ends[elements, 0]
+            turn = span[:, 0] * moved[:, 1] - span[:, 1] * moved[:, 0]
+            found[elements, :, 2] = (turn / model.mesh.lengths[elements] ** 2)[:, None]
+    return found
 
 
 def reflected(points: FloatArray, origin: FloatArray, normal: FloatArray) -> FloatArray:

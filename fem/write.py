@@ -8,6 +8,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import numpy.typing as npt
+from meshio._vtk_common import meshio_to_vtk_type
 
 from fem.abaqus.types import SOLIDS
 from fem.errors import ModelError, quoted
@@ -111,6 +112,9 @@ def _write_vtu(mesh: FrameMesh, path: Path) -> None:
 
 def _write_structure(mesh: StructureMesh, path: Path) -> None:
     """Compressed; coordinates in double precision."""
+    for kind in mesh.cells:
+        if kind not in meshio_to_vtk_type:
+            raise ModelError(f"{path}: VTK has no cells of kind {kind!r}")
     content = meshio.Mesh(
         mesh.points,
         list(mesh.cells.items()),

@@ -1,5 +1,5 @@
 """``python -m nldyn`` is the command line."""
 
-from nldyn.command import main
+from nldyn.app.command import main
 
 main()

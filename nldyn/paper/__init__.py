@@ -30,7 +30,6 @@ def main(out: str | Path, workers: int = 2) -> None:
     --------
     >>> main("results/paper")        # doctest: +SKIP
     """
-    from nldyn.interruption import ignored_interruption
     from nldyn.paper.chaos import chaos_of, submit_sweeps, write_chaos_figure
     from nldyn.paper.claims import evaluate, verdict_counts, write_claims
     from nldyn.paper.figures import write_figures
@@ -38,7 +37,8 @@ def main(out: str | Path, workers: int = 2) -> None:
     from nldyn.paper.kept import kept_folder
     from nldyn.paper.page import write_page
     from nldyn.paper.workers import worker_processes
-    from nldyn.result_directory import check_directory, result_directory
+    from nldyn.runtime.interruption import ignored_interruption
+    from nldyn.runtime.result_directory import check_directory, result_directory
 
     check_directory(out)
     folder_kept = kept_folder(out)

@@ -15,13 +15,13 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from nldyn.attractors import Attractor, AttractorOptions
-from nldyn.lifetimes import ChaosLifetime, chaos_lifetime, two_digits
+from nldyn.longterm.attractors import Attractor, AttractorOptions
+from nldyn.longterm.lifetimes import ChaosLifetime, chaos_lifetime, two_digits
+from nldyn.longterm.poincare import BruteForce, brute_force
 from nldyn.paper.evidence import Finding, published_claims
 from nldyn.paper.jobs import scene_system
 from nldyn.paper.workers import Workers
-from nldyn.plot import save_figure
-from nldyn.sections import BruteForce, brute_force
+from nldyn.plot.diagram import save_figure
 
 Way = Literal["up", "down"]
 Task = tuple[str, Way]

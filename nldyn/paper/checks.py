@@ -7,9 +7,10 @@ from collections.abc import Callable, Mapping
 from functools import cache, partial
 
 import cms
-from nldyn.branch import Branch, SpecialPoint
-from nldyn.diagrams import Diagram
-from nldyn.elements import hertz_stiffness
+from nldyn.base.resources import example
+from nldyn.bifurcations.point import SpecialPoint
+from nldyn.branches.branch import Branch
+from nldyn.branches.peaks import lowest_orbit, resonance_peaks
 from nldyn.paper.evidence import (
     READING_TOLERANCE,
     Finding,
@@ -23,9 +24,9 @@ from nldyn.paper.evidence import (
     unstable_share,
 )
 from nldyn.paper.jobs import BILINEAR_ALPHA, HERTZ_STIFFNESS, STIFFNESS
-from nldyn.peaks import lowest_orbit, resonance_peaks
-from nldyn.resources import example
-from nldyn.scene import build_component, load_scene
+from nldyn.scene.build import build_component, load_scene
+from nldyn.search.diagram import Diagram
+from nldyn.system.elements import hertz_stiffness
 
 Results = Mapping[str, Diagram]
 Check = Callable[[Results], Finding]

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from nldyn.branch import Branch, SpecialPoint
-from nldyn.diagrams import Diagram
-from nldyn.orbit import Orbit
-from nldyn.peaks import Peak, resonance_peaks
+from nldyn.bifurcations.point import SpecialPoint
+from nldyn.branches.branch import Branch
+from nldyn.branches.peaks import Peak, resonance_peaks
+from nldyn.orbits.orbit import Orbit
+from nldyn.search.diagram import Diagram
 
 DATA = Path(__file__).resolve().parent / "data"
 READING_TOLERANCE = 0.01  # what a reader can measure in a plot

@@ -8,13 +8,13 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from nldyn.branch import Branch
-from nldyn.diagrams import Diagram
-from nldyn.long_term_plots import shade_ranges
-from nldyn.orbit import Orbit
+from nldyn.branches.branch import Branch
+from nldyn.orbits.orbit import Orbit
 from nldyn.paper.chaos import CAPTION, FIGURE, SHADED, Chaos
 from nldyn.paper.evidence import orbits_at
-from nldyn.plot import new_axes_pair, plot_diagram, plot_orbit, save_figure
+from nldyn.plot.diagram import new_axes_pair, plot_diagram, plot_orbit, save_figure
+from nldyn.plot.longterm import shade_ranges
+from nldyn.search.diagram import Diagram
 
 Results = Mapping[str, Diagram]
 

@@ -9,17 +9,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cms
-from nldyn.continuation import broken_off
-from nldyn.diagrams import Diagram, Progress, Seed, diagram, notes_on_ends
-from nldyn.elements import Stop
-from nldyn.fixed_point_index import index_note
+from nldyn.base.resources import example
+from nldyn.branches.continuation import broken_off
+from nldyn.branches.options import ContinuationOptions
 from nldyn.paper.starts import follow_starts, keep_numbers, longest_whole, read_starts
 from nldyn.paper.workers import Workers, tell
-from nldyn.progress import compilation_told
-from nldyn.resources import example
-from nldyn.scene import build_component, build_system, load_scene
-from nldyn.step_control import ContinuationOptions
-from nldyn.system import System
+from nldyn.runtime.progress import Progress
+from nldyn.scene.build import build_component, build_system, load_scene
+from nldyn.search.diagram import Diagram, Seed, diagram, notes_on_ends
+from nldyn.search.fixed_point_index import index_note
+from nldyn.system.elements import Stop
+from nldyn.system.system import System
 
 BILINEAR_ALPHA = 790.0  # section 3, from equation 3.2
 STIFFNESS = 16877.0  # N/m, section 3
@@ -210,11 +210,10 @@ def run_job(name: str, family: int, folder: Path) -> Diagram:
     """
     job = job_named(name)
 
-    def progress(what: str, frequency_hz: float) -> None:
+    def progress(what: str, frequency_hz: float, done: float) -> None:
         tell(f"{name}: {what}", frequency_hz)
 
-    with compilation_told(progress):
-        return job.run(family, folder, progress)
+    return job.run(family, folder, progress)
 
 
 def submit_diagrams(

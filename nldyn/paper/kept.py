@@ -12,9 +12,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
 
-from nldyn.resources import PACKAGE
-from nldyn.result_directory import OutputError
-from nldyn.whole_file import write_whole
+from nldyn.base.resources import PACKAGE
+from nldyn.runtime.files import write_whole
+from nldyn.runtime.result_directory import OutputError
 
 Value = TypeVar("Value")
 ENDING = ".unfinished"

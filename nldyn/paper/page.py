@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 
-from nldyn.diagrams import Diagram
+from nldyn.base.version import software_version
 from nldyn.paper.claims import Claim, verdict_counts
 from nldyn.paper.figures import CAPTIONS, legend_text, title
-from nldyn.version import software_version
+from nldyn.search.diagram import Diagram
 
 STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; max-width: 1100px; margin: 2em auto; padding: 0 1em; }

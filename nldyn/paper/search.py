@@ -25,33 +25,28 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from nldyn.beside import range_within
-from nldyn.cli import plain_errors, told_what_is_kept
-from nldyn.closed_walks import by_closed_walks
-from nldyn.command import answering
-from nldyn.crossover import by_crossover
-from nldyn.detour import checked_factors
-from nldyn.detour_search import by_detour
-from nldyn.diagrams import Diagram, Progress
-from nldyn.errors import SystemModelError, check_whole
-from nldyn.exploration import Exploration, ExploreOptions, check_spacing, check_walk_states
-from nldyn.flow import flow_of, same_flow
+from nldyn.base.errors import SystemModelError, check_whole
+from nldyn.flow.flow_map import flow_of, same_flow
+from nldyn.io.branches import load_diagram
+from nldyn.io.checkpoint import CheckpointFile
+from nldyn.io.store import save
+from nldyn.orbits.homotopy import checked_factors
+from nldyn.orbits.starts import MOST_COUNT
 from nldyn.paper.jobs import JOBS, LONG, Job, job_named
-from nldyn.paper.starts import (
-    LONGEST,
-    Start,
-    follow_starts,
-    read_starts,
-    starts_path,
-    write_starts,
-)
-from nldyn.parameters import Parameter
-from nldyn.progress import progress_line
-from nldyn.pseudo_orbit_search import by_pseudo_orbits
-from nldyn.search import MOST_COUNT
-from nldyn.store import load_diagram
-from nldyn.survey import explore
-from nldyn.whole_file import write_whole
+from nldyn.paper.starts import LONGEST, Start, follow_starts, read_starts, starts_path, write_starts
+from nldyn.report.console import plain_errors, told_what_is_kept
+from nldyn.runtime.files import write_whole
+from nldyn.runtime.interruption import answering
+from nldyn.runtime.progress import Progress, progress_line
+from nldyn.search.by_pseudo_orbits import by_pseudo_orbits
+from nldyn.search.diagram import Diagram
+from nldyn.search.exploration import Exploration, ExploreOptions, check_spacing, check_walk_states
+from nldyn.search.explore import explore
+from nldyn.search.extend import range_within
+from nldyn.search.homotopy import by_detour
+from nldyn.search.mixtures import by_crossover
+from nldyn.search.random_walks import by_closed_walks
+from nldyn.system.parameters import Parameter
 
 EFFORT = ExploreOptions(spacing=0.01, starts=1, settling=200, rounds=24, passing=24)
 WAYS: dict[str, Callable[..., Diagram]] = {  # searches beside known branches, by their options
@@ -76,7 +71,7 @@ def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Explorat
         with told_what_is_kept(kept):
             found = explore(
                 job.system(), job.range_hz, LONGEST, effort=effort, options=LONG,
-                known=known, progress=report, checkpoint=kept,
+                known=known, progress=report, checkpoint=CheckpointFile(kept),
             )  # fmt: skip
     write_found(found.diagram, job, folder)
     line = f"{effort.seed},{len(found.diagram.branches) - found.stage.given}\n"
@@ -98,7 +93,7 @@ def _search_beside(name: str, folder: Path, way: str, look: Callable[..., Diagra
         known, place, _ = known_branches(job, folder, report)
         kept = place.with_suffix(f".{way}.h5")
         with told_what_is_kept(kept):
-            found = look(known, options=LONG, progress=report, checkpoint=kept)
+            found = look(known, options=LONG, progress=report, checkpoint=CheckpointFile(kept))
     if len(found.branches) > len(known.branches) or not starts_path(name, folder).exists():
         write_found(found, job, folder)
     kept.unlink(missing_ok=True)
@@ -114,7 +109,7 @@ def known_branches(job: Job, folder: Path, progress: Progress) -> tuple[Diagram,
         doubled = (LONGEST, LONG.max_points)
         system = job.system()
         known = follow_starts(system, starts, job.range_hz, LONG, doubled, progress, whole=True)
-        known.save(place)
+        save(known, place)
     known = load_diagram(place)
     if not _is_of(known, job):
         raise SystemModelError(f"{folder}: {place.stem}* are of another model; delete them")
@@ -124,7 +119,7 @@ def known_branches(job: Job, folder: Path, progress: Progress) -> tuple[Diagram,
 def write_found(found: Diagram, job: Job, folder: Path) -> None:
     """Write the starts of branches, and the branches for the next search."""
     write_starts(starts_path(job.name, folder), found.branches)
-    found.save(branches_path(job, folder, read_starts(job.name, folder))[0])
+    save(found, branches_path(job, folder, read_starts(job.name, folder))[0])
 
 
 def branches_path(job: Job, folder: Path, starts: Sequence[Start]) -> tuple[Path, int]:

@@ -16,17 +16,19 @@ from pathlib import Path
 
 import numpy as np
 
-from nldyn.branch import Branch
-from nldyn.diagrams import Collector, Diagram, Progress, middle_orbit
-from nldyn.errors import SystemModelError, check_frequency, check_whole, numbers
-from nldyn.flow import flow_of
-from nldyn.linear import Real
-from nldyn.orbit import LONGEST_PERIOD, Orbit, check_observe, stroboscopic
+from nldyn.base.arrays import Real
+from nldyn.base.errors import SystemModelError, check_frequency, check_whole, numbers
+from nldyn.branches.branch import Branch
+from nldyn.branches.options import ContinuationOptions
+from nldyn.flow.flow_map import flow_of
+from nldyn.orbits.orbit import Orbit, check_observe, stroboscopic
+from nldyn.orbits.shooting import LONGEST_PERIOD
+from nldyn.orbits.starts import orbit_near
 from nldyn.paper.kept import keep, read_kept
-from nldyn.search import orbit_near
-from nldyn.step_control import ContinuationOptions
-from nldyn.system import System
-from nldyn.whole_file import write_whole
+from nldyn.runtime.files import write_whole
+from nldyn.runtime.progress import Progress, silent
+from nldyn.search.diagram import Collector, Diagram, middle_orbit
+from nldyn.system.system import System
 
 DATA = Path(__file__).parent / "data"
 LONGEST = 3  # period of the orbits looked for
@@ -123,7 +125,7 @@ def follow_starts(
         Longest period to which flips are followed, and most points in one direction of branches
         that are longer in period than `LONGEST` and whose own flips would lead beyond.
     progress : callable, optional
-        Called as ``progress(what, frequency_hz)``.
+        Called as ``progress(what, frequency_hz, done)``.
     whole : bool
         Whether the branches are to be followed any further; if not, see `keep_numbers`.
     keep_at : callable, optional
@@ -149,9 +151,10 @@ def follow_starts(
                 f"{2 * system.size}"
             )
     observe = check_observe(system, None)
-    box = Collector(flow, range_hz, observe, options, progress or (lambda what, hz: None))
+    box = Collector(flow, range_hz, observe, options, progress or silent)
     lost = 0
     for number, start in enumerate(starts):
+        box.done = number / len(starts)
         path = keep_at(number) if keep_at else None
         found: Followed | None = read_kept(path) if path else None
         if found is not None:

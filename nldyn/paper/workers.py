@@ -13,9 +13,8 @@ from multiprocessing.queues import SimpleQueue
 from pathlib import Path
 from typing import TypeVar
 
-from nldyn.diagrams import Progress
 from nldyn.paper.kept import kept
-from nldyn.progress import progress_line
+from nldyn.runtime.progress import Progress, progress_line
 
 Key = TypeVar("Key")
 Value = TypeVar("Value")
@@ -34,7 +33,7 @@ class Workers:
     messages : SimpleQueue
         What each of them is at, with a frequency in Hz.
     report : callable
-        Called as ``report(what, frequency_hz)``.
+        Called as ``report(what, frequency_hz, done)``.
     folder : Path
         Keeps what is computed.
     """
@@ -60,9 +59,9 @@ class Workers:
             done = f"{len(futures) - len(waiting)} of {len(futures)} {what}"
             while not self.messages.empty():
                 at, frequency_hz = self.messages.get()
-                self.report(f"{done}, {at}", frequency_hz)
+                self.report(f"{done}, {at}", frequency_hz, 0.0)
             if ended:
-                self.report(done, 0.0)
+                self.report(done, 0.0, 1.0 - len(waiting) / max(len(futures), 1))
         return {key: future.result() for key, future in futures.items()}
 
 

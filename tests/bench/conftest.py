@@ -2,7 +2,7 @@
 
 import pytest
 
-from nldyn.bench.models import Case, Flip, load_flip
+from bench.models import Case, Flip, load_flip
 
 
 @pytest.fixture(scope="session")

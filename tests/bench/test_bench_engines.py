@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from nldyn.bench import motion
-from nldyn.bench.engines import ENGINES, NLDYN
-from nldyn.bench.measure import errors, flip_frequency_error, measure_engine
-from nldyn.bench.models import load_orbit_start
+from bench import motion
+from bench.engines import ENGINES, NLDYN
+from bench.measure import errors, flip_frequency_error, measure_engine
+from bench.models import load_orbit_start
 
 # setting and largest error allowed
 ACCURACY = {

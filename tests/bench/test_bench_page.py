@@ -5,13 +5,13 @@ import csv
 import numpy as np
 import pytest
 
-from nldyn.bench import run
-from nldyn.bench.figures import draw_model
-from nldyn.bench.measure import Sample
-from nldyn.bench.models import load_case
-from nldyn.bench.page import write_page
-from nldyn.bench.run import auto_flip_points, auto_times, sample_row, special_point_rows
-from nldyn.bench.studies import (
+from bench import run
+from bench.figures import draw_model
+from bench.measure import Sample
+from bench.models import load_case
+from bench.page import write_page
+from bench.run import auto_flip_points, auto_times, sample_row, special_point_rows
+from bench.studies import (
     BRANCHES,
     BranchTime,
     FirstCall,
@@ -20,8 +20,8 @@ from nldyn.bench.studies import (
     pair_up,
     profile_branch,
 )
-from nldyn.bench.targets import all_targets, fastest_rows, ratio_rows, throughput_targets
-from nldyn.bench.throughput import (
+from bench.targets import all_targets, fastest_rows, ratio_rows, throughput_targets
+from bench.throughput import (
     Row,
     Threads,
     by_fixed_steps,
@@ -31,7 +31,7 @@ from nldyn.bench.throughput import (
     rate_at,
     scaling_table,
 )
-from nldyn.result_directory import OutputError
+from nldyn.runtime.result_directory import OutputError
 
 ENGINES = ("nldyn", "solve_ivp DOP853", "solve_ivp DOP853 in numpy")
 

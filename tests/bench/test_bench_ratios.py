@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from nldyn.bench.ratios import envelope, seconds_at, times_faster
+from bench.ratios import envelope, seconds_at, times_faster
 
 FAST = [(10.0**-k, 1e-5 * 10.0 ** (k / 4)) for k in range(2, 13, 2)]
 SLOW = [(10.0**-k, 1e-3 * 10.0 ** (k / 2)) for k in range(1, 12, 2)]

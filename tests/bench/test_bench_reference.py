@@ -3,15 +3,15 @@
 import mpmath
 import numpy as np
 import pytest
+from hard.stiffness import beam_with_stop
 from scipy.integrate import solve_ivp
 
-from nldyn.bench import motion
-from nldyn.bench.exact import ExactFlow, Precision
-from nldyn.bench.measure import errors
-from nldyn.bench.models import MODELS, Case, load_case, load_grazing, stored, to_system, to_table
-from nldyn.bench.reference import model_system
-from nldyn.flow import FlowMap
-from nldyn.hard.stiffness import beam_with_stop
+from bench import motion
+from bench.exact import ExactFlow, Precision
+from bench.measure import errors
+from bench.models import MODELS, Case, load_case, load_grazing, stored, to_system, to_table
+from bench.reference import model_system
+from nldyn.flow.flow_map import FlowMap
 
 
 def by_runge_kutta(case: Case, rtol: float):

@@ -14,9 +14,10 @@ from xml.etree import ElementTree
 
 from PIL import Image
 
-from nldyn import checkpoint, load_branches, load_diagram
-from nldyn.cli import main
-from nldyn.result_directory import MANIFEST
+from nldyn.app.cli import main
+from nldyn.io.branches import load_branches, load_diagram
+from nldyn.runtime import keeper
+from nldyn.runtime.result_directory import MANIFEST
 
 TABLES = ("branches.csv", "special_points.csv", "ends.csv", "branches.h5", "summary.json")
 PICTURES = ("diagram.png", "diagram.svg")
@@ -62,7 +63,7 @@ def run(scene: Path, out: Path, event: int | None = None) -> Callable[[], None]:
     """The work of `nldyn run`, which keeps what it has twenty times a second."""
 
     def work() -> None:
-        checkpoint.PAUSE, checkpoint.SHARE = 0.05, 0.0
+        keeper.PAUSE, keeper.SHARE = 0.05, 0.0
         if event is not None:
             sys.addaudithook(die_at(event))
         main(["run", str(scene), "--out", str(out), "--quiet"])

@@ -1,4 +1,4 @@
-"""The command line called in this process, with limits of time and memory."""
+"""The command line called in this process, with limits of processor time and memory."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from pathlib import Path
 
 from click.testing import CliRunner, Result
 
-from nldyn.cli import main
+from nldyn.app.cli import main
 
-SECONDS = 10.0  # for one command
+SECONDS = 10.0  # of processor time, for one command
+PATIENCE = 60  # times as long by the clock, after which it counts as waiting for ever
 MEMORY = 2_000_000_000  # bytes beyond what the process has at the start
 
 
@@ -21,9 +22,15 @@ class TooLongError(BaseException):
     """A command took longer than it may; not an Exception, so that nothing catches it."""
 
 
+TIMERS = {signal.ITIMER_PROF: (signal.SIGPROF, 1), signal.ITIMER_REAL: (signal.SIGALRM, PATIENCE)}
+
+
 @contextmanager
 def limits(seconds: float = SECONDS, memory: int = MEMORY) -> Iterator[None]:
-    """End what takes longer than some seconds, and refuse it more than some memory."""
+    """End what takes more than some seconds of the processor, and refuse it much memory.
+
+    Not seconds by the clock: other programs may have the processor meanwhile.
+    """
 
     def stop(*_: object) -> None:
         raise TooLongError
@@ -31,13 +38,16 @@ def limits(seconds: float = SECONDS, memory: int = MEMORY) -> Iterator[None]:
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     before = resource.getrlimit(resource.RLIMIT_AS)
     resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + memory, before[1]))
-    handler = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    handlers = {number: signal.signal(number, stop) for number, _ in TIMERS.values()}
+    for timer, (_, times) in TIMERS.items():
+        signal.setitimer(timer, times * seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, handler)
+        for timer in TIMERS:
+            signal.setitimer(timer, 0.0)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
         resource.setrlimit(resource.RLIMIT_AS, before)
 
 

@@ -19,8 +19,8 @@ from typing import Any
 
 from killing import check_results
 
-from nldyn import load_diagram
-from nldyn.command import main
+from nldyn.app.command import main
+from nldyn.io.branches import load_diagram
 
 PROCESSOR_SECONDS = 20  # after which Ctrl-C comes
 PATIENCE = 60  # more of them, after which it counts as not answered

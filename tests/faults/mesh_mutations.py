@@ -92,6 +92,14 @@ def _cut(draw: Any, content: bytes) -> bytes:
     return content[: draw(st.integers(0, len(content)))]
 
 
+def packed_zeros(mebibytes: int) -> bytes:
+    """What zlib makes of so many MiB of zeros, from one MiB: fully flushed blocks may repeat."""
+    raw = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
+    block = raw.compress(bytes(1 << 20)) + raw.flush(zlib.Z_FULL_FLUSH)
+    checksum = ((mebibytes << 20) % 65521 << 16) | 1  # of zeros, by RFC 1950
+    return b"\x78\xda" + mebibytes * block + raw.flush() + checksum.to_bytes(4, "big")
+
+
 @cache
 def bombs() -> dict[str, bytes]:
     """Small files that declare, or unpack to, something huge."""
@@ -101,7 +109,7 @@ def bombs() -> dict[str, bytes]:
     tail = b"$Elements\n1\n1 1 2 1 1 1 2\n$EndElements\n"
     v41 = b"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
     binary = b"$MeshFormat\n4.1 1 8\n" + np.int32(1).tobytes() + b"\n$EndMeshFormat\n"
-    packed = zlib.compress(bytes(1 << 30), 9)
+    packed = packed_zeros(1 << 10)
     header = np.array([1, 1 << 30, 1 << 30, len(packed)], dtype=np.uint32).tobytes()
     array = (base64.b64encode(header) + base64.b64encode(packed)).decode()
     grid = (

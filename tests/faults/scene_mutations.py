@@ -13,7 +13,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from nldyn.resources import example, examples
+from nldyn.base.resources import example, examples
 
 Path = tuple[str | int, ...]
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from killing import same_results
 
-from nldyn import Plane, basins, simulate, study, sweep
+from nldyn import Plane, basins, parameter_study, simulate, sweep
+from nldyn.base.resources import example
 from nldyn.paper.jobs import JOBS, joined, submit_diagrams
 from nldyn.paper.workers import worker_processes
-from nldyn.resources import example
-from nldyn.scene import build_system, load_scene
+from nldyn.scene.build import build_system, load_scene
 
-START = "from nldyn.command import main; main()"
+START = "from nldyn.app.command import main; main()"
 
 
 def test_two_processes_give_the_same_bytes(tmp_path):
@@ -105,8 +105,8 @@ def test_a_study_is_the_same_with_any_number_of_workers(workers):
         "excitation.0.amplitude": [0.1, 0.2, 0.3],
         "damping.modal_ratio": [[0.01, 0.02], [0.03, 0.04]],
     }
-    alone = study(example("bilinear_modal.toml"), values, response)
+    alone = parameter_study(example("bilinear_modal.toml"), values, response)
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-        found = study(example("bilinear_modal.toml"), values, response, executor=pool)
+        found = parameter_study(example("bilinear_modal.toml"), values, response, executor=pool)
     assert found.identical(alone)
     assert len(np.unique(found["size"])) == 6

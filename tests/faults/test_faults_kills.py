@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from killing import TABLES, check_results, check_whole, forked, run, same_results
 
-from nldyn import study
-from nldyn.resources import example
+from nldyn import parameter_study
+from nldyn.base.resources import example
 
 QUICK, FULL = 12, 220
 SHARED_MEMORY = Path("/dev/shm")
@@ -100,7 +100,7 @@ def test_hundreds_of_killed_runs(task, place, record_property):
         record_property(name, count)
 
 
-START = "from nldyn.command import main; main()"
+START = "from nldyn.app.command import main; main()"
 
 
 @pytest.mark.slow
@@ -135,13 +135,13 @@ def test_results_that_a_killed_run_had_moved_away_are_put_back(task, place):
 
 
 def check(out):
-    from nldyn.result_directory import check_directory
+    from nldyn.runtime.result_directory import check_directory
 
     check_directory(out)
 
 
 def test_the_draft_of_a_run_at_work_is_left_alone(tmp_path):
-    from nldyn.result_directory import check_directory, result_directory
+    from nldyn.runtime.result_directory import check_directory, result_directory
 
     with result_directory(tmp_path / "out", "run") as draft:
         assert forked(lambda: check_directory(tmp_path / "out"), tmp_path / "log") == 0
@@ -160,9 +160,9 @@ def test_a_killed_study_goes_on_with_the_cases_it_has(tmp_path):
     values = {"stops.0.gap": [1e-6 * k for k in range(150)]}
 
     def work():
-        study(example("one_dof.toml"), values, measured, keep=keep)
+        parameter_study(example("one_dof.toml"), values, measured, keep=keep)
 
-    work_once = study(example("one_dof.toml"), values, measured)
+    work_once = parameter_study(example("one_dof.toml"), values, measured)
     kept = 0
     for _ in range(6):
         assert forked(work, tmp_path / "log", chance.uniform(0.05, 0.3)) in (0, -signal.SIGKILL)
@@ -172,5 +172,5 @@ def test_a_killed_study_goes_on_with_the_cases_it_has(tmp_path):
                 json.loads(line)
             assert len(lines) >= kept
             kept = len(lines)
-    found = study(example("one_dof.toml"), values, measured, keep=keep)
+    found = parameter_study(example("one_dof.toml"), values, measured, keep=keep)
     assert found.identical(work_once)

@@ -12,7 +12,8 @@ from small_meshes import write_meshes
 
 import fem
 from fem.page import write_page
-from nldyn.scene import SceneError, build_component, load_scene, parse_scene
+from nldyn.base.errors import SceneError
+from nldyn.scene.build import build_component, load_scene, parse_scene
 
 IN_FOLDER = "outside the folder of the scene and the current one"
 

@@ -12,7 +12,7 @@ from limited_runs import check_ended, limited_run
 from random_scenes import altered_scene, random_scene
 from small_meshes import fuzz, write_meshes
 
-from nldyn.cli import main
+from nldyn.app.cli import main
 
 QUICK, FULL = 8, 150
 SOON = 4  # s of processor time

@@ -12,8 +12,8 @@ from limited_commands import command, refusal
 from scene_mutations import TEXTS, document, spoil, tweak
 from small_meshes import fuzz, write_meshes
 
-from nldyn.resources import mesh
-from nldyn.scene import build_component, build_system, load_scene
+from nldyn.base.resources import mesh
+from nldyn.scene.build import build_component, build_system, load_scene
 
 QUICK, FULL = 50, 4000
 KEYS = {name: tomllib.loads(text) for name, text in TEXTS.items()}

@@ -142,6 +142,18 @@ def solid_plate():
     )
 
 
+def shell_plate(thickness, held, skew=False, kind="quad", n=16):
+    """FV12, FV15, FV16 and FV22 as shells: the middle plane, 10 m by 10 m."""
+    mesh = fem.box_mesh("plate", (10.0, 10.0), (n, n), kind=kind)
+    x, y, z = mesh.points.T
+    if skew:
+        mesh = mesh.with_points(np.column_stack([x + y / np.sqrt(2.0), y / np.sqrt(2.0), z]))
+    supports = [fem.Support("plate", ("x", "y", "rotation_z"))]
+    supports += [fem.Support(side, CLAMP) for side in held]
+    return fem.StructureModel(mesh, {"plate": fem.ShellPart(STEEL, thickness)}, supports=supports)
+
+
+SIDES = ("x0", "x1", "y0", "y1")
 BENCHMARKS = [
     Benchmark(
         "FV2 pin-ended double cross", double_cross, 0,
@@ -176,6 +188,23 @@ BENCHMARKS = [
     Benchmark(
         "FV22 clamped thick rhombic plate", partial(rhombic_plate, 1.0, (16, 16, 2)), 0,
         (133.95, 201.41, 265.81, 283.68, 334.45, 386.62), "16 x 16 x 2 hexahedron20", 0.028,
+    ),
+    Benchmark(
+        "FV12 free thin square plate", partial(shell_plate, 0.05, ()), 3,
+        (1.622, 2.360, 2.922, 4.233, 4.233, 7.416), "shell, 16 x 16 quad", 0.015,
+    ),
+    Benchmark(
+        "FV15 clamped thin rhombic plate", partial(shell_plate, 0.05, SIDES, skew=True, n=32), 0,
+        (7.938, 12.835, 17.941, 19.133, 24.009, 27.922), "shell, 32 x 32 quad", 0.011,
+    ),
+    Benchmark(
+        "FV16 cantilevered thin square plate",
+        partial(shell_plate, 0.05, ("x0",), kind="triangle"), 0,
+        (0.421, 1.029, 2.582, 3.306, 3.753, 6.555), "shell, 16 x 16 x 2 triangle", 0.0125,
+    ),
+    Benchmark(
+        "FV22 clamped thick rhombic plate", partial(shell_plate, 1.0, SIDES, skew=True, n=32), 0,
+        (133.95, 201.41, 265.81, 283.68, 334.45, 386.62), "shell, 32 x 32 quad", 0.022,
     ),
     Benchmark(
         "FV32 cantilevered tapered membrane", tapered_membrane, 0,

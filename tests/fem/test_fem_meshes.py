@@ -129,13 +129,17 @@ def test_a_written_mesh_comes_back_to_the_last_bit(tmp_path, extension):
         assert {name: value.tolist() for name, value in getattr(back, kind).items()} == expected
 
 
-def test_nodes_and_cells_off_the_frame_are_left_out():
+def test_nodes_off_the_frame_are_left_out_and_cells_off_it_are_told():
     content = meshio.Mesh(
         [[9.0, 9.0], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
         [("triangle", [[1, 2, 3]]), ("line", [[1, 2]])],
-        cell_data={"set:rod": [[0], [1]]},
+        cell_data={"set:rod": [[0], [1]], "set:web": [[1], [0]]},
         point_sets={"tip": [2], "outside": [0, 3]},
     )
+    with pytest.raises(fem.ModelError, match=r"not read: 1 triangle \(in 'web'; block 0 of"):
+        fem.from_meshio(content)
+    del content.cells[0]
+    content.cell_data = {"set:rod": [[1]]}
     mesh = fem.from_meshio(content)
     assert mesh.points.tolist() == [[0, 0, 0], [1, 0, 0]]
     assert mesh.node("tip") == 1
@@ -296,6 +300,15 @@ def test_a_bad_abaqus_file_is_one_sentence_with_its_name(tmp_path, text, sentenc
 def test_unusable_files_of_gmsh_are_one_sentence(name, sentence):
     with pytest.raises(fem.ModelError, match=sentence):
         fem.read_mesh(DATA / name)
+
+
+def test_straight_lines_of_second_order_are_cut_at_their_middle_nodes():
+    path = DATA / "gmsh41_second_order.msh"
+    frame, whole = fem.read_mesh(path), fem.read_structure(path)
+    threes = whole.cells["line3"]
+    assert len(frame.lines) == 2 * len(threes)
+    pieces = np.stack([threes[:, [0, 2]], threes[:, [2, 1]]], axis=1).reshape(-1, 2)
+    assert np.array_equal(frame.points[frame.lines], whole.points[pieces])
 
 
 @pytest.mark.parametrize("name", ["missing.msh", "missing.vtu", "missing.inp"])

@@ -51,6 +51,34 @@ def block(kind, lengths=(1.0, 0.05, 0.02), poisson=0.3, thickness=None, plane=No
     )
 
 
+def trusses():
+    part = fem.TrussPart(STEEL, 1e-4)
+    held = [fem.Support("a", ("x", "y")), fem.Support("c", "y")]
+    return fem.FrameModel(
+        fem.frame_mesh({"a": (0, 0), "b": (1, 2), "c": (2, 0.5)}, [("p", "a", "b", 1),
+                       ("p", "b", "c", 1), ("p", "a", "c", 1)]),
+        parts={"p": part}, supports=held,
+    )  # fmt: skip
+
+
+def curved_truss():
+    points = [[0, 0, 0], [1, 0, 0.2], [0.45, 0.2, 0.1]]
+    mesh = fem.StructureMesh(points, {"line3": [[0, 1, 2]]}, {"p": {"line3": [0]}}, {"a": [0]})
+    held = [fem.Support("a", ("x", "y", "z")), fem.Support("p", "z")]
+    return fem.StructureModel(mesh, {"p": fem.TrussPart(STEEL, 1e-4)}, supports=held)
+
+
+def shell(kind, offset=0.0):
+    mesh = fem.box_mesh("s", (1.0, 0.5), (4, 3), kind=kind)
+    x, y, _ = mesh.points.T
+    points = np.column_stack([x, y, 0.2 * x**2 - 0.3 * x * y])
+    return fem.StructureModel(
+        mesh.with_points(points),
+        parts={"s": fem.ShellPart(STEEL, 1e-3, offset)},
+        supports=[fem.Support("x0", ("x", "y", "z"))],
+    )
+
+
 MODELS = {
     "frame": frame(),
     "Timoshenko's frame": frame("timoshenko"),
@@ -62,7 +90,13 @@ MODELS = {
     "beams with an offset": beams("timoshenko", offset=(0.02, 0.03)),
     "hexahedra": block("hexahedron"),
     "hexahedra, 20 nodes": block("hexahedron20"),
+    "wedges, 15 nodes": block("wedge15"),
+    "pyramids, 13 nodes": block("pyramid13"),
     "tetrahedra, 10 nodes, negative Poisson's ratio": block("tetra10", poisson=-0.3),
+    "shell of quadrilaterals": shell("quad"),
+    "trusses": trusses(),
+    "curved truss of three nodes": curved_truss(),
+    "shell of triangles with an offset": shell("triangle", 0.01),
     "quadrilaterals in plane stress": block("quad8", (1.0, 0.05), thickness=0.01, plane="stress"),
 }
 

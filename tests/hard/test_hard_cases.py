@@ -4,18 +4,35 @@ import math
 
 import pytest
 
-from nldyn.hard.case import Case, Measured
-from nldyn.hard.cases import CASES
-from nldyn.hard.page import row, write_page
-from nldyn.hard.run import measure, run
-from nldyn.result_directory import OutputError
+from hard.case import Case, Measured
+from hard.cases import CASES
+from hard.page import row, write_page
+from hard.run import measure, run
+from nldyn.runtime.result_directory import OutputError
+
+# of processor time they take two thirds; `make hard` computes them all, and -m slow these
+LONG = (
+    "1 kg that swings 1 m, stop of 1e+06 N/m^1.5",
+    "energy of the 1-DOF model over 1e5 periods, in roundings",
+    "free vibration against a Hertz stop, 1e-05 m",
+    "free vibration against a Hertz stop, 0.1 m",
+    "period 30 at 36 Hz, multiplier above 1e+06",
+    "multipliers of the orbit of period 30",
+    "free body between two stops, a thousand impacts",
+    "period with 12 impacts",
+    "folds of the harmonic branch, 1-DOF model",
+    "three branches within 1e-6 of each other",
+    "scene in mm, t and s, modal frequencies",
+)
+
+
+def marks(case):
+    known = [pytest.mark.xfail(strict=True, reason=case.fault)] if case.fault else []
+    return known + [pytest.mark.slow] * (case.name in LONG)
+
 
 QUICK = [
-    pytest.param(
-        case,
-        id=f"{case.subject}: {case.name}",
-        marks=[pytest.mark.xfail(strict=True, reason=case.fault)] if case.fault else [],
-    )
+    pytest.param(case, id=f"{case.subject}: {case.name}", marks=marks(case))
     for case in CASES
     if case.quick
 ]
@@ -25,6 +42,10 @@ QUICK = [
 def test_hard_case_stays_within_its_bound(case):
     result = measure(case)
     assert result.passed, f"{result.measured.error:.1e} > {case.bound:.0e}: {result.measured.note}"
+
+
+def test_the_long_cases_are_among_the_quick_ones():
+    assert {case.name for case in CASES if case.quick}.issuperset(LONG)
 
 
 def made_up(run, bound=1.0, fault=""):

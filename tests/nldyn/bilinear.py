@@ -14,7 +14,7 @@ import mpmath as mp
 import numpy as np
 
 from nldyn import HarmonicForce, Stop, System
-from nldyn.orbit import Orbit
+from nldyn.orbits.orbit import Orbit
 
 mp.mp.dps = 30
 SAMPLES = 20000

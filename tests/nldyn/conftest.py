@@ -3,7 +3,7 @@
 import pytest
 from one_dof import RANGE_HZ, THREE_HZ, make_one_dof
 
-from nldyn import Diagram, ExploreOptions, System, continue_branch, explore, solve_orbit
+from nldyn import Diagram, System, continue_branch, solve_orbit
 
 
 @pytest.fixture(scope="session")
@@ -21,6 +21,14 @@ def harmonic_branch(one_dof):
 @pytest.fixture(scope="session")
 def three(one_dof) -> Diagram:
     """The branches of periods 1, 2 and 3 at THREE_HZ, the last of which ends at a fold."""
-    found = explore(one_dof, THREE_HZ, 3, effort=ExploreOptions(spacing=0.01, starts=2)).diagram
-    assert sorted(branch.period for branch in found.branches) == [1, 2, 3]
-    return found
+    orbits = [
+        solve_orbit(one_dof, 36.5),
+        solve_orbit(one_dof, 36.9, 3, guess=[-1.784e-05, 3.800e-4]),
+        solve_orbit(one_dof, 37.6, 2, guess=[-2.318e-05, 5.069e-5]),
+    ]
+    assert [orbit.period for orbit in orbits] == [1, 3, 2]
+    names = "01 harmonic", "02 1/3", "03 1/2"
+    branches = (
+        continue_branch(o, THREE_HZ, name=name) for o, name in zip(orbits, names, strict=True)
+    )
+    return Diagram(tuple(branches), THREE_HZ, "middle")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from nldyn import Orbit
-from nldyn.orbit import refine, shooting_problem
+from nldyn.orbits.newton import refine
+from nldyn.orbits.shooting import shooting_problem
 
 
 def run_through(orbit: Orbit, times: int) -> Orbit:

@@ -4,10 +4,10 @@ import numpy as np
 from scipy import sparse
 
 import cms
-from nldyn import Setting, Stop, Unbalance
+from nldyn import LoadCase, Stop, Unbalance
 
 MASSES, MASS, SPRING = 41, 0.05, 141000.0
-SETTING = Setting(
+SETTING = LoadCase(
     (30.0, 45.0),
     stops=(Stop("middle", stiffness=2e7),),
     excitation=(Unbalance("middle", 2e-4),),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from bench.models import load_case
 from independent import Motion
 
 from nldyn import (
@@ -17,8 +18,7 @@ from nldyn import (
     SystemModelError,
     Unbalance,
 )
-from nldyn.bench.models import load_case
-from nldyn.shooting import ShootingProblem
+from nldyn.orbits.shooting import ShootingProblem
 
 CASES = ["one_dof", "two_dof", "four_dof", "sixteen_dof"]
 

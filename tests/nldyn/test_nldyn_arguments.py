@@ -21,9 +21,7 @@ from nldyn import (
     System,
     SystemModelError,
     Unbalance,
-    Walk,
     cascade,
-    cascades_in,
     continue_branch,
     continue_constant,
     continue_in,
@@ -32,21 +30,21 @@ from nldyn import (
     diagram,
     explore,
     find_orbits,
+    harmonics,
     index_sum,
-    load_curve,
     normal_form,
-    plot_contact_force,
-    plot_curves,
-    plot_diagram,
-    plot_history,
-    plot_phase_portrait,
-    plot_spectrum,
     refine_special,
+    save,
     solve_orbit,
-    spectrum,
-    switch_at_branch_point,
-    switch_at_flip,
 )
+from nldyn.bifurcations.normal_forms import switch_at_branch_point
+from nldyn.bifurcations.period_doubling import switch_at_flip
+from nldyn.branches.arclength import Stepper
+from nldyn.branches.cascades import cascades_in
+from nldyn.io.curves import load_curve
+from nldyn.plot.curves import plot_curves
+from nldyn.plot.diagram import plot_diagram
+from nldyn.plot.orbit import plot_contact_force, plot_history, plot_phase_portrait, plot_spectrum
 
 JUNK = (None, "nonsense", [], {"a": 1}, math.nan, -1.0, 10**400, object())
 PAIR, WINDOW = ("frequency_hz", "gap"), ((20.0, 30.0), (-1e-6, 1e-6))
@@ -99,17 +97,17 @@ def test_what_is_no_special_point_is_refused(function, arguments):
 
 
 @pytest.mark.parametrize(
-    "plot", [plot_history, plot_phase_portrait, plot_spectrum, plot_contact_force, spectrum]
+    "plot", [plot_history, plot_phase_portrait, plot_spectrum, plot_contact_force, harmonics]
 )
 def test_what_is_no_orbit_cannot_be_drawn(plot, orbit):
     check_named(refused(plot), "orbit must be an Orbit, got")
-    if plot is not spectrum:
+    if plot is not harmonics:
         axes = [junk for junk in JUNK if junk is not None]
         check_named(refused(lambda junk: plot(orbit, junk), *axes), "ax must be an Axes or None")
     if plot is not plot_contact_force:
         said = refused(lambda junk: plot(orbit, interface=junk), [], 3, math.nan)
         check_named(said, "interface must be a str or None")
-    word = "orders" if plot in (plot_spectrum, spectrum) else "samples"
+    word = "orders" if plot in (plot_spectrum, harmonics) else "samples"
     said = refused(lambda junk: plot(orbit, **{word: junk}))
     check_named(said, f"{word} must be a whole number")
 
@@ -171,14 +169,14 @@ def test_numbers_of_a_parameter_are_checked():
     check_named(said, "Parameter: index must be a whole number")
 
 
-@pytest.mark.parametrize("name", ["orbit", "range_hz", "at", "options", "progress", "name"])
+@pytest.mark.parametrize("name", ["start", "range_hz", "at", "options", "progress", "name"])
 def test_arguments_of_a_continuation_are_named(name, orbit):
-    good = {"orbit": orbit, "range_hz": (25.0, 27.0)}
+    good = {"start": orbit, "range_hz": (25.0, 27.0)}
     junk = {
         "options": [x for x in JUNK if x is not None],
         "progress": [x for x in JUNK if x is not None],
         "name": [x for x in JUNK if x != "nonsense"],
-        "at": [None, "nonsense", math.nan, -1.0, [None], [math.nan], [-26.0], ["26"], [99.0], 26.0],
+        "at": ["nonsense", math.nan, -1.0, [None], [math.nan], [-26.0], ["26"], [99.0], 26.0],
     }.get(name, JUNK)
     said = refused(lambda value: continue_branch(**{**good, name: value}), *junk)
     check_named(said, name)
@@ -273,6 +271,7 @@ def test_other_arguments_of_a_wrong_kind_are_named(one_dof, orbit, harmonic_bran
         refused(lambda x: diagram(one_dof, (20.0, 30.0), [], seeds=[x])), "seeds: each must be"
     )
     for name in ("search_points", "doublings"):
+
         def call(x, name=name):
             return diagram(one_dof, (20.0, 30.0), [1], **{name: x})
 
@@ -282,11 +281,11 @@ def test_other_arguments_of_a_wrong_kind_are_named(one_dof, orbit, harmonic_bran
         said = refused(lambda x, kind=kind: kind(x, 1e9), 3, [], math.nan)
         check_named(said, f"{name}: at must be a str")
     curve = tmp_path / "curve.h5"
-    continue_in(orbit, "frequency_hz", (25.5, 26.5)).save(curve)
+    save(continue_in(orbit, "frequency_hz", (25.5, 26.5)), curve)
     for name in ("laws", "monitor"):
         said = refused(lambda x, name=name: load_curve(curve, **{name: x}), 3, "text", [1])
         check_named(said, f"{name} must be")
-    check_named(refused(lambda x: Walk(x, (25.0, 27.0), ContinuationOptions())), "start must be")
+    check_named(refused(lambda x: Stepper(x, (25.0, 27.0), ContinuationOptions())), "start must be")
     check_named(refused(lambda x: one_dof.with_elements(stops=x), 3, [3]), "stop")
 
 
@@ -355,5 +354,5 @@ def test_element_that_a_system_does_not_have_is_told_apart_from_none_at_all():
     ):
         with pytest.raises(SystemModelError, match=told):
             continue_in(orbit, Parameter(name, index), (1.0, 2.0))
-    with pytest.raises(SystemModelError, match="range_hz must hold numbers only"):
+    with pytest.raises(SystemModelError, match="continue_branch: an orbit needs a range_hz"):
         continue_branch(orbit, None)

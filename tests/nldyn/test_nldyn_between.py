@@ -5,13 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hard.continuation import beam
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from nldyn import ContinuationOptions, continue_branch, solve_orbit
-from nldyn.between import Between
-from nldyn.hard.continuation import beam
+from nldyn.bifurcations.hidden_pairs import Between
 
 PLACES = (-0.8, 0.0, 1.0, 1.9)
 

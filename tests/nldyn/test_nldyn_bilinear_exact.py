@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from bilinear import Bilinear, PiecewiseOrbit
 
-from nldyn import continue_branch, continue_special, solve_orbit, switch_at_flip
-from nldyn.trail import trace
+from nldyn import continue_branch, continue_special, solve_orbit
+from nldyn.bifurcations.period_doubling import switch_at_flip
+from nldyn.branches.leg import trace
 
 OSCILLATOR = Bilinear(damping=0.04, stiffness=1.0, stop=40.0, gap=0.0, force=1.0)
 MULTIPLIER = {"LP": 1, "PD": -1}

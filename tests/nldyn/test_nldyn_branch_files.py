@@ -3,6 +3,7 @@
 import dataclasses
 import os
 import shutil
+from functools import partial
 
 import h5py
 import numpy as np
@@ -24,14 +25,13 @@ from nldyn import (
     Unbalance,
     continue_branch,
     diagram,
-    load_branch,
-    load_branches,
-    load_diagram,
+    save,
     solve_orbit,
-    store,
 )
-from nldyn.result_directory import OutputError
-from nldyn.whole_file import check_writable
+from nldyn.io import branches as store
+from nldyn.io.branches import load_branch, load_branches, load_diagram
+from nldyn.runtime.files import check_writable
+from nldyn.runtime.result_directory import OutputError
 
 
 def two_modes():
@@ -61,7 +61,7 @@ def branch():
 @pytest.fixture(scope="module")
 def saved(branch, tmp_path_factory):
     path = tmp_path_factory.mktemp("saved") / "branch.h5"
-    branch.save(path)
+    save(branch, path)
     return path
 
 
@@ -110,7 +110,7 @@ def test_tables_of_a_loaded_branch_are_the_same(branch, saved):
 
 
 def test_special_points_and_folds_of_a_long_branch_come_back(harmonic_branch, tmp_path):
-    harmonic_branch.save(tmp_path / "harmonic.h5")
+    save(harmonic_branch, tmp_path / "harmonic.h5")
     loaded = load_branch(tmp_path / "harmonic.h5")
     assert {s.kind for s in loaded.special_points} >= {"LP", "PD", "GR"}
     assert_same_branches(loaded, harmonic_branch)
@@ -121,12 +121,12 @@ def test_a_branch_without_a_stop_comes_back(tmp_path):
         [13.0], {"tip": [0.6]}, modal_damping=0.02, excitation=[Unbalance("tip", 5e-6)]
     )
     branch = continue_branch(solve_orbit(system, 10.0), (9.0, 12.0))
-    branch.save(tmp_path / "linear.h5")
+    save(branch, tmp_path / "linear.h5")
     assert_same_branches(load_branch(tmp_path / "linear.h5"), branch)
 
 
 def test_saving_a_loaded_branch_gives_the_same_file(saved, tmp_path):
-    load_branch(saved).save(tmp_path / "again.h5")
+    save(load_branch(saved), tmp_path / "again.h5")
     assert (tmp_path / "again.h5").read_bytes() == saved.read_bytes()
 
 
@@ -146,7 +146,7 @@ def test_several_branches_in_one_file(one_dof, tmp_path):
     whole = diagram(one_dof, (30.0, 40.0), [1, 2], search_points=1)
     assert len(whole.branches) > 1
     path = tmp_path / "diagram.h5"
-    whole.save(path)
+    save(whole, path)
     loaded = load_diagram(path)
     assert (loaded.range_hz, loaded.observe, loaded.notes) == ((30.0, 40.0), "middle", whole.notes)
     for mine, other in zip(loaded.branches, whole.branches, strict=True):
@@ -190,7 +190,7 @@ def test_every_dataset_has_a_unit_and_the_file_its_version(saved):
 def test_points_of_different_systems_are_refused(branch, harmonic_branch, tmp_path):
     mixed = Branch("mixed", 1, (branch.nodes[0], harmonic_branch.nodes[0]), (), ("", ""))
     with pytest.raises(SystemModelError, match="'mixed' cannot be saved"):
-        mixed.save(tmp_path / "mixed.h5")
+        save(mixed, tmp_path / "mixed.h5")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -209,7 +209,7 @@ def test_a_law_of_the_users_own_is_passed_again(tmp_path):
     system = make_one_dof(stops=[Stop("middle", 5e9, law=hertz)])
     branch = continue_branch(solve_orbit(system, 26.0), (25.8, 26.2))
     path = tmp_path / "law.h5"
-    branch.save(path)
+    save(branch, path)
     assert_same_branches(load_branch(path, laws={0: hertz}), branch)
     refused(path, "stop 0 at 'middle'", "laws={0: law}")
     refused(path, "no stop 1 has a law of its own", laws={0: hertz, 1: hertz})
@@ -351,7 +351,7 @@ def test_an_error_while_writing_leaves_the_old_file(branch, copy, monkeypatch, s
     before = copy.read_bytes()
     monkeypatch.setattr(os, step, full)
     with pytest.raises(OutputError, match=r"copy\.h5: cannot be written: no space left"):
-        branch.save(copy)
+        save(branch, copy)
     assert copy.read_bytes() == before
     assert [entry.name for entry in copy.parent.iterdir()] == ["copy.h5"]
 
@@ -363,7 +363,7 @@ def test_ctrl_c_while_writing_leaves_the_old_file(branch, copy, monkeypatch):
     before = copy.read_bytes()
     monkeypatch.setattr(os, "fsync", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        branch.save(copy)
+        save(branch, copy)
     assert copy.read_bytes() == before
     assert [entry.name for entry in copy.parent.iterdir()] == ["copy.h5"]
 
@@ -380,7 +380,7 @@ def test_places_that_cannot_be_written_are_named(branch, tmp_path):
         (locked / "b.h5", "the folder is read-only"),
     ):
         with pytest.raises(OutputError, match=fault):
-            branch.save(place)
+            save(branch, place)
     locked.chmod(0o755)
     assert list(locked.iterdir()) == []
 
@@ -390,14 +390,14 @@ def test_what_is_not_a_name_of_a_file_is_refused(branch):
         load_branch(3)
     for name in (3, "a\0b"):
         with pytest.raises(OutputError, match="cannot be the name of a file"):
-            branch.save(name)
+            save(branch, name)
 
 
 @pytest.mark.parametrize("length", [245, 255, 300])
 def test_a_name_that_is_too_long_is_refused_before_any_work(branch, tmp_path, length):
     """Also one that is itself short enough, but not with what is added while it is written."""
     place = tmp_path / ("b" * (length - 3) + ".h5")
-    for write in (branch.save, check_writable):
+    for write in (partial(save, branch), check_writable):
         with pytest.raises(OutputError, match="cannot be the name of a file: file name too long"):
             write(place)
 
@@ -407,7 +407,7 @@ def test_writing_follows_a_link(branch, tmp_path):
     link, place = tmp_path / "link.h5", there / "branch.h5"
     link.symlink_to(place)
     for _ in range(2):
-        branch.save(link)
+        save(branch, link)
         assert link.is_symlink() and [entry.name for entry in there.iterdir()] == ["branch.h5"]
         assert_same_branches(load_branch(link), branch)
 

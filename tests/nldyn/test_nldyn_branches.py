@@ -20,23 +20,23 @@ from nldyn import (
     System,
     SystemModelError,
     Unbalance,
-    Walk,
     continue_branch,
     diagram,
     find_orbits,
     solve_orbit,
-    switch_at_flip,
 )
-from nldyn._events import branch_point_test, flip_test, torus_test
-from nldyn.branch import BranchPoint
-from nldyn.continuation import start_point
-from nldyn.orbit import Orbit, minimal_period, same_orbit
-from nldyn.peaks import lowest_orbit, resonance_peaks
-from nldyn.resources import example
-from nldyn.roots import LocateError
-from nldyn.scene import build_system, load_scene
-from nldyn.step_search import special_points_between
-from nldyn.trail import trace
+from nldyn.base.errors import LocateError
+from nldyn.base.resources import example
+from nldyn.bifurcations.period_doubling import switch_at_flip
+from nldyn.bifurcations.point import BranchPoint
+from nldyn.bifurcations.within_step import special_points_between
+from nldyn.branches.arclength import Stepper
+from nldyn.branches.continuation import start_point
+from nldyn.branches.leg import trace
+from nldyn.branches.peaks import lowest_orbit, resonance_peaks
+from nldyn.orbits.multiplier_tests import branch_point_test, flip_test, torus_test
+from nldyn.orbits.orbit import Orbit, minimal_period, same_orbit
+from nldyn.scene.build import build_system, load_scene
 
 
 @pytest.fixture(scope="module")
@@ -165,7 +165,7 @@ def test_flip_that_is_not_found_leaves_no_point_twice(harmonic_branch, monkeypat
     def fails(*_, **__):
         raise ConvergenceError("no orbit")
 
-    monkeypatch.setattr("nldyn.doubling.refine", fails)
+    monkeypatch.setattr("nldyn.bifurcations.period_doubling.refine", fails)
     flip = next(f for f in flips(harmonic_branch) if 8.0 < f.frequency_hz < 11.0)
     nodes, _, reason, _ = trace(switch_at_flip(flip), (5.7, 90.0))
     assert reason.startswith("meets the branch of period 1 beyond 10.4")
@@ -379,12 +379,12 @@ def test_both_orbits_close_to_a_fold_are_given(harmonic_branch, index):
 
 def test_walk_can_be_stopped_between_two_points_and_taken_up_again(one_dof):
     start = start_point(solve_orbit(one_dof, 45.0), 1.0, RANGE_HZ)
-    walk = Walk(start, (40.0, 60.0), ContinuationOptions())
+    walk = Stepper(start, (40.0, 60.0), ContinuationOptions())
     some = list(itertools.islice(walk, 4))
     assert [p.arclength for p in some] == sorted(p.arclength for p in some)
     assert some[0] is start
     assert walk.stop_reason == "not finished"
-    rest = Walk(some[-1], (40.0, 60.0), ContinuationOptions())
+    rest = Stepper(some[-1], (40.0, 60.0), ContinuationOptions())
     points = list(rest)
     assert rest.stop_reason == "end of the frequency range"
     assert points[-1].orbit.frequency_hz == pytest.approx(60.0, rel=1e-14)
@@ -438,9 +438,9 @@ def test_branch_notes_where_special_points_may_be_missing(one_dof, monkeypatch, 
     def fails(*_):
         raise LocateError("no root found")
 
-    monkeypatch.setattr("nldyn.trail.special_points_between", fails)
+    monkeypatch.setattr("nldyn.branches.leg.special_points_between", fails)
     if middle_fails:
-        monkeypatch.setattr("nldyn.trail.Chord.at", fails)
+        monkeypatch.setattr("nldyn.branches.leg.Chord.at", fails)
     branch = continue_branch(solve_orbit(one_dof, 33.0), (32.9, 33.1))
     pieces = (1 if middle_fails else 16) * (len(branch.points) - 1)
     assert len(branch.notes) == pieces

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from hard.continuation import beam as four_modes
 from one_dof import between_stops, make_one_dof
 from test_nldyn_uncoupled import oscillator
 
@@ -23,23 +24,21 @@ from nldyn import (
     continue_branch,
     diagram,
     solve_orbit,
-    special,
-    switch_at_branch_point,
-    switch_at_flip,
-    walk,
 )
-from nldyn.branch import BranchPoint
-from nldyn.continuation import _without_repeat, start_point
-from nldyn.hard.continuation import beam as four_modes
-from nldyn.near_crossing import distance, lies_on_crossing
-from nldyn.normal_forms import is_symmetric
-from nldyn.resources import example
-from nldyn.roots import LocateError
-from nldyn.scene import build_system, load_scene
-from nldyn.shooting import asymmetry, metric_length
-from nldyn.step_search import special_points_between
-from nldyn.trail import Leg
-from nldyn.walk import BY_TOLERANCE
+from nldyn.base.errors import LocateError
+from nldyn.base.resources import example
+from nldyn.bifurcations import locate as special
+from nldyn.bifurcations.branch_crossing import distance, lies_on_crossing
+from nldyn.bifurcations.normal_forms import is_symmetric, switch_at_branch_point
+from nldyn.bifurcations.period_doubling import switch_at_flip
+from nldyn.bifurcations.point import BranchPoint
+from nldyn.bifurcations.within_step import special_points_between
+from nldyn.branches import arclength as walk
+from nldyn.branches.arclength import BY_TOLERANCE
+from nldyn.branches.continuation import _without_repeat, start_point
+from nldyn.branches.leg import Leg
+from nldyn.orbits.shooting import asymmetry, metric_length
+from nldyn.scene.build import build_system, load_scene
 
 SHORT = ContinuationOptions(first_step=0.005, max_step=0.005)
 LONG = ContinuationOptions(first_step=0.05)
@@ -194,16 +193,25 @@ def on_springs(ratio: float, force: float, *stops: Stop) -> System:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("place", [2, 9, 20, 30])
-def test_flips_on_both_sides_of_a_grazing_point_within_a_step_are_found(place):
-    """Between 8.8543 and 8.8578 Hz two pairs of flips lie around the grazing points of a branch."""
+@pytest.fixture(scope="module")
+def flips_around_grazing():
+    """A branch of period 4, and its special points with short steps."""
     system = on_springs(0.02, 5.0, *(Stop("m", 1e7, gap=1e-3, direction=side) for side in (1, -1)))
     guess = np.array([0.00096285, -0.00178918])
     start = solve_orbit(system, 8.856826796779755, 4, guess=guess)
     fine = ContinuationOptions(max_step=0.0005, first_step=0.0005)
     expected = special_points(continue_branch(start, (8.8, 8.9), options=fine))
     assert [kind for kind, _ in expected].count("PD") == 4
-    usual = continue_branch(continue_branch(start, (8.8, 8.9)).points[place], (8.8, 8.9))
+    return continue_branch(start, (8.8, 8.9)), expected
+
+
+@pytest.mark.parametrize("place", [2, 9, 20, 30])
+def test_flips_on_both_sides_of_a_grazing_point_within_a_step_are_found(
+    flips_around_grazing, place
+):
+    """Between 8.8543 and 8.8578 Hz two pairs of flips lie around the grazing points of a branch."""
+    branch, expected = flips_around_grazing
+    usual = continue_branch(branch.points[place], (8.8, 8.9))
     assert sorted(special_points(usual)) == [
         (kind, pytest.approx(hz, rel=1e-9)) for kind, hz in sorted(expected)
     ]
@@ -244,14 +252,15 @@ def test_grazing_point_beside_a_flip_is_found_where_the_contact_is_too_slight_to
         ]
 
 
-def test_end_of_a_doubled_branch_is_told_as_no_fold():
+@pytest.mark.parametrize("every", [18, pytest.param(6, marks=pytest.mark.slow)])
+def test_end_of_a_doubled_branch_is_told_as_no_fold(every):
     """The branch turns at its flip; from this start rounding put two folds there."""
     ratio, stop = 0.037775752970254865, Stop("m", 24402899.633555975, gap=0.00028860699650216725)
     system = on_springs(ratio, 7.065386225652446, stop)
     found = diagram(system, (6.5, 16.0), (1, 2), doublings=1, search_points=4)
     branch = next(b for b in found.branches if b.period == 2 and b.frequency_hz.min() < 9.7)
     expected = sorted(special_points(branch))
-    for start in branch.points[6:-6:6]:
+    for start in branch.points[6:-6:every]:
         again = continue_branch(start, (6.5, 16.0))
         assert sorted(special_points(again)) == [
             (kind, pytest.approx(hz, rel=1e-8)) for kind, hz in expected
@@ -352,16 +361,26 @@ def test_a_test_that_jumps_where_no_multiplier_is_critical_tells_of_no_point(
         special._located(kind, special.Chord(first, last))
 
 
-@pytest.mark.parametrize("index", [0, 1])
-@pytest.mark.parametrize("amplitude", [1e-5, 1e-6, 4.1630532849205377e-07])
-@pytest.mark.parametrize("side", [0, 1])
-def test_a_closed_half_begun_beside_its_pitchfork_has_that_once(facing, index, amplitude, side):
-    """The first step or the last may tell it, or both; as many as one begun far from it has."""
+def half_of(facing, index, side, amplitude):
+    """A half of the branch that is born at one of two pitchforks, begun at a distance from it."""
     special = [s for s in facing.special_points if s.kind == "BP"][index]
-    far, near = (
-        continue_branch(switch_at_branch_point(special, a)[side].orbit, (6.5, 8.5))
-        for a in (1e-2, amplitude)
-    )
+    return continue_branch(switch_at_branch_point(special, amplitude)[side].orbit, (6.5, 8.5))
+
+
+HALVES = [(0, 0), (1, 1), *(pytest.param(at, marks=pytest.mark.slow) for at in [(0, 1), (1, 0)])]
+
+
+@pytest.fixture(scope="module", params=HALVES)
+def far_half(facing, request):
+    """Begun far from its pitchfork, with its place."""
+    return half_of(facing, *request.param, 1e-2), *request.param
+
+
+@pytest.mark.parametrize("amplitude", [1e-5, 1e-6, 4.1630532849205377e-07])
+def test_a_closed_half_begun_beside_its_pitchfork_has_that_once(facing, far_half, amplitude):
+    """The first step or the last may tell it, or both; as many as one begun far from it has."""
+    far, index, side = far_half
+    near = half_of(facing, index, side, amplitude)
     for branch in (far, near):
         assert branch.closed and not branch.notes
     kinds, hz = zip(*[told_by(branch) for branch in (far, near)], strict=True)
@@ -456,18 +475,23 @@ def test_ill_conditioned_pitchforks_are_crossed_and_located_from_any_step(first_
     assert met == pytest.approx([s.frequency_hz for s in crossings[-2:]], rel=1e-10)
 
 
-@pytest.mark.parametrize("first_step", [0.01, 0.002])
-@pytest.mark.parametrize("beside", [-1e-5, -3e-6, -1e-6, 1e-6, 3e-6, 1e-5])
-def test_walk_that_begins_beside_a_pitchfork_crosses_it(beside, first_step):
-    """The way from its start to where Newton's method ends is too short to tell where to go on."""
+@pytest.fixture(scope="module")
+def with_pitchfork():
+    """A symmetric branch that ends behind a pitchfork."""
     stops = [Stop("a", stiffness=1.07e9, direction=side) for side in (1, -1)]
     system = System.from_modal(
         [18.98], {"a": [0.597]}, modal_damping=0.00647, stops=stops,
         excitation=[Unbalance("a", 2.49e-5)],
     )  # fmt: skip
-    whole = continue_branch(solve_orbit(system, 20.0), (20.0, 26.8))
-    pitchfork = [s for s in whole.special_points if s.kind == "BP"][-1]
-    start = whole.at(pitchfork.frequency_hz * (1.0 + beside))[0]
+    return continue_branch(solve_orbit(system, 20.0), (20.0, 26.8))
+
+
+@pytest.mark.parametrize("first_step", [0.01, 0.002])
+@pytest.mark.parametrize("beside", [-1e-5, -3e-6, -1e-6, 1e-6, 3e-6, 1e-5])
+def test_walk_that_begins_beside_a_pitchfork_crosses_it(with_pitchfork, beside, first_step):
+    """The way from its start to where Newton's method ends is too short to tell where to go on."""
+    pitchfork = [s for s in with_pitchfork.special_points if s.kind == "BP"][-1]
+    start = with_pitchfork.at(pitchfork.frequency_hz * (1.0 + beside))[0]
     options = ContinuationOptions(first_step=first_step)
     branch = continue_branch(start, (25.0, 26.8), options=options)
     assert branch.stop_reasons == ("end of the frequency range",) * 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,8 +12,10 @@ import pytest
 from one_dof import make_one_dof
 
 from nldyn import Stop, SystemModelError, by_closed_walks, index_sum
-from nldyn.beside import WINDOW, orbits_near
-from nldyn.closed_walks import (
+from nldyn.flow.flow_map import FlowMap
+from nldyn.orbits.orbit import stroboscopic
+from nldyn.search.extend import WINDOW, orbits_near
+from nldyn.search.random_walks import (
     LEAST,
     NARROWEST,
     NEIGHBOURS,
@@ -21,9 +24,7 @@ from nldyn.closed_walks import (
     _known_states,
     near_closed_walks,
 )
-from nldyn.flow import FlowMap
-from nldyn.orbit import stroboscopic
-from nldyn.system import System
+from nldyn.system.system import System
 
 OMEGA = 2.0 * np.pi * 37.0
 
@@ -31,7 +32,8 @@ OMEGA = 2.0 * np.pi * 37.0
 def test_from_one_branch_all_others_are_found(three):
     """The harmonic, and a few motions, tell where states lie, no more."""
     (harmonic,) = three.of_period(1)
-    done = by_closed_walks(replace(three, branches=(harmonic,)), states=1000, tries=50)
+    known = replace(three, branches=(harmonic,))
+    done = by_closed_walks(known, states=1000, tries=50, spacing=0.02)
     assert sorted(branch.period for branch in done.branches) == [1, 2, 3]
     for wanted in three.branches:
         (found,) = done.of_period(wanted.period)
@@ -50,7 +52,7 @@ def test_only_the_periods_and_frequencies_wanted_are_tried(three):
     tried = set()
     done = by_closed_walks(
         three, min_period=2, max_period=2, range_hz=(37.2, 38.0), tries=3, spacing=0.005,
-        states=500, progress=lambda what, hz: tried.add(hz),
+        states=500, progress=lambda what, hz, done: tried.add(hz),
     )  # fmt: skip
     assert 37.2 < min(tried) < max(tried) < 38.0
     assert f" of {3 * len(tried)} closed walks led to" in done.notes[-1]
@@ -58,7 +60,8 @@ def test_only_the_periods_and_frequencies_wanted_are_tried(three):
 
 
 def test_the_same_seed_gives_the_same_and_another_one_other_walks(three):
-    notes = [by_closed_walks(three, states=200, tries=20, seed=n).notes[-1] for n in (1, 1, 2)]
+    search = partial(by_closed_walks, three, states=200, tries=20, spacing=0.02)
+    notes = [search(seed=n).notes[-1] for n in (1, 1, 2)]
     assert notes[0] == notes[1] != notes[2]
 
 

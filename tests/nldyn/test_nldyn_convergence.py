@@ -15,18 +15,19 @@ import fem
 from nldyn import (
     ConvergenceError,
     Damper,
+    LoadCase,
     SceneError,
-    Setting,
     Stop,
     System,
     SystemModelError,
     Unbalance,
-    converge,
-    convergence,
+    convergence_study,
     solve_orbit,
 )
-from nldyn.cli import main
-from nldyn.convergence import (
+from nldyn.app.cli import main
+from nldyn.base.resources import example
+from nldyn.reduction import convergence
+from nldyn.reduction.convergence import (
     contact_time,
     distance,
     harmonic_branch,
@@ -36,16 +37,15 @@ from nldyn.convergence import (
     measured_linear,
     receptance,
     receptance_bound,
-    with_mesh,
 )
-from nldyn.convergence_output import write_study
-from nldyn.resources import example
-from nldyn.scene import build_component, load_scene
+from nldyn.report.convergence import write_study
+from nldyn.scene.build import build_component, load_scene
+from nldyn.scene.convergence import with_mesh
 
 
 @pytest.fixture(scope="module")
 def study():
-    return converge(
+    return convergence_study(
         string(),
         SETTING,
         modes=(1, 3, 7, 15),
@@ -67,11 +67,11 @@ def test_the_full_model_is_the_reference(study):
 def test_the_reference_of_a_large_component_has_a_bound_of_its_own_error(monkeypatch):
     monkeypatch.setattr(convergence, "ALL_MODES_UP_TO", 40)
     monkeypatch.setattr(convergence, "FEWEST_REFERENCE_MODES", 6)
-    study = converge(string(), SETTING, modes=(1, 2))
+    study = convergence_study(string(), SETTING, modes=(1, 2))
     assert (study.reference.label, study.reference.modes) == ("reference", 6)
     assert "reference: rubin with 6 modes (its undamped receptance is within" in study.report()
     with pytest.raises(SystemModelError, match="up to 40 degrees of freedom, this one has 41"):
-        converge(string(), SETTING, modes=(1,), full=True)
+        convergence_study(string(), SETTING, modes=(1,), full=True)
 
 
 def test_the_bound_of_the_reference_holds():
@@ -85,7 +85,7 @@ def test_the_bound_of_the_reference_holds():
 
 def test_contacts_are_compared_only_where_there_are_any():
     far = replace(SETTING, stops=(Stop("middle", stiffness=2e7, gap=1.0),))
-    study = converge(string(), far, modes=(1, 3))
+    study = convergence_study(string(), far, modes=(1, 3))
     assert all(np.isnan((error.force, error.contact)).all() for error in study.errors)
     assert "no stop is touched at 36.7423 Hz" in study.report()
     assert "contact force" not in study.report()
@@ -167,14 +167,14 @@ def meshes():
             interfaces={"tip": fem.Interface("tip", "y")},
         )
         components[f"{count} elements"] = fem.assemble(model)
-    setting = Setting(
-        (20.0, 60.0),
+    setting = LoadCase(
+        (30.0, 40.0),
         stops=(Stop("tip", stiffness=1e8),),
         excitation=(Unbalance("tip", 1e-4),),
         dampers=(Damper("tip", 1.0),),
         modal_damping=0.02,
     )
-    return converge(components, setting, modes=(3,), methods=("rubin", "macneal"))
+    return convergence_study(components, setting, modes=(3,), methods=("rubin", "macneal"))
 
 
 def test_errors_of_a_beam_fall_with_the_fourth_power_of_its_elements(meshes):
@@ -222,7 +222,7 @@ def test_dampers_close_a_receptance_of_modes_and_flexibility():
 
 def test_the_reference_of_models_of_one_size_is_the_one_with_the_best_receptance():
     for methods in (("craig-bampton", "rubin"), ("rubin", "craig-bampton")):
-        study = converge(string(), SETTING, modes=(4,), methods=methods, at_hz=36.0)
+        study = convergence_study(string(), SETTING, modes=(4,), methods=methods, at_hz=36.0)
         assert study.best.label == "rubin"
 
 
@@ -280,14 +280,14 @@ def test_solids_are_refined_in_the_mesher():
 )
 def test_faults_are_told(changed, words):
     with pytest.raises(SystemModelError, match=words):
-        converge(string(), SETTING, **{"modes": (1,), **changed})
+        convergence_study(string(), SETTING, **{"modes": (1,), **changed})
 
 
 def test_a_setting_without_excitation_is_refused():
     with pytest.raises(SystemModelError, match="no excitation"):
-        Setting((10.0, 20.0))
+        LoadCase((10.0, 20.0))
     with pytest.raises(SystemModelError, match="from low to high"):
-        Setting((20.0, 10.0), excitation=(Unbalance("middle", 1.0),))
+        LoadCase((20.0, 10.0), excitation=(Unbalance("middle", 1.0),))
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,12 @@ import pytest
 from branches_alike import without
 from one_dof import THREE_HZ
 
-from nldyn import SystemModelError, by_crossover, crossover, index_sum
-from nldyn.beside import PLACES, WINDOW, collector_beside, orbits_near
-from nldyn.crossover import BEYOND, NEIGHBOURS, Loops, near_mixtures
-from nldyn.exploration import steps_between
-from nldyn.pseudo_orbits import NODES
+from nldyn import SystemModelError, by_crossover, index_sum
+from nldyn.search import mixtures as crossover
+from nldyn.search.exploration import steps_between
+from nldyn.search.extend import PLACES, WINDOW, collector_beside, orbits_near
+from nldyn.search.mixtures import BEYOND, NEIGHBOURS, Loops, near_mixtures
+from nldyn.search.pseudo_orbits import NODES
 
 
 @pytest.mark.parametrize(("period", "tries"), [(1, 50), (2, 50), (3, 200)])
@@ -65,7 +66,7 @@ def test_only_the_periods_and_frequencies_wanted_are_tried(three):
     tried = set()
     done = by_crossover(
         three, min_period=2, max_period=2, range_hz=(37.2, 38.0), tries=3, spacing=0.005,
-        progress=lambda what, hz: tried.add(hz),
+        progress=lambda what, hz, done: tried.add(hz),
     )  # fmt: skip
     assert 37.2 < min(tried) < max(tried) < 38.0
     assert f" of {3 * len(tried)} mixtures led to" in done.notes[-1]

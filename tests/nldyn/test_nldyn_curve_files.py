@@ -8,6 +8,7 @@ import pytest
 from one_dof import between_stops, make_one_dof
 
 from nldyn import (
+    CheckpointFile,
     ContinuationOptions,
     Damper,
     HarmonicForce,
@@ -19,14 +20,13 @@ from nldyn import (
     continue_constant,
     continue_in,
     continue_special,
-    curves,
-    load_branch,
-    load_curve,
-    load_curves,
-    save_curves,
+    save,
     solve_orbit,
 )
-from nldyn.conditions import peak_force
+from nldyn.curves import curves
+from nldyn.io.branches import load_branch
+from nldyn.io.curves import load_curve, load_curves, save_curves
+from nldyn.orbits.conditions import peak_force
 
 
 def symmetric() -> System:
@@ -80,7 +80,7 @@ def curve(request):
 @pytest.fixture(scope="module")
 def loaded(curve, tmp_path_factory):
     path = tmp_path_factory.mktemp("curves") / "curve.h5"
-    curve.save(path)
+    save(curve, path)
     return load_curve(path, monitor=force if curve.kind == "force" else None)
 
 
@@ -140,7 +140,7 @@ def test_a_loaded_curve_goes_on(tmp_path):
     start = solve_orbit(make_one_dof(), 26.0)
     short = continue_in(start, Parameter("stiffness"), (1e9, 2e10), options=few)
     assert "3 points" in short.stop_reasons
-    short.save(tmp_path / "short.h5")
+    save(short, tmp_path / "short.h5")
     longer = load_curve(tmp_path / "short.h5").extend([(1e9, 2e10)])
     assert longer.values[[0, -1], 0] == pytest.approx([1e9, 2e10], rel=1e-14)
     assert longer.stop_reasons == ("end of the range of stiffness",) * 2
@@ -161,14 +161,14 @@ def test_an_interrupted_curve_is_kept_and_finished(tmp_path, share):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        continue_special(found, pair, ranges, progress=stop, checkpoint=path)
+        continue_special(found, pair, ranges, progress=stop, checkpoint=CheckpointFile(path))
     kept = load_curve(path)
     assert kept.stop_reasons == ("not finished", "not finished") and not kept.marks
     assert len(kept.points) >= len(seen) - 1
     assert (kept.points[0].arclength < 0.0) is (share > 0.5)
-    with pytest.raises(SystemModelError, match="exists already; load_curve and"):
-        continue_special(found, pair, ranges, checkpoint=path)
-    done = kept.extend(ranges, checkpoint=path)
+    with pytest.raises(SystemModelError, match="exists already; load and"):
+        continue_special(found, pair, ranges, checkpoint=CheckpointFile(path))
+    done = kept.extend(ranges, checkpoint=CheckpointFile(path))
     assert done.stop_reasons == whole.stop_reasons
     assert done.values[[0, -1]] == pytest.approx(whole.values[[0, -1]], rel=1e-9)
     assert [mark.kind for mark in done.marks] == [mark.kind for mark in whole.marks]
@@ -183,7 +183,10 @@ def test_an_interrupted_curve_is_kept_and_finished(tmp_path, share):
         continue_in(solve_orbit(make_one_dof(), 26.0), "gap", (0.0, 1e-7), options=few),
     ):
         with pytest.raises(SystemModelError, match="holds another curve, or more of this one"):
-            other.extend([(5.0, 60.0), (-1e-7, 2e-7)][-len(other.parameters) :], checkpoint=path)
+            other.extend(
+                [(5.0, 60.0), (-1e-7, 2e-7)][-len(other.parameters) :],
+                checkpoint=CheckpointFile(path),
+            )
 
 
 @pytest.mark.parametrize("searched", [False, True])
@@ -206,7 +209,9 @@ def test_an_interrupted_closed_curve_closes_where_it_began(tmp_path, monkeypatch
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
         if searched:
             patched.setattr(curves, "_marked", stop_search)
-        continue_in(orbit, "frequency_hz", (11.0, 12.0), progress=stop, checkpoint=path)
+        continue_in(
+            orbit, "frequency_hz", (11.0, 12.0), progress=stop, checkpoint=CheckpointFile(path)
+        )
     done = load_curve(path).extend([(11.0, 12.0)])
     assert done.stop_reasons == whole.stop_reasons
     length = [curve.points[-1].arclength for curve in (done, whole)]
@@ -229,7 +234,7 @@ def test_several_curves_in_one_file_and_what_is_refused(tmp_path):
         load_branch(path)
     with pytest.raises(SystemModelError, match="curves must be a list of curves, got 3"):
         save_curves(path, 3)
-    curve.save(path)
+    save(curve, path)
     with pytest.raises(SystemModelError, match="a file cannot hold: pass monitor="):
         load_curve(path)
     with pytest.raises(SystemModelError, match="the monitor passed is not 'force'"):

@@ -23,7 +23,6 @@ from nldyn import (
     System,
     SystemModelError,
     Unbalance,
-    codimension,
     continue_branch,
     continue_constant,
     continue_in,
@@ -31,17 +30,19 @@ from nldyn import (
     normal_form,
     refine_special,
     solve_orbit,
-    switch_at_flip,
 )
-from nldyn.bordered import OrbitFamily
-from nldyn.codimension import along_tori, flip_coefficient, is_torus
-from nldyn.conditions import Singular, bialternate, max_abs_displacement, peak_force
-from nldyn.curve_walk import OTHER_EXTREME
-from nldyn.orbit import Orbit, shooting_problem
-from nldyn.parameter_values import EVERY_MODE, Chart, value_of, with_value
-from nldyn.resources import example
-from nldyn.scene import build_system, load_scene
-from nldyn.trail import trace
+from nldyn.base.resources import example
+from nldyn.bifurcations.period_doubling import switch_at_flip
+from nldyn.branches.leg import trace
+from nldyn.curves import events as codimension
+from nldyn.curves.events import along_tori, flip_coefficient, is_torus
+from nldyn.curves.walk import OTHER_EXTREME
+from nldyn.orbits.bordered import OrbitFamily
+from nldyn.orbits.conditions import Singular, bialternate, max_abs_displacement, peak_force
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.shooting import shooting_problem
+from nldyn.scene.build import build_system, load_scene
+from nldyn.system.chart import EVERY_MODE, Chart, value_of, with_value
 
 MASS, NATURAL, RATIO = 2.0, 2.0 * math.pi * 10.0, 0.03
 

@@ -18,10 +18,10 @@ from nldyn import (
     continue_branch,
     continue_in,
     continue_special,
-    plot_orbit_curve,
     solve_orbit,
 )
-from nldyn.curve_walk import CurvePoint, extremes_meet
+from nldyn.curves.walk import CurvePoint, extremes_meet
+from nldyn.plot.curves import plot_orbit_curve
 
 SECOND = Parameter("natural_frequency_hz", 1)
 

@@ -11,6 +11,7 @@ import pytest
 from independent import Motion
 
 from nldyn import (
+    CheckpointFile,
     ContinuationOptions,
     Damper,
     Diagram,
@@ -24,20 +25,19 @@ from nldyn import (
     continue_branch,
     find_orbits,
     index_sum,
-    load_branches,
-    load_diagram,
+    save,
     solve_orbit,
 )
-from nldyn.branch import is_at
-from nldyn.checkpoint import Checkpoint
-from nldyn.detour import Detour, _far, checked_factors
-from nldyn.diagrams import Collector
-from nldyn.flow import flow_of
-from nldyn.orbit import Orbit
+from nldyn.bifurcations.point import is_at
+from nldyn.branches.checkpoint import Checkpoint
+from nldyn.flow.flow_map import flow_of
+from nldyn.io.branches import load_branches, load_diagram, save_branches
+from nldyn.orbits.homotopy import Homotopy, _far, checked_factors
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.starts import orbit_near
 from nldyn.paper.jobs import scene_system
 from nldyn.paper.starts import read_starts
-from nldyn.search import orbit_near
-from nldyn.store import save_branches
+from nldyn.search.diagram import Collector
 
 RANGE_HZ = (7.2, 11.0)
 HALF = {"damping": 0.5}
@@ -135,7 +135,7 @@ SECOND = Parameter("natural_frequency_hz", 1)
 def test_carried_by_a_detour_and_back_an_orbit_is_the_same(factors):
     system = replace(two_modes(), dampers=(Damper("tip", 0.3),))
     orbit = solve_orbit(system, 10.0)
-    detour = Detour(orbit.problem.flow, checked_factors(system, factors))
+    detour = Homotopy(orbit.problem.flow, checked_factors(system, factors))
     other = detour.carried(orbit, 0.0, 1.0)
     there, tiny = other.system, {"rtol": 1e-12}
     all_damping = factors.get("damping", 1.0)
@@ -162,7 +162,7 @@ def three(harmonic) -> Diagram:
 @pytest.mark.parametrize("factors", [{"damping": 0.9}, {"excitation": 1.02}, {SECOND: 1.003}])
 def test_a_fold_carried_there_and_back_is_the_same_and_moves_meanwhile(found, factors):
     (first, *_) = [s for s in found.branches[1].special_points if s.kind == "LP"]
-    detour = Detour(first.orbit.problem.flow, checked_factors(two_modes(), factors))
+    detour = Homotopy(first.orbit.problem.flow, checked_factors(two_modes(), factors))
     there = detour.carried_fold(first.orbit, 0.0, 1.0)
     assert runge_kutta_gap(there, detour.flow(1.0).system) < 1e-8
     assert np.abs(there.multipliers - 1.0).min() < 1e-6
@@ -179,13 +179,13 @@ def folds_of(diagram: Diagram) -> list[Orbit]:
 def asked(monkeypatch) -> list[tuple[float, bytes]]:
     """Places on its way at which a fold is looked for, and from which guesses."""
     asked: list[tuple[float, bytes]] = []
-    near = Detour._fold_near
+    near = Homotopy._fold_near
 
     def noted(self, fold, share, guess):
         asked.append((share, guess.tobytes()))
         return near(self, fold, share, guess)
 
-    monkeypatch.setattr(Detour, "_fold_near", noted)
+    monkeypatch.setattr(Homotopy, "_fold_near", noted)
     return asked
 
 
@@ -195,7 +195,7 @@ def test_every_fold_gets_to_a_natural_frequency_a_little_off(three, index, facto
     """Newton's method finds some from nowhere but near by: steps below 1e-3 are needed at first."""
     factors = checked_factors(two_modes(), {Parameter("natural_frequency_hz", index): factor})
     folds = folds_of(three)
-    detour = Detour(folds[0].problem.flow, factors)
+    detour = Homotopy(folds[0].problem.flow, factors)
     assert len(folds) == 9
     for fold in folds:
         asked.clear()
@@ -208,7 +208,7 @@ def test_every_fold_gets_to_a_natural_frequency_a_little_off(three, index, facto
 def test_a_fold_whose_way_is_smooth_takes_steps_each_longer_than_the_one_before(three, asked):
     fold = folds_of(three)[0]
     factors = checked_factors(two_modes(), {"excitation": 1.1})
-    assert Detour(fold.problem.flow, factors).carried_fold(fold, 0.0, 1.0) is not None
+    assert Homotopy(fold.problem.flow, factors).carried_fold(fold, 0.0, 1.0) is not None
     places = [place for place, _ in asked]
     steps = np.diff([0.0, *places])
     assert places[-1] == 1.0 and len(places) <= 8
@@ -228,7 +228,7 @@ def test_a_fold_is_not_changed_for_another_one_near_by_on_its_way(start_hz, fold
     orbit = orbit_near(flow_of(system), start.state, 3, omega, "middle")
     branch = continue_branch(orbit, (18.0, 90.0), options=ContinuationOptions(max_points=250))
     (fold,) = (s for s in branch.special_points if abs(s.frequency_hz - fold_hz) < 2e-6)
-    detour = Detour(orbit.problem.flow, checked_factors(system, factors))
+    detour = Homotopy(orbit.problem.flow, checked_factors(system, factors))
     there = detour.carried_fold(fold.orbit, 0.0, 1.0)
     back = there and detour.carried_fold(there, 1.0, 0.0)
     assert back is None or is_at(back, fold)
@@ -240,7 +240,7 @@ def test_folds_of_small_motions_are_carried_as_those_of_large_ones():
     for size in (1.0, 1e-6):
         system = two_modes(size=size)
         branch = continue_branch(solve_orbit(system, 10.99), RANGE_HZ)
-        detour = Detour(branch.points[0].problem.flow, checked_factors(system, HALF))
+        detour = Homotopy(branch.points[0].problem.flow, checked_factors(system, HALF))
         folds = folds_of(Diagram((branch,), RANGE_HZ, "tip"))
         ends.append([detour.carried_fold(fold, 0.0, 1.0).frequency_hz for fold in folds])
     assert len(ends[0]) == 4
@@ -263,7 +263,7 @@ def test_far_is_told_of_states_and_of_frequencies(size, states, frequency, first
 
 def test_an_orbit_far_from_where_it_was_expected_is_not_taken(harmonic):
     orbit, other = (solve_orbit(two_modes(), hz) for hz in (10.0, 7.5))
-    detour = Detour(orbit.problem.flow, checked_factors(two_modes(), HALF))
+    detour = Homotopy(orbit.problem.flow, checked_factors(two_modes(), HALF))
     asked = []
 
     def near(here, share, guess):
@@ -277,9 +277,9 @@ def test_an_orbit_far_from_where_it_was_expected_is_not_taken(harmonic):
 def test_what_is_no_fold_in_the_end_is_not_taken(found, monkeypatch):
     fold = folds_of(found)[0]
     monkeypatch.setattr(
-        "nldyn.detour.correct", lambda *_: SimpleNamespace(converged=False, orbit=fold)
+        "nldyn.orbits.homotopy.correct", lambda *_: SimpleNamespace(converged=False, orbit=fold)
     )
-    detour = Detour(fold.problem.flow, checked_factors(two_modes(), HALF))
+    detour = Homotopy(fold.problem.flow, checked_factors(two_modes(), HALF))
     assert detour.carried_fold(fold, 0.0, 1.0) is None
 
 
@@ -292,7 +292,7 @@ def test_all_folds_of_the_branches_there_and_no_other_points_are_carried_back(fo
 def test_folds_alone_lead_to_an_isola_that_lies_between_the_frequencies(
     harmonic, found, monkeypatch
 ):
-    monkeypatch.setattr("nldyn.beside.steps_between", lambda low, high, spacing: 0)
+    monkeypatch.setattr("nldyn.search.extend.steps_between", lambda low, high, spacing: 0)
     done = by_detour(harmonic, HALF, max_period=1)
     assert ", 0 of 0 orbits carried back, " in done.notes[-1]
     (isola,) = done.branches[1:]
@@ -363,7 +363,7 @@ def test_branches_of_longer_periods_than_wanted_do_not_count_as_given():
 def test_interrupted_it_goes_on_with_what_it_has_found(harmonic, found, tmp_path):
     place, seen = tmp_path / "found.h5", []
 
-    def interrupt(what: str, frequency_hz: float) -> None:
+    def interrupt(what: str, frequency_hz: float, done: float) -> None:
         seen.append(what)
         if seen.count("back") in (3, 4):
             raise KeyboardInterrupt
@@ -371,10 +371,15 @@ def test_interrupted_it_goes_on_with_what_it_has_found(harmonic, found, tmp_path
     for _ in range(2):
         with pytest.raises(KeyboardInterrupt):
             by_detour(
-                harmonic, HALF, max_period=1, spacing=0.1, progress=interrupt, checkpoint=place
+                harmonic,
+                HALF,
+                max_period=1,
+                spacing=0.1,
+                progress=interrupt,
+                checkpoint=CheckpointFile(place),
             )
         assert len(load_branches(place)) == 1  # what is known is not kept
-    resumed = by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
+    resumed = by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=CheckpointFile(place))
     assert [len(b.nodes) for b in resumed.branches] == [len(b.nodes) for b in found.branches]
     assert np.array_equal(resumed.branches[1].frequency_hz, found.branches[1].frequency_hz)
     assert met_from_others(resumed) == met_from_others(found) == (0, 1)
@@ -386,7 +391,7 @@ def all_repeated(monkeypatch):
 
     Those of folds are left out: each would be followed anew.
     """
-    monkeypatch.setattr("nldyn.detour_search._folds_carried_back", lambda *_: "no folds")
+    monkeypatch.setattr("nldyn.search.homotopy._folds_carried_back", lambda *_: "no folds")
     repeats = Collector._repeats
     monkeypatch.setattr(
         Collector, "_repeats", lambda box, b: box.checkpoint._write is not None or repeats(box, b)
@@ -396,9 +401,9 @@ def all_repeated(monkeypatch):
 def test_a_branch_that_repeats_a_known_one_is_not_kept(
     harmonic, all_repeated, monkeypatch, tmp_path
 ):
-    monkeypatch.setattr("nldyn.checkpoint.PAUSE", 1e9)  # written at the end only
+    monkeypatch.setattr("nldyn.runtime.keeper.PAUSE", 1e9)  # written at the end only
     place = tmp_path / "found.h5"
-    done = by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
+    done = by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=CheckpointFile(place))
     assert not re.search(r" 0 of \d+ orbits carried back", done.notes[-1])
     assert len(done.branches) == 1
     assert not place.exists()
@@ -408,10 +413,10 @@ def test_a_branch_that_repeats_a_known_one_is_not_kept(
 def test_a_branch_that_repeats_a_known_one_does_not_stay_in_the_file(
     harmonic, all_repeated, monkeypatch, tmp_path
 ):
-    monkeypatch.setattr("nldyn.checkpoint.PAUSE", 0.0)
-    monkeypatch.setattr("nldyn.checkpoint.SHARE", 0.0)
+    monkeypatch.setattr("nldyn.runtime.keeper.PAUSE", 0.0)
+    monkeypatch.setattr("nldyn.runtime.keeper.SHARE", 0.0)
     place = tmp_path / "found.h5"
-    by_detour(harmonic, HALF, max_period=1, spacing=0.3, checkpoint=place)
+    by_detour(harmonic, HALF, max_period=1, spacing=0.3, checkpoint=CheckpointFile(place))
     assert load_branches(place) == []
 
 
@@ -420,7 +425,9 @@ def test_a_branch_of_the_file_that_turns_out_to_be_known_is_not_added(
 ):
     place = tmp_path / "found.h5"
     save_branches(place, found.branches[1:])
-    done = by_detour(harmonic, {"damping": 0.95}, max_period=1, spacing=0.5, checkpoint=place)
+    done = by_detour(
+        harmonic, {"damping": 0.95}, max_period=1, spacing=0.5, checkpoint=CheckpointFile(place)
+    )
     assert len(done.branches) == 1
 
 
@@ -457,19 +464,21 @@ def test_some_orbits_are_carried_back_however_wide_the_spacing(found):
 def test_what_a_file_of_known_branches_holds_stays_there(harmonic, found, tmp_path):
     place = tmp_path / "known.h5"
     save_branches(place, harmonic.branches)
-    by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
+    by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=CheckpointFile(place))
     kept = load_branches(place)
     assert [len(b.nodes) for b in kept] == [len(b.nodes) for b in found.branches]
-    found.save(place)
+    save(found, place)
     with pytest.raises(SystemModelError, match="holds a diagram or exploration"):
-        by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
+        by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=CheckpointFile(place))
     assert len(load_diagram(place).branches) == 2
 
 
 def test_another_factor_loses_nothing_that_the_file_has(harmonic, found, tmp_path):
     place = tmp_path / "found.h5"
-    by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=place)
-    again = by_detour(harmonic, {"damping": 0.95}, max_period=1, spacing=0.5, checkpoint=place)
+    by_detour(harmonic, HALF, max_period=1, spacing=0.1, checkpoint=CheckpointFile(place))
+    again = by_detour(
+        harmonic, {"damping": 0.95}, max_period=1, spacing=0.5, checkpoint=CheckpointFile(place)
+    )
     for branches in (again.branches[1:], load_branches(place)):
         (isola,) = branches
         assert np.array_equal(isola.frequency_hz, found.branches[1].frequency_hz)
@@ -485,7 +494,9 @@ def test_a_branch_of_a_wider_range_and_one_without_its_course_may_be_known(harmo
         known = Diagram((branch,), [low, high], "tip")
         place = tmp_path / "found.h5"
         for _ in range(2):
-            done = by_detour(known, HALF, max_period=1, spacing=0.1, checkpoint=place)
+            done = by_detour(
+                known, HALF, max_period=1, spacing=0.1, checkpoint=CheckpointFile(place)
+            )
             assert len(done.branches) == 2
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from nldyn.tables import UNITS
+from nldyn.branches.tables import UNITS
 
 ROOT = Path(__file__).parents[2]
 BRANCHES = (ROOT / "docs" / "branches.md").read_text(encoding="utf-8")

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from nldyn import HarmonicForce, Stop, System, continue_branch, solve_orbit, spectrum
+from nldyn import HarmonicForce, Stop, System, continue_branch, harmonics, solve_orbit
 
 MU, FORCE = 0.2, 1.0
 
@@ -68,7 +68,7 @@ def test_amplitudes_err_by_the_next_power_of_the_small_parameter(sigma):
     a = math.sqrt(square)
     errors = []
     for epsilon in (0.02, 0.01):
-        lines = spectrum(solve_orbit(duffing(epsilon), hertz(epsilon, sigma))).amplitude
+        lines = harmonics(solve_orbit(duffing(epsilon), hertz(epsilon, sigma))).amplitude
         errors.append((lines[1] - a, lines[3] - epsilon * a**3 / 32.0))
     (first, third), (first_half, third_half) = errors
     assert first / first_half == pytest.approx(2.0, rel=0.1)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from hard.modes import nearly_defective
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -26,7 +27,6 @@ from nldyn import (
     hertz_stiffness,
     solve_orbit,
 )
-from nldyn.hard.modes import nearly_defective
 
 NOT_FINITE = st.sampled_from([math.nan, math.inf, -math.inf])
 NEGATIVE = st.floats(-1e100, -1e-100)

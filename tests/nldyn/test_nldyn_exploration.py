@@ -9,9 +9,10 @@ import h5py
 import numpy as np
 import pytest
 from branches_alike import assert_same_branches
-from one_dof import between_stops
+from one_dof import THREE_HZ, between_stops
 
 from nldyn import (
+    CheckpointFile,
     ContinuationOptions,
     ExploreOptions,
     FlowMap,
@@ -22,30 +23,30 @@ from nldyn import (
     System,
     SystemModelError,
     Unbalance,
-    checkpoint,
     continue_branch,
-    crossings,
     describe,
     diagram,
     explore,
     find_orbits,
     index_sum,
-    load_branches,
-    load_diagram,
-    load_exploration,
+    save,
     solve_orbit,
-    survey,
-    switch_at_branch_point,
-    switch_at_flip,
 )
-from nldyn.deflation import deflated_orbit
-from nldyn.diagrams import Collector, middle_orbit
-from nldyn.exploration import chao_lower_bound, settling_periods
-from nldyn.orbit import stroboscopic
-from nldyn.resources import example
-from nldyn.roots import LocateError
-from nldyn.scene import build_system, load_scene
-from nldyn.search import random_states
+from nldyn.base.errors import LocateError
+from nldyn.base.resources import example
+from nldyn.bifurcations.normal_forms import switch_at_branch_point
+from nldyn.bifurcations.period_doubling import switch_at_flip
+from nldyn.branches import at_frequency as crossings
+from nldyn.io.branches import load_branches, load_diagram, load_exploration
+from nldyn.orbits.deflation import deflated_orbit
+from nldyn.orbits.orbit import stroboscopic
+from nldyn.orbits.starts import random_states, settling_periods
+from nldyn.runtime import keeper
+from nldyn.runtime.progress import silent
+from nldyn.scene.build import build_system, load_scene
+from nldyn.search.diagram import Collector, middle_orbit
+from nldyn.search.exploration import chao_lower_bound
+from nldyn.search.explore import explore as survey
 
 NOTHING_MORE = {"pseudo_orbits": 0, "mixtures": 0, "walks": 0}  # beside motions and deflation
 
@@ -101,54 +102,88 @@ def test_every_simulation_is_accounted_for(around_37):
         assert bool(c.periods) == (c.settled > 0)
 
 
-def test_a_frequency_is_searched_until_the_indices_of_its_orbits_add_up(monkeypatch):
-    """Branches that pass a short range may be missed; their indices are missed, too."""
-    system, effort = system_of("two_dof_xi_0.01"), ExploreOptions(spacing=0.01, starts=3)
-    sums, reports = [], []
-    for again in (0, survey.AGAIN):
-        monkeypatch.setattr(survey, "AGAIN", again)
-        found = explore(system, (36.0, 37.0), 3, effort=effort)
-        branches = found.diagram.branches
-        sums.append([index_sum(branches, hz, n) for hz in (36.2, 36.8) for n in (1, 2, 3)])
-        reports.append(found.report())
-    assert set(sums[0]) != {1}
-    assert "orbits are missing" in reports[0]
-    assert set(sums[1]) == {1}
-    assert "P to P^3 add up to one from 36 to 37 Hz; isolas that are missing" in reports[1]
+@pytest.mark.parametrize("found_by", [3, None])
+def test_a_frequency_is_searched_until_the_indices_of_its_orbits_add_up(
+    three, found_by, monkeypatch
+):
+    """The harmonic is given; the other branches are found by the third search, or never."""
+    searched, search = [], survey._Survey._search
+
+    def given_in_the_end(self, starts, known, **others):
+        searched.append(known.frequency_hz)
+        if len(searched) == found_by:
+            self.box.from_orbits(map(middle_orbit, three.branches))
+            known.take()
+        return search(self, starts[:0], known, **others)
+
+    monkeypatch.setattr(survey._Survey, "_search", given_in_the_end)
+    known = replace(three, branches=tuple(three.of_period(1)))
+    effort = ExploreOptions(spacing=0.02, starts=1, passing=0, **NOTHING_MORE)
+    flow = three.branches[0].points[0].problem.flow
+    found = explore(flow, THREE_HZ, 3, effort=effort, known=known)
+    counts = [searched.count(c.frequency_hz) for c in found.coverage]
+    branches, report = found.diagram.branches, found.report()
+    sums = {index_sum(branches, hz, n) for hz in (36.2, 36.8) for n in (1, 2, 3)}
+    if found_by is None:
+        assert counts == [2 + survey.AGAIN] * len(counts)
+        assert sums != {1} and "orbits are missing" in report
+    else:
+        assert counts == [found_by + 1] + [2] * (len(counts) - 1)  # on the way up and down
+        assert sums == {1}
+        assert "P to P^3 add up to one from 36 to 38.5 Hz; isolas that are missing" in report
 
 
-def test_short_motions_pass_unstable_orbits_of_further_branches(monkeypatch):
-    """Two modes from 29 to 29.3 Hz, where one motion of 30 periods comes to few of them."""
+def test_unstable_orbits_that_short_motions_pass_are_found(three, monkeypatch):
+    """Motions that begin a millionth off them; nothing else is tried."""
+    monkeypatch.setattr(survey._Survey, "_motion", lambda *_: (None, None))
     monkeypatch.setattr(survey, "AGAIN", 0)
-    system = system_of("two_dof_xi_0.01")
-    few = ExploreOptions(spacing=0.1, starts=1, settling=30, **NOTHING_MORE)
-    without, found = (
-        explore(system, (29.0, 29.3), 2, effort=replace(few, passing=n)) for n in (0, 24)
-    )
-    assert len(without.diagram.branches) < len(found.diagram.branches)
-    for hz in (29.1, 29.2):
-        assert [index_sum(found.diagram.branches, hz, n) for n in (1, 2)] == [1, 1]
+    effort = ExploreOptions(spacing=0.02, starts=1, passing=3, **NOTHING_MORE)
+    flow = three.branches[0].points[0].problem.flow
+    given = []
+
+    def beside_orbits(flow, omega, count, seed):
+        hz = omega / (2.0 * math.pi)
+        orbits = [o for n in (2, 3) for b in three.of_period(n) for o in b.at(hz) if not o.stable]
+        given.append((hz, count, seed))
+        return np.array([(1.0 + 1e-6) * stroboscopic(orbit)[0] for orbit in orbits])
+
+    monkeypatch.setattr(survey, "_at_random", beside_orbits)
+    known = replace(three, branches=tuple(three.of_period(1)))
+    without = explore(flow, THREE_HZ, 3, effort=replace(effort, passing=0), known=known)
+    assert without.diagram.branches == known.branches and not given
+    found = explore(flow, THREE_HZ, 3, effort=effort, known=known)
+    assert sorted(branch.period for branch in found.diagram.branches) == [1, 2, 3]
+    for wanted in three.branches:
+        (branch,) = found.diagram.of_period(wanted.period)
+        assert all(wanted.contains(orbit) for orbit in branch.points)
+    assert [(hz, count) for hz, count, _ in given] == [(c.frequency_hz, 3) for c in found.coverage]
+    assert len({seed for _, _, seed in given}) == len(given)
 
 
 @pytest.mark.parametrize(
-    ("guesses", "said"),
+    ("given", "left_out", "guesses", "said"),
     [
-        ({"pseudo_orbits": 200}, "beside up to 200 pseudo-orbits of each length up to 2 orbits"),
-        ({"mixtures": 60}, "beside 60 mixtures of each length up to 2 orbits"),
-        ({"walks": 200}, "beside up to 200 closed walks of each length up to 2 orbits"),
+        ((1, 2), 3, {"pseudo_orbits": 50}, "up to 50 pseudo-orbits of each length up to 3 orbits"),
+        ((1, 3), 2, {"mixtures": 50}, "beside 50 mixtures of each length up to 3 orbits"),
+        ((1,), 3, {"walks": 50}, "beside up to 50 closed walks of each length up to 3 orbits"),
     ],
 )
-def test_further_guesses_on_the_way_down_lead_to_further_branches(guesses, said, monkeypatch):
-    """Two modes from 29 to 29.3 Hz, where one motion of 30 periods comes to few of them."""
+def test_further_guesses_on_the_way_down_lead_to_further_branches(
+    three, given, left_out, guesses, said, monkeypatch
+):
+    """Some branches are given, and no motion is followed; those left out meet none of them."""
+    monkeypatch.setattr(survey._Survey, "_motion", lambda *_: (None, None))
     monkeypatch.setattr(survey, "AGAIN", 0)
-    system = system_of("two_dof_xi_0.01")
-    few = ExploreOptions(spacing=0.1, starts=1, settling=30, **NOTHING_MORE)
+    known = replace(three, branches=tuple(b for b in three.branches if b.period in given))
+    few = ExploreOptions(spacing=0.02, starts=1, passing=0, walk_states=1000, **NOTHING_MORE)
     without, found = (
-        explore(system, (29.0, 29.3), 2, effort=replace(few, **more)) for more in ({}, guesses)
+        explore(three.branches[0].points[0].problem.flow, THREE_HZ, 3, known=known, effort=effort)
+        for effort in (few, replace(few, **guesses))
     )
-    assert len(without.diagram.branches) < len(found.diagram.branches)
-    for orbit in (b.points[len(b.points) // 2] for b in without.diagram.branches):
-        assert any(branch.contains(orbit) for branch in found.diagram.branches)
+    assert without.diagram.branches == known.branches
+    assert found.diagram.branches[: len(known.branches)] == known.branches
+    (wanted,), (more,) = three.of_period(left_out), found.diagram.of_period(left_out)
+    assert all(wanted.contains(orbit) for orbit in more.points)
     assert said in found.report()
     assert " of each length" not in without.report()
     way_up = replace(found, stage=replace(found.stage, steps=1, ends=()))
@@ -297,7 +332,9 @@ def test_a_finished_exploration_goes_on_with_more_rounds(whole, tmp_path):
     path = tmp_path / "found.h5"
     for rounds in (1, 2):
         effort = replace(EFFORT, rounds=rounds)
-        found = explore(system_of("one_dof"), **QUESTION, effort=effort, checkpoint=path)
+        found = explore(
+            system_of("one_dof"), **QUESTION, effort=effort, checkpoint=CheckpointFile(path)
+        )
     assert_same_exploration(found, whole)
 
 
@@ -340,7 +377,7 @@ def stopped_at(step, orbits=0):
     """Progress that stops as Ctrl-C does, some orbits after a step has begun."""
     steps, seen = 0, 0
 
-    def report(what, hz):
+    def report(what, hz, done):
         nonlocal steps, seen
         steps += what == "explore"
         seen += steps >= step
@@ -357,7 +394,7 @@ def interrupt(path, *place):
             **QUESTION,
             effort=EFFORT,
             progress=stopped_at(*place),
-            checkpoint=path,
+            checkpoint=CheckpointFile(path),
         )
 
 
@@ -397,7 +434,9 @@ def test_an_interrupted_exploration_goes_on_to_the_last_digit(whole, tmp_path, p
             assert len(part.diagram.branches) == len(load_branches(path)) > 0
             assert part.stage.steps >= place[0] - 1
             assert len(part.coverage) <= min(part.stage.steps, len(whole.coverage))
-    again = explore(system_of("one_dof"), **QUESTION, effort=EFFORT, checkpoint=path)
+    again = explore(
+        system_of("one_dof"), **QUESTION, effort=EFFORT, checkpoint=CheckpointFile(path)
+    )
     assert_same_exploration(again, whole)
     assert_same_exploration(load_exploration(path), whole)
 
@@ -407,10 +446,16 @@ def test_frequencies_that_are_done_are_not_simulated_again(whole, tmp_path):
     interrupt(path, 6)
     steps = []
 
-    def report(what, hz):
+    def report(what, hz, done):
         steps.extend([hz] if what == "explore" else [])
 
-    explore(system_of("one_dof"), **QUESTION, effort=EFFORT, progress=report, checkpoint=path)
+    explore(
+        system_of("one_dof"),
+        **QUESTION,
+        effort=EFFORT,
+        progress=report,
+        checkpoint=CheckpointFile(path),
+    )
     assert len(steps) == 2 * len(whole.coverage) - 5
 
 
@@ -451,13 +496,13 @@ def test_exploration_beside_known_branches_goes_on_to_the_last_digit(harmonic, t
     path = tmp_path / "found.h5"
     ask = partial(explore, system_of("one_dof"), **QUESTION, effort=EFFORT, known=harmonic)
     with pytest.raises(KeyboardInterrupt):
-        ask(progress=stopped_at(*place), checkpoint=path)
+        ask(progress=stopped_at(*place), checkpoint=CheckpointFile(path))
     assert load_exploration(path).stage.given == 1
-    assert_same_exploration(ask(checkpoint=path), ask())
+    assert_same_exploration(ask(checkpoint=CheckpointFile(path)), ask())
     with pytest.raises(SystemModelError, match=r"holds another .* or known branches"):
-        explore(system_of("one_dof"), **QUESTION, effort=EFFORT, checkpoint=path)
+        explore(system_of("one_dof"), **QUESTION, effort=EFFORT, checkpoint=CheckpointFile(path))
     with pytest.raises(SystemModelError, match=r"holds another .* or known branches"):
-        ask(known=replace(harmonic, notes=("some note",)), checkpoint=path)
+        ask(known=replace(harmonic, notes=("some note",)), checkpoint=CheckpointFile(path))
 
 
 def test_known_branches_of_something_else_are_refused(harmonic):
@@ -481,14 +526,14 @@ def test_known_branches_of_something_else_are_refused(harmonic):
 
 def test_coverage_is_kept_where_no_branch_is_found(tmp_path, monkeypatch):
     """Undamped free flight between impacts settles on nothing."""
-    monkeypatch.setattr(checkpoint, "PAUSE", 0.0)
+    monkeypatch.setattr(keeper, "PAUSE", 0.0)
     system = System.from_modal(
         [10.0], {"tip": [1.0]}, stops=[Stop("tip", 1e9, gap=1e-3)],
         excitation=[HarmonicForce("tip", 1.0)],
     )  # fmt: skip
     path = tmp_path / "found.h5"
     effort = ExploreOptions(spacing=0.02, starts=2, settling=30, unstable_period=0)
-    found = explore(system, (20.0, 21.0), 1, effort=effort, checkpoint=path)
+    found = explore(system, (20.0, 21.0), 1, effort=effort, checkpoint=CheckpointFile(path))
     kept = load_exploration(path)
     assert kept.coverage == found.coverage and not kept.diagram.branches
     assert sum(c.unsettled + c.failed for c in kept.coverage) > 0
@@ -496,7 +541,7 @@ def test_coverage_is_kept_where_no_branch_is_found(tmp_path, monkeypatch):
 
 def test_a_saved_exploration_is_read_with_its_coverage(whole, tmp_path):
     path = tmp_path / "found.h5"
-    whole.save(path)
+    save(whole, path)
     loaded = load_exploration(path)
     assert_same_exploration(loaded, whole)
     assert loaded.report() == whole.report()
@@ -507,7 +552,7 @@ def test_a_saved_exploration_is_read_with_its_coverage(whole, tmp_path):
 def test_what_a_file_does_not_tell_of_was_not_done(whole, tmp_path):
     """One of a version that made no further guesses goes on without them."""
     path = tmp_path / "found.h5"
-    whole.save(path)
+    save(whole, path)
     with h5py.File(path, "r+") as file:
         efforts = [
             (group, name)
@@ -520,14 +565,14 @@ def test_what_a_file_does_not_tell_of_was_not_done(whole, tmp_path):
     assert len(efforts) == 4
     without = replace(EFFORT, **NOTHING_MORE, walk_states=ExploreOptions.walk_states)
     assert load_exploration(path).question.effort == without
-    explore(system_of("one_dof"), **QUESTION, effort=without, checkpoint=path)
+    explore(system_of("one_dof"), **QUESTION, effort=without, checkpoint=CheckpointFile(path))
     with pytest.raises(SystemModelError, match="holds another exploration"):
-        explore(system_of("one_dof"), **QUESTION, effort=EFFORT, checkpoint=path)
+        explore(system_of("one_dof"), **QUESTION, effort=EFFORT, checkpoint=CheckpointFile(path))
 
 
 def test_another_exploration_in_the_file_is_refused_and_kept(whole, tmp_path):
     path = tmp_path / "found.h5"
-    whole.save(path)
+    save(whole, path)
     before = path.read_bytes()
     other = replace(EFFORT, seed=21)
     asked = [
@@ -538,18 +583,20 @@ def test_another_exploration_in_the_file_is_refused_and_kept(whole, tmp_path):
     ]
     for question in asked:
         with pytest.raises(SystemModelError, match="holds another exploration"):
-            explore(system_of("one_dof"), **question, checkpoint=path)
+            explore(system_of("one_dof"), **question, checkpoint=CheckpointFile(path))
     with pytest.raises(SystemModelError, match="holds another exploration"):
-        explore(system_of("two_dof_xi_0.01"), **QUESTION, effort=EFFORT, checkpoint=path)
+        explore(
+            system_of("two_dof_xi_0.01"), **QUESTION, effort=EFFORT, checkpoint=CheckpointFile(path)
+        )
     assert path.read_bytes() == before
 
 
 def test_a_file_without_exploration_or_with_a_damaged_one_is_refused(whole, tmp_path):
     path = tmp_path / "found.h5"
-    whole.diagram.save(path)
+    save(whole.diagram, path)
     with pytest.raises(SystemModelError, match="holds no exploration"):
         load_exploration(path)
-    whole.save(path)
+    save(whole, path)
     with h5py.File(path, "r+") as file:
         file["exploration"].attrs["steps"] = 3
     with pytest.raises(SystemModelError, match="'/exploration/steps' is 3 with 7 frequencies"):
@@ -609,7 +656,7 @@ def test_bad_questions_are_refused_before_any_simulation(range_hz, period, says)
 def test_a_doubled_branch_begins_at_its_flip():
     """What lies between the flip and the orbit from which the branch is followed belongs to it."""
     flow = FlowMap(system_of("one_dof"))
-    box = Collector(flow, (28.0, 60.0), "middle", ContinuationOptions(), lambda what, hz: None)
+    box = Collector(flow, (28.0, 60.0), "middle", ContinuationOptions(), silent)
     box.from_orbits([solve_orbit(flow, 50.0)])
     flip = next(s for s in box.branches[0].special_points if s.kind == "PD")
     box.from_flip(flip)
@@ -625,7 +672,7 @@ def test_where_a_doubled_branch_comes_to_its_flip_the_other_one_has_half_the_per
     """Followed on as a branch of the doubled period it would be the same orbits twice."""
     flow = FlowMap(system_of("one_dof"))
     box, other = (
-        Collector(flow, (28.0, 60.0), "middle", ContinuationOptions(), lambda what, hz: None)
+        Collector(flow, (28.0, 60.0), "middle", ContinuationOptions(), silent)
         for _ in range(2)
     )
     box.from_orbits([solve_orbit(flow, 50.0)])
@@ -663,7 +710,7 @@ def test_orbits_of_a_branch_are_known_where_newtons_method_at_their_frequency_fa
 def test_orbits_beside_the_ends_of_a_doubled_branch_are_known():
     """At the frequency of one beside a flip, Newton's method may come to the single period."""
     flow = FlowMap(system_of("two_dof_xi_0.01"))
-    box = Collector(flow, (17.9, 18.9), "middle", ContinuationOptions(), lambda what, hz: None)
+    box = Collector(flow, (17.9, 18.9), "middle", ContinuationOptions(), silent)
     box.from_orbits([solve_orbit(flow, 18.4), *find_orbits(flow, 18.6, 2)])
     harmonic = box.branches[0]
     flips = [s for s in harmonic.special_points if s.kind == "PD"]

@@ -20,11 +20,10 @@ from nldyn import (
     continue_branch,
     diagram,
     explore,
-    index_gaps,
     index_sum,
     solve_orbit,
 )
-from nldyn.fixed_point_index import index, index_note
+from nldyn.search.fixed_point_index import index, index_gaps, index_note
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +80,7 @@ def test_a_crossing_found_from_the_other_branch_has_its_place_on_this_one():
     passed = 0
     for branch in found.branches:
         crossings = [id(s.point) for s in branch.special_points if s.kind == "BP"]
-        places = branch.places
+        places = branch.places.points
         for before, place, after in zip(places, places[1:], places[2:], strict=False):
             if id(place) in crossings and abs(place.tangent[-1]) > 0.1:
                 hz = [point.orbit.frequency_hz for point in (before, place, after)]

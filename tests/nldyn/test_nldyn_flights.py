@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from independent import exact_flight, state_map
 
 from nldyn import Damper, FlowMap, HarmonicForce, System, Unbalance
-from nldyn.linear import _growth
+from nldyn.system.linear import _growth
 
 RNG = np.random.default_rng(1)
 FACTOR = RNG.standard_normal((4, 4))

@@ -9,6 +9,7 @@ import pytest
 
 from nldyn import (
     Branch,
+    CheckpointFile,
     ContinuationOptions,
     ConvergenceError,
     Diagram,
@@ -24,17 +25,17 @@ from nldyn import (
     continue_branch,
     explore,
     find_orbits,
-    load_exploration,
     solve_orbit,
-    survey,
 )
-from nldyn.branch import is_at
-from nldyn.flow import flow_of
-from nldyn.fold_search import connected_folds, leading_parameter
+from nldyn.bifurcations.point import is_at
+from nldyn.flow.flow_map import flow_of
+from nldyn.io.branches import load_exploration
+from nldyn.orbits.starts import orbit_near
 from nldyn.paper.jobs import scene_system
 from nldyn.paper.starts import read_starts
-from nldyn.search import orbit_near
-from nldyn.survey import _Survey
+from nldyn.search.explore import _Survey
+from nldyn.search.explore import explore as survey
+from nldyn.search.folds import connected_folds, leading_parameter
 
 
 def two_modes() -> System:
@@ -181,12 +182,12 @@ def test_interrupted_among_the_folds_it_goes_on_and_gives_the_same(
     follow = _Survey.follow_folds
     monkeypatch.setattr(_Survey, "follow_folds", stop)
     with pytest.raises(KeyboardInterrupt):
-        explored(harmonic, checkpoint=place)
+        explored(harmonic, checkpoint=CheckpointFile(place))
     kept = load_exploration(place)
     assert kept.folds_due and not kept.finished
     assert "not finished: of round 1 the folds of 1 of" in kept.report()
     monkeypatch.setattr(_Survey, "follow_folds", follow)
-    resumed = explored(harmonic, checkpoint=place)
+    resumed = explored(harmonic, checkpoint=CheckpointFile(place))
     assert resumed.finished and load_exploration(place).finished
     assert resumed.new_branches == whole.new_branches
     for a, b in zip(resumed.diagram.branches, whole.diagram.branches, strict=True):

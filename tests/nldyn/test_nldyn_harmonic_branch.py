@@ -16,7 +16,7 @@ from independent import Motion
 from one_dof import RANGE_HZ
 
 from nldyn import continue_branch, solve_orbit
-from nldyn.peaks import resonance_peaks
+from nldyn.branches.peaks import resonance_peaks
 
 
 def table(name: str) -> list[dict[str, str]]:

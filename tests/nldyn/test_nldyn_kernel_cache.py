@@ -11,8 +11,8 @@ import numba
 import pytest
 from numba.core.caching import IndexDataCacheFile
 
-from nldyn._sample import local_extremes, sample_states, state_at
-from nldyn.kernel_cache import first_call, resting_on
+from nldyn.flow.kernels.sample import local_extremes, sample_states, state_at
+from nldyn.runtime.kernel_cache import first_call, resting_on
 
 
 def double(x):
@@ -59,14 +59,14 @@ def test_the_collector_rests_during_a_first_call_and_is_as_before_afterwards(col
 INTERRUPTED = """
 import _thread, signal, threading
 import numpy as np
-import nldyn.kernel_cache
+import nldyn.runtime.kernel_cache
 from nldyn import FlowMap, Stop, System
 
-usual = nldyn.kernel_cache.deferred_interruption
+usual = nldyn.runtime.kernel_cache.deferred_interruption
 def deferred_interruption():
     threading.Timer(0.2, _thread.interrupt_main).start()
     return usual()
-nldyn.kernel_cache.deferred_interruption = deferred_interruption
+nldyn.runtime.kernel_cache.deferred_interruption = deferred_interruption
 signal.signal(signal.SIGINT, signal.default_int_handler)
 flow = FlowMap(System.from_modal([13.0], {"a": [1.0]}, stops=[Stop("a", 1e9)]))
 try:

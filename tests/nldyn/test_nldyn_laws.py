@@ -10,16 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from one_dof import make_one_dof
 
-from nldyn import (
-    Damper,
-    FlowMap,
-    FlowOptions,
-    HarmonicForce,
-    Stop,
-    System,
-    Unbalance,
-    solve_orbit,
-)
+from nldyn import Damper, FlowMap, FlowOptions, HarmonicForce, Stop, System, Unbalance, solve_orbit
 
 LAW = settings(deadline=None, max_examples=60, derandomize=True)
 FREQUENCIES = [13.1, 117.5, 326.5]

@@ -9,9 +9,9 @@ import pytest
 from one_dof import make_one_dof
 from scipy.stats import poisson
 
-from nldyn import ChaosLifetime, SystemModelError, chaos_lifetime, classify
-from nldyn.attractors import Attractor, AttractorOptions
-from nldyn.lifetimes import LOOK, _ended
+from nldyn import SystemModelError, chaos_lifetime, classify
+from nldyn.longterm.attractors import Attractor, AttractorOptions
+from nldyn.longterm.lifetimes import LOOK, ChaosLifetime, _ended
 
 
 @pytest.fixture(scope="module")

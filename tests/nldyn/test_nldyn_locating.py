@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nldyn import Stop, System, Unbalance, continue_branch, solve_orbit
-from nldyn.roots import LocateError, root
+from nldyn.base.errors import LocateError
+from nldyn.bifurcations.roots import root
 
 
 class Counted:

@@ -11,7 +11,6 @@ from one_dof import make_one_dof
 from scipy.spatial import cKDTree
 
 from nldyn import (
-    AttractorOptions,
     ContinuationOptions,
     ExploreOptions,
     FlowMap,
@@ -28,30 +27,30 @@ from nldyn import (
     contact_measures,
     continue_branch,
     find_attractors,
+    harmonics,
     impact_section,
     impacts,
-    measures_table,
+    simulate,
+    solve_orbit,
+    spectra_map,
+    stable_manifold,
+    stroboscopic_section,
+    sweep,
+)
+from nldyn.base.errors import ConvergenceError
+from nldyn.longterm.attractors import Attractor, AttractorOptions, zero_one_test
+from nldyn.longterm.basins import settle, target_of
+from nldyn.longterm.poincare import BruteForce, Column
+from nldyn.longterm.wear import measures_table, power_spectrum, spectra_table
+from nldyn.plot.longterm import (
     plot_basins,
     plot_brute_force,
     plot_section,
     plot_spectra,
     plot_sweep,
     plot_wear,
-    simulate,
-    solve_orbit,
-    spectra_map,
-    spectra_table,
-    spectrum,
-    stable_manifold,
-    stroboscopic_section,
-    sweep,
+    strobe_curves,
 )
-from nldyn.attractors import Attractor, zero_one_test
-from nldyn.basin_maps import settle, target_of
-from nldyn.long_term_plots import strobe_curves
-from nldyn.orbit import ConvergenceError
-from nldyn.sections import BruteForce, Column
-from nldyn.wear import power_spectrum
 
 
 @pytest.fixture(scope="module")
@@ -127,8 +126,8 @@ def test_free_vibration_under_forcing_is_quasi_periodic():
 
 
 def test_a_torus_of_a_damped_structure_is_quasi_periodic():
-    from nldyn.resources import example
-    from nldyn.scene import build_system, load_scene
+    from nldyn.base.resources import example
+    from nldyn.scene.build import build_system, load_scene
 
     found = classify(build_system(load_scene(example("four_dof_xi_0.01.toml"))), 62.0)
     assert found.kind == "quasi-periodic"
@@ -326,8 +325,8 @@ def test_points_of_a_stable_manifold_lie_on_the_edge_between_the_phases(one_dof,
 
 
 def test_two_stable_orbits_share_the_plane_and_unstable_ones_sit_on_the_edge():
-    from nldyn.resources import example
-    from nldyn.scene import build_system, load_scene
+    from nldyn.base.resources import example
+    from nldyn.scene.build import build_system, load_scene
 
     system = build_system(load_scene(example("two_dof_xi_0.01.toml")))
     plane = Plane.at_interface(system, (-3e-5, 1e-5), (-0.006, 0.006))
@@ -356,8 +355,8 @@ def test_two_stable_orbits_share_the_plane_and_unstable_ones_sit_on_the_edge():
 
 @pytest.mark.parametrize("ratio", ["0.01", "0.001"])
 def test_of_the_two_stable_branches_below_23_hz_one_is_left_at_23_hz(ratio):
-    from nldyn.resources import example
-    from nldyn.scene import build_system, load_scene
+    from nldyn.base.resources import example
+    from nldyn.scene.build import build_system, load_scene
 
     system = build_system(load_scene(example(f"two_dof_xi_{ratio}.toml")))
     for hz, impacts_of in ((22.8, {1, 2}), (23.0, {2})):
@@ -389,7 +388,7 @@ def test_neighbourhood_of_an_orbit_leads_to_it(one_dof):
 def test_mean_contact_force_balances_the_spring(one_dof):
     for hz, period in ((25.3, 1), (50.0, 2)):
         orbit = solve_orbit(one_dof, hz, period)
-        mean = float(spectrum(orbit).phasor[0].real)
+        mean = float(harmonics(orbit).phasor[0].real)
         found = contact_measures(orbit)
         assert found.impulse_rate == pytest.approx(-16877.0 * mean, rel=1e-6)
         assert found.impact_rate == pytest.approx(orbit.impacts * hz / period)
@@ -444,7 +443,7 @@ def test_harmonics_of_orbits_are_those_of_their_spectra(one_dof):
     orbits = [solve_orbit(one_dof, 25.3), solve_orbit(one_dof, 50.0, 2)]
     table = spectra_table(orbits, orders=4)
     for index, orbit in enumerate(orbits):
-        lines = spectrum(orbit)
+        lines = harmonics(orbit)
         assert table["mean"][index] == pytest.approx(lines.phasor[0].real, rel=1e-6)
         for order in range(1, 5):
             said = lines.amplitude[order * orbit.period]
@@ -475,7 +474,7 @@ def test_bands_of_a_spectra_map_hold_the_lines_of_orbits(one_dof):
     found = spectra_map(orbits, orders=4, parts=6)
     assert found.attractor.tolist() == ["period 1", "period 2"]
     for rms, orbit in zip(found.rms, orbits[::-1], strict=True):
-        lines = spectrum(orbit, orders=4)
+        lines = harmonics(orbit, orders=4)
         expected = np.zeros(25)
         expected[:: 6 // orbit.period] = lines.amplitude / math.sqrt(2.0)
         expected[0] *= math.sqrt(2.0)  # the mean has no twin
@@ -562,9 +561,9 @@ def test_spectrum_at_any_point_is_that_of_its_modes():
     row = np.array([0.1, -0.7])
     steady = system.steady(orbit.omega)
     displacement = (system.linear.right @ steady)[:2]
-    assert spectrum(orbit, row).phasor[1] == pytest.approx(row @ displacement, rel=1e-9)
+    assert harmonics(orbit, row).phasor[1] == pytest.approx(row @ displacement, rel=1e-9)
     with pytest.raises(SystemModelError, match="displacements of 2 modes"):
-        spectrum(orbit, np.ones(3))
+        harmonics(orbit, np.ones(3))
 
 
 # pictures and bad input

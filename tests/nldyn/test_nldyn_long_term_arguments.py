@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from nldyn import (
-    AttractorOptions,
     Plane,
     System,
     SystemModelError,
@@ -21,11 +20,6 @@ from nldyn import (
     impact_section,
     impacts,
     lyapunov_exponents,
-    plot_basins,
-    plot_brute_force,
-    plot_section,
-    plot_spectra,
-    plot_sweep,
     run_all,
     simulate,
     solve_orbit,
@@ -34,9 +28,16 @@ from nldyn import (
     stroboscopic_section,
     sweep,
 )
-from nldyn.attractors import zero_one_test
-from nldyn.lyapunov import standard_errors
-from nldyn.wear import measures_table, power_spectrum
+from nldyn.longterm.attractors import AttractorOptions, zero_one_test
+from nldyn.longterm.lyapunov import standard_errors
+from nldyn.longterm.wear import measures_table, power_spectrum
+from nldyn.plot.longterm import (
+    plot_basins,
+    plot_brute_force,
+    plot_section,
+    plot_spectra,
+    plot_sweep,
+)
 
 JUNK = (None, "nonsense", {"a": 1}, math.nan, -1, 10**400, object(), np.zeros(3), 1j)
 

@@ -20,7 +20,7 @@ from nldyn import (
     simulate,
     solve_orbit,
 )
-from nldyn.lyapunov import spectrum_from, standard_errors
+from nldyn.longterm.lyapunov import spectrum_from, standard_errors
 
 
 def test_exponents_of_linear_modes_are_their_decays():

@@ -27,7 +27,7 @@ from nldyn import (
     refine_special,
     solve_orbit,
 )
-from nldyn.orbit import Orbit
+from nldyn.orbits.orbit import Orbit
 
 STIFFNESS, PRELOAD = 1.0, 1.0
 OWN_X, OWN_Y = 1.0, 1.0  # squared frequencies of the coordinates without the stops

@@ -28,11 +28,11 @@ from nldyn import (
     find_orbits,
     solve_orbit,
 )
-from nldyn.multipliers import (
+from nldyn.orbits.multipliers import (
     MultiplierError,
     Stability,
+    floquet_spectrum,
     log_determinant,
-    spectrum,
     uncertainties,
 )
 
@@ -73,7 +73,7 @@ def graded(rng, decades, k):
 def test_random_products_have_the_eigenvalues_of_high_precision(n, k):
     """Between neighbours of nearly the same modulus the order is free: compare as a set."""
     factors = np.random.default_rng(10 * n + k).normal(size=(k, n, n))
-    found = spectrum(factors)
+    found = floquet_spectrum(factors)
     exact, logarithms = exact_multipliers(factors)
     np.testing.assert_allclose(found.log_moduli, logarithms, rtol=0, atol=1e-10)
     for mu in exact:
@@ -95,7 +95,7 @@ def test_large_and_tiny_multipliers_are_both_right(decades, k):
     error = 1e3 * k * len(decades) * EPS * spread
     assert error < 1e-6
     error = math.sqrt(error) if repeated else error
-    np.testing.assert_allclose(spectrum(factors).log_moduli, logarithms, rtol=0, atol=error)
+    np.testing.assert_allclose(floquet_spectrum(factors).log_moduli, logarithms, rtol=0, atol=error)
     assert logarithms[-1] == pytest.approx(min(decades) * math.log(10.0), abs=1e-3)
 
 
@@ -105,13 +105,13 @@ def test_product_formed_first_loses_the_tiny_multipliers_that_the_sequence_keeps
     formed = np.linalg.multi_dot(factors[::-1])
     lost = np.sort(np.log(np.abs(np.linalg.eigvals(formed))))[0]
     assert abs(lost - logarithms[-1]) > 1.0
-    assert abs(spectrum(factors).log_moduli[-1] - logarithms[-1]) < 1e-10
+    assert abs(floquet_spectrum(factors).log_moduli[-1] - logarithms[-1]) < 1e-10
 
 
 def test_very_long_periods_neither_overflow_nor_underflow():
     factors = np.tile(graded(np.random.default_rng(5), [1.5, 0.2, -2.5], 3), (400, 1, 1))
     _, logarithms = exact_multipliers(factors[:3])
-    found = spectrum(factors)
+    found = floquet_spectrum(factors)
     np.testing.assert_allclose(found.log_moduli, 400 * logarithms, rtol=1e-12)
     assert found.multipliers[2] == 0.0
     assert math.isinf(abs(found.multipliers[0]))
@@ -122,8 +122,8 @@ def test_factors_of_extreme_size_are_no_worse():
     factors = np.random.default_rng(2).normal(size=(4, 4, 4))
     sizes = np.array([1e200, 1e-250, 1e150, 1e-90])[:, None, None]
     np.testing.assert_allclose(
-        spectrum(sizes * factors).log_moduli - 10 * math.log(10.0),
-        spectrum(factors).log_moduli, rtol=0, atol=1e-11,
+        floquet_spectrum(sizes * factors).log_moduli - 10 * math.log(10.0),
+        floquet_spectrum(factors).log_moduli, rtol=0, atol=1e-11,
     )  # fmt: skip
 
 
@@ -134,7 +134,7 @@ def test_rotation_and_growth_make_a_conjugate_pair(k):
     block = np.zeros((4, 4))
     block[:2, :2], block[2, 2], block[3, 3] = turn, 3.0, -0.2
     basis = well_conditioned(np.random.default_rng(1), 4)
-    found = spectrum(np.tile(basis @ block @ np.linalg.inv(basis), (k, 1, 1))).multipliers
+    found = floquet_spectrum(np.tile(basis @ block @ np.linalg.inv(basis), (k, 1, 1))).multipliers
     pair = (0.9 * np.exp(0.3j)) ** k
     np.testing.assert_allclose(found, [3.0**k, pair, pair.conjugate(), (-0.2) ** k], rtol=1e-13)
 
@@ -145,7 +145,7 @@ def test_rotation_and_growth_make_a_conjugate_pair(k):
 def test_repeated_multipliers_with_independent_directions_are_exact():
     basis = well_conditioned(np.random.default_rng(4), 4)
     factor = basis @ np.diag([2.0, 2.0, 0.5, 0.5]) @ np.linalg.inv(basis)
-    found = spectrum(np.tile(factor, (3, 1, 1)))
+    found = floquet_spectrum(np.tile(factor, (3, 1, 1)))
     np.testing.assert_allclose(found.multipliers, [8.0, 8.0, 0.125, 0.125], rtol=1e-13)
     unsure = uncertainties(np.tile(factor, (3, 1, 1)), found, 1e-8)
     assert np.all(unsure < 1e-6)
@@ -159,7 +159,7 @@ def test_defective_multipliers_are_as_sure_as_the_root_of_the_error(order):
     block[3, 3] = 1e-6
     basis = well_conditioned(np.random.default_rng(6), 4)
     factor = (basis @ block @ np.linalg.inv(basis))[None]
-    found = spectrum(factor)
+    found = floquet_spectrum(factor)
     assert np.abs(found.log_moduli[:order] - math.log(0.5)).max() < 30.0 * EPS ** (1.0 / order)
     error = 1e-9
     unsure = uncertainties(factor, found, error)[0]
@@ -173,7 +173,7 @@ def test_zero_of_a_triangular_factor_is_an_exactly_zero_multiplier(k, place):
     factors = np.triu(np.random.default_rng(8).normal(size=(k, 4, 4)))
     factors[-1] += np.tril(np.random.default_rng(9).normal(size=(4, 4)), -1)
     factors[0, place, place] = 0.0
-    found = spectrum(factors)
+    found = floquet_spectrum(factors)
     assert np.sum(found.multipliers == 0.0) == 1
     assert found.log_moduli[-1] == -math.inf
     _, logarithms = exact_multipliers(factors)
@@ -184,7 +184,7 @@ def test_two_zeros_in_different_factors_are_two_zero_multipliers():
     factors = np.triu(np.random.default_rng(12).normal(size=(4, 5, 5)))
     factors[-1] += np.tril(np.random.default_rng(13).normal(size=(5, 5)), -1)
     factors[0, 3, 3] = factors[2, 1, 1] = 0.0
-    found = spectrum(factors)
+    found = floquet_spectrum(factors)
     assert np.sum(found.multipliers == 0.0) == 2
     _, logarithms = exact_multipliers(factors)
     np.testing.assert_allclose(found.log_moduli[:3], logarithms[:3], rtol=0, atol=1e-11)
@@ -195,25 +195,25 @@ def test_singular_full_matrices_leave_the_other_multipliers_right():
     rng = np.random.default_rng(14)
     factors = rng.normal(size=(3, 4, 4))
     factors[1] -= np.outer(factors[1] @ np.ones(4), np.ones(4)) / 4.0
-    found = spectrum(factors)
+    found = floquet_spectrum(factors)
     _, logarithms = exact_multipliers(factors)
     np.testing.assert_allclose(found.log_moduli[:3], logarithms[:3], rtol=0, atol=1e-11)
     assert found.log_moduli[3] < math.log(EPS) + 7.0
     assert found.squeeze < 1e-14
     assert uncertainties(factors, found, 1e-12)[3] > 1.0
-    assert np.all(spectrum(factors * 0.0).multipliers == 0.0)
+    assert np.all(floquet_spectrum(factors * 0.0).multipliers == 0.0)
 
 
 def test_nilpotent_product_is_zero():
     up, down = np.diag([1.0, 2.0], 1), np.diag([3.0, 0.0, 1.0])
-    assert np.all(spectrum(np.array([up, down])).multipliers == 0.0)
+    assert np.all(floquet_spectrum(np.array([up, down])).multipliers == 0.0)
 
 
 def test_matrices_that_are_not_finite_are_refused():
     factors = np.full((2, 2, 2), 1.0)
     factors[1, 0, 1] = math.inf
     with pytest.raises(MultiplierError):
-        spectrum(factors)
+        floquet_spectrum(factors)
 
 
 # --- laws ----------------------------------------------------------------------------------------
@@ -235,7 +235,7 @@ def sequence(case):
 def test_multipliers_do_not_depend_on_where_the_period_begins(case, shift):
     """Differences are of rounding size, as `uncertainties` estimates it."""
     factors = sequence(case)
-    found, shifted = spectrum(factors), spectrum(np.roll(factors, shift, axis=0))
+    found, shifted = floquet_spectrum(factors), floquet_spectrum(np.roll(factors, shift, axis=0))
     bound = 100.0 * uncertainties(factors, found, 4.0 * EPS * factors.shape[1]) + 1e-14
     assert np.all(np.abs(found.log_moduli - shifted.log_moduli) <= bound)
 
@@ -248,7 +248,7 @@ def test_coordinates_between_the_segments_do_not_matter(case, seed):
     rng = np.random.default_rng(seed)
     bases = [np.linalg.qr(rng.normal(size=(n, n)))[0] for _ in range(k)]
     turned = np.array([bases[(j + 1) % k] @ factors[j] @ bases[j].T for j in range(k)])
-    found, other = spectrum(factors), spectrum(turned)
+    found, other = floquet_spectrum(factors), floquet_spectrum(turned)
     bound = 100.0 * uncertainties(factors, found, 4.0 * EPS * n) + 1e-14
     assert np.all(np.abs(found.log_moduli - other.log_moduli) <= bound)
 
@@ -259,7 +259,7 @@ def test_log_moduli_add_up_to_the_log_determinant(case):
     factors = sequence(case)
     factors[:, :, 0] *= np.sign(np.linalg.det(factors))[:, None]
     value, rounding = log_determinant(factors)
-    found = spectrum(factors)
+    found = floquet_spectrum(factors)
     unsure = uncertainties(factors, found, 4.0 * EPS * factors.shape[1])
     assert abs(found.log_moduli.sum() - value) <= 100.0 * (unsure.sum() + rounding) + 1e-12
 
@@ -283,7 +283,7 @@ def test_constant_matrices_give_the_exponentials_for_any_number_of_segments(name
     defective = name == "critical damping"
     for k in (30, 100, 301):
         piece = expm(np.array(matrix) * period / k)
-        found = spectrum(np.tile(piece, (k, 1, 1)))
+        found = floquet_spectrum(np.tile(piece, (k, 1, 1)))
         tolerance = 1e-6 * k if defective else 1e-10
         np.testing.assert_allclose(found.log_moduli, logarithms, rtol=0, atol=tolerance)
 
@@ -314,13 +314,13 @@ def test_mathieus_multipliers_meet_on_the_edges_of_the_tongues(k, function, orde
     q = 2.0
     edge = float(function(order, q))
     segments = mathieu_segments(edge, q, k)
-    found = spectrum(segments)
+    found = floquet_spectrum(segments)
     np.testing.assert_allclose(found.multipliers, [sign, sign], atol=1e-4)
     unsure = uncertainties(segments, found, 1e-10)
     assert Stability(found.multipliers[0], found.log_moduli[0], unsure[0]).verdict == "undecided"
     inside, outside = [], []
     for a in (edge - 0.05, edge + 0.05):
-        spread = spectrum(mathieu_segments(a, q, k)).log_moduli
+        spread = floquet_spectrum(mathieu_segments(a, q, k)).log_moduli
         assert spread.sum() == pytest.approx(0.0, abs=1e-9)  # Liouville: no damping
         (inside if spread[0] < 1e-9 else outside).append(a)
     assert len(inside) == len(outside) == 1
@@ -359,7 +359,7 @@ def test_uncertainty_agrees_with_the_first_order_worst_case(seed):
     rng = np.random.default_rng(seed)
     k, n = int(rng.integers(1, 5)), int(rng.integers(2, 7))
     factors = graded(rng, np.linspace(2.0, -2.0, n) + rng.uniform(-0.1, 0.1, n), k)
-    found = spectrum(factors)
+    found = floquet_spectrum(factors)
     assert np.all(found.multipliers.imag == 0.0)
     ratio = uncertainties(factors, found, 1e-9) / (1e-9 * worst_first_order_change(factors))
     assert np.all((ratio > 0.1) & (ratio < 10.0))
@@ -391,7 +391,7 @@ def test_multipliers_agree_with_a_finer_map_on_many_more_segments():
     fine = replace(orbit.problem, flow=orbit.problem.flow.finer)
     pieces = fine.jacobians(orbit.point, 12)
     assert len(pieces) == 12 * len(orbit.jacobians)
-    change = np.abs(spectrum(pieces).log_moduli - orbit.log_moduli)
+    change = np.abs(floquet_spectrum(pieces).log_moduli - orbit.log_moduli)
     assert np.all(change < orbit.log_modulus_uncertainties)
     assert np.all(change < 1e-7)
 
@@ -437,10 +437,10 @@ def test_segments_that_squeeze_a_direction_below_rounding_are_cut():
     """Multipliers down to e^-621: a run on 400 segments and a finer map gives them again."""
     orbit = solve_orbit(overdamped(), 5.0)
     assert orbit.impacts == 1
-    lost = np.abs(spectrum(orbit.jacobians).log_moduli[2:] - orbit.log_moduli[2:])
+    lost = np.abs(floquet_spectrum(orbit.jacobians).log_moduli[2:] - orbit.log_moduli[2:])
     assert np.all(lost > 10.0)
     fine = replace(orbit.problem, flow=orbit.problem.flow.finer).jacobians(orbit.point, 200)
-    change = np.abs(spectrum(fine).log_moduli - orbit.log_moduli)
+    change = np.abs(floquet_spectrum(fine).log_moduli - orbit.log_moduli)
     assert np.all(change < 1e-9)
     assert orbit.log_moduli.sum() == pytest.approx(-1000.0, abs=1e-9)
     assert orbit.multipliers[-1].real == pytest.approx(math.exp(orbit.log_moduli[-1]), rel=1e-9)
@@ -501,7 +501,7 @@ def test_stated_uncertainty_holds_against_a_finer_map(harmonic_branch):
     shares = []
     for orbit in harmonic_branch.points[::10]:
         fine = replace(orbit.problem, flow=orbit.problem.flow.finer).jacobians(orbit.point, 1)
-        change = abs(spectrum(fine).log_moduli[0] - orbit.log_moduli[0])
+        change = abs(floquet_spectrum(fine).log_moduli[0] - orbit.log_moduli[0])
         shares.append(change / orbit.stability.uncertainty)
         assert orbit.stability.uncertainty < 1e-4
     assert max(shares) < 1.0

@@ -61,4 +61,4 @@ def test_a_branch_with_a_detour_is_extended_as_if_walked_at_once(walks):
     whole = walks[1][0]
     for end in (44.2, 44.27, 44.3, 44.5):
         part = continue_branch(whole.points[0], (RANGE[0], end), options=LONG)
-        assert_same_branches(part.extend(RANGE), whole)
+        assert_same_branches(continue_branch(part, RANGE), whole)

@@ -19,18 +19,13 @@ from nldyn import (
     SystemModelError,
     Unbalance,
     cascade,
-    cascades_in,
     continue_branch,
     describe,
     diagram,
     normal_form,
     solve_orbit,
-    switch_at_branch_point,
-    switch_at_flip,
 )
-from nldyn.branch import SpecialPoint
-from nldyn.cascades import FEIGENBAUM
-from nldyn.critical import (
+from nldyn.bifurcations.critical import (
     CoefficientError,
     Estimate,
     Loop,
@@ -42,9 +37,13 @@ from nldyn.critical import (
     loop_of,
     torus,
 )
-from nldyn.normal_forms import is_symmetric, resonance
-from nldyn.orbit import refine, shooting_problem
-from nldyn.trail import trace
+from nldyn.bifurcations.normal_forms import is_symmetric, resonance, switch_at_branch_point
+from nldyn.bifurcations.period_doubling import switch_at_flip
+from nldyn.bifurcations.point import SpecialPoint
+from nldyn.branches.cascades import FEIGENBAUM, cascades_in
+from nldyn.branches.leg import trace
+from nldyn.orbits.newton import refine
+from nldyn.orbits.shooting import shooting_problem
 
 
 def of_kind(branch, kind):
@@ -321,7 +320,7 @@ def test_error_of_a_coefficient_covers_other_steps(harmonic_branch, monkeypatch,
             continue
         first = normal_form(special).coefficient
         with monkeypatch.context() as patch:
-            patch.setattr("nldyn.critical.LARGEST_STEP", longest)
+            patch.setattr("nldyn.bifurcations.critical.LARGEST_STEP", longest)
             other = normal_form(special).coefficient
         assert abs(other.value - first.value) <= first.error + other.error
         assert first.error < 1e-5 * abs(first.value)

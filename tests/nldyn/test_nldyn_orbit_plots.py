@@ -5,21 +5,10 @@ import pytest
 from matplotlib.backend_bases import MouseEvent
 from matplotlib.figure import Figure
 
-from nldyn import (
-    Stop,
-    System,
-    SystemModelError,
-    Unbalance,
-    plot_contact_force,
-    plot_diagram,
-    plot_history,
-    plot_phase_portrait,
-    plot_spectrum,
-    solve_orbit,
-    spectrum,
-)
-from nldyn.hover import show_labels
-from nldyn.plot import new_axes
+from nldyn import Stop, System, SystemModelError, Unbalance, harmonics, solve_orbit
+from nldyn.plot.diagram import new_axes, plot_diagram
+from nldyn.plot.hover import show_labels
+from nldyn.plot.orbit import plot_contact_force, plot_history, plot_phase_portrait, plot_spectrum
 
 PLOTS = (plot_history, plot_phase_portrait, plot_spectrum, plot_contact_force)
 
@@ -115,7 +104,7 @@ def test_phase_portrait_is_closed_and_has_the_stop_in_its_place(one_dof):
 def test_spectrum_shows_the_lines(stable):
     ax = plot_spectrum(stable, orders=8)
     (marks,) = ax.lines
-    lines = spectrum(stable, orders=8)
+    lines = harmonics(stable, orders=8)
     assert (ax.get_xlabel(), ax.get_yscale()) == ("frequency (Hz)", "log")
     assert marks.get_xdata() == pytest.approx(lines.frequency_hz)
     assert 1e-6 * marks.get_ydata() == pytest.approx(lines.amplitude)

@@ -22,7 +22,7 @@ from nldyn import (
     continue_branch,
     solve_orbit,
 )
-from nldyn.orbit import minimal_period, same_orbit
+from nldyn.orbits.orbit import minimal_period, same_orbit
 
 MASS = np.array([[2.0, 0.3], [0.3, 1.0]])
 STIFFNESS = np.array([[3e4, -1e4], [-1e4, 2e4]])

@@ -11,9 +11,9 @@ from nldyn import (
     continue_branch,
     solve_orbit,
 )
-from nldyn.fixed_point_index import _changes
+from nldyn.orbits.starts import orbit_near
 from nldyn.paper.jobs import scene_system
-from nldyn.search import orbit_near
+from nldyn.search.fixed_point_index import _changes
 
 
 def test_two_flips_within_a_step_are_found():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from nldyn import ConvergenceError, HarmonicForce, Stop, System, find_orbits, solve_orbit
-from nldyn.preload import rest, tangent_stiffness
+from nldyn.system.rest import rest, tangent_stiffness
 
 OWN = 20.0 * math.pi  # rad/s
 

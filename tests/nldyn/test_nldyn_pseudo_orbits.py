@@ -14,23 +14,24 @@ from hypothesis import strategies as st
 from one_dof import THREE_HZ
 
 from nldyn import (
+    CheckpointFile,
     Diagram,
     SystemModelError,
     by_pseudo_orbits,
     continue_branch,
-    index_gaps,
     index_sum,
-    load_branches,
-    load_diagram,
-    pseudo_orbits,
+    save,
     solve_orbit,
 )
-from nldyn.branch import NOT_FINISHED
-from nldyn.exploration import steps_between
+from nldyn.branches.branch import NOT_FINISHED
+from nldyn.io.branches import load_branches, load_diagram
+from nldyn.orbits.starts import nearest_orbit
 from nldyn.paper.jobs import scene_system
-from nldyn.pseudo_orbit_search import WAYS
-from nldyn.pseudo_orbits import FARTHEST, NEAR, NODES, Pieces
-from nldyn.search import nearest_orbit
+from nldyn.search import pseudo_orbits
+from nldyn.search.by_pseudo_orbits import WAYS
+from nldyn.search.exploration import steps_between
+from nldyn.search.fixed_point_index import index_gaps
+from nldyn.search.pseudo_orbits import FARTHEST, NEAR, NODES, Pieces
 
 
 @pytest.mark.parametrize("period", [1, 2, 3])
@@ -220,19 +221,23 @@ def test_a_branch_that_was_begun_is_finished(three, tmp_path):
     """Interrupted on the way along it, and with the known branches read from a file."""
     (left_out,) = three.of_period(3)
     place, known = tmp_path / "found.h5", tmp_path / "known.h5"
-    without(three, left_out).save(known)
+    save(without(three, left_out), known)
     seen = []
 
-    def interrupt(what: str, frequency_hz: float) -> None:
+    def interrupt(what: str, frequency_hz: float, done: float) -> None:
         seen.append(what)
         if seen.count("1/3") == 5:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        by_pseudo_orbits(load_diagram(known), tries=50, progress=interrupt, checkpoint=place)
+        by_pseudo_orbits(
+            load_diagram(known), tries=50, progress=interrupt, checkpoint=CheckpointFile(place)
+        )
     (begun,) = load_branches(place)
     assert NOT_FINISHED in begun.stop_reasons
-    (found,) = by_pseudo_orbits(load_diagram(known), tries=50, checkpoint=place).branches[2:]
+    (found,) = by_pseudo_orbits(
+        load_diagram(known), tries=50, checkpoint=CheckpointFile(place)
+    ).branches[2:]
     assert len(begun.points) < len(found.points)
     assert NOT_FINISHED not in found.stop_reasons
     ends = [special.frequency_hz for special in found.special_points if special.kind == "LP"]

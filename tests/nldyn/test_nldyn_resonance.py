@@ -25,7 +25,7 @@ from nldyn import (
     find_orbits,
     solve_orbit,
 )
-from nldyn._kernels import NEAR
+from nldyn.system.linear import NEAR
 
 HZ = 10.0
 OWN = 2 * np.pi * HZ

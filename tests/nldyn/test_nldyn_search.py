@@ -27,9 +27,9 @@ from nldyn import (
     find_orbits,
     solve_orbit,
 )
-from nldyn.continuation import open_ends
-from nldyn.orbit import minimal_period, same_orbit, stroboscopic
-from nldyn.search import orbit_beside, orbit_near
+from nldyn.branches.continuation import open_ends
+from nldyn.orbits.orbit import minimal_period, same_orbit, stroboscopic
+from nldyn.orbits.starts import orbit_beside, orbit_near
 
 # where the paper's text sees subharmonics: 1/3 near 37.1, 1/5 near 62.2, 1/7 near 58, 1/13 near 81
 PLACES = [(3, 37.1), (5, 62.2), (7, 58.0), (13, 80.19), (2, 50.6), (3, 76.0)]
@@ -158,7 +158,7 @@ def test_diagram_says_which_orbit_it_could_not_follow(monkeypatch):
     def fails(orbit, *_, **__):
         raise ConvergenceError(f"no orbit at {orbit.frequency_hz:g} Hz: singular Jacobian")
 
-    monkeypatch.setattr("nldyn.diagrams.start_point", fails)
+    monkeypatch.setattr("nldyn.search.diagram.start_point", fails)
     found = diagram(make_one_dof(stops=[]), (25.0, 27.0), periods=(1,), search_points=1)
     assert found.branches == ()
     assert found.notes[0].startswith("orbit of period 1 found but not followed: no orbit at 25.98")

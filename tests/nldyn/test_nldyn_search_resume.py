@@ -10,14 +10,15 @@ import pytest
 from branches_alike import assert_same_branches, without
 
 from nldyn import (
+    CheckpointFile,
     ContinuationOptions,
     Diagram,
     SystemModelError,
     by_closed_walks,
     by_crossover,
     by_pseudo_orbits,
-    load_branches,
 )
+from nldyn.io.branches import load_branches
 
 Search = Callable[..., Diagram]
 WAYS: dict[str, Search] = {
@@ -34,7 +35,7 @@ class Frequencies:
         self.way, self.last = way, last
         self.tried: list[float] = []
 
-    def __call__(self, what: str, frequency_hz: float) -> None:
+    def __call__(self, what: str, frequency_hz: float, done: float) -> None:
         if what == self.way and frequency_hz not in self.tried:
             self.tried.append(frequency_hz)
             if len(self.tried) == self.last:
@@ -51,19 +52,19 @@ def interrupted(three, way, tmp_path):
     """A file of a search that was interrupted at its third frequency."""
     place = tmp_path / "found.h5"
     with pytest.raises(KeyboardInterrupt):
-        WAYS[way](three, progress=Frequencies(way, 3), checkpoint=place)
+        WAYS[way](three, progress=Frequencies(way, 3), checkpoint=CheckpointFile(place))
     return place
 
 
 def test_interrupted_it_gives_what_an_uninterrupted_one_gives(three, way, interrupted):
     whole, rest = Frequencies(way), Frequencies(way)
     wanted = WAYS[way](three, progress=whole)
-    resumed = WAYS[way](three, progress=rest, checkpoint=interrupted)
+    resumed = WAYS[way](three, progress=rest, checkpoint=CheckpointFile(interrupted))
     assert len(whole.tried) > 3
     assert rest.tried == whole.tried[2:]
     assert resumed.notes == wanted.notes
     nothing = Frequencies(way)
-    again = WAYS[way](three, progress=nothing, checkpoint=interrupted)
+    again = WAYS[way](three, progress=nothing, checkpoint=CheckpointFile(interrupted))
     assert not nothing.tried
     assert again.notes == wanted.notes
 
@@ -78,7 +79,7 @@ def test_another_search_begins_anew(three, way, interrupted):
     ):
         tried = Frequencies(way, 1)
         with pytest.raises(KeyboardInterrupt):
-            WAYS[way](known, progress=tried, checkpoint=interrupted, **numbers)
+            WAYS[way](known, progress=tried, checkpoint=CheckpointFile(interrupted), **numbers)
         fresh = Frequencies(way, 1)
         with pytest.raises(KeyboardInterrupt):
             WAYS[way](known, progress=fresh, **numbers)
@@ -94,19 +95,19 @@ def test_what_it_has_found_is_not_lost_and_changes_nothing_where_it_goes_on(thre
     wanted = search(known, progress=whole)
     tried: list[float] = []
 
-    def interrupt(what: str, frequency_hz: float) -> None:
+    def interrupt(what: str, frequency_hz: float, done: float) -> None:
         if what == way:
             tried.append(frequency_hz)
             if place.exists() and load_branches(place):
                 raise KeyboardInterrupt
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("nldyn.checkpoint.PAUSE", 0.0)
-        patch.setattr("nldyn.checkpoint.SHARE", 0.0)
+        patch.setattr("nldyn.runtime.keeper.PAUSE", 0.0)
+        patch.setattr("nldyn.runtime.keeper.SHARE", 0.0)
         with pytest.raises(KeyboardInterrupt):
-            search(known, progress=interrupt, checkpoint=place)
+            search(known, progress=interrupt, checkpoint=CheckpointFile(place))
     rest = Frequencies(way)
-    found = search(known, progress=rest, checkpoint=place)
+    found = search(known, progress=rest, checkpoint=CheckpointFile(place))
     assert rest.tried == whole.tried[whole.tried.index(tried[-1]) :]
     assert found.notes == wanted.notes
     for branch, same in zip(found.branches, wanted.branches, strict=True):
@@ -120,7 +121,7 @@ def test_a_search_of_an_earlier_version_begins_anew(three, way, interrupted):
         del file["search"].attrs["known"]
     tried = Frequencies(way, 1)
     with pytest.raises(KeyboardInterrupt):
-        WAYS[way](three, progress=tried, checkpoint=interrupted)
+        WAYS[way](three, progress=tried, checkpoint=CheckpointFile(interrupted))
     fresh = Frequencies(way, 1)
     with pytest.raises(KeyboardInterrupt):
         WAYS[way](three, progress=fresh)
@@ -131,4 +132,4 @@ def test_a_damaged_place_is_told_by_its_name(three, way, interrupted):
     with h5py.File(interrupted, "r+") as file:
         del file["search"].attrs["done"]
     with pytest.raises(SystemModelError, match=r"found\.h5: attribute '/search/done' is missing"):
-        WAYS[way](three, checkpoint=interrupted)
+        WAYS[way](three, checkpoint=CheckpointFile(interrupted))

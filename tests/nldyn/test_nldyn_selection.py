@@ -12,18 +12,18 @@ from strings import MASSES, SETTING, string
 
 import cms
 import fem
-from nldyn import Setting, Stop, SystemModelError, Unbalance, reduce_for, solve_orbit
-from nldyn.convergence import harmonic_branch, largest_force, matched, special_points_of
-from nldyn.peaks import resonance_peaks
-from nldyn.resources import example
-from nldyn.scene import build_component, load_scene
-from nldyn.selection import contact_duration
-from nldyn.setting import setting_of
+from nldyn import LoadCase, Stop, SystemModelError, Unbalance, select_modes, solve_orbit
+from nldyn.base.resources import example
+from nldyn.branches.peaks import resonance_peaks
+from nldyn.reduction.candidates import contact_duration
+from nldyn.reduction.convergence import harmonic_branch, largest_force, matched, special_points_of
+from nldyn.scene.build import build_component, load_scene
+from nldyn.scene.load_case import load_case_of
 
 
 @pytest.fixture(scope="module")
 def selection():
-    return reduce_for(string(), SETTING, tolerance=0.02)
+    return select_modes(string(), SETTING, tolerance=0.02)
 
 
 def test_modes_that_the_middle_cannot_see_are_dropped(selection):
@@ -42,7 +42,7 @@ def test_modes_that_the_middle_cannot_see_are_dropped(selection):
 def test_an_interface_that_is_not_in_use_does_not_count():
     """The quarter point would see every second mode, but nothing acts there."""
     quarter = {"quarter": np.eye(MASSES)[MASSES // 4]}
-    found = reduce_for(string(quarter), SETTING, tolerance=0.02)
+    found = select_modes(string(quarter), SETTING, tolerance=0.02)
     assert all(number % 2 for number in found.kept)
 
 
@@ -86,7 +86,7 @@ def test_true_error_of_folds_and_flips_lies_within_the_stated_band(stiffness, ra
         stops=(Stop.linear("middle", stiffness),),
         modal_damping=0.01,
     )
-    found = reduce_for(string(), setting, tolerance=0.02, special_points=True)
+    found = select_modes(string(), setting, tolerance=0.02, special_points=True)
     models = (cms.reduce(string(), modes=MASSES), found.reduced)
     exact, own = (
         special_points_of(harmonic_branch(setting.system(m), setting, lambda hz: None))
@@ -111,20 +111,20 @@ def test_true_error_of_a_solid_lies_within_the_stated_band():
         interfaces={"tip": fem.Interface("tip", "z")},
     )
     component = fem.assemble(model)
-    setting = Setting(
+    setting = LoadCase(
         (95.0, 130.0),
         stops=(Stop("tip", stiffness=2e7),),
         excitation=(Unbalance("tip", 1e-5),),
         modal_damping=0.03,
     )
-    selection = reduce_for(component, setting, tolerance=0.05)
+    selection = select_modes(component, setting, tolerance=0.05)
     _, high = selection.error
     assert high < 0.2
     assert true_error(component, setting, selection.reduced, 24) <= high * 1.05
 
 
 def test_a_smaller_tolerance_keeps_more(selection):
-    finer = reduce_for(string(), SETTING, tolerance=0.001)
+    finer = select_modes(string(), SETTING, tolerance=0.001)
     assert len(finer.kept) > len(selection.kept)
     assert finer.error[1] < selection.error[1]
 
@@ -151,15 +151,15 @@ def test_contact_of_a_sphere_is_hertz_formula():
 @pytest.mark.parametrize("tolerance", [0.0, 1.0, np.nan, "small"])
 def test_a_tolerance_out_of_range_is_told(tolerance):
     with pytest.raises(SystemModelError, match="tolerance must lie in"):
-        reduce_for(string(), SETTING, tolerance=tolerance)
+        select_modes(string(), SETTING, tolerance=tolerance)
 
 
 @pytest.mark.slow
 def test_true_error_of_the_beam_lies_within_the_stated_band():
     """Harmonic branches of the chosen model and of 20 modes, at seven frequencies and the peak."""
     scene = load_scene(example("four_dof_xi_0.01.toml"))
-    component, setting = build_component(scene), setting_of(scene)
-    selection = reduce_for(component, setting, tolerance=0.01)
+    component, setting = build_component(scene), load_case_of(scene)
+    selection = select_modes(component, setting, tolerance=0.01)
     models = (cms.reduce(component, modes=20), selection.reduced)
     full, small = (harmonic_branch(setting.system(m), setting, lambda hz: None) for m in models)
     pairs = [
@@ -188,7 +188,7 @@ def test_the_example_of_the_docs(capsys):
     assert "modes kept: 1 (13.12 Hz), 2 (117.4 Hz), 3 (326.1 Hz), 5 (639.4 Hz)" in (
         capsys.readouterr().out
     )
-    selection, setting = names["selection"], names["setting_of"](names["scene"])
+    selection, setting = names["selection"], names["load_case_of"](names["scene"])
     component = names["build_component"](names["scene"])
     full = setting.system(cms.reduce(component, modes=20))
     for hz in (20.0, 60.0, 85.0):

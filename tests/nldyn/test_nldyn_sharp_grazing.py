@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 from nldyn import HarmonicForce, Stop, System, continue_branch, solve_orbit
-from nldyn.conditions import Grazing, depth_row
+from nldyn.orbits.conditions import Grazing, depth_row
 
 FREQUENCIES = np.array([25.125, 25.2])
 AT_STOP, AT_FORCE = np.array([1.136, 0.11]), np.array([-0.553, -0.785])

@@ -23,8 +23,8 @@ from nldyn import (
     solve_orbit,
     sweep,
 )
-from nldyn.flow import BUNCH
-from nldyn.simulation import PIECE, chirp_steps, transient_end
+from nldyn.flow.flow_map import BUNCH
+from nldyn.longterm.simulation import PIECE, chirp_steps, transient_end
 
 
 def ball(speed: float = -0.2, stop: Stop | None = None) -> tuple[System, list[float]]:
@@ -39,9 +39,7 @@ def test_simulation_agrees_with_adaptive_integration():
     system = make_one_dof()
     start = np.array([-1e-4, 1e-2])
     motion = simulate(system, 26.0, periods=6, start=start)
-    x, _ = Independent(system).run(
-        start, (0.0, 12.0 * np.pi), 2.0 * np.pi * 26.0, tangent=False
-    )
+    x, _ = Independent(system).run(start, (0.0, 12.0 * np.pi), 2.0 * np.pi * 26.0, tangent=False)
     assert len(impacts(motion)) >= 4
     scale = np.abs(motion.strobe).max(axis=0)
     assert np.all(np.abs(motion.end - x) < 1e-8 * scale)

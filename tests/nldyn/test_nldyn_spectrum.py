@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from repeated import run_through
 
-from nldyn import HarmonicForce, Stop, System, SystemModelError, find_orbits, solve_orbit, spectrum
+from nldyn import HarmonicForce, Stop, System, SystemModelError, find_orbits, harmonics, solve_orbit
 
 
 def test_a_linear_system_answers_at_the_frequency_of_the_force():
@@ -14,7 +14,7 @@ def test_a_linear_system_answers_at_the_frequency_of_the_force():
         modal_damping=0.02,
         excitation=[HarmonicForce("tip", 2.0, 25.0)],
     )
-    lines = spectrum(run_through(solve_orbit(system, 17.0), 2), orders=3)
+    lines = harmonics(run_through(solve_orbit(system, 17.0), 2), orders=3)
     omega, natural = 2.0 * np.pi * 17.0, 2.0 * np.pi * np.array([13.0, 40.0])
     transfer = 1.0 / (natural**2 - omega**2 + 0.04j * natural * omega)
     phasor = 2.0 * np.exp(1j * np.radians(25.0)) * np.sum(transfer * np.array([0.6, 0.3]) ** 2)
@@ -30,7 +30,7 @@ def test_lines_are_the_response_to_force_and_contact(one_dof, frequency, period)
     The lines of the contact force come from the quadrature of the collocation.
     """
     orbit = find_orbits(one_dof, frequency, period)[0]
-    lines = spectrum(orbit, orders=40)
+    lines = harmonics(orbit, orders=40)
     phases, weights = orbit.trajectory.contact_quadrature()
     (stop,) = one_dof.stops
     v, states = one_dof.stop_vector(stop), orbit.states(phases)
@@ -53,13 +53,13 @@ def test_lines_are_the_response_to_force_and_contact(one_dof, frequency, period)
 def test_requests_that_make_no_sense_are_refused(one_dof):
     orbit = solve_orbit(one_dof, 26.0)
     with pytest.raises(SystemModelError, match="orders must be a whole number"):
-        spectrum(orbit, orders=0)
+        harmonics(orbit, orders=0)
     with pytest.raises(SystemModelError, match="unknown interface 'nose'"):
-        spectrum(orbit, "nose")
+        harmonics(orbit, "nose")
 
 
 def test_a_system_at_rest_has_no_lines():
     system = System.from_modal(
         [13.0], {"tip": [0.6]}, modal_damping=0.02, stops=[Stop("tip", 1e9, gap=1e-3)]
     )
-    assert spectrum(solve_orbit(system, 10.0), orders=2).amplitude.tolist() == [0.0, 0.0, 0.0]
+    assert harmonics(solve_orbit(system, 10.0), orders=2).amplitude.tolist() == [0.0, 0.0, 0.0]

@@ -10,16 +10,16 @@ import cluster_tasks
 import numpy as np
 import pytest
 
-from nldyn import FlowMap, SceneError, Stop, SystemModelError, study
-from nldyn.resources import example
-from nldyn.study_keys import case_keys
+from nldyn import FlowMap, SceneError, Stop, SystemModelError, parameter_study
+from nldyn.base.resources import example
+from nldyn.scene.study_keys import case_keys
 
 GAPS = [0.0, 5e-4, 1e-3]
 
 
 def grid(**more):
     keys = {"stops.0.gap": GAPS, "damping.modal_ratio": [0.01, 0.02]}
-    return study(example("one_dof.toml"), keys, cluster_tasks.frequencies, **more)
+    return parameter_study(example("one_dof.toml"), keys, cluster_tasks.frequencies, **more)
 
 
 def test_a_grid_is_labelled_by_its_keys_and_keeps_failures():
@@ -52,14 +52,16 @@ def test_a_study_goes_on_where_it_was(tmp_path):
 def test_another_scene_does_not_use_the_cases_of_this_one(tmp_path):
     keep = tmp_path / "study.jsonl"
     grid(keep=keep)
-    study(example("one_dof.toml"), {"stops.0.gap": [2e-4]}, cluster_tasks.frequencies, keep=keep)
+    parameter_study(
+        example("one_dof.toml"), {"stops.0.gap": [2e-4]}, cluster_tasks.frequencies, keep=keep
+    )
     assert len(keep.read_text().splitlines()) == 7
 
 
 def test_latin_hypercube_covers_each_range_evenly_and_repeats():
     keys = {"stops.0.gap": (0.0, 8e-4), "damping.modal_ratio": (0.0, 0.1)}
     runs = [
-        study(
+        parameter_study(
             example("one_dof.toml"), keys, cluster_tasks.frequencies,
             design="latin hypercube", samples=16, seed=4,
         )
@@ -79,7 +81,7 @@ def modes(system):
 @pytest.mark.parametrize("design", ["random", "latin hypercube"])
 def test_samples_of_a_key_of_whole_numbers_are_whole(design):
     keys = {"reduction.modes": (1, 4), "damping.modal_ratio": (0.01, 0.02)}
-    found = study(example("two_dof_xi_0.01.toml"), keys, modes, design=design, samples=6)
+    found = parameter_study(example("two_dof_xi_0.01.toml"), keys, modes, design=design, samples=6)
     assert (found["failure"] == "").all()
     chosen = found["reduction.modes"].values
     assert chosen.dtype.kind == "i" and len(set(chosen)) > 1
@@ -90,7 +92,7 @@ def test_samples_of_a_key_of_whole_numbers_are_whole(design):
 
 def test_whole_numbers_in_a_key_of_any_numbers_are_not_rounded():
     keys = {"stops.0.gap": (0, 1)}  # also written without a point in some scenes
-    found = study(example("one_dof.toml"), keys, modes, design="random", samples=4)
+    found = parameter_study(example("one_dof.toml"), keys, modes, design="random", samples=4)
     assert not np.any(found["stops.0.gap"].values == found["stops.0.gap"].values.round())
 
 
@@ -100,7 +102,7 @@ def ratios(system):
 
 def test_values_of_a_grid_may_be_numbers_and_lists_in_turn():
     keys = {"damping.modal_ratio": [[0.01, 0.02], 0.03, np.array([0.01, 0.02])]}
-    found = study(example("two_dof_xi_0.01.toml"), keys, ratios)
+    found = parameter_study(example("two_dof_xi_0.01.toml"), keys, ratios)
     assert found["damping.modal_ratio"].values.tolist()[:2] == ["[0.01, 0.02]", "0.03"]
     assert (found["failure"] == "").all()
     np.testing.assert_allclose(found["second"].values, [0.02, 0.03, 0.02], rtol=1e-12)
@@ -137,7 +139,7 @@ def test_progress_counts_all_cases():
 )  # fmt: skip
 def test_bad_input_is_one_sentence(keys, more, error, said):
     with pytest.raises(error, match=said):
-        study(example("one_dof.toml"), keys, cluster_tasks.frequencies, **more)
+        parameter_study(example("one_dof.toml"), keys, cluster_tasks.frequencies, **more)
 
 
 def test_a_file_that_is_no_study_is_refused(tmp_path):
@@ -213,7 +215,7 @@ def test_measures_of_other_content_have_other_keys(one, other):
 def test_two_measures_of_one_name_do_not_share_a_file(tmp_path):
     keep = tmp_path / "study.jsonl"
     found = [
-        study(example("one_dof.toml"), {"stops.0.gap": [0.0]}, scaled(factor), keep=keep)
+        parameter_study(example("one_dof.toml"), {"stops.0.gap": [0.0]}, scaled(factor), keep=keep)
         for factor in (1.0, 2.0)
     ]
     assert float(found[1]["f"].item() / found[0]["f"].item()) == 2.0
@@ -242,10 +244,10 @@ def test_a_file_that_cannot_be_written_is_refused_before_any_case(tmp_path):
 
     for keep in (tmp_path / "missing" / "study.jsonl", tmp_path):
         with pytest.raises(SystemModelError, match="cannot be"):
-            study(example("one_dof.toml"), {"stops.0.gap": [0.0]}, measure, keep=keep)
+            parameter_study(example("one_dof.toml"), {"stops.0.gap": [0.0]}, measure, keep=keep)
 
 
 @pytest.mark.parametrize("name", ["failure", "stops.0.gap"])
 def test_a_measured_number_has_a_name_of_its_own(name):
     with pytest.raises(SystemModelError, match=f"must not be named '{name}'"):
-        study(example("one_dof.toml"), {"stops.0.gap": [0.0]}, lambda system: {name: 1.0})
+        parameter_study(example("one_dof.toml"), {"stops.0.gap": [0.0]}, lambda system: {name: 1.0})

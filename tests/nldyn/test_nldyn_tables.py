@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from nldyn import SystemModelError
-from nldyn.output import BRANCH_COLUMNS
-from nldyn.tables import UNITS
+from nldyn.branches.tables import UNITS
+from nldyn.report.results import BRANCH_COLUMNS
 
 
 def test_rows_belong_to_the_orbits(harmonic_branch):

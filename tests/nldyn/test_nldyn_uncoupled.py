@@ -17,8 +17,8 @@ from nldyn import (
     continue_branch,
     continue_special,
     solve_orbit,
-    switch_at_branch_point,
 )
+from nldyn.bifurcations.normal_forms import switch_at_branch_point
 
 MASS, STIFFNESS, DAMPING = 1.0, 100.0, 0.4
 STOP, GAP = 3000.0, 0.01

@@ -9,9 +9,10 @@ from fakes import FakeDiagram, resonance
 import nldyn.paper.chaos
 import nldyn.paper.figures
 from nldyn import FlowMap, System
-from nldyn.attractors import Attractor
-from nldyn.lifetimes import ChaosLifetime
-from nldyn.lyapunov import LyapunovSpectrum
+from nldyn.longterm.attractors import Attractor
+from nldyn.longterm.lifetimes import ChaosLifetime
+from nldyn.longterm.lyapunov import LyapunovSpectrum
+from nldyn.longterm.poincare import BruteForce, Column
 from nldyn.paper.chaos import (
     MODELS,
     POINTS,
@@ -27,7 +28,6 @@ from nldyn.paper.claims import evaluate
 from nldyn.paper.evidence import Finding
 from nldyn.paper.figures import SHOWN, write_figures
 from nldyn.paper.workers import worker_processes
-from nldyn.sections import BruteForce, Column
 
 FLOW = FlowMap(System.from_modal([10.0], {"middle": [1.0]}, modal_damping=0.1))
 EMPTY = np.empty(0)

@@ -11,12 +11,7 @@ from fakes import FakeBranch, FakeDiagram, FakeNode, FakeOrbit, FakeSpecialPoint
 
 import nldyn.paper.checks
 from nldyn.paper.checks import CHECKS
-from nldyn.paper.claims import (
-    judged,
-    last_digit,
-    verdict_counts,
-    write_claims,
-)
+from nldyn.paper.claims import judged, last_digit, verdict_counts, write_claims
 from nldyn.paper.evidence import Finding, published_claims
 from nldyn.paper.page import write_page
 

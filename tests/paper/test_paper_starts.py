@@ -7,23 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nldyn import (
-    ContinuationOptions,
-    ExploreOptions,
-    SystemModelError,
-    explore,
-    index_sum,
-)
-from nldyn.continuation import broken_off
-from nldyn.diagrams import middle_orbit
-from nldyn.exploration import steps_between
-from nldyn.fixed_point_index import index_note
-from nldyn.flow import FlowMap
-from nldyn.orbit import stroboscopic
+from nldyn import ContinuationOptions, ExploreOptions, SystemModelError, explore, index_sum
+from nldyn.branches.continuation import broken_off
+from nldyn.flow.flow_map import FlowMap
+from nldyn.orbits.orbit import stroboscopic
+from nldyn.orbits.starts import orbit_near
 from nldyn.paper.jobs import LONG, job_named, joined, scene_system
 from nldyn.paper.search import MODELS, known_branches, main, search, search_by_detour
 from nldyn.paper.starts import Start, follow_starts, read_starts, starts_path, write_starts
-from nldyn.search import orbit_near
+from nldyn.runtime.progress import silent
+from nldyn.search.diagram import middle_orbit
+from nldyn.search.exploration import steps_between
+from nldyn.search.fixed_point_index import index_note
 
 WITHOUT_DOUBLED = (1, 50)
 
@@ -259,12 +254,12 @@ def test_branches_of_another_model_are_refused(two_known):
     """Their file is named after the starts, which lead to orbits of a changed model as well."""
     name, folder = two_known
     job = job_named(name)
-    known, _, _ = known_branches(job, folder, lambda what, hz: None)
+    known, _, _ = known_branches(job, folder, silent)
     assert len(known.branches) == 2
     system = job.system()
     changed = replace(job, system=lambda: replace(system, damping=1.001 * system.damping))
     with pytest.raises(SystemModelError, match="are of another model; delete them"):
-        known_branches(changed, folder, lambda what, hz: None)
+        known_branches(changed, folder, silent)
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nldyn.critical import Estimate
-from nldyn.multipliers import Stability
-from nldyn.normal_forms import NormalForm
+from nldyn.bifurcations.critical import Estimate
+from nldyn.bifurcations.normal_forms import NormalForm
+from nldyn.orbits.multipliers import Stability
 
 SURE = Stability(0.5 + 0.2j, -0.62, 1e-7)
 
@@ -90,9 +90,6 @@ class FakeDiagram:
     branches: list
     notes: tuple = ()
     range_hz: tuple = (5.0, 90.0)
-
-    def save(self, path):
-        path.write_bytes(b"branches")
 
     def of_period(self, period):
         return [branch for branch in self.branches if branch.period == period]

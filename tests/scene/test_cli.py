@@ -10,13 +10,14 @@ from click.testing import CliRunner
 from fakes import diagram
 
 import nldyn.paper
-import nldyn.progress
-import nldyn.scene
-from nldyn import Walk, load_branches, load_diagram, load_exploration, survey
-from nldyn.cli import main
+import nldyn.runtime.progress
+import nldyn.scene.build
+from nldyn.app.cli import main
+from nldyn.base.resources import example, mesh
+from nldyn.branches.arclength import Stepper
+from nldyn.io.branches import load_branches, load_diagram, load_exploration, save_branches
 from nldyn.paper.kept import kept, kept_folder
-from nldyn.resources import example, mesh
-from nldyn.store import save_branches
+from nldyn.search import explore as survey
 
 ONE_DOF = str(example("one_dof.toml"))
 
@@ -30,17 +31,16 @@ def computed(monkeypatch):
     """Let every scene give the same ready diagram."""
 
     def compute(scene, progress, checkpoint):
-        progress("harmonic branch", 25.3)
+        progress("harmonic branch", 25.3, 0.5)
         return replace(diagram(), notes=("no 1/5 orbit found near 62.2 Hz",))
 
-    monkeypatch.setattr(nldyn.scene, "compute", compute)
+    monkeypatch.setattr(nldyn.scene.build, "compute", compute)
 
 
-def test_run(tmp_path, computed, monkeypatch):
-    monkeypatch.setattr(nldyn.progress, "FILE_PAUSE", 0.0)
+def test_run(tmp_path, computed):
     result = invoke("run", ONE_DOF, "--out", tmp_path / "out")
     assert result.exit_code == 0
-    assert result.stderr == "00:00  1 orbits, harmonic branch at 25.30 Hz\n"
+    assert result.stderr == ""
     assert "note: no 1/5 orbit found near 62.2 Hz" in result.stdout
     assert "3 branches with 1100 points" in result.stdout
     assert "special points: 3 GR, 3 LP, 6 PD" in result.stdout
@@ -76,7 +76,7 @@ def test_quiet_run_says_nothing_on_stderr(tmp_path, computed):
 
 
 def test_somebody_elses_directory_is_refused_before_the_work(tmp_path, monkeypatch):
-    monkeypatch.setattr(nldyn.scene, "compute", lambda *_: pytest.fail("computed"))
+    monkeypatch.setattr(nldyn.scene.build, "compute", lambda *_: pytest.fail("computed"))
     (tmp_path / "mine.txt").write_text("")
     result = invoke("run", ONE_DOF, "--out", tmp_path)
     assert result.exit_code == 2
@@ -95,7 +95,7 @@ def stop_in_compiled_code(*_):
 
 @pytest.mark.parametrize("interrupt", [stop, stop_in_compiled_code])
 def test_ctrl_c(tmp_path, monkeypatch, interrupt):
-    monkeypatch.setattr(nldyn.scene, "compute", interrupt)
+    monkeypatch.setattr(nldyn.scene.build, "compute", interrupt)
     result = invoke("run", ONE_DOF, "--out", tmp_path / "out", "--quiet")
     assert result.exit_code == 130
     assert result.stderr == "nldyn: stopped by Ctrl-C, nothing is written\n"
@@ -114,7 +114,7 @@ def short_scene(folder):
 def test_a_run_goes_on_after_ctrl_c(tmp_path, monkeypatch):
     scene, out = short_scene(tmp_path), tmp_path / "new" / "out"
     assert invoke("run", scene, "--out", tmp_path / "whole", "--quiet").exit_code == 0
-    advance = Walk._advance
+    advance = Stepper._advance
     steps = []
 
     def counted(*arguments):
@@ -123,7 +123,7 @@ def test_a_run_goes_on_after_ctrl_c(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return advance(*arguments)
 
-    monkeypatch.setattr(Walk, "_advance", counted)
+    monkeypatch.setattr(Stepper, "_advance", counted)
     limit = 60
     stopped = invoke("run", scene, "--out", out, "--quiet")
     unfinished = tmp_path / "new" / "out.unfinished.h5"
@@ -325,7 +325,10 @@ def test_orbit_cannot_be_drawn_without_a_range(tmp_path):
 
 
 def test_help_imports_nothing_heavy_of_its_own():
-    code = "import sys, nldyn; a = set(sys.modules); import nldyn.cli; print(*set(sys.modules) - a)"
+    code = (
+        "import sys, nldyn; a = set(sys.modules); import nldyn.app.cli; "
+        "print(*set(sys.modules) - a)"
+    )
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()

@@ -11,8 +11,11 @@ import types
 import numba
 import pytest
 
-from nldyn import command, progress
+from nldyn.app import command
 from nldyn.paper.workers import _ended_at_failure
+from nldyn.runtime import progress
+from nldyn.runtime.compilation import COMPILING, Compilations, compilations
+from nldyn.runtime.kernel_cache import ensure_cache
 
 
 def stop_loading(_):
@@ -28,8 +31,8 @@ def stop_loading_an_extension(_):
 
 @pytest.mark.parametrize("load", [stop_loading, stop_loading_an_extension])
 def test_ctrl_c_while_the_package_is_loaded(monkeypatch, capsys, load):
-    unready = type("Unready", (types.ModuleType,), {"main": property(load)})("nldyn.cli")
-    monkeypatch.setitem(sys.modules, "nldyn.cli", unready)
+    unready = type("Unready", (types.ModuleType,), {"main": property(load)})("nldyn.app.cli")
+    monkeypatch.setitem(sys.modules, "nldyn.app.cli", unready)
     with pytest.raises(SystemExit) as end:
         command.main()
     assert end.value.code == 130
@@ -39,7 +42,8 @@ def test_ctrl_c_while_the_package_is_loaded(monkeypatch, capsys, load):
 def test_ctrl_c_in_executed_text_gives_the_exit_code_all_the_same(tmp_path):
     """As in the making of a dataclass; with ``-m`` Python would end by the signal."""
     (tmp_path / "work.py").write_text(
-        "from nldyn.command import answering\nanswering(lambda: exec('raise KeyboardInterrupt'))\n",
+        "from nldyn.app.command import answering\n"
+        "answering(lambda: exec('raise KeyboardInterrupt'))\n",
         encoding="utf-8",
     )
     done = subprocess.run([sys.executable, "-m", "work"], cwd=tmp_path, check=False)
@@ -47,8 +51,10 @@ def test_ctrl_c_in_executed_text_gives_the_exit_code_all_the_same(tmp_path):
 
 
 def test_other_errors_of_loading_are_not_hidden(monkeypatch):
-    broken = type("Broken", (types.ModuleType,), {"main": property(lambda _: 1 / 0)})("nldyn.cli")
-    monkeypatch.setitem(sys.modules, "nldyn.cli", broken)
+    broken = type("Broken", (types.ModuleType,), {"main": property(lambda _: 1 / 0)})(
+        "nldyn.app.cli"
+    )
+    monkeypatch.setitem(sys.modules, "nldyn.app.cli", broken)
     with pytest.raises(ZeroDivisionError):
         command.main()
 
@@ -57,7 +63,9 @@ def test_no_folder_for_compiled_code():
     """Without one, a temporary folder serves, one line says so, and nothing is left of it."""
     environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
     environment["NUMBA_CACHE_LOCATOR_CLASSES"] = "UserProvidedCacheLocator"
-    code = "import nldyn.flow, os; f = os.environ['NUMBA_CACHE_DIR']; print(f, os.listdir(f))"
+    code = (
+        "import nldyn.flow.flow_map, os; f = os.environ['NUMBA_CACHE_DIR']; print(f, os.listdir(f))"
+    )
     run = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
     )
@@ -71,28 +79,71 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_terminal_gets_one_line_that_is_cleared_at_the_end(monkeypatch):
+@pytest.fixture
+def clock(monkeypatch):
+    """Time that goes on as told."""
+    now = [0.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    return now
+
+
+def shown_lines(terminal):
+    return [line for line in terminal.getvalue().split("\r\x1b[K") if line]
+
+
+def test_terminal_gets_one_line_that_is_cleared_at_the_end(monkeypatch, clock):
     monkeypatch.setattr(sys, "stderr", Terminal())
-    monkeypatch.setattr(progress, "TERMINAL_PAUSE", 0.0)
-    monkeypatch.setenv("COLUMNS", "40")
+    monkeypatch.setenv("COLUMNS", "60")
     with progress.progress_line() as report:
-        report("search", 88.0)
-        report("1/2", 45.678)
-        report("x" * 100, 45.678)
-    shown = sys.stderr.getvalue().split("\r\x1b[K")
-    assert shown[1:3] == ["00:00  0 orbits, search at 88.00 Hz", "00:00  1 orbits, 1/2 at 45.68 Hz"]
-    assert len(shown[3]) == 39 and shown[4] == ""
+        for seconds, done in ((0.0, 0.0), (30.0, 0.05), (60.0, 0.25), (60.01, 0.3), (90.0, 0.5)):
+            clock[0] = seconds
+            report("1/2", 45.678, done)
+        clock[0] = 100.0
+        report("x" * 100, 0.0, 0.5)
+    shown = shown_lines(sys.stderr)
+    assert shown[:4] == [
+        "00:00  0% done: 1/2 at 45.68 Hz",
+        "00:30  5% done: 1/2 at 45.68 Hz",  # less than a tenth tells too little
+        "01:00  25% done, about 3 min left: 1/2 at 45.68 Hz",
+        "01:30  50% done, about 2 min left: 1/2 at 45.68 Hz",  # that of 0.01 s is left out
+    ]
+    assert len(shown) == 5 and len(shown[4]) == 59 and sys.stderr.getvalue().endswith("\r\x1b[K")
 
 
-def test_a_file_gets_a_line_a_minute(monkeypatch, capsys):
-    seconds = iter([0.0, 59.0, 61.0, 62.0, 130.0])
-    monkeypatch.setattr(progress.time, "monotonic", lambda: next(seconds))
-    with progress.progress_line() as report:
-        for hz in (10.0, 20.0, 30.0, 40.0):
-            report("1/1", hz)
-    assert capsys.readouterr().err == (
-        "01:01  2 orbits, 1/1 at 20.00 Hz\n02:10  4 orbits, 1/1 at 40.00 Hz\n"
-    )
+@pytest.mark.parametrize("quiet", [True, False])
+def test_a_file_gets_no_line(capsys, clock, quiet):
+    with progress.progress_line(quiet) as report:
+        for clock[0] in (0.0, 100.0, 200.0):
+            report("1/1", 20.0, 0.1)
+    assert capsys.readouterr().err == ""
+
+
+def test_what_an_earlier_run_did_and_compilations_take_no_time(clock):
+    line = progress.ProgressLine()
+    line("1/1", 20.0, 0.5)
+    clock[0] = 10.0
+    compilations.muted = True
+    compilations.begin()
+    clock[0] = 60.0
+    line("1/1", 20.0, 0.75)
+    assert line.left() == pytest.approx(10.0)  # 25 % took 10 s, though a compilation lasts
+    clock[0] = 70.0
+    compilations.end()
+    compilations.muted = False
+    assert line.left() == pytest.approx(10.0)
+    line("1/1", 20.0, 0.7)  # never back
+    assert line.done == 0.75
+
+
+def test_shares_add_up_with_their_weights():
+    told = []
+    whole = progress.Shares(lambda what, hz, done: told.append(done), {"a": 1.0, "b": 3.0})
+    whole.part("a")("...", 0.0, 0.5)
+    whole.counted("b", "motions")(2, 3)
+    whole.weigh("c", 4.0)
+    whole.end("b")
+    whole.part("c")("...", 0.0, 7.0)
+    assert told == pytest.approx([0.125, 0.625, 0.9375])
 
 
 def test_worker_processes_end_with_the_work():
@@ -104,12 +155,30 @@ def test_worker_processes_end_with_the_work():
     assert not worker.is_alive()
 
 
-def test_compilation_is_told_and_compiled_code_is_not():
-    twice = numba.njit(lambda x: 2 * x)
-    said = []
-    with progress.compilation_told(lambda what, frequency_hz: said.append(what)):
-        twice(1)
-        assert said == ["compiling, about 20 s the first time"]
-        twice(2)
-    numba.njit(lambda x: 3 * x)(1)
-    assert len(said) == 1
+def test_a_compilation_is_told_once_on_stderr_and_compiled_code_is_not(capsys):
+    told = Compilations()
+    told.begin()
+    told.begin()
+    told.end()
+    told.end()
+    told.begin()
+    told.end()
+    assert capsys.readouterr().err == f"{COMPILING}\n"
+
+
+def test_only_own_kernels_are_told(monkeypatch):
+    began = []
+    monkeypatch.setattr(compilations, "begin", lambda: began.append(1))
+    monkeypatch.setattr(compilations, "end", lambda: None)
+    ensure_cache()
+    numba.njit(lambda x: 2 * x)(1)
+    assert not began
+
+    def own(x):
+        return 3 * x
+
+    own.__module__ = "nldyn.somewhere"
+    kernel = numba.njit(own)
+    kernel(1)
+    kernel(2)
+    assert len(began) == 1

@@ -10,9 +10,9 @@ from click.testing import CliRunner
 
 import cms
 import fem
-from nldyn.cli import main
-from nldyn.resources import example
-from nldyn.scene import build_component, load_scene
+from nldyn.app.cli import main
+from nldyn.base.resources import example
+from nldyn.scene.build import build_component, load_scene
 
 
 def first_hz(name):

@@ -8,13 +8,13 @@ from fakes import diagram, resonance
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nldyn.continuation import continue_branch
-from nldyn.elements import Stop, Unbalance
-from nldyn.orbit import solve_orbit
-from nldyn.plot import branch_curve, length_unit, plot_diagram, plot_orbit, stability_runs
-from nldyn.resources import example
-from nldyn.scene import build_system, load_scene
-from nldyn.system import System
+from nldyn.base.resources import example
+from nldyn.branches.continuation import continue_branch
+from nldyn.orbits.solve import solve_orbit
+from nldyn.plot.diagram import branch_curve, length_unit, plot_diagram, plot_orbit, stability_runs
+from nldyn.scene.build import build_system, load_scene
+from nldyn.system.elements import Stop, Unbalance
+from nldyn.system.system import System
 
 
 @given(st.lists(st.booleans(), max_size=30))

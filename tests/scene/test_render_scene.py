@@ -6,10 +6,16 @@ import pytest
 from click.testing import CliRunner
 
 import fem.render
-from nldyn.cli import main
-from nldyn.render import deepest_impact, deepest_state, orbit_to_draw, render_scene, stop_to_draw
-from nldyn.resources import example, mesh
-from nldyn.scene import build_system, load_scene, parse_scene
+from nldyn.app.cli import main
+from nldyn.base.resources import example, mesh
+from nldyn.report.render import (
+    deepest_impact,
+    deepest_state,
+    orbit_to_draw,
+    render_scene,
+    stop_to_draw,
+)
+from nldyn.scene.build import build_system, load_scene, parse_scene
 
 BEAM = example("two_dof_xi_0.01.toml")
 
@@ -40,7 +46,9 @@ def test_without_graphics_the_rest_is_written(tmp_path, monkeypatch):
 
 def test_mp4_that_cannot_be_written_is_told_before_the_work(tmp_path, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    monkeypatch.setattr("nldyn.render.build_component", lambda scene: pytest.fail("computed"))
+    monkeypatch.setattr(
+        "nldyn.report.render.build_component", lambda scene: pytest.fail("computed")
+    )
     result, out = render(tmp_path, BEAM, "--frequency-hz", "23.0", "--video", "mp4")
     assert result.exit_code == 3
     assert result.stderr.startswith(f"nldyn: {out}/motion.mp4: writing .mp4 needs imageio-ffmpeg")
@@ -113,7 +121,7 @@ def test_all_pictures(tmp_path, monkeypatch):
     available, advice = fem.render.gl_available()
     if not available:
         pytest.skip(advice)
-    monkeypatch.setattr("nldyn.render.FRAMES", 3)
+    monkeypatch.setattr("nldyn.report.render.FRAMES", 3)
     result, out = render(tmp_path, BEAM, "--frequency-hz", "23.0")
     assert result.exit_code == 0, result.output
     stress = "deepest_contact_stress.png"

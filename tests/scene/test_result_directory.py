@@ -6,7 +6,7 @@ from multiprocessing import get_context
 
 import pytest
 
-from nldyn.result_directory import OutputError, check_directory, result_directory
+from nldyn.runtime.result_directory import OutputError, check_directory, result_directory
 
 
 def write(place, kind="run", **files):

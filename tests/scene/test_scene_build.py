@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import nldyn.diagrams
-from nldyn.errors import SceneError
-from nldyn.resources import example, examples, mesh
-from nldyn.scene import (
+import nldyn.search.diagram
+from nldyn.base.errors import SceneError
+from nldyn.base.resources import example, examples, mesh
+from nldyn.scene.build import (
     build_component,
     build_reduced,
     build_selection,
@@ -19,7 +19,7 @@ from nldyn.scene import (
     load_scene,
     parse_scene,
 )
-from nldyn.setting import setting_of
+from nldyn.scene.load_case import load_case_of
 
 MODAL = """
 [modal]
@@ -36,7 +36,7 @@ def test_rayleighs_damping_of_a_mesh_is_that_of_its_matrices():
     squares = build_system(scene).natural_frequencies ** 2
     added = build_system(damped).total_damping - build_system(scene).total_damping
     np.testing.assert_allclose(added, np.diag(2.0 + 1e-5 * squares), rtol=1e-10, atol=1e-9)
-    asked = setting_of(damped).system(build_reduced(scene)).total_damping
+    asked = load_case_of(damped).system(build_reduced(scene)).total_damping
     np.testing.assert_allclose(asked, build_system(damped).total_damping, rtol=1e-12)
     with pytest.raises(SceneError, match=r"Rayleigh's damping, which needs a \[mesh\]"):
         build_system(parse_scene(MODAL + "[damping]\nrayleigh_mass = 1.0"))
@@ -120,12 +120,12 @@ def with_tolerance(*changes):
 def test_a_tolerance_asks_for_a_selection_in_the_scenes_setting(monkeypatch, caplog):
     asked = {}
 
-    def reduce_for(component, setting, *, tolerance):
+    def select_modes(component, setting, *, tolerance):
         assert set(component.interfaces) == {"middle"}
         asked.update(range=setting.range_hz, tolerance=tolerance)
         return SimpleNamespace(reduced="the model", report=lambda: "modes kept: 1")
 
-    monkeypatch.setattr("nldyn.selection.reduce_for", reduce_for)
+    monkeypatch.setattr("nldyn.reduction.selection.select_modes", select_modes)
     with caplog.at_level("INFO", logger="nldyn"):
         assert build_reduced(with_tolerance()) == "the model"
     assert asked == {"range": (15.0, 90.0), "tolerance": 0.3}
@@ -140,7 +140,7 @@ def test_a_tolerance_asks_for_a_selection_in_the_scenes_setting(monkeypatch, cap
     ],
 )
 def test_a_tolerance_that_cannot_be_met_is_told(old, new, sentence, monkeypatch):
-    monkeypatch.setattr("nldyn.selection.MOST_MODES", 3)
+    monkeypatch.setattr("nldyn.reduction.selection.MOST_MODES", 3)
     with pytest.raises(SceneError, match=sentence):
         build_selection(with_tolerance((old, new)))
 
@@ -228,7 +228,7 @@ def test_tolerance_of_a_scene_is_that_of_its_flow_map(monkeypatch):
     scene = load_scene(example("one_dof.toml"))
     text = scene.text.replace("[continuation]", "[continuation]\nrtol = 1e-6")
     taken = []
-    monkeypatch.setattr(nldyn.diagrams, "diagram", lambda flow, *_, **__: taken.append(flow))
+    monkeypatch.setattr(nldyn.search.diagram, "diagram", lambda flow, *_, **__: taken.append(flow))
     compute(parse_scene(text, scene.file))
     assert taken[0].options.rtol == 1e-6
 
@@ -351,3 +351,94 @@ def test_a_scene_of_beams_in_space(tmp_path):
     assert abs(component.stiffness - direct.stiffness).max() == 0.0
     assert abs(component.mass - direct.mass).max() == 0.0
     assert len(build_reduced(scene, component).frequencies_hz) == 5
+
+
+SHELL = """
+[mesh]
+file = "plate.vtu"
+model = "structure"
+[parts.plate]
+kind = "shell"
+youngs_modulus = 2.1e11
+density = 7800.0
+poissons_ratio = 0.3
+thickness = 0.002
+offset = 0.001
+[[supports]]
+at = "x0"
+fixed = ["x", "y", "z", "rotation_x", "rotation_y", "rotation_z"]
+[interfaces.tip]
+at = "tip"
+direction = "z"
+[[couplings]]
+at = "tip"
+face = "x1"
+[reduction]
+modes = 4
+"""
+
+
+def test_a_scene_of_shells(tmp_path):
+    import fem
+
+    plate = fem.box_mesh("plate", (0.3, 0.1), (6, 2), kind="quad")
+    fem.write_mesh(plate, tmp_path / "plate.vtu")
+    scene = parse_scene(SHELL, tmp_path / "plate.toml")
+    component = build_component(scene)
+    part = fem.ShellPart(fem.Material(2.1e11, 7800.0, 0.3), 0.002, 0.001)
+    assert component.model.parts == {"plate": part}
+    assert len(build_reduced(scene, component).frequencies_hz) == 5
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("thickness = 0.002", "", r"parts\.plate needs 'thickness', as it is of kind 'shell'"),
+        ("poissons_ratio = 0.3", "", "needs 'poissons_ratio', as it is of kind 'shell'"),
+        ("offset = 0.001", "offset = [0.1, 0.0]", "needs one number in 'offset'"),
+        ("offset = 0.001", "offset = [0.1]", "must be two numbers .of a beam. or one"),
+        ("offset = 0.001", "width = 0.1", "'width', which is not a key of a part of kind 'shell'"),
+        ('model = "structure"', "", r"parts\.plate\.kind 'shell' needs \[mesh\]|couplings needs"),
+    ],
+)
+def test_a_fault_in_a_scene_of_shells_is_told(old, new, sentence):
+    with pytest.raises(SceneError, match=sentence) as caught:
+        parse_scene(SHELL.replace(old, new))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_scene_of_trusses(tmp_path):
+    import fem
+
+    ends = {"a": (0, 1), "b": (0, -1), "tip": (1, 0)}
+    frame = fem.frame_mesh(ends, [("bars", "a", "tip", 1), ("bars", "b", "tip", 1)])
+    fem.write_mesh(frame, tmp_path / "bars.msh")
+    text = """
+    [mesh]
+    file = "bars.msh"
+    [parts.bars]
+    kind = "truss"
+    youngs_modulus = 2.1e11
+    density = 7800.0
+    area = 1e-4
+    [[supports]]
+    at = "a"
+    fixed = ["x", "y"]
+    [[supports]]
+    at = "b"
+    fixed = ["x", "y"]
+    [interfaces.tip]
+    at = "tip"
+    direction = "y"
+    [reduction]
+    modes = 2
+    """
+    component = build_component(parse_scene(text, tmp_path / "bars.toml"))
+    assert component.model.parts == {"bars": fem.TrussPart(fem.Material(2.1e11, 7800.0), 1e-4)}
+    assert component.stiffness.shape == (2, 2)
+    for old, new, sentence in (
+        ("area = 1e-4", "", "needs 'area', as it is of kind 'truss'"),
+        ("area = 1e-4", "area = 1e-4\nwidth = 0.1", "'width', which is not a key of a part of kin"),
+    ):
+        with pytest.raises(SceneError, match=sentence):
+            parse_scene(text.replace(old, new), tmp_path / "bars.toml")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from nldyn.cli import main
-from nldyn.errors import SceneError
-from nldyn.scene import build_component, build_reduced, build_system, load_scene
+from nldyn.app.cli import main
+from nldyn.base.errors import SceneError
+from nldyn.scene.build import build_component, build_reduced, build_system, load_scene
 
 DECK = """*NODE
 {nodes}*ELEMENT, TYPE=B21, ELSET=BEAM

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from nldyn.resources import example, examples
-from nldyn.scene import load_scene, parse_scene
-from nldyn.scene_messages import all_keys, table_at
-from nldyn.scene_schema import Scene
+from nldyn.base.resources import example, examples
+from nldyn.scene.build import load_scene, parse_scene
+from nldyn.scene.messages import all_keys, table_at
+from nldyn.scene.schema import Scene
 
 DOC = (Path(__file__).parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
 

@@ -7,8 +7,8 @@ import pytest
 from click.testing import CliRunner
 
 import fem
-from nldyn.cli import main
-from nldyn.resources import example, mesh
+from nldyn.app.cli import main
+from nldyn.base.resources import example, mesh
 
 MODAL = """
 [modal]

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from fakes import FakeBranch, FakeDiagram, FakeNode, FakeOrbit, FakeSpecialPoint, diagram
 
-from nldyn.multipliers import Stability
-from nldyn.output import write_results
-from nldyn.resources import example
-from nldyn.scene import load_scene
+from nldyn.base.resources import example
+from nldyn.orbits.multipliers import Stability
+from nldyn.report.results import write_results
+from nldyn.scene.build import load_scene
 
 FILES = {
     "branches.csv",
@@ -122,7 +122,7 @@ def test_no_directory_if_the_picture_fails(tmp_path, monkeypatch):
     def fail(*_, **__):
         raise RuntimeError("no font")
 
-    monkeypatch.setattr("nldyn.plot.save_diagram", fail)
+    monkeypatch.setattr("nldyn.plot.diagram.save_diagram", fail)
     with pytest.raises(RuntimeError, match="no font"):
         write_results(diagram(), tmp_path / "out")
     assert list(tmp_path.iterdir()) == []

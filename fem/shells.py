@@ -1,0 +1,329 @@
+"""Shells of flat facets: from material and thickness to the matrices of triangles and quads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from skfem.quadrature import get_quadrature
+
+from fem.beams import cross_matrix
+from fem.cells import KINDS, CellKind
+from fem.errors import ModelError, check_positive, is_finite
+from fem.membranes import areas, membrane_rows, plane_law
+from fem.mesh import FloatArray, IntArray
+from fem.model import Material
+from fem.plates import SHEAR_FACTOR, jacobians, plate_rows
+
+FACETS: dict[str, dict[str, tuple[tuple[int, ...], ...]]] = {
+    "triangle": {"triangle": ((0, 1, 2),)},
+    "triangle6": {"triangle": ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))},
+    "quad": {"quad": ((0, 1, 2, 3),)},
+    "quad8": {
+        "triangle": ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7)),
+        "quad": ((4, 5, 6, 7),),
+    },
+    "quad9": {"quad": ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3))},
+}
+"""How a cell of a kind is cut into facets with three or four nodes."""
+
+TRIANGLES = {
+    "triangle": ((1.0, (0, 1, 2)),),
+    "quad": ((0.5, (0, 1, 2)), (0.5, (0, 2, 3)), (0.5, (0, 1, 3)), (0.5, (1, 2, 3))),
+}
+"""The membrane of a quadrilateral is the mean of its two cuts into triangles."""
+ORDERS = {"triangle": 4, "quad": 2}
+"""Polynomial order that is integrated exactly: the rotation of a triangle's middle is a cubic."""
+SMOOTH_DEGREES = 30.0
+"""Facets that meet at less than this angle are taken for one smooth surface."""
+BATCH_BYTES = 1e8
+
+
+@dataclass(frozen=True)
+class ShellPart:
+    """A part of the mesh that is a shell: triangles and quadrilaterals with a thickness.
+
+    Parameters
+    ----------
+    material
+        With a Poisson's ratio.
+    thickness
+        In m.
+    offset
+        Place in m of the middle surface as seen from the nodes, along the normal of the cells:
+        right-handed about it their nodes are in order.
+
+    Examples
+    --------
+    >>> ShellPart(Material(2.1e11, 7800.0, poissons_ratio=0.3), thickness=0.001).offset
+    0.0
+    """
+
+    material: Material
+    thickness: float
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.material, Material):
+            raise ModelError(f"part: material must be a Material, not {self.material!r}")
+        self.material.poissons_ratio_for("shell part")
+        check_positive("shell part", thickness=self.thickness)
+        if not is_finite(self.offset):
+            raise ModelError(f"shell part: offset must be finite, not {self.offset!r}")
+
+    @property
+    def stretching(self) -> float:
+        """E t / (1 - nu²) in N/m."""
+        nu = self.material.poissons_ratio_for("shell part")
+        return self.material.youngs_modulus * self.thickness / (1.0 - nu**2)
+
+    @property
+    def shearing(self) -> float:
+        """5/6 G t in N/m."""
+        nu = self.material.poissons_ratio_for("shell part")
+        modulus = self.material.youngs_modulus / (2.0 * (1.0 + nu))
+        return SHEAR_FACTOR * modulus * self.thickness
+
+
+def facets_of(kinds: dict[str, IntArray]) -> dict[str, IntArray]:
+    """Cells (e, b) by kind, cut into facets of three or four nodes.
+
+    Examples
+    --------
+    >>> facets_of({"quad8": np.arange(8)[None]})["quad"]
+    array([[4, 5, 6, 7]])
+    """
+    found: dict[str, list[IntArray]] = {}
+    for kind, cells in kinds.items():
+        for facet, local in FACETS[kind].items():
+            pieces = cells[:, np.array(local)].reshape(-1, len(local[0]))
+            found.setdefault(facet, []).append(pieces)
+    return {kind: np.concatenate(blocks) for kind, blocks in found.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class FlatCells:
+    """Facets in planes of their own.
+
+    Parameters
+    ----------
+    axes
+        Unit vectors x, y and the normal z as rows, shape (e, 3, 3).
+    plane
+        Places of the corners in the plane, in m, shape (e, b, 2).
+    heights
+        Of the corners above the plane, shape (e, b): zero for triangles, of alternate signs for
+        warped quadrilaterals.
+    """
+
+    axes: FloatArray
+    plane: FloatArray
+    heights: FloatArray
+
+
+def flat_cells(corners: FloatArray) -> FlatCells:
+    """The planes of facets (e, b, 3); a quadrilateral's is parallel to both of its diagonals."""
+    if corners.shape[1] == 3:
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        x = corners[:, 1] - corners[:, 0]
+    else:
+        first, second = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+        normal, x = np.cross(first, second), first - second
+    z, x = unit(normal), unit(x)
+    axes = np.stack([x, np.cross(z, x), z], axis=1)
+    local = np.einsum("eij,ebj->ebi", axes, corners - corners.mean(axis=1, keepdims=True))
+    return FlatCells(axes, local[..., :2], local[..., 2])
+
+
+def unit(vectors: FloatArray) -> FloatArray:
+    """Vectors (e, 3) of length 1, or of zeros."""
+    length = np.linalg.norm(vectors, axis=1)[:, None]
+    return np.asarray(vectors / np.where(length > 0.0, length, 1.0), dtype=np.float64)
+
+
+def check_shape(kind: CellKind, cells: FlatCells, nodes: IntArray, what: str) -> None:
+    """Raise ModelError for a facet without area, or with a corner that points inwards."""
+    area = np.linalg.det(jacobians(kind, cells.plane, kind.corners))
+    size = np.linalg.norm(np.ptp(cells.plane, axis=1), axis=1) ** 2
+    bad = np.flatnonzero(~(area > 1e-9 * size[:, None]).all(axis=1))
+    if len(bad):
+        listed = ", ".join(str(node) for node in nodes[bad[0]])
+        raise ModelError(
+            f"{what}: the {kind.name} with the nodes {listed} is flat, folded or has a corner of"
+            " 180° or more"
+        )
+
+
+def check_sides(kinds: Sequence[IntArray], what: str) -> None:
+    """Raise ModelError if two neighbours have their normals on different sides.
+
+    Neighbours whose nodes run the same way round pass along their common edge in opposite
+    directions.
+    """
+    edges = np.concatenate(
+        [np.stack([n, np.roll(n, -1, axis=1)], axis=-1).reshape(-1, 2) for n in kinds]
+    )
+    edges, count = np.unique(edges, axis=0, return_counts=True)
+    if count.max() > 1:
+        first, second = edges[np.argmax(count > 1)]
+        raise ModelError(
+            f"{what}: it has an offset, but two of its cells that meet at the nodes {first} and"
+            f" {second} have their normals on different sides; turn the order of the nodes of one"
+        )
+
+
+def node_matrices(part: ShellPart, cells: FlatCells) -> FloatArray:
+    """Six displacements of the middle surface in local axes from those of a node, (e, b, 6, 6)."""
+    arms = (part.offset - cells.heights)[..., None] * cells.axes[:, None, 2]
+    T = np.zeros((*arms.shape[:2], 6, 6))
+    T[..., :3, :3] = T[..., 3:, 3:] = cells.axes[:, None]
+    T[..., :3, 3:] = cells.axes[:, None] @ -cross_matrix(arms)
+    return T
+
+
+def local_rows(
+    part: ShellPart, kind: CellKind, plane: FloatArray, reduction: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Deformations (e, r, b, 6) of flat facets and their stiffness (e, r), in local axes."""
+    nu = part.material.poissons_ratio_for("shell part")
+    count, b = plane.shape[:2]
+    rows, stiffness = [], []
+    for share, corners in TRIANGLES[kind.name]:
+        at = list(corners)
+        own, weight = membrane_rows(plane[:, at], share * part.stretching, nu, reduction)
+        block = np.zeros((count, own.shape[1], b, 6))
+        block[:, :, np.array(at)[:, None], [0, 1, 5]] = own.reshape(count, -1, 3, 3)
+        rows.append(block)
+        stiffness.append(weight)
+    places, weights = get_quadrature(kind.element, ORDERS[kind.name])
+    law = plane_law(part.stretching * part.thickness**2 / 12.0, nu)
+    bent, weight = plate_rows(kind, plane, places.T, weights, law, part.shearing)
+    block = np.zeros((count, bent.shape[1], b, 6))
+    block[..., 2:5] = bent.reshape(count, -1, b, 3)
+    return np.concatenate([*rows, block], axis=1), np.concatenate([*stiffness, weight], axis=1)
+
+
+def local_mass(part: ShellPart, kind: CellKind, plane: FloatArray) -> FloatArray:
+    """Consistent mass (e, b, 6, b, 6) in local axes, with the inertia of turning fibres.
+
+    Rotations about the normal have that inertia against the turn of the cell in its plane alone,
+    so that a rigid body has its own.
+    """
+    places, weights = get_quadrature(kind.element, ORDERS[kind.name])
+    values, slopes = kind.basis(places.T)
+    J = jacobians(kind, plane, places.T)
+    volume = np.linalg.det(J) * weights
+    products = np.einsum("eq,qa,qc->eac", volume, values, values, optimize=True)
+    density, t = part.material.density, part.thickness
+    count, b = plane.shape[:2]
+    M = np.zeros((count, b, 6, b, 6))
+    for axis in range(5):
+        M[:, :, axis, :, axis] = density * (t if axis < 3 else t**3 / 12.0) * products
+    turn = np.zeros((count, len(weights), b, 6))
+    gradient = np.matmul(slopes, np.linalg.inv(J))
+    turn[..., 0], turn[..., 1] = gradient[..., 1] / 2.0, -gradient[..., 0] / 2.0
+    turn[..., 5] = values
+    M += np.einsum(
+        "eq,eqai,eqcj->eaicj", density * t**3 / 12.0 * volume, turn, turn, optimize=True
+    )
+    return M
+
+
+def corner_normals(points: FloatArray, kinds: Sequence[IntArray]) -> list[FloatArray]:
+    """Normals (e, b, 3) of the surface at the corners of facets, for each array of nodes (e, b).
+
+    The mean of the normals of the facets that meet there and belong to one smooth surface with
+    this one, whichever way round their nodes are.
+
+    Examples
+    --------
+    >>> points = np.array([[0, 0, 0], [1, 0, 0.1], [1, 1, 0.1], [0, 1, 0], [2, 0, 0], [2, 1, 0.0]])
+    >>> normals = corner_normals(points, [np.array([[0, 1, 2, 3], [1, 4, 5, 2]])])[0]
+    >>> np.round(normals[0, :2], 4)
+    array([[-0.0995,  0.    ,  0.995 ],
+           [ 0.    ,  0.    ,  1.    ]])
+    """
+    flat = [np.repeat(flat_cells(points[n]).axes[:, 2], n.shape[1], axis=0) for n in kinds]
+    normal, node = np.concatenate(flat), np.concatenate([n.ravel() for n in kinds])
+    at = (np.arange(len(node)), node)
+    meets = sparse.csr_array((np.ones(len(node)), at), shape=(len(node), len(points)))
+    pairs = sparse.coo_array(meets @ meets.T)
+    one, other = pairs.coords
+    cosine = np.einsum("pi,pi->p", normal[one], normal[other])
+    weight = np.sign(cosine) * (np.abs(cosine) > np.cos(np.radians(SMOOTH_DEGREES)))
+    mean = sparse.csr_array((weight, (one, other)), shape=pairs.shape) @ normal
+    mean = unit(mean)
+    ends = np.cumsum([n.size for n in kinds])[:-1]
+    return [
+        part.reshape(*n.shape, 3) for part, n in zip(np.split(mean, ends), kinds, strict=True)
+    ]
+
+
+def curvature_reduction(part: ShellPart, cells: FlatCells, normals: FloatArray) -> FloatArray:
+    """Factors (e,) on the stiffness against rotations about the normal where a shell is curved.
+
+    Notes
+    -----
+    Where the surface turns by the angle alpha from the middle of a facet of size h to its corners,
+    bending with the curvature k turns these by k h about lines in the surface, of which k h alpha
+    is about the normal of the facet. As stretching this costs E t (k h alpha)², which is
+    12 (alpha h / t)² times what bending itself does, E t³ k²/12, and a coarse thin shell would
+    lock. Divided by 1 plus this ratio it costs as much at most; on a flat or a finely divided
+    shell the factor is 1.
+    """
+    turned = np.linalg.norm(normals - cells.axes[:, None, 2], axis=2).max(axis=1)
+    first = areas(cells.plane[:, :3])
+    area = 2.0 * first if cells.plane.shape[1] == 3 else first + areas(cells.plane[:, [0, 2, 3]])
+    ratio = 12.0 * turned**2 * area / part.thickness**2
+    return np.asarray(1.0 / (1.0 + ratio), dtype=np.float64)
+
+
+def shell_rows(
+    part: ShellPart,
+    kind: CellKind,
+    points: FloatArray,
+    nodes: IntArray,
+    normals: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Deformations (e, r, 6 b) of facets from their nodes' displacements, and stiffness (e, r).
+
+    The normals (e, b, 3) are those of `corner_normals`.
+    """
+    cells = flat_cells(points[nodes])
+    reduction = curvature_reduction(part, cells, normals)
+    rows, stiffness = local_rows(part, kind, cells.plane, reduction)
+    found = np.matmul(rows.transpose(0, 2, 1, 3), node_matrices(part, cells))
+    return found.transpose(0, 2, 1, 3).reshape(*stiffness.shape, -1), stiffness
+
+
+def shell_matrices(
+    part: ShellPart, kind: CellKind, points: FloatArray, nodes: IntArray, normals: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Stiffness and mass (e, 6 b, 6 b) of facets for the six displacements of their nodes."""
+    rows, stiffness = shell_rows(part, kind, points, nodes, normals)
+    K = np.matmul((rows * stiffness[..., None]).transpose(0, 2, 1), rows)
+    cells = flat_cells(points[nodes])
+    T = node_matrices(part, cells)
+    M = local_mass(part, kind, cells.plane)
+    M = np.einsum("eaki,eakcl,eclj->eaicj", T, M, T, optimize=True).reshape(K.shape)
+    return (K + K.transpose(0, 2, 1)) / 2.0, (M + M.transpose(0, 2, 1)) / 2.0
+
+
+def facet_batches(kind: CellKind, count: int) -> Iterator[slice]:
+    """Slices of so many facets that their matrices stay small."""
+    step = max(int(BATCH_BYTES / (8 * 6 * (6 * kind.node_count) ** 2)), 1)
+    for first in range(0, count, step):
+        yield slice(first, min(first + step, count))
+
+
+def shell_kinds() -> set[str]:
+    """Names of the kinds of cells of which a shell may be.
+
+    Examples
+    --------
+    >>> sorted(shell_kinds())
+    ['quad', 'quad8', 'quad9', 'triangle', 'triangle6']
+    """
+    return {name for name in FACETS if name in KINDS}

@@ -1,0 +1,103 @@
+"""The public names of nldyn, each with its home; `nldyn/__init__.py` loads them from this list."""
+
+# base
+from nldyn.base.errors import ConvergenceError as ConvergenceError
+from nldyn.base.errors import LocateError as LocateError
+from nldyn.base.errors import SceneError as SceneError
+from nldyn.base.errors import SystemModelError as SystemModelError
+
+# bifurcations
+from nldyn.bifurcations.normal_forms import NormalForm as NormalForm
+from nldyn.bifurcations.normal_forms import describe as describe
+from nldyn.bifurcations.normal_forms import normal_form as normal_form
+from nldyn.bifurcations.point import SpecialPoint as SpecialPoint
+from nldyn.bifurcations.switching import switch_branch as switch_branch
+
+# branches
+from nldyn.branches.branch import Branch as Branch
+from nldyn.branches.cascades import Cascade as Cascade
+from nldyn.branches.cascades import cascade as cascade
+from nldyn.branches.continuation import continue_branch as continue_branch
+from nldyn.branches.options import ContinuationOptions as ContinuationOptions
+
+# curves
+from nldyn.curves.curves import Curve as Curve
+from nldyn.curves.curves import continue_constant as continue_constant
+from nldyn.curves.curves import continue_in as continue_in
+from nldyn.curves.curves import continue_special as continue_special
+from nldyn.curves.marks import refine_special as refine_special
+
+# flow
+from nldyn.flow.flow_map import FlowMap as FlowMap
+from nldyn.flow.options import FlowOptions as FlowOptions
+
+# io
+from nldyn.io.checkpoint import CheckpointFile as CheckpointFile
+from nldyn.io.store import load as load
+from nldyn.io.store import save as save
+
+# longterm
+from nldyn.longterm.attractors import Attractor as Attractor
+from nldyn.longterm.attractors import classify as classify
+from nldyn.longterm.attractors import find_attractors as find_attractors
+from nldyn.longterm.basins import Basins as Basins
+from nldyn.longterm.basins import Plane as Plane
+from nldyn.longterm.basins import basins as basins
+from nldyn.longterm.impacts import impacts as impacts
+from nldyn.longterm.lifetimes import chaos_lifetime as chaos_lifetime
+from nldyn.longterm.lyapunov import lyapunov_exponents as lyapunov_exponents
+from nldyn.longterm.manifolds import basin_edge as basin_edge
+from nldyn.longterm.manifolds import stable_manifold as stable_manifold
+from nldyn.longterm.poincare import brute_force as brute_force
+from nldyn.longterm.poincare import impact_section as impact_section
+from nldyn.longterm.poincare import stroboscopic_section as stroboscopic_section
+from nldyn.longterm.simulation import Motion as Motion
+from nldyn.longterm.simulation import simulate as simulate
+from nldyn.longterm.simulation import sweep as sweep
+from nldyn.longterm.wear import contact_measures as contact_measures
+from nldyn.longterm.wear import spectra_map as spectra_map
+
+# orbits
+from nldyn.orbits.harmonics import Harmonics as Harmonics
+from nldyn.orbits.harmonics import harmonics as harmonics
+from nldyn.orbits.multipliers import Stability as Stability
+from nldyn.orbits.orbit import Orbit as Orbit
+from nldyn.orbits.solve import solve_orbit as solve_orbit
+from nldyn.orbits.starts import SearchOptions as SearchOptions
+from nldyn.orbits.starts import find_orbits as find_orbits
+
+# reduction
+from nldyn.reduction.convergence import ConvergenceStudy as ConvergenceStudy
+from nldyn.reduction.convergence import convergence_study as convergence_study
+from nldyn.reduction.load_case import LoadCase as LoadCase
+from nldyn.reduction.selection import ModeSelection as ModeSelection
+from nldyn.reduction.selection import select_modes as select_modes
+
+# runtime
+from nldyn.runtime.executors import run_all as run_all
+
+# scene
+from nldyn.scene.study import parameter_study as parameter_study
+from nldyn.search.by_pseudo_orbits import by_pseudo_orbits as by_pseudo_orbits
+
+# search
+from nldyn.search.diagram import Diagram as Diagram
+from nldyn.search.diagram import Seed as Seed
+from nldyn.search.diagram import diagram as diagram
+from nldyn.search.exploration import Exploration as Exploration
+from nldyn.search.exploration import ExploreOptions as ExploreOptions
+from nldyn.search.explore import explore as explore
+from nldyn.search.fixed_point_index import index_sum as index_sum
+from nldyn.search.homotopy import by_detour as by_detour
+from nldyn.search.mixtures import by_crossover as by_crossover
+from nldyn.search.random_walks import by_closed_walks as by_closed_walks
+
+# system
+from nldyn.system.elements import Damper as Damper
+from nldyn.system.elements import HarmonicForce as HarmonicForce
+from nldyn.system.elements import Stop as Stop
+from nldyn.system.elements import Unbalance as Unbalance
+from nldyn.system.elements import dissipation_for as dissipation_for
+from nldyn.system.elements import hertz_stiffness as hertz_stiffness
+from nldyn.system.parameters import Parameter as Parameter
+from nldyn.system.system import System as System

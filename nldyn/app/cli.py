@@ -1,0 +1,434 @@
+"""The command line: ``nldyn run``, ``check``, ``render``, ``converge`` and ``paper``.
+
+Exit codes: 0 done, 2 something in the scene or on the command line is wrong, 3 a picture or an
+animation needs something that is not installed, 130 stopped with Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from nldyn.base.exit_codes import BAD_INPUT, INTERRUPTED, NO_GRAPHICS, NOTHING_FOUND
+from nldyn.report.console import kept_at_interrupt, plain_errors, told_what_is_kept
+from nldyn.runtime.interruption import STOPPED, interrupted
+
+if TYPE_CHECKING:
+    from nldyn.search.diagram import Diagram
+    from nldyn.system.elements import Stop
+    from nldyn.system.system import System
+
+def usable_cores() -> int:
+    """How many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+any_path = click.Path(path_type=Path, readable=False)  # what is wrong with it is said later
+scene_argument = click.argument("scene", type=any_path, metavar="SCENE.toml")
+out_option = click.option(
+    "--out",
+    required=True,
+    type=any_path,
+    metavar="DIR",
+    help="Directory for the results: new, empty, or of an earlier run.",
+)
+mesh_option = click.option(
+    "--mesh-folder",
+    "mesh_folders",
+    multiple=True,
+    type=any_path,
+    metavar="DIR",
+    help="Folder from which the mesh may come, beside those of the scene and the current one.",
+)
+quiet_option = click.option("--quiet", is_flag=True, help="Show no progress.")
+jobs_option = click.option(
+    "--jobs",
+    type=click.IntRange(1, 1000),
+    default=usable_cores,
+    show_default="all cores",
+    metavar="N",
+    help="Processes that share the work; the results do not depend on it.",
+)
+
+
+def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    """Print the version and stop, if wanted."""
+    if wanted:
+        from nldyn.base.version import software_version
+
+        click.echo(f"nldyn {software_version()}")
+        context.exit()
+
+
+class PlainGroup(click.Group):
+    """Commands that tell a fault on their command line in one sentence, without their usage."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Read the options that stand before the command."""
+        # without any argument the help is shown
+        with plain_interrupt(), plain_usage(click.NoSuchOption):
+            return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> object:
+        """Run the command that is asked for."""
+        with plain_interrupt(), plain_usage(click.UsageError), plain_warnings():
+            return super().invoke(ctx)
+
+
+@contextmanager
+def plain_usage(kind: type[click.UsageError]) -> Iterator[None]:
+    """Tell a fault of the command line in one line on stderr, and exit."""
+    try:
+        yield
+    except kind as error:
+        fault = error.format_message().rstrip(".")
+        click.echo(f"nldyn: {fault[:1].lower()}{fault[1:]}", err=True)
+        sys.exit(BAD_INPUT)
+
+
+@contextmanager
+def plain_interrupt() -> Iterator[None]:
+    """Tell Ctrl-C in one line on stderr, and exit; compiled code wraps it."""
+    try:
+        yield
+    except (KeyboardInterrupt, Exception) as error:
+        if not interrupted(error):
+            raise
+        click.echo(STOPPED, err=True)
+        sys.exit(INTERRUPTED)
+
+
+@contextmanager
+def plain_warnings() -> Iterator[None]:
+    """Tell warnings in one line on stderr, without the place in the program."""
+
+    def show(message: Warning | str, *_: object, **__: object) -> None:
+        click.echo(f"nldyn: warning: {message}", err=True)
+
+    with warnings.catch_warnings():
+        warnings.showwarning = show
+        yield
+
+
+@click.group(cls=PlainGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--version",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=print_version,
+    help="Show the version and exit.",
+)
+def main() -> None:
+    """Bifurcation diagrams of structures that hit a stop, from a mesh or from modal data."""
+
+
+@main.command()
+@scene_argument
+@out_option
+@mesh_option
+@click.option("--log", is_flag=True, help="Draw the displacement on a logarithmic axis.")
+@quiet_option
+@jobs_option
+def run(
+    scene: Path, out: Path, mesh_folders: tuple[Path, ...], log: bool, quiet: bool, jobs: int
+) -> None:
+    """Compute the branches of a scene, and write tables and a diagram."""
+    with plain_errors():
+        from nldyn.io.checkpoint import CheckpointFile
+        from nldyn.runtime.progress import progress_line
+        from nldyn.runtime.result_directory import check_directory
+        from nldyn.scene.build import compute, explore_scene, load_scene
+
+        start = time.perf_counter()
+        loaded = load_scene(scene, mesh_folders)
+        check_directory(out)
+        with kept_at_interrupt(out) as unfinished:
+            kept = CheckpointFile(unfinished)
+            with progress_line(quiet) as report:
+                found = explore_scene(loaded, report, kept, jobs) if loaded.explore else None
+                diagram = found.diagram if found else compute(loaded, report, kept, jobs)
+            from nldyn.report.results import write_results
+
+            yscale: Literal["linear", "log"] = "log" if log else "linear"
+            write_results(found or diagram, out, loaded, yscale=yscale)
+        if found:
+            click.echo("\n".join(found.coverage_lines()))
+        click.echo(describe(diagram, time.perf_counter() - start, out))
+        if not diagram.branches:
+            click.echo("nldyn: no periodic orbit was found; the tables are empty", err=True)
+            sys.exit(NOTHING_FOUND)
+
+
+@main.command()
+@scene_argument
+@mesh_option
+def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
+    """Check a scene, and print the modes of its structure."""
+    with plain_errors():
+        from nldyn.runtime.progress import messages_shown
+        from nldyn.scene.build import (
+            build_candidates,
+            build_component,
+            build_reduced,
+            build_system,
+            load_scene,
+        )
+        from nldyn.scene.checks import check_computable, range_remark
+
+        loaded = load_scene(scene, mesh_folders)
+        with messages_shown():
+            reduced = candidates = None
+            component = None if loaded.mesh is None else build_component(loaded)
+            if loaded.reduction is not None and loaded.reduction.tolerance is not None:
+                candidates = build_candidates(loaded, component)
+                reduced = candidates.reduced()
+            elif component is not None:
+                reduced = build_reduced(loaded, component)
+            system = build_system(loaded, reduced)
+        for item in () if component is None else component.model.mesh.left_out:
+            click.echo(f"left out of the mesh file: {item}")
+        if component is not None and (brought := component.model.mesh.attachments):
+            click.echo(f"taken from the mesh file: {brought}")
+        click.echo(describe_system(system, 0 if reduced is None else reduced.residual_modes))
+        check_computable(loaded, scene)
+        if candidates is not None and loaded.reduction is not None:
+            click.echo(
+                f"modes up to {candidates.cutoff_hz:.4g} Hz may matter; of these, 'nldyn run' "
+                f"keeps as many as tolerance = {loaded.reduction.tolerance:g} needs"
+            )
+        if remark := range_remark(loaded, float(system.frequencies_hz.max())):
+            click.echo(f"note: {remark}")
+        click.echo(f"{scene}: no fault found")
+
+
+@main.command()
+@scene_argument
+@out_option
+@mesh_option
+@click.option(
+    "--frequency-hz",
+    type=click.FloatRange(1e-6, 1e12),
+    metavar="HZ",
+    help="Draw the orbit at this excitation frequency; else the highest harmonic one.",
+)
+@click.option(
+    "--period",
+    type=click.IntRange(1, 100),
+    default=1,
+    show_default=True,
+    help="Period of that orbit, in periods of the excitation.",
+)
+@click.option(
+    "--video",
+    type=click.Choice(["gif", "mp4"]),
+    default="gif",
+    show_default=True,
+    help="Kind of animation; mp4 needs imageio-ffmpeg.",
+)
+@quiet_option
+def render(
+    scene: Path,
+    out: Path,
+    mesh_folders: tuple[Path, ...],
+    frequency_hz: float | None,
+    period: int,
+    video: str,
+    quiet: bool,
+) -> None:
+    """Draw mode shapes, deepest contact and one period in motion of a scene with a mesh."""
+    if period != 1 and frequency_hz is None:
+        raise click.UsageError("'--period' needs '--frequency-hz'")
+    with plain_errors():
+        from fem.gl import RenderError
+        from nldyn.report.render import render_scene
+        from nldyn.runtime.progress import progress_line
+        from nldyn.runtime.result_directory import check_directory
+        from nldyn.scene.build import load_scene
+
+        loaded = load_scene(scene, mesh_folders)
+        check_directory(out)
+
+        try:
+            with progress_line(quiet) as report:
+                made = render_scene(
+                    loaded,
+                    out,
+                    frequency_hz=frequency_hz,
+                    period=period,
+                    video=video,
+                    progress=report,
+                )
+        except RenderError as error:
+            click.echo(f"nldyn: {error}", err=True)
+            sys.exit(NO_GRAPHICS)
+    click.echo(f"written to {out}")
+    if made.missing:
+        click.echo(f"nldyn: {made.missing}", err=True)
+        sys.exit(NO_GRAPHICS)
+
+
+def number_list(
+    _context: click.Context, _parameter: click.Parameter, value: str | None
+) -> list[int] | None:
+    """Read whole numbers with commas between them, or ranges like 1-10."""
+    if value is None:
+        return None
+    found: set[int] = set()
+    for piece in value.split(","):
+        first, _dash, last = piece.strip().partition("-")
+        if not first.isdecimal() or (last and not last.isdecimal()):
+            raise click.BadParameter(f"'{value}' is not a list of whole numbers such as 1-10,20")
+        if int(last or first) - int(first) > 1000:
+            raise click.BadParameter(f"'{value}' names more than 1000 numbers")
+        found |= set(range(int(first), int(last or first) + 1))
+    return sorted(found)
+
+
+@main.command()
+@scene_argument
+@out_option
+@mesh_option
+@click.option(
+    "--modes",
+    callback=number_list,
+    metavar="LIST",
+    help="Numbers of kept modes, such as 1-10,20; by default 1 to 10, 12, 16, 20, 30 and 40.",
+)
+@click.option(
+    "--methods",
+    default="rubin",
+    show_default=True,
+    metavar="LIST",
+    help="Methods to compare: rubin, craig-bampton, guyan, truncation, macneal.",
+)
+@click.option(
+    "--refinements",
+    callback=number_list,
+    metavar="LIST",
+    help="Meshes to compare: cut every line into so many; by default 1.",
+)
+@click.option(
+    "--meshes",
+    metavar="LIST",
+    help="Meshes to compare: files with the names of the scene's, from coarse to fine.",
+)
+@click.option("--at-hz", type=click.FloatRange(1e-6, 1e12), metavar="HZ", help="Orbit to compare.")
+@click.option("--full", is_flag=True, help="Find this orbit in the full model, too (minutes).")
+@quiet_option
+def converge(
+    scene: Path,
+    out: Path,
+    mesh_folders: tuple[Path, ...],
+    modes: list[int] | None,
+    methods: str,
+    refinements: list[int] | None,
+    meshes: str | None,
+    at_hz: float | None,
+    full: bool,
+    quiet: bool,
+) -> None:
+    """Compute the harmonic branch with more and more modes, and compare."""
+    with plain_errors():
+        from nldyn.reduction.convergence import COUNTS
+        from nldyn.report.convergence import write_study
+        from nldyn.runtime.progress import progress_line
+        from nldyn.runtime.result_directory import check_directory
+        from nldyn.scene.build import load_scene
+        from nldyn.scene.convergence import convergence_study_of
+
+        loaded = load_scene(scene, mesh_folders)
+        check_directory(out)
+
+        with progress_line(quiet) as report:
+            study = convergence_study_of(
+                loaded,
+                modes=modes or COUNTS,
+                methods=[name.strip() for name in methods.split(",")],
+                refinements=refinements or [1],
+                meshes=[name.strip() for name in meshes.split(",")] if meshes else (),
+                at_hz=at_hz,
+                full=full,
+                progress=report,
+            )
+        write_study(study, out, loaded.title)
+        click.echo(study.report())
+        click.echo(f"written to {out}")
+
+
+@main.command()
+@out_option
+def paper(out: Path) -> None:
+    """Reproduce the figures and numbers of the paper."""
+    with plain_errors():
+        from nldyn.paper import main as reproduce
+        from nldyn.paper.kept import has_values, unfinished_folder
+
+        with told_what_is_kept(unfinished_folder(out), has_values):
+            reproduce(out)
+
+
+def describe(diagram: Diagram, seconds: float, out: Path) -> str:
+    """Say in a few lines what was computed."""
+    branches = diagram.branches
+    kinds = Counter(str(point.kind) for branch in branches for point in branch.special_points)
+    found = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())) or "none"
+    points = sum(len(branch.points) for branch in branches)
+    lines = [
+        f"{len(branches)} {'branch' if len(branches) == 1 else 'branches'} with {points} points "
+        f"in {seconds:.1f} s",
+        f"special points: {found}",
+        *(f"note: {note}" for note in dict.fromkeys(diagram.notes)),
+        f"written to {out}",
+    ]
+    return "\n".join(lines)
+
+
+def describe_system(system: System, residual: int = 0) -> str:
+    """Tabulate frequencies and participation of the modes, and the static flexibility.
+
+    The last ``residual`` modes are marked as such.
+    """
+    names = list(system.interfaces)
+    width = max(14, *(len(name) + 2 for name in names))
+    lines = ["mode   frequency (Hz)   participation (1/sqrt(kg)) at"]
+    lines.append(" " * 23 + "".join(f"{name:>{width}}" for name in names))
+    for mode, hz in enumerate(system.frequencies_hz):
+        values = "".join(f"{system.participation[name][mode]:>{width}.6g}" for name in names)
+        mark = "  residual" if mode >= system.size - residual else ""
+        lines.append(f"{mode + 1:>4}{hz:>19.6f}{values}{mark}")
+    flexibility = "".join(f"{static_flexibility(system, name):>{width}.6g}" for name in names)
+    lines.append(f"{'static flexibility m/N':<23}{flexibility}")
+    lines += [describe_stop(stop) for stop in system.stops]
+    return "\n".join(lines)
+
+
+def describe_stop(stop: Stop) -> str:
+    """Say in a line where a stop is and what it does."""
+    unit = "N/m" if stop.exponent == 1.0 else f"N/m^{stop.exponent:g}"
+    loss = f", dissipation {stop.dissipation:g} s/m" if stop.dissipation else ""
+    where = f"at '{stop.at}'" + (f" against '{stop.against}'" if stop.against else "")
+    return (
+        f"stop {where}: {stop.stiffness:.6g} {unit}, gap {stop.gap:g} m, "
+        f"direction {stop.direction:+d}{loss}"
+    )
+
+
+def static_flexibility(system: System, interface: str) -> float:
+    """Displacement in m at an interface for a steady force of 1 N there; inf if nothing holds."""
+    shares = system.participation[interface] ** 2
+    squares = system.natural_frequencies**2
+    if any(shares[squares == 0.0]):
+        return float("inf")
+    return float(sum(shares[squares > 0.0] / squares[squares > 0.0]))

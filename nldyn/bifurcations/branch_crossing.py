@@ -1,0 +1,90 @@
+"""Where branches cross beside an orbit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nldyn.bifurcations.point import SpecialPoint
+from nldyn.orbits.conditions import nearest_crossing
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.shooting import metric_length
+
+CROSSES = 1e-12  # least unfolding of a crossing, relative to the orbit, that is not rounding
+ON_CROSSING = 3e-7  # distance from one, relative to the orbit, at which a branch cannot be told
+NEAR_CRITICAL = 1e-3  # a multiplier no nearer to 1 or -1 is not that of a special point
+NEIGHBOUR = 1e-3  # arclength between two branch points at one turn, and dP/ds there
+SHORTEST_CROSSING = 3e-6  # step over which a branch may cross another one
+SAME = 2.0 * SHORTEST_CROSSING  # distance of branch points that two such steps locate as one
+
+
+def is_crossing(orbit: Orbit) -> bool:
+    """Whether branches cross beside an orbit, and do not only come close; if it can be told."""
+    crossing = nearest_crossing(orbit)
+    return crossing is None or crossing[1] <= CROSSES
+
+
+def lies_on_crossing(orbit: Orbit, within: float) -> bool:
+    """Whether branches cross within a distance of an orbit, relative to it.
+
+    On a plane across a branch Newton's method may find any orbit of the other one there.
+    """
+    return crossing_within(orbit, within) is not None
+
+
+def crossing_within(orbit: Orbit, within: float) -> Orbit | None:
+    """Where branches cross within a distance of an orbit, relative to it, if they do."""
+    crossing = crossing_beside(orbit)
+    return crossing if crossing is not None and distance(orbit, crossing) < within else None
+
+
+def crossing_beside(orbit: Orbit) -> Orbit | None:
+    """Where branches cross beside an orbit that has a multiplier near 1, if they do."""
+    if float(np.abs(orbit.multipliers - 1.0).min()) > NEAR_CRITICAL:
+        return None
+    return true_crossing(orbit)
+
+
+def distance(a: Orbit, b: Orbit) -> float:
+    """Distance of two orbits of one problem, relative to the first."""
+    return metric_length(a.problem.metric(a.point), b.point - a.point)
+
+
+def true_crossing(orbit: Orbit) -> Orbit | None:
+    """Where branches cross beside an orbit, if they do."""
+    crossing = nearest_crossing(orbit)
+    return crossing[0] if crossing is not None and crossing[1] <= CROSSES else None
+
+
+def without_repeats(found: list[SpecialPoint]) -> list[SpecialPoint]:
+    """Of neighbouring branch points where one branch turns, only the one nearest to the turn.
+
+    A branch that turns where it meets another one has a multiplier that touches 1 there without
+    passing it, so that rounding decides how often the branch point's test changes sign. The turn is
+    no fold.
+    """
+    kept: list[SpecialPoint] = []
+    for special in found:
+        if kept and _turns_twice(kept[-1], special):
+            crossings = [s for s in (kept[-1], special) if s.kind == "BP"]
+            kept[-1] = min(crossings, key=_pace)
+        else:
+            kept.append(special)
+    return kept
+
+
+def _turns_twice(a: SpecialPoint, b: SpecialPoint) -> bool:
+    apart = abs(a.point.arclength - b.point.arclength)
+    turning = apart < NEIGHBOUR and max(_pace(a), _pace(b)) < NEIGHBOUR
+    kinds = {a.kind, b.kind}
+    one = apart < NEIGHBOUR and same_crossing(a, b)
+    return one or (turning and kinds in ({"BP"}, {"BP", "LP"}))
+
+
+def same_crossing(a: SpecialPoint, b: SpecialPoint) -> bool:
+    """Whether two special points are one branch point."""
+    return a.kind == b.kind == "BP" and distance(a.orbit, b.orbit) < SAME
+
+
+def _pace(special: SpecialPoint) -> float:
+    """How fast the frequency changes along the branch."""
+    return abs(float(special.point.tangent[-1]))

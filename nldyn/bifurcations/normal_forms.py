@@ -1,0 +1,517 @@
+"""What a special point means: normal-form coefficients, directions, and a sentence in plain words.
+
+Nothing here is computed by a continuation: the coefficients cost a few dozen flow maps each.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from nldyn.base.arrays import Complex, Real
+from nldyn.base.errors import LocateError, SystemModelError, check_positive, check_types
+from nldyn.bifurcations.critical import (
+    CoefficientError,
+    Coefficients,
+    Crossing,
+    Estimate,
+    Loop,
+    crossing,
+    doubled_parameter,
+    flip,
+    fold,
+    loop_of,
+    torus,
+)
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special
+from nldyn.orbits.orbit import Orbit, minimal_period
+from nldyn.orbits.shooting import asymmetry, metric_length
+
+CLOSE = 1e-3  # relative distance in frequency of a special point that counts as close
+NEAR_RESONANCE_DEG = 5.0
+UNCHANGED = 1e-3  # relative change of a null vector that is none
+SIDES = {1: "above", -1: "below"}
+LOST = "the coefficient is lost in its error"
+NUMBERS = {1: "one", 2: "two", 3: "three"}
+
+
+@dataclass(frozen=True)
+class NormalForm:
+    """What happens at a special point.
+
+    Parameters
+    ----------
+    name : str
+        ``fold``, ``supercritical flip``, ``subcritical flip``, ``supercritical torus``,
+        ``subcritical torus``, ``supercritical pitchfork``, ``subcritical pitchfork``,
+        ``transcritical``, ``new contact`` or ``split contact``; ``flip``, ``torus``, ``pitchfork``
+        or ``branch point`` where the coefficient does not tell more.
+    sentence : str
+        The same in plain words.
+    coefficient : Estimate, optional
+        Of the normal form, for ξ in units of the orbit's size (see
+        `nldyn.bifurcations.critical`): a of a fold, c of a flip or pitchfork, the first Lyapunov
+        coefficient of a torus, ⟨p, B(q, q)⟩ of a transcritical point.
+    frequency_shift : Estimate, optional
+        (f - f₀)/(f₀ ξ²) of the orbits that meet or are born here.
+    side : int
+        +1 where these exist above the frequency of the point, -1 below, 0 on both sides or unknown.
+    stable : bool, optional
+        Whether these are stable (of a fold: whether one of the two is).
+    """
+
+    name: str
+    sentence: str
+    coefficient: Estimate | None = None
+    frequency_shift: Estimate | None = None
+    side: int = 0
+    stable: bool | None = None
+
+
+def describe(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> str:
+    """Say in one or two sentences what happens at a special point.
+
+    Parameters
+    ----------
+    special : SpecialPoint
+        Where.
+    others : sequence of SpecialPoint
+        The special points of the same branch, of which close ones are named at a grazing point.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance, continue_branch, solve_orbit
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> branch = continue_branch(solve_orbit(system, 33.0), (32.0, 34.0))
+    >>> describe(branch.special_points[0])[:49]
+    'Flip at 33.6544 Hz, supercritical: a stable orbit'
+    """
+    return normal_form(special, others).sentence
+
+
+def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> NormalForm:
+    """Normal form of a special point; the parameters are those of `describe`.
+
+    Returns
+    -------
+    NormalForm
+        Where a coefficient cannot be computed, the sentence says why.
+
+    Raises
+    ------
+    SystemModelError
+        For a kind of point that is none of LP, PD, NS, BP and GR.
+
+    References
+    ----------
+    Yu. A. Kuznetsov (2004), *Elements of Applied Bifurcation Theory*, 3rd ed., section 5.4.
+    """
+    check_special("describe", special, of_branch=getattr(special, "kind", "") in ("GR", "BP"))
+    check_types(others=(others, Sequence))
+    for other in others:
+        check_special("describe: others", other, of_branch=False)
+    if special.kind == "GR":
+        return _grazing(special, others)
+    kinds = {"LP": _fold, "PD": _flip, "NS": _torus, "BP": _branch_point}
+    if special.kind not in kinds:
+        raise SystemModelError(f"no special point is of the kind {special.kind!r}")
+    try:
+        return kinds[special.kind](special, loop_of(special.orbit))
+    except CoefficientError as error:
+        title, name = {
+            "LP": ("Fold", "fold"),
+            "PD": ("Flip", "flip"),
+            "NS": ("Neimark-Sacker point", "torus"),
+            "BP": ("Branch point", "branch point"),
+        }[special.kind]
+        return NormalForm(name, f"{title} at {_hz(special)}: no coefficient can be given, {error}.")
+
+
+# --- folds ---------------------------------------------------------------------------------------
+
+
+def _fold(special: SpecialPoint, loop: Loop) -> NormalForm:
+    form, q = fold(loop)
+    shift = form.parameter
+    side, hz = shift.sign, _hz(special)
+    if not side:
+        sentence = f"Fold at {hz}: on which side the two orbits exist cannot be told, {LOST}."
+        return NormalForm("fold", sentence, form.nonlinear, shift)
+    others = others_outside(special)
+    if others:
+        which = f"both are unstable, {_other_multipliers(others)}"
+    else:
+        growth = -form.nonlinear.value * displacement_along(special.orbit, q)
+        which = f"the one of {'larger' if growth > 0.0 else 'smaller'} displacement is stable"
+    sentence = (
+        f"Fold at {hz}: two orbits exist {SIDES[side]} {hz} and neither {SIDES[-side]} it; {which}."
+    )
+    return NormalForm("fold", sentence, form.nonlinear, shift, side, not others)
+
+
+def displacement_along(orbit: Orbit, q: Real) -> float:
+    """Derivative of the largest observed displacement along a change q (k, 2n) of the nodes."""
+    extremes = orbit.observed_extremes
+    index = int(np.argmax(np.abs(extremes.values)))
+    output = len(orbit.system.stops) + orbit.system.interfaces.index(orbit.observe)
+    change, _ = output_change(orbit, output, float(extremes.phases[index]), q)
+    return math.copysign(1.0, float(extremes.values[index])) * change
+
+
+def output_change(orbit: Orbit, output: int, phase: float, q: Real) -> tuple[float, float]:
+    """Derivatives of an output at a phase along a change q of the nodes, and with respect to P."""
+    problem = orbit.problem
+    row = problem.flow.rows[output]
+    j = int(np.searchsorted(problem.phases, phase, side="right")) - 1
+    j = min(max(j, 0), problem.segments - 1)
+    start = float(problem.phases[j])
+    if phase - start < 1e-12:
+        return float(row @ q[j]), 0.0
+    node = problem.nodes(orbit.point)[j]
+    found = problem.flow.shoot(node[None], np.array([start, phase]), orbit.omega)
+    if found.failure:
+        raise CoefficientError(found.failure)
+    return float(row @ found.jacobians[0] @ q[j]), float(row @ found.d_omega[0]) * orbit.omega
+
+
+# --- flips ---------------------------------------------------------------------------------------
+
+
+def _flip(special: SpecialPoint, loop: Loop) -> NormalForm:
+    form, _ = flip(loop)
+    shift = doubled_parameter(form)
+    hz, sign, side = _hz(special), form.nonlinear.sign, shift.sign
+    title = f"Flip at {hz}"
+    if not (sign and side):
+        sentence = f"{title}: super- or subcritical cannot be told, {LOST}."
+        return NormalForm("flip", sentence, form.nonlinear, shift)
+    others = others_outside(special)
+    stable = sign > 0 and not others
+    word = "supercritical" if sign > 0 else "subcritical"
+    orbit = f"{'a stable' if stable else 'an unstable'} orbit of twice the period"
+    why = f" ({_other_multipliers(others)})" if sign > 0 and others else ""
+    sentence = (
+        f"{title}, {word}: {orbit} ({2e3 * special.orbit.duration:.4g} ms) exists "
+        f"{SIDES[side]} {hz}{why}."
+    )
+    return NormalForm(f"{word} flip", sentence, form.nonlinear, shift, side, stable)
+
+
+# --- tori ----------------------------------------------------------------------------------------
+
+
+def _torus(special: SpecialPoint, loop: Loop) -> NormalForm:
+    mu = critical_pair(special.orbit.multipliers)
+    form = torus(loop, mu)
+    shift = form.parameter
+    hz, sign, side = _hz(special), form.nonlinear.sign, shift.sign
+    turn = resonance(mu)
+    if not (sign and side):
+        sentence = (
+            f"Neimark-Sacker point at {hz}: super- or subcritical cannot be told, {LOST}; {turn}."
+        )
+        return NormalForm("torus", sentence, form.nonlinear, shift)
+    others = others_outside(special)
+    stable = sign < 0 and not others
+    word = "supercritical" if sign < 0 else "subcritical"
+    why = f" ({_other_multipliers(others)})" if sign < 0 and others else ""
+    sentence = (
+        f"Neimark-Sacker point at {hz}, {word}: {'a stable' if stable else 'an unstable'} torus "
+        f"(a motion of two frequencies) exists {SIDES[side]} {hz}{why}; {turn}."
+    )
+    return NormalForm(f"{word} torus", sentence, form.nonlinear, shift, side, stable)
+
+
+def critical_pair(multipliers: Complex) -> complex:
+    """The multiplier in the upper half plane that is nearest to the unit circle."""
+    upper = multipliers[multipliers.imag > 0.0]
+    if not upper.size:
+        raise CoefficientError("no multiplier is complex")
+    return complex(upper[np.argmin(np.abs(np.abs(upper) - 1.0))])
+
+
+def resonance(mu: complex) -> str:
+    """Say how far a pair on the unit circle is from the strong resonances.
+
+    Examples
+    --------
+    >>> resonance(1j ** 0.9)
+    'its multipliers turn by 81 degrees per period, 9 from the strong resonance 1:4'
+    """
+    angle = math.degrees(abs(math.atan2(mu.imag, mu.real)))
+    order = min((1, 2, 3, 4), key=lambda m: abs(angle - 360.0 / m % 360.0))
+    distance = abs(angle - 360.0 / order % 360.0)
+    said = (
+        f"its multipliers turn by {angle:.4g} degrees per period, {distance:.3g} from the strong "
+        f"resonance 1:{order}"
+    )
+    if distance < NEAR_RESONANCE_DEG:
+        said += ", which decides what happens further away"
+    return said
+
+
+# --- branch points -------------------------------------------------------------------------------
+
+
+def _branch_point(special: SpecialPoint, loop: Loop) -> NormalForm:
+    shorter = minimal_period(special.orbit)
+    if shorter < special.orbit.period:
+        return _shorter_period_met(special, shorter)
+    found = crossing(loop)
+    return _pitchfork(special, found) if found.is_pitchfork else _transcritical(special, found)
+
+
+def _shorter_period_met(special: SpecialPoint, shorter: int) -> NormalForm:
+    sentence = f"Branch point at {_hz(special)}: here the orbit is one of period {shorter}"
+    if special.orbit.period == 2 * shorter:
+        sentence += ", at a flip of a branch of that period, from which this branch is born."
+        return NormalForm("flip", sentence)
+    return NormalForm("branch point", f"{sentence}, of a branch of that period.")
+
+
+def _pitchfork(special: SpecialPoint, found: Crossing) -> NormalForm:
+    form: Coefficients = found.pitchfork
+    shift = form.parameter
+    hz, sign, side = _hz(special), form.nonlinear.sign, shift.sign
+    symmetric = _breaks_mirror(special.orbit, found.q)
+    title = f"Branch point at {hz}, pitchfork"
+    if symmetric:
+        title += " (the symmetry x(t + T/2) = -x(t) breaks)"
+    if not (sign and side):
+        sentence = f"{title}: super- or subcritical cannot be told, {LOST}."
+        return NormalForm("pitchfork", sentence, form.nonlinear, shift)
+    others = others_outside(special)
+    stable = sign < 0 and not others
+    word = "supercritical" if sign < 0 else "subcritical"
+    pair = "mirror images of each other" if symmetric else "one on either side of the old one"
+    why = f"; {_other_multipliers(others)}" if sign < 0 and others else ""
+    sentence = (
+        f"{title}, {word}: two {'stable' if stable else 'unstable'} orbits, {pair}, exist "
+        f"{SIDES[side]} {hz}{why}."
+    )
+    return NormalForm(f"{word} pitchfork", sentence, form.nonlinear, shift, side, stable)
+
+
+def _transcritical(special: SpecialPoint, found: Crossing) -> NormalForm:
+    hz = _hz(special)
+    if not found.roots:
+        sentence = (
+            f"Branch point at {hz}: the branching equation has no real solution but the point "
+            "itself (an isolated orbit)."
+        )
+        return NormalForm("branch point", sentence, found.quadratic[0])
+    others = others_outside(special)
+    which = (
+        f"both are unstable, {_other_multipliers(others)}"
+        if others
+        else "the stable one becomes unstable and the other stable"
+    )
+    sentence = (
+        f"Branch point at {hz}, transcritical: two branches cross, each goes on to either side; "
+        f"{which}."
+    )
+    return NormalForm("transcritical", sentence, found.quadratic[0], stable=not others)
+
+
+def is_symmetric(orbit: Orbit, rtol: float = 1e-4) -> bool:
+    """Whether half a period turns the orbit into its mirror image, x(t + T/2) = -x(t)."""
+    return asymmetry(orbit.problem, orbit.point) <= rtol
+
+
+def _breaks_mirror(orbit: Orbit, q: Real) -> bool:
+    """Whether a change q (k, 2n) takes an orbit's symmetry x(t + T/2) = -x(t) from it.
+
+    Then half a period leaves q as it is; a mirrored q keeps the symmetry, and another one tells
+    that the system has none.
+    """
+    if not is_symmetric(orbit):
+        return False
+    shifted = np.roll(q, orbit.problem.segments // 2, axis=0)
+    return bool(np.abs(shifted - q).max() < UNCHANGED * np.abs(q).max())
+
+
+def switch_at_branch_point(
+    special: SpecialPoint, amplitude: float = 0.02
+) -> tuple[BranchPoint, BranchPoint]:
+    """First points of the other branch through a branch point, one in either direction.
+
+    At a broken symmetry these are the two halves of the new branch; `nldyn.branches.leg.trace`
+    follows each of them.
+
+    Parameters
+    ----------
+    special : SpecialPoint
+        A branch point (BP).
+    amplitude : float
+        Relative size of the first step; smaller ones are tried if it fails.
+
+    Returns
+    -------
+    pair of BranchPoint
+        Their tangents lead away from the branch point.
+
+    Raises
+    ------
+    SystemModelError
+        If the special point is not a branch point.
+    LocateError
+        If the other branch is not found, or is one of a shorter period.
+    """
+    check_special("switch_at_branch_point", special, "BP")
+    check_positive("amplitude", amplitude)
+    shorter = minimal_period(special.orbit)
+    if shorter < special.orbit.period:
+        raise LocateError(
+            f"the other branch at {_hz(special)} is one of period {shorter}: solve for its orbits"
+        )
+    try:
+        direction = other_tangent(special)
+    except CoefficientError as error:
+        raise LocateError(f"no other branch at {_hz(special)}: {error}") from None
+    return (
+        _step_off(special, direction, amplitude),
+        _step_off(special, -direction, amplitude),
+    )
+
+
+def other_tangent(special: SpecialPoint) -> Real:
+    """Unit tangent (N + 1,) of the branch that crosses at a branch point.
+
+    Of the two solutions of the branching equation it is the one further from the direction of the
+    branch on which the point was found.
+    """
+    found = crossing(loop_of(special.orbit))
+    if not found.roots:
+        raise CoefficientError("the branching equation has no real solution")
+    weights = special.orbit.problem.metric(special.orbit.point)
+    tangents = []
+    for alpha, beta in found.roots:
+        tangent = np.append((alpha * found.q + beta * found.v).ravel(), beta)
+        tangents.append(tangent / metric_length(weights, tangent))
+    along = [abs(float(special.point.tangent @ (weights * t))) for t in tangents]
+    return np.asarray(tangents[int(np.argmin(along))])
+
+
+def _step_off(special: SpecialPoint, direction: Real, amplitude: float) -> BranchPoint:
+    """Point of the branch with a tangent at a distance from the branch point.
+
+    The distance must be short where a linear stop is just touched beside the branch point: the
+    other branch bends there and has another tangent behind.
+    """
+    orbit = special.orbit
+    problem = orbit.problem
+    row = problem.metric(orbit.point) * direction
+    row /= np.linalg.norm(row)
+    for share in (1.0, 0.25, 0.05, 0.01, 1e-3, 1e-4):
+        size = share * amplitude
+        found = problem.correct(orbit.point + size * direction, row, longest=size)
+        if found.converged:
+            tangent = problem.tangent(found, direction)
+            return BranchPoint(Orbit.of(problem, found, orbit.observe), tangent, 0.0)
+    raise LocateError(f"no orbit found beside the branch point at {_hz(special)}: {found.failure}")
+
+
+# --- grazing -------------------------------------------------------------------------------------
+
+
+def _grazing(special: SpecialPoint, others: Sequence[SpecialPoint]) -> NormalForm:
+    orbit, hz = special.orbit, _hz(special)
+    touches = touching(orbit)
+    if not touches:
+        return NormalForm("new contact", f"Grazing at {hz}: the system has no stop.")
+    output, phase, is_maximum = touches[0]
+    states = special.point.tangent[:-1].reshape(orbit.problem.segments, -1)
+    try:
+        along, by_parameter = output_change(orbit, output, phase, states)
+        pace = float(special.point.tangent[-1])
+        slope = (along + by_parameter * pace) * pace
+    except CoefficientError:
+        slope = 0.0
+    side = int(np.sign(slope)) * (1 if is_maximum else -1)
+    stops = " and ".join(_stop_name(orbit, *touch[:2]) for touch in touches)
+    verb = "is" if len(touches) == 1 else "are"
+    if is_maximum:
+        name, what, follows = "new contact", "just touched, with zero speed", "the contact exists"
+    else:
+        name, what, follows = "split contact", "left for an instant", "the contact is split in two"
+    where = f"; {follows} {SIDES[side]} {hz}" if side else ""
+    sentence = (
+        f"Grazing at {hz}: {stops} {verb} {what}{where}. {_stability_at_grazing(special, others)}"
+    )
+    return NormalForm(name, sentence, side=side, stable=orbit.stable)
+
+
+def touching(orbit: Orbit) -> list[tuple[int, float, bool]]:
+    """Stop, phase and whether a maximum, of the penetrations' extremes nearest to zero.
+
+    The nearest comes first; others follow that are as near within rounding, which happens where
+    a symmetric orbit touches two stops alike.
+    """
+    found = []
+    for index in range(len(orbit.system.stops)):
+        extremes = orbit.extremes(index)
+        found += [
+            (abs(float(value)), index, float(phase), bool(kind))
+            for phase, value, kind in zip(
+                extremes.phases, extremes.values, extremes.is_maximum, strict=True
+            )
+        ]
+    found.sort()
+    limit = 1e-8 * max((entry[0] for entry in found), default=0.0)
+    return [entry[1:] for number, entry in enumerate(found) if number == 0 or entry[0] < limit]
+
+
+def _stop_name(orbit: Orbit, index: int, phase: float) -> str:
+    stops = orbit.system.stops
+    number = f" {index + 1}" if len(stops) > 1 else ""
+    return f"stop{number} at '{stops[index].at}' ({1e3 * phase / orbit.omega:.4g} ms)"
+
+
+def _stability_at_grazing(special: SpecialPoint, others: Sequence[SpecialPoint]) -> str:
+    close = [
+        other
+        for other in others
+        if other.kind != "GR"
+        and abs(other.frequency_hz / special.frequency_hz - 1.0) < CLOSE
+        and abs(other.orbit.max_abs_displacement / special.orbit.max_abs_displacement - 1.0) < 0.05
+    ]
+    said = "The force sets in softly, so the multipliers are continuous and stability stays"
+    if close:
+        named = ", ".join(f"{other.kind} at {_hz(other)}" for other in close)
+        return f"{said}, but a special point is close by ({named})."
+    return f"{said}."
+
+
+# --- all -----------------------------------------------------------------------------------------
+
+
+def others_outside(special: SpecialPoint) -> int:
+    """How many multipliers lie outside the unit circle besides the critical ones."""
+    mu = special.orbit.multipliers
+    if special.kind == "NS":
+        pair = critical_pair(mu)
+        distance = np.minimum(np.abs(mu - pair), np.abs(mu - pair.conjugate()))
+        rest = np.delete(mu, np.argsort(distance, kind="stable")[:2])
+    else:
+        critical = -1.0 if special.kind == "PD" else 1.0
+        rest = np.delete(mu, int(np.argmin(np.abs(mu - critical))))
+    return int(np.sum(np.abs(rest) > 1.0 + 1e-9))
+
+
+def _other_multipliers(count: int) -> str:
+    number = NUMBERS.get(count, str(count))
+    lie = "lies" if count == 1 else "lie"
+    return f"as {number} other multiplier{'' if count == 1 else 's'} {lie} outside the unit circle"
+
+
+def _hz(special: SpecialPoint) -> str:
+    return f"{special.frequency_hz:.6g} Hz"

@@ -1,0 +1,78 @@
+"""Extremes of the penetrations that change their sign between two orbits."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from nldyn.base.errors import LocateError
+from nldyn.bifurcations.point import BranchPoint
+from nldyn.orbits.extremes import alone, nearest, sign_changes
+from nldyn.orbits.orbit import Orbit
+from nldyn.system.system import System
+
+SMOOTH_TOUCH = 1.5  # exponent of a stop from which on multipliers have a slope at a touch
+
+
+@dataclass(frozen=True)
+class Touch:
+    """An extremum of a stop's penetration whose sign differs between two neighbouring orbits."""
+
+    output: int
+    is_maximum: bool
+    phase: float
+
+    def depth(self, point: BranchPoint) -> float:
+        """Value of the extremum of this kind nearest in phase."""
+        found = point.orbit.extremes(self.output)
+        full = 2.0 * math.pi * point.orbit.period
+        index = nearest(found.phases, found.is_maximum, self.is_maximum, self.phase, full)
+        if index < 0:
+            raise LocateError("an extreme has vanished")
+        return float(found.values[index])
+
+
+def touching_extremes(a: Orbit, b: Orbit) -> list[Touch]:
+    """Extremes of the penetrations that change sign between two neighbouring orbits.
+
+    A maximum that becomes positive is a new contact; a minimum that becomes negative splits one.
+    """
+    touches = []
+    full = 2.0 * math.pi * a.period
+    for output in range(len(a.system.stops)):
+        first, last = a.extremes(output), b.extremes(output)
+        kinds, phases = sign_changes(
+            *(first.phases, first.values, first.is_maximum),
+            *(last.phases, last.values, last.is_maximum),
+            full,
+        )
+        touches += [Touch(output, bool(k), float(p)) for k, p in zip(kinds, phases, strict=True)]
+    return touches
+
+
+def changes_hidden_by_birth(a: Orbit, b: Orbit) -> bool:
+    """Whether extremes that only one of two orbits has are across the stop in the other.
+
+    A maximum and a minimum of the penetration that are born together in flight may both reach the
+    stop before the next point: a new contact and its union with another one, after which there are
+    as many contacts as before.
+    """
+    full = 2.0 * math.pi * a.period
+    for output in range(len(a.system.stops)):
+        first, last = a.extremes(output), b.extremes(output)
+        if first.phases.size == last.phases.size:
+            continue
+        fewer = a
+        if first.phases.size > last.phases.size:
+            fewer, first, last = b, last, first
+        new = alone(first.phases, first.is_maximum, last.phases, last.is_maximum, full)
+        if np.any(last.values[new] * fewer.penetration(output, last.phases[new]) < 0.0):
+            return True
+    return False
+
+
+def touches_sharply(system: System) -> bool:
+    """Whether a stop is so stiff from the first touch that multipliers have no slope there."""
+    return any(stop.exponent < SMOOTH_TOUCH for stop in system.stops)

@@ -1,0 +1,443 @@
+"""The walk along a branch of periodic orbits in one direction, by pseudo-arclength."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, check_types
+from nldyn.base.rows import Rows
+from nldyn.bifurcations.branch_crossing import (
+    ON_CROSSING,
+    SHORTEST_CROSSING,
+    crossing_beside,
+    is_crossing,
+    lies_on_crossing,
+)
+from nldyn.bifurcations.events import crosses
+from nldyn.bifurcations.period_doubling import flip_between, half_difference, passed_flip
+from nldyn.bifurcations.point import BranchPoint
+from nldyn.branches.branch import CLOSED, JOINS, NOT_FINISHED, POINTS, RANGE_END, SHORT_STEP
+from nldyn.branches.options import ContinuationOptions
+from nldyn.orbits.conditions import TOUCH, depth_row
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.shooting import ShootingProblem, asymmetry, metric_length, shifts
+
+KINK = TOUCH  # step below which a branch may bend by any angle where the number of contacts changes
+MEETS_OPEN_END = "meets another branch where that was broken off"
+BROKEN = 1e-8  # asymmetry of an orbit that is more than rounding,
+BY_TOLERANCE = 1.0  # or, over the tolerance of the flow map, more than its error (0.3 at most seen)
+EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
+MEETING_STEP = 1e-4  # longest step over which a doubled branch may meet the one it comes from
+LONGER_CROSSINGS = (1.0, 10.0, 100.0)  # steps from a crossing, over `SHORTEST_CROSSING`
+FARTHEST_CROSSING = 1e-4  # distance of one from which a step may begin
+LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
+RECENT = 10  # points behind a walk that it does not come back to
+SAME_PLACE = 1e-8  # distance of points that are one, relative to the orbit
+COMES_BACK = "comes back to where it had been"
+TOO_NEAR = "on the way it left the branch for another one that lies too near"
+
+
+@dataclass(frozen=True, eq=False)
+class StepperState:
+    """Where a walk is, and its step control there: all that the next points depend on.
+
+    Parameters
+    ----------
+    here : BranchPoint
+        The last point.
+    step : float
+        Arclength of the next step.
+    behind : (2, N + 1)
+        Shooting unknowns and tangent of the point before; no rows at the start.
+    count : int
+        Steps made.
+    """
+
+    here: BranchPoint
+    step: float
+    behind: Real
+    count: int
+
+
+@dataclass
+class Stepper:
+    """Iterator over the points of a branch in one direction.
+
+    Yields `BranchPoint`s; when it ends, `stop_reason` says why. The caller may stop between any
+    two points; asked for points again, the walk goes on where it was.
+
+    Parameters
+    ----------
+    start : BranchPoint
+        First point, yielded first; its tangent gives the direction.
+    range_hz : (float, float)
+        Frequencies between which to stay.
+    options : ContinuationOptions
+        Step control.
+    open_ends : (m, N + 1) array, optional
+        Where other branches were broken off: the walk stops at the first of these that it passes.
+    stride : StepperState, optional
+        Where to go on, if not at the start.
+    visited : list of BranchPoint
+        The points so far.
+    """
+
+    start: BranchPoint
+    range_hz: tuple[float, float]
+    options: ContinuationOptions
+    open_ends: Real | None = None
+    stop_reason: str = NOT_FINISHED
+    stride: StepperState | None = None
+    visited: list[BranchPoint] = field(default_factory=list, repr=False)
+    _places: Rows | None = field(default=None, init=False, repr=False)  # unknowns of these
+    _obstacle: str = field(default="", init=False, repr=False)
+    _depth_row: tuple[BranchPoint, Real | None] | None = field(default=None, init=False, repr=False)
+    _met: float = field(default=0.0, init=False, repr=False)  # last step too long to meet a flip
+
+    def __post_init__(self) -> None:
+        check_types(start=(self.start, BranchPoint), options=(self.options, ContinuationOptions))
+
+    def __iter__(self) -> Iterator[BranchPoint]:
+        """Walk along the branch."""
+        problem = self.start.orbit.problem
+        if self.stride is None:
+            behind = np.empty((0, self.start.tangent.size))
+            self.stride = StepperState(self.start, self.options.first_step, behind, 0)
+            yield self.start
+        while self.stride.count < self.options.max_points:
+            here, step, behind = self.stride.here, self.stride.step, self.stride.behind
+            attempt = self._shortened(problem, behind, here, step)
+            if attempt is None:
+                self.stop_reason = f"{SHORT_STEP}{self.options.min_step:g}: {self._obstacle}"
+                return
+            step, point, angle, miss = attempt
+            low, high = self.range_hz
+            if not low <= point.orbit.frequency_hz <= high:
+                end = self._range_end(here, point, low if point.orbit.frequency_hz < low else high)
+                self.stop_reason = RANGE_END
+                if end is not None:
+                    yield end
+                return
+            if passed_flip(here.orbit, point.orbit):
+                half = f"the branch of period {problem.period // 2}"
+                try:
+                    end = flip_between(here, point)
+                except ConvergenceError:
+                    self.stop_reason = (
+                        f"meets {half} beyond {here.orbit.frequency_hz:.6g} Hz, where no orbit of "
+                        "that period was found"
+                    )
+                    return
+                self.stop_reason = f"{JOINS} {half} at the flip at {end.orbit.frequency_hz:.6g} Hz"
+                yield end
+                return
+            if self.closes(here, point):
+                self.stop_reason = CLOSED
+                yield point
+                return
+            if self.stride.count % LOOKS_BACK == 0 and self._comes_back(here, point):
+                self.stop_reason = f"{COMES_BACK} at {here.orbit.frequency_hz:.6g} Hz: {TOO_NEAR}"
+                return
+            if self.open_ends is not None and _passed(here, point, self.open_ends).any():
+                self.stop_reason = MEETS_OPEN_END
+                yield point
+                return
+            bent = step <= KINK and point.orbit.impacts != here.orbit.impacts
+            growth = 0.7 * self.options.max_angle / max(angle, 1e-3)
+            growth = min(growth, math.sqrt(0.5 * self.options.max_miss / max(miss, 1e-6)))
+            step = min(step * min(max(growth, 0.5), 1.6), self.options.max_step)
+            behind = np.array([] if bent else [here.orbit.point, here.tangent])
+            behind = behind.reshape(-1, here.tangent.size)
+            self.stride = StepperState(point, step, behind, self.stride.count + 1)
+            self.visited.append(point)
+            yield point
+        self.stop_reason = f"{self.options.max_points}{POINTS}"
+
+    def _shortened(
+        self, problem: ShootingProblem, behind: Real, here: BranchPoint, step: float
+    ) -> tuple[float, BranchPoint, float, float] | None:
+        """The longest step up to `step` that leads to a next point, with what `_advance` gives."""
+        tried = False
+        while step >= self.options.min_step:
+            attempt = self._advance(problem, behind, here, step)
+            if attempt is None and step <= KINK:
+                attempt = self._across_touch(problem, here, step)
+            if attempt is None and step <= MEETING_STEP and self._met == 2.0 * step:
+                step, self._met = self._met, 0.0  # shorter, it ends too near to the flip
+                attempt = self._advance(problem, behind, here, step, step)
+            if attempt is not None:
+                return step, *attempt
+            step *= 0.5
+            if not tried and self.options.min_step <= step < SHORTEST_CROSSING:
+                tried, attempt = True, self._past_crossing(here)
+                if attempt is not None:
+                    return attempt[0].arclength - here.arclength, *attempt
+        return None
+
+    def _advance(
+        self,
+        problem: ShootingProblem,
+        behind: Real,
+        here: BranchPoint,
+        step: float,
+        crossing: float = 0.0,
+    ) -> tuple[BranchPoint, float, float] | None:
+        """Next point, its angle to this one and its relative distance from the predictor.
+
+        None when the step must be shorter, as it must be to cross another branch or to meet it:
+        up to `SHORTEST_CROSSING` or `MEETING_STEP`, or `crossing` if that is longer.
+        """
+        weights = problem.metric(here.orbit.point)
+        direction = here.tangent / metric_length(weights, here.tangent)
+        straight = here.orbit.point + step * direction
+        row = weights * direction
+        row /= math.sqrt(float(row @ row))
+        predicted = _extrapolate(weights, behind, here, step) if behind.size else straight
+        found = problem.correct(
+            predicted,
+            row,
+            offset=float(row @ straight),
+            longest=2.0 * (self.options.max_miss if step > KINK else 1.0) * step,
+            max_iterations=8,
+        )
+        if not found.converged:
+            self._obstacle = found.failure
+            if found.last_step < math.inf:
+                self._obstacle += f", last relative step {found.last_step:.1e}"
+            return None
+        self._obstacle = "what Newton's method finds is not the next point of the branch"
+        if _jumped(problem, here.orbit.point, straight, found.point):
+            return None
+        miss = metric_length(weights, found.point - predicted) / step
+        if step <= KINK and miss < 1.0:  # a linear stop that is touched bends the branch
+            orbit = Orbit.of(problem, found, here.orbit.observe)
+            if orbit.impacts != here.orbit.impacts:
+                tangent = problem.tangent(found, direction)
+                return BranchPoint(orbit, tangent, here.arclength + step), 0.0, 0.0
+        if miss > self.options.max_miss:
+            return None
+        # a curve that turns by max_angle leaves its tangent by half of that: a longer correction
+        # has landed on another branch
+        off = metric_length(weights, found.point - straight)
+        if off > 0.75 * self.options.max_angle * step:
+            return None
+        tangent = problem.tangent(found, direction)
+        cosine = float(direction @ (weights * tangent)) / metric_length(weights, tangent)
+        angle = math.acos(min(max(cosine, -1.0), 1.0))
+        if angle > self.options.max_angle:
+            return None
+        orbit = Orbit.of(problem, found, here.orbit.observe)
+        # behind a grazing point the branch may turn on a very short length
+        if step > self.options.grazing_step and orbit.impacts != here.orbit.impacts:
+            return None
+        meets = passed_flip(here.orbit, orbit)
+        if meets and step > max(MEETING_STEP, crossing):
+            self._met = step
+            return None
+        point = BranchPoint(orbit, tangent, here.arclength + step)
+        if (
+            not meets
+            and crosses(here, point)
+            and (step > max(crossing, SHORTEST_CROSSING) or not is_crossing(orbit))
+        ):
+            return None
+        if lies_on_crossing(orbit, min(0.1 * step, ON_CROSSING)):
+            return None
+        return point, angle, miss
+
+    def _across_touch(
+        self, problem: ShootingProblem, here: BranchPoint, step: float
+    ) -> tuple[BranchPoint, float, float] | None:
+        """Next point on the other side of a grazing point, as `_advance` gives it, or None.
+
+        A stiff stop may bend the branch by more than a right angle within 1e-8, back from every
+        plane across its tangent. The depth of the touch rises or falls all the way, and where it is
+        held the stop's force hardly depends on the orbit.
+        """
+        if self._depth_row is None or self._depth_row[0] is not here:
+            self._depth_row = here, depth_row(here.orbit)
+        row = self._depth_row[1]
+        if row is None:
+            return None
+        weights = problem.metric(here.orbit.point)
+        guess = here.orbit.point + step * here.tangent / metric_length(weights, here.tangent)
+        found = problem.correct(guess, row, longest=2.0 * KINK, max_iterations=8)
+        if not found.converged or _jumped(problem, here.orbit.point, guess, found.point):
+            return None
+        orbit = Orbit.of(problem, found, here.orbit.observe)
+        length = metric_length(weights, found.point - here.orbit.point)
+        if length > KINK or orbit.impacts == here.orbit.impacts:
+            return None
+        tangent = problem.tangent(found, here.tangent)
+        if float(row @ tangent) * float(row @ here.tangent) < 0.0:
+            tangent = -tangent
+        return BranchPoint(orbit, tangent, here.arclength + length), 0.0, 0.0
+
+    def _past_crossing(self, here: BranchPoint) -> tuple[BranchPoint, float, float] | None:
+        """Next point from one beside which branches cross, or None.
+
+        Its place is some mixture of theirs, and the next orbits may be so ill conditioned that
+        Newton's method does not find them: longer steps lead on from the crossing itself.
+        """
+        crossing = _crossing_ahead(here)
+        if crossing is None:
+            return None
+        problem, obstacle = here.orbit.problem, self._obstacle
+        back = max(here.arclength - crossing.arclength, 0.0)
+        none = np.empty((0, crossing.tangent.size))
+        for factor in LONGER_CROSSINGS:
+            length = back + factor * SHORTEST_CROSSING
+            attempt = self._advance(problem, none, crossing, length, length)
+            if attempt is not None:
+                return attempt
+        self._obstacle = obstacle
+        return None
+
+    def _range_end(self, a: BranchPoint, b: BranchPoint, end_hz: float) -> BranchPoint | None:
+        """Point of the branch exactly at an end of the range."""
+        p = math.log(2.0 * math.pi * end_hz)
+        pa, pb = a.orbit.point[-1], b.orbit.point[-1]
+        if pa == p:
+            return None
+        share = (p - pa) / (pb - pa)
+        problem = a.orbit.problem
+        guess = (1.0 - share) * a.orbit.point + share * b.orbit.point
+        row = np.zeros(guess.size)
+        row[-1] = 1.0
+        guess[-1] = p
+        found = problem.correct(guess, row)
+        if not found.converged:
+            return None
+        orbit = Orbit.of(problem, found, a.orbit.observe)
+        tangent = problem.tangent(found, a.tangent)
+        length = a.arclength + share * (b.arclength - a.arclength)
+        return BranchPoint(orbit, tangent, length)
+
+    def closes(self, a: BranchPoint, b: BranchPoint) -> bool:
+        """Whether the walk from a to b passes the start again, in the same direction.
+
+        The orbit may have come back shifted by some of its excitation periods.
+        """
+        start = self.start
+        if b.arclength - start.arclength < 3.0 * (b.arclength - a.arclength):
+            return False
+        places, tangents = self._shifts
+        step = start.orbit.problem.metric(start.orbit.point) * (b.orbit.point - a.orbit.point)
+        return bool((_passed(a, b, places) & (tangents @ step > 0.0)).any())
+
+    def _comes_back(self, a: BranchPoint, b: BranchPoint) -> bool:
+        """Whether the walk from a to b passes a point that it has passed before, not the start.
+
+        It can, in the same direction, only where it has left its branch for another one on the way.
+        """
+        if self._places is None:
+            self._places = Rows(a.orbit.point.size)
+        for point in self.visited[len(self._places.so_far()) :]:
+            self._places.add(point.orbit.point)
+        passed = _passed(a, b, self._places.so_far()[:-RECENT])
+        if not passed.any():
+            return False
+        problem = a.orbit.problem
+        weights, step = problem.metric(a.orbit.point), b.orbit.point - a.orbit.point
+        length2 = float(step @ (weights * step))
+        for index in np.flatnonzero(passed):
+            place, tangent = self.visited[index].orbit.point, self.visited[index].tangent
+            if tangent @ (weights * step) <= 0.0:
+                continue
+            row = weights * tangent / np.linalg.norm(weights * tangent)
+            share = float((place - a.orbit.point) @ (weights * step)) / length2
+            guess = a.orbit.point + share * step
+            found = problem.correct(guess, row, offset=float(row @ place))
+            if found.converged and metric_length(weights, found.point - place) < SAME_PLACE:
+                return True
+        return False
+
+    @cached_property
+    def _shifts(self) -> tuple[Real, Real]:
+        """Shooting unknowns and tangents of the start shifted by its excitation periods."""
+        problem = self.start.orbit.problem
+        return (
+            np.array(shifts(problem, self.start.orbit.point)),
+            np.array(shifts(problem, self.start.tangent)),
+        )
+
+
+def _crossing_ahead(here: BranchPoint) -> BranchPoint | None:
+    """Where another branch crosses that of a point right beside there, on its tangent.
+
+    It may lie a little behind.
+    """
+    crossing = crossing_beside(here.orbit)
+    if crossing is None:
+        return None
+    way = crossing.point - here.orbit.point
+    weights = here.orbit.problem.metric(here.orbit.point)
+    if metric_length(weights, way) > FARTHEST_CROSSING:
+        return None
+    ahead = float(way @ (weights * here.tangent)) / metric_length(weights, here.tangent)
+    return BranchPoint(crossing, here.tangent, here.arclength + ahead)
+
+
+def _passed(a: BranchPoint, b: BranchPoint, places: Real) -> NDArray[np.bool_]:
+    """Which places (m, N + 1) lie beside the step from a to b, nearer than 0.1 of its length."""
+    start, step = a.orbit.point, b.orbit.point - a.orbit.point
+    weights = a.orbit.problem.metric(start)
+    length2 = float(step @ (weights * step))
+    passed = np.zeros(len(places), dtype=bool)
+    near = np.abs(places[:, -1] - start[-1]) <= 1.1 * math.sqrt(length2)  # few are
+    if near.any():
+        way = places[near] - start
+        along = way @ (weights * step)
+        off = way - np.outer(along / length2, step)
+        inside = (along >= 0.0) & (along <= length2)
+        passed[near] = inside & ((off * off) @ weights < 0.01 * length2)
+    return passed
+
+
+def _extrapolate(weights: Real, behind: Real, here: BranchPoint, step: float) -> Real:
+    """Point at a distance along the tangent on the cubic through two points and their tangents."""
+    (a, tangent), b = behind, here.orbit.point
+    direction = here.tangent / metric_length(weights, here.tangent)
+    row = weights * direction
+    back = float(row @ (a - b))
+    slope_a, slope_b = tangent / float(row @ tangent), direction
+    x = step / back  # 0 here, 1 behind
+    return np.asarray(
+        (1.0 + 2.0 * x) * (1.0 - x) ** 2 * b
+        + x * (1.0 - x) ** 2 * back * slope_b
+        + x * x * (3.0 - 2.0 * x) * a
+        + x * x * (x - 1.0) * back * slope_a
+    )
+
+
+def _jumped(problem: ShootingProblem, here: Real, guess: Real, there: Real) -> bool:
+    """Whether a step has landed on an orbit shifted by some excitation periods, or on half of one.
+
+    Where it is shifted, some other shift of it lies nearer to where the step began. Only through a
+    flip the halves change places steadily, as the tangent foretells; not in a jump. Nor does a
+    doubled branch go on along the one that it comes from, nor one of broken symmetry along the
+    symmetric one.
+    """
+    broken = asymmetry(problem, here)
+    least = max(BROKEN, BY_TOLERANCE * problem.flow.options.rtol)
+    if broken > least and asymmetry(problem, there) < EQUAL_HALVES * broken:
+        return True
+    apart, *others = (float(np.linalg.norm((p - here)[:-1])) for p in shifts(problem, there))
+    if problem.period % 2 == 0:  # half its period: a flip, below
+        del others[problem.period // 2 - 1]
+    if any(other < apart for other in others):
+        return True
+    if problem.period % 2:
+        return False
+    a, g, b = (half_difference(problem, point) for point in (here, guess, there))
+    before, after = float(np.linalg.norm(a)), float(np.linalg.norm(b))
+    if after < EQUAL_HALVES * before:  # on the branch of half the period
+        return True
+    return float(a @ b) < 0.0 and float(np.linalg.norm(b - g)) > 0.5 * max(before, after)

@@ -1,0 +1,483 @@
+"""Pseudo-arclength continuation of periodic orbits in the excitation frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, SystemModelError, check_range, check_types, numbers
+from nldyn.bifurcations.branch_crossing import (
+    NEIGHBOUR,
+    ON_CROSSING,
+    lies_on_crossing,
+    same_crossing,
+)
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.branches.at_frequency import check_requested, requested
+from nldyn.branches.branch import (
+    CLOSED,
+    NOT_FINISHED,
+    POINTS,
+    RANGE_END,
+    SHORT_STEP,
+    Branch,
+    Course,
+)
+from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_at
+from nldyn.branches.leg import Leg, LegBuilder
+from nldyn.branches.options import ContinuationOptions
+from nldyn.flow.ahead import Ahead
+from nldyn.flow.flow_map import FlowMap
+from nldyn.orbits.orbit import Orbit, check_minimal
+from nldyn.orbits.shooting import shifts
+from nldyn.runtime.threads import one_thread
+
+FROM_FOLD = 1e-4  # arclength from a fold to the point at which a branch through it begins
+MIDDLE = 0.1  # of that, within which it lies
+NEARLY_FLAT = 1e-3  # frequency part of a tangent, up to which it may be that of a fold
+MET_AGAIN = 1e-6  # longest Newton step by which a solved orbit is met again across its branch
+
+
+def continue_branch(
+    start: Orbit | Branch,
+    range_hz: tuple[float, float] | None = None,
+    *,
+    name: str = "",
+    options: ContinuationOptions | None = None,
+    progress: Callable[[float], None] | None = None,
+    open_ends: Sequence[Real] = (),
+    at: Sequence[float] | None = None,
+    checkpoint: BranchFile | Checkpoint | None = None,
+) -> Branch:
+    """Continue an orbit in both directions through a range of frequencies, or go on with a branch.
+
+    A branch is finished where it was interrupted, and followed beyond the ends of its range. Its
+    points are those of one continuation through the new range, to the last digit; those at the
+    ends of the old range are left out.
+
+    Parameters
+    ----------
+    start : Orbit or Branch
+        Where to start. The frequency of an orbit must lie in the range; from a fold the first
+        point is 1e-4 of arclength away.
+    range_hz : (float, float)
+        Frequencies in Hz, ascending. The ends are met exactly. For a branch it contains the one of
+        before, which is kept unless given.
+    name : str
+        Name of the branch; one that goes on keeps its own.
+    options : ContinuationOptions, optional
+        Step control; for a branch from here on. With more `max_points`, or a smaller `min_step`,
+        an end goes on that had come to the limit.
+    progress : callable, optional
+        Called with the frequency of every point.
+    open_ends : sequence of (N + 1,) arrays
+        Where other branches were broken off, see `Stepper`.
+    at : sequence of float, optional
+        Frequencies in Hz at which orbits are wanted: `Branch.requested` has all of them, at each
+        passage of the branch. For a branch those of before unless given.
+    checkpoint : CheckpointFile, optional
+        File that keeps what is computed, written now and then, at the end, and when an exception
+        such as Ctrl-C ends the computation. If it holds this very continuation, that one goes on
+        and gives the points of an uninterrupted one.
+
+    Returns
+    -------
+    Branch
+
+    Raises
+    ------
+    SystemModelError
+        If the range is empty, the orbit, a requested frequency or the range of before lies
+        outside, the branch was put together by hand, or `checkpoint` holds something else.
+    OutputError
+        If `checkpoint` cannot be written.
+    ConvergenceError
+        If Newton's method does not meet the orbit again at its own frequency, or branches cross
+        there.
+
+    References
+    ----------
+    H. B. Keller (1977), pseudo-arclength continuation; E. Doedel et al., AUTO-07p manual.
+
+    Examples
+    --------
+    >>> from nldyn import System, Unbalance, continue_branch, solve_orbit
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> orbit = solve_orbit(system, frequency_hz=10.0)
+    >>> longer = continue_branch(continue_branch(orbit, (9.0, 12.0)), (5.0, 20.0))
+    >>> whole = continue_branch(orbit, (5.0, 20.0))
+    >>> longer.frequency_hz.tolist() == whole.frequency_hz.tolist()
+    True
+    """
+    if isinstance(start, Branch):
+        return extended(start, range_hz, options, at, progress, checkpoint)
+    if range_hz is None:
+        raise SystemModelError("continue_branch: an orbit needs a range_hz")
+    return _from_orbit(
+        start, range_hz, name, options, progress, open_ends, () if at is None else at, checkpoint
+    )
+
+
+def _from_orbit(
+    orbit: Orbit,
+    range_hz: tuple[float, float],
+    name: str,
+    options: ContinuationOptions | None,
+    progress: Callable[[float], None] | None,
+    open_ends: Sequence[Real],
+    at: Sequence[float],
+    checkpoint: BranchFile | Checkpoint | None,
+) -> Branch:
+    """The branch of an orbit; see `continue_branch`."""
+    check_types(
+        start=(orbit, Orbit),
+        name=(name, str),
+        options=(options, ContinuationOptions, None),
+        progress=(progress, Callable, None),
+        open_ends=(open_ends, Sequence),
+    )
+    check_minimal(orbit)
+    low, high = check_range(range_hz)
+    if not low * (1.0 - 1e-9) <= orbit.frequency_hz <= high * (1.0 + 1e-9):
+        raise SystemModelError(
+            f"the orbit at {orbit.frequency_hz:g} Hz lies outside range_hz = ({low:g}, {high:g})"
+        )
+    course = Course(
+        (low, high),
+        options or ContinuationOptions(),
+        alike(orbit, [numbers("open_ends", end) for end in open_ends]),
+        check_requested(at, (low, high)),
+    )
+    start = start_point(orbit, 1.0, (low, high))
+    with checkpoint_at(checkpoint, orbit.system) as kept:
+        known = kept.branch_from(start.orbit, course)
+        if known is not None:
+            return extended(known, at=at, progress=progress, checkpoint=kept)
+        return complete(name, None, None, start, course, progress, kept)
+
+
+def extended(
+    branch: Branch,
+    range_hz: tuple[float, float] | None = None,
+    options: ContinuationOptions | None = None,
+    at: Sequence[float] | None = None,
+    progress: Callable[[float], None] | None = None,
+    checkpoint: BranchFile | Checkpoint | None = None,
+) -> Branch:
+    """Finish or extend a branch; see `continue_branch`."""
+    course = branch.course
+    if course is None:
+        raise SystemModelError(
+            f"branch '{branch.name}' cannot be extended: it does not tell how it was continued"
+        )
+    low, high = check_range(course.range_hz if range_hz is None else range_hz)
+    if not low <= course.range_hz[0] < course.range_hz[1] <= high:
+        raise SystemModelError(
+            f"range_hz = ({low:g}, {high:g}) must contain the range of the branch, "
+            f"({course.range_hz[0]:g}, {course.range_hz[1]:g})"
+        )
+    new = replace(
+        course,
+        range_hz=(low, high),
+        options=options or course.options,
+        at=check_requested(course.at if at is None else at, (low, high)),
+    )
+    with checkpoint_at(checkpoint, branch.points[0].system) as kept:
+        known = kept.branch_from(branch.points[course.start], new, course)
+        if known is not None and known.course is not None and known.course.range_hz == (low, high):
+            branch, course = known, known.course  # this very extension was begun before
+        forward, backward = split(branch, course)
+        start = branch.nodes[course.start]
+        return complete(branch.name, forward, backward, start, new, progress, kept)
+
+
+@one_thread()
+def complete(
+    name: str,
+    forward: Leg | None,
+    backward: Leg | None,
+    start: BranchPoint,
+    course: Course,
+    progress: Callable[[float], None] | None,
+    checkpoint: Checkpoint,
+    ahead: Ahead | None = None,
+) -> Branch:
+    """Walk the legs of a branch that are missing or may go on, forward first, and join them.
+
+    Parameters
+    ----------
+    name : str
+        Name of the branch.
+    forward, backward : Leg, optional
+        What is known.
+    start : BranchPoint
+        Where both began, heading forward.
+    course : Course
+        Range, options and requested frequencies.
+    progress : callable, optional
+        Called with the frequency of every point.
+    checkpoint : Checkpoint
+        Keeps what is computed.
+    ahead : Ahead, optional
+        May have walked legs already, and walks the one backward while that forward is walked here.
+    """
+    ahead = ahead or Ahead(start.orbit.problem.flow)
+
+    def walked(
+        leg: Leg | None, first: BranchPoint, whole: Callable[[Leg | None], Branch | None]
+    ) -> Leg:
+        if leg is not None and not goes_on(leg, course):
+            return leg
+        key = leg_key(first, course)
+        if leg is None and ahead.is_begun(key):
+            checkpoint.work = lambda: whole(None)
+            here = first.orbit.frequency_hz
+            waiting = partial(progress, here) if progress else None
+            return ahead.value(key, walked_leg, first, course, meanwhile=waiting)
+        ahead.forget(key)
+        leg = leg or Leg([first], [], [], NOT_FINISHED, None)
+        trail = LegBuilder.going_on(leg, course.range_hz, course.options, course.open_ends)
+
+        checkpoint.work = lambda: whole(trail.so_far())
+        return trail.follow(progress, kept)
+
+    def kept() -> None:
+        checkpoint.offer()
+        ahead.look()
+
+    if forward is None:
+        offer_leg(ahead, _reversed(start), course, first=True)
+    forward = walked(forward, start, lambda leg: join(name, leg, backward, course) if leg else None)
+    if forward.reason == CLOSED:
+        ahead.forget(leg_key(_reversed(start), course))
+        backward = None
+    else:
+        done = forward
+        backward = walked(backward, _reversed(start), lambda leg: join(name, done, leg, course))
+    branch = join(name, forward, backward, course)
+    points, lost = requested(branch.places, course.at)
+    lost = [note for note in lost if note not in branch.notes]
+    branch = replace(branch, requested=tuple(points), notes=(*branch.notes, *lost))
+    checkpoint.work = lambda: branch
+    checkpoint.offer()
+    return branch
+
+
+def walked_leg(
+    flow: FlowMap, first: BranchPoint, course: Course, look: Callable[[], None] | None = None
+) -> Leg:
+    """The leg of a branch from a point on, whole; ``look`` is called on the way."""
+    leg = Leg([first], [], [], NOT_FINISHED, None)
+    trail = LegBuilder.going_on(leg, course.range_hz, course.options, course.open_ends)
+    return trail.follow(keep=look)
+
+
+def leg_key(first: BranchPoint, course: Course) -> Hashable:
+    """What a leg depends on, beside the flow map and how orbits are told."""
+    orbit = first.orbit
+    return (
+        orbit.period, orbit.problem.segments, orbit.observe, orbit.point.tobytes(),
+        first.tangent.tobytes(), course.range_hz, course.options, course.open_ends.tobytes(),
+    )  # fmt: skip
+
+
+def offer_leg(
+    ahead: Ahead,
+    start: BranchPoint,
+    course: Course,
+    *,
+    group: Hashable = None,
+    member: Hashable = None,
+    first: bool = False,
+) -> None:
+    """Let a leg be walked ahead."""
+    key = leg_key(start, course)
+    ahead.offer(key, walked_leg, start, course, group=group, member=member, first=first)
+
+
+def offer_branch(ahead: Ahead, start: BranchPoint, course: Course, group: Hashable = None) -> None:
+    """Let both legs of a branch be walked ahead."""
+    member = leg_key(start, course)
+    for point in (start, _reversed(start)):
+        offer_leg(ahead, point, course, group=group, member=member)
+
+
+def start_point(orbit: Orbit, direction: float, range_hz: tuple[float, float]) -> BranchPoint:
+    """Branch point at an orbit, heading up (+1) or down (-1) in frequency.
+
+    Beside a flip or a fold, where the frequency hardly tells the orbits of a branch apart, the
+    orbit is met again on the plane across the branch. From a fold it is a short way to the point,
+    if that lies in the range: at the fold itself rounding decides on which side the orbit is.
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton's method does not meet the orbit again, or branches cross so near to it that it
+        may be of either.
+    """
+    if lies_on_crossing(orbit, ON_CROSSING):
+        raise ConvergenceError(
+            f"branches cross at the orbit at {orbit.frequency_hz:g} Hz: begin farther from there, "
+            "or with one of switch_at_branch_point"
+        )
+    problem = orbit.problem
+    towards = np.zeros(orbit.point.size)
+    towards[-1] = direction
+    found = problem.correct(orbit.point, towards)
+    if not found.converged and np.isfinite(found.along).all() and found.along.any():
+        across = problem.metric(orbit.point) * problem.tangent(found, towards)
+        found = problem.correct(orbit.point, across, longest=MET_AGAIN)
+    if not found.converged:
+        raise ConvergenceError(f"no orbit at {orbit.frequency_hz:g} Hz: {found.failure}")
+    here = BranchPoint(orbit, problem.tangent(found, towards), 0.0)
+    beside = _beside_fold(here, direction)
+    low, high = range_hz
+    return beside if beside and low <= beside.orbit.frequency_hz <= high else here
+
+
+def _beside_fold(here: BranchPoint, direction: float) -> BranchPoint | None:
+    """Point a short way from a fold that is here, where the branch heads up (+1) or down (-1).
+
+    None if no fold is here: the branch turns in the middle between the points on both sides.
+    """
+    if abs(float(here.tangent[-1])) > NEARLY_FLAT:
+        return None
+    problem, place = here.orbit.problem, here.orbit.point
+    across = problem.metric(place) * here.tangent
+    sides = [
+        problem.correct(place + way * here.tangent, across, longest=FROM_FOLD)
+        for way in (-FROM_FOLD, FROM_FOLD)
+    ]
+    if not all(side.converged for side in sides):
+        return None
+    tangents = [problem.tangent(side, here.tangent) for side in sides]
+    first, last = (float(tangent[-1]) for tangent in tangents)
+    if abs(first + last) > MIDDLE * abs(first - last):
+        return None
+    index = int(last * direction > 0.0)
+    return BranchPoint(Orbit.of(problem, sides[index], here.orbit.observe), tangents[index], 0.0)
+
+
+def goes_on(leg: Leg, course: Course) -> bool:
+    """Whether a walk would go on with the range and the options of a course."""
+    end, options = leg.end, course.options
+    if leg.reason == NOT_FINISHED:
+        return True
+    if end is None:
+        return False
+    if leg.reason == RANGE_END:
+        low, high = course.range_hz
+        return low * (1.0 + 1e-9) < leg.nodes[-1].orbit.frequency_hz < high * (1.0 - 1e-9)
+    if leg.reason.endswith(POINTS):
+        return options.max_points > end.count
+    shortest = leg.reason.partition(":")[0]
+    return shortest != f"{SHORT_STEP}{options.min_step:g}" and leg.reason.startswith(SHORT_STEP)
+
+
+def join(name: str, forward: Leg, backward: Leg | None, course: Course) -> Branch:
+    """Branch of two legs from one start."""
+    if backward is None:
+        first = CLOSED if forward.reason == CLOSED else NOT_FINISHED
+        backward = Leg([forward.nodes[0]], [], [], first, None)
+    forward, backward = _without_repeat(forward, backward)
+    branch = make_branch(
+        name,
+        [_reversed(point) for point in backward.nodes[:0:-1]] + forward.nodes,
+        [_reversed_special(s) for s in reversed(backward.special_points)] + forward.special_points,
+        (backward.reason, forward.reason),
+        backward.notes + forward.notes,
+    )
+    whole = replace(
+        course,
+        start=len(backward.nodes) - 1,
+        special_points_before=len(backward.special_points),
+        notes_before=len(backward.notes),
+        ends=(backward.end, forward.end),
+    )
+    return replace(branch, course=whole)
+
+
+def _without_repeat(forward: Leg, backward: Leg) -> tuple[Leg, Leg]:
+    """Two legs from one start, of which only one tells a branch point that lies at it.
+
+    There rounding decides the sign of the branch point's test, so that both may have met it; it is
+    left out of the leg of which it lies behind the start.
+    """
+    if not (forward.special_points and backward.special_points):
+        return forward, backward
+    a, b = forward.special_points[0], backward.special_points[0]
+    farthest = max(abs(a.point.arclength), abs(b.point.arclength))
+    if not (farthest < NEIGHBOUR and same_crossing(a, b)):
+        return forward, backward
+    if a.point.arclength < 0.0:
+        return _without_first(forward), backward
+    return forward, _without_first(backward)
+
+
+def _without_first(leg: Leg) -> Leg:
+    """A leg without its first special point."""
+    end = leg.end and replace(leg.end, special_points=max(leg.end.special_points - 1, 0))
+    return replace(leg, special_points=leg.special_points[1:], end=end)
+
+
+def split(branch: Branch, course: Course) -> tuple[Leg, Leg | None]:
+    """The legs of which a branch was joined: forward and, if it was begun, backward."""
+    nodes, special, notes = branch.nodes, branch.special_points, branch.notes
+    start, specials, lines = course.start, course.special_points_before, course.notes_before
+    first, last = branch.stop_reasons
+    forward = Leg(
+        list(nodes[start:]), list(special[specials:]), list(notes[lines:]), last, course.ends[1]
+    )
+    if course.ends[0] is None:
+        return forward, None
+    backward = Leg(
+        [_reversed(point) for point in nodes[start::-1]],
+        [_reversed_special(s) for s in reversed(special[:specials])],
+        list(notes[:lines]),
+        first,
+        course.ends[0],
+    )
+    return forward, backward
+
+
+def make_branch(
+    name: str,
+    nodes: list[BranchPoint],
+    special: list[SpecialPoint],
+    reasons: tuple[str, str],
+    notes: list[str],
+) -> Branch:
+    """Branch from its parts; the period is that of its orbits."""
+    period = nodes[0].orbit.period
+    return Branch(name, period, tuple(nodes), tuple(special), reasons, tuple(notes))
+
+
+def _reversed(point: BranchPoint) -> BranchPoint:
+    return BranchPoint(point.orbit, -point.tangent, -point.arclength)
+
+
+def _reversed_special(special: SpecialPoint) -> SpecialPoint:
+    return SpecialPoint(special.kind, _reversed(special.point), special.frequency_error)
+
+
+def broken_off(branch: Branch) -> list[tuple[BranchPoint, str]]:
+    """The ends at which a branch was broken off, and why."""
+    ends = zip((branch.nodes[0], branch.nodes[-1]), branch.stop_reasons, strict=True)
+    return [(end, why) for end, why in ends if why.endswith(POINTS) or why.startswith(SHORT_STEP)]
+
+
+def open_ends(branch: Branch) -> list[Real]:
+    """Shooting unknowns where a branch was broken off, shifted by all its excitation periods."""
+    ends = [end.orbit for end, _ in broken_off(branch)]
+    return [place for orbit in ends for place in shifts(orbit.problem, orbit.point)]
+
+
+def alike(orbit: Orbit, places: Sequence[Real]) -> Real:
+    """Those of some shooting unknowns that are as many as an orbit's, (m, N + 1)."""
+    size = orbit.point.size
+    return np.array([place for place in places if place.size == size]).reshape(-1, size)

@@ -1,0 +1,372 @@
+"""A walk with the special points that lie on its way."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from operator import attrgetter
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, LocateError
+from nldyn.bifurcations.branch_crossing import NEIGHBOUR, distance, same_crossing, without_repeats
+from nldyn.bifurcations.chord import Chord
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.bifurcations.within_step import insert_dip, special_points_between
+from nldyn.branches.arclength import COMES_BACK, MEETS_OPEN_END, Stepper, StepperState
+from nldyn.branches.branch import CLOSED, JOINS, NOT_FINISHED, WalkEnd
+from nldyn.branches.options import ContinuationOptions
+from nldyn.orbits.shooting import metric_length
+
+AT_FLIP = 1e-5  # distance of a turn of a doubled branch from its end that may be the flip itself
+FLAT = 1e-4  # frequency part of tangents beside such a turn, below which it is
+SHORTEST_DETOUR = 1e-6  # first step of a walk that looks closely at what lies within a step
+MOST_DETOUR = 500  # points of such a walk
+STRAIGHT = 1.1  # its length over that of the step, up to which it leads straight there
+TOGETHER = 1e-9  # arclength between two special points that rounding may exchange
+BEYOND = 0.25  # of the step: how far in ln ω one that searches the last may leave the range
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """What a walk in one direction has found, in its own order.
+
+    Parameters
+    ----------
+    nodes, special_points, notes : list
+        As in `Branch`.
+    reason : str
+        Why the walk stopped.
+    end : WalkEnd, optional
+        How it would go on.
+    """
+
+    nodes: list[BranchPoint]
+    special_points: list[SpecialPoint]
+    notes: list[str]
+    reason: str
+    end: WalkEnd | None
+
+
+@dataclass
+class LegBuilder:
+    """A walk with what is found on the way.
+
+    Special points of a pair of neighbouring points are located as soon as the next point is known,
+    since that may put another point between them.
+
+    Parameters
+    ----------
+    walk : Stepper
+        The walk.
+    nodes, special_points, notes : list
+        What was found before, if the walk goes on; of the pairs of nodes all but the last have
+        been searched.
+    """
+
+    walk: Stepper
+    nodes: list[BranchPoint] = field(default_factory=list)
+    special_points: list[SpecialPoint] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._searched = max(len(self.nodes) - 2, 0)
+        self._mark = self._here() if self.nodes else None
+
+    @classmethod
+    def going_on(
+        cls,
+        leg: Leg,
+        range_hz: tuple[float, float],
+        options: ContinuationOptions,
+        open_ends: Real,
+    ) -> LegBuilder:
+        """The same walk with another end of its range or other options."""
+        walk = Stepper(leg.nodes[0], range_hz, options, open_ends)
+        end = leg.end
+        if end is None:
+            return cls(walk)
+        here = leg.nodes[end.node]
+        walk.stride = StepperState(here, end.step, end.behind, end.count)
+        walk.visited = list(leg.nodes[: end.kept])
+        return cls(
+            walk,
+            [*leg.nodes[: end.kept], here],
+            leg.special_points[: end.special_points],
+            leg.notes[: end.notes],
+        )
+
+    def follow(
+        self,
+        progress: Callable[[float], None] | None = None,
+        keep: Callable[[], None] | None = None,
+    ) -> Leg:
+        """Walk to the end.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called with the frequency of every point.
+        keep : callable, optional
+            Called after every point, when `so_far` tells of it.
+        """
+        for point in self.walk:
+            self.nodes.append(point)
+            if progress is not None:
+                progress(point.orbit.frequency_hz)
+            if len(self.nodes) > 2:
+                insert_dip(self.nodes, len(self.nodes) - 2)
+            regular = self.walk.stride is not None and self.walk.stride.here is point
+            self._search(len(self.nodes) - 2, closely=regular)
+            if regular:
+                self._mark = self._here()
+                if keep is not None:
+                    keep()
+        self._search(len(self.nodes) - 1, closely=False)
+        if self.walk.stop_reason.startswith(COMES_BACK):
+            self.notes.append(self.walk.stop_reason)
+        special = self.special_points
+        if self.walk.stop_reason.startswith(JOINS):
+            special = [s for s in special if not self._is_flip_at_end(s)]
+        elif self.walk.stop_reason == CLOSED:  # the last step leads beyond the start
+            special = self._once_around()
+            last = self.nodes.pop()  # a dip may have put others there
+            self.nodes = [*(p for p in self.nodes if not self._is_repeated(p)), last]
+        end = self._end(next(i for i, p in enumerate(self.nodes) if p is self._stride.here))
+        notes = [*self.notes, *not_told_apart(special)]
+        return Leg(self.nodes, special, notes, self.walk.stop_reason, end)
+
+    def _once_around(self) -> list[SpecialPoint]:
+        """The special points of a closed branch, whose last step leads beyond the start.
+
+        What lies there was told after the start. Of a branch point beside that rounding decides
+        whether the first step or the last tells it, or both.
+        """
+        before = self._stride.here.arclength
+        near = self.nodes[-1].arclength - before + NEIGHBOUR
+        told: list[SpecialPoint] = []
+        for special in self.special_points:
+            beside = [s for s in told if s.point.arclength < near]
+            if special.point.arclength > before and any(same_crossing(special, s) for s in beside):
+                continue
+            if special.kind == "BP" or not self._is_repeated(special.point):
+                told.append(special)
+        return told
+
+    def so_far(self) -> Leg | None:
+        """What was found up to the last complete point; None before the first."""
+        if self._mark is None:
+            return None
+        kept, special, notes, stride = self._mark
+        return Leg(
+            [*self.nodes[:kept], stride.here],
+            self.special_points[:special],
+            self.notes[:notes],
+            NOT_FINISHED,
+            self._end(kept),
+        )
+
+    def _is_flip_at_end(self, special: SpecialPoint) -> bool:
+        """Whether a turn of a doubled branch is where it joins the one that it comes from."""
+        if special.kind not in ("BP", "LP"):
+            return False
+        if distance(self.nodes[-1].orbit, special.orbit) > AT_FLIP:
+            return False
+        after = bisect(self.nodes, special.point.arclength, key=attrgetter("arclength"))
+        beside = self.nodes[max(after - 1, 0) : after + 1]
+        return special.kind == "BP" or min(abs(float(p.tangent[-1])) for p in beside) < FLAT
+
+    def _is_repeated(self, point: BranchPoint) -> bool:
+        """Whether a point of a closed branch lies where the walk has begun again."""
+        here = self._stride.here
+        return point.arclength > here.arclength and self.walk.closes(here, point)
+
+    @property
+    def _stride(self) -> StepperState:
+        assert self.walk.stride is not None
+        return self.walk.stride
+
+    def _here(self) -> tuple[int, int, int, StepperState]:
+        """How much will stay as it is, whatever follows."""
+        return len(self.nodes) - 1, len(self.special_points), len(self.notes), self._stride
+
+    def _end(self, node: int) -> WalkEnd | None:
+        if self._mark is None:
+            return None
+        kept, special, notes, stride = self._mark
+        return WalkEnd(stride.step, stride.behind, stride.count, node, kept, special, notes)
+
+    def _walk_closely(self) -> bool:
+        """Put the points of a walk with shorter steps into the step searched, if it led on.
+
+        A narrow resonance may lie within one step: the branch leaves at its foot and comes back
+        beside it. What lies behind is moved by the length of the detour.
+        """
+        a, b = self.nodes[self._searched : self._searched + 2]
+        between = _detour(a, b, self.walk, self.walk.range_hz)
+        if between is None:
+            return False
+        longer = _arclength_behind(between, b) - b.arclength
+        behind = self.nodes[self._searched + 1 :]
+        moved = [replace(p, arclength=p.arclength + longer) for p in behind]
+        self.nodes[self._searched + 1 :] = [*between, *moved]
+        self.walk.stride = replace(self._stride, here=moved[-1])
+        return True
+
+    def _search(self, pairs: int, closely: bool = True) -> None:
+        """Locate the special points of the first pairs of nodes, as far as that is not done.
+
+        Where that fails, the step is walked again with shorter ones, whose points are kept; not at
+        the end of the walk, whose last steps a longer one does anew.
+        """
+        known = len(self.special_points)
+        ahead = len(self.nodes) - pairs  # nodes that stay beyond those searched
+        while self._searched < len(self.nodes) - ahead:
+            a, b = self.nodes[self._searched : self._searched + 2]
+            before = self.nodes[self._searched - 1] if self._searched else None
+            after = next(iter(self.nodes[self._searched + 2 :]), None)
+            try:
+                self.special_points += special_points_between(a, b, before, after)
+            except (LocateError, ConvergenceError) as error:
+                if closely and self._walk_closely():
+                    continue
+                found, lost = _by_halves(a, b, error)
+                every = self._along_straight_way(a, b) if lost and not closely else None
+                if every is not None:
+                    found, lost = every, []
+                self.special_points += found
+                self.notes += lost
+            self._searched += 1
+        if len(self.special_points) > known:
+            self.special_points = without_repeats(self.special_points)
+
+    def _along_straight_way(self, a: BranchPoint, b: BranchPoint) -> list[SpecialPoint] | None:
+        """All special points on a walk with shorter steps, if it leads from a to b straight.
+
+        To know b again it must pass it, also at the end of the range. None if any may be missing.
+        """
+        low, high = self.walk.range_hz
+        step = b.arclength - a.arclength
+        beyond = math.exp(BEYOND * step)
+        between = _detour(a, b, self.walk, (low / beyond, high * beyond))
+        if between is None:
+            return None
+        longer = (_arclength_behind(between, b) - a.arclength) / step
+        if longer > STRAIGHT:
+            return None
+        lengths = (a.arclength + (p.arclength - a.arclength) / longer for p in between)
+        way = [replace(p, arclength=x) for p, x in zip(between, lengths, strict=True)]
+        found, lost = _in_pieces([a, *way, b])
+        return None if lost else found
+
+
+def not_told_apart(found: Sequence[SpecialPoint]) -> list[str]:
+    """Notes on special points as close together as orbits are exact, if branches cross there.
+
+    A fold beside a grazing point is told from it at any distance, but not three of them or more.
+    """
+    groups: list[list[SpecialPoint]] = []
+    for special in found:
+        place = special.point.arclength
+        if groups and abs(place - groups[-1][-1].point.arclength) < TOGETHER:
+            groups[-1].append(special)
+        else:
+            groups.append([special])
+    return [
+        f"{', '.join(s.kind for s in group)} near {group[0].frequency_hz:.8g} Hz lie so close "
+        "together that neither their order nor their kinds are sure"
+        for group in groups
+        if len(group) > 2 or (len(group) == 2 and "BP" in [s.kind for s in group])
+    ]
+
+
+def trace(
+    start: BranchPoint,
+    range_hz: tuple[float, float],
+    options: ContinuationOptions | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[list[BranchPoint], list[SpecialPoint], str, list[str]]:
+    """Walk from a point in the direction of its tangent and collect special points.
+
+    Parameters
+    ----------
+    start : BranchPoint
+        Where to begin.
+    range_hz : (float, float)
+        Frequencies in Hz.
+    options : ContinuationOptions, optional
+        Step control.
+    progress : callable, optional
+        Called with the frequency of every point.
+
+    Returns
+    -------
+    nodes, special_points, reason, notes
+        As those of a `Leg`.
+    """
+    trail = LegBuilder(Stepper(start, range_hz, options or ContinuationOptions()))
+    leg = trail.follow(progress)
+    return leg.nodes, leg.special_points, leg.reason, leg.notes
+
+
+def _detour(
+    a: BranchPoint, b: BranchPoint, walk: Stepper, range_hz: tuple[float, float]
+) -> list[BranchPoint] | None:
+    """Points of a walk with shorter steps from a that passes b in its direction, or None."""
+    first_step = (b.arclength - a.arclength) / 64.0
+    if first_step < max(SHORTEST_DETOUR, walk.options.min_step):
+        return None
+    options = replace(
+        walk.options, first_step=first_step, max_step=8.0 * first_step, max_points=MOST_DETOUR
+    )
+    inner = Stepper(a, range_hz, options, b.orbit.point[None])
+    between = list(inner)[1:-1]
+    if inner.stop_reason != MEETS_OPEN_END or not between:
+        return None
+    last = between[-1]
+    weights = last.orbit.problem.metric(last.orbit.point)
+    ahead = float((b.orbit.point - last.orbit.point) @ (weights * b.tangent))
+    return between if ahead > 0.0 else None
+
+
+def _arclength_behind(way: Sequence[BranchPoint], b: BranchPoint) -> float:
+    """Arclength of a point that is met behind a way."""
+    last = way[-1]
+    weights = last.orbit.problem.metric(last.orbit.point)
+    return last.arclength + metric_length(weights, b.orbit.point - last.orbit.point)
+
+
+def _by_halves(
+    a: BranchPoint, b: BranchPoint, reason: Exception, depth: int = 0
+) -> tuple[list[SpecialPoint], list[str]]:
+    """Special points of a chord on which a correction failed: try again on its halves.
+
+    With notes on the pieces where it failed again.
+    """
+    try:
+        if depth > 3:
+            raise reason
+        middle = Chord(a, b).at(0.5)
+    except (LocateError, ConvergenceError) as error:
+        low, high = (f"{hz:.8g}" for hz in sorted(p.orbit.frequency_hz for p in (a, b)))
+        place = f"between {low} and {high}" if low != high else f"near {low}"
+        return [], [f"special points {place} Hz may be missing: {error}"]
+    return _in_pieces([a, middle, b], depth + 1)
+
+
+def _in_pieces(
+    points: Sequence[BranchPoint], depth: int = 0
+) -> tuple[list[SpecialPoint], list[str]]:
+    """Special points between some points of a branch, with notes on what could not be searched."""
+    found: list[SpecialPoint] = []
+    notes: list[str] = []
+    for a, b in pairwise(points):
+        try:
+            found += special_points_between(a, b)
+        except (LocateError, ConvergenceError) as error:
+            more, lost = _by_halves(a, b, error, depth)
+            found += more
+            notes += lost
+    return found, notes

@@ -1,0 +1,142 @@
+"""Orbits as tables: columns of numbers with their units in their names."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nldyn.base.errors import SystemModelError
+from nldyn.base.version import software_version
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.orbits.orbit import Orbit
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+Part = Literal["points", "special_points", "requested"]
+
+UNITS = {
+    "period": "1",
+    "frequency_hz": "Hz",
+    "max_abs_displacement_m": "m",
+    "max_penetration_m": "m",
+    "impacts": "1",
+    "stable": "1",
+    "largest_multiplier": "1",
+    "multiplier_angle_deg": "deg",
+    "relative_uncertainty": "1",
+    "liouville_error": "1",
+    "error": "1",
+    "arclength": "1",
+    "frequency_error": "1",
+}
+
+
+def orbit_columns(
+    orbits: Sequence[Orbit], known_hz: Sequence[float] = ()
+) -> dict[str, NDArray[Any]]:
+    """Give what is reported of orbits as columns.
+
+    Parameters
+    ----------
+    orbits : sequence of Orbit
+        One for each row.
+    known_hz : sequence of float
+        Frequencies that orbits may meet exactly, see `at_known`.
+
+    Returns
+    -------
+    dict of str to (n,) array
+        Their units are in `UNITS`.
+    """
+    columns: dict[str, list[Any]] = {
+        "period": [orbit.period for orbit in orbits],
+        "frequency_hz": [at_known(orbit.frequency_hz, known_hz) for orbit in orbits],
+        "max_abs_displacement_m": [orbit.max_abs_displacement for orbit in orbits],
+        "max_penetration_m": [orbit.max_penetration for orbit in orbits],
+        "impacts": [orbit.impacts for orbit in orbits],
+        "stable": [orbit.stable for orbit in orbits],
+        "largest_multiplier": [abs(orbit.largest_multiplier) for orbit in orbits],
+        "multiplier_angle_deg": [
+            math.degrees(cmath.phase(orbit.largest_multiplier)) for orbit in orbits
+        ],
+        "relative_uncertainty": [orbit.stability.uncertainty for orbit in orbits],
+        "liouville_error": [orbit.liouville_error for orbit in orbits],
+        "error": [orbit.error for orbit in orbits],
+    }
+    kinds: dict[str, type] = {"period": int, "impacts": int, "stable": bool}
+    return {name: np.array(list_, dtype=kinds.get(name, float)) for name, list_ in columns.items()}
+
+
+def at_known(frequency_hz: float, known_hz: Sequence[float]) -> float:
+    """Give the known frequency that a frequency meets, else the frequency itself.
+
+    Orbits keep the logarithm of their frequency, so that 90 Hz come back as 89.99999999999999.
+
+    Examples
+    --------
+    >>> at_known(89.99999999999999, (5.0, 90.0)), at_known(89.999, (5.0, 90.0))
+    (90.0, 89.999)
+    """
+    met = (known for known in known_hz if math.isclose(frequency_hz, known, rel_tol=1e-14))
+    return float(next(met, frequency_hz))
+
+
+def point_columns(
+    points: Sequence[BranchPoint], known_hz: Sequence[float] = ()
+) -> dict[str, NDArray[Any]]:
+    """Give the columns of `orbit_columns` and the arclength of points of a branch."""
+    columns = orbit_columns([point.orbit for point in points], known_hz)
+    columns["arclength"] = np.array([point.arclength for point in points], dtype=float)
+    return columns
+
+
+def special_columns(
+    special: Sequence[SpecialPoint], columns: dict[str, NDArray[Any]]
+) -> dict[str, NDArray[Any]]:
+    """Give the columns of special points: their type first, and the error of their frequency."""
+    errors = np.array([point.frequency_error for point in special], dtype=float)
+    return {
+        "type": np.array([point.kind for point in special], dtype=str),
+        **columns,
+        "frequency_error": errors,
+    }
+
+
+def to_pandas(columns: Mapping[str, NDArray[Any]], about: Mapping[str, Any]) -> pandas.DataFrame:
+    """Give columns as a DataFrame, with what they are about as its attributes."""
+    try:
+        import pandas
+    except ImportError:
+        raise SystemModelError("to_pandas needs pandas, which is not installed") from None
+    frame = pandas.DataFrame(columns)
+    frame.index.name = "point"
+    frame.attrs = {**about, "software": f"nldyn {software_version()}"}
+    return frame
+
+
+def to_xarray(
+    columns: Mapping[str, NDArray[Any]],
+    multipliers: NDArray[np.complex128],
+    about: Mapping[str, Any],
+) -> xarray.Dataset:
+    """Give columns and multipliers (n, 2n_modes) as a Dataset over ``point``."""
+    try:
+        import xarray
+    except ImportError:
+        raise SystemModelError("to_xarray needs xarray, which is not installed") from None
+    data = {
+        name: ("point", column, {"units": UNITS[name]} if name in UNITS else {})
+        for name, column in columns.items()
+    }
+    return xarray.Dataset(
+        {**data, "multipliers": (("point", "multiplier"), multipliers, {"units": "1"})},
+        coords={"point": np.arange(len(multipliers))},
+        attrs={**about, "software": f"nldyn {software_version()}"},
+    )

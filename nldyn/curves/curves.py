@@ -1,0 +1,638 @@
+"""Continuation in any parameter: branches, curves of special points, curves of a held quantity."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise, zip_longest
+from typing import Any, Literal, Protocol, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import (
+    ConvergenceError,
+    LocateError,
+    SystemModelError,
+    check_choice,
+    check_types,
+    is_finite,
+    shown,
+)
+from nldyn.bifurcations.point import check_special
+from nldyn.bifurcations.roots import root
+from nldyn.branches.branch import NOT_FINISHED
+from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.tables import orbit_columns
+from nldyn.curves.marks import CurveChord, Located, LocatedPoint, marks_between
+from nldyn.curves.walk import CLOSED_CURVE, DISSOLVED, CurvePoint, CurveWalk, curve_point, passages
+from nldyn.flow.flow_map import FlowMap, same_flow
+from nldyn.orbits.bordered import Condition, Free, OrbitFamily, correct, gradient, tangent_surface
+from nldyn.orbits.conditions import Held, Monitor, defined_by
+from nldyn.orbits.orbit import Orbit, check_minimal, same_orbit
+from nldyn.runtime.keeper import Keeper
+from nldyn.system.chart import Chart, checked_parameter, value_of
+from nldyn.system.parameters import Parameter
+from nldyn.system.system import System
+
+CurvePart = Literal["points", "marks"]
+CLOSE = 1e-3  # how far the defining condition of a start may be off
+CROSSES_END = 1e-3  # component of a unit tangent that leads to or from the end of a range
+
+
+class CurveFile(Protocol):
+    """A file that keeps a curve; `nldyn.CheckpointFile` is one."""
+
+    @property
+    def name(self) -> str:
+        """How messages call it."""
+
+    def exists(self) -> bool:
+        """Whether an earlier run has written it."""
+
+    def check_writable(self) -> None:
+        """Raise an `OutputError` if it cannot be written."""
+
+    def remove(self) -> None:
+        """Delete it, if it is there."""
+
+    def read_curves(self, system: System, monitor: Monitor | None) -> list[Curve]:
+        """The curves of a system that it holds."""
+
+    def write_curves(self, curves: Sequence[Curve]) -> None:
+        """Keep curves in place of what it holds."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Curve:
+    """A curve of periodic orbits in one or two parameters.
+
+    Parameters
+    ----------
+    kind : str
+        What the orbits have in common: LP, PD, NS, GR, the name of a monitor, or orbit.
+    parameters : tuple of Parameter
+        What changes.
+    points : tuple of CurvePoint
+        In order along the curve.
+    marks : tuple of LocatedPoint
+        Points at which a further condition is met, in the same order.
+    stop_reasons : tuple of str
+        Why the continuation stopped at the first and at the last point.
+    notes : tuple of str
+        What may be missing.
+    """
+
+    kind: str
+    parameters: tuple[Parameter, ...]
+    points: tuple[CurvePoint, ...]
+    marks: tuple[LocatedPoint, ...]
+    stop_reasons: tuple[str, str]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def orbits(self) -> list[Orbit]:
+        """The orbits, in order."""
+        return [point.orbit for point in self.points]
+
+    @property
+    def values(self) -> Real:
+        """Values of the parameters, shape (k, n_parameters)."""
+        return np.array([point.values for point in self.points])
+
+    @property
+    def residuals(self) -> Real:
+        """Largest residual at each point, shape (k,)."""
+        return np.array([point.residual for point in self.points])
+
+    def __repr__(self) -> str:
+        """One line, in place of all numbers of all orbits."""
+        names = " and ".join(parameter.name for parameter in self.parameters)
+        marks = ", ".join(mark.kind for mark in self.marks) or "none"
+        return (
+            f"<Curve of {self.kind} in {names}: {len(self.points)} points, marks: {marks}; "
+            f"{' / '.join(self.stop_reasons)}>"
+        )
+
+    def table(self, part: CurvePart = "points") -> dict[str, NDArray[Any]]:
+        """Columns of numbers, one row per orbit; ``pandas.DataFrame`` takes them as they are.
+
+        Parameters
+        ----------
+        part : {"points", "marks"}
+            Which orbits: row i belongs to ``curve.points[i]`` or ``curve.marks[i]``.
+
+        Returns
+        -------
+        dict of str to (n,) array
+            The parameters under their names, with the index where it is not 0, in SI units, then
+            the columns of `Branch.table`, and the residual.
+
+        Raises
+        ------
+        SystemModelError
+            For an unknown part.
+        """
+        check_choice("table: part", part, get_args(CurvePart))
+        rows = self.points if part == "points" else self.marks
+        columns: dict[str, NDArray[Any]] = {}
+        if part == "marks":
+            columns["type"] = np.array([mark.kind for mark in self.marks], dtype=str)
+        values = np.array([row.values for row in rows], dtype=float)
+        by_parameter = values.reshape(-1, len(self.parameters)).T
+        columns.update(zip(map(_column_name, self.parameters), by_parameter, strict=True))
+        for name, column in orbit_columns([row.orbit for row in rows]).items():
+            columns.setdefault(name, column)
+        columns["residual"] = np.array([row.residual for row in rows], dtype=float)
+        if part == "points":
+            columns["arclength"] = np.array([point.arclength for point in self.points])
+        return columns
+
+    def extend(
+        self,
+        ranges: Sequence[tuple[float, float]],
+        *,
+        options: ContinuationOptions | None = None,
+        progress: Callable[[Real], None] | None = None,
+        checkpoint: CurveFile | None = None,
+    ) -> Curve:
+        """Follow the curve beyond its ends, or finish it; the points that it has are kept.
+
+        Parameters
+        ----------
+        ranges : one of (float, float) for each parameter
+            Values between which to stay, which contain those of the curve.
+        options, progress
+            As for `continue_special`.
+        checkpoint : CheckpointFile, optional
+            As for `continue_special`, but the file may be the one that holds this curve.
+
+        Returns
+        -------
+        Curve
+
+        Raises
+        ------
+        SystemModelError
+            For ranges that do not contain the curve, or a file that holds something else.
+        """
+        charts = _charts(
+            self.orbits[0], self.parameters, ranges, options, progress, len(self.parameters)
+        )
+        for chart, column in zip(charts, self.values.T, strict=True):
+            chart.check_start(float(column.min()))
+            chart.check_start(float(column.max()))
+        keeper = _keeper(checkpoint, self)
+        whole = replace(self, points=tuple(point.on_charts(charts) for point in self.points))
+        return _followed(whole, options, progress, keeper)
+
+    def at(self, parameter: str | Parameter, value: float) -> list[Orbit]:
+        """All orbits of the curve at which a parameter has a value, corrected there, each once.
+
+        Of two that are close to a turn of the parameter, nearer than 1e-7 of it, none may be found.
+
+        Parameters
+        ----------
+        parameter : str or Parameter
+            One of the curve's, or its name: as in the table, or without index if only one has it.
+        value : float
+            Its value.
+
+        Raises
+        ------
+        SystemModelError
+            If the curve does not change the parameter.
+        """
+        if not is_finite(value):
+            raise SystemModelError(f"value must be a finite number, got {shown(value)}")
+        which = self._index_of(parameter)
+        first = self.points[:1] if math.isclose(self.values[0, which], value) else ()
+        found: list[CurvePoint] = []
+        for point in (*first, *passages(self.points, which, value)):
+            if not any(_same_place(point, other) for other in found):
+                found.append(point)
+        return [point.orbit for point in found]
+
+    def _index_of(self, wanted: str | Parameter) -> int:
+        """Place of a parameter among the curve's."""
+        own = list(enumerate(self.parameters))
+        matches = [i for i, p in own if wanted in (p, _column_name(p))]
+        matches = matches or [i for i, p in own if wanted == p.name]
+        if len(matches) != 1:
+            columns = ", ".join(map(_column_name, self.parameters))
+            raise SystemModelError(
+                f"the curve has no parameter {shown(wanted)}; there are: {columns}"
+            )
+        return matches[0]
+
+
+def _column_name(parameter: Parameter) -> str:
+    """Name of a parameter in a table, with its index where that is not 0."""
+    return f"{parameter.name}_{parameter.index}" if parameter.index else parameter.name
+
+
+def continue_in(
+    orbit: Orbit,
+    parameter: str | Parameter,
+    limits: tuple[float, float],
+    *,
+    options: ContinuationOptions | None = None,
+    progress: Callable[[Real], None] | None = None,
+    checkpoint: CurveFile | None = None,
+) -> Curve:
+    """Continue an orbit in one parameter, all others held.
+
+    Parameters
+    ----------
+    orbit : Orbit
+        Where to start.
+    parameter : str or Parameter
+        See `nldyn.system.chart.checked_parameter`.
+    limits : (float, float)
+        Values between which to stay; ends are met exactly.
+    options : ContinuationOptions, optional
+        Step control.
+    progress : callable, optional
+        Called with the parameter's value at every point.
+    checkpoint : CheckpointFile, optional
+        A new HDF5 file that keeps the curve, written now and then, at the end, and when an
+        exception such as Ctrl-C ends the computation: `nldyn.load` and `Curve.extend` go on.
+
+    Returns
+    -------
+    Curve
+        Its marks are the special points LP, PD, NS, BP and GR.
+
+    Raises
+    ------
+    SystemModelError
+        For a parameter that there is not, or a range that does not hold the start.
+    ConvergenceError
+        If Newton's method does not meet the orbit again.
+
+    Examples
+    --------
+    >>> from nldyn import System, Stop, Unbalance, solve_orbit
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     stops=[Stop("middle", stiffness=5.17e9, gap=2e-6)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> curve = continue_in(solve_orbit(system, 20.0), "gap", (1e-6, 1e-5))
+    >>> [f"{value:.6g}" for value in curve.values[[0, -1], 0]]
+    ['1e-06', '1e-05']
+    """
+    charts = _charts(orbit, [parameter], [limits], options, progress)
+    keeper = _keeper(checkpoint)
+    start = _start(OrbitFamily.around(orbit, charts), orbit, Free())
+    return _curve("orbit", start, options, progress, keeper)
+
+
+def continue_special(
+    special: Located,
+    parameters: Sequence[str | Parameter],
+    ranges: Sequence[tuple[float, float]],
+    *,
+    options: ContinuationOptions | None = None,
+    progress: Callable[[Real], None] | None = None,
+    checkpoint: CurveFile | None = None,
+) -> Curve:
+    """Continue a fold, flip, Neimark-Sacker, branch or grazing point in two parameters.
+
+    A branch point is followed where both parameters leave the symmetry as it is that brings it
+    about; otherwise it is a single point of their plane.
+
+    Parameters
+    ----------
+    special : SpecialPoint or LocatedPoint
+        LP, PD, NS, BP or GR.
+    parameters : two of str or Parameter
+        See `nldyn.system.chart.checked_parameter`.
+    ranges : two of (float, float)
+        Values between which to stay.
+    options : ContinuationOptions, optional
+        Step control.
+    progress : callable, optional
+        Called with the parameters' values at every point.
+    checkpoint : CheckpointFile, optional
+        A new HDF5 file that keeps the curve, written now and then, at the end, and when an
+        exception such as Ctrl-C ends the computation: `nldyn.load` and `Curve.extend` go on.
+
+    Returns
+    -------
+    Curve
+        Its marks are points of codimension two.
+
+    Raises
+    ------
+    SystemModelError
+        For a kind that cannot be followed, a parameter that there is not, a range that does
+        not hold the start, or a branch point that dissolves when the parameters change.
+    ConvergenceError
+        If Newton's method does not meet the point again.
+
+    References
+    ----------
+    Yu. A. Kuznetsov (2004), *Elements of Applied Bifurcation Theory*, section 10.3.
+    """
+    check_special("continue_special", special, of_branch=False)
+    charts = _charts(special.orbit, parameters, ranges, options, progress, 2)
+    keeper = _keeper(checkpoint)
+    curve = _curve(special.kind, special_start(special, charts), options, progress, keeper)
+    if len(curve.points) == 1 and DISSOLVED in curve.stop_reasons:
+        if checkpoint is not None:
+            checkpoint.remove()
+        names = " or ".join(chart.parameter.name for chart in charts)
+        raise SystemModelError(
+            f"the BP at {special.orbit.frequency_hz:g} Hz is a single point: it dissolves when "
+            f"{names} changes, as the symmetry does that brings it about"
+        )
+    return curve
+
+
+def special_start(special: Located, charts: tuple[Chart, ...]) -> CurvePoint:
+    """First point of a curve of special points of a kind, heading up in its first parameter.
+
+    Raises
+    ------
+    ConvergenceError, SystemModelError
+        As `continue_special`.
+    """
+    orbit = special.orbit
+    family, condition = defined_by(special.kind, OrbitFamily.around(orbit, charts), orbit)
+    _check_special(special.kind, family, orbit, condition)
+    return _start(family, orbit, condition)
+
+
+def continue_constant(
+    orbit: Orbit,
+    monitor: Monitor,
+    parameters: Sequence[str | Parameter],
+    ranges: Sequence[tuple[float, float]],
+    *,
+    value: float | None = None,
+    options: ContinuationOptions | None = None,
+    progress: Callable[[Real], None] | None = None,
+    checkpoint: CurveFile | None = None,
+) -> Curve:
+    """Continue an orbit in two parameters so that a monitored quantity stays constant.
+
+    Parameters
+    ----------
+    orbit : Orbit
+        Where to start.
+    monitor : {"peak_force", "max_penetration", "max_abs_displacement"} or callable
+        What to hold, over all stops or of the observed interface; or a function of an orbit.
+    parameters, ranges
+        As for `continue_special`.
+    value : float, optional
+        Value to hold; the orbit's own unless given. The orbit is first followed in the first
+        parameter alone, both ways within its range, up to where it has the value.
+    options, progress, checkpoint
+        As for `continue_special`; the way to the value is not kept.
+
+    Returns
+    -------
+    Curve
+        Its marks are the special points LP, PD, NS and GR.
+
+    Raises
+    ------
+    SystemModelError
+        For bad input, also a monitor that is zero on the orbit.
+    ConvergenceError
+        If no orbit with the value is found on the way; the text says which values are.
+    """
+    charts = _charts(orbit, parameters, ranges, options, progress, 2)
+    keeper = _keeper(checkpoint)
+    condition = Held.of(monitor, value, orbit)
+    orbit = _with_value(orbit, condition, charts[0], options or ContinuationOptions())
+    start = _start(OrbitFamily.around(orbit, charts), orbit, condition)
+    return _curve(condition.name, start, options, progress, keeper)
+
+
+def _with_value(orbit: Orbit, condition: Held, chart: Chart, options: ContinuationOptions) -> Orbit:
+    """The orbit that has the value to be held, on the curve of orbits in one parameter."""
+    present = condition.monitor(orbit)
+    if abs(present / condition.target - 1.0) < CLOSE:
+        return orbit
+    start = _start(OrbitFamily.around(orbit, (chart,)), orbit, Free())
+    ends, met = [start, start.reversed()], [present]
+    for pair in zip_longest(*(CurveWalk(end, options) for end in ends)):
+        for side, point in enumerate(pair):
+            if point is None:
+                continue
+            try:
+                found = _between(condition, ends[side], point)
+            except LocateError as error:
+                raise ConvergenceError(f"{condition.name} was not reached: {error}") from None
+            if found is not None:
+                return found
+            ends[side] = point
+            met.append(condition.monitor(point.orbit))
+    name, places = chart.parameter.name, sorted(float(end.values[0]) for end in ends)
+    raise ConvergenceError(
+        f"no orbit with {condition.name} = {condition.target:g} was found: it is {present:g} at "
+        f"the start and from {min(met):g} to {max(met):g} where {name} goes from {places[0]:g} to "
+        f"{places[1]:g}; start at another orbit, or widen the range of {name}"
+    )
+
+
+def _between(condition: Held, a: CurvePoint, b: CurvePoint) -> Orbit | None:
+    """The orbit with the value to be held between two points of a curve, if they lie about it."""
+
+    def off(point: CurvePoint) -> float:
+        return float(condition.monitor(point.orbit)) / condition.target - 1.0
+
+    if not off(a) * off(b) <= 0.0:
+        return None
+    chord = CurveChord(a, b)
+    return chord.at(root(lambda sigma: off(chord.at(sigma)))[0]).orbit
+
+
+def _check_special(kind: str, family: OrbitFamily, orbit: Orbit, condition: Condition) -> None:
+    """Refuse a start that is not nearly a special point of its kind."""
+    off = float(np.abs(condition.value(family.at(family.unknowns(orbit)))).max())
+    if off > CLOSE:
+        raise SystemModelError(
+            f"the orbit at {orbit.frequency_hz:g} Hz is no {kind}: its defining condition "
+            f"is off by {off:.1e}; locate it first, see refine_special"
+        )
+
+
+def _charts(
+    orbit: Orbit,
+    parameters: Sequence[str | Parameter],
+    ranges: Sequence[tuple[float, float]],
+    options: ContinuationOptions | None,
+    progress: Callable[[Real], None] | None,
+    count: int = 1,
+) -> tuple[Chart, ...]:
+    """Charts of the parameters, checked against the start; other arguments are checked as well."""
+    check_types(
+        orbit=(orbit, Orbit),
+        parameters=(parameters, list, tuple),
+        ranges=(ranges, list, tuple),
+        options=(options, ContinuationOptions, None),
+        progress=(progress, Callable, None),
+    )
+    check_minimal(orbit)
+    if len(parameters) != count:
+        raise SystemModelError(f"a curve of this kind needs two parameters, got {len(parameters)}")
+    if len(ranges) != count:
+        raise SystemModelError("give as many ranges as parameters, one pair of numbers each")
+    chosen = [checked_parameter(orbit.system, parameter) for parameter in parameters]
+    if len(set(chosen)) < len(chosen):
+        raise SystemModelError(f"parameter '{chosen[0].name}' is given twice")
+    charts = tuple(Chart.of(p, limits) for p, limits in zip(chosen, ranges, strict=True))
+    for chart in charts:
+        chart.check_start(value_of(orbit.system, orbit.frequency_hz, chart.parameter))
+    return charts
+
+
+def _curve(
+    kind: str,
+    start: CurvePoint,
+    options: ContinuationOptions | None,
+    progress: Callable[[Real], None] | None,
+    keeper: Keeper[Curve],
+) -> Curve:
+    """Walk both ways from the start and mark what is met."""
+    parameters = tuple(chart.parameter for chart in start.found.at.family.charts)
+    begun = Curve(kind, parameters, (start,), (), (NOT_FINISHED, NOT_FINISHED))
+    return _followed(begun, options, progress, keeper)
+
+
+def _keeper(place: CurveFile | None, known: Curve | None = None) -> Keeper[Curve]:
+    """What keeps a curve in a file, which must be new or hold a piece of a known curve."""
+    if place is None:
+        return Keeper()
+    place.check_writable()
+    if place.exists():
+        if known is None:
+            raise SystemModelError(
+                f"{place.name}: exists already; load and Curve.extend go on from a curve that it "
+                "holds, or choose another file, or delete it"
+            )
+        condition = known.points[0].condition
+        monitor = condition.monitor if isinstance(condition, Held) else None
+        held = place.read_curves(known.orbits[0].system, monitor)
+        if not (len(held) == 1 and _is_piece(held[0], known)):
+            raise SystemModelError(
+                f"{place.name}: holds another curve, or more of this one; choose another file, or "
+                "delete it"
+            )
+    return Keeper(place.write_curves)
+
+
+def _is_piece(held: Curve, known: Curve) -> bool:
+    """Whether a curve has no points but those of another one."""
+    if (held.kind, held.parameters) != (known.kind, known.parameters):
+        return False
+    a, b = held.points[0].found.at.family, known.points[0].found.at.family
+    rows = {tuple(row) for row in known.values.tolist()}
+    return (
+        (a.period, a.segments) == (b.period, b.segments)
+        and same_flow(FlowMap(a.system, a.options), FlowMap(b.system, b.options))
+        and all(tuple(row) in rows for row in held.values.tolist())
+    )
+
+
+def _followed(
+    curve: Curve,
+    options: ContinuationOptions | None,
+    progress: Callable[[Real], None] | None,
+    keeper: Keeper[Curve],
+) -> Curve:
+    """A curve followed beyond its ends, forward first, with what is met on the new points.
+
+    Of one that was not finished all points are searched.
+    """
+    forward: list[CurvePoint] = []
+    backward: list[CurvePoint] = []
+    first, last = curve.stop_reasons
+
+    def whole() -> Curve:
+        """What there is, not finished before it is searched."""
+        points = [point.reversed() for point in backward[:0:-1]]
+        points += [*curve.points, *forward[1:]]
+        closed = CLOSED_CURVE in (first, last)
+        reasons = NOT_FINISHED, CLOSED_CURVE if closed else NOT_FINISHED
+        return replace(curve, points=tuple(points), stop_reasons=reasons)
+
+    with keeper:
+        keeper.work = whole
+        for leg in (forward, backward):
+            if CLOSED_CURVE in (first, last):
+                break
+            points = whole().points
+            end, origin = points[-1], points[0]
+            if leg is backward:
+                end, origin = origin.reversed(), end.reversed()
+            walk = CurveWalk(end, options or ContinuationOptions(), origin)
+            for point in walk:
+                leg.append(point)
+                if progress is not None:
+                    progress(point.values)
+                keeper.offer()
+            if leg is forward:
+                last = walk.stop_reason
+            else:
+                first = walk.stop_reason
+        if CLOSED_CURVE in (first, last):
+            first = last = CLOSED_CURVE
+        points = whole().points
+        if NOT_FINISHED in curve.stop_reasons:
+            marks, notes = _marked(points)
+        else:
+            (ahead, notes), (before, lost) = _marked(forward), _marked(backward)
+            marks = [*before[::-1], *curve.marks, *ahead]
+            notes = [*curve.notes, *notes, *lost]
+        done = replace(
+            curve, points=points, marks=tuple(marks), stop_reasons=(first, last), notes=tuple(notes)
+        )
+        keeper.work = lambda: done
+    return done
+
+
+def _marked(points: Sequence[CurvePoint]) -> tuple[list[LocatedPoint], list[str]]:
+    """What is met between the points, in order, and what may be missing."""
+    marks: list[LocatedPoint] = []
+    notes: list[str] = []
+    for a, b in pairwise(points):
+        more, lost = marks_between(a, b)
+        marks += more
+        notes += lost
+    return marks, notes
+
+
+def _same_place(a: CurvePoint, b: CurvePoint) -> bool:
+    """Whether two points have the same orbit of the same system."""
+    return np.allclose(a.values, b.values, rtol=1e-8, atol=0.0) and same_orbit(a.orbit, b.orbit)
+
+
+def _start(family: OrbitFamily, orbit: Orbit, condition: Condition) -> CurvePoint:
+    """First point of a curve, heading up in its first parameter."""
+    guess = family.unknowns(orbit)
+    first = family.n_states
+    at = family.at(guess)
+    _, surface = tangent_surface(at)
+    by_surface = gradient(at, surface, condition)
+    along = surface @ np.linalg.svd(by_surface)[2][-1] if by_surface.size else surface[:, 0]
+    row = family.metric(guess) * along
+    for place, chart in enumerate(family.charts, first):
+        at_end = chart.value(float(guess[place])) in (chart.low, chart.high)
+        if at_end and abs(along[place]) > CROSSES_END * np.linalg.norm(along):
+            row = np.zeros(guess.size)  # held there, as behind it there may be no system
+            row[place] = 1.0
+    row /= np.linalg.norm(row)
+    found = correct(family, guess, condition, row, float(row @ guess))
+    if not found.converged:
+        raise ConvergenceError(
+            f"the start of the curve at {orbit.frequency_hz:g} Hz was not found: {found.failure}"
+        )
+    for chart, value in zip(family.charts, found.at.values.tolist(), strict=True):
+        chart.check_start(value)
+    up = np.zeros(guess.size)
+    up[first] = 1.0
+    return curve_point(found, condition, up, 0.0)

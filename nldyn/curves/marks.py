@@ -1,0 +1,320 @@
+"""Special points solved by their defining systems, and those met along curves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, LocateError, check_whole
+from nldyn.bifurcations.events import leaves_circle
+from nldyn.bifurcations.point import check_special
+from nldyn.bifurcations.roots import root
+from nldyn.bifurcations.touching import Touch, touching_extremes
+from nldyn.curves.events import is_torus, torus_pair
+from nldyn.curves.walk import UNFOLDED, CurvePoint, between, curve_point, is_torus_curve
+from nldyn.orbits.bordered import Condition, Free, OrbitFamily, correct, length_unit
+from nldyn.orbits.conditions import Both, BranchPoint, Grazing, Singular, defined_by
+from nldyn.orbits.orbit import Orbit
+from nldyn.system.chart import FREQUENCY, Chart, checked_parameter, value_of
+from nldyn.system.parameters import Parameter
+
+POLE = 1e-3  # of its values beside it: what a test is not below where it has no root but a pole
+ALIKE = 1e-6  # share of a step within which touches are those of one orbit by symmetry
+
+
+class Located(Protocol):
+    """A special point of a branch or of a curve."""
+
+    @property
+    def kind(self) -> str:
+        """LP, PD, NS, BP or GR."""
+
+    @property
+    def orbit(self) -> Orbit:
+        """Its orbit."""
+
+
+@dataclass(frozen=True, eq=False)
+class LocatedPoint:
+    """A special point found by Newton's method, or a point marked on a curve.
+
+    Parameters
+    ----------
+    kind : str
+        LP, PD, NS, BP, GR; on curves also CP, GPD, LPPD, R1 to R4 and pairs, see the theory.
+    orbit : Orbit
+        The orbit.
+    parameters : tuple of Parameter
+        The numbers that were free.
+    values : (n_parameters,) array
+        Their values.
+    residual : float
+        Largest of the relative error of closing and the defining conditions.
+    error : float
+        Relative length of the last step: of Newton's method, or along the curve.
+    """
+
+    kind: str
+    orbit: Orbit
+    parameters: tuple[Parameter, ...]
+    values: Real
+    residual: float
+    error: float
+
+    @property
+    def frequency_hz(self) -> float:
+        """Excitation frequency in Hz."""
+        return self.orbit.frequency_hz
+
+
+def refine_special(
+    special: Located, parameter: str | Parameter = FREQUENCY, *, max_iterations: int = 12
+) -> LocatedPoint:
+    """Solve the defining system of a special point by Newton's method in one parameter.
+
+    Parameters
+    ----------
+    special : SpecialPoint or LocatedPoint
+        LP, PD, NS, GR or BP.
+    parameter : str or Parameter
+        Which number is free: see `nldyn.system.chart.checked_parameter`.
+    max_iterations : int
+        Most steps.
+
+    Returns
+    -------
+    LocatedPoint
+
+    Raises
+    ------
+    SystemModelError
+        For an unknown kind or parameter.
+    LocateError
+        If Newton's method does not converge.
+
+    References
+    ----------
+    G. Moore (1980), *Numer. Funct. Anal. Optim.* 2, 441-472 (branch points);
+    W. J. F. Govaerts (2000); Yu. A. Kuznetsov (2004), section 10.3.
+    """
+    check_special("refine_special", special, of_branch=False)
+    check_whole("max_iterations", max_iterations, 1, 1000)
+    orbit = special.orbit
+    chosen = checked_parameter(orbit.system, parameter)
+    value = value_of(orbit.system, orbit.frequency_hz, chosen)
+    span = (0.5 * value, 2.0 * value) if value > 0.0 else (value - 1.0, value + 1.0)
+    if chosen.name == "gap" and value <= 0.0:
+        size = orbit.max_abs_displacement
+        span = (value - size, value + size)
+    family = OrbitFamily.around(orbit, (Chart(chosen, *span),))
+    family, condition = defined_by(special.kind, family, orbit)
+    guess = family.unknowns(orbit)
+    found = correct(family, guess, condition, max_iterations=max_iterations)
+    if not found.converged:
+        raise LocateError(
+            f"{special.kind} near {orbit.frequency_hz:.6g} Hz was not refined: {found.failure}"
+        )
+    values = found.at.values
+    residual = found.residual(condition)
+    if special.kind == "BP":  # an unfolding that stays is a branch point that is none
+        residual = max(residual, abs(float(found.at.point[-1])))
+    return LocatedPoint(special.kind, found.orbit, (chosen,), values, residual, found.step)
+
+
+@dataclass
+class CurveChord:
+    """The piece of a curve between two neighbouring points, as a function of σ in [0, 1]."""
+
+    first: CurvePoint
+    last: CurvePoint
+
+    def __post_init__(self) -> None:
+        self._known: dict[float, CurvePoint] = {0.0: self.first, 1.0: self.last}
+
+    def at(self, sigma: float) -> CurvePoint:
+        """Point of the curve on the plane through σ of the secant.
+
+        Raises
+        ------
+        LocateError
+            If Newton's method fails there.
+        """
+        sigma = min(max(sigma, 0.0), 1.0)
+        if sigma not in self._known:
+            a, b = self.first, self.last
+            family = a.found.at.family
+            secant = b.point - a.point
+            row = family.metric(a.point) * secant
+            row /= np.linalg.norm(row)
+            level = float(row @ (a.point + sigma * secant))
+            found = correct(family, self._between(sigma), a.condition, row, level)
+            if not found.converged:
+                raise LocateError(found.failure)
+            length = a.arclength + sigma * (b.arclength - a.arclength)
+            self._known[sigma] = curve_point(found, a.condition, secant, length)
+        return self._known[sigma]
+
+    def _between(self, sigma: float) -> Real:
+        """Cubic interpolation of the unknowns between the nearest known points."""
+        below = max(s for s in self._known if s < sigma)
+        above = min(s for s in self._known if s > sigma)
+        x = (sigma - below) / (above - below)
+        return between(self._known[below], self._known[above], x)
+
+
+def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], list[str]]:
+    """What is met between two neighbouring points of a curve, in order, and what may be missing."""
+    chord = CurveChord(a, b)
+    found: list[tuple[float, LocatedPoint]] = []
+    notes: list[str] = []
+    for name, test in _changes_of_sign(a, b):
+        try:
+            sigma, error = root(lambda x, test=test: test(chord.at(x)))  # type: ignore[misc]
+            point = chord.at(sigma)
+            if abs(test(point)) > POLE * max(abs(test(a)), abs(test(b))):
+                if name != "GPD":  # whose coefficient has a pole where a flip meets a fold
+                    notes.append(_missing(name, a, "its test jumps there"))
+                continue
+            if _is_true(name, point):
+                found.append((sigma, _marked(name, point, error * (b.arclength - a.arclength))))
+        except (LocateError, ConvergenceError) as error:
+            notes.append(_missing(name, a, error))
+    for touches in _touches(a, b):
+        try:
+            found.append(_touched(touches, chord))
+        except (LocateError, ConvergenceError) as error:
+            notes.append(_missing(_touch_name(a.condition), a, error))
+    if b.corner:
+        found.append((1.0, _marked(b.corner, b, b.found.step)))
+    found.sort(key=lambda pair: pair[0])
+    return [mark for _, mark in found], notes
+
+
+def _touched(touches: Sequence[Touch], chord: CurveChord) -> tuple[float, LocatedPoint]:
+    """Where a stop is touched between two points of a curve.
+
+    At a branch point the curve may have a corner there, before which Newton's method on planes
+    steps to and fro; then it is sought with both conditions.
+
+    Raises
+    ------
+    LocateError, ConvergenceError
+        If none of the touches, which are alike, is found.
+    """
+    name, touch = _touch_name(chord.first.condition), touches[0]
+    try:
+        sigma, error = root(lambda x: touch.depth(chord.at(x)))  # type: ignore[arg-type]
+        length = chord.last.arclength - chord.first.arclength
+        return sigma, _marked(name, chord.at(sigma), error * length)
+    except (LocateError, ConvergenceError):
+        for other in touches:
+            met = _met_at_touch(name, chord, other)
+            if met is not None:
+                return met
+        raise
+
+
+def _met_at_touch(name: str, chord: CurveChord, touch: Touch) -> tuple[float, LocatedPoint] | None:
+    """The point where a stop is touched, by Newton's method for both conditions."""
+    a, b = chord.first, chord.last
+    family, guess = a.found.at.family, between(a, b, _share(touch, a, b))
+    grazing = Grazing(touch.output, touch.is_maximum, touch.phase, length_unit(a.orbit))
+    both = Both(a.condition, grazing)
+    found = correct(family, guess, both, max_iterations=25)
+    weights, way = family.metric(a.point), b.point - a.point
+    sigma = float((found.at.point - a.point) @ (weights * way) / (way @ (weights * way)))
+    if not (found.converged and 0.0 <= sigma <= 1.0):
+        return None
+    if isinstance(a.condition, BranchPoint) and abs(found.at.point[-1]) > UNFOLDED:
+        return None
+    parameters = tuple(chart.parameter for chart in family.charts)
+    values, residual = found.at.values, found.residual(both)
+    return sigma, LocatedPoint(name, found.orbit, parameters, values, residual, found.step)
+
+
+def _share(touch: Touch, a: CurvePoint, b: CurvePoint) -> float:
+    """Share of the way from a to b at which a stop is touched, by linear interpolation."""
+    before, after = touch.depth(a), touch.depth(b)  # type: ignore[arg-type]
+    return before / (before - after)
+
+
+def _touches(a: CurvePoint, b: CurvePoint) -> list[list[Touch]]:
+    """Touches between two points, those together that a symmetry of the structure exchanges."""
+    condition = a.condition
+    if a.corner or b.corner:
+        return []
+    alike: dict[float, list[Touch]] = {}
+    for touch in touching_extremes(a.orbit, b.orbit):
+        own = isinstance(condition, Grazing) and condition.is_of(
+            touch.output, touch.is_maximum, touch.phase, a.orbit.period
+        )
+        if own:
+            continue
+        share = _share(touch, a, b)
+        near = next((other for other in alike if abs(other - share) < ALIKE), share)
+        alike.setdefault(near, []).append(touch)
+    return list(alike.values())
+
+
+def _changes_of_sign(
+    a: CurvePoint, b: CurvePoint
+) -> list[tuple[str, Callable[[CurvePoint], float]]]:
+    """Tests that change sign between two points, with the names of what they tell of."""
+    names = [name for name in a.tests if a.tests[name] * b.tests[name] < 0.0]
+    if not leaves_circle(a.orbit.multipliers, b.orbit.multipliers):
+        names = [name for name in names if name not in ("NS", "GRNS")]
+    if "LP" in names and "BP" in names:  # at a fold both change sign
+        names.remove("BP")
+    return [
+        (name, lambda point, name=name: point.tests[name])  # type: ignore[misc]
+        for name in names
+    ]
+
+
+def _touch_name(condition: Condition) -> str:
+    if isinstance(condition, Grazing):
+        return "GRGR"
+    if isinstance(condition, BranchPoint):
+        return "GRBP"
+    return f"GR{condition.kind}" if isinstance(condition, Singular) else "GR"
+
+
+def _is_true(name: str, point: CurvePoint) -> bool:
+    """Whether a pair of multipliers is complex where a test tells of one on the unit circle."""
+    mu = point.orbit.multipliers
+    if name in ("NS", "GRNS"):
+        return is_torus(mu)
+    if name == "BPNS":
+        return is_torus(np.delete(mu, int(np.argmin(np.abs(mu - 1.0)))))
+    if name in ("LPNS", "PDNS") and not is_torus_curve(point.condition):
+        target = 1.0 if name == "LPNS" else -1.0
+        return is_torus(np.delete(mu, int(np.argmin(np.abs(mu - target)))))
+    if name == "NSNS":
+        return is_torus(np.delete(mu, torus_pair(mu)))
+    if name == "CP":  # the parameters turn back
+        return bool(np.abs(point.tangent[-2:]).max() < 1e-3)
+    return True
+
+
+def _marked(name: str, point: CurvePoint, error: float) -> LocatedPoint:
+    """A mark on a curve; on a branch in one parameter it is polished by its defining system."""
+    parameters = tuple(chart.parameter for chart in point.found.at.family.charts)
+    mark = LocatedPoint(name, point.orbit, parameters, point.values, point.residual, abs(error))
+    if isinstance(point.condition, Free):
+        try:
+            return refine_special(mark, parameters[0])
+        except LocateError:
+            return mark
+    return mark
+
+
+def _missing(name: str, point: CurvePoint, why: Exception | str) -> str:
+    """The note that a mark may be missing behind a point."""
+    charts = point.found.at.family.charts
+    pairs = zip(charts, point.values.tolist(), strict=True)
+    place = ", ".join(f"{chart.parameter.name} = {value:.8g}" for chart, value in pairs)
+    return f"{name} near {place} may be missing: {why}"

@@ -1,0 +1,725 @@
+"""The flow map: where a state goes, how it depends on its start and on the frequency.
+
+Between contacts the modes are propagated in closed form; contact phases by Gauss collocation on
+the contact forces. See ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nldyn.base.arrays import Complex, Real
+from nldyn.base.errors import (
+    LARGEST_FREQUENCY,
+    SMALLEST_FREQUENCY,
+    SystemModelError,
+    check_types,
+    check_whole,
+    is_finite,
+    shown,
+)
+from nldyn.flow.gauss import GaussTables, gauss_tables
+from nldyn.flow.kernels.layout import (
+    CONTACT_FAILED,
+    DIVERGED,
+    NOT_CONVERGED,
+    OK,
+    RECORD_FULL,
+    ROUNDED,
+    SINGULAR,
+    TOO_MANY_PIECES,
+    TOO_MANY_STEPS,
+    Record,
+    SystemData,
+)
+from nldyn.flow.kernels.newton import Corrector, newton
+from nldyn.flow.kernels.sample import local_extremes, sample_states
+from nldyn.flow.options import FlowOptions, _floats, _nodes_for_switch
+from nldyn.flow.packing import parameter_tables
+from nldyn.runtime.interruption import behind
+from nldyn.runtime.kernel_cache import first_call
+from nldyn.system.contact_law import law_address
+from nldyn.system.parameters import Parameter
+from nldyn.system.system import System, same_system
+
+__all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
+
+BUNCH = 20  # excitation periods in one compiled call, where many follow each other
+_REASONS = {
+    OK: "",
+    TOO_MANY_PIECES: "more than 20000 flights and contact panels in one segment: too many contacts "
+    "or too fast a mode (more `segments` of solve_orbit help)",
+    TOO_MANY_STEPS: "a stop stays so close to a touch that the search for it takes too many steps",
+    CONTACT_FAILED: "a contact phase could not be resolved",
+    ROUNDED: "a contact is hidden by rounding: the displacements are too large beside its depth, "
+    "or the damping of a stop beside its force",
+    DIVERGED: "Newton's method diverged",
+    SINGULAR: "singular Jacobian",
+    NOT_CONVERGED: "Newton's method did not converge",
+}
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Results of k consecutive segments.
+
+    Parameters
+    ----------
+    ends : (k, 2n)
+        States at the ends.
+    jacobians : (k, 2n, 2n)
+        Derivatives of the ends with respect to the starts.
+    d_omega : (k, 2n)
+        Derivatives of the ends with respect to ω at fixed phases.
+    d_parameters : (k, 2n, n_parameters)
+        Derivatives of the ends with respect to the parameters asked for, at fixed phases.
+    closings : (n_stops,)
+        How often each stop closed.
+    failure : str
+        Empty, or why the segments could not be computed.
+    """
+
+    ends: Real
+    jacobians: Real
+    d_omega: Real
+    d_parameters: Real
+    closings: NDArray[np.int64]
+    failure: str
+
+    @property
+    def monodromy(self) -> Real:
+        """Product of the segments' Jacobians, (2n, 2n)."""
+        return chain(self.jacobians)
+
+
+@dataclass(frozen=True)
+class FlowError:
+    """Relative errors of the flow map over segments, in the norm of the coordinates z.
+
+    Parameters
+    ----------
+    state : float
+        Of the states at the ends of the segments.
+    monodromy : float
+        Of the monodromy matrix.
+    d_omega : float
+        Of the derivatives with respect to ω.
+    d_parameters : float
+        Of those with respect to the parameters asked for, in the columns' own units; the largest.
+    """
+
+    state: float
+    monodromy: float
+    d_omega: float
+    d_parameters: float = 0.0
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Outcome of Newton's method for the shooting equations.
+
+    Parameters
+    ----------
+    point : (N + 1,)
+        States at the k phases and ln ω.
+    along : (N + 1,)
+        Direction of the branch, of no particular length or sense.
+    jacobians : (k, 2n, 2n)
+        Of the segments, at the point before the last step.
+    motion : Trajectory
+        From the point before the last step.
+    iterations : int
+    first_step, last_step : float
+        Lengths of the first and the last Newton step: the error left is far below the last.
+    failure : str
+        Empty, or why it did not converge.
+    """
+
+    point: Real
+    along: Real
+    jacobians: Real
+    motion: Trajectory
+    iterations: int
+    first_step: float
+    last_step: float
+    failure: str
+
+    @property
+    def converged(self) -> bool:
+        """Whether a solution was found."""
+        return not self.failure
+
+
+def chain(jacobians: Real) -> Real:
+    """Product of the Jacobians (k, 2n, 2n) of consecutive segments, (2n, 2n)."""
+    product = np.asarray(jacobians[0])
+    for jacobian in jacobians[1:]:
+        product = jacobian @ product
+    return product
+
+
+class FlowMap:
+    """Exact flights and collocated contact phases of a system.
+
+    States z are the pairs of coordinates of `LinearPart`; `to_state` and `to_modal` translate.
+
+    Parameters
+    ----------
+    system : System
+        What to propagate.
+    options : FlowOptions, optional
+        Accuracy.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from nldyn import FlowMap, System, Unbalance
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> flow = FlowMap(system)
+    >>> omega = 2 * np.pi * 20.0
+    >>> steady = system.steady(omega).real[None]
+    >>> segments = flow.shoot(steady, np.array([0.0, 2 * np.pi]), omega)
+    >>> bool(np.allclose(segments.ends, steady, rtol=1e-12))
+    True
+    """
+
+    def __repr__(self) -> str:
+        """One line: the system and the accuracy."""
+        return f"<FlowMap to {self.options.rtol:g} of {self.system!r}>"
+
+    def __init__(self, system: System, options: FlowOptions | None = None) -> None:
+        check_types(system=(system, System), options=(options, FlowOptions, None))
+        self.system = system
+        self.options = options or FlowOptions()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what defines the map alone: a compiled law has another address elsewhere."""
+        return FlowMap, (self.system, self.options)
+
+    @cached_property
+    def tables(self) -> GaussTables:
+        """Collocation tables."""
+        exponents = [stop.exponent for stop in self.system.stops]
+        smooth = all(float(2.0 * exponent).is_integer() for exponent in exponents)
+        power = 2 if smooth else 4
+        nodes, tail = self.options.panel_nodes, self.options.panel_tail
+        for stop in self.system.stops:
+            viscous = stop.dissipation != 0.0
+            nodes = _nodes_for_switch(stop.exponent, power, viscous, nodes, tail)
+        return gauss_tables(nodes, power)
+
+    @cached_property
+    def rows(self) -> Real:
+        """Output rows (n_stops + n_interfaces, 2n): penetrations first, then displacements."""
+        s = self.system
+        vectors = [s.stop_vector(stop) for stop in s.stops] + list(s.participation.values())
+        return np.array([s.displacement_row(v) for v in vectors]).reshape(len(vectors), 2 * s.size)
+
+    @cached_property
+    def rate_rows(self) -> Real:
+        """Rows of the outputs' velocities in flight."""
+        return self.system.linear.times_block(self.rows)
+
+    @cached_property
+    def _data(self) -> SystemData:
+        s, linear = self.system, self.system.linear
+        vectors = [s.stop_vector(stop) for stop in s.stops]
+        accelerations = linear.times_block(self.rate_rows)
+        thirds = np.abs(linear.times_block(accelerations))
+        growth = np.repeat(linear.growth, 2)
+        bounds = np.multiply(thirds, growth, out=np.zeros_like(thirds), where=thirds > 0.0)
+        force = np.array([s.force_column(v) for v in vectors]).reshape(-1, 2 * s.size)
+        stops = [
+            (
+                stop.gap,
+                stop.stiffness,
+                stop.exponent,
+                stop.dissipation,
+                v @ v,
+                _duration_factor(stop.exponent),
+                self.options.instant(stop.exponent),
+            )
+            for stop, v in zip(s.stops, vectors, strict=True)
+        ]
+        return SystemData(
+            linear.blocks,
+            np.array([self.rows, self.rate_rows, accelerations]),
+            bounds,
+            np.ascontiguousarray(force.T),
+            s.drive,
+            np.array(stops, dtype=float).reshape(-1, 7),
+            np.array([law_address(stop.law) for stop in s.stops], dtype=np.int64),
+            self.options.panel_tail,
+            self.options.node_angle,
+        )
+
+    def shoot(
+        self,
+        nodes: Real,
+        phases: Real,
+        omega: float,
+        *,
+        sensitivities: bool = True,
+        chained: bool = False,
+        parameters: Sequence[Parameter] = (),
+    ) -> Segments:
+        """Carry states over consecutive segments.
+
+        Parameters
+        ----------
+        nodes : (k, 2n) array
+            State at the start of each segment; only the first is used when `chained`.
+        phases : (k + 1,) array
+            Forcing phases ωt of the segment ends in radians.
+        omega : float
+            Excitation frequency in rad/s.
+        sensitivities : bool
+            Whether to compute the derivatives (without them the arrays hold no numbers of use).
+        chained : bool
+            Start each segment where the one before ended.
+        parameters : sequence of Parameter
+            Numbers of stops and excitation with respect to which derivatives are wanted, too.
+
+        Returns
+        -------
+        Segments
+
+        Raises
+        ------
+        SystemModelError
+            For a parameter that the system does not have, or arrays of the wrong shape or with
+            numbers that make no sense.
+        """
+        status, *_, ends, jacobians, d_omegas, d_parameters, closings = self._fly(
+            self._no_record, False, nodes, phases, omega, chained, sensitivities, parameters
+        )
+        return Segments(ends, jacobians, d_omegas, d_parameters, closings, _REASONS[status])
+
+    def error(
+        self,
+        nodes: Real,
+        phases: Real,
+        omega: float,
+        *,
+        chained: bool = False,
+        parameters: Sequence[Parameter] = (),
+    ) -> FlowError:
+        """Estimate the errors of `shoot` by a finer map; infinite where either fails.
+
+        Parameters and exceptions are those of `shoot`.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import nldyn
+        >>> system = nldyn.System.from_modal(
+        ...     [10.0], {"a": [1.0]}, stops=[nldyn.Stop("a", 1e9)],
+        ...     excitation=[nldyn.HarmonicForce("a", 1.0)],
+        ... )
+        >>> flow = nldyn.FlowMap(system)
+        >>> flow.error(np.zeros((1, 2)), np.array([0.0, 2.0 * np.pi]), 50.0).state < 1e-9
+        True
+        """
+        here, finer = (
+            flow.shoot(nodes, phases, omega, chained=chained, parameters=parameters)
+            for flow in (self, self.finer)
+        )
+        if here.failure or finer.failure:
+            return FlowError(math.inf, math.inf, math.inf, math.inf if parameters else 0.0)
+        columns = zip(here.d_parameters.T, finer.d_parameters.T, strict=True)
+        return FlowError(
+            relative_error(here.ends, finer.ends),
+            relative_error(here.monodromy, finer.monodromy),
+            relative_error(here.d_omega, finer.d_omega),
+            max((relative_error(a, b) for a, b in columns), default=0.0),
+        )
+
+    def strobe(self, state: Real, omega: float, periods: int) -> Segments:
+        """Carry a state (2n,) over excitation periods from phase zero on, without derivatives."""
+        check_whole("periods", periods, 1)
+        phases = np.linspace(0.0, 2.0 * np.pi * periods, periods + 1)
+        nodes = _floats("state", state)[None]
+        parts: list[Segments] = []
+        for first in range(0, periods, BUNCH):  # between two of them Ctrl-C is answered
+            some = phases[first : first + BUNCH + 1]
+            parts.append(self.shoot(nodes, some, omega, sensitivities=False, chained=True))
+            if parts[-1].failure:
+                break
+            nodes = parts[-1].ends[-1:]
+        return replace(
+            parts[-1],
+            ends=np.concatenate([part.ends for part in parts]),
+            closings=np.sum([part.closings for part in parts], axis=0),
+        )
+
+    def _check_segments(self, nodes: Real, phases: Real, omega: float, chained: bool) -> None:
+        if phases.ndim != 1 or phases.size < 2 or not (phases[1:] > phases[:-1]).all():
+            raise SystemModelError("phases must be two or more ascending numbers")
+        size = 2 * self.system.size
+        rows = 1 if chained else phases.size - 1
+        if nodes.ndim != 2 or nodes.shape[1] != size or len(nodes) < rows:
+            raise SystemModelError(
+                f"nodes must have shape ({rows}, {size}) for {phases.size - 1} segments of "
+                f"{self.system.size} modes, got {nodes.shape}"
+            )
+        if not math.isfinite(nodes.sum() + phases[-1] - phases[0]):
+            raise SystemModelError("nodes and phases must be finite")
+        full = 2.0 * math.pi
+        if not (
+            is_finite(omega) and full * SMALLEST_FREQUENCY <= omega <= full * LARGEST_FREQUENCY
+        ):
+            raise SystemModelError(
+                f"omega must be positive, that of {SMALLEST_FREQUENCY:g} to "
+                f"{LARGEST_FREQUENCY:g} Hz, got {shown(omega)}"
+            )
+
+    def trajectory(
+        self, nodes: Real, phases: Real, omega: float, *, chained: bool = False
+    ) -> Trajectory:
+        """Record the motion from phase to phase, restarted from each node state.
+
+        Parameters
+        ----------
+        nodes : (k, 2n) array
+            States at the first k phases; only the first is used when `chained`.
+        phases : (k + 1,) array
+            Forcing phases in radians.
+        omega : float
+            Excitation frequency in rad/s.
+        chained : bool
+            Start each segment where the one before ended.
+
+        Returns
+        -------
+        Trajectory
+        """
+        capacity = (16 if chained else 64) * np.size(phases)
+        while True:
+            record = self._record(capacity)
+            status, *_, closings = self._fly(record, True, nodes, phases, omega, chained, False)
+            if status != RECORD_FULL:
+                return self._motion(omega, record, closings, _REASONS[status])
+            capacity *= 4
+
+    def newton(
+        self,
+        guess: Real,
+        row: Real,
+        level: float,
+        phases: Real,
+        state_weight: float,
+        rtol: float,
+        longest: float,
+        max_iterations: int,
+    ) -> Solution:
+        """Solve the shooting equations with ``row @ point = level``; see `newton.Corrector`.
+
+        Parameters
+        ----------
+        guess, row : (N + 1,) arrays
+            States at the k phases, one after the other, and ln ω; normal of the plane.
+        level : float
+            Offset of the plane.
+        phases : (k + 1,) array
+            Forcing phases of the segment ends.
+        state_weight : float
+            Weight of the states in the squared length of a step.
+        rtol, longest, max_iterations : float, float, int
+            When to stop.
+
+        Returns
+        -------
+        Solution
+
+        Raises
+        ------
+        SystemModelError
+            If the arrays do not fit the segments.
+        """
+        guess, row = (np.ascontiguousarray(x, dtype=float) for x in (guess, row))
+        unknowns = 2 * self.system.size * (phases.size - 1) + 1
+        if not guess.shape == row.shape == (unknowns,):  # the kernel would leave their memory
+            raise SystemModelError(
+                f"guess and row must have shape ({unknowns},) for {phases.size - 1} segments of "
+                f"{self.system.size} modes, got {guess.shape} and {row.shape}"
+            )
+        corrector = Corrector(row, float(level), float(state_weight), rtol, longest, max_iterations)
+        capacity = 64 * phases.size
+        while True:
+            point, record = guess.copy(), self._record(capacity)
+            status, iterations, first, last, along, _, jacobians, *_, closings = self._call(
+                record, True, 0.0, point, phases, False, True, (), corrector
+            )
+            if status != RECORD_FULL:
+                omega = math.exp(point[-1])
+                motion = self._motion(omega, record, closings, _REASONS[status])
+                return Solution(
+                    point, along, jacobians, motion, iterations, first, last, _REASONS[status]
+                )
+            capacity *= 4
+
+    def _fly(
+        self,
+        record: Record,
+        recording: bool,
+        nodes: Real,
+        phases: Real,
+        omega: float,
+        chained: bool,
+        sensitivities: bool,
+        parameters: Sequence[Parameter] = (),
+    ) -> tuple[Any, ...]:
+        """The flow map alone; see `kernels.newton.newton` for what comes back."""
+        nodes, phases = _floats("nodes", nodes), np.ascontiguousarray(_floats("phases", phases))
+        self._check_segments(nodes, phases, omega, chained)
+        return self._call(
+            record, recording, float(omega), np.append(nodes, 0.0), phases, chained, sensitivities,
+            parameters,
+        )  # fmt: skip
+
+    def _call(
+        self,
+        record: Record,
+        recording: bool,
+        omega: float,
+        point: Real,
+        phases: Real,
+        chained: bool,
+        sensitivities: bool,
+        parameters: Sequence[Parameter],
+        corrector: Corrector | None = None,
+    ) -> tuple[Any, ...]:
+        """The kernel, which corrects the point (N + 1,) or, without corrector, only flies."""
+        corrector = corrector or Corrector(point, 0.0, 0.0, 0.0, 0.0, 0)
+        table, drive_by = (
+            parameter_tables(self.system, parameters) if parameters else self._no_parameters
+        )
+        arguments = (
+            self._data, self.tables, record, recording, omega, point, phases, bool(chained),
+            bool(sensitivities), table, drive_by, corrector,
+        )  # fmt: skip
+        try:
+            found = newton(*arguments) if newton.overloads else first_call(newton, *arguments)
+            return found  # type: ignore[no-any-return]
+        except SystemError as error:
+            told = error
+        raise behind(told)  # out here, so that it does not become its own cause
+
+    @cached_property
+    def _no_record(self) -> Record:
+        return self._record(0)
+
+    @cached_property
+    def _no_parameters(self) -> tuple[NDArray[np.int64], Complex]:
+        return parameter_tables(self.system, ())
+
+    def _motion(
+        self, omega: float, rec: Record, closings: NDArray[np.int64], failure: str
+    ) -> Trajectory:
+        """The motion in a record, of which only the used part is kept."""
+        n = int(rec.used[0])
+        pieces = Record._make([*(array[:n].copy() for array in rec[:-1]), rec.used])
+        return Trajectory(self, omega, pieces, closings, failure)
+
+    @cached_property
+    def finer(self) -> FlowMap:
+        """The same map at a setting whose errors are negligible beside those of this one."""
+        return FlowMap(self.system, self.options.finer)
+
+    def to_modal(self, states: Real) -> Real:
+        """Modal displacements and velocities (..., 2n) of states z."""
+        return np.asarray(self._coordinates("states", states) @ self.system.linear.right.T)
+
+    def to_state(self, modal: Real) -> Real:
+        """States z of modal displacements and velocities (..., 2n)."""
+        return np.asarray(self._coordinates("modal", modal) @ self.system.linear.left.T)
+
+    def _coordinates(self, name: str, values: Real) -> Real:
+        values = _floats(name, values)
+        if values.ndim == 0 or values.shape[-1] != 2 * self.system.size:
+            raise SystemModelError(
+                f"{name} must have {2 * self.system.size} columns, got an array {values.shape}"
+            )
+        return values
+
+    def _record(self, capacity: int) -> Record:
+        return Record(
+            np.empty(capacity),
+            np.empty(capacity),
+            np.empty(capacity, dtype=np.int64),
+            np.empty(capacity, dtype=np.int64),
+            np.empty((capacity, 2 * self.system.size)),
+            np.empty((capacity, len(self.system.stops), self.tables.nodes.size)),
+            np.empty((capacity, len(self.system.stops), self.tables.nodes.size)),
+            np.zeros(2, dtype=np.int64),
+        )
+
+
+def relative_error(value: Real, reference: Real) -> float:
+    """Length of the difference over that of the reference; without it where the latter is zero."""
+    size = float(np.linalg.norm(reference))
+    return float(np.linalg.norm(value - reference)) / (size or 1.0)
+
+
+def flow_of(system: System | FlowMap) -> FlowMap:
+    """The flow map itself, or that of a system at the default accuracy."""
+    return system if isinstance(system, FlowMap) else FlowMap(system)
+
+
+def same_flow(a: FlowMap, b: FlowMap) -> bool:
+    """Whether two flow maps have the same numbers and laws, and states in the same coordinates."""
+    return a is b or (
+        a.options == b.options
+        and same_system(a.system, b.system)
+        and np.array_equal(a.system.linear.right, b.system.linear.right)
+    )
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Recorded motion: exact at any instant, not a table of samples.
+
+    Parameters
+    ----------
+    flow : FlowMap
+        What made it.
+    omega : float
+        Excitation frequency in rad/s.
+    record : Record
+        Flights and contact panels.
+    closings : (n_stops,)
+        How often each stop closed.
+    failure : str
+        Empty, or why it stopped early.
+    """
+
+    flow: FlowMap
+    omega: float
+    record: Record
+    closings: NDArray[np.int64]
+    failure: str
+
+    def states(self, phases: Real) -> Real:
+        """States z (k, 2n) at ascending forcing phases (k,) within the motion.
+
+        Raises
+        ------
+        SystemModelError
+            For phases that are no such list.
+        """
+        phases = _floats("phases", phases)
+        if phases.ndim != 1 or not (phases[1:] >= phases[:-1]).all():
+            raise SystemModelError("phases must be a list of ascending numbers")
+        first, last = self._span
+        slack = 1e-9 * max(1.0, abs(last))
+        if phases.size and not first - slack <= phases[0] <= phases[-1] <= last + slack:
+            raise SystemModelError(
+                f"phases must lie within the motion, {first:g} to {last:g}, got "
+                f"{phases[0]:g} to {phases[-1]:g}"
+            )
+        states = self._evaluate(sample_states, phases)
+        inside, solved = self._solved_in_contact(phases)
+        states[inside] = solved
+        return states
+
+    def _solved_in_contact(self, phases: Real) -> tuple[NDArray[np.intp], Real]:
+        """Which of some ascending phases lie in contact panels, and the flow map's states (k, 2n).
+
+        Between the ends of a panel its polynomial is less accurate. Each state is solved for anew
+        from the start of its panel, or from before the contact where the panel begins it. The map
+        also runs from each phase to where the next one begins, which lies before: that takes no
+        time. None are told if it fails.
+        """
+        rec, flow = self.record, self.flow
+        none = np.empty(0, dtype=np.intp), np.empty((0, rec.start.shape[1]))
+        if not (rec.kind >= 0).any():
+            return none
+        piece = np.maximum(np.searchsorted(rec.phase, phases, side="right") - 1, 0)
+        inside = np.flatnonzero(rec.kind[piece] >= 0)[::-1]
+        if not inside.size:
+            return none
+        begins = rec.kind // 2 == 1
+        start = np.maximum.accumulate(np.where(begins, 0, np.arange(begins.size)))[piece[inside]]
+        legs = np.stack([rec.phase[start], phases[inside]], axis=1).ravel()
+        nodes = np.repeat(rec.start[start], 2, axis=0)[:-1]
+        status, *_, ends, _, _, _, _ = flow._call(
+            flow._no_record, False, self.omega, np.append(nodes, 0.0), legs, False, False, ()
+        )
+        return (inside, ends[::2]) if status == OK else none
+
+    @cached_property
+    def _span(self) -> tuple[float, float]:
+        """Forcing phases at which the motion begins and ends."""
+        rec = self.record
+        if not rec.phase.size:
+            return math.nan, math.nan
+        return float(rec.phase[0]), float(rec.phase[-1] + self.omega * rec.duration[-1])
+
+    def extremes(self, output: int) -> Real:
+        """Phase, value and kind (+1 maximum, -1 minimum) of an output's local extremes, (k, 3).
+
+        The motion is taken as periodic. Outputs are the stops' penetrations without their gaps,
+        then the interfaces' displacements.
+
+        Raises
+        ------
+        SystemModelError
+            If there is no such output.
+        """
+        flow = self.flow
+        check_whole("output", output, 0, len(flow.rows) - 1)
+        row, rate_row = flow.rows[output], flow.rate_rows[output]
+        found = self._evaluate(local_extremes, row, rate_row)
+        order = np.argsort(found[:, 0], kind="stable")
+        inside, solved = self._solved_in_contact(found[order, 0])
+        found[order[inside], 1] = solved @ row
+        return found
+
+    def contact_quadrature(self) -> tuple[Real, Real]:
+        """Forcing phases (k,) of all nodes of contact panels, and their weights in s (k,)."""
+        tables, rec = self.flow.tables, self.record
+        contact = rec.kind >= 0
+        kind, duration = rec.kind[contact], rec.duration[contact, None]
+        phases = rec.phase[contact, None] + self.omega * duration * tables.chi[kind]
+        return phases.ravel(), (duration * tables.weights[kind]).ravel()
+
+    @cached_property
+    def _response(self) -> tuple[Complex, Complex]:
+        """Near eigenvalues (k,), amplitudes (1 + k, 2n) of steady response and growths."""
+        return self.flow.system.response(self.omega)
+
+    def _evaluate(self, kernel: Any, *arguments: object) -> Real:
+        """Call a kernel of `_sample` on the recorded pieces."""
+        data, tables, rec = self.flow._data, self.flow.tables, self.record
+        found = kernel(
+            data.blocks,
+            data.force,
+            self.omega,
+            tables,
+            rec.phase,
+            rec.duration,
+            rec.kind,
+            rec.start,
+            rec.force,
+            int(rec.used[0]),
+            *self._response,
+            *arguments,
+        )
+        return np.asarray(found)
+
+
+def _duration_factor(p: float) -> float:
+    """Contact duration of a free impact over (peak penetration / speed) for F = k δ^p.
+
+    2 ∫ dx / sqrt(1 - x^(p+1)) from 0 to 1 = 2.94 for Hertz's law (Johnson 1985, eq. 11.24).
+    """
+    q = 1.0 / (p + 1.0)
+    return 2.0 * math.sqrt(math.pi) * math.gamma(1.0 + q) / math.gamma(0.5 + q)

@@ -1,0 +1,472 @@
+"""The course of a contact, panel after panel."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from nldyn.flow.kernels.compiling import always_inline, inner
+from nldyn.flow.kernels.flights import (
+    carried_noise,
+    distance,
+    output_derivatives,
+    output_noise,
+    output_size,
+    rate_noise,
+)
+from nldyn.flow.kernels.law import law, singular_slope
+from nldyn.flow.kernels.layout import (
+    CONTACT_FAILED,
+    CREEP,
+    DECAY,
+    DISSIPATION,
+    DURATION,
+    EXPONENT,
+    FLIGHT,
+    GAP,
+    INSTANT,
+    MOBILITY,
+    OK,
+    STIFFNESS,
+)
+from nldyn.flow.kernels.panel import node_outputs, panel_end, solve_panel
+from nldyn.flow.kernels.resolution import (
+    first_doubt,
+    first_root,
+    largest,
+    legendre_tail,
+    map_fraction,
+    refined,
+    resolved,
+    shows_decay,
+)
+
+
+@inner
+def expected_contact(fl, stop, w, phase):
+    """Peak penetration, duration and time to release of a free impact through the present state.
+
+    From the energy of the contact spring and the local mobility; a push (positive acceleration
+    without speed) counts as an impact as deep as its static penetration. All zero when the stop
+    is left at once.
+    """
+    value, speed, accel, _ = output_derivatives(fl, stop, w, phase, 0.0)
+    depth = max(value - fl.stops[stop, GAP], 0.0)
+    p = fl.stops[stop, EXPONENT]
+    rate = fl.stops[stop, STIFFNESS] * fl.stops[stop, MOBILITY]
+    static = (max(accel, 0.0) / rate) ** (1.0 / p)
+    energy = 0.5 * speed * speed + rate * (depth ** (p + 1.0) + static ** (p + 1.0)) / (p + 1.0)
+    if energy <= 0.0:
+        return 0.0, 0.0, 0.0
+    top_speed = np.sqrt(2.0 * energy)
+    peak = (energy * (p + 1.0) / rate) ** (1.0 / (p + 1.0))
+    duration = fl.stops[stop, DURATION] * peak / top_speed
+    left = duration * (0.5 + np.arcsin(speed / top_speed) / np.pi)
+    if speed >= 0.0 and depth < static:  # pushed in from near rest
+        left = duration
+    elif speed < 0.0:
+        left = min(0.5 * duration, -depth / speed)
+    if accel < 0.0 and left > 0.0:
+        root = np.sqrt(speed * speed - 2.0 * accel * depth)
+        if speed > 0.0:  # a slow touch is turned back by the deceleration
+            turned = (speed + root) / -accel
+            share = turned / (turned + left)
+            left *= share
+            duration *= share
+            peak *= share
+        else:  # (speed + root) / -accel without cancellation, for an acceleration of any size
+            left = min(left, 2.0 * depth / (root - speed))
+    return peak, duration, left
+
+
+@inner
+def profile_guess(tab, kind, h, peak, duration, left, delta_row):
+    """Half-sine penetrations at the nodes to start Newton's method from."""
+    for i in range(delta_row.size):
+        t = h * tab.chi[kind, i]
+        x = np.pi * min((duration - left + t) / duration, 1.0)
+        delta_row[i] = max(peak * np.sin(x), 1e-2 * peak)
+
+
+@inner
+def stretch_profile(tab, old_kind, new_kind, ratio, old, new):
+    """Carry node values over to a panel `ratio` times as long, linearly in time."""
+    m = old.size
+    for i in range(m):
+        x = tab.chi[new_kind, i] * ratio
+        j = 0
+        while j < m and tab.chi[old_kind, j] < x:
+            j += 1
+        if j == 0:
+            new[i] = old[0] * x / tab.chi[old_kind, 0] if old_kind >= 2 else old[0]
+        elif j == m:
+            new[i] = old[m - 1]
+        else:
+            x0, x1 = tab.chi[old_kind, j - 1], tab.chi[old_kind, j]
+            new[i] = old[j - 1] + (old[j] - old[j - 1]) * (x - x0) / (x1 - x0)
+
+
+@inner
+def first_event(fl, tab, kind, phase, w, h, closed, panel, w_end):
+    """Stop that first opens or closes within a panel and the fraction of the panel, or (-1, 2).
+
+    With the fraction at which one first comes so near to it that only the state can tell, or 2.
+    """
+    m = tab.nodes.size
+    event, where, doubtful = -1, 2.0, 2.0
+    position = -1
+    inner = np.empty((1, m))
+    values = np.empty(m + 2)
+    for s in range(closed.size):
+        noise = output_noise(fl, s, w)
+        start, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
+        end, _, _, _ = output_derivatives(fl, s, w_end, phase + fl.omega * h, 0.0)
+        sign = 1.0 if closed[s] else -1.0  # the values are positive as long as nothing happens
+        if closed[s]:
+            position += 1
+            for i in range(m):
+                inner[0, i] = panel.output[position, i]
+        else:
+            node_outputs(fl, tab, kind, phase, w, h, panel, s, inner)
+            for i in range(m):
+                inner[0, i] = fl.stops[s, GAP] - inner[0, i]
+        values[0], values[m + 1] = (
+            sign * (start - fl.stops[s, GAP]),
+            sign * (end - fl.stops[s, GAP]),
+        )
+        for i in range(m):
+            values[i + 1] = inner[0, i]
+        fine = refined(tab, values)
+        tail = 4.0 * legendre_tail(tab, inner, 0)
+        below, edge = noise + tail, 0.0
+        if sign * speed > 0.0:  # the panel may begin a little before the event that it begins with
+            below += 2.0 * max(-values[0], 0.0)
+            edge = min(2.0 * values[0], 0.0)
+        root = first_root(tab, values, fine, below, edge)
+        if root <= 1.0:
+            fraction = map_fraction(tab, kind, root)
+            if fraction < where:
+                event, where = s, fraction
+        elif tail > 10.0 * noise:
+            low = first_doubt(tab, values, fine, noise, tail)
+            if low < 1.0:
+                doubtful = min(doubtful, map_fraction(tab, kind, low))
+    return event, where, doubtful if doubtful < where else 2.0
+
+
+@inner
+def creep(fl, stop, w, phase, duration):
+    """Depth and speed of a body that creeps out of a stop, its speed held by the damping, or zeros.
+
+    So it does where an elastic contact would take much longer than the damping to act.
+    """
+    if fl.laws[stop] != 0 or fl.stops[stop, DISSIPATION] == 0.0:
+        return 0.0, 0.0
+    value, speed, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
+    depth = value - fl.stops[stop, GAP]
+    if speed >= 0.0 or depth <= 0.0:
+        return 0.0, 0.0
+    _, _, viscosity = law(fl, stop, depth, speed)
+    if viscosity * fl.stops[stop, MOBILITY] * duration < CREEP:
+        return 0.0, 0.0
+    return depth, speed
+
+
+@inner
+def guess_panel(fl, tab, phase, w, h, h_mapped, start_switch, panel):
+    """Choose the kind and length of a panel and guess its penetrations.
+
+    h bounds the length, h_mapped that of a panel that is to end with a release.
+
+    A contact is covered by two panels, so that no panel has to resolve more than a quarter wave.
+    """
+    active, delta = panel.active, panel.output
+    ends = False
+    length = h
+    for a in range(active.size):
+        _, duration, left = expected_contact(fl, active[a], w, phase)
+        depth, speed = creep(fl, active[a], w, phase, duration)
+        if depth > 0.0:
+            if -0.5 * depth / speed < length:
+                ends = False
+                length = -0.5 * depth / speed
+        elif left > min(0.6 * duration, h_mapped):
+            if 0.5 * left < length:
+                ends = False
+                length = 0.5 * left
+        elif left < length:
+            ends = True
+            length = left
+    kind = 2 * start_switch + (1 if ends else 0)
+    for a in range(active.size):
+        peak, duration, left = expected_contact(fl, active[a], w, phase)
+        depth, speed = creep(fl, active[a], w, phase, duration)
+        if depth > 0.0:
+            for i in range(tab.nodes.size):
+                later = depth + speed * length * tab.chi[kind, i]
+                delta[a, i] = max(later, 1e-3 * depth)
+        elif duration > 0.0:
+            profile_guess(tab, kind, length, peak, duration, left, delta[a])
+        else:
+            for i in range(tab.nodes.size):
+                delta[a, i] = 0.0
+    return kind, length
+
+
+@inner
+def remembered_panel(rec, start_switch, h_max, panel):
+    """Kind, length and event of the same panel of the motion before, or (-1, 0, -1).
+
+    Fills the penetrations.
+    """
+    n = rec.used[0]
+    if n >= rec.used[1] or rec.kind[n] == FLIGHT or rec.kind[n] // 2 != start_switch:
+        return -1, 0.0, -1
+    for a in range(panel.active.size):
+        for i in range(panel.F.shape[1]):
+            panel.output[a, i] = rec.depth[n, panel.active[a], i]
+        if largest(panel.output, a) == 0.0:
+            return -1, 0.0, -1
+    kind, h, event = rec.kind[n], rec.duration[n], rec.event[n]
+    if h > h_max or (event < 0 and h > 0.98 * h_max):
+        return kind, h_max, -1
+    return kind, h, event
+
+
+@inner
+def keep_profile(tab, kind, new_kind, ratio, panel, guess):
+    """Carry all penetrations over to a panel `ratio` times as long."""
+    for a in range(panel.active.size):
+        stretch_profile(tab, kind, new_kind, ratio, panel.output[a], guess)
+        top = 0.0
+        for i in range(guess.size):
+            top = max(top, guess[i])
+        for i in range(guess.size):
+            panel.output[a, i] = max(guess[i], 1e-3 * top)
+
+
+@inner
+def time_to_event(fl, stop, closed, w, phase):
+    """Time (of either sign) to the instant at which a stop opens or closes in flight, or inf.
+
+    The nearer root of the parabola through the present; inf where the gap changes the wrong way.
+    """
+    always_inline()
+    value, speed, accel, _ = output_derivatives(fl, stop, w, phase, 0.0)
+    value -= fl.stops[stop, GAP]
+    if (speed >= 0.0) if closed else (speed <= 0.0):
+        return np.inf
+    square = speed * speed - 2.0 * accel * value
+    root = math.sqrt(square) if square > 0.0 else abs(speed)
+    return -2.0 * value / (speed + math.copysign(root, speed))
+
+
+@inner
+def coarsest_instant(fl):
+    """Largest error allowed in the instant of an event, as a share of a panel."""
+    found = 0.0
+    for s in range(fl.stops.shape[0]):
+        found = max(found, fl.stops[s, INSTANT])
+    return found
+
+
+@inner
+def at_switch(fl, stop, w, phase, allowed):
+    """Whether a stop is just at its surface, to within a time allowed or rounding."""
+    value, speed, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
+    reach = allowed * abs(speed) + 10.0 * output_noise(fl, stop, w)
+    return abs(value - fl.stops[stop, GAP]) <= reach
+
+
+@inner
+def with_event(fl, stop, w, phase, allowed, closed):
+    """Whether a stop is to open or close now, to within a time allowed or rounding."""
+    if not at_switch(fl, stop, w, phase, allowed):
+        return False
+    _, speed, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
+    return closed[stop] != (speed > 0.0)
+
+
+@inner
+def instant_with(fl, aim, w, phase, h, closed):
+    """Error allowed in the instant at which a stop and others with it open or close."""
+    allowed = fl.stops[aim, INSTANT] * h
+    for s in range(closed.size):
+        share = fl.stops[s, INSTANT] * h
+        if share < allowed and with_event(fl, s, w, phase, 10.0 * coarsest_instant(fl) * h, closed):
+            allowed = share
+    return allowed
+
+
+@inner
+def stop_at_switch(fl, w, phase, h, closed):
+    """Stop that is to open or close now, to within a share of a length h of time, or -1."""
+    stop, nearest = -1, np.inf
+    allowed = 10.0 * coarsest_instant(fl) * h
+    for s in range(closed.size):
+        late = abs(time_to_event(fl, s, closed[s], w, phase))
+        gap = abs(distance(fl, s, w, phase))
+        here = late <= allowed or gap <= 10.0 * output_noise(fl, s, w)
+        if late < nearest and here:
+            stop, nearest = s, late
+    return stop
+
+
+@inner
+def graded_length(fl, active, w, phase, h, sign, switched, event):
+    """Longest panel on which the slopes of stops that closed a little before (sign 1) are smooth.
+
+    With sign -1 the same at the end of a panel, of stops that open a little after it, `event` left
+    out. A law with a power that is not whole is singular at its switch; at a distance τ from it,
+    4 τ is a length on which Legendre coefficients fall by 2.6 from one to the next (Bernstein's
+    ellipse). Where a map has its nodes crowded there (switched), a switch within the error allowed
+    in its instant does not count.
+    """
+    longest = np.inf
+    for a in range(active.size):
+        s = active[a]
+        if s == event or not singular_slope(fl, s):
+            continue
+        value, speed, accel, _ = output_derivatives(fl, s, w, phase, 0.0)
+        delta = value - fl.stops[s, GAP]
+        if delta <= 10.0 * output_noise(fl, s, w):
+            continue
+        if accel > 0.0 and speed * speed < 2.0 * accel * delta:  # it nearly opens: a complex pair
+            away = math.sqrt(2.0 * delta / accel)
+        elif sign * speed > 0.0:
+            away = delta / abs(speed)
+        else:
+            continue
+        if not switched or away > 10.0 * fl.stops[s, INSTANT] * h:
+            longest = min(longest, 4.0 * away)
+    return longest
+
+
+@inner
+def far_off(fl, phase, w, h, tried, panel, event, where):
+    """Whether a panel holds another solution of the force laws than the motion.
+
+    It opens a stop at once that is not about to, or lets one feed as much as it should damp.
+    """
+    if event < 0:
+        return not panel.decay[1].min() > -DECAY
+    allowed = 10.0 * coarsest_instant(fl) * h
+    return not (h * where > 1e-12 * tried or at_switch(fl, event, w, phase, allowed))
+
+
+@inner
+def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec):
+    """Solve one panel and choose its length, at most h_max, and h_mapped to aim at an event.
+
+    Returns (status, kind, h, event): a panel that ends where stop `event` opens or closes, or
+    (event = -1) one short enough to be resolved.
+    """
+    active = panel.active
+    panel.kept[0] = False
+    guess = np.empty(tab.nodes.size)
+    rounding = np.empty(panel.output.shape[0])
+    for a in range(active.size):
+        rounding[a] = output_noise(fl, active[a], w)  # events are found in the state
+    for o in range(active.size, rounding.size):
+        rounding[o] = rate_noise(fl, active[o - active.size], w)
+    noise = rounding.copy()
+    smooth, switch = 2 * start_switch, 2 * start_switch + 1
+    limit = h_max
+    kind, h, aim = remembered_panel(rec, start_switch, h_max, panel)
+    if kind < 0:
+        kind, h = guess_panel(fl, tab, phase, w, limit, h_mapped, start_switch, panel)
+    graded = graded_length(fl, active, w, phase, h, 1.0, start_switch == 1, -1)
+    if h > 1.5 * graded:
+        aim = -1
+        kind, h = guess_panel(fl, tab, phase, w, graded, h_mapped, start_switch, panel)
+    tried = h
+    looked = False
+    for attempt in range(100):
+        if h <= 1e-16 * tried or phase + fl.omega * h == phase:
+            if aim < 0 or not at_switch(fl, aim, w, phase, 10.0 * coarsest_instant(fl) * tried):
+                aim = stop_at_switch(fl, w, phase, tried, closed)
+            return OK if aim >= 0 else CONTACT_FAILED, kind, 0.0, aim
+        for a in range(active.size):
+            more = carried_noise(fl, active[a], w, phase, panel.depth[0, a], h)
+            panel.depth[3, a] = panel.depth[1, a] + more
+            noise[a] = min(panel.depth[3, a], rounding[a])
+        found = solve_panel(fl, tab, kind, phase, w, h, noise, panel)
+        if found:
+            decays = shows_decay(fl, tab, kind, h, panel)
+            panel_end(fl, tab, kind, phase, w, h, panel, w_end)
+            event, where, doubtful = first_event(fl, tab, kind, phase, w, h, closed, panel, w_end)
+            found = not far_off(fl, phase, w, h, tried, panel, event, where)
+        if not found:
+            limit = 0.4 * min(h, tried)
+            aim = -1
+            kind, h = guess_panel(fl, tab, phase, w, limit, h_mapped, start_switch, panel)
+            tried = h
+            continue
+        end_phase = phase + fl.omega * h
+        fine = decays and resolved(fl, tab, kind, h, rounding, panel)
+        if fine:
+            to_switch = kind % 2 == 1
+            fine = h <= 1.5 * graded_length(
+                fl, active, w_end, end_phase, h, -1.0, to_switch, aim if to_switch else -1
+            )
+        if 1e-6 < doubtful < 1.0 - 1e-6 and not looked:  # the state at the end of a panel is exact
+            looked = True
+            keep_profile(tab, kind, smooth, doubtful, panel, guess)
+            kind, aim = smooth, -1
+            h *= doubtful
+            continue
+        near_end = 1e-3
+        if event >= 0 and event != aim:  # so near that `switch_with` will find it
+            near_end = max(min(5.0 * fl.stops[event, INSTANT], 1e-7), 1e-12)
+        at_end = where > 1.0 - near_end
+        lost = attempt % 20 == 19  # the instant that is aimed at goes to and fro
+        if event >= 0 and (aim < 0 or not at_end) and not lost:
+            goal = switch
+            aim = event
+            if h * where > h_mapped:  # half the way first
+                goal, aim, where = smooth, -1, 0.5 * where
+            keep_profile(tab, kind, goal, where, panel, guess)
+            kind = goal
+            h *= where
+            continue
+        if aim < 0 and kind % 2 == 1 and h < h_max:  # a release was expected here: follow it
+            for a in range(active.size):
+                if (
+                    aim < 0
+                    and time_to_event(fl, active[a], closed[active[a]], w_end, end_phase) < h
+                ):
+                    aim = active[a]
+        if aim >= 0 and not lost:
+            dh = time_to_event(fl, aim, closed[aim], w_end, end_phase)
+            if abs(dh) <= instant_with(fl, aim, w_end, end_phase, h, closed) or (
+                dh < np.inf and abs(distance(fl, aim, w_end, end_phase)) <= output_noise(fl, aim, w)
+            ):
+                if fine:
+                    return OK, kind, h, aim
+            elif -0.5 * h < dh < h and (dh < 0.0 or h < h_max):
+                h = min(h + dh, h_max)
+                continue
+            elif dh > 0.0 and fine:  # the contact goes on
+                return OK, kind, h, -1
+        elif fine and not lost:
+            return OK, kind, h, -1
+        aim = -1
+        keep_profile(tab, kind, smooth, 0.5, panel, guess)
+        kind = smooth
+        h *= 0.5
+    return CONTACT_FAILED, kind, h, -1
+
+
+@inner
+def lost_to_rounding(fl, stop, w, peak, noise):
+    """Share of the speed at a stop that rounding of the penetration costs in a contact so deep."""
+    if peak <= 0.0:
+        return 0.0
+    p = fl.stops[stop, EXPONENT]
+    rate = fl.stops[stop, STIFFNESS] * fl.stops[stop, MOBILITY]
+    impact_speed = math.sqrt(2.0 * rate * peak ** (p + 1.0) / (p + 1.0))
+    speed = impact_speed + output_size(fl, stop, w, 0) * fl.omega
+    for j in range(w.size):
+        speed += abs(fl.rows[1, stop, j] * w[j])
+    return noise / peak * impact_speed / speed

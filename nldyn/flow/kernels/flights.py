@@ -1,0 +1,509 @@
+"""Motion between contacts in closed form, and the search for the first contact."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from nldyn.flow.kernels.compiling import always_inline, inner, never_inline
+from nldyn.flow.kernels.layout import GAP, MOST_STEPS, FlowData
+from nldyn.system.linear import NEAR
+
+
+@inner
+def block_exponential(block, t):
+    """The four entries of exp(block t), row by row (also for equal or zero eigenvalues)."""
+    mean = 0.5 * (block[0, 0] + block[1, 1])
+    half = 0.5 * (block[0, 0] - block[1, 1])
+    square = half * half + block[0, 1] * block[1, 0]
+    if square < 0.0:
+        rate = math.sqrt(-square)
+        size = math.exp(mean * t)
+        even = size * math.cos(rate * t)
+        odd = size * math.sin(rate * t) / rate
+    else:
+        rate = math.sqrt(square)
+        if abs(rate * t) < 1.0:
+            size = math.exp(mean * t)
+            even = size * math.cosh(rate * t)
+            odd = size * (math.sinh(rate * t) / rate if rate > 0.0 else t)
+        else:
+            up, down = math.exp((mean + rate) * t), math.exp((mean - rate) * t)
+            even = 0.5 * (up + down)
+            odd = 0.5 * (up - down) / rate
+    return even + odd * half, odd * block[0, 1], odd * block[1, 0], even - odd * half
+
+
+@inner
+def there_and_back(block, t):
+    """The four entries of exp(block t), those of exp(-block t), the diagonal of exp(block t) - 1.
+
+    The last has its own precision, also where it is small.
+    """
+    mean = 0.5 * (block[0, 0] + block[1, 1])
+    half = 0.5 * (block[0, 0] - block[1, 1])
+    square = half * half + block[0, 1] * block[1, 0]
+    rate = math.sqrt(abs(square))
+    less = math.expm1(mean * t)
+    size = 1.0 + less if less > -0.5 else math.exp(mean * t)
+    if square >= 0.0:
+        e00, e01, e10, e11 = block_exponential(block, t)
+        i00, i01, i10, i11 = block_exponential(block, -t)
+        s, c = math.sinh(0.5 * rate * t), math.cosh(0.5 * rate * t)
+        swing, a = 2.0 * s * s, half * (2.0 * s * c / rate if rate > 0.0 else t)
+        d00, d11 = less + size * (swing + a), less + size * (swing - a)
+        return e00, e01, e10, e11, i00, i01, i10, i11, d00, d11
+    s, c = math.sin(0.5 * rate * t), math.cos(0.5 * rate * t)
+    swing, odd = -2.0 * s * s, 2.0 * s * c / rate  # cos - 1, sin / rate
+    even = 1.0 + swing
+    a, b, c, d = odd * half, odd * block[0, 1], odd * block[1, 0], 1.0 / size
+    return (
+        size * (even + a), size * b, size * c, size * (even - a),
+        d * (even - a), -d * b, -d * c, d * (even + a),
+        less + size * (swing + a), less + size * (swing - a),
+    )  # fmt: skip
+
+
+@inner
+def turned(phase):
+    """e^{i phase}."""
+    return complex(math.cos(phase), math.sin(phase))
+
+
+@inner
+def from_rest(rate, t):
+    """∫ exp(rate u) du from 0 to t for a complex rate, to full precision also where it is small."""
+    x, y = rate.real * t, rate.imag * t
+    square = x * x + y * y
+    if square < 1e-18:
+        return complex(t + 0.5 * t * x, 0.5 * t * y)
+    half, size = math.sin(0.5 * y), math.expm1(x)
+    real = size * math.cos(y) - 2.0 * half * half
+    imag = (size + 1.0) * math.sin(y)
+    share = t / square
+    return complex((real * x + imag * y) * share, (imag * x - real * y) * share)
+
+
+@inner
+def growth(rate, omega, phase):
+    """Solution of e' = rate e + e^{iωt} at rest at phase zero, and e^{iωt}, for a rate near iω.
+
+    e = (e^{rate t} - e^{iωt})/(rate - iω) without its cancellation; at resonance e = t e^{iωt}.
+    """
+    never_inline()
+    turn = turned(phase)
+    return turn * from_rest(rate - 1j * omega, phase / omega), turn
+
+
+@inner
+def growth_by_omega(rate, omega, phase):
+    """Derivative of `growth` with respect to ω at a fixed phase.
+
+    With off = rate - iω it is e^{iφ} ∫ exp(off u) du from 0 to t = φ/ω, and its derivative
+    -e^{iφ} (i ∫ u exp(off u) du + exp(off t) t/ω).
+    """
+    never_inline()
+    e, turn = growth(rate, omega, phase)
+    t = phase / omega
+    off = rate - 1j * omega
+    x = off * t
+    end = turned(x.imag) * math.exp(x.real)
+    if abs(x) > 1.0:
+        by_rate = (t * end * turn - e) / off
+    else:
+        series, power = 0.0 * x, turn * (t * t)
+        for j in range(18):
+            series += power / (j + 2)
+            power *= x / (j + 1)
+        by_rate = series
+    return -1j * by_rate - end * turn * (t / omega)
+
+
+@inner
+def swelling(near, forced, omega, out, phase):
+    """Value, two time derivatives, and bound of the third over a period, of an output's growth.
+
+    e grows by at most the time that passes, since no eigenvalue grows.
+    """
+    never_inline()
+    value, first, second, bound = 0.0, 0.0, 0.0, 0.0
+    for k in range(near.size):
+        share, rate = forced[1 + k, 0, out], near[k]
+        e, turn = growth(rate, omega, phase)
+        size, later = abs(rate), abs(e) + 2.0 * math.pi / omega
+        value += (share * e).real
+        e = rate * e + turn
+        first += (share * e).real
+        second += (share * (rate * e + 1j * omega * turn)).real
+        bound += abs(share) * (size * size * (size * later + 1.0) + omega * (size + omega))
+    return value, first, second, bound
+
+
+@inner
+def swollen(near, forced, omega, out, phase, t):
+    """Change of an output's growth in a time t from a phase on, to its own precision."""
+    never_inline()
+    change = 0.0
+    for k in range(near.size):
+        rate = near[k]
+        e, turn = growth(rate, omega, phase)
+        fresh = turn * turned(omega * t) * from_rest(rate - 1j * omega, t)
+        change += (forced[1 + k, 0, out] * (e * rate * from_rest(rate, t) + fresh)).real
+    return change
+
+
+@inner
+def add_swelling_by(near, forced, omega, out, phase, t, rate, factor, sums):
+    """Add the derivatives of an output's growth, or its rate's, at time t after a fixed phase.
+
+    sums (n_columns,) ends with the columns of the parameters and of ω, as in `panel_columns`.
+    """
+    never_inline()
+    last = sums.size - 1
+    first = sums.size + 1 - forced.shape[1]
+    for k in range(near.size):
+        e, turn = growth(near[k], omega, phase)
+        e1 = near[k] * e + turn
+        d = growth_by_omega(near[k], omega, phase) + e1 * (t / omega)
+        if rate:
+            e, d = e1, near[k] * d + 1j * t * turn
+        sums[last] += factor * (forced[1 + k, 1, out] * e + forced[1 + k, 0, out] * d).real
+        for c in range(first, last):
+            sums[c] += factor * (forced[1 + k, 2 + c - first, out] * e).real
+
+
+@inner
+def add_growth(near, response, omega, phase, sign, w, columns):
+    """Add sign times the growth to the state w (2n,) and its derivatives to its last columns."""
+    never_inline()
+    last = columns.shape[1] - 1
+    first = columns.shape[1] + 1 - response.shape[1]
+    for k in range(near.size):
+        e, _ = growth(near[k], omega, phase)
+        d = sign * growth_by_omega(near[k], omega, phase)
+        e *= sign
+        for i in range(w.size):
+            w[i] += (response[1 + k, 0, i] * e).real
+            columns[i, last] += (response[1 + k, 1, i] * e + response[1 + k, 0, i] * d).real
+            for c in range(first, last):
+                columns[i, c] += (response[1 + k, 2 + c - first, i] * e).real
+
+
+@inner
+def output_derivatives(fl, out, w, phase, t):
+    """Value and first two time derivatives of output `out`, and a bound on the third, after t.
+
+    The bound holds for one excitation period at least.
+    """
+    always_inline()
+    turn = fl.forced[0, 0, out] * turned(phase + fl.omega * t)
+    value = turn.real
+    first = -fl.omega * turn.imag
+    second = -fl.omega * fl.omega * turn.real
+    bound = abs(turn) * fl.omega**3
+    for b in range(fl.blocks.shape[0]):
+        j = 2 * b
+        x, y = w[j], w[j + 1]
+        if t != 0.0:
+            e00, e01, e10, e11 = block_exponential(fl.blocks[b], t)
+            x, y = e00 * x + e01 * y, e10 * x + e11 * y
+        value += fl.rows[0, out, j] * x + fl.rows[0, out, j + 1] * y
+        first += fl.rows[1, out, j] * x + fl.rows[1, out, j + 1] * y
+        second += fl.rows[2, out, j] * x + fl.rows[2, out, j + 1] * y
+        if fl.blocks[b, 0, 1] == 0.0 and fl.blocks[b, 1, 0] == 0.0:  # two decays
+            bound += fl.bound3[out, j] * abs(x) + fl.bound3[out, j + 1] * abs(y)
+        else:
+            size = math.hypot(fl.bound3[out, j], fl.bound3[out, j + 1])
+            bound += size * math.hypot(x, y)
+    if fl.near.size > 0:
+        s, s1, s2, s3 = swelling(fl.near, fl.forced, fl.omega, out, phase + fl.omega * t)
+        value += s
+        first += s1
+        second += s2
+        bound += s3
+    return value, first, second, bound
+
+
+@inner
+def distance(fl, stop, w, phase):
+    """Penetration of a stop, negative when it is open."""
+    always_inline()
+    value, _, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
+    return value - fl.stops[stop, GAP]
+
+
+@inner
+def output_size(fl, out, w, order):
+    """Sum of the sizes of an output's terms (order 0), or of those of its rate (order 1)."""
+    pace = fl.omega if order == 1 else 1.0
+    total = abs(fl.forced[0, 0, out]) * pace
+    for k in range(fl.near.size):
+        total += abs(fl.forced[1 + k, 0, out]) * (2.0 * math.pi / fl.omega) * pace
+    for j in range(w.size):
+        total += abs(fl.rows[order, out, j] * w[j])
+    return total
+
+
+@inner
+def output_noise(fl, out, w):
+    """Rounding error to expect in an output: 4 units in the last place of its terms."""
+    return 1e-15 * output_size(fl, out, w, 0)
+
+
+@inner
+def rate_noise(fl, out, w):
+    """The same in the output's rate."""
+    return 1e-15 * output_size(fl, out, w, 1)
+
+
+@inner
+def carried_noise(fl, stop, w, phase, depth, h):
+    """The same in a penetration that is carried on from a depth over a time h."""
+    change = abs(fl.forced[0, 0, stop]) * fl.omega * h
+    for k in range(fl.near.size):
+        e, _ = growth(fl.near[k], fl.omega, phase)
+        change += h * abs(fl.forced[1 + k, 0, stop]) * (abs(fl.near[k] * e) + 1.0)
+    for j in range(w.size):
+        change += h * (abs(fl.rows[1, stop, j]) + h * abs(fl.rows[2, stop, j])) * abs(w[j])
+    return 1e-15 * (abs(depth) + change)
+
+
+@inner
+def fastest_moved(blocks, force):
+    """Largest |eigenvalue|, in 1/s, of the blocks that stops move by more than rounding."""
+    fastest, least = 0.0, 0.0
+    if force.size > 0:
+        least = 1e-14 * np.abs(force).max()
+    for b in range(blocks.shape[0]):
+        if not np.abs(force[2 * b : 2 * b + 2]).sum() > least:
+            continue
+        block = blocks[b]
+        mean = 0.5 * (block[0, 0] + block[1, 1])
+        square = 0.25 * (block[0, 0] - block[1, 1]) ** 2 + block[0, 1] * block[1, 0]
+        rate = math.sqrt(abs(square))
+        fastest = max(fastest, math.hypot(mean, rate) if square < 0.0 else abs(mean) + rate)
+    return fastest
+
+
+@inner
+def safe_step(h, h1, h2, bound):
+    """First positive root of h + h1 τ + h2 τ²/2 + bound τ³/6, for h <= 0.
+
+    No function with these derivatives and a third derivative below `bound` reaches zero sooner.
+    """
+    if h >= 0.0 and (h1 > 0.0 or (h1 == 0.0 and h2 > 0.0)):
+        return 0.0
+    if bound <= 0.0:  # a parabola
+        if h >= 0.0:
+            return -2.0 * h1 / h2 if h2 > 0.0 else np.inf
+        square = h1 * h1 - 2.0 * h * h2
+        top = h1 + math.sqrt(square) if square >= 0.0 else 0.0
+        return -2.0 * h / top if top > 0.0 else np.inf
+    if h >= 0.0:
+        # leave the root at zero out: h1 + h2 τ/2 + bound τ²/6 = 0
+        return (-0.5 * h2 + math.sqrt(0.25 * h2 * h2 - 2.0 / 3.0 * bound * h1)) * 3.0 / bound
+    turning = h2 * h2 - 2.0 * bound * h1
+    tau = -1.0
+    if h2 < 0.0 and h1 > 0.0 and turning >= 0.0:
+        top = 2.0 * h1 / (-h2 + math.sqrt(turning))
+        if h + top * (h1 + top * (0.5 * h2 + top * bound / 6.0)) >= 0.0:
+            tau = 0.0  # the root lies on the concave rise before the top: Newton from the left
+    if tau < 0.0:  # beyond the inflection: Newton from an upper bound of all roots
+        tau = 2.0 * max(
+            3.0 * abs(h2) / bound,
+            max(math.sqrt(6.0 * abs(h1) / bound), (6.0 * abs(h) / bound) ** (1.0 / 3.0)),
+        )
+    for _ in range(60):
+        p = h + tau * (h1 + tau * (0.5 * h2 + tau * bound / 6.0))
+        p1 = h1 + tau * (h2 + 0.5 * tau * bound)
+        if p1 <= 0.0:
+            break
+        step = p / p1
+        tau -= step
+        if abs(step) <= 1e-15 * tau:
+            break
+    return max(tau, 0.0)
+
+
+@inner
+def closing_time(fl, stop, w, phase, start, end, shortest):
+    """First time in [start, end] at which a stop closes, or inf; no contact is passed over.
+
+    Every step is bounded by the third derivative, so that it cannot cross a contact; the steps
+    converge to the contact at order three. Only contacts that are shorter than `shortest` or no
+    deeper than rounding can be stepped over, and only where the approach is so slow that the
+    acceleration stops it in that time. Negative if it takes too many steps.
+    """
+    longest = 2.0 * math.pi / fl.omega
+    noise = output_noise(fl, stop, w)
+    t = start
+    for _ in range(MOST_STEPS):
+        if t > end:
+            return np.inf
+        value, h1, h2, bound = output_derivatives(fl, stop, w, phase, t)
+        h = value - fl.stops[stop, GAP]
+        if h >= 0.0 and h1 > 0.0:
+            return t
+        tau = safe_step(min(h, 0.0), h1, h2, bound)
+        if tau < shortest:
+            if h1 > 0.0 and h + h1 * shortest >= 0.0:
+                return min(t + max(tau, 0.0), end)
+            tau = max(shortest, safe_step(min(h, 0.0) - noise, h1, h2, bound))
+        t += min(tau, longest)
+    return -1.0
+
+
+@inner
+def fly_state(blocks, w, t):
+    """Advance a state (2n,) in place by a flight of duration t."""
+    for b in range(blocks.shape[0]):
+        e00, e01, e10, e11 = block_exponential(blocks[b], t)
+        x, y = w[2 * b], w[2 * b + 1]
+        w[2 * b], w[2 * b + 1] = e00 * x + e01 * y, e10 * x + e11 * y
+
+
+@inner
+def swung(turn, angle):
+    """Change of a complex number as it turns by an angle, to its own precision."""
+    s, c = math.sin(0.5 * angle), math.cos(0.5 * angle)
+    return turn * complex(-2.0 * s * s, 2.0 * s * c)
+
+
+@inner
+def flown(fl, stop, phase, w, t):
+    """Change of a penetration in a flight of duration t from the state w, to its own precision."""
+    value = (fl.forced[0, 0, stop] * swung(turned(phase), fl.omega * t)).real
+    value += swollen(fl.near, fl.forced, fl.omega, stop, phase, t)
+    for b in range(fl.blocks.shape[0]):
+        j = 2 * b
+        _, e01, e10, _, _, _, _, _, d00, d11 = there_and_back(fl.blocks[b], t)
+        value += fl.rows[0, stop, j] * (d00 * w[j] + e01 * w[j + 1])
+        value += fl.rows[0, stop, j + 1] * (e10 * w[j] + d11 * w[j + 1])
+    return value
+
+
+@inner
+def fly(fl, columns, t):
+    """Advance sensitivities (2n, n_columns) in place by a flight of duration t."""
+    for b in range(fl.blocks.shape[0]):
+        e00, e01, e10, e11 = block_exponential(fl.blocks[b], t)
+        for c in range(columns.shape[1]):
+            x, y = columns[2 * b, c], columns[2 * b + 1, c]
+            columns[2 * b, c] = e00 * x + e01 * y
+            columns[2 * b + 1, c] = e10 * x + e11 * y
+
+
+@inner
+def forced_output(fl, out, phase):
+    """Response of an output to the excitation at a forcing phase."""
+    value, _, _, _ = swelling(fl.near, fl.forced, fl.omega, out, phase)
+    return value + (fl.forced[0, 0, out] * turned(phase)).real
+
+
+@inner
+def add_rates(blocks, w, rate):
+    """Add the rates of change of w (2n,) in free vibration."""
+    for b in range(blocks.shape[0]):
+        for i in range(2):
+            for j in range(2):
+                rate[2 * b + i] += blocks[b, i, j] * w[2 * b + j]
+
+
+@inner
+def free_output(fl, out, w, t):
+    """Output of the homogeneous state w after a flight of duration t."""
+    value = 0.0
+    for b in range(fl.blocks.shape[0]):
+        j = 2 * b
+        e00, e01, e10, e11 = block_exponential(fl.blocks[b], t)
+        value += fl.rows[0, out, j] * (e00 * w[j] + e01 * w[j + 1])
+        value += fl.rows[0, out, j + 1] * (e10 * w[j] + e11 * w[j + 1])
+    return value
+
+
+@inner
+def near_rate(block, omega):
+    """Eigenvalue λ of a block with |λ - iω| < NEAR ω, or zero."""
+    mean = 0.5 * (block[0, 0] + block[1, 1])
+    half = 0.5 * (block[0, 0] - block[1, 1])
+    square = half * half + block[0, 1] * block[1, 0]
+    rate = math.sqrt(abs(square))
+    near = square < 0.0 and math.hypot(mean, rate - omega) < NEAR * omega
+    return complex(mean, rate) if near else complex(0.0, 0.0)
+
+
+@inner
+def respond(blocks, omega, x, row, response):
+    """Fill a row of `FlowData.response` with what an excitation x (2n,) brings about.
+
+    That is (iω - A)⁻¹ x, but for a block with a near eigenvalue λ. There x falls into its parts
+    along the two eigenvectors: that of λ is the drive of the growth, that of its conjugate has a
+    steady response.
+    """
+    k = 0
+    for b in range(blocks.shape[0]):
+        block = blocks[b]
+        i, j = 2 * b, 2 * b + 1
+        u, v = x[i], x[j]
+        rate = near_rate(block, omega)
+        if rate.imag > 0.0:
+            k += 1
+            half = 0.5 * (block[0, 0] - block[1, 1])
+            p = 0.5 * u - 0.5j * (half * u + block[0, 1] * v) / rate.imag
+            q = 0.5 * v - 0.5j * (block[1, 0] * u - half * v) / rate.imag
+            for c in range(x.size):
+                response[k, row, c] = 0.0
+            response[k, row, i], response[k, row, j] = p, q
+            away = complex(-rate.real, omega + rate.imag)
+            response[0, row, i], response[0, row, j] = (u - p) / away, (v - q) / away
+        else:
+            m00, m01 = 1j * omega - block[0, 0], -block[0, 1]
+            m10, m11 = -block[1, 0], 1j * omega - block[1, 1]
+            det = m00 * m11 - m01 * m10
+            response[0, row, i] = (m11 * u - m01 * v) / det
+            response[0, row, j] = (m00 * v - m10 * u) / det
+
+
+@inner
+def at_frequency(system, omega, parameters, drive_by):
+    """Numbers of the system at an excitation frequency (rad/s), see `shoot`."""
+    blocks, rows, drive = system.blocks, system.rows, system.drive
+    near = np.empty(blocks.shape[0], dtype=np.complex128)
+    k = 0
+    for b in range(blocks.shape[0]):
+        near[k] = near_rate(blocks[b], omega)
+        if near[k].imag > 0.0:
+            k += 1
+    x = np.empty(drive.shape[1], dtype=np.complex128)
+    response = np.empty((1 + k, 2 + parameters.shape[0], x.size), dtype=np.complex128)
+    for row in range(response.shape[1]):
+        for i in range(x.size):
+            if row == 0:
+                x[i] = drive[0, i] + omega * omega * drive[1, i]
+            elif row == 1:
+                x[i] = 2.0 * omega * drive[1, i] - 1j * response[0, 0, i]
+            else:
+                x[i] = drive_by[row - 2, 0, i] + omega * omega * drive_by[row - 2, 1, i]
+        respond(blocks, omega, x, row, response)
+    forced = np.zeros((1 + k, response.shape[1], rows.shape[1]), dtype=np.complex128)
+    for p in range(1 + k):
+        for row in range(response.shape[1]):
+            for out in range(rows.shape[1]):
+                for i in range(x.size):
+                    forced[p, row, out] += rows[0, out, i] * response[p, row, i]
+    return FlowData(
+        blocks,
+        rows,
+        system.bound3,
+        system.force,
+        system.stops,
+        system.laws,
+        near[:k],
+        response,
+        forced,
+        parameters,
+        omega,
+        system.tail,
+        system.node_angle,
+    )

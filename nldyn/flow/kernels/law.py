@@ -1,0 +1,98 @@
+"""The force of a stop and its derivatives."""
+
+from __future__ import annotations
+
+import math
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from nldyn.flow.kernels.compiling import inner
+from nldyn.flow.kernels.layout import DISSIPATION, EXPONENT, GAP, ROUND, STIFFNESS
+
+
+@intrinsic
+def call_law(typing, address, delta, speed):
+    """Call ``void law(double delta, double speed, double out[3])`` at an address."""
+    signature = types.UniTuple(types.float64, 3)(types.int64, types.float64, types.float64)
+
+    def codegen(context, builder, signature, arguments):
+        double = ir.DoubleType()
+        kind = ir.FunctionType(ir.VoidType(), [double, double, double.as_pointer()])
+        function = builder.inttoptr(arguments[0], kind.as_pointer())
+        out = cgutils.alloca_once(builder, double, size=3)
+        builder.call(function, [arguments[1], arguments[2], out])
+        values = [builder.load(cgutils.gep_inbounds(builder, out, i)) for i in range(3)]
+        return context.make_tuple(builder, signature.return_type, values)
+
+    return signature, codegen
+
+
+@inner
+def law(fl, stop, delta, speed):
+    """Contact force and its derivatives with respect to penetration and speed."""
+    if delta <= 0.0:
+        return 0.0, 0.0, 0.0
+    if fl.laws[stop] != 0:
+        return call_law(fl.laws[stop], delta, speed)
+    exponent = fl.stops[stop, EXPONENT]
+    slope = fl.stops[stop, STIFFNESS]
+    if exponent == 1.5:
+        slope *= math.sqrt(delta)
+    elif exponent != 1.0:
+        slope *= delta ** (exponent - 1.0)
+    loss = fl.stops[stop, DISSIPATION]
+    factor = 1.0 + loss * speed
+    return slope * delta * factor, exponent * slope * factor, loss * slope * delta
+
+
+@inner
+def closed_law(fl, stop, delta, speed):
+    """The same within a panel on which the stop is closed.
+
+    There a law whose slope sets in almost at once goes on beyond the switch, as an odd function:
+    the outermost node may come to lie on its other side, and would drop the whole stiffness.
+    """
+    if delta < 0.0 and fl.stops[stop, EXPONENT] < ROUND:
+        force, stiffness, viscosity = law(fl, stop, -delta, speed)
+        return -force, stiffness, -viscosity
+    return law(fl, stop, delta, speed)
+
+
+@inner
+def depends_on_speed(fl, stop):
+    """Whether a force depends on the speed of penetration, as far as one knows."""
+    return fl.laws[stop] != 0 or fl.stops[stop, DISSIPATION] != 0.0
+
+
+@inner
+def needs_speed(fl, stop):
+    """Whether a force depends on the speed, or is to be differentiated by what makes it do so."""
+    needed = depends_on_speed(fl, stop)
+    for c in range(fl.parameters.shape[0]):
+        wanted = fl.parameters[c, 0] == DISSIPATION and fl.parameters[c, 1] == stop
+        needed = needed or wanted
+    return needed
+
+
+@inner
+def law_by(fl, stop, column, delta, speed):
+    """Derivative of a stop's force with respect to its own number in a column of `stops`."""
+    force, slope, _ = closed_law(fl, stop, delta, speed)
+    if column == GAP:
+        return -slope
+    if column == STIFFNESS:
+        return force / fl.stops[stop, STIFFNESS]
+    if column == EXPONENT:
+        return force * math.log(delta) if delta > 0.0 else 0.0
+    factor = 1.0 + fl.stops[stop, DISSIPATION] * speed  # column == DISSIPATION
+    return speed * force / factor
+
+
+@inner
+def singular_slope(fl, stop):
+    """Whether the slope of a stop's force is singular at its switch."""
+    exponent = fl.stops[stop, EXPONENT]
+    return fl.laws[stop] != 0 or exponent != math.floor(exponent)

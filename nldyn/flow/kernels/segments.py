@@ -1,0 +1,326 @@
+"""Flights and contacts in turn through the segments of a motion."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from nldyn.flow.kernels.compiling import inlined, inner
+from nldyn.flow.kernels.contact import contact_panel, expected_contact, lost_to_rounding, with_event
+from nldyn.flow.kernels.flights import (
+    add_growth,
+    add_rates,
+    at_frequency,
+    closing_time,
+    distance,
+    fastest_moved,
+    fly,
+    fly_state,
+    growth,
+    output_derivatives,
+    output_noise,
+    turned,
+)
+from nldyn.flow.kernels.law import law
+from nldyn.flow.kernels.layout import (
+    CONTACT_FAILED,
+    DECAY,
+    FLIGHT,
+    GAP,
+    INSTANT,
+    OK,
+    RECORD_FULL,
+    ROUNDED,
+    TOO_MANY_PIECES,
+    TOO_MANY_STEPS,
+    WORST_ROUNDING,
+)
+from nldyn.flow.kernels.panel import new_panel, panel_columns, same_stops
+from nldyn.flow.kernels.resolution import at_end
+
+
+@inner
+def record_piece(fl, rec, before, phase, h, kind, event, w):
+    """Append a piece; return its index, or -1 when the record is full."""
+    n = rec.used[0]
+    if n >= rec.phase.size:
+        return -1
+    rec.phase[n] = before + phase
+    rec.duration[n] = h
+    rec.kind[n] = kind
+    rec.event[n] = event
+    turn = turned(phase)
+    for i in range(w.size):
+        rec.start[n, i] = w[i] + (fl.response[0, 0, i] * turn).real
+    for k in range(fl.near.size):
+        e, _ = growth(fl.near[k], fl.omega, phase)
+        for i in range(w.size):
+            rec.start[n, i] += (fl.response[1 + k, 0, i] * e).real
+    for a in range(rec.force.shape[1]):
+        for i in range(rec.force.shape[2]):
+            rec.force[n, a, i] = 0.0
+            rec.depth[n, a, i] = 0.0
+    rec.used[0] = n + 1
+    return n
+
+
+@inlined
+def propagate(
+    fl, tab, start, phase, duration, with_columns, rec, recording, end, jacobian, d_omega,
+    d_parameters, closings,
+):  # fmt: skip
+    """Carry a state over one segment.
+
+    Parameters
+    ----------
+    fl : FlowData
+        Numbers of the system.
+    tab : GaussTables
+        Collocation tables.
+    start : (2n,)
+        State z at the start.
+    phase, duration : float
+        Forcing phase at the start; duration in s. The duration follows the frequency
+        (fixed phase), and the derivative with respect to ω takes that into account.
+    with_columns : bool
+        Whether to carry sensitivities.
+    rec, recording : Record, bool
+        Where to record the pieces, and whether to.
+
+    end : (2n,)
+        Filled with the state at the end.
+    jacobian : (2n, 2n)
+        Filled with the derivative of the end with respect to the start, if wanted.
+    d_omega : (2n,)
+        Filled with the derivative of the end with respect to ω.
+    d_parameters : (2n, n_parameters)
+        Filled with the derivatives of the end with respect to the parameters.
+    closings : (n_stops,)
+        Increased by how often each stop closed.
+
+    Returns
+    -------
+    status : int
+    """
+    size = start.size
+    n_stops = fl.stops.shape[0]
+    before = 2.0 * math.pi * math.floor(phase / (2.0 * math.pi))  # whole turns cost digits
+    phase -= before
+    turn = turned(phase)
+    w = np.empty(size)
+    n_parameters = fl.parameters.shape[0]
+    last = size + n_parameters
+    columns = np.zeros((size, last + 1))
+    for i in range(size):
+        w[i] = start[i] - (fl.response[0, 0, i] * turn).real
+        columns[i, i] = 1.0
+        columns[i, last] = -(fl.response[0, 1, i] * turn).real
+        for c in range(n_parameters):
+            columns[i, size + c] = -(fl.response[0, 2 + c, i] * turn).real
+    add_growth(fl.near, fl.response, fl.omega, phase, -1.0, w, columns)
+    closed = np.zeros(n_stops, dtype=np.bool_)
+    for s in range(n_stops):
+        value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
+        left = output_noise(fl, s, w) if speed < 0.0 else 0.0  # it opens at this instant
+        closed[s] = value - fl.stops[s, GAP] > left
+    pushes = np.full(n_stops, np.nan)
+    status = run_pieces(
+        fl, tab, w, columns, phase, before, duration, closed, closings, with_columns, rec,
+        recording, pushes,
+    )  # fmt: skip
+    end_phase = phase + fl.omega * duration
+    turn = turned(end_phase)
+    rate = np.zeros(size)
+    add_rates(fl.blocks, w, rate)
+    for s in range(n_stops):
+        value, speed, _, _ = output_derivatives(fl, s, w, end_phase, 0.0)
+        force, _, _ = law(fl, s, value - fl.stops[s, GAP], speed)
+        if not np.isnan(pushes[s]):
+            force = pushes[s]
+        for i in range(size):
+            rate[i] -= fl.force[i, s] * force
+    add_growth(fl.near, fl.response, fl.omega, end_phase, 1.0, w, columns)
+    for i in range(size):
+        end[i] = w[i] + (fl.response[0, 0, i] * turn).real
+        d_omega[i] = columns[i, last] + (fl.response[0, 1, i] * turn).real
+        d_omega[i] -= rate[i] * (duration / fl.omega)
+        if with_columns:
+            for j in range(size):
+                jacobian[i, j] = columns[i, j]
+            for c in range(n_parameters):
+                d_parameters[i, c] = columns[i, size + c] + (fl.response[0, 2 + c, i] * turn).real
+    return status
+
+
+@inner
+def switch_with(fl, w, phase, h, closed, closings):
+    """Open and close the stops that do so at the very instant of another one's event.
+
+    Each to the small share of the length h of the panel before it to which it must be known.
+    """
+    for s in range(closed.size):
+        if with_event(fl, s, w, phase, 10.0 * fl.stops[s, INSTANT] * h, closed):
+            closed[s] = not closed[s]
+            if closed[s]:
+                closings[s] += 1
+
+
+@inlined
+def run_pieces(
+    fl, tab, w, columns, phase, before, duration, closed, closings, with_columns, rec, recording,
+    pushes,
+):  # fmt: skip
+    """Advance w and its sensitivities in place over a segment, piece by piece.
+
+    `before` is the phase of the whole turns before it, which only the record shows. `pushes`
+    (n_stops,) is filled with the forces at the end of stops that damp so strongly that they cannot
+    be told from the state there.
+    """
+    m = tab.nodes.size
+    n_stops = closed.size
+    fastest = fastest_moved(fl.blocks, fl.force)
+    # lengths of panels that resolve the fastest mode: the maps spread the nodes at one end
+    h_even = fl.node_angle * m / fastest if fastest > 0.0 else np.inf
+    h_mapped = 0.75 * h_even / tab.power
+    panel = new_panel(fl, m, w.size, np.empty(0, dtype=np.int64))
+    # 1.6e-11 periods of the excitation or of the fastest mode, but more than rounding of the time
+    shortest = max(1e-10 / max(fastest, fl.omega), 1e-15 * duration)
+    t = 0.0
+    start_switch = 1 if duration < 0.0 else 0  # written so that one version is compiled, not two
+    skip = 0.0
+    flight, none = (FLIGHT, -1) if duration >= 0.0 else (0, 0)  # as above
+    w_end = np.empty(w.size)
+    # penetrations that are carried from panel to panel, and their rounding errors
+    depth, doubt = np.zeros(n_stops), np.full(n_stops, np.inf)
+    for _ in range(20000):
+        remain = duration - t
+        if remain <= 0.0:
+            return OK
+        here = phase + fl.omega * t
+        pushes[:] = np.nan
+        active = np.empty(n_stops, dtype=np.int64)
+        n_active = 0
+        for s in range(n_stops):
+            if closed[s]:
+                active[n_active] = s
+                n_active += 1
+            else:
+                doubt[s] = np.inf
+        if n_active == 0:
+            first, stop = remain, none
+            for s in range(n_stops):
+                at = closing_time(fl, s, w, here, skip, first, shortest)
+                if at < 0.0:
+                    return TOO_MANY_STEPS
+                if at < first:
+                    first, stop = at, s
+            if recording and record_piece(fl, rec, before, here, first, flight, stop, w) < 0:
+                return RECORD_FULL
+            fly_state(fl.blocks, w, first)
+            if with_columns:
+                fly(fl, columns, first)
+            t = duration if stop < 0 else t + first
+            skip = 0.0
+            if stop >= 0:
+                closed[stop] = True
+                closings[stop] += 1
+                switch_with(fl, w, phase + fl.omega * t, 0.0, closed, closings)
+                start_switch = 1
+            continue
+        active = active[:n_active]
+        if not same_stops(active, panel.active):
+            panel = new_panel(fl, m, w.size, active)
+        if n_active == 1 and start_switch == 1:
+            peak, _, left = expected_contact(fl, active[0], w, here)
+            noise = output_noise(fl, active[0], w)
+            if lost_to_rounding(fl, active[0], w, peak, noise) > WORST_ROUNDING:
+                return ROUNDED
+            if peak <= 100.0 * noise:  # a touch without force
+                closed[active[0]] = False
+                closings[active[0]] -= 1
+                start_switch, skip = 0, max(left, shortest)
+                continue
+        h_max = min(remain, h_mapped if start_switch == 1 else h_even)
+        for a in range(n_active):
+            noise = output_noise(fl, active[a], w)
+            if doubt[active[a]] >= noise:  # the state knows it as well
+                value = distance(fl, active[a], w, here)
+                begins = start_switch == 1 and abs(value) <= noise
+                depth[active[a]] = 0.0 if begins else value
+                doubt[active[a]] = 0.0 if begins else noise
+            panel.depth[0, a], panel.depth[1, a] = depth[active[a]], doubt[active[a]]
+        status, kind, h, event = contact_panel(
+            fl, tab, here, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec
+        )
+        if status != OK:
+            return status
+        if h > 0.0:
+            if not np.isfinite(w_end.sum()):
+                return CONTACT_FAILED
+            if recording:
+                n = record_piece(fl, rec, before, here, h, kind, event, w)
+                if n < 0:
+                    return RECORD_FULL
+                for a in range(n_active):
+                    for i in range(m):
+                        rec.force[n, active[a], i] = panel.F[a, i]
+                        rec.depth[n, active[a], i] = panel.output[a, i]
+            for a in range(n_active):
+                if 1e-16 * panel.decay[1, a] > WORST_ROUNDING:
+                    return ROUNDED
+                panel.decay[0, a] += panel.decay[1, a]
+                if panel.decay[1, a] > DECAY:
+                    pushes[active[a]] = at_end(tab, panel.F, a)
+            if with_columns:
+                panel_columns(fl, tab, kind, here, t, h, panel, columns)
+            for k in range(w.size):
+                w[k] = w_end[k]
+            t = duration if h >= remain else t + h
+            for a in range(n_active):
+                depth[active[a]], doubt[active[a]] = panel.depth[2, a], panel.depth[3, a]
+        start_switch = 0
+        if event >= 0:
+            panel.decay[:] = 0.0
+            closed[event] = not closed[event]
+            start_switch = 1
+            if closed[event]:
+                closings[event] += 1
+            switch_with(fl, w, phase + fl.omega * t, h, closed, closings)
+            skip = shortest if h < shortest else 0.0
+    return TOO_MANY_PIECES
+
+
+@inlined
+def shoot(
+    system, tab, rec, recording, omega, nodes, phases, chained, with_columns, parameters, drive_by
+):
+    """Propagate each node (k, 2n) to the next phase; see `propagate` for what comes back.
+
+    When `chained`, only the first node is used and each segment starts where the last one ended.
+    Derivatives are also taken with respect to parameters (n, 2), see `FlowData`; drive_by
+    (n, 2, 2n) is the derivative of `SystemData.drive` with respect to each.
+    """
+    fl = at_frequency(system, omega, parameters, drive_by)
+    k = phases.size - 1
+    size = nodes.shape[1]
+    ends = np.zeros((k, size))
+    kept = k if with_columns else 1
+    jacobians = np.zeros((kept, size, size))
+    d_omegas = np.zeros((kept, size))
+    d_parameters = np.zeros((kept, size, parameters.shape[0]))
+    closings = np.zeros(system.stops.shape[0], dtype=np.int64)
+    rec.used[1] = rec.used[0] if recording else 0
+    rec.used[0] = 0
+    status = OK
+    for i in range(k):
+        start = ends[i - 1] if chained and i > 0 else nodes[i]
+        duration = (phases[i + 1] - phases[i]) / omega
+        j = i if with_columns else 0
+        status = propagate(
+            fl, tab, start, phases[i], duration, with_columns, rec, recording,
+            ends[i], jacobians[j], d_omegas[j], d_parameters[j], closings,
+        )  # fmt: skip
+        if status != OK:
+            break
+    return ends, jacobians, d_omegas, d_parameters, closings, status

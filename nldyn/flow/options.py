@@ -1,0 +1,124 @@
+"""How exactly a flow is computed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy.special import gamma, rgamma
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import SystemModelError, check_whole, is_finite, numbers, shown
+from nldyn.flow.kernels.layout import ROUND
+
+
+@dataclass(frozen=True)
+class FlowOptions:
+    """Accuracy of the flow map.
+
+    Parameters
+    ----------
+    rtol : float
+        Relative error to aim at in the state after a period, 1e-13 to 1e-2; that of the Jacobian
+        is about ten times as large. It sets the two others unless these are given.
+    nodes : int, optional
+        Gauss nodes on a contact panel, 4 to 40, and more where the exponent of a stop needs them;
+        the end of a panel is accurate to order 2 nodes.
+    tail : float, optional
+        A panel is halved until the last two Legendre coefficients of its force are below this
+        fraction of the largest force. The error at its end goes with the square.
+
+    Examples
+    --------
+    >>> FlowOptions(rtol=1e-6).panel_nodes
+    10
+    """
+
+    rtol: float = 1e-9
+    nodes: int | None = None
+    tail: float | None = None
+
+    def __post_init__(self) -> None:
+        if not (is_finite(self.rtol) and 1e-13 <= self.rtol <= 1e-2):
+            raise SystemModelError(
+                f"FlowOptions: rtol must lie between 1e-13 and 1e-2, got {shown(self.rtol)}"
+            )
+        if self.nodes is not None:
+            check_whole("FlowOptions: nodes", self.nodes, 4, 40)
+        if self.tail is not None and not (is_finite(self.tail) and 0.0 < self.tail < 1.0):
+            raise SystemModelError(
+                f"FlowOptions: tail must lie between 0 and 1, got {shown(self.tail)}"
+            )
+
+    @property
+    def panel_nodes(self) -> int:
+        """Gauss nodes on a panel: more for more digits, since panels converge spectrally."""
+        return self.nodes or round(2.0 - 4.0 / 3.0 * math.log10(self.rtol))
+
+    @property
+    def panel_tail(self) -> float:
+        """Legendre tail accepted on a panel."""
+        return self.tail or 0.3 * math.sqrt(self.rtol)
+
+    @property
+    def node_angle(self) -> float:
+        """Phase of the fastest mode from node to node of a panel, in rad.
+
+        Found by trials with up to 64 modes: with it, an undamped mode costs less than `rtol`, and
+        the Jacobian less than ten times that where a contact is 1e-4 of the period.
+        """
+        return 0.95 + 0.08 * (math.log10(self.rtol) + 9.0)
+
+    @property
+    def finer(self) -> FlowOptions:
+        """A setting whose errors are negligible beside those of this one."""
+        return FlowOptions(
+            max(1e-3 * self.rtol, 1e-13), min(self.panel_nodes + 4, 40), 0.03 * self.panel_tail
+        )
+
+    def instant(self, exponent: float) -> float:
+        """Error allowed in the instant of an event, as a share of the panel before it.
+
+        The slope of the force starts with the power ``exponent - 1`` of the time, so an error ε
+        of its start costs ε^exponent in the Jacobian. More than a millionth would make events of
+        two stops look simultaneous.
+        """
+        if exponent < ROUND:
+            return 1e-13
+        return min(float((1e-2 * self.rtol) ** (1.0 / exponent)), 1e-6)
+
+
+def _floats(name: str, values: Real) -> Real:
+    """The values, without a look at those that are an array of floats already."""
+    known = isinstance(values, np.ndarray) and values.dtype == np.float64
+    return values if known else numbers(name, values)
+
+
+@lru_cache
+def _nodes_for_switch(exponent: float, power: int, viscous: bool, nodes: int, tail: float) -> int:
+    """Nodes, not fewer than asked for, with which the force after a switch can be resolved.
+
+    On a panel that is short enough the penetration goes as s^power, the force as s^p with
+    p = exponent power, its slope, times dχ/ds, as s^(p - 1) and, if it depends on the rate, its
+    slope with that as s^(p + power - 1); with too few nodes their Legendre tails stay above what
+    is accepted of the value at the last node, however short it is. The coefficients of s^p are
+    (2k+1) Γ(p+1)² / (Γ(p-k+1) Γ(p+k+2)).
+    """
+    force = exponent * power
+
+    def unresolved(p: float, nodes: int, tail: float) -> bool:
+        last = 0.5 + 0.5 * float(np.polynomial.legendre.leggauss(nodes)[0][-1])
+        k = np.array([nodes - 2, nodes - 1])
+        shares = rgamma(p - k + 1.0) * rgamma(p + k + 2.0)
+        coefficients = np.abs((2 * k + 1) * gamma(p + 1.0) ** 2 * shares)
+        return bool((coefficients > tail * last**p).any())
+
+    while (
+        unresolved(force, nodes, tail)
+        or unresolved(force - 1.0, nodes, 4.0 * tail)
+        or (viscous and unresolved(force + power - 1.0, nodes, 4.0 * tail))
+    ):
+        nodes += 1
+    return nodes

@@ -1,0 +1,46 @@
+"""A system's numbers as the compiled flow takes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nldyn.base.arrays import Complex
+from nldyn.base.errors import check_types
+from nldyn.flow.kernels.layout import DISSIPATION, EXPONENT, GAP, STIFFNESS
+from nldyn.system.elements import turn
+from nldyn.system.parameters import OF_STOPS, Parameter, check_exact
+from nldyn.system.system import System
+
+_COLUMNS = dict(zip(OF_STOPS, (GAP, STIFFNESS, EXPONENT, DISSIPATION), strict=True))
+_EXCITATION = -1
+
+
+def parameter_tables(
+    system: System, parameters: Sequence[Parameter]
+) -> tuple[NDArray[np.int64], Complex]:
+    """What the kernels need to know of parameters: see `kernels.segments.shoot`.
+
+    Raises
+    ------
+    SystemModelError
+        For a parameter that the system does not have.
+    """
+    check_types(parameters=(parameters, Sequence))
+    for parameter in parameters:
+        check_types(**{"parameters: entry": (parameter, Parameter)})
+    table = np.zeros((len(parameters), 2), dtype=np.int64)
+    drive_by = np.zeros((len(parameters), 2, 2 * system.size), dtype=complex)
+    for row, parameter in enumerate(parameters):
+        check_exact(system, parameter)
+        name, index = parameter.name, parameter.index
+        if name in _COLUMNS:
+            table[row] = _COLUMNS[name], index
+        else:
+            source = system.excitation[index]
+            table[row] = _EXCITATION, index
+            column = system.force_column(system.participation[source.at])
+            drive_by[row, source.order // 2] = turn(source.phase_deg) * column
+    return table, drive_by

@@ -1,0 +1,547 @@
+"""Branches in HDF5 files: everything that makes them up, to the last digit.
+
+A file has the attributes ``format``, ``format_version`` and ``software``; a group for each flow
+map (system and accuracy) in ``flow_maps``, one for each branch in ``branches``, and in each branch
+one for its ``nodes``, ``special_points`` and ``requested`` points, one for its ``course``, and a
+``table`` of what is reported of the nodes, which other software may read and this one does not.
+A ``search`` for further branches has a group of its own.
+Datasets carry their unit as the attribute ``unit``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import SystemModelError
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.branches.branch import Branch, Course, WalkEnd
+from nldyn.branches.checkpoint import Tally
+from nldyn.branches.continuation import alike
+from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.tables import UNITS, orbit_columns
+from nldyn.flow.flow_map import FlowMap, Trajectory, same_flow
+from nldyn.flow.kernels.layout import Record
+from nldyn.io.flow import STATE_UNIT, Laws, checked_laws, read_flow, write_flow
+from nldyn.io.hdf5 import Group, new_file, opened, put, set_attribute
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.shooting import ShootingProblem
+from nldyn.search.diagram import Diagram
+from nldyn.search.exploration import Coverage, Exploration, ExploreOptions, Question, Stage
+
+FORMAT = "nldyn branches"
+FORMAT_VERSION = 2
+RECORD_UNITS = {"phase": "rad", "duration": "s", "w": STATE_UNIT, "force": "N", "depth": "m"}
+
+
+def save_branches(path: str | Path, branches: Sequence[Branch], tally: Tally | None = None) -> None:
+    """Write branches to one file, whole or not at all, and how far a search for others has come.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    SystemModelError
+        If the points of a branch are of different systems.
+    """
+    _write(path, branches, {}, tally=tally)
+
+
+def save_diagram(path: str | Path, diagram: Diagram) -> None:
+    """Write a diagram with its branches to one file, whole or not at all; see `Diagram.save`."""
+    _write(path, diagram.branches, _of_diagram(diagram))
+
+
+def save_exploration(path: str | Path, found: Exploration) -> None:
+    """Write an exploration to one file, whole or not at all; see `Exploration.save`."""
+    diagram = found.diagram
+    _write(path, diagram.branches, _of_diagram(diagram), found)
+
+
+def _of_diagram(diagram: Diagram) -> dict[str, Any]:
+    return {"range_hz": diagram.range_hz, "observe": diagram.observe, "notes": diagram.notes}
+
+
+def load_branch(path: str | Path, name: str | None = None, *, laws: Laws | None = None) -> Branch:
+    """Read a branch that `Branch.save` or `Diagram.save` wrote.
+
+    Its points, special points and orbits have the numbers of the branch that was saved, and it can
+    be extended as that one could.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    name : str, optional
+        Name of the branch, if there are several in the file.
+    laws : mapping of int to callable, optional
+        Contact laws of the user's own by the number of their stop: a file holds numbers, no code.
+
+    Returns
+    -------
+    Branch
+
+    Raises
+    ------
+    SystemModelError
+        If the file is not one of branches, is damaged, or was written by a later version; if the
+        name does not tell one branch; if a law is missing or is another one.
+
+    Examples
+    --------
+    >>> load_branch("nowhere.h5")
+    Traceback (most recent call last):
+        ...
+    nldyn.base.errors.SystemModelError: nowhere.h5: there is no such file
+    """
+    branches = load_branches(path, laws=laws)
+    found = branches if name is None else [b for b in branches if b.name == name]
+    if len(found) != 1:
+        names = ", ".join(f"'{branch.name}'" for branch in branches) or "none"
+        wanted = "a name must choose one of its branches" if name is None else f"no '{name}'"
+        raise SystemModelError(f"{path}: {wanted}; there are: {names}")
+    return found[0]
+
+
+def load_branches(path: str | Path, *, laws: Laws | None = None) -> list[Branch]:
+    """Read all branches of a file; see `load_branch`."""
+    with opened(path, FORMAT, FORMAT_VERSION) as root:
+        return _read_branches(root, _read_flows(root, laws))
+
+
+def load_bare_branches(path: Path, laws: Laws) -> tuple[list[Branch], Tally | None]:
+    """Read what `save_branches` wrote, of a file that holds nothing else."""
+    with opened(path, FORMAT, FORMAT_VERSION) as root:
+        if root.has_attribute("range_hz"):
+            raise SystemModelError(f"{path}: holds a diagram or exploration, not branches alone")
+        tally = _read_tally(root.group("search")) if "search" in root else None
+        return _read_branches(root, _read_flows(root, laws)), tally
+
+
+def load_diagram(path: str | Path, *, laws: Laws | None = None) -> Diagram:
+    """Read a diagram that `Diagram.save` wrote.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    laws : mapping of int to callable, optional
+        See `load_branch`.
+
+    Returns
+    -------
+    Diagram
+
+    Raises
+    ------
+    SystemModelError
+        As `load_branch`, and if the file holds branches without a diagram.
+    """
+    with opened(path, FORMAT, FORMAT_VERSION) as root:
+        if not root.has_attribute("range_hz"):
+            raise SystemModelError(f"{path}: holds branches without a diagram; use load_branches")
+        return _read_diagram(root, _read_flows(root, laws))
+
+
+def load_exploration(path: str | Path, *, laws: Laws | None = None) -> Exploration:
+    """Read an exploration that `Exploration.save` wrote, or what `explore` keeps while it works.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    laws : mapping of int to callable, optional
+        See `load_branch`.
+
+    Returns
+    -------
+    Exploration
+
+    Raises
+    ------
+    SystemModelError
+        As `load_branch`, and if the file holds no exploration.
+    """
+    with opened(path, FORMAT, FORMAT_VERSION) as root:
+        if "exploration" not in root:
+            raise SystemModelError(f"{path}: holds no exploration; use load_branches")
+        flows = _read_flows(root, laws)
+        diagram = _read_diagram(root, flows)
+        question, stage = _read_exploration(root.group("exploration"), flows, diagram)
+        return Exploration(diagram, question, stage)
+
+
+def _write(
+    path: str | Path,
+    branches: Sequence[Branch],
+    attributes: Mapping[str, Any],
+    exploration: Exploration | None = None,
+    tally: Tally | None = None,
+) -> None:
+    """Write a file of branches."""
+    flows: list[FlowMap] = []
+    with new_file(path, FORMAT, FORMAT_VERSION) as file:
+        for key, value in attributes.items():
+            set_attribute(file, key, value)
+        groups = file.create_group("branches")
+        for number, branch in enumerate(branches):
+            _write_branch(groups.create_group(f"{number:04d}"), branch, flows)
+        if exploration is not None:
+            _write_exploration(file.create_group("exploration"), exploration, flows)
+        if tally is not None:
+            _write_tally(file.create_group("search"), tally)
+        maps = file.create_group("flow_maps")
+        for number, flow in enumerate(flows):
+            write_flow(maps.create_group(f"{number:04d}"), flow)
+
+
+def _write_branch(group: Any, branch: Branch, flows: list[FlowMap]) -> None:
+    problem, observe = branch.nodes[0].orbit.problem, branch.nodes[0].orbit.observe
+    others = [special.point for special in branch.special_points]
+    for point in (*branch.nodes, *others, *branch.requested):
+        mine = point.orbit.problem
+        if (
+            not same_flow(mine.flow, problem.flow)
+            or (mine.period, mine.segments) != (problem.period, problem.segments)
+            or point.orbit.observe != observe
+        ):
+            raise SystemModelError(
+                f"branch '{branch.name}' cannot be saved: its points are of different systems, "
+                "flow maps or shooting problems"
+            )
+    number = _number_of(problem.flow, flows)
+    for key, value in {
+        "name": branch.name,
+        "period": branch.period,
+        "segments": problem.segments,
+        "flow_map": number,
+        "observe": observe,
+        "stop_reasons": branch.stop_reasons,
+        "notes": branch.notes,
+    }.items():
+        set_attribute(group, key, value)
+    _write_points(group.create_group("nodes"), branch.nodes, problem)
+    special = group.create_group("special_points")
+    _write_points(special, others, problem)
+    set_attribute(special, "kinds", [s.kind for s in branch.special_points])
+    put(special, "frequency_error", [s.frequency_error for s in branch.special_points], "1")
+    _write_points(group.create_group("requested"), branch.requested, problem)
+    table = group.create_group("table")
+    for name, column in orbit_columns(branch.points).items():
+        put(table, name, column, UNITS[name])
+    if branch.course is not None:
+        _write_course(group.create_group("course"), branch.course)
+
+
+def _number_of(flow: FlowMap, flows: list[FlowMap]) -> int:
+    """Number of a flow map among those of the file, to which it is added if it is new."""
+    if not any(same_flow(flow, other) for other in flows):
+        flows.append(flow)
+    return next(i for i, other in enumerate(flows) if same_flow(other, flow))
+
+
+def _write_exploration(group: Any, found: Exploration, flows: list[FlowMap]) -> None:
+    question, stage = found.question, found.stage
+    set_attribute(group, "flow_map", _number_of(question.flow, flows))
+    set_attribute(group, "max_period", question.max_period)
+    for name, value in asdict(question.effort).items():
+        if value is not None:
+            set_attribute(group, f"effort {name}", value)
+    _write_options(group, question.options)
+    for name in ("steps", "branches", "notes", "given", "folds_followed"):
+        set_attribute(group, name, getattr(stage, name))
+    put(group, "carried", stage.carried, STATE_UNIT)
+    put(group, "met", np.asarray(stage.met, dtype=np.int64), "1 where motions came to a branch")
+    put(group, "ends", np.array(stage.ends, dtype=np.int64), "branches at each round's end")
+    table = group.create_group("coverage")
+    coverage = stage.coverage
+    put(table, "frequency_hz", np.array([c.frequency_hz for c in coverage], dtype=float), "Hz")
+    for name in ("settled", "unsettled", "failed"):
+        put(table, name, np.array([getattr(c, name) for c in coverage], dtype=np.int64), "1")
+    attractors = np.array([len(c.periods) for c in coverage], dtype=np.int64)
+    periods = np.array([n for c in coverage for n in c.periods], dtype=np.int64)
+    put(table, "different_periods", attractors, "1")
+    put(table, "periods", periods, "1; those of one frequency after the other")
+
+
+def _write_tally(group: Any, tally: Tally) -> None:
+    for name in ("question", "given", "known", "done", "tried", "came"):
+        set_attribute(group, name, getattr(tally, name))
+    put(group, "met", np.array(sorted(tally.met), dtype=np.int64), "1; numbers of known branches")
+
+
+def _write_options(group: Any, options: ContinuationOptions) -> None:
+    for name, value in asdict(options).items():
+        set_attribute(group, f"option {name}", value)
+
+
+def _write_points(group: Any, points: Sequence[BranchPoint], problem: ShootingProblem) -> None:
+    orbits = [point.orbit for point in points]
+    length, size, count = problem.segments * problem.size + 1, problem.size, len(points)
+
+    def stacked(arrays: Iterable[ArrayLike], *shape: int) -> Real:
+        return np.array(list(arrays), dtype=float).reshape(count, *shape)
+
+    unknowns = stacked((orbit.point for orbit in orbits), length)
+    put(group, "point", unknowns, f"{STATE_UNIT}; the last column: logarithm of rad/s")
+    put(group, "tangent", stacked((p.tangent for p in points), length), "as point")
+    put(group, "arclength", stacked(p.arclength for p in points), "1")
+    jacobians = stacked((o.jacobians for o in orbits), problem.segments, size, size)
+    put(group, "jacobians", jacobians, "1")
+    put(group, "error", stacked(o.error for o in orbits), "1")
+    _write_motions(group.create_group("motion"), [o.motion for o in orbits], problem.flow)
+
+
+def _write_motions(group: Any, motions: Sequence[Trajectory | None], flow: FlowMap) -> None:
+    """Recorded motions, one after the other; an orbit without one has no pieces."""
+    stops = len(flow.system.stops)
+    known = [motion for motion in motions if motion is not None]
+    pieces = [0 if motion is None else motion.record.phase.size for motion in motions]
+    put(group, "pieces", np.array(pieces, dtype=np.int64), "1")
+    omega = [math.nan if motion is None else motion.omega for motion in motions]
+    put(group, "omega", np.array(omega, dtype=float), "rad/s")
+    closings = [np.zeros(stops) if motion is None else motion.closings for motion in motions]
+    put(group, "closings", np.array(closings, dtype=np.int64).reshape(len(motions), stops), "1")
+    for name, empty in _record_columns(flow):
+        parts = [getattr(motion.record, name) for motion in known]
+        put(group, name, np.concatenate([empty, *parts]), RECORD_UNITS.get(name, "1"))
+
+
+def _record_columns(flow: FlowMap) -> list[tuple[str, NDArray[Any]]]:
+    """Names of the columns of a record, and empty ones."""
+    empty = flow._record(0)
+    return [(name, getattr(empty, name)) for name in Record._fields if name != "used"]
+
+
+def _write_course(group: Any, course: Course) -> None:
+    set_attribute(group, "range_hz", course.range_hz)
+    set_attribute(group, "start", course.start)
+    set_attribute(group, "special_points_before", course.special_points_before)
+    set_attribute(group, "notes_before", course.notes_before)
+    _write_options(group, course.options)
+    put(group, "at", np.array(course.at, dtype=float), "Hz")
+    put(group, "open_ends", course.open_ends, f"{STATE_UNIT}; the last: logarithm of rad/s")
+    for name, end_ in zip(("backward", "forward"), course.ends, strict=True):
+        if end_ is not None:
+            part = group.create_group(name)
+            for key in ("step", "count", "node", "kept", "special_points", "notes"):
+                set_attribute(part, key, getattr(end_, key))
+            put(part, "behind", end_.behind, "as point")
+
+
+def _read_flows(root: Group, laws: Laws | None) -> list[FlowMap]:
+    known = checked_laws(laws)
+    return [read_flow(group, known) for group in root.group("flow_maps").groups()]
+
+
+def _read_branches(root: Group, flows: Sequence[FlowMap]) -> list[Branch]:
+    return [_read_branch(group, flows) for group in root.group("branches").groups()]
+
+
+def _read_diagram(root: Group, flows: Sequence[FlowMap]) -> Diagram:
+    range_hz, observe = root.pair("range_hz"), root.text("observe")
+    branches = tuple(_read_branches(root, flows))
+    return Diagram(branches, range_hz, observe, tuple(root.texts("notes")))
+
+
+def _flow_of(group: Group, flows: Sequence[FlowMap]) -> FlowMap:
+    number = group.whole("flow_map")
+    if not 0 <= number < len(flows):
+        raise group.fault("attribute", "flow_map", f"is {number}, but there are {len(flows)}")
+    return flows[number]
+
+
+def _read_branch(group: Group, flows: Sequence[FlowMap]) -> Branch:
+    problem = ShootingProblem(
+        _flow_of(group, flows), group.whole("period"), group.whole("segments")
+    )
+    observe = group.text("observe")
+    if observe not in problem.flow.system.interfaces:
+        raise group.fault("attribute", "observe", f"names an unknown interface '{observe}'")
+    nodes = _read_points(group.group("nodes"), problem, observe)
+    special = group.group("special_points")
+    points = _read_points(special, problem, observe)
+    kinds = special.texts("kinds")
+    if len(kinds) != len(points):
+        raise special.fault("attribute", "kinds", f"has {len(kinds)} of {len(points)} entries")
+    errors = special.array("frequency_error", len(points))
+    reasons = group.texts("stop_reasons")
+    if not nodes:
+        raise group.fault("group", "nodes", "is empty")
+    if len(reasons) != 2:
+        raise group.fault("attribute", "stop_reasons", "must have two entries")
+    return Branch(
+        group.text("name"),
+        problem.period,
+        tuple(nodes),
+        tuple(map(SpecialPoint, kinds, points, errors.tolist())),
+        (reasons[0], reasons[1]),
+        tuple(group.texts("notes")),
+        tuple(_read_points(group.group("requested"), problem, observe)),
+        _read_course(group.group("course"), nodes) if "course" in group else None,
+    )
+
+
+def _read_points(group: Group, problem: ShootingProblem, observe: str) -> list[BranchPoint]:
+    arclength = group.array("arclength", -1)
+    count, size = arclength.size, problem.size
+    point = group.array("point", count, problem.segments * size + 1)
+    tangent = group.array("tangent", *point.shape)
+    jacobians = group.array("jacobians", count, problem.segments, size, size)
+    error = group.array("error", count)
+    motions = _read_motions(group.group("motion"), count, problem.flow)
+    return [
+        BranchPoint(
+            Orbit(problem, point[i], jacobians[i], float(error[i]), observe, motions[i]),
+            tangent[i],
+            float(arclength[i]),
+        )
+        for i in range(count)
+    ]
+
+
+def _read_motions(group: Group, count: int, flow: FlowMap) -> list[Trajectory | None]:
+    pieces = group.array("pieces", count, kind=np.int64)
+    total = int(pieces.sum())
+    omega = group.array("omega", count)
+    closings = group.array("closings", count, len(flow.system.stops), kind=np.int64)
+    columns = {
+        name: group.array(name, total, *empty.shape[1:], kind=empty.dtype.type)
+        for name, empty in _record_columns(flow)
+    }
+    motions: list[Trajectory | None] = []
+    end = 0
+    for i, number in enumerate(pieces.tolist()):
+        start, end = end, end + number
+        used = np.array([number, number], dtype=np.int64)
+        part = {name: column[start:end] for name, column in columns.items()}
+        record = Record(**part, used=used)
+        motion = Trajectory(flow, float(omega[i]), record, closings[i], "")
+        motions.append(motion if number else None)
+    return motions
+
+
+def _read_course(group: Group, nodes: Sequence[BranchPoint]) -> Course:
+    low, high = group.pair("range_hz")
+    start = group.whole("start")
+    if not 0 <= start < len(nodes):
+        raise group.fault("attribute", "start", f"is {start}, but there are {len(nodes)} points")
+    backward, forward = (
+        _read_end(group.group(name), count) if name in group else None
+        for name, count in (("backward", start + 1), ("forward", len(nodes) - start))
+    )
+    return Course(
+        (low, high),
+        _read_options(group),
+        _read_open_ends(group, nodes[0].orbit),
+        tuple(group.array("at", -1).tolist()),
+        start,
+        group.whole("special_points_before"),
+        group.whole("notes_before"),
+        (backward, forward),
+    )
+
+
+def _read_open_ends(group: Group, orbit: Orbit) -> Real:
+    """Where other branches were broken off; version 1 has a dataset for each end."""
+    if group.has_group("open_ends"):
+        return alike(orbit, group.group("open_ends").arrays())
+    return group.array("open_ends", -1, orbit.point.size)
+
+
+def _read_tally(group: Group) -> Tally | None:
+    """None of a version that did not tell how many branches were known, which begins anew."""
+    if not group.has_attribute("known"):
+        return None
+    names = "given", "known", "done", "tried", "came"
+    given, known, done, tried, came = map(group.whole, names)
+    met = frozenset(group.array("met", -1, kind=np.int64).tolist())
+    return Tally(group.text("question"), given, known, done, tried, came, met)
+
+
+def _read_options(group: Group) -> ContinuationOptions:
+    lengths = {
+        item.name: group.number(f"option {item.name}")
+        for item in fields(ContinuationOptions)
+        if item.name != "max_points"
+    }
+    return ContinuationOptions(**lengths, max_points=group.whole("option max_points"))
+
+
+def _read_exploration(
+    group: Group, flows: Sequence[FlowMap], diagram: Diagram
+) -> tuple[Question, Stage]:
+    efforts: dict[str, Any] = {
+        item.name: (group.number if item.name in ("spacing", "fold_factor") else group.whole)(
+            f"effort {item.name}"
+        )
+        for item in fields(ExploreOptions)
+        if item.name == "spacing" or group.has_attribute(f"effort {item.name}")
+    }
+    guesses = dict.fromkeys(("pseudo_orbits", "mixtures", "walks"), 0)
+    efforts = {**guesses, **efforts}  # what a file does not have was not done
+    question = Question(
+        _flow_of(group, flows),
+        diagram.range_hz,
+        group.whole("max_period"),
+        diagram.observe,
+        ExploreOptions(**efforts),
+        _read_options(group),
+    )
+    steps, branches, notes = (group.whole(name) for name in ("steps", "branches", "notes"))
+    given, folded = (
+        group.whole(name) if group.has_attribute(name) else 0
+        for name in ("given", "folds_followed")
+    )
+    carried = group.array("carried", -1, 2 * question.flow.system.size)
+    coverage = _read_coverage(group.group("coverage"))
+    ends = tuple(group.array("ends", -1, kind=np.int64).tolist())
+    met = group.array("met", -1, branches, kind=np.int64) > 0
+    done, here, length = question.place(max(steps, 0))
+    reached = sum(len(question.frequencies(turn)) for turn in range(done)) + min(here, length // 2)
+    if steps < 0 or len(coverage) != reached or len(ends) != done or not 0 <= len(met) - done <= 1:
+        raise group.fault("attribute", "steps", f"is {steps} with {len(coverage)} frequencies")
+    for name, value, most in (
+        ("branches", branches, len(diagram.branches)),
+        ("notes", notes, len(diagram.notes)),
+        ("given", given, branches),
+        ("folds_followed", folded, branches),
+    ):
+        if not 0 <= value <= most:
+            raise group.fault("attribute", name, f"is {value}, but there are {most}")
+    return question, Stage(steps, branches, notes, carried, coverage, met, ends, given, folded)
+
+
+def _read_coverage(group: Group) -> tuple[Coverage, ...]:
+    hz = group.array("frequency_hz", -1)
+    counts = [
+        group.array(name, hz.size, kind=np.int64).tolist()
+        for name in ("settled", "unsettled", "failed")
+    ]
+    different = group.array("different_periods", hz.size, kind=np.int64)
+    periods = group.array("periods", int(different.sum()), kind=np.int64)
+    parts = np.split(periods, np.cumsum(different)[:-1]) if hz.size else []
+    rows = zip(hz.tolist(), (tuple(part.tolist()) for part in parts), *counts, strict=True)
+    return tuple(Coverage(*row) for row in rows)
+
+
+def _read_end(group: Group, nodes: int) -> WalkEnd:
+    node, kept = group.whole("node"), group.whole("kept")
+    if not 0 <= kept <= node < nodes:
+        raise group.fault("attribute", "node", f"is {node} with {kept} before, of {nodes} points")
+    return WalkEnd(
+        group.number("step"),
+        group.array("behind", -1, -1),
+        group.whole("count"),
+        node,
+        kept,
+        group.whole("special_points"),
+        group.whole("notes"),
+    )

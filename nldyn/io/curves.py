@@ -1,0 +1,256 @@
+"""Curves in HDF5 files: their unknowns to the last digit, from which their orbits are made again.
+
+A file has the attributes ``format``, ``format_version`` and ``software``, and a group for each
+curve: its flow map at the start, its parameters with their ranges, the unknowns, tangents and
+conditions of its points, its marks, and a ``table`` of what is reported of the points, which other
+software may read and this one does not. Datasets carry their unit as the attribute ``unit``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import SystemModelError, check_types, shown
+from nldyn.branches.tables import UNITS
+from nldyn.curves.curves import Curve
+from nldyn.curves.marks import LocatedPoint
+from nldyn.curves.walk import CurvePoint
+from nldyn.flow.flow_map import FlowMap
+from nldyn.io.flow import STATE_UNIT, Laws, checked_laws, read_flow, write_flow
+from nldyn.io.hdf5 import Group, new_file, opened, put, set_attribute
+from nldyn.orbits.bordered import Condition, Corrected, Evaluation, Free, OrbitFamily
+from nldyn.orbits.conditions import MONITORS, BranchPoint, Grazing, Held, Singular
+from nldyn.orbits.orbit import Orbit
+from nldyn.system.chart import UNITS as PARAMETER_UNITS
+from nldyn.system.chart import Chart, checked_parameter
+from nldyn.system.parameters import Parameter
+
+FORMAT = "nldyn curves"
+FORMAT_VERSION = 1
+POINT_UNIT = f"{STATE_UNIT}; then the parameters' coordinates"
+HELD = 1e-6  # how far the held quantity of a loaded curve may be off
+
+OwnMonitor = Callable[[Orbit], float]
+
+
+def save_curves(path: str | Path, curves: Sequence[Curve]) -> None:
+    """Write curves to one file, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    curves : sequence of Curve
+        What to write.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    SystemModelError
+        For anything but a list of curves.
+    """
+    if not isinstance(curves, list | tuple) or not all(isinstance(c, Curve) for c in curves):
+        raise SystemModelError(f"curves must be a list of curves, got {shown(curves)}")
+    with new_file(path, FORMAT, FORMAT_VERSION) as file:
+        groups = file.create_group("curves")
+        for number, curve in enumerate(curves):
+            _write_curve(groups.create_group(f"{number:04d}"), curve)
+
+
+def load_curves(
+    path: str | Path, *, laws: Laws | None = None, monitor: OwnMonitor | None = None
+) -> list[Curve]:
+    """Read all curves of a file; see `load_curve`."""
+    known = checked_laws(laws)
+    check_types(monitor=(monitor, Callable, None))
+    with opened(path, FORMAT, FORMAT_VERSION) as root:
+        groups = root.group("curves").groups()
+        return [_read_curve(group, known, monitor) for group in groups]
+
+
+def load_curve(
+    path: str | Path, *, laws: Laws | None = None, monitor: OwnMonitor | None = None
+) -> Curve:
+    """Read a curve that `Curve.save` wrote.
+
+    Its points have the unknowns of the curve that was saved, to the last digit; the orbits are made
+    of them when they are asked for, by the flow map.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    laws : mapping of int to callable, optional
+        Contact laws of the user's own by the number of their stop, see `load_branch`.
+    monitor : callable, optional
+        The user's own function that was held constant: a file holds no code.
+
+    Returns
+    -------
+    Curve
+
+    Raises
+    ------
+    SystemModelError
+        If the file is not one of curves, is damaged, holds several, or was written by a later
+        version; if a law or the monitor is missing or is another one.
+
+    Examples
+    --------
+    >>> load_curve("nowhere.h5")
+    Traceback (most recent call last):
+        ...
+    nldyn.base.errors.SystemModelError: nowhere.h5: there is no such file
+    """
+    curves = load_curves(path, laws=laws, monitor=monitor)
+    if len(curves) != 1:
+        raise SystemModelError(f"{path}: holds {len(curves)} curves; use load_curves")
+    return curves[0]
+
+
+def _write_curve(group: Any, curve: Curve) -> None:
+    points, marks = curve.points, curve.marks
+    family = points[0].found.at.family
+    for key, value in {
+        "kind": curve.kind,
+        "parameters": [chart.parameter.name for chart in family.charts],
+        "observe": family.observe,
+        "period": family.period,
+        "segments": family.segments,
+        "frequency_hz": family.frequency_hz,
+        "stop_reasons": curve.stop_reasons,
+        "notes": curve.notes,
+        "corners": [point.corner for point in points],
+        "marks": [mark.kind for mark in marks],
+    }.items():
+        set_attribute(group, key, value)
+    write_flow(group.create_group("flow_map"), FlowMap(family.system, family.options))
+    charts = [(c.parameter.index, c.low, c.high) for c in family.charts]
+    put(group, "ranges", np.array(charts, dtype=float), "index, then those of the parameters")
+    if family.unfolding is not None:
+        put(group, "unfolding", family.unfolding, STATE_UNIT)
+    put(group, "point", [point.point for point in points], POINT_UNIT)
+    put(group, "tangent", [point.tangent for point in points], "as point")
+    put(group, "arclength", [point.arclength for point in points], "1")
+    put(group, "step", [point.found.step for point in points], "1")
+    condition = group.create_group("condition")
+    set_attribute(condition, "kind", type(points[0].condition).__name__)
+    rows = [_numbers_of(point.condition) for point in points]
+    for name in rows[0]:
+        put(condition, name, np.array([row[name] for row in rows], dtype=float), "relative or SI")
+    places = [family.unknowns(mark.orbit) for mark in marks]
+    put(group, "mark_point", np.reshape(places, (len(marks), points[0].point.size)), POINT_UNIT)
+    put(group, "mark_residual", [mark.residual for mark in marks], "1")
+    put(group, "mark_error", [mark.error for mark in marks], "1")
+    table = group.create_group("table")
+    units = {"residual": "1", **PARAMETER_UNITS, **UNITS}
+    for name, column in curve.table().items():
+        put(table, name, column, units.get(name) or units[name.rsplit("_", 1)[0]])
+
+
+def _numbers_of(condition: Condition) -> dict[str, Any]:
+    """The numbers of a condition, by the names of its fields."""
+    names = {
+        Free: (),
+        Singular: ("left", "right"),
+        BranchPoint: ("left", "right", "unit"),
+        Grazing: ("stop", "is_maximum", "phase", "unit"),
+        Held: ("target",),
+    }[type(condition)]
+    return {name: getattr(condition, name) for name in names}
+
+
+def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve:
+    flow = read_flow(group.group("flow_map"), laws)
+    names = group.texts("parameters")
+    ranges = group.array("ranges", len(names), 3)
+    charts = tuple(
+        Chart.of(checked_parameter(flow.system, Parameter(name, int(index))), (low, high))
+        for name, (index, low, high) in zip(names, ranges.tolist(), strict=True)
+    )
+    family = OrbitFamily(
+        flow.system,
+        flow.options,
+        group.whole("period"),
+        group.whole("segments"),
+        group.text("observe"),
+        group.number("frequency_hz"),
+        charts,
+    )
+    if "unfolding" in group:
+        family = family.unfolded(group.array("unfolding", family.n_states))
+    size = family.n_states + family.n_free
+    corners, kinds = group.texts("corners"), group.texts("marks")
+    count = len(corners)
+    points, tangents = group.array("point", count, size), group.array("tangent", count, size)
+    lengths, steps = group.array("arclength", count), group.array("step", count)
+    conditions = _read_conditions(group, family, count, points, monitor)
+    found = [
+        Corrected(Evaluation(family, point), condition, step, 0, "")
+        for point, condition, step in zip(points, conditions, steps.tolist(), strict=True)
+    ]
+    places = group.array("mark_point", len(kinds), size)
+    residuals, errors = (group.array(f"mark_{name}", len(kinds)) for name in ("residual", "error"))
+    reasons = group.texts("stop_reasons")
+    if len(reasons) != 2 or not count:
+        raise group.fault("attribute", "stop_reasons", "must have two entries, of some points")
+    parameters = tuple(chart.parameter for chart in charts)
+    return Curve(
+        group.text("kind"),
+        parameters,
+        tuple(map(CurvePoint, found, conditions, tangents, lengths.tolist(), corners)),
+        tuple(
+            LocatedPoint(
+                kind,
+                Evaluation(family, place).make_orbit(error),
+                parameters,
+                family.values(place),
+                residual,
+                error,
+            )
+            for kind, place, residual, error in zip(
+                kinds, places, residuals.tolist(), errors.tolist(), strict=True
+            )
+        ),
+        (reasons[0], reasons[1]),
+        tuple(group.texts("notes")),
+    )
+
+
+def _read_conditions(
+    curve: Group, family: OrbitFamily, count: int, points: Real, monitor: OwnMonitor | None
+) -> list[Condition]:
+    group, n = curve.group("condition"), family.n_states
+    kind, of = group.text("kind"), curve.text("kind")
+    if kind == "Free":
+        return [Free()] * count
+    if kind == "BranchPoint":
+        left, unit = group.array("left", count, n), group.array("unit", count, n + 1)
+        return list(map(BranchPoint, left, group.array("right", count, 2, n + 1), unit))
+    if kind == "Singular":
+        left, right = group.array("left", count, -1), group.array("right", count, -1)
+        return [Singular(of, *borders) for borders in zip(left, right, strict=True)]
+    if kind == "Grazing":
+        columns = [group.array(x, count) for x in ("stop", "is_maximum", "phase", "unit")]
+        rows = zip(*(column.tolist() for column in columns), strict=True)
+        return [Grazing(int(stop), bool(top), phase, unit) for stop, top, phase, unit in rows]
+    if kind != "Held":
+        raise group.fault("attribute", "kind", f"names an unknown condition '{kind}'")
+    held = MONITORS.get(of.partition(" ")[0], monitor)
+    if held is None:
+        raise SystemModelError(
+            f"{group.path}: the curve holds '{of}' constant, a function that a file cannot hold: "
+            "pass monitor="
+        )
+    conditions = [Held(of, held, target) for target in group.array("target", count).tolist()]
+    if abs(float(conditions[0].value(Evaluation(family, points[0]))[0])) > HELD:
+        raise SystemModelError(
+            f"{group.path}: the monitor passed is not '{of}', which the curve holds constant"
+        )
+    return list(conditions)

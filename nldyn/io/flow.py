@@ -1,0 +1,197 @@
+"""Flow maps in HDF5 files: the numbers of a system and the accuracy, in its own coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from nldyn.base.errors import SystemModelError, check_types
+from nldyn.flow.flow_map import FlowMap
+from nldyn.flow.options import FlowOptions
+from nldyn.io.hdf5 import Group, put, set_attribute
+from nldyn.system.contact_law import ContactLaw
+from nldyn.system.elements import Damper, Excitation, HarmonicForce, Stop, Unbalance
+from nldyn.system.linear import LinearPart
+from nldyn.system.parameters import strength
+from nldyn.system.system import System
+
+TRIALS = ((0.1, 0.0), (1.0, 0.1), (1.0, -0.1))  # penetration over its unit, speed in m/s
+STATE_UNIT = "m kg^0.5"
+
+Laws = Mapping[int, ContactLaw]
+
+
+def laws_of(system: System) -> Laws:
+    """Contact laws of a system's own, by the numbers of their stops."""
+    return {i: stop.law for i, stop in enumerate(system.stops) if stop.law}
+
+
+def checked_laws(laws: Laws | None) -> Laws:
+    """Contact laws by the numbers of their stops."""
+    check_types(laws=(laws, Mapping, None))
+    return laws or {}
+
+
+def write_flow(group: Any, flow: FlowMap) -> None:
+    """Write the numbers of a flow map into a group."""
+    for key, value in asdict(flow.options).items():
+        if value is not None:
+            set_attribute(group, key, value)
+    system, linear = flow.system, flow.system.linear
+    put(group, "natural_frequencies", system.natural_frequencies, "rad/s")
+    put(group, "damping", system.damping, "1/s")
+    set_attribute(group, "interfaces", system.interfaces)
+    vectors = np.array([system.participation[name] for name in system.interfaces], dtype=float)
+    put(group, "participation", vectors.reshape(-1, system.size), "kg^-0.5")
+    basis = group.create_group("basis")  # of the states: another computer may choose another one
+    put(basis, "blocks", linear.blocks, "1/s")
+    put(basis, "right", linear.right, "kg^-0.5 for displacements")
+    put(basis, "left", linear.left, "kg^0.5 for displacements")
+    put(basis, "growth", linear.growth, "1")
+    set_attribute(basis, "condition", linear.condition)
+    stops = system.stops
+    _write_columns(
+        group.create_group("stops"),
+        {"at": [s.at for s in stops], "against": [s.against or "" for s in stops]},
+        {
+            "stiffness": ("N/m^exponent", [s.stiffness for s in stops]),
+            "exponent": ("1", [s.exponent for s in stops]),
+            "gap": ("m", [s.gap for s in stops]),
+            "direction": ("1", [s.direction for s in stops]),
+            "dissipation": ("s/m", [s.dissipation for s in stops]),
+            "is_against": ("1", [s.against is not None for s in stops]),
+            "has_own_law": ("1", [s.law is not None for s in stops]),
+            "law_trials": ("N, N/m, N s/m", [_trials(s) for s in stops]),
+        },
+    )
+    _write_columns(
+        group.create_group("dampers"),
+        {"at": [d.at for d in system.dampers]},
+        {"coefficient": ("N s/m", [d.coefficient for d in system.dampers])},
+    )
+    sources = system.excitation
+    _write_columns(
+        group.create_group("excitation"),
+        {
+            "at": [s.at for s in sources],
+            "kind": ["unbalance" if isinstance(s, Unbalance) else "harmonic" for s in sources],
+        },
+        {
+            "size": ("kg m of an unbalance, else N", [strength(s) for s in sources]),
+            "phase_deg": ("degree", [s.phase_deg for s in sources]),
+        },
+    )
+
+
+def _write_columns(
+    group: Any, texts: Mapping[str, Sequence[str]], numbers: Mapping[str, tuple[str, Sequence[Any]]]
+) -> None:
+    for name, values in texts.items():
+        set_attribute(group, name, values)
+    for name, (unit, column) in numbers.items():
+        put(group, name, np.array(column, dtype=float), unit)
+
+
+def _trials(stop: Stop) -> list[tuple[float, float, float]]:
+    """What a stop's own law gives at a few penetrations and speeds, to know it again."""
+    law = stop.law
+    if law is None:
+        return [(0.0, 0.0, 0.0) for _ in TRIALS]
+    unit = stop.stiffness ** (-1.0 / stop.exponent)
+    return [law(share * unit, speed) for share, speed in TRIALS]
+
+
+def read_flow(group: Group, laws: Laws) -> FlowMap:
+    """The flow map that `write_flow` wrote, with the laws of the user's own.
+
+    Raises
+    ------
+    SystemModelError
+        For numbers that make no system, and a law that is missing or is another one.
+    """
+    omega = group.array("natural_frequencies", -1)
+    n = omega.size
+    names = group.texts("interfaces")
+    vectors = group.array("participation", len(names), n)
+    try:
+        system = System(
+            omega,
+            group.array("damping", n, n),
+            dict(zip(names, vectors, strict=True)),
+            _read_stops(group.group("stops"), laws),
+            _read_dampers(group.group("dampers")),
+            _read_excitation(group.group("excitation")),
+        )
+    except SystemModelError as error:
+        if str(error).startswith(str(group.path)):
+            raise
+        raise SystemModelError(f"{group.path}: {error}") from error
+    basis = group.group("basis")
+    vars(system)["linear"] = LinearPart(
+        basis.array("blocks", n, 2, 2),
+        basis.array("right", 2 * n, 2 * n),
+        basis.array("left", 2 * n, 2 * n),
+        basis.array("growth", n),
+        basis.number("condition"),
+    )
+    nodes = group.whole("nodes") if group.has_attribute("nodes") else None
+    tail = group.number("tail") if group.has_attribute("tail") else None
+    return FlowMap(system, FlowOptions(group.number("rtol"), nodes, tail))
+
+
+def _read_stops(group: Group, laws: Laws) -> tuple[Stop, ...]:
+    at, against = group.texts("at"), group.texts("against")
+    count = len(at)
+    numbers = ("stiffness", "exponent", "gap", "direction", "dissipation")
+    values = {name: group.array(name, count) for name in (*numbers, "is_against", "has_own_law")}
+    trials = group.array("law_trials", *((count, len(TRIALS), 3) if count else (0,)))
+    for i in laws:
+        if i not in range(count) or not values["has_own_law"][i]:
+            raise SystemModelError(f"{group.path}: laws: no stop {i} has a law of its own")
+    stops = []
+    for i in range(count):
+        law = None
+        if values["has_own_law"][i]:
+            if i not in laws:
+                raise SystemModelError(
+                    f"{group.path}: stop {i} at '{at[i]}' has a law of its own, which a file "
+                    f"cannot hold: pass laws={{{i}: law}}"
+                )
+            law = laws[i]
+        stop = Stop(
+            at[i],
+            float(values["stiffness"][i]),
+            float(values["exponent"][i]),
+            float(values["gap"][i]),
+            int(values["direction"][i]),
+            against[i] if values["is_against"][i] else None,
+            float(values["dissipation"][i]),
+            law,
+        )
+        if not np.array_equal(_trials(stop), trials[i]):
+            raise SystemModelError(
+                f"{group.path}: the law passed for stop {i} at '{at[i]}' is not the one with "
+                "which the file was written: its forces differ"
+            )
+        stops.append(stop)
+    return tuple(stops)
+
+
+def _read_dampers(group: Group) -> tuple[Damper, ...]:
+    at = group.texts("at")
+    return tuple(map(Damper, at, group.array("coefficient", len(at)).tolist()))
+
+
+def _read_excitation(group: Group) -> tuple[Excitation, ...]:
+    at, kinds = group.texts("at"), group.texts("kind")
+    size, phase = group.array("size", len(at)), group.array("phase_deg", len(at))
+    sources: list[Excitation] = []
+    for place, kind, amount, angle in zip(at, kinds, size.tolist(), phase.tolist(), strict=True):
+        if kind not in ("unbalance", "harmonic"):
+            raise group.fault("attribute", "kind", f"has an unknown entry '{kind}'")
+        maker = Unbalance if kind == "unbalance" else HarmonicForce
+        sources.append(maker(place, amount, angle))
+    return tuple(sources)

@@ -1,0 +1,640 @@
+"""Basins of attraction in a plane of initial states, with shares and integrity."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+import scipy.linalg as sla
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+from scipy.spatial import cKDTree
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import (
+    SystemModelError,
+    check_frequency,
+    check_types,
+    check_whole,
+    is_finite,
+    numbers,
+    shown,
+)
+from nldyn.flow.flow_map import FlowMap, chain, flow_of
+from nldyn.longterm.attractors import (
+    Attractor,
+    AttractorOptions,
+    attractor_from,
+    find_attractors,
+    same_attractor,
+)
+from nldyn.orbits.newton import check_bounded
+from nldyn.orbits.orbit import Orbit, check_observe, stroboscopic
+from nldyn.runtime.executors import check_execution, values_of
+from nldyn.system.system import System, same_system
+
+CHUNK = 16  # periods between two looks at where a motion is
+CELLS = 250  # initial states in one computation
+SHELLS = (1.0, 0.5, 0.2)  # of a neighbourhood, on which its contraction is tried
+LINGERS = 48  # periods in a row near an attractor that is not periodic
+MOST_CELLS = 10**7
+UNDECIDED = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """A rectangle in the space of initial states at forcing phase zero.
+
+    Parameters
+    ----------
+    origin : (2n,)
+        Modal displacements and velocities where both coordinates are zero.
+    x, y : (2n,)
+        What a unit of either coordinate adds.
+    x_range, y_range : (float, float)
+        Ends of the rectangle, ascending.
+    x_label, y_label : str
+        Names for the axes of a picture, with their units.
+
+    Raises
+    ------
+    SystemModelError
+        If shapes disagree, a range is not ascending, or x and y are parallel.
+    """
+
+    origin: Real
+    x: Real
+    y: Real
+    x_range: tuple[float, float]
+    y_range: tuple[float, float]
+    x_label: str = "x"
+    y_label: str = "y"
+
+    def __repr__(self) -> str:
+        """One line: what is on the axes, and how far they reach."""
+        (a, b), (c, d) = self.x_range, self.y_range
+        return f"<Plane: {self.x_label} {a:g} to {b:g}, {self.y_label} {c:g} to {d:g}>"
+
+    def __post_init__(self) -> None:
+        for name in ("origin", "x", "y"):
+            object.__setattr__(self, name, numbers(f"plane: {name}", getattr(self, name)))
+        if self.origin.ndim != 1 or not self.x.shape == self.origin.shape == self.y.shape:
+            raise SystemModelError("plane: origin, x and y must be vectors of one length")
+        for name in ("x_range", "y_range"):
+            ends = getattr(self, name)
+            check_types(**{f"plane: {name}": (ends, Sequence, np.ndarray)})
+            ascending = len(ends) == 2 and all(is_finite(e) for e in ends) and ends[0] < ends[1]
+            if not ascending:
+                raise SystemModelError(
+                    f"plane: {name} must be two ascending numbers, got {shown(ends)}"
+                )
+        if np.linalg.matrix_rank(np.array([self.x, self.y])) < 2:
+            raise SystemModelError("plane: x and y must not be parallel")
+
+    @classmethod
+    def at_interface(
+        cls,
+        system: System,
+        displacement: tuple[float, float],
+        velocity: tuple[float, float],
+        *,
+        interface: str | None = None,
+        origin: Real | None = None,
+    ) -> Plane:
+        """Displacement (m) and velocity (m/s) of an interface, as from a blow there.
+
+        The modes take part as a blow at the interface moves them, in proportion to their
+        participation: of all states with these two numbers it is the one nearest to `origin`.
+
+        Parameters
+        ----------
+        system : System
+            The system.
+        displacement, velocity : (float, float)
+            Ranges of the interface's displacement and velocity.
+        interface : str, optional
+            The first unless given.
+        origin : (2n,) array, optional
+            Modal displacements and velocities through which the plane passes; rest unless given.
+
+        Raises
+        ------
+        SystemModelError
+            For input that makes no sense.
+
+        Examples
+        --------
+        >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]})
+        >>> plane = Plane.at_interface(system, (-1e-4, 1e-4), (-0.1, 0.1))
+        >>> plane.states((3, 3)).shape
+        (3, 3, 2)
+        """
+        for label, ends in (("displacement", displacement), ("velocity", velocity)):
+            check_types(**{f"plane: {label}": (ends, Sequence, np.ndarray)})
+        name = check_observe(system, interface)
+        phi = system.participation[name]
+        if not np.any(phi):
+            raise SystemModelError(f"no mode moves interface '{name}'")
+        along = phi / float(phi @ phi)
+        n = system.size
+        base = np.zeros(2 * n) if origin is None else numbers("origin", origin)
+        if base.shape != (2 * n,):
+            raise SystemModelError(f"origin must have {2 * n} entries, got shape {base.shape}")
+        x = np.concatenate([along, np.zeros(n)])
+        y = np.concatenate([np.zeros(n), along])
+        base = base - x * float(phi @ base[:n]) - y * float(phi @ base[n:])
+        labels = (f"displacement of {name} (m)", f"velocity of {name} (m/s)")
+        return cls(base, x, y, displacement, velocity, *labels)
+
+    def axes(self, shape: tuple[int, int]) -> tuple[Real, Real]:
+        """Coordinates of the middles of the cells, (nx,) and (ny,), for a shape (ny, nx)."""
+        ny, nx = check_shape("plane: shape", shape)
+        (x0, x1), (y0, y1) = self.x_range, self.y_range
+        return (
+            x0 + (x1 - x0) * (np.arange(nx) + 0.5) / nx,
+            y0 + (y1 - y0) * (np.arange(ny) + 0.5) / ny,
+        )
+
+    def states(self, shape: tuple[int, int]) -> Real:
+        """Modal states in the middles of the cells, (ny, nx, 2n)."""
+        x, y = self.axes(shape)
+        return np.asarray(self.origin + x[None, :, None] * self.x + y[:, None, None] * self.y)
+
+    def coordinates(self, modal: Real) -> tuple[Real, NDArray[np.bool_]]:
+        """Coordinates (k, 2) of states (k, 2n), and which of the states lie in the plane (k,)."""
+        modal = numbers("modal", modal)
+        if modal.ndim != 2 or modal.shape[1] != self.origin.size:
+            raise SystemModelError(
+                f"modal must be states (k, {self.origin.size}), got shape {modal.shape}"
+            )
+        basis = np.array([self.x, self.y]).T
+        unit = np.linalg.norm(basis, axis=1).max()
+        found, *_ = np.linalg.lstsq(basis / unit, (modal - self.origin).T, rcond=None)
+        off = np.linalg.norm(modal - self.origin - (basis / unit @ found).T, axis=1)
+        size = np.linalg.norm(modal, axis=1)
+        return found.T / unit, off <= 1e-6 * np.maximum(size, 1e-300)
+
+
+@dataclass(frozen=True, eq=False)
+class Basin:
+    """One attractor's part of the plane.
+
+    Parameters
+    ----------
+    attractor : Attractor
+        The attractor.
+    share : float
+        Share of the cells.
+    integrity : float
+        Radius of the largest disc within it, in units of the sides of the rectangle: the integrity
+        factor of Rega and Lenci. The edge of the rectangle counts as a boundary.
+    distance : float
+        Distance from the attractor's nearest stroboscopic point to another basin, in the same
+        units: their local integrity measure. nan if none of its points lies in the rectangle.
+    """
+
+    attractor: Attractor
+    share: float
+    integrity: float
+    distance: float
+
+
+@dataclass(frozen=True, eq=False)
+class Basins:
+    """Which attractor each cell of a plane leads to.
+
+    Parameters
+    ----------
+    plane : Plane
+        The initial states.
+    frequency_hz : float
+        Excitation frequency in Hz.
+    attractors : tuple of Attractor
+        Those that were reached.
+    labels : (ny, nx) int
+        Index of the attractor, or -1 where the motion did not settle in time or failed.
+    phases : (ny, nx) int
+        Of a subharmonic of period n, by how many excitation periods, 0 to n - 1, the motion runs
+        ahead of the attractor's first state; else 0.
+    periods : (ny, nx) int
+        Excitation periods until the attractor's neighbourhood was reached.
+    checked, wrong : int
+        Cells that were simulated and classified once more by themselves, and how many of them came
+        to another result.
+    notes : tuple of str
+        How many simulations failed, and why.
+    """
+
+    plane: Plane
+    frequency_hz: float
+    attractors: tuple[Attractor, ...]
+    labels: NDArray[np.int64]
+    phases: NDArray[np.int64]
+    periods: NDArray[np.int64]
+    checked: int
+    wrong: int
+    notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """One line: cells, frequency, attractors."""
+        rows, columns = self.labels.shape
+        kinds = ", ".join(attractor.kind for attractor in self.attractors) or "none"
+        return (
+            f"<Basins: {columns} x {rows} cells at {self.frequency_hz:.6g} Hz, attractors: {kinds}>"
+        )
+
+    @property
+    def undecided(self) -> float:
+        """Share of the cells that led to no attractor in time."""
+        return float(np.mean(self.labels == UNDECIDED))
+
+    @property
+    def basins(self) -> tuple[Basin, ...]:
+        """Each attractor with its share and its integrity."""
+        return tuple(self._basin(index) for index in range(len(self.attractors)))
+
+    def _basin(self, index: int) -> Basin:
+        inside = self.labels == index
+        ny, nx = inside.shape
+        depth = np.asarray(distance_transform_edt(np.pad(inside, 1), sampling=(1.0 / ny, 1.0 / nx)))
+        return Basin(
+            self.attractors[index],
+            float(inside.mean()),
+            float(depth.max()),
+            self._distance(index, inside),
+        )
+
+    def points(self, index: int) -> Real:
+        """Coordinates (k, 2) of an attractor's stroboscopic states in the plane."""
+        check_whole("points: index", index, 0, len(self.attractors) - 1)
+        attractor = self.attractors[index]
+        found, inside = self.plane.coordinates(attractor.flow.to_modal(attractor.states))
+        return found[inside]
+
+    def _distance(self, index: int, inside: NDArray[np.bool_]) -> float:
+        points = self.points(index)
+        (x0, x1), (y0, y1) = self.plane.x_range, self.plane.y_range
+        points = (points - (x0, y0)) / (x1 - x0, y1 - y0)
+        points = points[((points >= 0.0) & (points <= 1.0)).all(axis=1)]
+        ny, nx = inside.shape
+        rows, columns = np.nonzero(~inside)
+        if not len(points) or not len(rows):
+            return math.nan
+        others = np.column_stack([(columns + 0.5) / nx, (rows + 0.5) / ny])
+        return float(np.min(cKDTree(others).query(points)[0]))
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """Where a motion counts as having reached an attractor.
+
+    Parameters
+    ----------
+    states : (k, 2n)
+        Stroboscopic states z.
+    shapes : (k, 2n, 2n), optional
+        Of a periodic orbit: motions with ``(z - states[i])ᵀ shapes[i] (z - states[i]) < 1`` for
+        some i converge to it.
+    reach : float
+        Of another attractor: distance from the states within which it stays.
+    """
+
+    states: Real
+    shapes: Real | None
+    reach: float
+
+    def reached(self, strobe: Real) -> NDArray[np.int64]:
+        """Index of the state that each of the states (m, 2n) is near to, or -1."""
+        if self.shapes is None:
+            distance = np.asarray(self._tree.query(strobe)[0])
+            return np.where(distance <= self.reach, 0, UNDECIDED)
+        off = strobe[:, None, :] - self.states[None]
+        near = np.einsum("mki,kij,mkj->mk", off, self.shapes, off) < 1.0
+        return np.where(near.any(axis=1), near.argmax(axis=1), UNDECIDED)
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.states)
+
+
+def target_of(attractor: Attractor) -> Target:
+    """Neighbourhood of an attractor in which motions count as having reached it."""
+    if attractor.orbit is not None:
+        return _orbit_target(attractor.orbit)
+    tree = cKDTree(attractor.states)
+    own = np.asarray(tree.query(attractor.states, k=2)[0])[:, 1]
+    return Target(attractor.states, None, 3.0 * float(np.quantile(own, 0.95)))
+
+
+def _orbit_target(orbit: Orbit) -> Target:
+    """Ellipsoids around the stroboscopic states of a stable orbit that contract over its period.
+
+    Each one is a level of the quadratic function that decreases under the linearised map
+    [Stein's equation]; the largest for which points on three shells also come nearer under
+    the full map is taken.
+    """
+    flow, omega, period = orbit.problem.flow, orbit.omega, orbit.period
+    states = stroboscopic(orbit)
+    parts = orbit.problem.segments // period
+    steps = [chain(orbit.jacobians[k * parts : (k + 1) * parts]) for k in range(period)]
+    scale = orbit.problem.scale(orbit.point)
+    shapes = []
+    for k in range(period):
+        turn = chain(np.array(steps[k:] + steps[:k]))
+        shape = sla.solve_discrete_lyapunov(turn.T, np.eye(len(turn)))
+        shapes.append(shape / np.linalg.norm(shape, 2))
+    rng = np.random.default_rng(1)
+    tries = rng.standard_normal((40 * flow.system.size, states.shape[1]))
+    radius = scale
+
+    def comes_nearer(k: int, radius: float) -> bool:
+        lower = np.linalg.cholesky(shapes[k])
+        for shell in SHELLS:
+            for direction in tries:
+                off = np.linalg.solve(lower.T, direction / np.linalg.norm(direction))
+                start = states[k] + shell * radius * off
+                found = flow.strobe(start, omega, period)
+                if found.failure:
+                    return False
+                left = found.ends[-1] - states[k]
+                if float(left @ shapes[k] @ left) >= (shell * radius) ** 2:
+                    return False
+        return True
+
+    while radius > 1e-6 * scale and not all(comes_nearer(k, radius) for k in range(period)):
+        radius /= 1.5
+    return Target(states, np.array(shapes) / radius**2, 0.0)
+
+
+@dataclass(frozen=True)
+class Settled:
+    """Where motions from k states have gone.
+
+    Parameters
+    ----------
+    labels, phases, periods : (k,) int
+        As in `Basins`.
+    ends : (k, 2n)
+        Last states z.
+    failures : (k,) of str
+        Why a simulation failed, if it did.
+    """
+
+    labels: NDArray[np.int64]
+    phases: NDArray[np.int64]
+    periods: NDArray[np.int64]
+    ends: Real
+    failures: NDArray[np.object_]
+
+
+def settle(
+    flow: FlowMap, omega: float, targets: Sequence[Target], longest: int, states: Real
+) -> Settled:
+    """Follow motions from states z (k, 2n) until they reach a target, or for `longest` periods."""
+    found = Settled(
+        np.full(len(states), UNDECIDED, dtype=np.int64),
+        np.zeros(len(states), dtype=np.int64),
+        np.zeros(len(states), dtype=np.int64),
+        states.copy(),
+        np.full(len(states), "", dtype=object),
+    )
+    for row in range(len(states)):
+        _settle_one(flow, omega, targets, longest, found, row)
+    return found
+
+
+def _settle_one(
+    flow: FlowMap, omega: float, targets: Sequence[Target], longest: int, found: Settled, row: int
+) -> None:
+    """Fill one row of what is found; see `settle`."""
+    lingered = [0] * len(targets)
+    for before in range(0, longest, CHUNK):
+        moved = flow.strobe(found.ends[row], omega, CHUNK)
+        if moved.failure:
+            found.failures[row] = moved.failure
+            return
+        found.ends[row] = moved.ends[-1]
+        found.periods[row] = before + CHUNK
+        for index, target in enumerate(targets):
+            near = target.reached(moved.ends)
+            hits = np.flatnonzero(near != UNDECIDED)
+            if target.shapes is None:
+                lingered[index] = lingered[index] + CHUNK if len(hits) == CHUNK else 0
+                if lingered[index] >= LINGERS:
+                    found.labels[row] = index
+                    return
+            elif len(hits):
+                period = before + 1 + int(hits[0])
+                found.labels[row] = index
+                found.phases[row] = (int(near[hits[0]]) - period) % len(target.states)
+                found.periods[row] = period
+                return
+
+
+def basins(
+    system: System | FlowMap,
+    frequency_hz: float,
+    plane: Plane,
+    *,
+    shape: tuple[int, int] = (100, 100),
+    attractors: Sequence[Attractor] = (),
+    starts: int = 24,
+    longest: int = 2000,
+    checks: int = 40,
+    seed: int = 20,
+    observe: str | None = None,
+    options: AttractorOptions | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Basins:
+    """Basins of attraction in a plane of initial states at forcing phase zero.
+
+    Attractors are found from some of the cells first. Every cell is then simulated until it enters
+    a neighbourhood of one of them, of which trial motions have shown that it contracts; a motion
+    that enters none is classified by itself, and may add an attractor. Some cells are classified
+    once more without the neighbourhoods, as a check of the picture.
+
+    Parameters
+    ----------
+    system : System or FlowMap
+        What to simulate.
+    frequency_hz : float
+        Excitation frequency in Hz.
+    plane : Plane
+        The initial states.
+    shape : (int, int)
+        Numbers of cells (ny, nx).
+    attractors : sequence of Attractor
+        Those that are known, of the same system and frequency.
+    starts : int
+        Cells from which attractors are looked for first.
+    longest : int
+        Excitation periods after which a motion is given up.
+    checks : int
+        Cells classified once more.
+    seed : int
+        Of the cells that are picked.
+    observe, options
+        As for `nldyn.classify`.
+    executor : concurrent.futures.Executor, optional
+        Where to compute; here unless given.
+    progress : callable, optional
+        Called as ``progress(done, total)`` in each stage, counted anew: after each motion that
+        looks for attractors, after every 250 cells, after each check.
+
+    Returns
+    -------
+    Basins
+
+    Raises
+    ------
+    SystemModelError
+        For a system without damping, which has no attractors, and other input that makes no
+        sense.
+    TaskError
+        If a computation ends in an error.
+
+    Examples
+    --------
+    >>> from nldyn import Plane, Stop, System, Unbalance, basins
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> plane = Plane.at_interface(system, (-2e-4, 0.0), (-0.05, 0.05))
+    >>> found = basins(system, 50.0, plane, shape=(6, 6), checks=4)
+    >>> found.wrong, found.undecided
+    (0, 0.0)
+
+    References
+    ----------
+    G. Rega, S. Lenci (2005), Identifying, evaluating, and controlling dynamical integrity measures
+    in non-linear mechanical oscillators, *Nonlinear Anal.* 63.
+    """
+    flow = flow_of(system)
+    check_types(
+        plane=(plane, Plane), options=(options, AttractorOptions, None),
+        attractors=(attractors, Sequence),
+    )  # fmt: skip
+    check_execution(executor, progress)
+    check_frequency("frequency_hz", frequency_hz)
+    omega = 2.0 * math.pi * frequency_hz
+    check_bounded(flow.system, omega)
+    if flow.system.conservative:
+        raise SystemModelError("basins: a system without damping has no attractors")
+    name = check_observe(flow.system, observe)
+    options = options or AttractorOptions()
+    for label, value, least in (
+        ("starts", starts, 1), ("longest", longest, CHUNK), ("checks", checks, 0), ("seed", seed, 0)
+    ):  # fmt: skip
+        check_whole(f"basins: {label}", value, least)
+    check_shape("basins: shape", shape)
+    if plane.origin.size != 2 * flow.system.size:
+        raise SystemModelError(
+            f"plane: states have {plane.origin.size} entries but the system needs "
+            f"{2 * flow.system.size}"
+        )
+    _check_known(attractors, flow.system, frequency_hz)
+    modal = plane.states(shape).reshape(-1, plane.origin.size)
+    rng = np.random.default_rng(seed)
+    picked = rng.choice(len(modal), min(starts, len(modal)), replace=False)
+    known = list(attractors)
+    shares = find_attractors(
+        flow, frequency_hz, starts=modal[picked], observe=name, options=options,
+        executor=executor, progress=progress,
+    )  # fmt: skip
+    for share in shares:
+        _add(known, share.attractor)
+    failed = Counter({s.attractor.failure: s.count for s in shares if s.attractor.failure})
+    notes = _told(failed, len(picked), "simulations that look for attractors")
+    failures = np.full(len(modal), "", dtype=object)
+    states = flow.to_state(modal)
+    labels, phases, periods = (np.full(len(modal), value) for value in (UNDECIDED, 0, 0))
+    order = rng.permutation(len(modal))  # so that all computations take about as long
+    left, done = order, 0
+    while len(left) and done < len(known):
+        targets = [target_of(attractor) for attractor in known]
+        pieces = [left[k : k + CELLS] for k in range(0, len(left), CELLS)]
+        task = partial(settle, flow, omega, targets, longest)
+        ends = values_of(task, [states[piece] for piece in pieces], executor, progress)
+        for piece, settled in zip(pieces, ends, strict=True):
+            labels[piece], states[piece] = settled.labels, settled.ends
+            failures[piece] = settled.failures
+            phases[piece] = settled.phases - periods[piece]
+            periods[piece] += settled.periods
+        done = len(known)
+        left = order[labels[order] == UNDECIDED]
+        new = partial(attractor_from, flow, frequency_hz, name, options)
+        for attractor in values_of(new, list(states[left[:starts]]), executor, progress):
+            _add(known, attractor)
+    checked = rng.choice(len(modal), min(checks, len(modal)), replace=False)
+    again = partial(_index_of, flow, frequency_hz, name, options, known)
+    results = values_of(again, [flow.to_state(modal[cell]) for cell in checked], executor, progress)
+    wrong = sum(index != labels[cell] for cell, index in zip(checked, results, strict=True))
+    counts = np.array([max(attractor.period, 1) for attractor in known] + [1])
+    notes += _told(Counter(failures[failures != ""].tolist()), len(modal), "cells")
+    return Basins(
+        plane,
+        frequency_hz,
+        tuple(known),
+        labels.reshape(shape),
+        (phases % counts[labels]).reshape(shape),
+        periods.reshape(shape),
+        len(checked),
+        int(wrong),
+        tuple(notes),
+    )
+
+
+def _told(failures: Mapping[str, int], total: int, what: str) -> list[str]:
+    """How many of the simulations failed for each reason."""
+    return [f"{n} of {total} {what} failed: {reason}" for reason, n in failures.items()]
+
+
+def check_shape(name: str, shape: tuple[int, int]) -> tuple[int, int]:
+    """Two whole numbers of at least 1 and of no huge product; a SystemModelError names them."""
+    check_types(**{name: (shape, Sequence)})
+    if len(shape) != 2:
+        raise SystemModelError(f"{name} must be two numbers, got {shown(shape)}")
+    for count in shape:
+        check_whole(name, count, 1)
+    if shape[0] * shape[1] > MOST_CELLS:
+        raise SystemModelError(f"{name} may have up to {MOST_CELLS} cells, got {shown(shape)}")
+    return shape
+
+
+def _check_known(attractors: Sequence[Attractor], system: System, frequency_hz: float) -> None:
+    """Refuse attractors of another system or frequency than those of the basins."""
+    for k, attractor in enumerate(attractors):
+        check_types(**{f"attractors: entry {k}": (attractor, Attractor)})
+        if not math.isclose(attractor.frequency_hz, frequency_hz, rel_tol=1e-9):
+            raise SystemModelError(
+                f"attractors: entry {k} is one at {attractor.frequency_hz:g} Hz, but the basins "
+                f"are asked for at {frequency_hz:g} Hz"
+            )
+        if not same_system(attractor.flow.system, system):
+            raise SystemModelError(f"attractors: entry {k} is one of another system")
+
+
+def _add(known: list[Attractor], attractor: Attractor) -> None:
+    """Keep an attractor that is new and not a motion that has yet to settle, or never does."""
+    if attractor.kind in ("failed", "undecided", "drifting"):
+        return
+    if not any(same_attractor(attractor, other) for other in known):
+        known.append(attractor)
+
+
+def _index_of(
+    flow: FlowMap, hz: float, observe: str, options: AttractorOptions,
+    known: Sequence[Attractor], state: Real,
+) -> int:  # fmt: skip
+    """Index among the known attractors of the one that a state leads to."""
+    found = attractor_from(flow, hz, observe, options, state)
+    for index, attractor in enumerate(known):
+        if same_attractor(found, attractor):
+            return index
+    return UNDECIDED

@@ -1,0 +1,519 @@
+"""Newton's method for periodic orbits that meet conditions, in chosen parameters.
+
+The unknowns are the shooting states u, parameters p and, for a branch point, an unfolding number:
+N + m of them. The N shooting equations R(u, p) = 0 have exact derivatives; where these have full
+rank they leave a surface of m dimensions, and only along its m tangents are the derivatives of the
+conditions g needed. There they are central differences.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, SystemModelError
+from nldyn.flow.flow_map import FlowMap, Segments
+from nldyn.flow.options import FlowOptions
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.shooting import ShootingProblem, metric_length
+from nldyn.system.chart import FREQUENCY, Chart, has_exact_derivatives, value_of, with_value
+from nldyn.system.parameters import Parameter
+from nldyn.system.system import System
+
+# A central difference of a function g with the error ε errs by ε/h + h² g(3)/6. Monodromy matrices
+# are good to about 1e-10 and conditions of them bend where they change by one: a difference over
+# which g changes by 1e-4 to 1e-3 is good to about five digits, and a Newton step gains as many.
+# Where an extreme of a penetration comes near to zero, the second derivative of the motion jumps
+# there: a difference then reaches only a fifth of the way, but not below the shortest. Where g
+# bends on a shorter length, its second difference against the first tells: h g''/g' is 2 BENT at
+# most, so that h² g(3)/6 is about 1e-4 of the slope if g(3)/g' is about the square of g''/g'. No
+# bend is seen in rounding. A difference to one side is wrong by h g''/2, so it is always short.
+# The ends of motions change smoothly with a parameter, but on a short length beside light contacts;
+# so does what the flow map errs by, and rounding of 1e-13 allows short differences.
+DIFFERENCE = 1e-4
+END_DIFFERENCE = 1e-6
+LARGEST_CHANGE = 1e-3
+SHORTEST_DIFFERENCE = 1e-7
+BENT, SHORTEST_BEND = 0.02, 3e-6
+ROUNDING_BEND = 1e-9  # second difference that four values good to 1e-10 may have
+ROUNDING = 1e-7  # a Newton step below this that is no shorter than the last has met rounding
+KEEP_SLOPES = 1e-3  # after a Newton step shorter than this the slopes of g still serve
+SATISFIED = 1e-7  # residual of a condition up to which a solution counts
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitFamily:
+    """Periodic orbits of a system in which chosen numbers may change.
+
+    Parameters
+    ----------
+    system : System
+        At the start. Its coordinates z are those of the unknowns.
+    options : FlowOptions
+        Accuracy of the flow map.
+    period, segments : int
+        As for `ShootingProblem`.
+    observe : str
+        Interface whose displacement is reported.
+    frequency_hz : float
+        Excitation frequency where that is no parameter.
+    charts : tuple of Chart
+        The parameters.
+    unfolding : (N,) array, optional
+        Direction that is added to the shooting equations, times one more unknown.
+    """
+
+    system: System
+    options: FlowOptions
+    period: int
+    segments: int
+    observe: str
+    frequency_hz: float
+    charts: tuple[Chart, ...]
+    unfolding: Real | None = None
+
+    @classmethod
+    def around(cls, orbit: Orbit, charts: tuple[Chart, ...]) -> OrbitFamily:
+        """The family that an orbit belongs to."""
+        problem = orbit.problem
+        return cls(
+            orbit.system,
+            problem.flow.options,
+            problem.period,
+            problem.segments,
+            orbit.observe,
+            orbit.frequency_hz,
+            charts,
+        )
+
+    def unfolded(self, direction: Real) -> OrbitFamily:
+        """The family with a direction added to its equations."""
+        return replace(self, unfolding=direction)
+
+    @property
+    def n_states(self) -> int:
+        """Number N of states, and of shooting equations."""
+        return 2 * self.system.size * self.segments
+
+    @property
+    def n_free(self) -> int:
+        """Number m of parameters, and of the unfolding number."""
+        return len(self.charts) + (self.unfolding is not None)
+
+    def unknowns(self, orbit: Orbit) -> Real:
+        """Unknowns (N + m,) of an orbit of the family."""
+        nodes = orbit.problem.nodes(orbit.point)
+        here, start = orbit.system.linear, self.system.linear
+        if here is not start:  # an orbit of the family has coordinates of its own
+            nodes = nodes @ (start.left @ here.right).T
+        point = np.zeros(self.n_states + self.n_free)
+        point[: self.n_states] = nodes.ravel()
+        for place, chart in enumerate(self.charts, self.n_states):
+            value = value_of(orbit.system, orbit.frequency_hz, chart.parameter)
+            point[place] = chart.coordinate(value)
+        return point
+
+    def values(self, point: Real) -> Real:
+        """Values of the parameters."""
+        coordinates = point[self.n_states :]
+        return np.array(
+            [c.value(x) for c, x in zip(self.charts, coordinates.tolist(), strict=False)]
+        )
+
+    def at(self, point: Real) -> Evaluation:
+        """The equations at a point."""
+        return Evaluation(self, point)
+
+    def scale(self, point: Real) -> float:
+        """Root mean square of the states: the unit of relative lengths."""
+        states = point[: self.n_states]
+        return math.sqrt(float(states @ states) / self.segments) or 1.0
+
+    def metric(self, point: Real) -> Real:
+        """Weights g of the arclength ds² = Σ g Δ², relative in the states."""
+        weights = np.ones(point.size)
+        weights[: self.n_states] = 1.0 / (self.segments * self.scale(point) ** 2)
+        return weights
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """The shooting equations of a family at a point; what is asked for is computed once.
+
+    Parameters
+    ----------
+    family : OrbitFamily
+        Whose equations.
+    point : (N + m,) array
+        The unknowns.
+    """
+
+    family: OrbitFamily
+    point: Real
+
+    @cached_property
+    def values(self) -> Real:
+        """Values of the parameters."""
+        return self.family.values(self.point)
+
+    @cached_property
+    def problem(self) -> ShootingProblem:
+        """Shooting equations of the changed system."""
+        family = self.family
+        system = family.system
+        for chart, value in zip(family.charts, self.values.tolist(), strict=True):
+            system = with_value(system, chart.parameter, value)
+        return ShootingProblem(FlowMap(system, family.options), family.period, family.segments)
+
+    @cached_property
+    def omega(self) -> float:
+        """Excitation frequency in rad/s."""
+        hz = self.family.frequency_hz
+        for chart, value in zip(self.family.charts, self.values.tolist(), strict=True):
+            if chart.parameter.name == FREQUENCY:
+                hz = value
+        return 2.0 * math.pi * hz
+
+    @cached_property
+    def _change(self) -> tuple[Real, Real] | None:
+        """Matrices from the coordinates of the family's system to those here, and back."""
+        here, start = self.problem.flow.system.linear, self.family.system.linear
+        if here is start:
+            return None
+        return here.left @ start.right, start.left @ here.right
+
+    @cached_property
+    def nodes(self) -> Real:
+        """States (k, 2n) in the coordinates of the changed system."""
+        nodes = self.point[: self.family.n_states].reshape(self.family.segments, -1)
+        return nodes if self._change is None else nodes @ self._change[0].T
+
+    @cached_property
+    def segments(self) -> Segments:
+        """The segments, in the coordinates of the changed system."""
+        exact = [c.parameter for c in self.family.charts if has_exact_derivatives(c.parameter)]
+        return self._shot(True, exact)
+
+    def _shot(self, sensitivities: bool, parameters: Sequence[Parameter] = ()) -> Segments:
+        problem = self.problem
+        found = problem.flow.shoot(
+            self.nodes,
+            problem.phases,
+            self.omega,
+            sensitivities=sensitivities,
+            parameters=parameters,
+        )
+        if found.failure:
+            raise ConvergenceError(found.failure)
+        return found
+
+    def _back(self, ends: Real) -> Real:
+        """Vectors (k, 2n) in the coordinates of the family's system."""
+        return ends if self._change is None else ends @ self._change[1].T
+
+    def _ends(self) -> Real:
+        return self._back(self._shot(False).ends)
+
+    @cached_property
+    def residual(self) -> Real:
+        """R(u, p), shape (N,)."""
+        family = self.family
+        states = self.point[: family.n_states].reshape(family.segments, -1)
+        gap = (self._back(self.segments.ends) - np.roll(states, -1, axis=0)).ravel()
+        if family.unfolding is not None:
+            gap = gap + self.point[-1] * family.unfolding
+        return np.asarray(gap)
+
+    @cached_property
+    def jacobian(self) -> Real:
+        """Derivatives of R, shape (N, N + m)."""
+        family = self.family
+        n, k, size = family.n_states, family.segments, 2 * family.system.size
+        blocks = self.segments.jacobians
+        if self._change is not None:
+            blocks = self._change[1] @ blocks @ self._change[0]
+        matrix = np.zeros((n, n + family.n_free))
+        for j in range(k):
+            rows = slice(j * size, (j + 1) * size)
+            matrix[rows, rows] += blocks[j]
+            after = (j + 1) % k * size
+            matrix[rows, after : after + size] -= np.eye(size)
+        exact = 0
+        for place, chart in enumerate(family.charts, n):
+            if has_exact_derivatives(chart.parameter):
+                column = self._back(self.segments.d_parameters[:, :, exact]).ravel()
+                column = column * chart.slope(float(self.point[place]))
+                exact += 1
+            elif chart.parameter.name == FREQUENCY:
+                column = self._back(self.segments.d_omega).ravel()
+                column = column * 2.0 * math.pi * chart.slope(float(self.point[place]))
+            else:
+                column = self._difference(place)
+            matrix[:, place] = column
+        if family.unfolding is not None:
+            matrix[:, -1] = family.unfolding
+        return matrix
+
+    def _difference(self, place: int) -> Real:
+        """Derivative of the ends by a parameter, from the maps of two changed systems."""
+        step = np.zeros(self.point.size)
+        step[place] = END_DIFFERENCE
+        before, after, length = _pair(self, step, Evaluation._ends)
+        return np.asarray((after - before).ravel() / (length * END_DIFFERENCE))
+
+    @cached_property
+    def orbit(self) -> Orbit:
+        """The orbit of this point; none that closes unless the residual vanishes."""
+        return self.make_orbit(math.inf)
+
+    def make_orbit(self, error: float) -> Orbit:
+        """The orbit with an estimate of its relative error."""
+        point = np.append(self.nodes.ravel(), math.log(self.omega))
+        return Orbit(self.problem, point, self.segments.jacobians, error, self.family.observe)
+
+
+class Condition(Protocol):
+    """Scalar equations beside those of shooting."""
+
+    def value(self, at: Evaluation) -> Real:
+        """Values g at a point, shape (n_conditions,), without dimension."""
+
+    def reach(self, at: Evaluation) -> float:
+        """Relative length over which g may be differenced."""
+
+    def renewed(self, at: Evaluation) -> Condition:
+        """The same condition with the borders or phases that suit a solution."""
+
+
+@dataclass(frozen=True, eq=False)
+class Free:
+    """No condition."""
+
+    def value(self, at: Evaluation) -> Real:
+        """Nothing to hold, shape (0,)."""
+        return np.zeros(0)
+
+    def reach(self, at: Evaluation) -> float:
+        """Any."""
+        return DIFFERENCE
+
+    def renewed(self, at: Evaluation) -> Condition:
+        """The same."""
+        return self
+
+
+def reach_of_grazing(at: Evaluation) -> float:
+    """Length of a difference that does not carry an extreme of a penetration through zero."""
+    depth = nearest_depth(at.orbit)
+    return min(max(0.2 * depth, SHORTEST_DIFFERENCE), DIFFERENCE)
+
+
+def nearest_depth(orbit: Orbit) -> float:
+    """Smallest absolute value of an extreme of a penetration, relative to the orbit's size."""
+    stops = len(orbit.system.stops)
+    values = [np.abs(orbit.extremes(stop).values).min(initial=math.inf) for stop in range(stops)]
+    return float(min(values, default=math.inf)) / length_unit(orbit)
+
+
+def length_unit(orbit: Orbit) -> float:
+    """Displacement at a stop that goes with the size of the orbit, in m."""
+    rows = orbit.problem.flow.rows[: len(orbit.system.stops)]
+    size = orbit.problem.scale(orbit.point)
+    return size * (float(np.linalg.norm(rows, axis=1).max()) if rows.size else 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Corrected:
+    """Outcome of Newton's method.
+
+    Parameters
+    ----------
+    at : Evaluation
+        The equations at the last point.
+    condition : Condition
+        What was to be met.
+    step : float
+        Relative length of the last Newton step.
+    iterations : int
+        Number of steps.
+    failure : str
+        Empty, or why no solution was found.
+    """
+
+    at: Evaluation
+    condition: Condition
+    step: float
+    iterations: int
+    failure: str
+
+    @cached_property
+    def along(self) -> Real:
+        """Direction (N + m,) of the curve, if one is left free: of no particular length or sense.
+
+        Raises
+        ------
+        ConvergenceError
+            If the equations have no derivatives there.
+        """
+        _, surface = tangent_surface(self.at)
+        by_surface = gradient(self.at, surface, self.condition)
+        return np.asarray(surface @ np.linalg.svd(by_surface, full_matrices=True)[2][-1])
+
+    @property
+    def converged(self) -> bool:
+        """Whether a solution was found."""
+        return not self.failure
+
+    @cached_property
+    def orbit(self) -> Orbit:
+        """The orbit found."""
+        return self.at.make_orbit(self.step)
+
+    def residual(self, condition: Condition) -> float:
+        """Largest of the relative error of closing and the condition."""
+        family = self.at.family
+        closing = float(np.linalg.norm(self.at.residual))
+        closing /= math.sqrt(family.segments) * family.scale(self.at.point)
+        return max(closing, float(np.abs(condition.value(self.at)).max(initial=0.0)))
+
+
+def correct(
+    family: OrbitFamily,
+    guess: Real,
+    condition: Condition,
+    row: Real | None = None,
+    level: float = 0.0,
+    *,
+    rtol: float = 1e-9,
+    max_iterations: int = 12,
+) -> Corrected:
+    """Newton's method for R = 0, g = 0 and, if a row is given, ``row @ point = level``.
+
+    Parameters
+    ----------
+    family : OrbitFamily
+        Whose orbits.
+    guess : (N + m,) array
+        Where to start.
+    condition : Condition
+        g, with m values, or m - 1 if a row is given.
+    row : (N + m,) array, optional
+        Normal of a plane.
+    level : float
+        Offset of the plane.
+    rtol : float
+        Relative length of a step after which to stop.
+    max_iterations : int
+        Most steps.
+
+    Returns
+    -------
+    Corrected
+    """
+    point, before, step = guess, math.inf, math.inf
+    slopes = None
+    for iteration in range(1, max_iterations + 1):
+        try:
+            if not (step < KEEP_SLOPES and step < 0.1 * before):
+                slopes = None
+            before = step
+            change, slopes = _newton_step(family.at(point), condition, slopes, row, level)
+            step = metric_length(family.metric(point), change)
+            point = point + change
+            if not step < 2.0:
+                raise ConvergenceError("Newton's method diverged")
+            if step <= rtol or (step < ROUNDING and step > 0.3 * before):
+                found = Corrected(family.at(point), condition, step, iteration, "")
+                if found.residual(condition) < SATISFIED:
+                    return found
+        except (ConvergenceError, SystemModelError, np.linalg.LinAlgError, OverflowError) as error:
+            return Corrected(family.at(point), condition, step, iteration, str(error))
+    failure = f"Newton's method did not converge, last relative step {step:.1e}"
+    return Corrected(family.at(point), condition, step, max_iterations, failure)
+
+
+def _newton_step(
+    at: Evaluation, condition: Condition, slopes: Real | None, row: Real | None, level: float
+) -> tuple[Real, Real]:
+    """The change of the unknowns, and g'.
+
+    The derivatives of g, as rows (n_conditions, N + m) that hold on the surface, are computed
+    unless given.
+    """
+    normal, surface = tangent_surface(at)
+    if slopes is None:
+        by_surface = gradient(at, surface, condition)
+        slopes = by_surface @ surface.T * at.family.metric(at.point)
+    else:
+        by_surface = slopes @ surface
+    try:
+        g = condition.value(at.family.at(at.point + normal))
+    except SystemModelError:  # beyond what a parameter can be; the next step starts nearer
+        g = condition.value(at)
+    rows, right = by_surface, -g
+    if row is not None:
+        rows = np.vstack([by_surface, row @ surface])
+        right = np.append(right, level - float(row @ (at.point + normal)))
+    change = normal + surface @ np.linalg.solve(rows, right)
+    if not np.all(np.isfinite(change)):
+        raise ConvergenceError("singular Jacobian")
+    return change, slopes
+
+
+def tangent_surface(at: Evaluation) -> tuple[Real, Real]:
+    """Shortest Newton step for R = 0 alone, and m unit tangents (N + m, m) of R = 0."""
+    family = at.family
+    n = family.n_states
+    unit = 1.0 / np.sqrt(family.metric(at.point))
+    q, r = np.linalg.qr((at.jacobian * unit).T, mode="complete")
+    if np.abs(np.diag(r)).min() < 1e-14 * np.abs(r).max():
+        raise ConvergenceError("singular Jacobian")
+    normal = q[:, :n] @ solve_triangular(r[:n], -at.residual, trans="T")
+    return unit * normal, unit[:, None] * q[:, n:]
+
+
+def gradient(at: Evaluation, directions: Real, condition: Condition) -> Real:
+    """Derivatives of g along unit directions (N + m, d), shape (n_conditions, d)."""
+    here = condition.value(at)
+    return np.array([_slope(at, direction, condition, here) for direction in directions.T]).T
+
+
+def _slope(at: Evaluation, direction: Real, condition: Condition, here: Real) -> Real:
+    """Derivatives of g along a unit direction, over a length on which it hardly bends."""
+    h = condition.reach(at)
+    while True:
+        first, last, length = _pair(at, h * direction, condition.value)
+        change = float(np.abs(last - first).max(initial=0.0))
+        bend = float(np.abs(last - 2.0 * here + first).max(initial=0.0))
+        if change > LARGEST_CHANGE and h > SHORTEST_DIFFERENCE:
+            h = max(0.2 * LARGEST_CHANGE / change * h, SHORTEST_DIFFERENCE)
+        elif bend > max(BENT * change, ROUNDING_BEND) and h > SHORTEST_BEND:
+            h = max(0.5 * BENT * change / bend * h, SHORTEST_BEND)
+        else:
+            return (last - first) / (h * length)
+
+
+def _pair(
+    at: Evaluation, step: Real, function: Callable[[Evaluation], Real]
+) -> tuple[Real, Real, float]:
+    """A function a step before and a step behind a point, and how many steps are between.
+
+    Where the system has no such value on one side (a damping below zero), the point itself serves.
+    """
+    found, length = [], 0.0
+    for sign in (-1.0, 1.0):
+        try:
+            found.append(function(at.family.at(at.point + sign * step)))
+            length += 1.0
+        except SystemModelError:
+            found.append(function(at))
+    if not length:
+        raise ConvergenceError("no derivative, for there are no systems on either side")
+    return found[0], found[1], length

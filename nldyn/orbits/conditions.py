@@ -1,0 +1,515 @@
+"""Defining conditions of special points, and monitors held constant: scalar functions of orbits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, SystemModelError, is_finite, shown
+from nldyn.flow.flow_map import Segments
+from nldyn.orbits.bordered import (
+    DIFFERENCE,
+    Condition,
+    Corrected,
+    Evaluation,
+    OrbitFamily,
+    correct,
+    length_unit,
+    reach_of_grazing,
+)
+from nldyn.orbits.extremes import nearest
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.shooting import metric_length
+from nldyn.system.chart import FREQUENCY, Chart
+from nldyn.system.parameters import Parameter
+
+KINDS = ("LP", "PD", "NS", "BP", "GR")
+
+BESIDE = 3e-3  # of an orbit's size: a crossing within it belongs to a turn
+TOUCH = 1e-6  # of an orbit's size: depth of a touch beside its grazing point
+LEVEL, ALIKE = 1e-4, 1e-9  # relative difference of two extremes about to change places, or one
+SMALLEST_OVERLAP = 1e-3  # of null vectors: it vanishes where a multiplier is double
+
+Monitor = str | Callable[[Orbit], float]
+
+
+def bialternate(matrix: Real) -> Real:
+    """Bialternate product of a matrix (m, m) with itself: its eigenvalues are μᵢμⱼ with i < j.
+
+    Parameters
+    ----------
+    matrix : (m, m) array
+        Any matrix.
+
+    Returns
+    -------
+    (m (m - 1) / 2, m (m - 1) / 2) array
+
+    References
+    ----------
+    Yu. A. Kuznetsov (2004), *Elements of Applied Bifurcation Theory*, section 10.2.2.
+
+    Examples
+    --------
+    >>> bialternate(np.diag([2.0, 3.0, 5.0])).diagonal().tolist()
+    [6.0, 10.0, 15.0]
+    """
+    p, q = np.triu_indices(matrix.shape[0], 1)
+    return np.asarray(
+        matrix[np.ix_(p, p)] * matrix[np.ix_(q, q)] - matrix[np.ix_(q, p)] * matrix[np.ix_(p, q)]
+    )
+
+
+def critical_matrix(kind: str, monodromy: Real) -> Real:
+    """Matrix that is singular at a fold (LP), a flip (PD) or a Neimark-Sacker point (NS)."""
+    if kind == "LP":
+        return monodromy - np.eye(len(monodromy))
+    if kind == "PD":
+        return monodromy + np.eye(len(monodromy))
+    product = bialternate(monodromy)
+    return np.asarray(product - np.eye(len(product)))
+
+
+@dataclass(frozen=True, eq=False)
+class Singular:
+    """A matrix of the monodromy is singular: the last entry g of the bordered system's solution,
+
+    [[A, b], [cᵀ, 0]] [v, g] = [0, 1], is zero (Govaerts 2000, ch. 3; Kuznetsov 2004, 10.3).
+
+    The value is g/bᵀc: nearly the distance of the multiplier, or of the product of two, from where
+    it should be.
+
+    Parameters
+    ----------
+    kind : {"LP", "PD", "NS"}
+        Which matrix A.
+    left, right : arrays
+        Borders b and c: unit singular vectors of A to its smallest singular value.
+    """
+
+    kind: str
+    left: Real
+    right: Real
+
+    @classmethod
+    def of(cls, kind: str, orbit: Orbit) -> Singular:
+        """The condition with the borders of an orbit."""
+        u, _, vh = np.linalg.svd(critical_matrix(kind, orbit.monodromy))
+        return cls(kind, u[:, -1], vh[-1])
+
+    def value(self, at: Evaluation) -> Real:
+        """Relative value of g, shape (1,)."""
+        matrix = critical_matrix(self.kind, at.segments.monodromy)
+        size = len(matrix)
+        bordered = np.zeros((size + 1, size + 1))
+        bordered[:size, :size] = matrix
+        bordered[:size, -1], bordered[-1, :size] = self.left, self.right
+        overlap = max(abs(float(self.left @ self.right)), SMALLEST_OVERLAP)
+        return np.linalg.solve(bordered, np.eye(size + 1)[-1])[-1:] / overlap
+
+    def reach(self, at: Evaluation) -> float:
+        """Not across a grazing."""
+        return reach_of_grazing(at)
+
+    def renewed(self, at: Evaluation) -> Singular:
+        """The same with the borders of another orbit, of the same sense."""
+        other = Singular.of(self.kind, at.orbit)
+        left, right = other.left, other.right
+        return Singular(
+            self.kind,
+            left if left @ self.left >= 0.0 else -left,
+            right if right @ self.right >= 0.0 else -right,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class BranchPoint:
+    """[R_u, R_p] has lost a rank (Moore 1980): with a left border ψ and right borders c₁, c₂
+
+    ψᵀ[R_u, R_p] + h₁c₁ᵀ + h₂c₂ᵀ = 0 with ψᵀb = 1 gives h₁ = h₂ = 0. The equations are unfolded,
+    R + λb = 0, which makes the system for (u, p, λ) regular; at a true branch point λ = 0.
+
+    Parameters
+    ----------
+    left : (N,) array
+        b.
+    right : (2, N + 1) array
+        c₁ and c₂.
+    unit : (N + 1,) array
+        Units of the unknowns, so that h has no dimension.
+    """
+
+    left: Real
+    right: Real
+    unit: Real
+
+    @classmethod
+    def of(cls, at: Evaluation) -> BranchPoint:
+        """The condition with the borders of a point, by the states and the first parameter."""
+        n = at.family.n_states
+        unit = 1.0 / np.sqrt(at.family.metric(at.point)[: n + 1])
+        u, _, vh = np.linalg.svd(at.jacobian[:, : n + 1] * unit)
+        return cls(u[:, -1], vh[-2:], unit)
+
+    def value(self, at: Evaluation) -> Real:
+        """h₁ and h₂, relative to the size of the states, shape (2,)."""
+        n = self.left.size
+        matrix = np.zeros((n + 2, n + 2))
+        matrix[:n, : n + 1] = at.jacobian[:, : n + 1] * self.unit / self.unit[0]
+        matrix[:n, -1] = self.left
+        matrix[n:, : n + 1] = self.right
+        return np.linalg.solve(matrix.T, np.eye(n + 2)[-1])[n:]
+
+    def reach(self, at: Evaluation) -> float:
+        """Not across a grazing."""
+        return reach_of_grazing(at)
+
+    def renewed(self, at: Evaluation) -> BranchPoint:
+        """The same with the borders of another point."""
+        return BranchPoint.of(at)
+
+
+@dataclass(frozen=True, eq=False)
+class Grazing:
+    """An extreme of a stop's penetration is zero.
+
+    Parameters
+    ----------
+    stop : int
+        Which stop.
+    is_maximum : bool
+        Whether a contact begins there; else one splits.
+    phase : float
+        Forcing phase: the extreme nearest to it is meant.
+    unit : float
+        Length by which the depth is divided, in m.
+    depth : float
+        Value of the extreme in that unit, if it is not to be zero.
+    """
+
+    stop: int
+    is_maximum: bool
+    phase: float
+    unit: float
+    depth: float = 0.0
+
+    @classmethod
+    def of(cls, orbit: Orbit) -> Grazing:
+        """The extreme nearest to zero of all stops.
+
+        Raises
+        ------
+        SystemModelError
+            If the orbit has none within 1 % of its size.
+        """
+        unit = length_unit(orbit)
+        best, shortest = None, 1e-2 * unit
+        for stop in range(len(orbit.system.stops)):
+            found = orbit.extremes(stop)
+            for phase, depth, kind in zip(
+                found.phases, found.values, found.is_maximum, strict=True
+            ):
+                if abs(depth) < shortest:
+                    shortest = abs(float(depth))
+                    best = cls(stop, bool(kind), float(phase), unit)
+        if best is None:
+            raise SystemModelError(f"the orbit at {orbit.frequency_hz:g} Hz does not graze a stop")
+        return best
+
+    def value(self, at: Evaluation) -> Real:
+        """Depth of the extreme, shape (1,)."""
+        return np.array([self.extreme(at.orbit)[1] / self.unit - self.depth])
+
+    def reach(self, at: Evaluation) -> float:
+        """The depth of an extreme has a continuous derivative also where it is zero."""
+        return DIFFERENCE
+
+    def renewed(self, at: Evaluation) -> Grazing:
+        """The same with the phase of another orbit."""
+        unit = length_unit(at.orbit)
+        return replace(self, phase=self.extreme(at.orbit)[0], unit=unit)
+
+    def is_of(self, stop: int, is_maximum: bool, phase: float, period: int) -> bool:
+        """Whether an extreme near a phase is this one."""
+        full = 2.0 * math.pi * period
+        apart = abs((phase - self.phase + 0.5 * full) % full - 0.5 * full)
+        return stop == self.stop and is_maximum == self.is_maximum and apart < 0.2
+
+    def extreme(self, orbit: Orbit) -> tuple[float, float]:
+        """Phase and depth of the extreme."""
+        found = orbit.extremes(self.stop)
+        full = 2.0 * math.pi * orbit.period
+        index = nearest(found.phases, found.is_maximum, self.is_maximum, self.phase, full)
+        if index < 0:
+            raise ConvergenceError("an extreme has vanished")
+        phase = float(found.phases[index])
+        return phase, exact_output(orbit, self.stop, phase) - orbit.system.stops[self.stop].gap
+
+    def slope(self, orbit: Orbit, phase: float) -> Real:
+        """Derivative (N + 1,) of the depth at a phase with respect to the shooting unknowns."""
+        row = orbit.problem.flow.rows[self.stop]
+        slope = np.zeros(orbit.point.size)
+        states = slope[:-1].reshape(orbit.problem.segments, -1)
+        segment, found = _flown_to(orbit, phase, sensitivities=True)
+        states[segment] = row if found is None else row @ found.jacobians[0]
+        slope[-1] = 0.0 if found is None else orbit.omega * float(row @ found.d_omega[0])
+        return slope
+
+
+def depth_row(orbit: Orbit) -> Real | None:
+    """Derivative (N + 1,) of the depth of a touch beside its grazing point, None without one."""
+    try:
+        touch = Grazing.of(orbit)
+        phase, depth = touch.extreme(orbit)
+        return touch.slope(orbit, phase) if abs(depth) <= TOUCH * touch.unit else None
+    except (SystemModelError, ConvergenceError):
+        return None
+
+
+def exact_output(orbit: Orbit, output: int, phase: float) -> float:
+    """An output of `FlowMap.rows` at a phase, by the flow map from the segment's start.
+
+    The recorded motion is a polynomial inside a contact, good to 1e-6; at an extreme, whose phase
+    it gives, an error of the phase matters to second order only.
+    """
+    segment, found = _flown_to(orbit, phase, sensitivities=False)
+    state = orbit.problem.nodes(orbit.point)[segment] if found is None else found.ends[0]
+    return float(orbit.problem.flow.rows[output] @ state)
+
+
+def _flown_to(orbit: Orbit, phase: float, sensitivities: bool) -> tuple[int, Segments | None]:
+    """Segment of a phase, and the flow from its start to there; None if that is its start."""
+    problem = orbit.problem
+    phases = problem.phases
+    phase = phase % phases[-1]
+    j = min(int(np.searchsorted(phases, phase, side="right")) - 1, problem.segments - 1)
+    if phase - phases[j] <= 1e-12:
+        return j, None
+    node = problem.nodes(orbit.point)[j]
+    found = problem.flow.shoot(
+        node[None], np.array([phases[j], phase]), orbit.omega, sensitivities=sensitivities
+    )
+    if found.failure:
+        raise ConvergenceError(found.failure)
+    return j, found
+
+
+def max_penetration(orbit: Orbit) -> float:
+    """Deepest penetration over all stops in m, zero if none is touched."""
+    return max(0.0, *(depth for _, depth in _depths(orbit)), 0.0)
+
+
+def peak_force(orbit: Orbit) -> float:
+    """Largest contact force over all stops in N, zero if none is touched.
+
+    Where a force depends on the speed, it is that of the recorded motion.
+    """
+    stops = orbit.system.stops
+    if any(stop.depends_on_speed for stop in stops):
+        return max((impact.force for impact in orbit.impact_list), default=0.0)
+    return max((float(stops[i].force(depth)) for i, depth in _depths(orbit)), default=0.0)
+
+
+def max_abs_displacement(orbit: Orbit) -> float:
+    """Largest absolute displacement of the observed interface in m."""
+    extremes = orbit.observed_extremes
+    if not extremes.values.size:
+        return 0.0
+    phase = float(extremes.phases[int(np.argmax(np.abs(extremes.values)))])
+    output = len(orbit.system.stops) + orbit.system.interfaces.index(orbit.observe)
+    return abs(exact_output(orbit, output, phase))
+
+
+def _depths(orbit: Orbit) -> list[tuple[int, float]]:
+    """Each stop with the depth of its deepest penetration."""
+    found = []
+    for index, peaks in enumerate(orbit.penetration_peaks):
+        if peaks.values.size:
+            phase = float(peaks.phases[int(np.argmax(peaks.values))])
+            depth = exact_output(orbit, index, phase) - orbit.system.stops[index].gap
+            found.append((index, depth))
+    return found
+
+
+def _extremes_of(monitor: Callable[[Orbit], float], orbit: Orbit) -> list[float]:
+    """What a monitor of this module is the largest of, from the recorded motion."""
+    if monitor is max_abs_displacement:
+        return [float(x) for x in np.abs(orbit.observed_extremes.values)]
+    peaks = zip(orbit.system.stops, orbit.penetration_peaks, strict=True)
+    depths = [(stop, float(depth)) for stop, found in peaks for depth in found.values]
+    if monitor is max_penetration:
+        return [depth for _, depth in depths]
+    return [float(stop.force(depth)) for stop, depth in depths] if monitor is peak_force else []
+
+
+MONITORS: dict[str, Callable[[Orbit], float]] = {
+    "peak_force": peak_force,
+    "max_penetration": max_penetration,
+    "max_abs_displacement": max_abs_displacement,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Both:
+    """Two conditions at once.
+
+    Parameters
+    ----------
+    first, second : Condition
+        Both are to hold.
+    """
+
+    first: Condition
+    second: Condition
+
+    def value(self, at: Evaluation) -> Real:
+        """Values of both."""
+        return np.append(self.first.value(at), self.second.value(at))
+
+    def reach(self, at: Evaluation) -> float:
+        """The shorter one."""
+        return min(self.first.reach(at), self.second.reach(at))
+
+    def renewed(self, at: Evaluation) -> Both:
+        """Both renewed."""
+        return Both(self.first.renewed(at), self.second.renewed(at))
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """A monitored quantity has a given value.
+
+    Parameters
+    ----------
+    name : str
+        What is held.
+    monitor : callable
+        A number of an orbit.
+    target : float
+        Its value.
+    """
+
+    name: str
+    monitor: Callable[[Orbit], float]
+    target: float
+
+    @classmethod
+    def of(cls, monitor: Monitor, target: float | None, orbit: Orbit) -> Held:
+        """The condition, checked; without a target, the orbit's own value is held.
+
+        Raises
+        ------
+        SystemModelError
+            For an unknown monitor, one that is zero on the orbit, or a target that is zero or of
+            the other sign.
+        """
+        if isinstance(monitor, str):
+            if monitor not in MONITORS:
+                raise SystemModelError(
+                    f"unknown monitor {shown(monitor)}; there are: {', '.join(MONITORS)}, "
+                    "or a function of an orbit"
+                )
+            function = MONITORS[monitor]
+        elif callable(monitor):
+            function = monitor
+        else:
+            raise SystemModelError(
+                f"monitor must be a name or a function of an orbit, got {shown(monitor)}"
+            )
+        name = getattr(monitor, "__name__", "monitor") if callable(monitor) else monitor
+        if name == "max_abs_displacement":
+            name = f"{name} of {orbit.observe}"
+        present = function(orbit)
+        if not is_finite(present) or (present == 0.0 and target is None):
+            raise SystemModelError(f"the start has {name} = {shown(present)}, which cannot be held")
+        if target is None:
+            target = present
+        if not (is_finite(target) and target != 0.0 and target * present >= 0.0):
+            raise SystemModelError(
+                f"{name} to be held must be finite and of the sign of the start's "
+                f"({present:g}), got {shown(target)}"
+            )
+        return cls(name, function, float(target))
+
+    def changes_extreme(self, orbit: Orbit) -> bool:
+        """Whether a second extreme is nearly as large as the largest one, which is held.
+
+        Where they change places the quantity has a corner. Those that are alike by symmetry do not.
+        """
+        *_, second, first = [0.0, 0.0, *sorted(_extremes_of(self.monitor, orbit))]
+        return ALIKE * first < first - second < LEVEL * first
+
+    def value(self, at: Evaluation) -> Real:
+        """Relative difference from the target, shape (1,)."""
+        return np.array([self.monitor(at.orbit) / self.target - 1.0])
+
+    def reach(self, at: Evaluation) -> float:
+        """Not across a grazing."""
+        return reach_of_grazing(at)
+
+    def renewed(self, at: Evaluation) -> Held:
+        """The same."""
+        return self
+
+
+def nearest_crossing(orbit: Orbit) -> tuple[Orbit, float] | None:
+    """The crossing of branches beside an orbit, and its unfolding relative to the orbit.
+
+    The unfolding is what must be added to the shooting equations for branches to cross: zero, but
+    for rounding, where they do. None where no crossing is found.
+
+    References
+    ----------
+    G. Moore (1980), *Numer. Funct. Anal. Optim.* 2, 441-472.
+    """
+    found = _beside("BP", orbit)
+    if found is None:
+        return None
+    return replace(found.orbit, problem=orbit.problem), abs(float(found.at.point[-1]))
+
+
+def nearest_flip(orbit: Orbit) -> Orbit | None:
+    """The flip of the branch of an orbit, if it has one beside it."""
+    found = _beside("PD", orbit)
+    return None if found is None else replace(found.orbit, problem=orbit.problem)
+
+
+def _beside(kind: str, orbit: Orbit) -> Corrected | None:
+    """The special point of a kind beside an orbit."""
+    hz = orbit.frequency_hz
+    family = OrbitFamily.around(orbit, (Chart(Parameter(FREQUENCY), 0.5 * hz, 2.0 * hz),))
+    try:
+        family, condition = defined_by(kind, family, orbit)
+        guess = family.unknowns(orbit)
+        found = correct(family, guess, condition, max_iterations=12)
+    except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
+        return None
+    apart = metric_length(family.metric(guess), found.at.point - guess)
+    return found if found.converged and apart <= BESIDE else None
+
+
+def defined_by(kind: str, family: OrbitFamily, orbit: Orbit) -> tuple[OrbitFamily, Condition]:
+    """Defining condition of a special point near an orbit, and the family in which it is solved.
+
+    Raises
+    ------
+    SystemModelError
+        For a kind that has none here, or an orbit that has no such point.
+    """
+    if kind == "BP":
+        guess = family.unknowns(orbit)
+        condition = BranchPoint.of(family.at(guess))
+        return family.unfolded(condition.left * family.scale(guess)), condition
+    if kind == "GR":
+        return family, Grazing.of(orbit)
+    if kind in KINDS:
+        if kind == "NS" and orbit.system.size < 2:
+            raise SystemModelError("a Neimark-Sacker point needs at least two modes")
+        return family, Singular.of(kind, orbit)
+    raise SystemModelError(
+        f"unknown kind of special point {shown(kind)}; there are: {', '.join(KINDS)}"
+    )

@@ -1,0 +1,122 @@
+"""Fourier coefficients of an orbit's motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nldyn.base.arrays import Complex, Real
+from nldyn.base.errors import SystemModelError, check_types, check_whole, numbers, shown
+from nldyn.orbits.orbit import Orbit, check_observe
+from nldyn.system.system import System
+
+MOST_SAMPLES = 2**18
+
+
+@dataclass(frozen=True, eq=False)
+class Harmonics:
+    """Lines of a periodic displacement, ``y(t) = Re Σ phasor_k exp(2πi frequency_hz_k t)``.
+
+    Parameters
+    ----------
+    frequency_hz : (m + 1,)
+        Multiples of the orbit's own frequency, that of the excitation over the period multiple,
+        from zero.
+    phasor : (m + 1,)
+        Complex amplitudes in m; the first is the mean.
+    """
+
+    frequency_hz: Real
+    phasor: Complex
+
+    def __repr__(self) -> str:
+        """One line: how many lines, and the largest."""
+        size = np.abs(self.phasor)
+        most = int(np.argmax(size))
+        return (
+            f"<Harmonics: {size.size} lines, the largest {size[most]:.4g} at "
+            f"{self.frequency_hz[most]:.6g} Hz>"
+        )
+
+    @property
+    def amplitude(self) -> Real:
+        """Amplitudes of the lines in m, (m + 1,)."""
+        return np.asarray(np.abs(self.phasor))
+
+
+def harmonics(orbit: Orbit, interface: str | Real | None = None, *, orders: int = 30) -> Harmonics:
+    """Fourier coefficients of a displacement over one period of an orbit.
+
+    The trapezoidal rule with more and more samples, until the coefficients stay within 1e-9 of
+    the largest (or there are 2¹⁸ samples).
+
+    Parameters
+    ----------
+    orbit : Orbit
+        A periodic orbit.
+    interface : str or (n,) array, optional
+        An interface, or the displacement of each mode at any point: a row of
+        ``reduced.expand(numpy.eye(n))``. The observed interface unless given.
+    orders : int
+        Highest multiple of the excitation frequency.
+
+    Returns
+    -------
+    Harmonics
+
+    Raises
+    ------
+    SystemModelError
+        For an unknown interface, a row of the wrong length, or if `orders` is not a whole number
+        of at least 1.
+
+    Examples
+    --------
+    >>> from nldyn import System, Unbalance, solve_orbit
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> orbit = solve_orbit(system, frequency_hz=20.0)
+    >>> lines = harmonics(orbit)           # a linear system answers at one frequency
+    >>> bool(abs(lines.amplitude[1] / orbit.max_abs_displacement - 1.0) < 1e-9)
+    True
+    """
+    check_types(orbit=(orbit, Orbit))
+    check_whole("harmonics: orders", orders, 1, 10**4)
+    phi = modal_row(orbit.system, orbit.observe if interface is None else interface)
+    lines = orders * orbit.period
+    samples = 2 ** int(np.ceil(np.log2(8 * lines)))
+    found = _coefficients(orbit, phi, lines, samples)
+    while samples < MOST_SAMPLES:
+        samples *= 2
+        coarser, found = found, _coefficients(orbit, phi, lines, samples)
+        if np.abs(found - coarser).max() <= 1e-9 * np.abs(found).max():
+            break
+    multiples = np.arange(lines + 1, dtype=float)
+    return Harmonics(multiples * (orbit.frequency_hz / orbit.period), found)
+
+
+def modal_row(system: System, point: str | Real | None) -> Real:
+    """Displacement of each mode (n,) at an interface, or at any point that is given so.
+
+    Raises
+    ------
+    SystemModelError
+        For an unknown interface or a row of the wrong length.
+    """
+    if point is None or isinstance(point, str):
+        return np.asarray(system.participation[check_observe(system, point)])
+    if np.shape(point) != (system.size,):
+        raise SystemModelError(
+            f"interface must be a str or None, or the displacements of {system.size} modes, got "
+            f"{shown(point)}"
+        )
+    return numbers("interface", point)
+
+
+def _coefficients(orbit: Orbit, phi: Real, lines: int, samples: int) -> Complex:
+    phases = 2.0 * np.pi * orbit.period * np.arange(samples) / samples
+    displacement = orbit.states(phases)[:, : phi.size] @ phi
+    phasor = np.fft.rfft(displacement)[: lines + 1] / samples
+    phasor[1:] *= 2.0
+    return np.asarray(phasor)

@@ -1,0 +1,128 @@
+"""Newton's method on the shooting equations at a fixed frequency."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, SystemModelError, numbers
+from nldyn.flow.flow_map import Trajectory
+from nldyn.orbits.orbit import Orbit, minimal_period
+from nldyn.orbits.shooting import ShootingProblem
+from nldyn.system.system import System
+
+# contact force over the excitation, and penetration over displacement, up to which a free body
+# counts as untouched
+TOUCH = 1e-7
+NOT_HELD = "the structure is free to move in a way that no stop limits, and nothing tells its place"
+NO_PLACE = (
+    "the structure is free to move as a whole, and where the motion touches no stop, nothing tells "
+    "its place; give a guess that touches one"
+)
+
+
+def guessed_nodes(problem: ShootingProblem, guess: Real, omega: float) -> Real:
+    """States (k, 2n) at the shooting phases from a guess, checked."""
+    guess = np.atleast_2d(numbers("guess", guess))
+    if guess.shape not in ((1, problem.size), (problem.segments, problem.size)):
+        raise SystemModelError(
+            f"guess must have {problem.size} entries (or {problem.segments} such rows), "
+            f"got shape {guess.shape}"
+        )
+    if guess.shape[0] == problem.segments:
+        return problem.flow.to_state(guess)
+    return spread(problem, problem.flow.to_state(guess[0]), omega)
+
+
+def first_orbit(
+    problem: ShootingProblem, starts: Iterable[Real], omega: float, observe: str
+) -> Orbit:
+    """The first orbit of the problem's own period that Newton's method finds from some states."""
+    failure = ConvergenceError()
+    for nodes in starts:
+        try:
+            orbit = refine(problem, nodes, omega, observe)
+        except ConvergenceError as error:
+            failure = error
+            continue
+        shortest = minimal_period(orbit)
+        if shortest == problem.period:
+            return orbit
+        failure = ConvergenceError(
+            f"no orbit of period {problem.period} found at {omega / (2.0 * math.pi):g} Hz: "
+            f"Newton's method came to one of period {shortest}; give a guess beside the orbit, or "
+            "try find_orbits"
+        )
+    raise failure
+
+
+def check_bounded(system: System, omega: float) -> None:
+    """Refuse the resonance of an undamped mode where no stop can limit the motion."""
+    if not system.stops:
+        system.steady(omega)
+
+
+def _is_left_free(system: System) -> bool:
+    """Whether the stops leave a mode of zero frequency, or a combination of such modes, free."""
+    free = system.natural_frequencies == 0.0
+    held = np.array([system.stop_vector(stop)[free] for stop in system.stops])
+    held = held.reshape(-1, int(free.sum()))  # without stops, too
+    return int(np.linalg.matrix_rank(held)) < held.shape[1]
+
+
+def _touches_only(system: System, motion: Trajectory, omega: float) -> bool:
+    """Whether contacts push, but by no more than rounding of the drive and of the motion."""
+    force = float(motion.record.force.max(initial=0.0))
+    depth = float(motion.record.depth.max(initial=0.0))
+    drive = sum(abs(source.phasor) * omega**source.order for source in system.excitation)
+    reach = np.abs(motion.record.start @ motion.flow.rows[: len(system.stops)].T).max(initial=0.0)
+    return 0.0 < force <= TOUCH * drive and depth <= TOUCH * reach
+
+
+def refine(
+    problem: ShootingProblem,
+    nodes: Real,
+    omega: float,
+    observe: str,
+    max_iterations: int = 25,
+) -> Orbit:
+    """Newton's method at fixed frequency from states (k, 2n)."""
+    guess = np.append(nodes.ravel(), math.log(omega))
+    row = np.zeros(guess.size)
+    row[-1] = 1.0
+    found = problem.correct(guess, row, max_iterations=max_iterations)
+    where = f"no orbit of period {problem.period} found at {omega / (2 * math.pi):g} Hz"
+    drifts = bool(np.any(problem.flow.system.natural_frequencies == 0.0))
+    if drifts and _touches_only(problem.flow.system, found.motion, omega):
+        raise ConvergenceError(f"{where}: {NO_PLACE}")
+    if not found.converged:
+        contact = np.any(found.motion.record.kind >= 0)
+        if not contact and problem.flow.system.grows(omega):
+            raise ConvergenceError(
+                f"{where}: an undamped mode is excited at its own frequency, and its motion grows "
+                "without bound where it touches no stop"
+            )
+        if drifts and _is_left_free(problem.flow.system):
+            raise ConvergenceError(f"{where}: {NOT_HELD}")
+        if not contact and drifts:
+            raise ConvergenceError(f"{where}: {NO_PLACE}")
+        step = f", last relative step {found.last_step:.1e}" if found.last_step < math.inf else ""
+        raise ConvergenceError(
+            f"{where}: {found.failure}{step} after {found.iterations} "
+            f"iteration{'' if found.iterations == 1 else 's'}; another guess or find_orbits may "
+            f"find one{', or continue_branch from calm motion' if problem.period == 1 else ''}"
+        )
+    return Orbit.of(problem, found, observe)
+
+
+def spread(problem: ShootingProblem, start: Real, omega: float) -> Real:
+    """States at all shooting phases by integrating from the first."""
+    if problem.segments == 1:
+        return start[None]
+    ends = problem.flow.shoot(
+        start[None], problem.phases[:-1], omega, sensitivities=False, chained=True
+    ).ends
+    return np.vstack([start[None], ends])

@@ -1,0 +1,523 @@
+"""Periodic orbits: how they are found, and what an engineer wants to know of one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, SystemModelError, check_types, check_whole, numbers
+from nldyn.flow.flow_map import FlowError, FlowMap, Solution, Trajectory, chain
+from nldyn.orbits.multipliers import (
+    COARSE,
+    MOST_PARTS,
+    FloquetSpectrum,
+    MultiplierError,
+    Stability,
+    floquet_spectrum,
+    log_determinant,
+    parts_for,
+    uncertainties,
+)
+from nldyn.orbits.shooting import ShootingProblem
+from nldyn.system.elements import Stop
+from nldyn.system.system import System
+
+
+@dataclass(frozen=True, eq=False)
+class Extremes:
+    """Local extremes of one output over an orbit.
+
+    Parameters
+    ----------
+    phases : (k,)
+        Forcing phases.
+    values : (k,)
+        Values of the output (m; for a stop its penetration, negative when open).
+    is_maximum : (k,) bool
+        Whether each is a maximum.
+    """
+
+    phases: Real
+    values: Real
+    is_maximum: NDArray[np.bool_]
+
+    def __repr__(self) -> str:
+        """One line: how many, and between which values."""
+        if not self.values.size:
+            return "<Extremes: none>"
+        low, high = self.values.min(), self.values.max()
+        return f"<Extremes: {self.values.size} from {low:.4g} to {high:.4g} m>"
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """A motion sampled in time.
+
+    Parameters
+    ----------
+    time : (k,)
+        Time in s from forcing phase zero.
+    modal : (k, n)
+        Modal displacements q.
+    modal_velocity : (k, n)
+        Modal velocities.
+    displacement : dict of str to (k,)
+        Displacement of each interface in m.
+    penetration, force : (k, n_stops)
+        Penetration (m, negative when open) and contact force (N) of each stop.
+    """
+
+    time: Real
+    modal: Real
+    modal_velocity: Real
+    displacement: dict[str, Real]
+    penetration: Real
+    force: Real
+
+    def __repr__(self) -> str:
+        """One line: samples, duration, interfaces."""
+        names = ", ".join(map(repr, self.displacement)) or "no interface"
+        return f"<History: {self.time.size} samples up to {self.time[-1]:.4g} s of {names}>"
+
+
+@dataclass(frozen=True)
+class Impact:
+    """One contact phase of an orbit.
+
+    Parameters
+    ----------
+    stop : int
+        Index of the stop.
+    time : float
+        Instant of deepest penetration in s from forcing phase zero.
+    penetration : float
+        Deepest penetration in m.
+    force : float
+        Largest contact force in N.
+    """
+
+    stop: int
+    time: float
+    penetration: float
+    force: float
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """A periodic orbit of a system.
+
+    Parameters
+    ----------
+    problem : ShootingProblem
+        The equations that it solves.
+    point : (N + 1,)
+        States z at the shooting phases and ln ω.
+    jacobians : (k, 2n, 2n)
+        Derivatives of the states z at the ends of the shooting segments with respect to those at
+        their starts.
+    error : float
+        Length of the last Newton step relative to the orbit: an estimate of its error.
+    observe : str
+        Interface whose displacement is reported.
+    motion : Trajectory, optional
+        The recorded motion, if it is known already.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance, solve_orbit
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> orbit = solve_orbit(system, frequency_hz=60.0)
+    >>> orbit.impacts, orbit.stable
+    (1, False)
+    """
+
+    problem: ShootingProblem
+    point: Real
+    jacobians: Real
+    error: float
+    observe: str
+    motion: Trajectory | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        """One line: period, frequency, amplitude, impacts, stability."""
+        try:
+            size = f"{self.max_abs_displacement:.4g} m at '{self.observe}', {self.impacts} impacts"
+            stability: str = self.stability.verdict
+        except ConvergenceError as error:
+            size, stability = str(error), "stability unknown"
+        return f"<Orbit of period {self.period} at {self.frequency_hz:.6g} Hz: {size}, {stability}>"
+
+    @classmethod
+    def of(cls, problem: ShootingProblem, found: Solution, observe: str) -> Orbit:
+        """Orbit from a solution of its equations."""
+        return cls(problem, found.point, found.jacobians, found.last_step, observe, found.motion)
+
+    @property
+    def system(self) -> System:
+        """The system."""
+        return self.problem.flow.system
+
+    @property
+    def omega(self) -> float:
+        """Excitation frequency in rad/s."""
+        return float(np.exp(self.point[-1]))
+
+    @property
+    def frequency_hz(self) -> float:
+        """Excitation frequency in Hz."""
+        return self.omega / (2.0 * math.pi)
+
+    @property
+    def period(self) -> int:
+        """Period multiple n: the orbit repeats after n excitation periods."""
+        return self.problem.period
+
+    @property
+    def duration(self) -> float:
+        """Period of the orbit in s."""
+        return self.period / self.frequency_hz
+
+    @cached_property
+    def monodromy(self) -> Real:
+        """Derivative of the state z after a period with respect to the one before, (2n, 2n).
+
+        It is the product of the Jacobians, in which large multipliers drown the small ones.
+        """
+        return chain(self.jacobians)
+
+    @property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Floquet multipliers, largest first, shape (2n,)."""
+        return self._spectrum[0].multipliers
+
+    @property
+    def log_moduli(self) -> Real:
+        """Natural logarithms of the moduli of the multipliers, (2n,), however small these are.
+
+        Minus infinity where a segment's Jacobian shows nothing of a direction, as where a stop
+        damps it to less than rounding.
+        """
+        return self._spectrum[0].log_moduli
+
+    @cached_property
+    def _spectrum(self) -> tuple[FloquetSpectrum, Real]:
+        """Multipliers and the Jacobians they come from.
+
+        Segments that squeeze a direction almost to their own rounding error are cut into parts.
+        """
+        try:
+            found, jacobians = floquet_spectrum(self.jacobians), self.jacobians
+            parts = parts_for(found.squeeze)
+            while found.squeeze < COARSE and parts <= MOST_PARTS:
+                finer = self.problem.jacobians(self.point, parts)
+                if finer is None:
+                    break
+                found, jacobians = floquet_spectrum(finer), finer
+                parts *= 2
+        except MultiplierError as error:
+            raise ConvergenceError(str(error)) from None
+        return found, jacobians
+
+    @cached_property
+    def log_modulus_uncertainties(self) -> Real:
+        """Estimate of how far each of the `log_moduli` may be off, (2n,).
+
+        Of each segment's Jacobian a relative error of ten times the flow map's `rtol` is assumed
+        (or of ten times `error`, where that is more); see `nldyn.orbits.multipliers.uncertainties`.
+        """
+        found, jacobians = self._spectrum
+        error = 10.0 * max(self.problem.flow.options.rtol, self.error)
+        return uncertainties(jacobians, found, error)
+
+    @property
+    def stability(self) -> Stability:
+        """The multiplier that decides stability, how far from the unit circle, and how sure."""
+        return Stability(
+            self.largest_multiplier,
+            float(self.log_moduli[0]),
+            float(self.log_modulus_uncertainties[0]),
+        )
+
+    @property
+    def largest_multiplier(self) -> complex:
+        """The multiplier that decides stability (of a complex pair the upper one)."""
+        value = complex(self.multipliers[0])
+        return complex(value.real, abs(value.imag))
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers lie inside the unit circle."""
+        return bool(abs(self.multipliers[0]) < 1.0)
+
+    @cached_property
+    def flow_error(self) -> FlowError:
+        """Error of the flow map on this orbit, by a finer one; infinite where either fails."""
+        problem = self.problem
+        return problem.flow.error(problem.nodes(self.point), problem.phases, self.omega)
+
+    @cached_property
+    def liouville_error(self) -> float:
+        """|det Φ / exp(-∫ (tr D + Σ v² ∂F/∂δ') dt) - 1|: Liouville's formula.
+
+        v² is the velocity jump per unit impulse at a stop whose force depends on the speed. The
+        determinant is the product of those of the segments. The error is nan where damping is so
+        strong that rounding hides the third digit of 1e-6 even so.
+        """
+        value, rounding = log_determinant(self._spectrum[1])
+        if rounding > 1e-6:
+            return math.nan
+        exact = -float(np.trace(self.system.total_damping)) * self.duration
+        exact -= contact_damping(self.problem.flow, self.trajectory)
+        return math.inf if math.isnan(value) else abs(math.expm1(min(value - exact, 700.0)))
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The recorded motion over one period of the orbit."""
+        if self.motion is not None:
+            return self.motion
+        problem = self.problem
+        motion = problem.flow.trajectory(problem.nodes(self.point), problem.phases, self.omega)
+        if motion.failure:
+            raise ConvergenceError(
+                f"the orbit at {self.frequency_hz:g} Hz could not be recorded: {motion.failure}"
+            )
+        return motion
+
+    def extremes(self, output: int) -> Extremes:
+        """Local extremes of an output: the stops' penetrations first, then the interfaces."""
+        if output not in self._extremes:
+            self._extremes[output] = self._find_extremes(output)
+        return self._extremes[output]
+
+    @cached_property
+    def _extremes(self) -> dict[int, Extremes]:
+        return {}
+
+    def _find_extremes(self, output: int) -> Extremes:
+        found = self.trajectory.extremes(output)
+        stops = self.system.stops
+        offset = stops[output].gap if output < len(stops) else 0.0
+        return Extremes(found[:, 0], found[:, 1] - offset, found[:, 2] > 0.0)
+
+    @cached_property
+    def observed_extremes(self) -> Extremes:
+        """Local extremes of the observed displacement."""
+        return self.extremes(len(self.system.stops) + self.system.interfaces.index(self.observe))
+
+    @cached_property
+    def penetration_peaks(self) -> tuple[Extremes, ...]:
+        """Local maxima of each stop's penetration, negative ones being near misses."""
+        peaks = []
+        for index in range(len(self.system.stops)):
+            found = self.extremes(index)
+            keep = found.is_maximum
+            peaks.append(Extremes(found.phases[keep], found.values[keep], keep[keep]))
+        return tuple(peaks)
+
+    @cached_property
+    def max_abs_displacement(self) -> float:
+        """Largest absolute displacement of the observed interface in m."""
+        values = self.observed_extremes.values
+        return float(np.max(np.abs(values))) if values.size else 0.0
+
+    @cached_property
+    def max_penetration(self) -> float:
+        """Deepest penetration over all stops in m (zero if none is touched)."""
+        values = [float(p.values.max()) for p in self.penetration_peaks if p.values.size]
+        return max(0.0, *values) if values else 0.0
+
+    @cached_property
+    def impacts(self) -> int:
+        """Number of contact phases in one period of the orbit, over all stops."""
+        return int(self.trajectory.closings.sum())
+
+    @cached_property
+    def impact_list(self) -> tuple[Impact, ...]:
+        """Contact peaks in the order of time (a double-peaked contact counts twice here)."""
+        impacts = [
+            Impact(
+                index,
+                float(phase / self.omega),
+                float(depth),
+                self._largest_force(index, float(phase), float(depth)),
+            )
+            for index, (stop, peaks) in enumerate(
+                zip(self.system.stops, self.penetration_peaks, strict=True)
+            )
+            for phase, depth in zip(peaks.phases, peaks.values, strict=True)
+            if depth > 0.0
+        ]
+        return tuple(sorted(impacts, key=lambda impact: impact.time))
+
+    def _largest_force(self, index: int, phase: float, depth: float) -> float:
+        """Largest force of the contact whose penetration is deepest at a phase."""
+        stop = self.system.stops[index]
+        if not stop.depends_on_speed:
+            return float(stop.force(depth))
+
+        def force(where: float) -> float:
+            state = self.states(np.array([where]))
+            return stop.force(*_depth_and_speed(self.system, stop, state)).item()
+
+        pieces = self.trajectory.record
+        within = (pieces.kind >= 0) & (pieces.force[:, index].max(axis=1) > 0.0)
+        reach = self.omega * float(pieces.duration[within].max(initial=0.0))
+        found = minimize_scalar(
+            lambda where: -force(where),
+            bounds=(phase - reach, phase),
+            method="bounded",
+            options={"xatol": 1e-9 * max(reach, 1e-9)},
+        )
+        return max(-float(found.fun), force(phase))
+
+    def states(self, phases: Real) -> Real:
+        """Modal displacements and velocities (k, 2n) at any forcing phases (k,) in radians.
+
+        Raises
+        ------
+        SystemModelError
+            If the phases are not a list of finite numbers.
+        """
+        phases = numbers("phases", phases)
+        if phases.ndim != 1:
+            raise SystemModelError(f"phases must be a list of phases, got shape {phases.shape}")
+        within = phases % (2.0 * np.pi * self.period)
+        order = np.argsort(within, kind="stable")
+        states = np.empty((phases.size, 2 * self.system.size))
+        states[order] = self.trajectory.states(within[order])
+        return self.problem.flow.to_modal(states)
+
+    def penetration(self, stop: int, phases: Real) -> Real:
+        """Penetration of a stop (m, negative when open) at any forcing phases."""
+        check_whole("penetration: stop", stop, 0, len(self.system.stops) - 1)
+        states = self.states(phases)
+        return _depth_and_speed(self.system, self.system.stops[stop], states)[0]
+
+    def history(self, samples: int = 1000) -> History:
+        """Sample one period of the orbit.
+
+        Parameters
+        ----------
+        samples : int
+            Number of equal time steps; the result has one sample more.
+
+        Returns
+        -------
+        History
+
+        Raises
+        ------
+        SystemModelError
+            If `samples` is not a whole number of at least 1.
+        """
+        check_whole("history: samples", samples, 1)
+        phases = np.linspace(0.0, 2.0 * np.pi * self.period, samples + 1)
+        return history_of(self.system, phases / self.omega, self.states(phases))
+
+
+def history_of(system: System, time: Real, states: Real) -> History:
+    """Displacements and forces at modal states (k, 2n), with their times (k,) in s."""
+    q = states[:, : system.size]
+    depth = np.empty((len(system.stops), time.size))
+    force = np.empty_like(depth)
+    for row, stop in enumerate(system.stops):
+        depth[row], speed = _depth_and_speed(system, stop, states)
+        force[row] = stop.force(depth[row], speed)
+    return History(
+        time,
+        q,
+        states[:, system.size :],
+        {name: q @ phi for name, phi in system.participation.items()},
+        depth.T,
+        force.T,
+    )
+
+
+def contact_damping(flow: FlowMap, motion: Trajectory) -> float:
+    """∫ Σ v² ∂F/∂δ' dt over the contacts of a motion, by the quadrature of their panels."""
+    system = flow.system
+    if not any(stop.depends_on_speed for stop in system.stops):
+        return 0.0
+    phases, weights = motion.contact_quadrature()
+    states = flow.to_modal(motion.states(phases))
+    total = 0.0
+    for stop in system.stops:
+        v = system.stop_vector(stop)
+        total += float(v @ v * weights @ stop.viscosity(*_depth_and_speed(system, stop, states)))
+    return total
+
+
+def _depth_and_speed(system: System, stop: Stop, states: Real) -> tuple[Real, Real]:
+    """Penetration of a stop (negative when open) and its rate at modal states (k, 2n)."""
+    v = system.stop_vector(stop)
+    return states[:, : system.size] @ v - stop.gap, states[:, system.size :] @ v
+
+
+def check_observe(system: System, observe: str | None) -> str:
+    """Interface to observe: the given one, else the system's first."""
+    check_types(system=(system, System), observe=(observe, str, None))
+    if not system.interfaces:
+        raise SystemModelError("the system has no interface to observe")
+    if observe is None:
+        return system.interfaces[0]
+    if observe not in system.interfaces:
+        raise SystemModelError(
+            f"observe: unknown interface '{observe}'; there are: {', '.join(system.interfaces)}"
+        )
+    return observe
+
+
+def stroboscopic(orbit: Orbit) -> Real:
+    """States (n, 2n_modes) at the start of each excitation period."""
+    problem = orbit.problem
+    return problem.nodes(orbit.point)[:: problem.segments // problem.period]
+
+
+def same_orbit(a: Orbit, b: Orbit, rtol: float = 1e-5) -> bool:
+    """Whether two orbits at one frequency agree up to a shift by whole excitation periods."""
+    if a.period != b.period or not math.isclose(a.omega, b.omega, rel_tol=1e-9):
+        return False
+    return shifted_alike(stroboscopic(a), stroboscopic(b), rtol * a.problem.scale(a.point))
+
+
+def shifted_alike(a: Real, b: Real, size: float) -> bool:
+    """Whether two cycles of states (n, 2n_modes) agree within a size up to a shift."""
+    return any(
+        float(np.abs(a - np.roll(b, shift, axis=0)).max()) <= size for shift in range(len(a))
+    )
+
+
+def minimal_period(orbit: Orbit, rtol: float = 1e-6) -> int:
+    """Smallest number of excitation periods after which the orbit really repeats."""
+    states = stroboscopic(orbit)
+    scale = orbit.problem.scale(orbit.point)
+    for n in range(1, orbit.period):
+        if orbit.period % n == 0:
+            shifted = np.roll(states, n, axis=0)
+            if float(np.abs(states - shifted).max()) <= rtol * scale:
+                return n
+    return orbit.period
+
+
+def check_minimal(orbit: Orbit) -> None:
+    """Refuse an orbit of a shorter period that is run through several times.
+
+    Raises
+    ------
+    SystemModelError
+        As said.
+    """
+    shortest = minimal_period(orbit)
+    if shortest < orbit.period:
+        raise SystemModelError(
+            f"the orbit of period {orbit.period} at {orbit.frequency_hz:g} Hz is one of period "
+            f"{shortest}, run through {orbit.period // shortest} times: solve for that"
+        )

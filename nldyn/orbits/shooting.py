@@ -1,0 +1,161 @@
+"""Multiple shooting: the boundary value problem of a periodic orbit and its Newton iterations.
+
+Unknowns are the states at k equally spaced phases of the orbit's period and p = ln ω;
+the equations say that each segment ends where the next one starts.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import SystemModelError, check_whole
+from nldyn.flow.flow_map import FlowMap, Solution
+
+SEGMENTS_PER_PERIOD = 2
+LONGEST_PERIOD = 10**4  # excitation periods of an orbit
+MOST_SEGMENTS = 10**5
+
+AT_REST = 1e-6  # size of an orbit, relative to the guess, that may be rounding
+
+
+@dataclass(frozen=True)
+class ShootingProblem:
+    """Periodic orbits of period multiple n on k segments.
+
+    Parameters
+    ----------
+    flow : FlowMap
+        The flow map.
+    period : int
+        Period multiple n: the orbit repeats after n excitation periods.
+    segments : int
+        Number k of shooting segments.
+    """
+
+    flow: FlowMap
+    period: int
+    segments: int
+
+    @cached_property
+    def phases(self) -> Real:
+        """Forcing phases of the segment ends, shape (k + 1,)."""
+        return np.linspace(0.0, 2.0 * np.pi * self.period, self.segments + 1)
+
+    @property
+    def size(self) -> int:
+        """Number of real coordinates of a state, 2n."""
+        return 2 * self.flow.system.size
+
+    def nodes(self, point: Real) -> Real:
+        """States (k, 2n) of a point."""
+        return point[:-1].reshape(self.segments, self.size)
+
+    def scale(self, point: Real) -> float:
+        """Root mean square of the modal displacements, the unit of relative steps."""
+        states = point[:-1]
+        return math.sqrt(float(states @ states) / self.segments) or 1.0
+
+    def metric(self, point: Real) -> Real:
+        """Weights g of the arclength: ds² = Σ g Δ², relative in states and frequency."""
+        weights = np.empty(point.size)
+        weights[:-1], weights[-1] = self._weight(point), 1.0
+        return weights
+
+    def jacobians(self, point: Real, parts: int) -> Real | None:
+        """Jacobians (k · parts, 2n, 2n) of the segments cut into equal parts.
+
+        Each segment starts from its own state, so that errors grow over one segment only. None if
+        the flow map fails.
+        """
+        pieces = []
+        ends = zip(self.nodes(point), self.phases[:-1], self.phases[1:], strict=True)
+        for state, start, end in ends:
+            phases, omega = np.linspace(start, end, parts + 1), math.exp(point[-1])
+            found = self.flow.shoot(state[None], phases, omega, chained=True)
+            if found.failure:
+                return None
+            pieces.append(found.jacobians)
+        return np.concatenate(pieces)
+
+    def correct(
+        self,
+        guess: Real,
+        row: Real,
+        *,
+        offset: float | None = None,
+        rtol: float = 1e-11,
+        longest: float = 1e3,
+        max_iterations: int = 12,
+    ) -> Solution:
+        """Newton's method on the plane ``row @ point = offset`` (through the guess by default).
+
+        A row (N + 1,) that is zero but for its last entry holds the frequency. A first step longer
+        than `longest` (relative, as in `metric`) means failure.
+        """
+        level = float(row @ guess) if offset is None else offset
+
+        def solved(start: Real) -> Solution:
+            return self.flow.newton(
+                start, row, level, self.phases, self._weight(start), rtol, longest, max_iterations
+            )
+
+        found = solved(guess)
+        # steps count relative to the start, and may still be large beside a much smaller orbit;
+        # motions at rest are not found any better
+        while found.converged and self.scale(found.point) < 0.1 * self.scale(guess):
+            finer = solved(found.point)
+            if not finer.converged and self.scale(found.point) < AT_REST * self.scale(guess):
+                break
+            guess, found = found.point, finer
+        return found
+
+    def _weight(self, point: Real) -> float:
+        """Weight of the square of a state's change."""
+        return 1.0 / (self.segments * self.scale(point) ** 2)
+
+    def tangent(self, found: Solution, towards: Real) -> Real:
+        """Unit tangent of the branch at a solution, on the side of the vector `towards`."""
+        along = found.along
+        weighted = self.metric(found.point) * along
+        length = math.sqrt(float(along @ weighted))
+        return along / (length if float(towards @ weighted) >= 0.0 else -length)
+
+
+def metric_length(weights: Real, vector: Real) -> float:
+    """Length of a vector (N + 1,) in a metric, see `ShootingProblem.metric`."""
+    return math.sqrt(float(vector @ (weights * vector)))
+
+
+def asymmetry(problem: ShootingProblem, point: Real) -> float:
+    """How far half a period is from mirroring an orbit, x(t + T/2) = -x(t), relative to it.
+
+    Infinite where it cannot, for an even period, or its nodes do not tell, for odd segments.
+    """
+    if problem.period % 2 == 0 or problem.segments % 2:
+        return math.inf
+    nodes = problem.nodes(point)
+    sum_ = nodes + np.roll(nodes, problem.segments // 2, axis=0)
+    return float(np.abs(sum_).max()) / problem.scale(point)
+
+
+def shifts(problem: ShootingProblem, point: Real) -> list[Real]:
+    """Shooting unknowns (N + 1,) of an orbit shifted by each of its excitation periods."""
+    nodes = problem.nodes(point)
+    moves = range(0, problem.segments, problem.segments // problem.period)
+    return [np.append(np.roll(nodes, move, axis=0).ravel(), point[-1]) for move in moves]
+
+
+def shooting_problem(flow: FlowMap, period: int, segments: int | None = None) -> ShootingProblem:
+    """Shooting equations with two segments per excitation period unless told otherwise."""
+    check_whole("period", period, 1, LONGEST_PERIOD)
+    if segments is None:
+        segments = SEGMENTS_PER_PERIOD * period
+    check_whole("segments", segments, 1, MOST_SEGMENTS)
+    if segments % period:
+        raise SystemModelError(f"segments must be a multiple of period {period}, got {segments}")
+    return ShootingProblem(flow, period, segments)

@@ -1,0 +1,140 @@
+"""One periodic orbit at a frequency, from a guess, a simulation from rest, or more damping."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, SystemModelError, check_frequency
+from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.orbits.homotopy import DAMPING, Homotopy
+from nldyn.orbits.newton import check_bounded, first_orbit, guessed_nodes, spread
+from nldyn.orbits.orbit import Orbit, check_observe
+from nldyn.orbits.shooting import ShootingProblem, shooting_problem
+from nldyn.orbits.starts import near_returns
+from nldyn.system.rest import at_rest, held_motion, rest
+from nldyn.system.system import System
+
+MORE_DAMPING = 7.0, 20.0, 55.0  # factors that may leave one orbit only
+
+
+def solve_orbit(
+    system: System | FlowMap,
+    frequency_hz: float,
+    period: int = 1,
+    *,
+    guess: Real | None = None,
+    observe: str | None = None,
+    segments: int | None = None,
+) -> Orbit:
+    """Find a periodic orbit at a given frequency by multiple shooting.
+
+    Parameters
+    ----------
+    system : System or FlowMap
+        What to solve.
+    frequency_hz : float
+        Excitation frequency in Hz.
+    period : int
+        Period multiple n.
+    guess : (2n,) or (k, 2n) array, optional
+        Modal displacements and velocities at phase zero, or at the k shooting phases. Without it
+        the system is simulated from rest for 200 periods; where the motion does not settle,
+        Newton's method starts where it nearly repeats, and from the small motion about a rest that
+        a stop holds. Where all that fails, an orbit of period 1 is carried here from up to 55 times
+        the modal damping.
+    observe : str, optional
+        Interface whose displacement is reported; the first unless given.
+    segments : int, optional
+        Number k of shooting segments; where given, the simulation from rest is cut as finely.
+
+    Returns
+    -------
+    Orbit
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense.
+    ConvergenceError
+        If the simulation fails, or Newton's method does not converge or comes to an orbit of a
+        shorter period; the text says why.
+
+    Examples
+    --------
+    >>> from nldyn import System, Unbalance
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> orbit = solve_orbit(system, frequency_hz=20.0)
+    >>> orbit.impacts
+    0
+    """
+    flow = flow_of(system)
+    check_frequency("frequency_hz", frequency_hz)
+    observe = check_observe(flow.system, observe)
+    problem = shooting_problem(flow, period, segments)
+    omega = 2.0 * math.pi * frequency_hz
+    check_bounded(flow.system, omega)
+    if guess is not None:
+        return first_orbit(problem, [guessed_nodes(problem, guess, omega)], omega, observe)
+    pieces = (segments or period) // period  # of one excitation period
+    try:
+        return first_orbit(problem, _simulated(problem, omega, pieces), omega, observe)
+    except ConvergenceError:
+        orbit = _by_more_damping(problem, omega, observe, pieces) if period == 1 else None
+        if orbit is None:
+            raise
+        return orbit
+
+
+def _simulated(problem: ShootingProblem, omega: float, pieces: int) -> Iterator[Real]:
+    """States at the shooting phases that a motion from rest comes near, the likeliest first.
+
+    It is simulated in pieces of the excitation period.
+    """
+    flow, period = problem.flow, problem.period
+    q = rest(flow.system)
+    start = flow.to_state(at_rest(q))
+    warm = np.linspace(0.0, 400.0 * np.pi, 200 * pieces + 1)
+    found = flow.shoot(start[None], warm, omega, sensitivities=False, chained=True)
+    if found.failure:
+        raise ConvergenceError(
+            f"the simulation from rest at {omega / (2.0 * math.pi):g} Hz failed: {found.failure}; "
+            "give a guess"
+        )
+    strobe = found.ends[pieces - 1 :: pieces][20:]
+    # beside a subharmonic attractor lies, in its middle, the orbit that it branched from
+    counts = (2, 3, 4, len(strobe)) if period == 1 else ()
+    middles = [strobe[-count:].mean(axis=0) for count in counts]
+    near = strobe[near_returns(strobe, period, 8)]
+    # at a sharp resonance the motion from rest takes too long to grow
+    linear = [] if flow.system.grows(omega) else [flow.system.steady(omega).real]
+    starts = (spread(problem, z, omega) for z in (strobe[-1], *near, *middles, *linear))
+    if not np.any(q):
+        return starts
+    held = held_motion(flow.system, q, omega, problem.phases[:-1])
+    return itertools.chain(starts, [flow.to_state(held)])
+
+
+def _by_more_damping(
+    problem: ShootingProblem, omega: float, observe: str, pieces: int
+) -> Orbit | None:
+    """Orbit at more damping, which a motion from rest comes near, carried back, or None."""
+    if not np.any(problem.flow.system.total_damping):
+        return None
+    for factor in MORE_DAMPING:
+        detour = Homotopy(problem.flow, {DAMPING: factor})
+        try:
+            more = replace(problem, flow=detour.flow(1.0))
+            orbit = first_orbit(more, _simulated(more, omega, pieces), omega, observe)
+        except (ConvergenceError, SystemModelError):
+            continue
+        found = detour.carried(orbit, 1.0, 0.0)
+        if found is not None:
+            return found
+    return None

@@ -1,0 +1,391 @@
+"""Starting orbits from time simulations: stroboscopic states that nearly return."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError, check_frequency, check_whole
+from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.orbits.newton import check_bounded, refine, spread
+from nldyn.orbits.orbit import Orbit, check_observe, minimal_period, same_orbit, stroboscopic
+from nldyn.orbits.shooting import (
+    SEGMENTS_PER_PERIOD,
+    ShootingProblem,
+    metric_length,
+    shooting_problem,
+)
+from nldyn.system.rest import at_rest, rest
+from nldyn.system.system import System
+
+DECAYS = 4.0  # time allowed for settling, over the slowest decay time of the linear part
+FEWEST, UNDAMPED = 30, 600  # periods of it: at least, and where nothing decays
+
+
+MOST_COUNT = 10**7  # of starts, periods and candidates
+FREQUENCY_WEIGHT = 10.0  # of a relative change of the frequency against one of the states
+NEARBY = 1e-3  # a step of least length that is short enough to end with
+LONG_STEPS = 0.5, 14  # of least length: the longest, and how many at most
+SHORT_STEPS = 0.1, 30  # lead to nine in ten of the orbits that 80 lead to
+FREQUENCY_SHIFT = 0.05  # how far the frequency may go, relative
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """How long to simulate and how many candidates to try.
+
+    Parameters
+    ----------
+    starts : int
+        Number of initial states: rest, then random ones.
+    transient, recorded : int
+        Excitation periods simulated before and during the recording.
+    candidates : int
+        Near returns tried for each start, closest first: attractors, and saddles on the way.
+    seed : int
+        Seed of the random initial states: results are repeatable.
+
+    Raises
+    ------
+    SystemModelError
+        For numbers that make no sense.
+    """
+
+    starts: int = 10
+    transient: int = 5
+    recorded: int = 175
+    candidates: int = 5
+    seed: int = 20
+
+    def __post_init__(self) -> None:
+        for name in ("starts", "recorded", "candidates"):
+            check_whole(f"search: {name}", getattr(self, name), 1, MOST_COUNT)
+        check_whole("search: transient", self.transient, 0, MOST_COUNT)
+        check_whole("search: seed", self.seed, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Strobe:
+    """Stroboscopic states of several simulations at one frequency.
+
+    Parameters
+    ----------
+    omega : float
+        Excitation frequency in rad/s.
+    runs : tuple of (k, 2n) arrays
+        States at the start of each recorded excitation period.
+    failures : tuple of str
+        Why each of the other simulations failed.
+    """
+
+    omega: float
+    runs: tuple[Real, ...]
+    failures: tuple[str, ...]
+
+
+def simulate_strobe(flow: FlowMap, frequency_hz: float, options: SearchOptions) -> Strobe:
+    """Simulate from rest and from random states and record once per excitation period.
+
+    The random states are up to ten times as large as the linear response, the size of resonant
+    motion, or as the smallest state that closes a gap, if that is larger.
+    """
+    omega = 2.0 * math.pi * frequency_hz
+    starts = random_states(flow, omega, options.starts, options.seed)
+    return simulate(flow, omega, starts, options.transient, options.recorded)
+
+
+def random_states(flow: FlowMap, omega: float, count: int, seed: int | Sequence[int]) -> Real:
+    """Initial states (count, 2n): rest, then random ones, see `simulate_strobe`."""
+    n = 2 * flow.system.size
+    rng = np.random.default_rng(seed)
+    size = max(response_size(flow.system, omega), reach(flow.system))
+    states = np.empty((count, n))
+    for index in range(count):
+        scale = 0.0 if index == 0 else size * 10.0 ** rng.uniform(-0.5, 1.0)
+        states[index] = scale * rng.standard_normal(n) / math.sqrt(n)
+    states[0] = flow.to_state(at_rest(rest(flow.system)))
+    return states
+
+
+def simulate(flow: FlowMap, omega: float, starts: Real, transient: int, recorded: int) -> Strobe:
+    """Simulate from each state (k, 2n) and record the state after each period of the excitation."""
+    total = transient + recorded
+    runs, failures = [], []
+    for start in starts:
+        found = flow.strobe(start, omega, total)
+        if found.failure:
+            failures.append(found.failure)
+        else:
+            runs.append(found.ends[transient:])
+    return Strobe(omega, tuple(runs), tuple(failures))
+
+
+def response_size(system: System, omega: float) -> float:
+    """Size of the linear response at ω (rad/s), for modes near resonance within one period.
+
+    Examples
+    --------
+    >>> from nldyn import HarmonicForce
+    >>> system = System.from_modal([10.0], {"tip": [1.0]}, excitation=[HarmonicForce("tip", 1.0)])
+    >>> bool(np.isfinite(response_size(system, 20.0 * np.pi)))
+    True
+    """
+    _, response = system.response(omega)
+    growth = 2.0 * np.pi / omega * np.abs(response[1:]).sum(axis=0)
+    return float((np.abs(response[0]) + growth).max())
+
+
+def reach(system: System) -> float:
+    """Size of the smallest state that closes one of the gaps; zero where none is open at rest.
+
+    Examples
+    --------
+    >>> from nldyn import Stop
+    >>> system = System.from_modal([10.0], {"tip": [2.0]}, modal_damping=0.1,
+    ...     stops=[Stop("tip", 1e9, gap=1e-3)])
+    >>> state = np.zeros(2)
+    >>> row = system.displacement_row(system.stop_vector(system.stops[0]))
+    >>> float(round(reach(system) * np.linalg.norm(row), 12))
+    0.001
+    """
+    needed = [
+        max(stop.gap, 0.0) / float(np.linalg.norm(row))
+        for stop in system.stops
+        if np.any(row := system.displacement_row(system.stop_vector(stop)))
+    ]
+    return min(needed, default=0.0)
+
+
+def orbits_from_strobe(
+    flow: FlowMap, strobe: Strobe, period: int, observe: str, options: SearchOptions
+) -> list[Orbit]:
+    """Orbits of one minimal period that Newton's method finds from near returns."""
+    problem = shooting_problem(flow, period)
+    found: list[Orbit] = []
+    for states in strobe.runs:
+        starts = [states[i] for i in near_returns(states, period, options.candidates)]
+        orbits = [_refined(problem, start, strobe.omega, observe) for start in starts]
+        if not any(orbits):  # an undamped motion goes round an orbit without coming near it
+            middle = states[::period].mean(axis=0)
+            orbits = [_refined(problem, middle, strobe.omega, observe)]
+        for orbit in orbits:
+            if orbit is None or minimal_period(orbit) != period:
+                continue
+            if not any(same_orbit(orbit, other) for other in found):
+                found.append(orbit)
+    return found
+
+
+def orbit_near(flow: FlowMap, start: Real, period: int, omega: float, observe: str) -> Orbit | None:
+    """Orbit that Newton's method finds from a state z, by its minimal period; None if none."""
+    problem = shooting_problem(flow, period)
+    try:
+        orbit = refine(problem, spread(problem, start, omega), omega, observe, max_iterations=10)
+        shorter = minimal_period(orbit)
+        if shorter < period:
+            problem = shooting_problem(flow, shorter)
+            nodes = spread(problem, stroboscopic(orbit)[0], omega)
+            orbit = refine(problem, nodes, omega, observe, max_iterations=10)
+    except ConvergenceError:
+        return None
+    return orbit
+
+
+def orbit_beside(
+    flow: FlowMap, start: Real, period: int, omega: float, observe: str
+) -> Orbit | None:
+    """Orbit beside a state z at a frequency near ω, by its minimal period; None if none is found.
+
+    See `nearest_orbit`.
+    """
+    nodes = spread(shooting_problem(flow, period), start, omega)
+    nodes = nodes.reshape(period, SEGMENTS_PER_PERIOD, -1)
+    return nearest_orbit(flow, nodes, omega, observe, SHORT_STEPS)
+
+
+def nearest_orbit(
+    flow: FlowMap, nodes: Real, omega: float, observe: str, steps: tuple[float, int]
+) -> Orbit | None:
+    """Orbit near some states at a frequency near ω, by its minimal period; None if none is found.
+
+    The frequency is free, and each Newton step is the shortest of those that solve the linearised
+    equations, the Gauss-Newton method of Allgower and Georg [1990, chapter 3]. So states beside
+    a branch that does not reach ω lead to it, and folds do no harm. With more states in a period,
+    these equations hold farther.
+
+    Parameters
+    ----------
+    flow : FlowMap
+        Of the system.
+    nodes : (period, k, 2n) array
+        States z at k equidistant phases of each excitation period, a multiple of the usual number
+        of shooting segments.
+    omega : float
+        Frequency in rad/s.
+    observe : str
+        Interface whose displacement is reported.
+    steps : (float, int)
+        Longest step, over the size of the states, and how many at most.
+    """
+    period, count, _ = nodes.shape
+    problem = shooting_problem(flow, period)
+    finer = shooting_problem(flow, period, period * count)
+    try:
+        solution = _least_length_solution(finer, nodes, omega, *steps)
+        if solution is None:
+            return None
+        usual = [_thinned(vector, nodes.shape) for vector in solution]
+        found = problem.correct(*usual, max_iterations=8)
+        if not found.converged:
+            return None
+        orbit = Orbit.of(problem, found, observe)
+    except ConvergenceError:
+        return None
+    shorter = minimal_period(orbit)
+    if shorter == orbit.period:
+        return orbit
+    return orbit_near(flow, stroboscopic(orbit)[0], shorter, orbit.omega, observe)
+
+
+def _least_length_solution(
+    problem: ShootingProblem, nodes: Real, omega: float, longest: float, most: int
+) -> tuple[Real, Real] | None:
+    """Point that Newton steps of least length lead to, and the row that they fix; None if none."""
+    point = np.append(nodes.ravel(), math.log(omega))
+    row = np.zeros(point.size)
+    row[-1] = 1.0
+    for _ in range(most):
+        found = problem.correct(point, row, max_iterations=1)
+        if not np.any(found.along):
+            return None
+        metric = problem.metric(point)
+        metric[-1] *= FREQUENCY_WEIGHT
+        row = metric * found.along
+        step = found.point - point
+        step -= found.along * float(row @ step) / float(row @ found.along)
+        length = metric_length(metric, step)
+        point = point + step * min(1.0, longest / length if length else 1.0)
+        if not abs(point[-1] - math.log(omega)) < FREQUENCY_SHIFT:
+            return None
+        if length < NEARBY:
+            return point, row
+    return None
+
+
+def _thinned(vector: Real, shape: tuple[int, ...]) -> Real:
+    """A point, or a row, with the usual number of segments in a period."""
+    every = shape[1] // SEGMENTS_PER_PERIOD
+    return np.append(vector[:-1].reshape(shape)[:, ::every].ravel(), vector[-1])
+
+
+def _refined(problem: ShootingProblem, start: Real, omega: float, observe: str) -> Orbit | None:
+    """Orbit that Newton's method finds from a state at phase zero, if it finds one soon."""
+    try:
+        return refine(problem, spread(problem, start, omega), omega, observe, max_iterations=10)
+    except ConvergenceError:
+        return None
+
+
+def find_orbits(
+    system: System | FlowMap,
+    frequency_hz: float,
+    period: int,
+    *,
+    observe: str | None = None,
+    options: SearchOptions | None = None,
+) -> list[Orbit]:
+    """Orbits of period multiple n at one frequency, started from time simulations.
+
+    The system is simulated from several initial states. Attractors of period n are found because
+    the states repeat; unstable orbits because chaotic motion passes near them and nearly repeats.
+    Every near return is refined by multiple shooting. Not finding an orbit proves nothing.
+
+    Parameters
+    ----------
+    system : System or FlowMap
+        What to search.
+    frequency_hz : float
+        Excitation frequency in Hz.
+    period : int
+        Period multiple n; orbits whose true period is shorter are left out.
+    observe : str, optional
+        Interface whose displacement is reported.
+    options : SearchOptions, optional
+        Effort.
+
+    Returns
+    -------
+    list of Orbit
+        Different orbits (not shifts of each other), in the order found.
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense.
+    ConvergenceError
+        If every simulation fails.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance, find_orbits
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> orbits = find_orbits(system, frequency_hz=50.0, period=2)
+    >>> any(orbit.stable for orbit in orbits)
+    True
+    """
+    flow = flow_of(system)
+    check_frequency("frequency_hz", frequency_hz)
+    check_bounded(flow.system, 2.0 * math.pi * frequency_hz)
+    options = options or SearchOptions()
+    strobe = simulate_strobe(flow, frequency_hz, options)
+    if not strobe.runs:
+        raise ConvergenceError(
+            f"every simulation at {frequency_hz:g} Hz failed: {strobe.failures[0]}"
+        )
+    return orbits_from_strobe(flow, strobe, period, check_observe(flow.system, observe), options)
+
+
+def near_returns(states: Real, period: int, count: int) -> list[int]:
+    """Indices where the state comes back after `period` more nearly than before and after.
+
+    A motion that settles on an attractor also lingers near the saddles that it passes. The
+    closest returns come first; states near a chosen one are left out.
+    """
+    if len(states) <= period:
+        return []
+    distance = np.linalg.norm(states[period:] - states[:-period], axis=1)
+    scale = float(np.linalg.norm(states, axis=1).max()) or 1.0
+    before, after = np.append(np.inf, distance[:-1]), np.append(distance[1:], np.inf)
+    returns = np.flatnonzero((distance <= before) & (distance <= after) & (distance < 0.3 * scale))
+    chosen: list[int] = []
+    for index in returns[np.argsort(distance[returns], kind="stable")]:
+        if len(chosen) == count:
+            break
+        apart = [np.linalg.norm(states[index] - states[c]) for c in chosen]
+        if all(a > 1e-2 * scale for a in apart):
+            chosen.append(int(index))
+    return chosen
+
+
+def settling_periods(system: System, frequency_hz: float) -> int:
+    """Excitation periods after which the slowest linear motion has decayed to e^-4, at least 30.
+
+    A motion without damping does not settle; 600 periods show where it goes.
+
+    Examples
+    --------
+    >>> from nldyn import System
+    >>> system = System.from_modal([10.0], {"tip": [1.0]}, modal_damping=0.01)
+    >>> settling_periods(system, 10.0)
+    64
+    """
+    slowest = system.linear.slowest_decay
+    if slowest <= 0.0:
+        return UNDAMPED
+    return max(math.ceil(DECAYS * frequency_hz / slowest), FEWEST)

@@ -1,0 +1,169 @@
+"""Draw curves in the plane of two parameters, and curves of orbits over one parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from nldyn.base.errors import SystemModelError, check_types, shown
+from nldyn.curves.curves import Curve
+from nldyn.plot.diagram import (
+    MARKER_NAMES,
+    MARKERS,
+    PERIOD_COLOURS,
+    STABLE,
+    UNSTABLE,
+    length_unit,
+    mark_style,
+    new_axes,
+    stability_runs,
+)
+from nldyn.system.parameters import Parameter
+
+LABELS = {
+    "frequency_hz": "excitation frequency (Hz)",
+    "stiffness": "contact stiffness (N/m$^p$)",
+    "exponent": "exponent of the contact law",
+    "dissipation": "dissipation (s/m)",
+    "amplitude": "force amplitude (N)",
+    "mass_times_radius": "unbalance (kg m)",
+    "coefficient": "damper (N s/m)",
+    "modal_damping": "damping ratio",
+    "natural_frequency_hz": "frequency of a mode (Hz)",
+}
+MONITOR_NAMES = {
+    "peak_force": "constant peak force",
+    "max_penetration": "constant penetration",
+    "max_abs_displacement": "constant displacement",
+}
+
+
+def plot_curves(curves: Sequence[Curve], ax: Axes | None = None) -> Axes:
+    """Draw curves in two parameters, with the points marked on them.
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+        All in the same two parameters.
+    ax : Axes, optional
+        Where to draw; a new figure unless given.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    SystemModelError
+        If there are no curves, or not all in the same two parameters.
+    """
+    several = isinstance(curves, list | tuple) and len(curves) > 0
+    if not several or not all(
+        isinstance(c, Curve) and len(c.parameters) == 2 and c.parameters == curves[0].parameters
+        for c in curves
+    ):
+        raise SystemModelError(
+            f"plot_curves needs a list of curves in the same two parameters, got {shown(curves)}"
+        )
+    check_types(ax=(ax, Axes, None))
+    ax = ax or new_axes(7.5, 5.0)
+    everything = np.vstack([curve.values for curve in curves])
+    scales, labels = [], []
+    for which, parameter in enumerate(curves[0].parameters):
+        scale, label = _scale_and_label(parameter, float(np.abs(everything[:, which]).max()))
+        scales.append(scale)
+        labels.append(label)
+    kinds = list(dict.fromkeys(curve.kind for curve in curves))
+    for curve in curves:
+        colour = PERIOD_COLOURS[kinds.index(curve.kind) % len(PERIOD_COLOURS)]
+        monitor, of, interface = curve.kind.partition(" of ")
+        name = MARKER_NAMES.get(curve.kind) or MONITOR_NAMES.get(monitor, monitor) + of + interface
+        first = curve is next(c for c in curves if c.kind == curve.kind)
+        x, y = (curve.values * scales).T
+        ax.plot(x, y, color=colour, lw=1.4, label=name if first else None)
+        for mark in curve.marks:
+            place = (float(mark.values[0] * scales[0]), float(mark.values[1] * scales[1]))
+            ax.plot(*place, "o", color=colour, ms=4.5, zorder=3)
+            ax.annotate(
+                mark.kind, place, xytext=(5, 4), textcoords="offset points", size=8, color=colour
+            )
+    ax.set_xlabel(labels[0])
+    ax.set_ylabel(labels[1])
+    ax.legend(frameon=False)
+    return ax
+
+
+def plot_orbit_curve(curve: Curve, ax: Axes | None = None) -> Axes:
+    """Draw the largest displacement of orbits over the one parameter in which they were continued.
+
+    Stable orbits are drawn solid, unstable ones dotted, special points with the marks of
+    `plot_diagram`.
+
+    Parameters
+    ----------
+    curve : Curve
+        From `continue_in`.
+    ax : Axes, optional
+        Where to draw; a new figure unless given.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    SystemModelError
+        If this is no curve of orbits in one parameter.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance, continue_in, solve_orbit
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     stops=[Stop("middle", stiffness=5.17e9, gap=2e-6)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> ax = plot_orbit_curve(continue_in(solve_orbit(system, 20.0), "gap", (1e-6, 1e-5)))
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('gap (µm)', 'max |y| at middle (µm)')
+    """
+    if not (isinstance(curve, Curve) and len(curve.parameters) == 1):
+        raise SystemModelError(
+            f"plot_orbit_curve needs a curve in one parameter, got {shown(curve)}"
+        )
+    check_types(ax=(ax, Axes, None))
+    ax = ax or new_axes(7.5, 5.0)
+    orbits = curve.orbits
+    largest = np.array([orbit.max_abs_displacement for orbit in orbits])
+    scale, label = _scale_and_label(curve.parameters[0], float(np.abs(curve.values).max()))
+    factor, unit = length_unit(float(largest.max()))
+    x, y = curve.values[:, 0] * scale, largest / factor
+    named = set()
+    for run in stability_runs([orbit.stable for orbit in orbits]):
+        name = "stable" if run.stable else "unstable"
+        ax.plot(
+            x[run.start : run.stop], y[run.start : run.stop], color=PERIOD_COLOURS[0], lw=1.4,
+            ls=STABLE if run.stable else UNSTABLE, label=None if name in named else name,
+        )  # fmt: skip
+        named.add(name)
+    for kind in MARKERS:
+        marks = [mark for mark in curve.marks if mark.kind == kind]
+        places = [
+            (float(mark.values[0]) * scale, mark.orbit.max_abs_displacement / factor)
+            for mark in marks
+        ]
+        if places:
+            x_marks, y_marks = zip(*places, strict=True)
+            ax.plot(x_marks, y_marks, label=f"{MARKER_NAMES[kind]} ({kind})", **mark_style(kind))
+    ax.set_xlabel(label)
+    ax.set_ylabel(f"max |y| at {orbits[0].observe} ({unit})")
+    ax.legend(frameon=False)
+    return ax
+
+
+def _scale_and_label(parameter: Parameter, largest: float) -> tuple[float, str]:
+    """Factor from SI to the unit drawn, and the label of an axis."""
+    if parameter.name == "gap":
+        factor, unit = length_unit(largest)
+        return 1.0 / factor, f"gap ({unit})"
+    return 1.0, LABELS[parameter.name]

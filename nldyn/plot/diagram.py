@@ -1,0 +1,475 @@
+"""Draw branches against the excitation frequency, and orbits over time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import ArrayLike, NDArray
+
+from nldyn.base.errors import check_choice, check_types
+from nldyn.branches.branch import check_branches
+from nldyn.plot.hover import show_labels
+
+if TYPE_CHECKING:
+    from nldyn.branches.branch import Branch
+    from nldyn.orbits.orbit import Orbit
+    from nldyn.search.diagram import Diagram
+    from nldyn.system.system import System
+
+STABLE: Literal["-"] = "-"
+UNSTABLE = (0.0, (1.0, 1.4))
+# Okabe and Ito's colours, told apart by colour-blind readers; dark ones first.
+PERIOD_COLOURS = (
+    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#5D4E9C", "#8B4513",
+    "#777777",
+)  # fmt: skip
+MARKERS = {"LP": "o", "PD": "s", "NS": "D", "BP": "^", "GR": "x"}
+MARKER_NAMES = {
+    "LP": "cyclic fold",
+    "PD": "flip",
+    "NS": "Neimark-Sacker",
+    "BP": "branch point",
+    "GR": "grazing",
+}
+PREFIXES = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
+SVG_SALT = "nldyn"
+
+
+@dataclass(frozen=True)
+class Run:
+    """Consecutive points ``start`` to ``stop - 1`` of a branch, to be drawn in one style."""
+
+    start: int
+    stop: int
+    stable: bool
+
+
+def stability_runs(stable: ArrayLike) -> list[Run]:
+    """Split a branch into runs to be drawn as stable or unstable.
+
+    Parameters
+    ----------
+    stable : (n,) array_like of bool
+        Stability of each point.
+
+    Returns
+    -------
+    list of Run
+        They cover the branch without gaps: two neighbours share one point, the last one of the
+        stable side, so that a stable line ends at a stable orbit.
+
+    Examples
+    --------
+    >>> for run in stability_runs([True, True, False, True]):
+    ...     print(run.start, run.stop, run.stable)
+    0 2 True
+    1 4 False
+    3 4 True
+    """
+    flags = np.asarray(stable, dtype=bool)
+    if flags.size == 0:
+        return []
+    changes = np.flatnonzero(flags[1:] != flags[:-1]) + 1
+    edges = [0, *changes.tolist(), flags.size]
+    runs = []
+    for first, last in pairwise(edges):
+        if flags[first]:
+            runs.append(Run(first, last, True))
+        else:
+            runs.append(Run(max(first - 1, 0), min(last + 1, flags.size), False))
+    return runs
+
+
+def branch_curve(
+    branch: Branch,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Give the curve to draw of a branch: its points, with the special points in between.
+
+    Parameters
+    ----------
+    branch : Branch
+        A branch.
+
+    Returns
+    -------
+    frequency_hz, max_abs_displacement, stable : (n,) arrays
+        In Hz and m, in the order along the branch. A special point counts as stable if a
+        neighbour is, so that the drawn stability changes at the special point itself.
+    """
+    located = [(node.arclength, node.orbit, node.orbit.stable) for node in branch.nodes]
+    lengths = [length for length, _, _ in located]
+    for special in branch.special_points:
+        after = int(np.searchsorted(lengths, special.point.arclength))
+        neighbours = branch.nodes[max(after - 1, 0) : after + 1]
+        stable = any(node.orbit.stable for node in neighbours)
+        located.append((special.point.arclength, special.orbit, stable))
+    located.sort(key=lambda entry: entry[0])
+    hz = np.array([orbit.frequency_hz for _, orbit, _ in located], dtype=float)
+    y = np.array([orbit.max_abs_displacement for _, orbit, _ in located], dtype=float)
+    return hz, y, np.array([stable for _, _, stable in located], dtype=bool)
+
+
+def length_unit(largest: float) -> tuple[float, str]:
+    """Choose the unit for an axis that reaches up to ``largest`` metres.
+
+    Examples
+    --------
+    >>> length_unit(2.3e-4)
+    (1e-06, 'µm')
+    """
+    size = abs(largest)
+    for factor, name in PREFIXES:
+        if size >= 0.5 * factor:
+            return factor, name
+    return PREFIXES[-1] if 0.0 < size < math.inf else PREFIXES[0]
+
+
+def mark_size(count: int) -> float:
+    """Choose the size of special points in points: the more there are, the smaller.
+
+    Examples
+    --------
+    >>> mark_size(10), mark_size(1000)
+    (4.5, 1.8)
+    """
+    return min(4.5, max(1.8, 35.0 / math.sqrt(max(count, 1))))
+
+
+def period_name(period: int) -> str:
+    """Name a branch by the period of its orbits: ``harmonic``, ``1/2 subharmonic``, ...
+
+    Examples
+    --------
+    >>> period_name(3)
+    '1/3 subharmonic'
+    """
+    return "harmonic" if period == 1 else f"1/{period} subharmonic"
+
+
+def plot_diagram(
+    diagram: Diagram | Branch | Iterable[Branch],
+    ax: Axes | None = None,
+    *,
+    yscale: Literal["linear", "log"] = "linear",
+    special_points: Sequence[str] = tuple(MARKERS),
+    unit: str | None = None,
+    legend: bool = True,
+    hover: bool = True,
+) -> Axes:
+    """Draw the largest displacement of each orbit against its excitation frequency.
+
+    Parameters
+    ----------
+    diagram : Diagram, Branch or iterable of Branch
+        Branches to draw.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure, free of pyplot, unless given.
+    yscale : {"linear", "log"}
+        Scale of the displacement axis.
+    special_points : sequence of str
+        Kinds to mark, out of LP, PD, NS, BP and GR.
+    unit : {"m", "mm", "µm", "nm"}, optional
+        Unit of the displacement axis; chosen by the largest value unless given.
+    legend : bool
+        Whether to explain colours, lines and marks.
+    hover : bool
+        Whether orbits and special points show their numbers under the pointer, where the figure is
+        live: in a window, or in a notebook after ``%matplotlib widget``, drawn in axes of pyplot.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        ``ax.figure.savefig(...)`` saves the picture.
+
+    Raises
+    ------
+    SystemModelError
+        For what is no branch or no axes, or a scale, kind or unit that there is not.
+
+    Examples
+    --------
+    >>> from nldyn import System, Unbalance, continue_branch, solve_orbit
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> branch = continue_branch(solve_orbit(system, frequency_hz=10.0), (5.0, 20.0))
+    >>> ax = plot_diagram([branch])
+    >>> ax.get_ylabel()
+    'max |y| (µm)'
+    """
+    several = getattr(diagram, "branches", diagram)
+    branches = list(several if isinstance(several, Iterable) else [several])
+    check_branches("diagram", branches)
+    check_types(ax=(ax, Axes, None), special_points=(special_points, Sequence))
+    check_choice("yscale", yscale, ("linear", "log"))
+    for kind in special_points:
+        check_choice("special_points", kind, MARKERS)
+    ax = ax if ax is not None else new_axes()
+    factor, unit = _unit_of(branches, unit)
+    colours = period_colours(branch.period for branch in branches)
+    for branch in branches:
+        _draw_branch(ax, branch, colours[branch.period], factor)
+    size = mark_size(sum(len(branch.special_points) for branch in branches))
+    marked = [kind for kind in special_points if _draw_marks(ax, branches, kind, factor, size)]
+    ax.set_xlabel("excitation frequency (Hz)")
+    ax.set_ylabel(f"max |y|{_observed(branches)} ({unit})")
+    ax.set_yscale(yscale)
+    if yscale == "linear":
+        ax.set_ylim(bottom=-0.02 * ax.get_ylim()[1])
+    if legend and branches:
+        draw_legend(ax, colours, branches, marked)
+    if hover:
+        _label_orbits(ax, branches, marked, factor, unit)
+    return ax
+
+
+def _observed(branches: Sequence[Branch]) -> str:
+    """Where the displacement is taken, in words, if the structure has several interfaces."""
+    orbits = [branch.nodes[0].orbit for branch in branches]
+    places = {orbit.observe for orbit in orbits if len(orbit.system.interfaces) > 1}
+    return f" at {places.pop()}" if len(places) == 1 else ""
+
+
+def plot_orbit(
+    orbit: Orbit, axes: tuple[Axes, Axes] | None = None, *, samples: int = 4000
+) -> tuple[Axes, Axes]:
+    """Draw displacement and contact force of an orbit over one of its periods.
+
+    Parameters
+    ----------
+    orbit : Orbit
+        A periodic orbit.
+    axes : pair of matplotlib.axes.Axes, optional
+        Where to draw displacement and force; a new figure unless given.
+    samples : int
+        Number of equal time steps.
+
+    Returns
+    -------
+    pair of matplotlib.axes.Axes
+        Those for the displacement and for the contact force. The instants of `Orbit.impact_list`,
+        when contacts are deepest, are marked in both, also those of contacts too short for the
+        samples; and where stops against the ground are that the orbit comes near.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance, solve_orbit
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     stops=[Stop("middle", stiffness=5.17e9)], excitation=[Unbalance("middle", 4.92e-6)])
+    >>> displacement, force = plot_orbit(solve_orbit(system, frequency_hz=25.3))
+    >>> displacement.get_title()
+    'harmonic orbit at 25.3 Hz'
+    """
+    history = orbit.history(samples)
+    upper, lower = axes if axes is not None else new_axes_pair()
+    places = stop_places(orbit.system, orbit.observe)
+    _draw_displacement(upper, history.time, history.displacement[orbit.observe], places)
+    _draw_forces(lower, history.time, history.force, [s.at for s in orbit.system.stops])
+    _mark_deepest((upper, lower), [impact.time for impact in orbit.impact_list])
+    name = period_name(orbit.period)
+    upper.set_title(f"{name} orbit at {orbit.frequency_hz:.6g} Hz")
+    lower.set_xlabel("time (s)")
+    return upper, lower
+
+
+def stop_places(system: System, interface: str) -> list[float]:
+    """Displacements in m at which an interface meets its stops against the ground.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System
+    >>> stops = [Stop("m", 1e9, gap=2e-3, direction=d) for d in (1, -1)]
+    >>> stop_places(System.from_modal([13.1], {"m": [0.635]}, stops=stops), "m")
+    [-0.002, 0.002]
+    """
+    ours = [stop for stop in system.stops if stop.at == interface and stop.against is None]
+    return sorted({stop.direction * stop.gap for stop in ours})
+
+
+def save_diagram(
+    diagram: Diagram,
+    directory: str | Path,
+    *,
+    title: str = "",
+    yscale: Literal["linear", "log"] = "linear",
+) -> None:
+    """Write ``diagram.png`` and ``diagram.svg`` to a directory that exists."""
+    ax = plot_diagram(diagram, yscale=yscale)
+    ax.set_title(title, parse_math=False)
+    save_figure(ax, Path(directory) / "diagram")
+
+
+def save_figure(ax: Axes, stem: Path) -> None:
+    """Write the figure of some axes as ``stem.png`` and ``stem.svg``, the same on every run."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    with mpl.rc_context({"svg.hashsalt": SVG_SALT}):
+        figure.savefig(stem.with_suffix(".png"), dpi=150)
+        figure.savefig(stem.with_suffix(".svg"), metadata={"Date": None})
+
+
+def new_axes(width: float = 10.5, height: float = 5.5) -> Axes:
+    """Make the axes of a figure of its own, in inches, without pyplot."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure.add_subplot()
+
+
+def new_axes_pair(width: float = 9.0, height: float = 6.0) -> tuple[Axes, Axes]:
+    """Make two axes one above the other that share the time axis."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
+    return upper, lower
+
+
+def period_colours(periods: Iterable[int]) -> dict[int, str]:
+    """Give each period its colour: the same for 1, 2 and 3 in every picture."""
+    present = sorted(set(periods) | {1, 2, 3})
+    return {p: PERIOD_COLOURS[i % len(PERIOD_COLOURS)] for i, p in enumerate(present)}
+
+
+def _draw_branch(ax: Axes, branch: Branch, colour: str, factor: float) -> None:
+    hz, y, stable = branch_curve(branch)
+    for run in stability_runs(stable):
+        part = slice(run.start, run.stop)
+        style = STABLE if run.stable else UNSTABLE
+        ax.plot(hz[part], y[part] / factor, color=colour, linewidth=1.4, linestyle=style)
+
+
+def _draw_marks(
+    ax: Axes, branches: Sequence[Branch], kind: str, factor: float, size: float
+) -> bool:
+    points = [p for branch in branches for p in branch.special_points if p.kind == kind]
+    if not points:
+        return False
+    hz = [float(point.orbit.frequency_hz) for point in points]
+    y = [float(point.orbit.max_abs_displacement) / factor for point in points]
+    ax.plot(hz, y, **mark_style(kind, size))
+    return True
+
+
+def mark_style(kind: str, size: float = 4.5) -> dict[str, Any]:
+    """How special points of a kind are drawn: arguments of `Axes.plot`.
+
+    Examples
+    --------
+    >>> mark_style("PD")["marker"]
+    's'
+    """
+    return {
+        "linestyle": "none",
+        "marker": MARKERS[kind],
+        "markersize": size,
+        "markerfacecolor": "white",
+        "markeredgecolor": "black",
+        "markeredgewidth": 0.18 * size,
+        "zorder": 4,
+    }
+
+
+def _label_orbits(
+    ax: Axes, branches: Sequence[Branch], marked: Sequence[str], factor: float, unit: str
+) -> None:
+    """Let special points, which come first, and points show what they are."""
+    entries = [
+        (branch.name, f"{MARKER_NAMES[special.kind]} ({special.kind})", special.orbit)
+        for branch in branches
+        for special in branch.special_points
+        if special.kind in marked
+    ]
+    count = len(entries)  # at the special points stability changes
+    entries += [
+        (branch.name, f"point {number}", orbit)
+        for branch in branches
+        for number, orbit in enumerate(branch.points)
+    ]
+    places = [(orbit.frequency_hz, orbit.max_abs_displacement / factor) for _, _, orbit in entries]
+
+    def label(index: int) -> str:
+        name, what, orbit = entries[index]
+        title = f"{name or period_name(orbit.period)}, {what}"
+        return f"{title}\n{orbit_text(orbit, factor, unit, stability=index >= count)}"
+
+    show_labels(ax, np.array(places, dtype=float).reshape(-1, 2), label)
+
+
+def orbit_text(orbit: Orbit, factor: float, unit: str, *, stability: bool = True) -> str:
+    """Say in two lines what an orbit is, with displacements in a unit of `factor` metres."""
+    word = ("stable, " if orbit.stable else "unstable, ") if stability else ""
+    impacts = f"{orbit.impacts} impact{'' if orbit.impacts == 1 else 's'}"
+    return (
+        f"{orbit.frequency_hz:.7g} Hz, max |y| {orbit.max_abs_displacement / factor:.5g} {unit}\n"
+        f"{word}largest multiplier {abs(orbit.largest_multiplier):.4g}, {impacts}"
+    )
+
+
+def draw_legend(
+    ax: Axes, colours: dict[int, str], branches: Sequence[Branch], marked: Sequence[str]
+) -> None:
+    """Explain colours, lines and the marked kinds of special points."""
+    periods = sorted({branch.period for branch in branches})
+    entries = [Line2D([], [], color=colours[p], label=period_name(p)) for p in periods]
+    entries += [
+        Line2D([], [], color="0.3", linestyle=STABLE, label="stable"),
+        Line2D([], [], color="0.3", linestyle=UNSTABLE, label="unstable"),
+    ]
+    for kind in marked:
+        label = f"{MARKER_NAMES[kind]} ({kind})"
+        entries.append(Line2D([], [], label=label, **mark_style(kind)))
+    ax.legend(handles=entries, fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
+
+
+def _draw_displacement(
+    ax: Axes, time: NDArray[np.float64], y: NDArray[np.float64], places: Sequence[float]
+) -> None:
+    """Draw it with those of the stops that are neither at zero, where a line is, nor far off."""
+    reach = float(np.abs(y).max())
+    factor, unit = length_unit(reach)
+    ax.axhline(0.0, color="0.6", linewidth=0.6)
+    ax.plot(time, y / factor, color=PERIOD_COLOURS[0], linewidth=1.4)
+    shown = [place for place in places if 0.0 < abs(place) <= 1.5 * reach]
+    for number, place in enumerate(shown):
+        label = "stop" if number == 0 else None
+        ax.axhline(place / factor, color=PERIOD_COLOURS[1], linestyle="-.", label=label)
+    ax.set_ylabel(f"displacement ({unit})")
+
+
+def _draw_forces(
+    ax: Axes, time: NDArray[np.float64], forces: NDArray[np.float64], names: Sequence[str]
+) -> None:
+    for number, name in enumerate(names):
+        colour = PERIOD_COLOURS[(number + 1) % len(PERIOD_COLOURS)]
+        label = f"stop at {name}" if names.count(name) == 1 else f"stop {number} at {name}"
+        ax.plot(time, forces[:, number], color=colour, linewidth=1.2, label=label)
+    ax.set_ylabel("contact force (N)")
+    ax.set_ylim(bottom=0.0)
+    if len(names) > 1:
+        ax.legend(fontsize="small", loc="upper right")
+
+
+def _mark_deepest(axes: Sequence[Axes], times: Sequence[float]) -> None:
+    for ax in axes:
+        for number, instant in enumerate(times):
+            label = "deepest contact" if number == 0 else None
+            ax.axvline(instant, color="0.35", linewidth=0.8, linestyle="--", label=label)
+    if axes[0].get_legend_handles_labels()[0]:
+        axes[0].legend(fontsize="small", loc="upper right")
+
+
+def _unit_of(branches: Sequence[Branch], unit: str | None) -> tuple[float, str]:
+    if unit is None:
+        largest = [float(np.max(b.max_abs_displacement)) for b in branches if len(b.points)]
+        return length_unit(max(largest, default=1.0))
+    check_choice("unit", unit, (name for _, name in PREFIXES))
+    return next(prefix for prefix in PREFIXES if prefix[1] == unit)

@@ -1,0 +1,155 @@
+"""The modes of a component that may matter in a setting, by its linear response alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import beta
+
+import cms
+from nldyn.base.arrays import Real
+from nldyn.base.errors import SystemModelError
+from nldyn.reduction.load_case import LoadCase
+from nldyn.system.elements import Stop
+
+INVISIBLE = 1e-6
+MOST_MODES = 60
+PULSE = 1.5  # a half sine of duration T has its first spectral zero at 1.5 / T
+BEYOND = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """A component reduced to the modes that may matter in a setting, and to more.
+
+    Parameters
+    ----------
+    whole : cms.ReducedModel
+        All modes up to twice the cut-off.
+    seen : list of int
+        Numbers, from 1, of those that an interface in use sees.
+    cutoff_hz : float
+        Up to where modes may matter: the larger of the excitation's highest frequency and 1.5
+        over the shortest contact.
+    contact_s : float
+        Shortest contact expected, in s; infinite without a stop.
+    """
+
+    whole: cms.ReducedModel
+    seen: list[int]
+    cutoff_hz: float
+    contact_s: float
+
+    def __repr__(self) -> str:
+        return f"<Candidates: {len(self.numbers)} modes up to {self.cutoff_hz:.4g} Hz>"
+
+    @property
+    def numbers(self) -> list[int]:
+        """Numbers of the modes seen up to the cut-off."""
+        return [n for n in self.seen if self.whole.frequencies_hz[n - 1] <= self.cutoff_hz]
+
+    def reduced(self) -> cms.ReducedModel:
+        """The model with these modes."""
+        return cms.keep_modes(self.whole, self.numbers or self.seen)
+
+
+def candidate_modes(component: cms.ComponentLike, setting: LoadCase) -> Candidates:
+    """The modes that may matter in a setting, see the notes of `nldyn.select_modes`.
+
+    Raises
+    ------
+    SystemModelError
+        If they are too many, or if the component has no interface for something.
+    cms.ReductionError
+        As `cms.reduce`.
+    """
+    first = cms.reduce(component, cutoff_hz=BEYOND * setting.range_hz[1])
+    contact = shortest_contact(setting, first)
+    cutoff = max(setting.range_hz[1], PULSE / contact)
+    whole = first
+    for _ in range(8):
+        whole = cms.reduce(component, cutoff_hz=BEYOND * cutoff)
+        contact = shortest_contact(setting, cms.keep_modes(whole, below(whole, cutoff)))
+        longer = max(setting.range_hz[1], PULSE / contact)
+        if longer <= 1.1 * cutoff or whole.modes > MOST_MODES:
+            break
+        cutoff = longer
+    seen = visible(whole, setting)
+    if len(seen) > MOST_MODES:
+        raise SystemModelError(
+            f"{len(seen)} modes up to {BEYOND * cutoff:.4g} Hz may matter, more than {MOST_MODES}; "
+            "reduce by hand"
+        )
+    return Candidates(whole, seen, cutoff, contact)
+
+
+def contact_duration(stop: Stop, mass: float, speed: float) -> float:
+    r"""Duration in s of the impact of a free mass on a stop without loss.
+
+    .. math:: T = \frac{2\delta}{v}\int_0^1\frac{dx}{\sqrt{1 - x^{p+1}}}, \qquad
+              \delta = \left(\frac{(p + 1) m v^2}{2k}\right)^{1/(p+1)}
+
+    Parameters
+    ----------
+    stop : Stop
+        With stiffness k and exponent p.
+    mass, speed : float
+        In kg and m/s.
+
+    References
+    ----------
+    K. L. Johnson (1985), *Contact Mechanics*, eq. 11.24: :math:`T = 2.94\,\delta/v` for p = 1.5.
+
+    Examples
+    --------
+    >>> t = contact_duration(Stop("middle", 5.17e9), 2.48, 0.05)
+    >>> depth = (1.25 * 2.48 * 0.05**2 / 5.17e9) ** 0.4
+    >>> round(t * 0.05 / depth, 3)
+    2.943
+    """
+    power = stop.exponent + 1.0
+    depth = (power * mass * speed**2 / (2.0 * stop.stiffness)) ** (1.0 / power)
+    return float(2.0 * depth / speed * beta(1.0 / power, 0.5) / power)
+
+
+def in_use(model: cms.ReducedModel, setting: LoadCase) -> Real:
+    """Participations (m, r) of the interfaces where something acts or is observed."""
+    names = {element.at for element in (*setting.stops, *setting.dampers, *setting.excitation)}
+    names |= {stop.against for stop in setting.stops if stop.against is not None}
+    names.add(setting.observe or model.interfaces[0])
+    return np.array([model.participation[name] for name in model.interfaces if name in names])
+
+
+def visible(model: cms.ReducedModel, setting: LoadCase) -> list[int]:
+    """Numbers of the modes that an interface in use sees, and of all rigid-body modes."""
+    rows = np.abs(in_use(model, setting))
+    seen = np.any(rows > INVISIBLE * rows.max(axis=1, keepdims=True), axis=0)
+    seen |= model.frequencies_hz == 0.0
+    return [int(i) + 1 for i in np.flatnonzero(seen[: model.modes])]
+
+
+def below(model: cms.ReducedModel, cutoff_hz: float) -> list[int]:
+    """Numbers of the modes up to a frequency."""
+    return [i + 1 for i in range(model.modes) if model.frequencies_hz[i] <= cutoff_hz]
+
+
+def share(model: cms.ReducedModel, setting: LoadCase, number: int) -> float:
+    """How much an interface in use sees a mode, relative to the one it sees best."""
+    rows = np.abs(in_use(model, setting)[:, : model.modes])
+    return float(np.max(rows[:, number - 1] / rows.max(axis=1)))
+
+
+def shortest_contact(setting: LoadCase, model: cms.ReducedModel) -> float:
+    """Duration in s of the shortest contact to be expected; infinite without a stop."""
+    system = setting.system(model)
+    omegas = 2.0 * np.pi * np.linspace(*setting.range_hz, 200)
+    shortest = math.inf
+    for stop in setting.stops:
+        c = system.stop_vector(stop)
+        row = system.displacement_row(c)
+        speed = max(w * abs(row @ system.steady(float(w))) for w in omegas)
+        if speed > 0.0:
+            shortest = min(shortest, contact_duration(stop, 1.0 / float(c @ c), speed))
+    return shortest

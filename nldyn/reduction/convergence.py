@@ -1,0 +1,693 @@
+"""How the answer depends on the reduction: number of modes, method, and mesh."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import cms
+from nldyn.base.arrays import Complex, Real
+from nldyn.base.errors import ConvergenceError, SystemModelError
+from nldyn.branches.branch import Branch
+from nldyn.branches.continuation import continue_branch
+from nldyn.branches.peaks import resonance_peaks
+from nldyn.flow.flow_map import FlowMap
+from nldyn.orbits.newton import refine
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.solve import solve_orbit
+from nldyn.reduction.load_case import LoadCase
+from nldyn.runtime.progress import Progress, Shares, silent
+from nldyn.system.system import System
+
+COUNTS = (*range(1, 11), 12, 16, 20, 30, 40)
+GRID = 400
+EIGENFREQUENCIES = 3
+SPECIAL_KINDS = ("LP", "PD")
+ONE_MODE = 4.0  # part of the cost of a branch that does not grow with its modes, in modes
+MATCH = 0.02  # special points of one kind farther apart are not the same
+INVISIBLE = 1e-9
+FULL = "full"
+REFERENCE = "reference"
+ALL_MODES_UP_TO = 1500  # degrees of freedom; of larger components the reference is reduced, too
+FEWEST_REFERENCE_MODES = 40
+METHODS = ("rubin", "craig-bampton", "guyan", "truncation", "macneal")
+MASSLESS = "its interfaces have no mass, so that a stop has no equation of motion"
+QUANTITIES = {
+    "eigenfrequency": "eigenfrequencies",
+    "receptance": "receptance",
+    "peak_hz": "peak frequency",
+    "peak_m": "peak height",
+    "fold_flip": "folds and flips",
+    "force": "contact force",
+    "contact": "contact duration",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What one reduced model answers.
+
+    Parameters
+    ----------
+    mesh, method : str
+        Name of the mesh, empty where there is one only, and how it was reduced.
+    dofs, modes, size : int
+        Degrees of freedom of the component, kept component modes, modal coordinates of the system.
+    frequencies_hz : (k,) array
+        Lowest eigenfrequencies that an interface sees.
+    receptance : (f,) complex array
+        Linear receptance at the observed interface over the range, with all dampers, m/N.
+    peak : Orbit or None
+        Orbit at the top of the highest resonance peak of the harmonic branch.
+    special_hz : dict of str to tuple
+        Frequencies of the folds (LP) and flips (PD) of the harmonic branch.
+    orbit : Orbit or None
+        Harmonic orbit at the frequency of the study.
+    seconds_per_orbit : float
+        Time to find that orbit again from a guess 0.1 % off, the shortest of nine.
+    seconds : float
+        Time for the branch.
+    note : str
+        What could not be computed.
+    """
+
+    mesh: str
+    method: str
+    dofs: int
+    modes: int
+    size: int
+    frequencies_hz: Real
+    receptance: Complex
+    peak: Orbit | None
+    special_hz: Mapping[str, tuple[float, ...]] | None
+    orbit: Orbit | None
+    seconds_per_orbit: float
+    seconds: float
+    note: str = ""
+
+    @property
+    def label(self) -> str:
+        """Mesh and method."""
+        return " ".join(filter(None, (self.mesh, self.method)))
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """Relative errors of one model against the reference; nan where a number is missing.
+
+    Parameters
+    ----------
+    eigenfrequency : float
+        Largest of the first three that an interface sees; infinite if there are fewer.
+    receptance : float
+        ``norm(H - H_ref) / norm(H_ref)`` over the range.
+    peak_hz, peak_m : float
+        Frequency and height of the highest resonance peak.
+    fold_flip : float
+        Largest error of a fold's or flip's frequency, of those that both models have.
+    counts : (int, int) or None
+        Folds and flips of the reference that the model lacks, and the other way round; None if
+        it has no branch.
+    force, contact : float
+        Largest contact force and whole contact time per period of the orbit at the frequency of
+        the study.
+    """
+
+    eigenfrequency: float
+    receptance: float
+    peak_hz: float
+    peak_m: float
+    fold_flip: float
+    counts: tuple[int, int] | None
+    force: float
+    contact: float
+
+
+@dataclass(frozen=True, eq=False)
+class ConvergenceStudy:
+    """A convergence study.
+
+    Parameters
+    ----------
+    setting : LoadCase
+        What was asked.
+    at_hz : float
+        Frequency of the orbits that are compared.
+    models : tuple of Measured
+        All models, the reference last.
+    errors : tuple of Errors
+        One for each model, against the references.
+    best : Measured
+        The model whose branch is that of reference.
+    reference_error : float
+        Bound, but for rounding, of the reference's own error: of the receptance without damping,
+        relative as in `Errors`. 0 for the full model.
+    """
+
+    setting: LoadCase
+    at_hz: float
+    models: tuple[Measured, ...]
+    errors: tuple[Errors, ...]
+    best: Measured
+    reference_error: float = 0.0
+
+    def __repr__(self) -> str:
+        """One line: how many models, and at which frequency their orbits are compared."""
+        return f"<ConvergenceStudy of {len(self.models)} models, orbits at {self.at_hz:.6g} Hz>"
+
+    @property
+    def reference(self) -> Measured:
+        """The model with which eigenfrequencies and receptance are compared: the full one if
+        it is small enough.
+        """
+        return self.models[-1]
+
+    def series(self) -> dict[str, list[int]]:
+        """Indices of the models with one mesh and method, by its label, without the reference."""
+        return self._grouped(lambda model: model.label)
+
+    def mesh_series(self) -> dict[str, list[int]]:
+        """Indices of the models by one method with one count on several meshes, by its name."""
+        found = self._grouped(lambda model: f"{model.method}, {counted_modes(model)}")
+        return {name: indices for name, indices in found.items() if len(indices) > 1}
+
+    def _grouped(self, name: Callable[[Measured], str]) -> dict[str, list[int]]:
+        found: dict[str, list[int]] = {}
+        for index, model in enumerate(self.models[:-1]):
+            found.setdefault(name(model), []).append(index)
+        return found
+
+    def enough(self, quantity: str, tolerance: float, indices: Sequence[int]) -> Measured | None:
+        """First model of a series from which on an error stays below a tolerance."""
+        found = None
+        for index in reversed(indices):
+            if not getattr(self.errors[index], quantity) <= tolerance:
+                break
+            found = self.models[index]
+        return found
+
+    def report(self) -> str:
+        """The study as a table and a few sentences."""
+        head = ("label", "dofs", "modes", "size", "eigenf.", "recept.", "peak Hz", "peak m",
+                "LP/PD", "lacks", "extra", "force", "contact", "ms/orbit", "branch s")  # fmt: skip
+        rows: list[tuple[str, ...]] = [head]
+        for model, error in zip(self.models, self.errors, strict=True):
+            numbers = (error.eigenfrequency, error.receptance, error.peak_hz, error.peak_m,
+                       error.fold_flip)  # fmt: skip
+            rows.append((
+                model.label, str(model.dofs), str(model.modes), str(model.size),
+                *map(shown_error, numbers),
+                *map(str, error.counts or ("-", "-")), shown_error(error.force),
+                shown_error(error.contact), f"{1e3 * model.seconds_per_orbit:.3g}",
+                f"{model.seconds:.3g}",
+            ))  # fmt: skip
+        widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
+        lines = [
+            "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
+            for row in rows
+        ]
+        whole = f"the full model ({self.reference.size} modes)"
+        if self.reference.method != FULL:
+            whole = (
+                f"rubin with {counted_modes(self.reference)} (its undamped receptance is within "
+                f"{self.reference_error:.1e} of the full model's but for rounding)"
+            )
+        lines.append(
+            f"reference: {whole} for eigenfrequencies and "
+            f"receptance{' and the orbit' if self.reference.orbit else ''}, {self.best.label} with "
+            f"{counted_modes(self.best)} for the rest; orbits at {self.at_hz:g} Hz"
+        )
+        known = self.reference.orbit or self.best.orbit
+        if known is not None and largest_force(known) == 0.0:
+            lines.append(
+                f"no stop is touched at {self.at_hz:g} Hz, so that there is no contact to compare"
+            )
+        for label, indices in self.series().items():
+            if len(indices) > 1:
+                lines += self.said_of(label, indices, counted_modes)
+        for label, indices in self.mesh_series().items():
+            lines += self.said_of(label, indices, lambda m: f"{m.dofs} degrees of freedom")
+        notes: dict[str, list[str]] = {}
+        for model in self.models:
+            notes.setdefault(model.note, []).append(f"{model.label}, {counted_modes(model)}")
+        lines += [f"note: {'; '.join(names)}: {note}" for note, names in notes.items() if note]
+        return "\n".join(lines)
+
+    def said_of(
+        self, label: str, indices: Sequence[int], size: Callable[[Measured], str]
+    ) -> list[str]:
+        """From what size on the errors of a series are small."""
+        lines = []
+        for quantity, name in QUANTITIES.items():
+            if all(np.isnan(getattr(self.errors[index], quantity)) for index in indices):
+                continue
+            said = []
+            for tolerance in (1e-2, 1e-4):
+                model = self.enough(quantity, tolerance, indices)
+                place = f"from {size(model)}" if model else "not reached"
+                said.append(f"{100 * tolerance:g} % {place}")
+            lines.append(f"{label}, {name}: {', '.join(said)}")
+        return lines + self.said_of_special_points(label, indices, size)
+
+    def said_of_special_points(
+        self, label: str, indices: Sequence[int], size: Callable[[Measured], str]
+    ) -> list[str]:
+        """From what size on a series has exactly the reference's folds and flips."""
+        found: Measured | None = None
+        followed = [index for index in indices if self.models[index].special_hz is not None]
+        for index in reversed(followed):
+            if self.errors[index].counts != (0, 0):
+                break
+            found = self.models[index]
+        if not followed:
+            return []
+        if found is None:
+            return [f"{label}: no model has the same folds and flips as the reference"]
+        return [f"{label}: the same folds and flips as the reference from {size(found)}"]
+
+
+def counted_modes(model: Measured) -> str:
+    """How many modes a model keeps, in words."""
+    return f"{model.modes} mode{'' if model.modes == 1 else 's'}"
+
+
+def convergence_study(
+    components: Mapping[str, cms.ComponentLike] | cms.ComponentLike,
+    setting: LoadCase,
+    *,
+    modes: Sequence[int] = COUNTS,
+    methods: Sequence[str] = ("rubin",),
+    at_hz: float | None = None,
+    full: bool = False,
+    progress: Progress | None = None,
+) -> ConvergenceStudy:
+    """Compute the same with more and more modes, and compare.
+
+    Parameters
+    ----------
+    components : ComponentLike or mapping of str to ComponentLike
+        The component, or the same on several meshes by name, the finest last.
+    setting : LoadCase
+        What acts on it and what range is asked for.
+    modes : sequence of int
+        Numbers of kept component modes.
+    methods : sequence of str
+        Names as for `cms.reduce`. By "macneal" interfaces have no mass, so that there is no
+        equation of motion with a stop: only the linear numbers are compared.
+    at_hz : float, optional
+        Frequency of the orbits that are compared; by default the geometric mean of the range.
+    full : bool
+        Also find the orbit at ``at_hz`` in the full model, with all modes that an interface can
+        see, and compare with that; this takes minutes for some hundred modes.
+    progress : callable, optional
+        Called as ``progress(what, frequency_hz, done)``.
+
+    Returns
+    -------
+    ConvergenceStudy
+
+    Raises
+    ------
+    SystemModelError
+        For counts or names that make no sense.
+    cms.ReductionError
+        As `cms.reduce`.
+
+    Notes
+    -----
+    The reference is the full model, all modes of the component (of the last one of several) that
+    an interface can see, for eigenfrequencies and receptance. Of a component with more than 1500
+    degrees of freedom it is a model by Rubin's method with twice the largest count, at least 40
+    modes; `cms.accuracy` bounds how far that is from the full one. For the harmonic branch it is
+    the model with the most coordinates; of several, the one with the best receptance. Every model
+    has the setting's modal damping for all of its modes, also the residual ones, whose damping is
+    therefore not that of the full model.
+    The harmonic branch is followed downwards from the orbit that a simulation from rest finds at
+    the upper end of the range.
+    """
+    if not isinstance(components, Mapping):
+        components = {"": components}
+    if not components or not modes or not methods:
+        raise SystemModelError("converge: give at least one component, count and method")
+    at_hz = setting.middle_hz if at_hz is None else at_hz
+    if not setting.range_hz[0] <= at_hz <= setting.range_hz[1]:
+        raise SystemModelError(f"converge: at_hz must lie in the range, got {at_hz:g}")
+    mesh, finest = list(components.items())[-1]
+    if full and finest.mass.shape[0] > ALL_MODES_UP_TO:
+        raise SystemModelError(
+            f"converge: full is for components with up to {ALL_MODES_UP_TO} degrees of freedom, "
+            f"this one has {finest.mass.shape[0]}"
+        )
+    whole = reference_model(finest, max(modes))
+    linear = measured_linear("", FULL if is_full(whole) else REFERENCE, whole, setting)
+    models: list[Measured] = []
+    counts = sorted(set(modes))
+    cases = [
+        (name, method, count)
+        for name in components
+        for method in methods
+        for count in (counts[:1] if method == "guyan" else counts)
+    ]
+    shares = Shares(progress or silent)
+    for number, (_, _, count) in enumerate(cases):
+        shares.weigh(str(number), ONE_MODE + count)
+    for name, component in components.items():
+        for method in methods:
+            for reduced in reductions(component, counts, method):
+                part = str(len(models))
+                models.append(measured(name, reduced, setting, at_hz, shares.part(part)))
+                shares.end(part)
+    best = best_of([model for model in models if model.mesh == mesh], linear)
+    if full and best.orbit is not None:
+        shares.weigh(FULL, 0.0)
+        linear = with_orbit(linear, whole, setting, best.orbit, shares.part(FULL))
+    models.append(linear)
+    errors = tuple(errors_of(model, linear, best, full) for model in models)
+    known = 0.0 if is_full(whole) else receptance_bound(finest, whole, linear, setting)
+    return ConvergenceStudy(setting, at_hz, tuple(models), errors, best, known)
+
+
+def best_of(models: Sequence[Measured], full: Measured) -> Measured:
+    """Of the models whose branch was followed the largest, of several that with least error."""
+    followed = [model for model in models if model.special_hz is not None]
+    if not followed:
+        raise ConvergenceError("no model of the study has a harmonic branch: " + models[-1].note)
+    return min(followed, key=lambda m: (-m.size, distance(m.receptance, full.receptance)))
+
+
+def measured(
+    mesh: str,
+    reduced: cms.ReducedModel,
+    setting: LoadCase,
+    at_hz: float,
+    progress: Progress = silent,
+) -> Measured:
+    """Compute what a `ConvergenceStudy` compares for one reduced model."""
+    linear = measured_linear(mesh, reduced.method, reduced, setting)
+    if reduced.has_massless_part:
+        return replace(linear, note=MASSLESS)
+    start = time.perf_counter()
+    try:
+        what = f"{linear.label}, {counted_modes(linear)}"
+        tell = told(progress, what, setting.range_hz)
+        branch = harmonic_branch(setting.system(reduced), setting, tell)
+    except ConvergenceError as error:
+        return replace(linear, note=str(error))
+    seconds = time.perf_counter() - start
+    peaks = resonance_peaks(branch)
+    orbits = branch.at(at_hz)
+    return replace(
+        linear,
+        peak=max(peaks, key=lambda p: p.height).orbit if peaks else None,
+        special_hz=special_points_of(branch),
+        orbit=orbits[0] if orbits else None,
+        seconds_per_orbit=seconds_per_orbit(orbits[0]) if orbits else np.nan,
+        seconds=seconds,
+        note="; ".join(branch.notes),
+    )
+
+
+def measured_linear(
+    mesh: str, method: str, reduced: cms.ReducedModel, setting: LoadCase
+) -> Measured:
+    """Counts, visible eigenfrequencies and receptance of a model."""
+    rows = np.array(list(reduced.participation.values()))
+    seen = np.any(np.abs(rows) > 1e-6 * np.abs(rows).max(axis=1, keepdims=True), axis=0)
+    return Measured(
+        mesh,
+        method,
+        dofs=int(reduced.basis.shape[0]),
+        modes=reduced.modes,
+        size=reduced.size,
+        frequencies_hz=np.sort(reduced.frequencies_hz[seen]),
+        receptance=receptance(reduced, setting, np.linspace(*setting.range_hz, GRID)),
+        peak=None,
+        special_hz=None,
+        orbit=None,
+        seconds_per_orbit=np.nan,
+        seconds=np.nan,
+    )
+
+
+def reductions(
+    component: cms.ComponentLike, counts: Sequence[int], method: str
+) -> list[cms.ReducedModel]:
+    """Models by one method with ascending counts; those by Rubin's lie in the largest."""
+    if method == "guyan":
+        return [cms.reduce(component, method=method)]
+    if method != "rubin":
+        return [cms.reduce(component, modes=count, method=method) for count in counts]
+    largest = cms.reduce(component, modes=counts[-1])
+    fewer = [cms.keep_modes(largest, range(1, count + 1)) for count in counts[:-1]]
+    return [*fewer, largest]
+
+
+def reference_model(component: cms.ComponentLike, modes: int) -> cms.ReducedModel:
+    """All modes of a component that an interface sees; of a large one more than a study's."""
+    size = int(component.mass.shape[0])
+    if size <= ALL_MODES_UP_TO:
+        return visible_modes(cms.reduce(component, modes=size, method="truncation"))
+    return cms.reduce(component, modes=min(max(2 * modes, FEWEST_REFERENCE_MODES), size))
+
+
+def is_full(reference: cms.ReducedModel) -> bool:
+    """Whether a `reference_model` is the full model."""
+    return reference.method == "truncation"
+
+
+def receptance_bound(
+    component: cms.ComponentLike, whole: cms.ReducedModel, linear: Measured, setting: LoadCase
+) -> float:
+    """Bound of the error of a model's undamped receptance over the range, as in `Errors`."""
+    observed = setting.observe or whole.interfaces[0]
+    grid = np.linspace(*setting.range_hz, GRID)
+    band = cms.accuracy(component, whole).receptance_error(grid, observed, observed)
+    return float(np.linalg.norm(np.abs(band).max(axis=1)) / np.linalg.norm(linear.receptance))
+
+
+def with_orbit(
+    model: Measured,
+    reduced: cms.ReducedModel,
+    setting: LoadCase,
+    guess: Orbit,
+    progress: Progress,
+) -> Measured:
+    """The full model with its orbit, found from that of a reduced one."""
+    progress(f"full model, {reduced.size} modes", guess.frequency_hz, 0.0)
+    try:
+        orbit = transferred(guess, setting.system(reduced))
+    except ConvergenceError as error:
+        return replace(model, note=str(error))
+    return replace(model, orbit=orbit, seconds_per_orbit=seconds_per_orbit(orbit, repeats=1))
+
+
+def visible_modes(reduced: cms.ReducedModel) -> cms.ReducedModel:
+    """The model without the modes that no interface sees."""
+    rows = np.array(list(reduced.participation.values()))
+    seen = np.any(np.abs(rows) > INVISIBLE * np.abs(rows).max(axis=1, keepdims=True), axis=0)
+    return replace(
+        reduced,
+        frequencies_hz=reduced.frequencies_hz[seen],
+        participation={name: row[seen] for name, row in reduced.participation.items()},
+        basis=reduced.basis[:, seen],
+        residuals=reduced.residuals[seen],
+        modes=int(np.count_nonzero(seen[: reduced.modes])),
+        damping=None if reduced.damping is None else reduced.damping[np.ix_(seen, seen)],
+    )
+
+
+def transferred(guess: Orbit, system: System) -> Orbit:
+    """The orbit of another model of the same component at the frequency of a known one.
+
+    The modes of the models correspond by the order of their frequencies, as far as the known
+    model has them; the others start at rest. Its coordinates are those of free-interface modes.
+    """
+    small, large = guess.system.size, system.size
+    known = np.array(
+        [int(np.argmin(np.abs(system.frequencies_hz - hz))) for hz in guess.system.frequencies_hz]
+    )
+    states = guess.problem.flow.to_modal(guess.problem.nodes(guess.point))
+    first = guess.system.interfaces[0]
+    alike = np.sign(guess.system.participation[first] * system.participation[first][known])
+    start = np.zeros((states.shape[0], 2 * large))
+    start[:, known] = states[:, :small] * alike
+    start[:, large + known] = states[:, small:] * alike
+    return solve_orbit(
+        system,
+        guess.frequency_hz,
+        guess.period,
+        guess=start,
+        observe=guess.observe,
+        segments=guess.problem.segments,
+    )
+
+
+def receptance(reduced: cms.ReducedModel, setting: LoadCase, frequency_hz: Real) -> Complex:
+    """Linear receptance (f,) at the observed interface, with all dampers."""
+    if reduced.has_massless_part:
+        return massless_receptance(reduced, setting, frequency_hz)
+    system = setting.system(reduced)
+    row = next(iter(system.participation.values()))
+    squares, D = system.natural_frequencies**2, system.total_damping
+    if not np.any(D - np.diag(np.diag(D))):
+        omega = 2 * np.pi * frequency_hz[:, None]
+        return np.asarray(np.sum(row**2 / (squares - omega**2 + 1j * omega * np.diag(D)), axis=1))
+    found = [
+        row @ np.linalg.solve(np.diag(squares - w**2) + 1j * w * D, row)
+        for w in 2 * np.pi * frequency_hz
+    ]
+    return np.array(found)
+
+
+def massless_receptance(
+    reduced: cms.ReducedModel, setting: LoadCase, frequency_hz: Real
+) -> Complex:
+    """The same where part of the flexibility has no mass: dampers close R = P Z^-1 P^T + G."""
+    if any(setting.rayleigh):  # not known where flexibility has no mass
+        return np.full(len(frequency_hz), np.nan, dtype=complex)
+    names = reduced.interfaces
+    observed = names.index(setting.observe or names[0])
+    R = np.array(
+        [
+            [reduced.receptance(frequency_hz, a, b, setting.modal_damping) for b in names]
+            for a in names
+        ]
+    )
+    C = np.diag([sum(d.coefficient for d in setting.dampers if d.at == name) for name in names])
+    found = [
+        np.linalg.solve(np.eye(len(names)) + 1j * w * R[:, :, k] @ C, R[:, observed, k])[observed]
+        for k, w in enumerate(2 * np.pi * frequency_hz)
+    ]
+    return np.array(found)
+
+
+def harmonic_branch(system: System, setting: LoadCase, tell: Callable[[float], None]) -> Branch:
+    """The harmonic branch downwards from the upper end of the range."""
+    low, high = setting.range_hz
+    tell(high)
+    try:
+        orbit = solve_orbit(FlowMap(system), high * (1.0 - 1e-9), observe=setting.observe)
+    except ConvergenceError as error:
+        rigid = int(np.count_nonzero(system.frequencies_hz == 0.0))
+        if not rigid:
+            raise
+        modes = f"{rigid} mode{'' if rigid == 1 else 's'} at 0 Hz"
+        raise ConvergenceError(f"{error}; nothing holds the structure: it has {modes}") from None
+    return continue_branch(orbit, (low, high), progress=tell)
+
+
+def told(
+    progress: Progress, what: str, range_hz: tuple[float, float]
+) -> Callable[[float], None]:
+    """Tell how much of a range a branch covers that comes down from its upper end."""
+    low, high = range_hz
+    lowest = high
+
+    def tell(frequency_hz: float) -> None:
+        nonlocal lowest
+        lowest = min(lowest, frequency_hz)
+        progress(what, frequency_hz, (high - lowest) / (high - low))
+
+    return tell
+
+
+def seconds_per_orbit(orbit: Orbit, repeats: int = 9) -> float:
+    """Time to find an orbit again from states 0.1 % off, the shortest of some repeats."""
+    problem, times = orbit.problem, []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        refine(problem, problem.nodes(orbit.point) * 1.001, orbit.omega, orbit.observe)
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def contact_time(orbit: Orbit) -> float:
+    """Time in s per period of the orbit during which a stop is touched."""
+    _, weights = orbit.trajectory.contact_quadrature()
+    return float(np.sum(weights))
+
+
+def largest_force(orbit: Orbit) -> float:
+    """Largest contact force in N over a period."""
+    return max((impact.force for impact in orbit.impact_list), default=0.0)
+
+
+def errors_of(model: Measured, reference: Measured, best: Measured, full: bool) -> Errors:
+    """Errors of a model: linear numbers against the reference, the branch's against ``best``.
+
+    The orbit is compared with that of the full model if there is one.
+    """
+    count = min(EIGENFREQUENCIES, reference.frequencies_hz.size)
+    exact = reference.frequencies_hz[:count]
+    own = model.frequencies_hz[:count]
+    eigenfrequency = (
+        float(np.max(np.abs(own - exact) / np.maximum(exact, 1e-300)))
+        if own.size == count
+        else np.inf
+    )
+    fold_flip, counts = np.nan, None
+    if model.special_hz is not None and best.special_hz is not None:
+        fold_flip, *lacking = matched(model.special_hz, best.special_hz)
+        counts = (lacking[0], lacking[1])
+    orbit = reference.orbit if full else best.orbit
+    return Errors(
+        eigenfrequency,
+        distance(model.receptance, reference.receptance),
+        relative(model.peak, best.peak, lambda o: o.frequency_hz),
+        relative(model.peak, best.peak, lambda o: o.max_abs_displacement),
+        fold_flip,
+        counts,
+        relative(model.orbit, orbit, largest_force),
+        relative(model.orbit, orbit, contact_time),
+    )
+
+
+def distance(given: Complex, known: Complex) -> float:
+    """Relative distance of a function on the grid from a known one."""
+    return float(np.linalg.norm(given - known) / np.linalg.norm(known))
+
+
+def relative(a: Orbit | None, b: Orbit | None, number: Callable[[Orbit], float]) -> float:
+    """Relative difference of a number of two orbits; nan where one is missing, or b's is zero."""
+    exact = 0.0 if b is None else number(b)
+    return abs(number(a) - exact) / abs(exact) if a is not None and exact else np.nan
+
+
+def special_points_of(branch: Branch) -> dict[str, tuple[float, ...]]:
+    """Frequencies of the folds and flips of a branch, by kind."""
+    return {
+        kind: tuple(sorted(p.frequency_hz for p in branch.special_points if str(p.kind) == kind))
+        for kind in SPECIAL_KINDS
+    }
+
+
+def matched(
+    own: Mapping[str, tuple[float, ...]], exact: Mapping[str, tuple[float, ...]]
+) -> tuple[float, int, int]:
+    """Largest relative distance of special points that belong together, and how many do not.
+
+    Points of one kind are paired nearest first, up to a distance of 2 %.
+    """
+    worst, missing, extra = 0.0, 0, 0
+    for kind, wanted in exact.items():
+        given = own.get(kind, ())
+        pairs = sorted((abs(g / w - 1.0), i, j) for i, w in enumerate(wanted)
+                       for j, g in enumerate(given))  # fmt: skip
+        left, right = set(range(len(wanted))), set(range(len(given)))
+        for distance, i, j in pairs:
+            if distance > MATCH or i not in left or j not in right:
+                continue
+            left.remove(i)
+            right.remove(j)
+            worst = max(worst, distance)
+        missing += len(left)
+        extra += len(right)
+    return worst, missing, extra
+
+
+def shown_error(value: float) -> str:
+    """An error in a table."""
+    return "-" if np.isnan(value) else f"{value:.1e}"

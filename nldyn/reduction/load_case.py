@@ -1,0 +1,99 @@
+"""What acts on a component and what is asked of it, apart from how it is reduced."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from nldyn.base.errors import SystemModelError, check_frequency
+from nldyn.system.elements import Damper, Excitation, Stop
+from nldyn.system.system import System
+
+if TYPE_CHECKING:
+    import cms
+
+
+@dataclass(frozen=True)
+class LoadCase:
+    """Stops, dampers and excitation of a component whose reduction is still open.
+
+    Parameters
+    ----------
+    range_hz : (float, float)
+        Excitation frequencies of interest.
+    stops, dampers, excitation : tuples
+        What acts at the interfaces.
+    modal_damping : float
+        Damping ratio of every mode, residual modes included.
+    observe : str, optional
+        Interface whose displacement is asked for; the first unless given.
+    rayleigh : (float, float)
+        alpha in 1/s and beta in s of the damping alpha M + beta K of the component.
+
+    Raises
+    ------
+    SystemModelError
+        For a range that is no range, or without excitation.
+
+    Examples
+    --------
+    >>> from nldyn import Unbalance
+    >>> LoadCase((15.0, 90.0), excitation=(Unbalance("middle", 4.92e-6),)).modal_damping
+    0.0
+    """
+
+    range_hz: tuple[float, float]
+    stops: tuple[Stop, ...] = ()
+    dampers: tuple[Damper, ...] = ()
+    excitation: tuple[Excitation, ...] = ()
+    modal_damping: float = 0.0
+    observe: str | None = None
+    rayleigh: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        low, high = self.range_hz
+        check_frequency("range_hz", low)
+        check_frequency("range_hz", high)
+        if not low < high:
+            raise SystemModelError(f"range_hz must run from low to high, got {self.range_hz}")
+        if not self.excitation:
+            raise SystemModelError("the setting has no excitation: nothing moves the structure")
+
+    @property
+    def middle_hz(self) -> float:
+        """Geometric mean of the range."""
+        return math.sqrt(self.range_hz[0] * self.range_hz[1])
+
+    def system(self, reduced: cms.ReducedModel) -> System:
+        """The system that a reduced model makes of it, the observed interface first.
+
+        Raises
+        ------
+        SystemModelError
+            As `System.from_reduced`.
+        """
+        if any(self.rayleigh):
+            reduced = reduced.with_damping(rayleigh=self.rayleigh)
+        return System.from_reduced(
+            with_first(reduced, self.observe) if self.observe else reduced,
+            modal_damping=self.modal_damping,
+            stops=self.stops,
+            dampers=self.dampers,
+            excitation=self.excitation,
+        )
+
+
+def with_first(reduced: cms.ReducedModel, observed: str) -> cms.ReducedModel:
+    """The reduced model with one interface before the others."""
+    order = sorted(reduced.interfaces, key=lambda name: name != observed)
+    changed = replace(reduced, participation={n: reduced.participation[n] for n in order})
+    if reduced.residual_flexibility is None and reduced.residual_shapes is None:
+        return changed
+    places = [reduced.interfaces.index(name) for name in order]
+    flexibility, shapes = reduced.residual_flexibility, reduced.residual_shapes
+    return replace(
+        changed,
+        residual_flexibility=None if flexibility is None else flexibility[places][:, places],
+        residual_shapes=None if shapes is None else shapes[:, places],
+    )

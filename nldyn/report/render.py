@@ -1,0 +1,337 @@
+"""Pictures of a scene's structure: its modes, its deepest contact, and one period in motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nldyn.base.errors import SceneError
+from nldyn.report.results import write_table
+from nldyn.runtime.progress import Progress, Shares, silent
+from nldyn.runtime.result_directory import result_directory
+from nldyn.scene.build import build_component, build_reduced, build_system
+from nldyn.scene.checks import check_computable
+from nldyn.scene.messages import scene_error
+
+if TYPE_CHECKING:
+    import cms
+    import fem
+    from fem.render import StopSphere
+    from nldyn.orbits.orbit import Impact, Orbit
+    from nldyn.runtime.progress import Progress
+    from nldyn.scene.schema import Scene
+    from nldyn.system.system import System
+
+DRAWN_RADIUS = 0.005
+FRAMES = 60
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """What `render_scene` made.
+
+    Parameters
+    ----------
+    directory : Path
+        Where the files are.
+    orbit : Orbit or None
+        The orbit drawn; none if the scene has no ``[continuation]``.
+    missing : str
+        Empty, or what to install to get the pictures that could not be made.
+    """
+
+    directory: Path
+    orbit: Orbit | None
+    missing: str = ""
+
+
+def render_scene(
+    scene: Scene,
+    directory: str | Path,
+    *,
+    frequency_hz: float | None = None,
+    period: int = 1,
+    video: str = "gif",
+    progress: Progress | None = None,
+) -> Rendering:
+    """Draw the mode shapes, the deepest contact and the motion of a scene with a mesh.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with a ``[mesh]``. Without a ``[continuation]`` only its modes are drawn.
+    directory : str or Path
+        Gets ``modes.csv`` and ``mode_shapes.png``, and for the orbit ``orbit.png``,
+        ``orbit.svg``, ``deepest_contact.png``, ``deepest_contact_stress.png`` and ``motion.gif``
+        or ``.mp4``; also ``mode_shapes.html`` and ``deepest_contact.html``, to be turned in a
+        browser. All of them or nothing.
+    frequency_hz : float, optional
+        Excitation frequency of the orbit in Hz; unless given, where the harmonic branch has its
+        largest displacement.
+    period : int
+        Period of the orbit in periods of the excitation, if a frequency is given.
+    video : {"gif", "mp4"}
+        Kind of animation.
+    progress : callable, optional
+        Called as ``progress(what, frequency_hz, done)``; the frequency is 0 where none applies.
+
+    Returns
+    -------
+    Rendering
+        Without a graphics library, what needs none is written, and `missing` says what to
+        install.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no mesh, or there is no such orbit.
+    OutputError
+        If the directory cannot be written.
+    fem.render.RenderError
+        If the animation is to be an .mp4 and imageio-ffmpeg is not installed; before any work.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from nldyn.base.resources import example
+    >>> from nldyn.scene.build import load_scene
+    >>> scene = load_scene(example("two_dof_xi_0.01.toml"))
+    >>> made = render_scene(scene, tempfile.mkdtemp(), frequency_hz=23.0)   # doctest: +SKIP
+    """
+    from fem.render import check_video
+
+    if scene.mesh is None:
+        raise scene_error(scene.file, ("mesh",), "is missing: only a mesh can be drawn")
+    if scene.continuation is not None or frequency_hz is not None:
+        check_computable(scene, scene.file)
+    if scene.continuation is not None:
+        check_video(Path(directory) / f"motion.{video}")
+    shares = Shares(progress or silent, {"model": 1.0, "orbit": 5.0, "pictures": 10.0})
+    shares.part("model")("model", 0.0, 0.0)
+    component = build_component(scene)
+    reduced = build_reduced(scene, component)
+    shares.end("model")
+    orbit = None
+    if scene.continuation is not None:
+        tell = shares.part("orbit")
+        orbit = orbit_to_draw(scene, build_system(scene, reduced), frequency_hz, period, tell)
+    shares.end("orbit")
+    with result_directory(directory, "render") as folder:
+        write_modes(reduced, folder / "modes.csv")
+        if orbit is not None:
+            save_orbit(orbit, folder)
+        drawing = _Drawing(scene, component, reduced, folder, shares.part("pictures"))
+        drawing.pages(orbit)
+        missing = drawing.draw(orbit, video)
+    return Rendering(Path(directory), orbit, missing)
+
+
+def orbit_to_draw(
+    scene: Scene,
+    system: System,
+    frequency_hz: float | None,
+    period: int = 1,
+    progress: Progress | None = None,
+) -> Orbit:
+    """Find the orbit to draw: at a frequency, or where the harmonic orbits are largest."""
+    from nldyn.base.errors import ConvergenceError
+    from nldyn.orbits.solve import solve_orbit
+    from nldyn.search.diagram import diagram
+
+    if frequency_hz is not None:
+        try:
+            return solve_orbit(system, frequency_hz=frequency_hz, period=period)
+        except ConvergenceError as error:
+            raise SceneError(f"{scene.file}: {error}") from error
+    assert scene.continuation is not None
+    low, high = scene.continuation.range_hz
+    branches = diagram(system, (low, high), [1], search_points=4, progress=progress).branches
+    orbits = [orbit for branch in branches for orbit in branch.points]
+    if not orbits:
+        raise SceneError(f"{scene.file}: no harmonic orbit is found from {low:g} to {high:g} Hz")
+    return max(orbits, key=lambda orbit: orbit.max_abs_displacement)
+
+
+def deepest_impact(scene: Scene, orbit: Orbit) -> Impact | None:
+    """Give the deepest contact of an orbit, if it touches a stop.
+
+    Stops that can be drawn come first: the others are penetrated by angles, not by lengths.
+    """
+    drawable = [hit for hit in orbit.impact_list if stop_sphere(scene, hit.stop) is not None]
+    hits = drawable or orbit.impact_list
+    return max(hits, key=lambda hit: hit.penetration, default=None)
+
+
+def deepest_state(orbit: Orbit, impact: Impact | None) -> NDArray[np.float64]:
+    """Modal displacements at a contact's deepest instant, or without one at the largest extreme."""
+    if impact is not None:
+        phase = orbit.omega * impact.time
+    else:
+        extremes = orbit.observed_extremes
+        phase = float(extremes.phases[np.argmax(np.abs(extremes.values))])
+    return orbit.states(np.array([phase]))[0, : orbit.system.size]
+
+
+def write_modes(reduced: cms.ReducedModel, path: Path) -> None:
+    """Write frequency and participation of each mode of the reduced model to a CSV file."""
+    columns = ["mode", "frequency_hz", *(f"participation_{name}" for name in reduced.participation)]
+    values = np.column_stack([reduced.frequencies_hz, *reduced.participation.values()]).tolist()
+    write_table(path, columns, ([number, *row] for number, row in enumerate(values, start=1)))
+
+
+def save_orbit(orbit: Orbit, folder: Path) -> None:
+    """Draw displacement and contact force over time, as ``orbit.png`` and ``orbit.svg``."""
+    from nldyn.plot.diagram import plot_orbit, save_figure
+
+    save_figure(plot_orbit(orbit)[0], folder / "orbit")
+
+
+def stop_sphere(scene: Scene, index: int) -> StopSphere | None:
+    """Give a stop as a sphere to be drawn, if it acts along an axis."""
+    from fem.render import StopSphere
+
+    axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+    stop = scene.stops[index]
+    place = scene.interfaces[stop.at]
+    if place.direction not in axes:
+        return None
+    way = tuple(stop.direction * along for along in axes[place.direction])
+    if scene.mesh is None or scene.mesh.model == "frame":
+        way = way[:2]
+    return StopSphere(place.at, stop.radius or DRAWN_RADIUS, way, stop.gap)
+
+
+def stop_to_draw(scene: Scene, impact: Impact | None) -> StopSphere | None:
+    """Give the stop of a contact; where nothing is touched, the first that can be drawn."""
+    if impact is not None:
+        return stop_sphere(scene, impact.stop)
+    spheres = (stop_sphere(scene, index) for index in range(len(scene.stops)))
+    return next((sphere for sphere in spheres if sphere is not None), None)
+
+
+@dataclass(frozen=True)
+class _Drawing:
+    """The pages for a browser, and the pictures, which need a graphics library."""
+
+    scene: Scene
+    component: fem.Component | fem.StructureComponent
+    reduced: cms.ReducedModel
+    folder: Path
+    tell: Progress
+
+    def draw(self, orbit: Orbit | None, video: str) -> str:
+        """Make all of them; say what to install if something is missing for it."""
+        from fem.render import RenderError, gl_available
+
+        available, advice = gl_available()
+        if not available:
+            return advice
+        try:
+            self.modes()
+            if orbit is not None:
+                self.deepest_contact(orbit)
+                self.motion(orbit, video)
+        except RenderError as error:
+            return str(error)
+        return ""
+
+    @property
+    def mode_titles(self) -> list[str]:
+        """What each mode of the reduced model is called."""
+        kept = self.reduced.size - self.reduced.residual_modes
+        return [
+            f"{'mode' if number < kept else 'residual mode'} {number + 1}: {hz:.1f} Hz"
+            for number, hz in enumerate(self.reduced.frequencies_hz)
+        ]
+
+    def pages(self, orbit: Orbit | None) -> None:
+        """Write the modes, and the stress at the deepest contact, as pages for a browser."""
+        from fem.page import write_page
+
+        write_page(
+            self.component,
+            self.reduced.basis,
+            self.mode_titles,
+            self.folder / "mode_shapes.html",
+            heading=self.scene.title or "Mode shapes",
+            mirror=_mirror(self.scene),
+        )
+        if orbit is None:
+            return
+        impact = deepest_impact(self.scene, orbit)
+        what = "largest deflection" if impact is None else "deepest contact"
+        write_page(
+            self.component,
+            self.reduced.expand(deepest_state(orbit, impact))[:, None],
+            [f"{what} at {orbit.frequency_hz:.4g} Hz"],
+            self.folder / "deepest_contact.html",
+            heading=self.scene.title or "Deepest contact",
+            mirror=_mirror(self.scene),
+            colour="stress",
+            relative=False,
+        )
+
+    def modes(self) -> None:
+        """Draw a sheet with all modes of the reduced model."""
+        from fem.render import render_modes
+
+        self.tell("mode shapes", 0.0, 0.1)
+        path = self.folder / "mode_shapes.png"
+        mirror = _mirror(self.scene)
+        render_modes(self.component, self.reduced.basis, self.mode_titles, path, mirror=mirror)
+
+    def deepest_contact(self, orbit: Orbit) -> None:
+        """Draw the structure at the instant of deepest contact: displacement, then stress."""
+        from fem.render import render_shape
+
+        self.tell("deepest contact", 0.0, 0.3)
+        impact = deepest_impact(self.scene, orbit)
+        what = "largest deflection" if impact is None else "deepest contact"
+        state = self.reduced.expand(deepest_state(orbit, impact))
+        stop = stop_to_draw(self.scene, impact)
+        for name, colour in (("contact", "displacement"), ("contact_stress", "stress")):
+            render_shape(
+                self.component,
+                state,
+                self.folder / f"deepest_{name}.png",
+                title=f"{what} at {orbit.frequency_hz:.4g} Hz",
+                scale=self.visible_scale(state, impact.penetration if impact else 0.0, stop),
+                stop=stop,
+                mirror=_mirror(self.scene),
+                colour=colour,
+            )
+
+    def visible_scale(
+        self, state: NDArray[np.float64], penetration: float, stop: StopSphere | None
+    ) -> float:
+        """Factor on the deflection at which the stop is not drowned in what it dents."""
+        from fem.render import automatic_scale, round_number, surface_of
+
+        factor = automatic_scale(surface_of(self.component, _mirror(self.scene)), state[None])
+        if stop is None or penetration == 0.0:
+            return factor
+        return min(factor, round_number(2.0 * stop.radius / penetration))
+
+    def motion(self, orbit: Orbit, video: str) -> None:
+        """Animate one period of the orbit, with the stop of the deepest contact."""
+        from fem.render import animate
+
+        self.tell("animation", 0.0, 0.5)
+        history = orbit.history(FRAMES)
+        animate(
+            self.component,
+            self.reduced.expand(history.modal[:-1].T).T,
+            self.folder / f"motion.{video}",
+            times=history.time[:-1],
+            title=f"one period of the orbit at {orbit.frequency_hz:.4g} Hz",
+            stop=stop_to_draw(self.scene, deepest_impact(self.scene, orbit)),
+            mirror=_mirror(self.scene),
+        )
+
+
+def _mirror(scene: Scene) -> str | None:
+    return scene.mesh.mirror if scene.mesh is not None else None

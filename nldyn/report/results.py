@@ -1,0 +1,235 @@
+"""Write branches, special points and diagrams to a directory.
+
+``branches.csv`` and ``special_points.csv`` hold every number to the last digit, in SI units;
+``branches.h5`` has the branches themselves, see `nldyn.io.branches`.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from nldyn.base.version import software_version
+from nldyn.bifurcations.normal_forms import normal_form
+from nldyn.branches.branch import NOT_FINISHED, POINTS, SHORT_STEP
+from nldyn.branches.cascades import cascades_in
+from nldyn.branches.tables import at_known, orbit_columns
+from nldyn.io.store import save
+from nldyn.plot.diagram import save_diagram
+from nldyn.runtime.result_directory import result_directory
+from nldyn.search.exploration import Exploration
+
+if TYPE_CHECKING:
+    from nldyn.branches.branch import Branch
+    from nldyn.branches.cascades import Cascade
+    from nldyn.scene.schema import Scene
+    from nldyn.search.diagram import Diagram
+    from nldyn.search.exploration import Exploration
+
+BRANCH_COLUMNS = (
+    "branch",
+    "point",
+    "period",
+    "frequency_hz",
+    "max_abs_displacement_m",
+    "max_penetration_m",
+    "impacts",
+    "stable",
+    "largest_multiplier",
+    "multiplier_angle_deg",
+    "relative_uncertainty",
+    "liouville_error",
+)
+SPECIAL_COLUMNS = (
+    "branch",
+    "period",
+    "type",
+    "frequency_hz",
+    "max_abs_displacement_m",
+    "impacts",
+    "normal_form",
+    "coefficient",
+    "coefficient_error",
+    "relative_shift",
+    "meaning",
+)
+
+END_COLUMNS = (
+    "branch",
+    "end",
+    "frequency_hz",
+    "max_abs_displacement_m",
+    "broken_off",
+    "reason",
+)
+COVERAGE_COLUMNS = ("frequency_hz", "periods", "settled", "unsettled", "failed")
+
+
+def write_results(
+    found: Diagram | Exploration,
+    directory: str | Path,
+    scene: Scene | None = None,
+    *,
+    yscale: Literal["linear", "log"] = "linear",
+) -> Path:
+    """Write a diagram as tables and pictures, all of them or nothing.
+
+    Parameters
+    ----------
+    found : Diagram or Exploration
+        What `nldyn.scene.build.compute` or `nldyn.scene.build.explore_scene` gave.
+    directory : str or Path
+        New, empty, or written by an earlier run, whose files are replaced; other files in it
+        are kept. Gets ``branches.csv``, ``special_points.csv``, ``ends.csv``, ``branches.h5``,
+        ``diagram.png``, ``diagram.svg``, ``summary.json``, with an exploration ``coverage.csv``
+        and, with a scene, ``scene.toml``.
+    scene : Scene, optional
+        The scene it was computed from; its text is copied.
+    yscale : {"linear", "log"}
+        Scale of the displacement axis of the diagram.
+
+    Returns
+    -------
+    Path
+        The directory.
+
+    Raises
+    ------
+    OutputError
+        If the directory holds only other people's files or cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from nldyn import System, Unbalance, diagram
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> computed = diagram(system, (10.0, 16.0), [1], search_points=1)
+    >>> folder = write_results(computed, tempfile.mkdtemp())
+    >>> (folder / "branches.csv").read_text()[:20]
+    'branch,point,period,'
+    """
+    exploration = found if isinstance(found, Exploration) else None
+    diagram = found.diagram if isinstance(found, Exploration) else found
+    with result_directory(directory, "run") as folder:
+        write_table(folder / "branches.csv", BRANCH_COLUMNS, branch_rows(diagram))
+        write_table(folder / "special_points.csv", SPECIAL_COLUMNS, special_rows(diagram))
+        write_table(folder / "ends.csv", END_COLUMNS, end_rows(diagram))
+        save(found, folder / "branches.h5")
+        if exploration is not None:
+            write_table(folder / "coverage.csv", COVERAGE_COLUMNS, coverage_rows(exploration))
+        save_diagram(diagram, folder, title=scene.title if scene else "", yscale=yscale)
+        text = json.dumps(summary(diagram), indent=1, allow_nan=False)
+        (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
+        if scene is not None:
+            (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
+    return Path(directory)
+
+
+def branch_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
+    """Give the rows of ``branches.csv``, one for each point of each branch."""
+    for branch in diagram.branches:
+        columns = orbit_columns(branch.points, diagram.range_hz)
+        columns["stable"] = columns["stable"].astype(int)
+        rows = zip(*(columns[name].tolist() for name in BRANCH_COLUMNS[2:]), strict=True)
+        for number, row in enumerate(rows):
+            yield (branch.name, number, *map(if_known, row))
+
+
+def end_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
+    """Give the rows of ``ends.csv``: the last good points of each branch, and why it ends there."""
+    for branch in diagram.branches:
+        ends = zip(("first", "last"), branch.stop_reasons, (0, -1), strict=True)
+        for name, reason, index in ends:
+            orbit = branch.points[index]
+            broken = reason.startswith((SHORT_STEP, NOT_FINISHED)) or reason.endswith(POINTS)
+            hz = at_known(orbit.frequency_hz, diagram.range_hz)
+            size = float(orbit.max_abs_displacement)
+            yield (branch.name, name, hz, size, int(broken), reason)
+
+
+def coverage_rows(found: Exploration) -> Iterable[tuple[object, ...]]:
+    """Give the rows of ``coverage.csv``, one for each frequency."""
+    for c in found.coverage:
+        periods = " ".join(map(str, c.periods))
+        yield (c.frequency_hz, periods, c.settled, c.unsettled, c.failed)
+
+
+def if_known(value: object) -> object:
+    """Give a value, or None (an empty cell) if it is nan or infinite."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def special_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
+    """Give the rows of ``special_points.csv``, branch by branch; the normal forms take time."""
+    for branch in diagram.branches:
+        for point in branch.special_points:
+            orbit = point.orbit
+            form = normal_form(point, branch.special_points)
+            coefficient, shift = form.coefficient, form.frequency_shift
+            yield (
+                branch.name,
+                orbit.period,
+                str(point.kind),
+                float(orbit.frequency_hz),
+                float(orbit.max_abs_displacement),
+                int(orbit.impacts),
+                form.name,
+                None if coefficient is None else if_known(coefficient.value),
+                None if coefficient is None else if_known(coefficient.error),
+                None if shift is None else if_known(shift.value),
+                form.sentence,
+            )
+
+
+def write_table(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
+    """Write a CSV file; floats keep every digit (``repr``)."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(rows)
+
+
+def summary(diagram: Diagram) -> Mapping[str, object]:
+    """Say what was computed and how exactly, as plain numbers for ``summary.json``."""
+    orbits = [orbit for branch in diagram.branches for orbit in branch.points]
+    return {
+        "software": f"nldyn {software_version()}",
+        "points": len(orbits),
+        "largest_relative_error": worst(orbit.error for orbit in orbits),
+        "largest_liouville_error": worst(orbit.liouville_error for orbit in orbits),
+        "stability_undecided": sum(orbit.stability.verdict == "undecided" for orbit in orbits),
+        "notes": list(diagram.notes),
+        "branches": [_branch_summary(branch, diagram.range_hz) for branch in diagram.branches],
+        "cascades": [_cascade_summary(cascade) for cascade in cascades_in(diagram.branches)],
+    }
+
+
+def _cascade_summary(cascade: Cascade) -> dict[str, object]:
+    return {
+        "periods": [flip.orbit.period for flip in cascade.flips],
+        "flips_hz": [float(flip.frequency_hz) for flip in cascade.flips],
+        "ratios": [float(ratio.value) for ratio in cascade.ratios],
+    }
+
+
+def _branch_summary(branch: Branch, range_hz: tuple[float, float]) -> dict[str, object]:
+    hz = [at_known(orbit.frequency_hz, range_hz) for orbit in branch.points]
+    return {
+        "name": branch.name,
+        "period": branch.period,
+        "points": len(hz),
+        "range_hz": [min(hz), max(hz)] if hz else None,
+        "special_points": len(branch.special_points),
+        "stop_reason": str(branch.stop_reason),
+    }
+
+
+def worst(values: Iterable[float]) -> float | None:
+    """Give the largest of some error figures; none if there are none or one is nan or inf."""
+    figures = [float(value) for value in values]
+    return max(figures) if figures and all(map(math.isfinite, figures)) else None

@@ -1,0 +1,335 @@
+"""Checks of a scene that need two of its tables, or its mesh, at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nldyn.base.errors import SceneError
+from nldyn.scene.messages import KeyPath, scene_error, show, unknown_name
+from nldyn.scene.schema import Matrix, Scene
+
+Report = Callable[[KeyPath, str], SceneError]
+LONGEST_NAME, LONGEST_TITLE = 100, 1000
+NAMED_BY = (
+    "names are physical groups in .msh, arrays 'set:NAME' in .vtu, ELSET and NSET in .inp files"
+)
+STRUCTURE_ONLY = ("couplings", "foundations")
+MESH_ONLY = (
+    *("parts", "supports", "point_masses", "springs", "hinges"),
+    *STRUCTURE_ONLY,
+    *("interfaces", "reduction"),
+)
+
+
+class TaggedMesh(Protocol):
+    """What the checks need of a mesh: the names of its parts and of its point sets."""
+
+    @property
+    def parts(self) -> Mapping[str, NDArray[np.int64]]:
+        """Elements of the parts by name."""
+
+    @property
+    def point_sets(self) -> Mapping[str, NDArray[np.int64]]:
+        """Nodes of the point sets by name."""
+
+
+class TaggedStructure(Protocol):
+    """What the checks need of the mesh of a structure: its groups of cells, and all its names."""
+
+    @property
+    def groups(self) -> Mapping[str, object]:
+        """Cells by name."""
+
+    @property
+    def names(self) -> list[str]:
+        """All names that stand for nodes."""
+
+
+def check_scene(scene: Scene, file: Path) -> None:
+    """Check what joins the tables of a scene; raise `SceneError` at the first fault."""
+
+    def report(key: KeyPath, fault: str) -> SceneError:
+        return scene_error(file, key, fault)
+
+    _check_names(scene, report)
+    _check_structure(scene, report)
+    _check_modal(scene, report)
+    _check_matrices(scene, report)
+    _check_interface_names(scene, report)
+    _check_seeds(scene, report)
+    _check_explore(scene, report)
+
+
+def check_mesh_names(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
+    """Check that the scene and the mesh agree on the names of parts and points."""
+    assert scene.mesh is not None
+    source = scene.mesh.file
+    _check_parts_known(scene, mesh.parts, file)
+    _check_parts_complete(scene, mesh, file)
+    for key, name in _points_used(scene):
+        _require(name, mesh.point_sets, f"a point set of the mesh {source}", file, key)
+        count = len(mesh.point_sets[name])
+        if count == 0 or (count > 1 and key[0] != "supports"):
+            fault = f"'{name}' must be a single point, but holds {count} nodes of the mesh {source}"
+            raise scene_error(file, key, fault)
+    _check_interfaces_free(scene, file)
+    if scene.mesh.mirror is not None:
+        _check_mirror(scene, scene.mesh.mirror, file)
+    for number, hinge in enumerate(scene.hinges):
+        key = ("hinges", number, "part")
+        _require(hinge.part, mesh.parts, f"a part of the mesh {source}", file, key)
+
+
+def _check_parts_known(scene: Scene, known: Mapping[str, object], file: Path) -> None:
+    assert scene.mesh is not None
+    for name in scene.parts:
+        if name not in known:
+            fault = _not_in_mesh(name, known, f"a part of the mesh {scene.mesh.file}")
+            raise scene_error(file, ("parts", name), fault.removeprefix(f"'{name}' "))
+
+
+def check_structure_names(scene: Scene, mesh: TaggedStructure, file: Path) -> None:
+    """Check that the scene of a structure and its mesh agree on the names of parts and places."""
+    assert scene.mesh is not None
+    source = scene.mesh.file
+    _check_parts_known(scene, mesh.groups, file)
+    known = dict.fromkeys([*mesh.names, *(coupling.at for coupling in scene.couplings)])
+    for key, name in (*_points_used(scene), *_faces_used(scene)):
+        _require(
+            name, known, f"a point or face of the mesh {source} or of [[couplings]]", file, key
+        )
+
+
+def check_computable(scene: Scene, file: Path) -> None:
+    """Check that the scene says what excites the structure and which range to follow."""
+    if not scene.excitation:
+        raise scene_error(file, ("excitation",), "is missing: nothing moves the structure")
+    if scene.continuation is None:
+        fault = "is missing: give the frequency range, range_hz = [lowest, highest]"
+        raise scene_error(file, ("continuation",), fault)
+
+
+def range_remark(scene: Scene, highest_hz: float) -> str:
+    """Say that the range goes beyond the modes that are kept of a mesh; empty if it does not."""
+    if scene.mesh is None or scene.continuation is None:
+        return ""
+    top = max(scene.continuation.range_hz)
+    if top <= highest_hz:
+        return ""
+    return (
+        f"range_hz goes up to {top:g} Hz, but the model of the structure to {highest_hz:.4g} Hz "
+        "only: keep more modes, or check the units"
+    )
+
+
+def check_ratio_count(scene: Scene, count: int, file: Path) -> None:
+    """Check that a list of damping ratios has one entry for each of ``count`` modes."""
+    ratios = scene.damping.modal_ratio
+    if isinstance(ratios, list) and len(ratios) != count:
+        fault = f"has {len(ratios)} entries for a model with {count} modes"
+        raise scene_error(file, ("damping", "modal_ratio"), fault)
+
+
+def _check_parts_complete(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
+    assert scene.mesh is not None
+    described = [mesh.parts[name] for name in scene.parts]
+    for name, elements in mesh.parts.items():
+        if not np.isin(elements, np.concatenate(described)).all():
+            fault = f"is missing: the mesh {scene.mesh.file} has a part '{name}'"
+            raise scene_error(file, ("parts", name), fault)
+
+
+def _check_interfaces_free(scene: Scene, file: Path) -> None:
+    held = {(support.at, direction) for support in scene.supports for direction in support.fixed}
+    for name, interface in scene.interfaces.items():
+        if (interface.at, interface.direction) in held:
+            fault = f"'{interface.direction}' is held by a support at '{interface.at}'"
+            raise scene_error(file, ("interfaces", name, "direction"), fault)
+
+
+def _check_mirror(scene: Scene, point: str, file: Path) -> None:
+    held = {direction for s in scene.supports if s.at == point for direction in s.fixed}
+    if held not in ({"x", "rotation"}, {"y", "rotation"}):
+        fault = (
+            f"'{point}' is not on a plane of symmetry, where [[supports]] fix ['x', 'rotation'] "
+            "or ['y', 'rotation'] and no more"
+        )
+        raise scene_error(file, ("mesh", "mirror"), fault)
+
+
+def _check_names(scene: Scene, report: Report) -> None:
+    """Refuse names that cannot be printed, or fill the screen."""
+    if len(scene.title) > LONGEST_TITLE or not scene.title.replace("\n", " ").isprintable():
+        fault = f"must be at most {LONGEST_TITLE} letters that can be printed, and ends of lines"
+        raise report(("title",), fault)
+    tables: dict[KeyPath, Iterable[str]] = {("parts",): scene.parts}
+    if scene.modal is not None:
+        tables["modal", "participation"] = scene.modal.participation
+    if scene.matrices is not None:
+        tables["matrices", "interfaces"] = scene.matrices.interfaces
+    tables[("interfaces",)] = scene.interfaces
+    for key, names in tables.items():
+        for name in names:
+            _check_name((*key, name), name, report)
+    for number, coupling in enumerate(scene.couplings):
+        _check_name(("couplings", number, "at"), coupling.at, report)
+
+
+def _check_name(key: KeyPath, name: str, report: Report) -> None:
+    if not 0 < len(name) <= LONGEST_NAME or not name.isprintable():
+        fault = f"must be a name of 1 to {LONGEST_NAME} letters that can be printed"
+        raise report(key, fault)
+
+
+def _check_structure(scene: Scene, report: Report) -> None:
+    kinds = [kind for kind in ("mesh", "modal", "matrices") if getattr(scene, kind) is not None]
+    if not kinds:
+        raise report((), "gives no structure; it needs one of [mesh], [modal] and [matrices]")
+    if len(kinds) > 1:
+        raise report((kinds[1],), f"cannot stand beside [{kinds[0]}]; keep one of them")
+    if scene.mesh is None:
+        for key in MESH_ONLY:
+            if getattr(scene, key):
+                raise report(
+                    (key,), f"describes a mesh, but the structure is given by [{kinds[0]}]"
+                )
+        return
+    twice = [name for name in scene.mesh.parts_from_file if name in scene.parts]
+    if twice:
+        fault = f"names '{twice[0]}', which [parts] gives, too; keep one of them"
+        raise report(("mesh", "parts_from_file"), fault)
+    for key in ("parts", "interfaces", "reduction"):
+        if not getattr(scene, key) and not (key == "parts" and scene.mesh.parts_from_file):
+            raise report((key,), "is missing: a mesh needs it")
+    if scene.mesh.model == "structure":
+        if scene.mesh.mirror is not None:
+            raise report(("mesh", "mirror"), "is for frames; a structure is drawn as it is")
+        return
+    for key in STRUCTURE_ONLY:
+        if getattr(scene, key):
+            raise report((key,), "needs [mesh] with model = 'structure'")
+    for name, part in scene.parts.items():
+        if part.kind in ("solid", "shell"):
+            fault = f"'{part.kind}' needs [mesh] with model = 'structure'"
+            raise report(("parts", name, "kind"), fault)
+
+
+def _check_modal(scene: Scene, report: Report) -> None:
+    if scene.modal is None:
+        return
+    count = len(scene.modal.frequencies_hz)
+    for name, values in scene.modal.participation.items():
+        _check_length(values, count, "mode", ("modal", "participation", name), report)
+
+
+def _check_matrices(scene: Scene, report: Report) -> None:
+    table = scene.matrices
+    if table is None:
+        return
+    count = len(table.mass)
+    for row in table.mass:
+        if len(row) != count:
+            fault = f"must be square, but has {_counted(count, 'row')} and one of "
+            raise report(("matrices", "mass"), fault + _counted(len(row), "number"))
+    for key, matrix in (
+        ("mass", table.mass), ("stiffness", table.stiffness), ("damping", table.damping)
+    ):  # fmt: skip
+        if matrix is not None:
+            _check_symmetric(matrix, count, ("matrices", key), report)
+    if np.linalg.eigvalsh(np.array(table.mass))[0] <= 0:
+        raise report(("matrices", "mass"), "must be positive definite")
+    for name, values in table.interfaces.items():
+        _check_length(values, count, "degree of freedom", ("matrices", "interfaces", name), report)
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def _check_symmetric(matrix: Matrix, count: int, key: KeyPath, report: Report) -> None:
+    if len(matrix) != count or any(len(row) != count for row in matrix):
+        size = f"{_counted(count, 'row')} of {_counted(count, 'number')}"
+        raise report(key, f"must have {size}, like the mass matrix")
+    values = np.array(matrix)
+    if not np.allclose(values, values.T, rtol=1e-9, atol=1e-12 * np.abs(values).max()):
+        raise report(key, "must be symmetric")
+
+
+def _check_length(values: list[float], count: int, unit: str, key: KeyPath, report: Report) -> None:
+    if len(values) != count:
+        fault = f"must have {_counted(count, 'number')}, one per {unit}, not {show(values)}"
+        raise report(key, fault)
+    if not any(values):
+        raise report(key, "must not be zero throughout: nothing could move there")
+
+
+def _check_interface_names(scene: Scene, report: Report) -> None:
+    for key, name in _interfaces_used(scene):
+        if name not in scene.interface_names:
+            raise report(key, unknown_name(name, scene.interface_names, "an interface"))
+
+
+def _check_seeds(scene: Scene, report: Report) -> None:
+    if scene.continuation is None:
+        return
+    low, high = scene.continuation.range_hz
+    for number, seed in enumerate(scene.subharmonics):
+        if not low <= seed.near_hz <= high:
+            fault = f"must lie within continuation.range_hz, not at {seed.near_hz:g}"
+            raise report(("subharmonics", number, "near_hz"), fault)
+
+
+def _check_explore(scene: Scene, report: Report) -> None:
+    """Refuse beside [explore] what says where to look."""
+    if scene.explore is None:
+        return
+    if scene.subharmonics:
+        raise report(("subharmonics",), "is of no use beside [explore]; keep one of them")
+    if scene.continuation is not None:
+        for key in ("periods", "follow_doublings", "search_points"):
+            if key in scene.continuation.model_fields_set:
+                raise report(("continuation", key), "is of no use beside [explore]; keep one")
+
+
+def _interfaces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
+    for table in ("dampers", "stops", "excitation"):
+        for number, entry in enumerate(getattr(scene, table)):
+            yield (table, number, "at"), entry.at
+    for number, stop in enumerate(scene.stops):
+        if stop.against is not None:
+            yield ("stops", number, "against"), stop.against
+    if scene.observe is not None:
+        yield ("observe", "at"), scene.observe.at
+
+
+def _points_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
+    for table in ("supports", "point_masses", "springs", "hinges"):
+        for number, entry in enumerate(getattr(scene, table)):
+            yield (table, number, "at"), entry.at
+    for name, interface in scene.interfaces.items():
+        yield ("interfaces", name, "at"), interface.at
+    if scene.mesh is not None and scene.mesh.mirror is not None:
+        yield ("mesh", "mirror"), scene.mesh.mirror
+
+
+def _faces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
+    for number, coupling in enumerate(scene.couplings):
+        yield ("couplings", number, "face"), coupling.face
+    for number, foundation in enumerate(scene.foundations):
+        yield ("foundations", number, "at"), foundation.at
+
+
+def _require(name: str, known: Mapping[str, object], what: str, file: Path, key: KeyPath) -> None:
+    if name not in known:
+        raise scene_error(file, key, _not_in_mesh(name, known, what))
+
+
+def _not_in_mesh(name: str, known: Mapping[str, object], what: str) -> str:
+    """Say that a name is not among those of a mesh and, if that has none, what gives it names."""
+    fault = unknown_name(name, known, what)
+    return fault if known else f"{fault} ({NAMED_BY})"

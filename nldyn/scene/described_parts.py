@@ -1,0 +1,51 @@
+"""Parts whose material and section are taken from the file of the mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from pydantic import ValidationError
+
+from nldyn.scene.messages import quoted, scene_error
+from nldyn.scene.schema import PartTable, Scene
+
+REFUSED = "refused"
+
+
+class DescribedMesh(Protocol):
+    """What is needed of a mesh: the keys of parts that its file gives."""
+
+    @property
+    def described(self) -> Mapping[str, Mapping[str, object]]:
+        """Keys of a part by its name; "refused" with a reason where they cannot be taken."""
+
+
+def with_described_parts(scene: Scene, mesh: DescribedMesh) -> Scene:
+    """The scene with the parts that ``parts_from_file`` names.
+
+    Raises
+    ------
+    SceneError
+        If the file describes no such part, or in a way that is not taken over.
+    """
+    if scene.mesh is None or not scene.mesh.parts_from_file:
+        return scene
+    key = ("mesh", "parts_from_file")
+    parts = dict(scene.parts)
+    for name in scene.mesh.parts_from_file:
+        if name not in mesh.described:
+            known = quoted(mesh.described) if mesh.described else "none"
+            fault = f"names '{name}', which the mesh file does not describe; it describes {known}"
+            raise scene_error(scene.file, key, fault)
+        given = mesh.described[name]
+        if REFUSED in given:
+            raise scene_error(scene.file, key, f"names '{name}': {given[REFUSED]}")
+        try:
+            parts[name] = PartTable.model_validate(dict(given))
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = ".".join(str(word) for word in first["loc"])
+            fault = f"names '{name}', whose numbers in the mesh file make no part: {place}: "
+            raise scene_error(scene.file, key, fault + first["msg"]) from None
+    return scene.model_copy(update={"parts": parts})

@@ -1,0 +1,42 @@
+"""The load case of a scene."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from nldyn.reduction.load_case import LoadCase
+from nldyn.scene.build import acting_elements
+from nldyn.scene.checks import check_computable
+from nldyn.scene.messages import scene_error
+
+if TYPE_CHECKING:
+    from nldyn.scene.schema import Scene
+
+
+def load_case_of(scene: Scene) -> LoadCase:
+    """The setting of a scene.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no mesh, nothing to compute, or damping ratios for a certain number of
+        modes.
+    """
+    check_computable(scene, scene.file)
+    if scene.mesh is None:
+        raise scene_error(scene.file, ("mesh",), "is missing: nothing is reduced")
+    if isinstance(scene.damping.modal_ratio, list):
+        fault = "must be one number where the number of modes is open"
+        raise scene_error(scene.file, ("damping", "modal_ratio"), fault)
+    assert scene.continuation is not None
+    low, high = scene.continuation.range_hz
+    stops, dampers, excitation = acting_elements(scene)
+    return LoadCase(
+        (low, high),
+        stops,
+        dampers,
+        excitation,
+        scene.damping.modal_ratio,
+        scene.observed,
+        scene.damping.rayleigh,
+    )

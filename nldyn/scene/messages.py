@@ -1,0 +1,219 @@
+"""Say in one sentence what is wrong with a scene: the file, the key, the fault, a guess."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from nldyn.base.errors import SceneError
+
+KeyPath = tuple[str | int, ...]
+MOST_SHOWN, LONGEST_SHOWN = 20, 60  # names in a list, letters of a name
+BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def scene_error(file: Path, key: KeyPath, fault: str, sep: str = " ") -> SceneError:
+    """Make the error for one key of one scene file."""
+    name = format_key(key)
+    return SceneError(printable(f"{file}: {name}{sep}{fault}" if name else f"{file}: {fault}"))
+
+
+def printable(text: str) -> str:
+    r"""Write what a terminal would obey, such as the end of a line, as an escape.
+
+    Examples
+    --------
+    >>> print(printable("two\nlines"))
+    two\nlines
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        letter if letter.isprintable() else letter.encode("unicode_escape").decode()
+        for letter in text
+    )
+
+
+def format_key(key: KeyPath) -> str:
+    """Write a key as a user would: ``stops[0].stiffness``, entries counted from 0.
+
+    Examples
+    --------
+    >>> format_key(("stops", 0, "at")), format_key(("parts", "left arm"))
+    ('stops[0].at', 'parts."left arm"')
+    """
+    text = ""
+    for step in key:
+        if isinstance(step, int):
+            text += f"[{step}]"
+        else:
+            text += ("." if text else "") + _key_step(step)
+    return text
+
+
+def _key_step(step: str) -> str:
+    short = shortened(step)
+    return short if BARE_KEY.fullmatch(step) else json.dumps(short, ensure_ascii=False)
+
+
+def shortened(name: str) -> str:
+    """A name, or the beginning of a long one."""
+    return name if len(name) <= LONGEST_SHOWN else name[: LONGEST_SHOWN - 3] + "..."
+
+
+def quoted(names: Iterable[str]) -> str:
+    """List names in quotes, in their own order, the first ones of many."""
+    every = list(names)
+    text = ", ".join(f"'{shortened(name)}'" for name in every[:MOST_SHOWN])
+    more = len(every) - MOST_SHOWN
+    return (text or "none") + (f" and {more} more" if more > 0 else "")
+
+
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """Give the known name that ``name`` is most likely a typing error of."""
+    matches = difflib.get_close_matches(name.lower(), list(known), n=1, cutoff=0.6)
+    return matches[0] if matches else None
+
+
+def unknown_name(name: str, known: Iterable[str], what: str) -> str:
+    """Say that ``name`` is not among ``known``, with the likely one or with all of them."""
+    names = list(known)
+    guess = nearest(name, names)
+    hint = f"did you mean '{guess}'?" if guess else f"known: {quoted(names)}"
+    return f"'{shortened(name)}' is not {what}; {hint}"
+
+
+def from_validation(file: Path, model: type[BaseModel], error: ValidationError) -> SceneError:
+    """Turn pydantic's report into one sentence about the most telling of its faults."""
+    details = error.errors(include_url=False)
+    first = min(details, key=lambda d: d["type"] != "extra_forbidden")
+    sentence = _fault(model, first)
+    more = len(details) - 1
+    if more and first["type"] != "extra_forbidden":
+        sentence += f" (and {more} more)"
+    return scene_error(file, _own_steps(model, first["loc"]), sentence)
+
+
+def _own_steps(model: type[BaseModel], key: KeyPath) -> KeyPath:
+    """The steps of a key that are a user's, without those of pydantic into one of several types."""
+    here: Any = model
+    for number, step in enumerate(key):
+        while get_origin(here) is Annotated:
+            here = get_args(here)[0]
+        if isinstance(here, type) and issubclass(here, BaseModel):
+            field = here.model_fields.get(str(step))
+            here = _without_none(field.annotation) if field else None
+        elif get_origin(here) in (list, dict):
+            here = get_args(here)[-1]
+        else:
+            return key[:number]
+    return key
+
+
+def _fault(model: type[BaseModel], detail: ErrorDetails) -> str:
+    kind, given, context = detail["type"], detail["input"], detail.get("ctx", {})
+    if kind == "extra_forbidden":
+        return _unknown_key(model, detail["loc"])
+    if kind == "missing":
+        return "is missing"
+    if kind == "value_error":
+        return str(context["error"])
+    if kind == "literal_error":
+        return f"must be {context['expected']}, not {show(given)}"
+    if kind == "too_short":
+        return "must not be empty"
+    if kind == "list_type" and isinstance(given, dict) and table_at(model, (*detail["loc"], 0)):
+        return f"must be written with two brackets: [[{format_key(detail['loc'])}]]"
+    if kind == "model_type":
+        return f"must be a table: [{format_key(detail['loc'])}]"
+    return f"must be {_wanted(kind, context)}, not {show(given)}"
+
+
+def _wanted(kind: str, context: Mapping[str, Any]) -> str:
+    """Describe what a value should have been."""
+    bounds = {
+        "greater_than": "greater than {gt:g}",
+        "greater_than_equal": "at least {ge:g}",
+        "less_than": "less than {lt:g}",
+        "less_than_equal": "at most {le:g}",
+    }
+    if kind in bounds:
+        return bounds[kind].format(**context)
+    kinds = {
+        "finite_number": "a finite number",
+        "float_type": "a number",
+        "int_type": "a whole number",
+        "bool_type": "true or false",
+        "string_type": "text in quotes",
+        "list_type": "a list in square brackets",
+        "dict_type": "a table",
+    }
+    return kinds.get(kind, "something else")
+
+
+def show(value: object) -> str:
+    """Show a value as it stands in a TOML file, shortened."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, dict):
+        return "a table"
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _unknown_key(model: type[BaseModel], key: KeyPath) -> str:
+    """Guess the key that was meant: here first, then the same word in another table."""
+    name = str(key[-1])
+    here = table_at(model, key[:-1])
+    known = list(here.model_fields) if here else []
+    guess = nearest(name, known)
+    if guess:
+        return f"is not a known key; did you mean '{guess}'?"
+    elsewhere = [path for path in all_keys(model) if path.rsplit(".", 1)[-1] == name]
+    if elsewhere:
+        return f"is not a known key here; did you mean {elsewhere[0]}?"
+    return f"is not a known key; known here: {quoted(known)}"
+
+
+def table_at(model: type[BaseModel], key: KeyPath) -> type[BaseModel] | None:
+    """Find the table that a key path leads to."""
+    here: Any = model
+    for step in key:
+        if isinstance(here, type) and issubclass(here, BaseModel):
+            field = here.model_fields.get(str(step))
+            here = _without_none(field.annotation) if field else None
+        elif get_origin(here) in (list, dict):
+            here = get_args(here)[-1]
+        else:
+            return None
+    return here if isinstance(here, type) and issubclass(here, BaseModel) else None
+
+
+def all_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
+    """List every key of a schema, outer tables first: ``stops``, ``stops.at``, ...
+
+    The user's own names in a table of tables are written ``NAME``.
+    """
+    for name, field in model.model_fields.items():
+        path = f"{prefix}{name}"
+        yield path
+        inner = _without_none(field.annotation)
+        if get_origin(inner) is dict:
+            path += ".NAME"
+        if get_origin(inner) in (list, dict):
+            inner = get_args(inner)[-1]
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            yield from all_keys(inner, path + ".")
+
+
+def _without_none(annotation: Any) -> Any:
+    """Take the ``None`` out of an optional type."""
+    options = [a for a in get_args(annotation) if a is not type(None)]
+    return options[0] if type(None) in get_args(annotation) else annotation

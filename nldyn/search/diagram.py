@@ -1,0 +1,731 @@
+"""The bifurcation diagram: all branches of the wanted periods that simulations and flips give."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from nldyn.base.errors import (
+    ConvergenceError,
+    LocateError,
+    SystemModelError,
+    check_frequency,
+    check_range,
+    check_types,
+    check_whole,
+)
+from nldyn.base.rows import Rows
+from nldyn.bifurcations.normal_forms import switch_at_branch_point
+from nldyn.bifurcations.period_doubling import switch_at_flip
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint, is_at
+from nldyn.branches.branch import JOINS, Branch, Course, check_branches
+from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_of_several
+from nldyn.branches.continuation import (
+    broken_off,
+    complete,
+    extended,
+    leg_key,
+    offer_branch,
+    open_ends,
+    start_point,
+    walked_leg,
+)
+from nldyn.branches.options import ContinuationOptions
+from nldyn.flow.ahead import Ahead, Task, computing_ahead
+from nldyn.flow.flow_map import FlowMap, flow_of, same_flow
+from nldyn.orbits.orbit import Orbit, check_observe, minimal_period, stroboscopic
+from nldyn.orbits.solve import solve_orbit
+from nldyn.orbits.starts import (
+    MOST_COUNT,
+    SearchOptions,
+    orbit_near,
+    orbits_from_strobe,
+    reach,
+    simulate_strobe,
+)
+from nldyn.runtime.progress import Progress, silent
+from nldyn.runtime.threads import one_thread
+from nldyn.search.outlook import Outlook
+from nldyn.system.system import System
+
+Found = tuple[tuple[str, ...], dict[int, list[Orbit]]]  # failures, and orbits by their periods
+
+MOST_JOBS = 1000
+MORE_STARTS = 4  # times as many in the second search, which looks for orbits with contact
+
+
+@dataclass(frozen=True)
+class Seed:
+    """A frequency at which to look for orbits of one period by simulation.
+
+    Parameters
+    ----------
+    period : int
+        Period multiple n.
+    near_hz : float
+        Excitation frequency in Hz.
+
+    Raises
+    ------
+    SystemModelError
+        For a period or frequency that makes no sense.
+    """
+
+    period: int
+    near_hz: float
+
+    def __post_init__(self) -> None:
+        check_whole("Seed: period", self.period, 1)
+        check_frequency("Seed: near_hz", self.near_hz)
+
+
+@dataclass(frozen=True, eq=False)
+class Diagram:
+    """Branches over a range of frequencies.
+
+    Parameters
+    ----------
+    branches : tuple of Branch
+        In the order found; names tell period and origin.
+    range_hz : (float, float)
+        The range in Hz.
+    observe : str
+        Interface whose displacement is reported.
+    notes : tuple of str
+        What was tried and gave nothing, and what may be missing.
+    """
+
+    branches: tuple[Branch, ...]
+    range_hz: tuple[float, float]
+    observe: str
+    notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """One line: range, branches, special points."""
+        low, high = self.range_hz
+        special = sum(len(branch.special_points) for branch in self.branches)
+        periods = ", ".join(map(str, sorted({branch.period for branch in self.branches})))
+        return (
+            f"<Diagram of {low:g} to {high:g} Hz at '{self.observe}': {counted(self.branches)} of "
+            f"period {periods or '(none)'}, {special} special points>"
+        )
+
+    def of_period(self, period: int) -> list[Branch]:
+        """Branches of one period multiple."""
+        return [b for b in self.branches if b.period == period]
+
+
+def check_known(known: Diagram, flow: FlowMap) -> None:
+    """Raise unless a diagram's branches are of this flow map and were followed over its range."""
+    low, high = check_range(known.range_hz)
+    check_branches("known: branches", known.branches)
+    check_types(**{"known: notes": (known.notes, tuple)})
+    for branch in known.branches:
+        if not same_flow(branch.points[0].problem.flow, flow):
+            raise SystemModelError(
+                f"known: branch '{branch.name}' is of another system or accuracy"
+            )
+        a, b = branch.course.range_hz if branch.course else (low, high)
+        if not a <= low < high <= b:
+            raise SystemModelError(
+                f"known: branch '{branch.name}' was followed from {a:g} to {b:g} Hz, not over the "
+                f"range of the diagram, {low:g} to {high:g} Hz"
+            )
+    check_observe(flow.system, known.observe)
+
+
+@dataclass
+class Collector:
+    """Branches found so far, with the tools to add more."""
+
+    flow: FlowMap
+    range_hz: tuple[float, float]
+    observe: str
+    options: ContinuationOptions
+    progress: Progress
+    checkpoint: Checkpoint = field(default_factory=Checkpoint)
+    branches: list[Branch] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    open_ends: dict[tuple[int, int], Rows] = field(default_factory=dict)
+    flip_ends: list[Orbit] = field(default_factory=list)
+    crossings: list[SpecialPoint] = field(default_factory=list)
+    done: float = 0.0  # share of the whole computation
+    ahead: Ahead | None = None
+    outlook: Outlook = field(default_factory=Outlook)
+    doubled: Callable[[int], bool] = lambda period: False  # whether to follow the flips of one
+    starts: dict[int, tuple[SpecialPoint, BranchPoint | LocateError]] = field(
+        default_factory=dict
+    )  # of the branches born at flips, by the flips' ids
+
+    def tell(self, what: str, frequency_hz: float) -> None:
+        """Say what is being computed."""
+        self.progress(what, frequency_hz, self.done)
+        if self.ahead is not None:
+            self.ahead.look()
+
+    def reach(self, part: str, count: int) -> None:
+        """Count what is done of a part of the `outlook`."""
+        self.outlook.reach(part, count)
+        self.done = self.outlook.done
+
+    def known(self, orbit: Orbit) -> bool:
+        return self.branch_of(orbit) is not None
+
+    def branch_of(self, orbit: Orbit) -> int | None:
+        """Index of the branch that passes through an orbit."""
+        passing = (i for i, branch in enumerate(self.branches) if branch.contains(orbit))
+        return next(passing, None)
+
+    def with_fold(self, orbit: Orbit) -> int | None:
+        """Index of the branch that has a fold at an orbit."""
+        return next(
+            (
+                index
+                for index, branch in enumerate(self.branches)
+                for special in branch.special_points
+                if special.kind == "LP" and is_at(orbit, special)
+            ),
+            None,
+        )
+
+    def of_period(self, period: int) -> list[Branch]:
+        return [branch for branch in self.branches if branch.period == period]
+
+    def _add(self, branch: Branch) -> None:
+        count = len(self.branches) + 1
+        label = "harmonic" if branch.period == 1 else f"1/{branch.period}"
+        named = replace(branch, name=f"{count:02d} {label}")
+        self._keep(named)
+        self.notes += [f"branch {named.name}: {note}" for note in named.notes]
+        self.notes += notes_on_ends(named)
+
+    def _keep(self, branch: Branch) -> None:
+        self.branches.append(branch)
+        for end in open_ends(branch):
+            self._open_ends_like(branch.nodes[0].orbit).add(end)
+        ends = zip(branch.stop_reasons, (branch.nodes[0], branch.nodes[-1]), strict=True)
+        self.flip_ends += [node.orbit for reason, node in ends if reason.startswith(JOINS)]
+
+    def _open_ends_like(self, orbit: Orbit) -> Rows:
+        """Where branches were broken off at orbits of as many periods and unknowns as this one.
+
+        What lies beyond is followed up to there.
+        """
+        like = orbit.period, orbit.point.size
+        return self.open_ends.setdefault(like, Rows(orbit.point.size))
+
+    def take(self, branches: Iterable[Branch], notes: Iterable[str]) -> None:
+        """Take branches that are known, with their names; see `follow_up`."""
+        self.notes += notes
+        for branch in branches:
+            self._keep(branch)
+
+    def take_back(self, branches: Iterable[Branch], notes: Iterable[str]) -> None:
+        """Take branches that an earlier run had found, named and followed up, in its order."""
+        branches = tuple(branches)
+        self.take(branches, notes)
+        for branch in branches:
+            for special in branch.special_points:
+                if special.kind == "BP":
+                    self._is_new_crossing(special)
+
+    def _is_new_crossing(self, special: SpecialPoint) -> bool:
+        """Whether a branch point was not met before; from now on it was."""
+        if any(is_at(special.orbit, other) for other in self.crossings):
+            return False
+        self.crossings.append(special)
+        return True
+
+    def within(self, orbits: Iterable[Orbit | None]) -> list[Orbit]:
+        """Those of some orbits that were found, and whose frequencies lie within the range."""
+        low, high = self.range_hz
+        return [o for o in orbits if o is not None and low <= o.frequency_hz <= high]
+
+    def from_orbits(
+        self, orbits: Iterable[Orbit], options: ContinuationOptions | None = None
+    ) -> None:
+        """Follow each orbit both ways, unless its branch is known."""
+        for orbit in orbits:
+            if self.known(orbit):
+                continue
+            try:
+                start = start_point(orbit, 1.0, self.range_hz)
+            except ConvergenceError as error:
+                self.notes.append(f"orbit of period {orbit.period} found but not followed: {error}")
+            else:
+                self.from_start(start, options)
+
+    def offer_orbits(self, orbits: Iterable[Orbit]) -> None:
+        """Let branches be followed ahead, of each period one at a time: most will be the same."""
+        if self.ahead is None or self.ahead.executor is None:
+            return
+        for orbit in orbits:
+            try:
+                start = start_point(orbit, 1.0, self.range_hz)
+            except ConvergenceError:
+                continue
+            group = "period", orbit.period
+            offer_branch(self.ahead, start, self._course(start, None), group)
+
+    def offer_flips(
+        self, branch: Branch, options: ContinuationOptions | None = None
+    ) -> None:
+        """Let the branches be followed ahead that are born at the flips of a branch.
+
+        A branch mostly leads from one flip to the next; so only every other one is tried.
+        """
+        if self.ahead is None or self.ahead.executor is None:
+            return
+        flips = [special for special in branch.special_points if special.kind == "PD"]
+        for special in flips[::2]:
+            start = self._start_at(special)
+            if isinstance(start, BranchPoint) and self._is_within(start.orbit):
+                offer_branch(self.ahead, start, self._course(start, options))
+
+    def _start_at(self, special: SpecialPoint) -> BranchPoint | LocateError:
+        """The start of the branch that is born at a flip, or why there is none; computed once."""
+        if id(special) not in self.starts:
+            try:
+                start: BranchPoint | LocateError = switch_at_flip(special)
+            except LocateError as error:
+                start = error
+            self.starts[id(special)] = special, start
+        return self.starts[id(special)][1]
+
+    def _course(self, start: BranchPoint, options: ContinuationOptions | None) -> Course:
+        ends = self._open_ends_like(start.orbit).so_far()
+        return Course(self.range_hz, options or self.options, ends)
+
+    def _is_within(self, orbit: Orbit) -> bool:
+        low, high = self.range_hz
+        return low <= orbit.frequency_hz <= high
+
+    def follow(self, orbit: Orbit, longest: int, wanted: int, most: int | None) -> None:
+        """Follow an orbit's branch unless it is known, and what it leads to; see `follow_up`."""
+        count = len(self.branches)
+        self.from_orbits([orbit])
+        self.follow_up(count, longest, wanted, most)
+
+    def follow_up(self, count: int, longest: int, wanted: int, most: int | None) -> None:
+        """Follow what the branches after the first `count` lead to.
+
+        Doubled branches are followed up to the longest period. Those that are longer in period than
+        wanted end after `most` points in one direction, if that is given.
+        """
+        shorter = self.options if most is None else replace(self.options, max_points=most)
+        while count < len(self.branches):
+            branch = self.branches[count]
+            count += 1
+            if 2 * branch.period <= longest:
+                self.offer_flips(branch, self.options if 2 * branch.period <= wanted else shorter)
+            for special in branch.special_points:
+                if special.kind not in ("PD", "BP"):
+                    continue
+                period = minimal_period(special.orbit) * (2 if special.kind == "PD" else 1)
+                options = self.options if period <= wanted else shorter
+                if special.kind == "PD" and period <= longest:
+                    self.from_flip(special, options)
+                elif special.kind == "BP":
+                    self.from_branch_point(special, options)
+            self.from_mirror(branch, self.options if branch.period <= wanted else shorter)
+
+    def from_mirror(self, branch: Branch, options: ContinuationOptions) -> None:
+        """Follow the mirror image of a branch, if the system is symmetric and it is not known."""
+        if not self.flow.system.symmetric:
+            return
+        orbit = middle_orbit(branch)
+        half_later = -orbit.states(orbit.problem.phases[:-1] + math.pi)
+        try:
+            image = solve_orbit(
+                orbit.problem.flow,
+                orbit.frequency_hz,
+                orbit.period,
+                guess=half_later,
+                observe=orbit.observe,
+                segments=orbit.problem.segments,
+            )
+            start = start_point(image, 1.0, self.range_hz)
+        except ConvergenceError as error:
+            self.notes.append(f"the mirror image of branch {branch.name} was not found: {error}")
+        else:
+            self.from_start(start, options)
+
+    def _repeats(self, branch: Branch) -> bool:
+        """Whether a branch is a known one after all: beside folds and flips that may not be seen.
+
+        One of the two holds the middle of the other. One that holds a known branch which was broken
+        off is more than that.
+        """
+        return self.known(middle_orbit(branch)) or any(
+            branch.contains(middle_orbit(other))
+            for other in self.of_period(branch.period)
+            if not broken_off(other)
+        )
+
+    def from_flip(self, special: SpecialPoint, options: ContinuationOptions | None = None) -> None:
+        """Follow the branch that is born at a flip, unless it is known."""
+        if any(is_at(end, special, 2) for end in self.flip_ends):
+            return
+        start = self._start_at(special)
+        if isinstance(start, LocateError):
+            self.notes.append(str(start))
+        else:
+            self.from_start(start, options)
+
+    def from_branch_point(
+        self, special: SpecialPoint, options: ContinuationOptions | None = None
+    ) -> None:
+        """Follow the other branch through a branch point both ways, unless it is known.
+
+        Where a doubled branch comes to the flip that it is born at, that is the one of the shorter
+        period.
+        """
+        if not self._is_new_crossing(special):
+            return
+        orbit, shorter = special.orbit, minimal_period(special.orbit)
+        if shorter < orbit.period:
+            state = stroboscopic(orbit)[0]
+            single = orbit_near(self.flow, state, shorter, orbit.omega, orbit.observe)
+            if single is None:
+                hz = f"{special.frequency_hz:.6g} Hz"
+                self.notes.append(f"no orbit of period {shorter} found at the branch point at {hz}")
+            else:
+                self.from_orbits([single], options)
+            return
+        try:
+            starts = switch_at_branch_point(special)
+        except LocateError as error:
+            self.notes.append(str(error))
+            return
+        for start in starts:
+            self.from_start(start, options)
+
+    def from_start(self, start: BranchPoint, options: ContinuationOptions | None = None) -> None:
+        """Follow a branch from a point both ways, unless it is known or out of range."""
+        if not self._is_within(start.orbit) or self.known(start.orbit):
+            return
+        progress = partial(self.tell, f"1/{start.orbit.period}")
+        course = self._course(start, options)
+        ahead = self.ahead or Ahead(self.flow)
+        group = "period", start.orbit.period
+        ahead.take(group, leg_key(start, course))
+        branch = self.checkpoint.branch_from(start.orbit, course)
+        if branch is not None:
+            branch = extended(branch, progress=progress, checkpoint=self.checkpoint)
+        else:
+            branch = complete("", None, None, start, course, progress, self.checkpoint, ahead)
+        self.take_in(branch)
+        ahead.release(group)
+        ahead.drop(self._is_followed)
+
+    def _is_followed(self, task: Task) -> bool:
+        """Whether the leg of a task is one of a branch that is known by now."""
+        return task.function is walked_leg and self.known(task.arguments[0].orbit)
+
+    def take_in(self, branch: Branch) -> None:
+        """Add the branch that was at work, unless it is a known one."""
+        if not self._repeats(branch):
+            self._add(branch)
+            if self.doubled(branch.period):
+                self.offer_flips(branch)
+        self.checkpoint.work = None
+
+
+def notes_on_ends(branch: Branch) -> list[str]:
+    """Where a branch was broken off, and why."""
+    return [
+        f"branch {branch.name} was broken off at {end.orbit.frequency_hz:.6g} Hz: {reason}"
+        for end, reason in broken_off(branch)
+    ]
+
+
+def counted(branches: Sequence[Branch]) -> str:
+    """How many branches, in words."""
+    return "1 branch" if len(branches) == 1 else f"{len(branches)} branches"
+
+
+def middle_orbit(branch: Branch) -> Orbit:
+    """Orbit of a branch away from where it ends and from where it turns or crosses another one.
+
+    Of those after a quarter, half and three quarters of its points the one whose multipliers keep
+    farthest from 1: halves of a broken symmetry cross the symmetric branch halfway.
+    """
+    inner = branch.nodes[1:-1] or branch.nodes
+    quarters = [inner[i * len(inner) // 4].orbit for i in (2, 1, 3)]
+    return max(quarters, key=lambda orbit: float(np.abs(orbit.multipliers - 1.0).min()))
+
+
+@one_thread()
+def diagram(
+    system: System | FlowMap,
+    range_hz: tuple[float, float],
+    periods: Sequence[int] = (1, 2, 3),
+    *,
+    seeds: Sequence[Seed] = (),
+    search_points: int = 12,
+    doublings: int = 0,
+    observe: str | None = None,
+    options: ContinuationOptions | None = None,
+    search: SearchOptions | None = None,
+    progress: Progress | None = None,
+    checkpoint: BranchFile | None = None,
+    jobs: int = 1,
+    executor: Executor | None = None,
+) -> Diagram:
+    """Compute the branches of the wanted periods over a range of frequencies.
+
+    Orbits of each period are looked for by simulation at `search_points` frequencies and at the
+    seeds, continued in both directions, and at each flip the doubled branch is followed when its
+    period is wanted. At a branch point the other branch is followed both ways; where a symmetry
+    breaks, these are its two halves. If the stops are open at rest and no orbit found touches one,
+    the search is repeated once with four times as many initial states. What no simulation comes
+    near (isolas of unstable orbits, say) is missed.
+
+    Parameters
+    ----------
+    system : System or FlowMap
+        What to compute.
+    range_hz : (float, float)
+        Frequencies in Hz, ascending.
+    periods : sequence of int
+        Period multiples wanted; may be empty when there are seeds.
+    seeds : sequence of Seed
+        Further frequencies at which to look for a period (which need not be in `periods`).
+    search_points : int
+        Number of frequencies searched, equally spaced on a logarithmic axis.
+    doublings : int
+        How many doublings to follow at flips whose doubled period is not in `periods`.
+    observe : str, optional
+        Interface whose displacement is reported; the first unless given.
+    options, search : optional
+        Step control and search effort.
+    progress : callable, optional
+        Called as ``progress(what, frequency_hz, done)``.
+    checkpoint : CheckpointFile, optional
+        File that keeps the branches computed so far, as for `continue_branch`. If it exists, the
+        simulations are repeated, but of the branches only what is not in it is computed; those that
+        were begun elsewhere stay in it. One of another system, accuracy or range is refused.
+    jobs : int
+        Processes that share the work, this one included. Their number changes nothing in the
+        result. A program that asks for several begins with ``if __name__ == "__main__":``, as for
+        `multiprocessing`.
+    executor : concurrent.futures.Executor, optional
+        Takes part in the work instead of processes of its own.
+
+    Returns
+    -------
+    Diagram
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense.
+    OutputError
+        If `checkpoint` cannot be written.
+
+    Examples
+    --------
+    >>> from nldyn import SearchOptions, Stop, System, Unbalance, diagram
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> found = diagram(system, (8.5, 9.0), (1, 2), search_points=1, search=SearchOptions(starts=1))
+    >>> sorted(branch.period for branch in found.branches)
+    [1, 2]
+    """
+    flow = flow_of(system)
+    low, high = check_range(range_hz)
+    check_types(
+        periods=(periods, Sequence),
+        seeds=(seeds, Sequence),
+        options=(options, ContinuationOptions, None),
+        search=(search, SearchOptions, None),
+        progress=(progress, Callable, None),
+        executor=(executor, Executor, None),
+    )
+    check_whole("jobs", jobs, 1, MOST_JOBS)
+    for seed in seeds:
+        check_types(**{"seeds: each": (seed, Seed)})
+    for period in periods:
+        check_whole("periods: each", period, 1)
+    wanted = sorted(set(periods))
+    if not (wanted or seeds):
+        raise SystemModelError("periods must not be empty when there are no seeds")
+    for seed in seeds:
+        if not low <= seed.near_hz <= high:
+            raise SystemModelError(
+                f"seeds: near_hz = {seed.near_hz:g} lies outside range_hz ({low:g}, {high:g})"
+            )
+    check_whole("search_points", search_points, 1, MOST_COUNT)
+    check_whole("doublings", doublings, 0, MOST_COUNT)
+    box = Collector(
+        flow,
+        (low, high),
+        check_observe(flow.system, observe),
+        options or ContinuationOptions(),
+        progress or silent,
+    )
+    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flow, (low, high))
+    box.doubled = lambda period: 2 * period in wanted
+    with box.checkpoint, computing_ahead(flow, jobs, executor) as box.ahead:
+        effort = search or SearchOptions()
+        box.outlook = Outlook(wanted, search_points if wanted else 0, len(seeds))
+        edges = np.geomspace(low, high, search_points + 1)
+        places = np.sqrt(edges[:-1] * edges[1:])[::-1].tolist() if wanted else []
+        _search(box, places, wanted, effort)
+        if places and _contact_is_missing(box):
+            more = replace(effort, starts=MORE_STARTS * effort.starts, seed=effort.seed + 1)
+            _search(box, places, wanted, more)
+        for seed in seeds:
+            key, given = _seed_task(box, seed, seed.near_hz, effort)
+            box.ahead.offer(key, search_at, *given)
+        for number, seed in enumerate(seeds, 1):
+            _follow_seed(box, seed, effort)
+            box.reach("seeds", number)
+        _follow_branch_points(box)
+        _follow_flips_of_new(box, wanted, doublings)
+        _follow_branch_points(box)
+        for branch in box.branches:  # which become more
+            box.from_mirror(branch, box.options)
+    for period in wanted:
+        if not any(branch.period == period for branch in box.branches):
+            tried = f"{search_points} frequenc{'y' if search_points == 1 else 'ies'}"
+            box.notes.append(f"no orbit of period {period} found by simulation at {tried}")
+    if _contact_is_missing(box):
+        box.notes.append(
+            "no orbit that touches a stop was found; there may be some all the same: try a range "
+            "that begins lower, or more search points"
+        )
+    return Diagram(tuple(box.branches), (low, high), box.observe, tuple(box.notes))
+
+
+def _search(
+    box: Collector, frequencies: Sequence[float], periods: Sequence[int], effort: SearchOptions
+) -> None:
+    """Follow what simulations at some frequencies come near, one period after the other."""
+    found = _searched(box, frequencies, periods, effort)
+    for frequency, (failures, _) in zip(frequencies, found, strict=True):
+        _note_failures(box, frequency, failures, effort)
+    at_flips = [period for period in periods if period % 2 == 0 and period // 2 in periods]
+    for period in periods:
+        orbits = [orbit for _, of_period in found for orbit in of_period[period]]
+        box.outlook.orbits(period, len(orbits))
+        if period not in at_flips:
+            box.offer_orbits(orbits)
+    for period in periods:
+        if period in at_flips:
+            box.outlook.flips(period, 0)
+            _follow_flips(box, box.of_period(period // 2))
+        for _, of_period in found:
+            for orbit in of_period[period]:
+                box.from_orbits([orbit])
+                box.reach(*box.outlook.orbit_done(period))
+
+
+def _searched(
+    box: Collector, frequencies: Sequence[float], periods: Sequence[int], effort: SearchOptions
+) -> list[Found]:
+    """What simulations at some frequencies come near, on all processes."""
+    ahead = box.ahead or Ahead(box.flow)
+
+    def told(done: int) -> None:
+        box.reach("search", done)
+        box.tell("search", frequencies[done - 1])
+
+    if frequencies:
+        box.tell("search", frequencies[0])
+    arguments = [(frequency, tuple(periods), box.observe, effort) for frequency in frequencies]
+    keys = [("search", *given) for given in arguments]
+    return ahead.values(keys, search_at, arguments, told)
+
+
+def search_at(
+    flow: FlowMap,
+    frequency_hz: float,
+    periods: Sequence[int],
+    observe: str,
+    effort: SearchOptions,
+    look: Callable[[], None] | None = None,
+) -> Found:
+    """Why simulations at a frequency failed, and the orbits of some periods that others pass."""
+    strobe = simulate_strobe(flow, frequency_hz, effort)
+    orbits = {p: orbits_from_strobe(flow, strobe, p, observe, effort) for p in periods}
+    return strobe.failures, orbits
+
+
+def _note_failures(
+    box: Collector, frequency_hz: float, failures: Sequence[str], effort: SearchOptions
+) -> None:
+    for reason, count in Counter(failures).items():
+        box.notes.append(
+            f"{count} of {effort.starts} simulations at {frequency_hz:.6g} Hz failed: {reason}"
+        )
+
+
+def _contact_is_missing(box: Collector) -> bool:
+    """Whether all stops are open at rest, and no orbit found touches one."""
+    orbits = (orbit for branch in box.branches for orbit in branch.points)
+    return reach(box.flow.system) > 0.0 and all(orbit.max_penetration == 0.0 for orbit in orbits)
+
+
+def _follow_seed(box: Collector, seed: Seed, effort: SearchOptions) -> None:
+    """Look around a seed's frequency, nearest first, until a new branch turns up."""
+    for shift in (0.0, 0.005, -0.005, 0.01, -0.01, 0.02, -0.02, 0.03, -0.03):
+        frequency = seed.near_hz * (1.0 + shift)
+        if not box.range_hz[0] <= frequency <= box.range_hz[1]:
+            continue
+        box.tell(f"search 1/{seed.period}", frequency)
+        key, given = _seed_task(box, seed, frequency, effort)
+        ahead = box.ahead or Ahead(box.flow)
+        failures, found = ahead.value(key, search_at, *given)
+        _note_failures(box, frequency, failures, effort)
+        if orbits := found[seed.period]:
+            box.from_orbits(orbits)
+            return
+    box.notes.append(f"no 1/{seed.period} orbit found near {seed.near_hz:g} Hz")
+
+
+def _seed_task(
+    box: Collector, seed: Seed, frequency_hz: float, effort: SearchOptions
+) -> tuple[Hashable, tuple[Any, ...]]:
+    given = (frequency_hz, (seed.period,), box.observe, effort)
+    return ("search", *given), given
+
+
+def _follow_flips(box: Collector, branches: Sequence[Branch]) -> None:
+    flips = [s for branch in branches for s in branch.special_points if s.kind == "PD"]
+    if not flips:
+        return
+    what = box.outlook.flips(2 * flips[0].orbit.period, len(flips))
+    for number, special in enumerate(flips, 1):
+        box.from_flip(special)
+        box.reach(what, number)
+
+
+def _follow_branch_points(box: Collector) -> None:
+    """Branches that cross those found, and those that cross these."""
+    for branch in box.branches:  # which grow
+        for special in branch.special_points:
+            if special.kind == "BP":
+                box.from_branch_point(special)
+
+
+def _follow_flips_of_new(box: Collector, wanted: Sequence[int], doublings: int) -> None:
+    """Doubled branches of wanted periods from branches found late, then further doublings."""
+    for period in wanted:
+        if 2 * period in wanted:
+            _follow_flips(box, box.of_period(period))
+    fresh = [b for b in box.branches if not {b.period, 2 * b.period} <= set(wanted)]
+    for _ in range(doublings):
+        count = len(box.branches)
+        _follow_flips(box, fresh)
+        fresh = box.branches[count:]
+        if not fresh:
+            break

@@ -1,0 +1,602 @@
+"""The search for all branches: simulations, deflation, and what the branches found lead to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor
+from dataclasses import replace
+from itertools import product
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import (
+    ConvergenceError,
+    SystemModelError,
+    check_range,
+    check_types,
+    check_whole,
+    shown,
+)
+from nldyn.bifurcations.point import is_at
+from nldyn.branches.branch import Branch
+from nldyn.branches.checkpoint import Checkpoint
+from nldyn.branches.options import ContinuationOptions
+from nldyn.flow.ahead import computing_ahead
+from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.orbits.deflation import deflated_orbit
+from nldyn.orbits.orbit import Orbit, check_observe, same_orbit, stroboscopic
+from nldyn.orbits.shooting import LONGEST_PERIOD
+from nldyn.orbits.starts import (
+    near_returns,
+    orbit_beside,
+    orbit_near,
+    random_states,
+    settling_periods,
+)
+from nldyn.runtime.progress import Progress, silent
+from nldyn.runtime.threads import one_thread
+from nldyn.search.by_pseudo_orbits import near_pseudo_orbits
+from nldyn.search.diagram import MOST_JOBS, Collector, Diagram, check_known
+from nldyn.search.exploration import Coverage, Exploration, ExploreOptions, Question, Stage
+from nldyn.search.extend import Guesses
+from nldyn.search.fixed_point_index import is_damped, sum_of_indices, without_index_note
+from nldyn.search.folds import connected_folds, leading_parameter
+from nldyn.search.mixtures import near_mixtures
+from nldyn.search.random_walks import near_closed_walks
+from nldyn.system.parameters import Parameter
+from nldyn.system.system import System
+
+RETURNS = 3.0  # recorded periods after settling, over the longest period looked for
+NEAR = 0.1  # a return within this share of the motion is worth a Newton iteration
+ARRIVED = 0.01  # a motion this near to a known orbit, relative, has settled on it or passes it
+CANDIDATES = 5  # near returns of each motion and period from which Newton's method starts
+TRANSIENT = 5  # periods of a motion beside which no orbits are looked for
+PASSING, BESIDE_PASSING = 60, 10  # periods of a short motion, and candidates as above
+PIECE = 16  # periods simulated between two looks at the known orbits; later a quarter of all
+LIKELY_ROUNDS = 2  # after which, mostly, a round has found nothing new
+AGAIN = 12  # times that a frequency is searched again while its indices say that orbits are missing
+
+
+class ExplorationFile(Protocol):
+    """A file that keeps an exploration; `nldyn.CheckpointFile` is one."""
+
+    @property
+    def name(self) -> str:
+        """How messages call it."""
+
+    def exists(self) -> bool:
+        """Whether an earlier run has written it."""
+
+    def check_writable(self) -> None:
+        """Raise an `OutputError` if it cannot be written."""
+
+    def read_exploration(self, system: System) -> Exploration:
+        """The exploration of a system that it holds."""
+
+    def write_exploration(self, found: Exploration) -> None:
+        """Keep an exploration in place of what it holds."""
+
+
+@one_thread()
+def explore(
+    system: System | FlowMap,
+    range_hz: tuple[float, float],
+    max_period: int = 8,
+    *,
+    observe: str | None = None,
+    effort: ExploreOptions | None = None,
+    options: ContinuationOptions | None = None,
+    known: Diagram | None = None,
+    progress: Progress | None = None,
+    checkpoint: ExplorationFile | None = None,
+    jobs: int = 1,
+    executor: Executor | None = None,
+) -> Exploration:
+    """Find the branches of periodic orbits in a range of frequencies, without initial guesses.
+
+    Motions are simulated at many frequencies from random states and swept up and down, each
+    frequency starting from the attractors of the one before. What they settle on is solved for as
+    an orbit, and its branch continued in both directions unless it is known. Unstable orbits come
+    from near returns of motions that wander, from Newton's method deflated by the known orbits
+    [Farrell, Birkisson and Funke 2015], and from flips, at each of which the doubled branch is
+    followed as long as its period is within `max_period`, and from branch points. On the way down,
+    others come from pieces and mixtures of known orbits and from closed walks among random states,
+    see `by_pseudo_orbits`, `by_crossover` and `by_closed_walks`. The folds of all of these may be
+    followed in damping or excitation to further ones (`ExploreOptions.fold_factor`).
+
+    Isolas of unstable orbits that no motion passes, attractors with small basins that exist
+    between two of the frequencies only, and orbits of longer periods can still be missing.
+
+    Parameters
+    ----------
+    system : System or FlowMap
+        What to explore.
+    range_hz : (float, float)
+        Frequencies in Hz, ascending.
+    max_period : int
+        Longest orbits wanted, in excitation periods.
+    observe : str, optional
+        Interface whose displacement is reported; the first unless given.
+    effort : ExploreOptions, optional
+        How much to simulate.
+    options : ContinuationOptions, optional
+        Step control.
+    known : Diagram, optional
+        Of this system in this range, from `diagram` or an exploration with less effort. Its
+        branches are taken over, what they lead to is followed, and others are looked for.
+    progress : callable, optional
+        Called as ``progress(what, frequency_hz, done)``.
+    checkpoint : CheckpointFile, optional
+        File that keeps what is found, written now and then, at the end, and when an exception such
+        as Ctrl-C ends the exploration; `load_exploration` reads it at any time. If it holds this
+        very exploration, that one goes on and gives what an uninterrupted one gives.
+    jobs, executor
+        As for `diagram`: they share the branches, and change nothing in what is found.
+
+    Returns
+    -------
+    Exploration
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense, or if `known` or `checkpoint` is of something else.
+    OutputError
+        If `checkpoint` cannot be written.
+
+    Examples
+    --------
+    >>> from nldyn import ExploreOptions, Stop, System, Unbalance, explore
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> found = explore(system, (48.0, 52.0), 2, effort=ExploreOptions(spacing=0.05, starts=4))
+    >>> sorted({branch.period for branch in found.diagram.branches})
+    [1, 2]
+    """
+    flow = flow_of(system)
+    check_types(
+        effort=(effort, ExploreOptions, None),
+        options=(options, ContinuationOptions, None),
+        known=(known, Diagram, None),
+        progress=(progress, Callable, None),
+        executor=(executor, Executor, None),
+    )
+    check_whole("jobs", jobs, 1, MOST_JOBS)
+    low, high = check_range(range_hz)
+    check_whole("max_period", max_period, 1, LONGEST_PERIOD)
+    question = Question(
+        flow,
+        (low, high),
+        max_period,
+        check_observe(flow.system, observe),
+        effort or ExploreOptions(),
+        options or ContinuationOptions(),
+    )
+    box = Collector(
+        flow,
+        question.range_hz,
+        question.observe,
+        question.options,
+        progress or silent,
+    )
+    if known is None:
+        known = Diagram((), question.range_hz, question.observe, ())
+    _check_known(known, question)
+    known = replace(known, notes=tuple(without_index_note(known.notes)))
+    survey = _Survey(box, question, known)
+    if checkpoint is None or not survey.goes_on_in(checkpoint):
+        box.take(known.branches, known.notes)
+    with box.checkpoint, computing_ahead(flow, jobs, executor) as box.ahead:
+        while not (found := survey.so_far(box.branches)).finished:
+            if found.folds_due:
+                survey.follow_folds()
+            else:
+                survey.step()
+    return survey.so_far(box.branches)
+
+
+def _check_known(known: Diagram, question: Question) -> None:
+    """Raise unless branches that are known belong to the question."""
+    check_known(known, question.flow)
+    if tuple(known.range_hz) != question.range_hz:
+        (a, b), (low, high) = known.range_hz, question.range_hz
+        raise SystemModelError(
+            f"known: is of {a:g} to {b:g} Hz, but {low:g} to {high:g} Hz are to be explored"
+        )
+    if known.observe != question.observe:
+        raise SystemModelError(
+            f"known: observes {shown(known.observe)}, not {shown(question.observe)}"
+        )
+
+
+def _same_branches(a: Diagram, b: Diagram) -> bool:
+    """Whether two diagrams hold the same branches, in the same order, and notes."""
+    return (
+        a.notes == b.notes
+        and len(a.branches) == len(b.branches)
+        and all(
+            np.array_equal(one.frequency_hz, other.frequency_hz)
+            and np.array_equal(one.nodes[0].orbit.point, other.nodes[0].orbit.point)
+            for one, other in zip(a.branches, b.branches, strict=True)
+        )
+    )
+
+
+class _Survey:
+    """Simulations over frequencies that fill a box of branches."""
+
+    def __init__(self, box: Collector, question: Question, known: Diagram) -> None:
+        self.box, self.question, self.known = box, question, known
+        self.max_period, self.effort = question.max_period, question.effort
+        nothing = np.empty((0, 2 * question.flow.system.size))
+        given = len(known.branches)
+        met = np.zeros((0, given), dtype=bool)
+        self.stage = Stage(0, given, len(known.notes), nothing, (), met, (), given)
+
+    def goes_on_in(self, place: ExplorationFile) -> bool:
+        """Keep everything in a file, and begin where the exploration in it ended, if there is one.
+
+        Raises
+        ------
+        SystemModelError, OutputError
+            As `explore`.
+        """
+        place.check_writable()
+        earlier: Sequence[Branch] = ()
+        begun = place.exists()
+        if begun:
+            kept = place.read_exploration(self.question.flow.system)
+            given = replace(
+                kept.diagram,
+                branches=kept.diagram.branches[: kept.stage.given],
+                notes=kept.diagram.notes[: len(self.known.notes)],
+            )
+            if not (self.question.same(kept.question) and _same_branches(given, self.known)):
+                raise SystemModelError(
+                    f"{place.name}: holds another exploration (other system, range, periods, "
+                    "effort, options or known branches); choose another file, or delete it"
+                )
+            self.stage = kept.stage
+            take = self.box.take_back if kept.stage.steps else self.box.take
+            take(
+                kept.diagram.branches[: kept.stage.branches],
+                kept.diagram.notes[: kept.stage.notes],
+            )
+            earlier = kept.diagram.branches[kept.stage.branches :]
+        self.box.checkpoint = Checkpoint(
+            lambda branches: place.write_exploration(self.so_far(branches)),
+            self.box.branches,
+            earlier,
+        )
+        return begun
+
+    def so_far(self, branches: Sequence[Branch]) -> Exploration:
+        """What the steps that are done have come to, with branches found since then too."""
+        box = self.box
+        diagram = Diagram(tuple(branches), box.range_hz, box.observe, tuple(box.notes))
+        return Exploration(diagram, self.question, self.stage)
+
+    def step(self) -> None:
+        """Simulate at the next frequency, from what came before and, going up, random states."""
+        box, flow, stage = self.box, self.box.flow, self.stage
+        turn, place, length = self.question.place(stage.steps)
+        up, last = place < length // 2, place == length - 1
+        frequency = self.question.frequencies(turn)[place if up else length - 1 - place]
+        box.done = self._share_done()
+        box.tell("explore", frequency)
+        omega = 2.0 * math.pi * frequency
+        if stage.steps == 0:
+            box.follow_up(0, *self._depth)
+        starts = stage.carried
+        if up:
+            seed: tuple[int, ...] = (self.effort.seed, turn, place)
+            starts = np.vstack([starts, random_states(flow, omega, self.effort.starts, seed)])
+        known = _Known(box, frequency)
+        here, carried = self._search(starts, known, also_unstable=up)
+        if up and self.effort.passing:
+            number = AGAIN + 1  # of the seed, after those of the searches again
+            seed = (self.effort.seed, turn, place, number)
+            self._pass_by(_at_random(flow, omega, self.effort.passing, seed), known)
+        for again in range(AGAIN if up else 0):
+            if not known.incomplete(min(self.effort.unstable_period, self.max_period)):
+                break
+            seed = (self.effort.seed, turn, place, again + 1)
+            starts = _at_random(flow, omega, self.effort.starts, seed)
+            here = here.with_more(self._search(starts, known, also_unstable=True)[0])
+        if not up and self.effort.unstable_period:
+            self._follow_guesses(frequency, (self.effort.seed, turn, place))
+        both = {c.frequency_hz: c for c in stage.coverage}
+        both[frequency] = both[frequency].with_more(here) if frequency in both else here
+        met = self._met(turn + 1)
+        met[turn, known.met] = True
+        self.stage = Stage(
+            stage.steps + 1,
+            len(box.branches),
+            len(box.notes),
+            np.array(carried).reshape(-1, 2 * flow.system.size),
+            tuple(both[hz] for hz in sorted(both)),
+            met,
+            (*stage.ends, len(box.branches)) if last else stage.ends,
+            stage.given,
+            stage.folds_followed,
+        )
+        if box.checkpoint.work is None:
+            box.checkpoint.work = lambda: None  # the coverage is worth keeping without a branch too
+        box.checkpoint.offer()
+
+    def _share_done(self) -> float:
+        """Share of the work that the steps done make; a second round may be the last."""
+        rounds = min(self.effort.rounds, LIKELY_ROUNDS)
+        lengths = [2 * len(self.question.frequencies(turn)) for turn in range(rounds)]
+        return min(self.stage.steps / sum(lengths), 1.0)
+
+    def _met(self, rounds: int) -> NDArray[np.bool_]:
+        """Which branches each round came to, with those found since the last step."""
+        met = np.zeros((rounds, len(self.box.branches)), dtype=bool)
+        met[: len(self.stage.met), : self.stage.branches] = self.stage.met
+        return met
+
+    def follow_folds(self) -> None:
+        """Follow the folds of the next branch in a second parameter, and what they lead to."""
+        box, stage = self.box, self.stage
+        branch = box.branches[stage.folds_followed]
+        parameter = leading_parameter(box.flow.system)
+        if branch.period <= self.max_period and parameter is not None:
+            self._beyond_folds(branch, parameter)
+        self.stage = replace(
+            stage,
+            branches=len(box.branches),
+            notes=len(box.notes),
+            met=self._met(len(stage.met)),
+            ends=(*stage.ends[:-1], len(box.branches)),
+            folds_followed=stage.folds_followed + 1,
+        )
+        box.checkpoint.offer()
+
+    def _beyond_folds(self, branch: Branch, parameter: Parameter) -> None:
+        """Follow the branches to which curves of a branch's folds come back."""
+        box, factor = self.box, self.effort.fold_factor
+        passed: list[Orbit] = []
+        for fold in branch.special_points:
+            if fold.kind != "LP" or any(is_at(orbit, fold) for orbit in passed):
+                continue
+            box.tell("folds", fold.frequency_hz)
+            which = f"the fold of branch {branch.name} at {fold.frequency_hz:.6g} Hz"
+            try:
+                found, broken = connected_folds(fold, parameter, factor, box.range_hz, box.options)
+            except (ConvergenceError, SystemModelError) as error:
+                box.notes.append(f"{which} was not followed in {parameter.name}: {error}")
+                continue
+            for reason in broken:
+                box.notes.append(f"the curve in {parameter.name} of {which} broke off: {reason}")
+            passed += found
+            for orbit in found:
+                if box.with_fold(orbit) is None:
+                    self._follow(orbit)
+
+    def _search(
+        self, starts: Real, known: _Known, *, also_unstable: bool
+    ) -> tuple[Coverage, list[Real]]:
+        """Follow what motions come to; the states from which the next frequency starts."""
+        attractors: list[Orbit] = []
+        runs, wandering = [], []
+        for start in starts:
+            run, orbit = self._motion(start, known)
+            if run is None:
+                continue
+            runs.append(run)
+            orbit = orbit or self._settled_on(run, known.omega, attractors)
+            if orbit is None:
+                wandering.append(run)
+            elif not any(same_orbit(orbit, other) for other in attractors):
+                attractors.append(orbit)
+                self._meet(orbit, known)
+        adrift = [run[-1] for run in wandering]
+        settled = [stroboscopic(orbit)[0] for orbit in attractors]
+        if also_unstable:
+            self._beside(runs, known, CANDIDATES)
+            self._deflate(adrift + settled, known)
+        coverage = Coverage(
+            known.frequency_hz,
+            tuple(sorted({orbit.period for orbit in attractors})),
+            len(runs) - len(wandering),
+            len(wandering),
+            len(starts) - len(runs),
+        )
+        return coverage, settled + adrift[:1]
+
+    def _motion(self, start: Real, known: _Known) -> tuple[Real | None, Orbit | None]:
+        """States after each period, and the known stable orbit on which the motion has settled.
+
+        It ends as soon as it comes near to one; no states if it cannot be computed.
+        """
+        flow = self.box.flow
+        settling = settling_periods(flow.system, known.frequency_hz)
+        settling = min(settling, self.effort.settling)
+        left = settling + math.ceil(RETURNS * self.max_period) + 1
+        states = np.array([start])
+        while left > 0:
+            self.box.tell("search", known.frequency_hz)
+            count = min(left, max(PIECE, len(states) // 4))
+            found = flow.strobe(states[-1], known.omega, count)
+            if found.failure:
+                return None, None
+            states = np.vstack([states, found.ends])
+            orbit = known.stable_near(states[-PIECE:])
+            if orbit is not None:
+                return states, orbit
+            left -= count
+        return states, None
+
+    def _settled_on(self, run: Real, omega: float, known: Sequence[Orbit]) -> Orbit | None:
+        """Stable orbit to which a run comes near at its end, one of the known ones if it can be."""
+        scale = float(np.linalg.norm(run, axis=1).max()) or 1.0
+        for orbit in known:
+            if _nearest(stroboscopic(orbit), run[-1]) < 1e-4 * scale:
+                return orbit
+        for period in range(1, self.max_period + 1):
+            tail = run[-period - self.max_period :]
+            off = np.linalg.norm(tail[period:] - tail[:-period], axis=1)
+            if float(np.median(off)) > NEAR * scale:
+                continue
+            found = self._orbit_near(run[-1 - period], period, omega)
+            if found is None or not found.stable:
+                continue
+            if _nearest(stroboscopic(found), run[-1]) < NEAR * scale:
+                return next((other for other in known if same_orbit(found, other)), found)
+        return None
+
+    def _orbit_near(self, start: Real, period: int, omega: float) -> Orbit | None:
+        return orbit_near(self.box.flow, start, period, omega, self.box.observe)
+
+    def _pass_by(self, starts: Real, known: _Known) -> None:
+        """Look for unstable orbits that short motions pass by."""
+        flow = self.box.flow
+        motions = [flow.strobe(start, known.omega, PASSING) for start in starts]
+        runs = [found.ends for found in motions if not found.failure]
+        self._beside(runs, known, BESIDE_PASSING)
+
+    def _follow_guesses(self, frequency_hz: float, seed: Sequence[int]) -> None:
+        """Follow the orbits to which pieces, mixtures and closed walks lead."""
+        for guesses in self._guesses(frequency_hz, seed):
+            for _, orbits in guesses:
+                for orbit in orbits:
+                    self._follow(orbit)
+
+    def _guesses(self, frequency_hz: float, seed: Sequence[int]) -> Iterator[Guesses]:
+        """Pseudo-orbits, mixtures and closed walks at a frequency, each with its own numbers."""
+        box, effort, periods = self.box, self.effort, self._unstable_periods()
+        mixing, walking, ordering = (
+            np.random.default_rng((*seed, AGAIN + number)) for number in (2, 3, 4)
+        )
+        if effort.pseudo_orbits:
+            yield near_pseudo_orbits(
+                box, box.branches, frequency_hz, effort.spacing, periods, effort.pseudo_orbits,
+                ordering,
+            )  # fmt: skip
+        if effort.mixtures and box.branches:
+            yield near_mixtures(box, box.branches, frequency_hz, periods, effort.mixtures, mixing)
+        if effort.walks:
+            yield near_closed_walks(
+                box, box.branches, frequency_hz, periods, effort.walk_states, effort.walks, walking
+            )
+
+    def _unstable_periods(self) -> range:
+        return range(1, min(self.effort.unstable_period, self.max_period) + 1)
+
+    def _beside(self, runs: Sequence[Real], known: _Known, candidates: int) -> None:
+        """Look for unstable orbits of short periods beside motions."""
+        box, omega = self.box, known.omega
+        for period, run in product(self._unstable_periods(), runs):
+            for start in near_returns(run[TRANSIENT:], period, candidates):
+                state = run[TRANSIENT + start]
+                number = known.beside(state, period)
+                if number is not None:
+                    known.met.append(number)
+                    continue
+                found = orbit_beside(box.flow, state, period, omega, box.observe)
+                for orbit in box.within([found]):
+                    self._meet(orbit, known)
+
+    def _deflate(self, starts: Sequence[Real], known: _Known) -> None:
+        """Look for unstable orbits of short periods with the known ones divided out."""
+        box = self.box
+        for period, start in product(self._unstable_periods(), starts):
+            others = known.of_period(period)
+            other = deflated_orbit(box.flow, start, period, known.omega, others, box.observe)
+            if other is not None:
+                self._follow(other)
+                known.take()
+
+    def _meet(self, orbit: Orbit, known: _Known) -> None:
+        """Follow the branch of an orbit that a motion came to, unless it is known."""
+        if known.number(orbit) is None:
+            self._follow(orbit)
+            known.take()
+        number = known.number(orbit)
+        if number is not None:
+            known.met.append(number)
+
+    def _follow(self, orbit: Orbit) -> None:
+        """Follow an orbit's branch unless it is known, and those that it leads to."""
+        self.box.follow(orbit, *self._depth)
+
+    @property
+    def _depth(self) -> tuple[int, int, int | None]:
+        """How far doubled branches are followed, see `Collector.follow_up`."""
+        longest = max(self.max_period, self.effort.doubled_period)
+        return longest, self.max_period, self.effort.doubled_points
+
+
+class _Known:
+    """Orbits of all branches at one frequency, and which of the branches motions came to."""
+
+    def __init__(self, box: Collector, frequency_hz: float) -> None:
+        self.box, self.frequency_hz = box, frequency_hz
+        self.omega = 2.0 * math.pi * frequency_hz
+        self.met: list[int] = []
+        self._orbits: list[tuple[int, Orbit, Real]] = []  # with their stroboscopic states
+        self._seen = 0
+        self.take()
+
+    def take(self) -> None:
+        """Take the orbits of branches that were found since."""
+        for number in range(self._seen, len(self.box.branches)):
+            orbits = self.box.branches[number].at(self.frequency_hz)
+            self._orbits += [(number, orbit, stroboscopic(orbit)) for orbit in orbits]
+        self._seen = len(self.box.branches)
+
+    def of_period(self, period: int) -> list[Orbit]:
+        """Orbits of one period multiple."""
+        return [orbit for _, orbit, _ in self._orbits if orbit.period == period]
+
+    def incomplete(self, longest: int) -> bool:
+        """Whether the indices of the fixed points of some Pⁿ up to a period do not add up to one.
+
+        They need not where a mode is not damped.
+        """
+        if not is_damped(self.box.flow.system):
+            return False
+        orbits = [orbit for _, orbit, _ in self._orbits]
+        return any(sum_of_indices(orbits, n) != 1 for n in range(1, longest + 1))
+
+    def number(self, orbit: Orbit) -> int | None:
+        """Number of the branch that an orbit, perhaps of another frequency, lies on."""
+        if orbit.omega == self.omega:
+            return next((i for i, other, _ in self._orbits if same_orbit(orbit, other)), None)
+        return self.box.branch_of(orbit)
+
+    def beside(self, state: Real, period: int) -> int | None:
+        """Number of the branch with an orbit near a state, its period the given one or a part."""
+        size = ARRIVED * (float(np.linalg.norm(state)) or 1.0)
+        for number, orbit, places in self._orbits:
+            if period % orbit.period == 0 and _nearest(places, state) < size:
+                return number
+        return None
+
+    def stable_near(self, states: Real) -> Orbit | None:
+        """Stable orbit near which the last of some states lie, one period after the other."""
+        size = ARRIVED * (float(np.linalg.norm(states, axis=1).max()) or 1.0)
+        for _, orbit, places in self._orbits:
+            if not orbit.stable:
+                continue
+            tail = states[-orbit.period :]
+            off = np.linalg.norm(places[:, None] - tail[None], axis=2).min(axis=0)
+            if float(off.max()) < size:
+                return orbit
+        return None
+
+
+def _at_random(flow: FlowMap, omega: float, count: int, seed: tuple[int, ...]) -> Real:
+    """Random states (count, 2n), without the rest that `random_states` begins with."""
+    return random_states(flow, omega, count + 1, seed)[1:]
+
+
+def _nearest(places: Real, state: Real) -> float:
+    """Distance of a state from the nearest of some places (m, 2n)."""
+    return float(np.linalg.norm(places - state, axis=1).min())

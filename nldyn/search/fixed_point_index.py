@@ -1,0 +1,278 @@
+"""Indices of fixed points: they add up to one at a frequency, unless orbits are missing there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import SystemModelError, check_frequency, check_range, check_whole
+from nldyn.branches.branch import CLOSED, Branch, check_branches
+from nldyn.flow.flow_map import same_flow
+from nldyn.orbits.orbit import Orbit
+from nldyn.system.system import System
+
+RESOLVED = 1e-8  # relative width of a range of frequencies that counts
+CLEAR = 1e-6  # distance of |1 - μ| from where an index changes, to be told from it
+NOTE = "indices of the fixed points of "  # how the note on them begins
+
+
+def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) -> int:
+    """Sum of the indices of all fixed points of Pⁿ on some branches, at one frequency.
+
+    P takes the state over one period of the excitation. A fixed point has the index +1 or -1, the
+    sign of det(I - DPⁿ), that is of ∏(1 - μᵢ). Motions of a structure with damping in all of its
+    modes, forced periodically and held back by stops, end in a ball that Pⁿ maps into itself,
+    whatever the stiffness of the stops; then the indices of all fixed points of Pⁿ add up to one
+    [Krasnosel'skii 1968, chapter 2]. Another sum proves that orbits whose period divides n are
+    missing from the branches, or that a branch was broken off.
+
+    The converse does not hold: the two halves of an isola have opposite indices.
+
+    Parameters
+    ----------
+    branches : iterable of Branch
+        Of one system, each of them once; those of a `Diagram`, for example.
+    frequency_hz : float
+        Excitation frequency in Hz, within the range that the branches were followed in.
+    period : int
+        Number n of excitation periods.
+
+    Returns
+    -------
+    int
+        Every orbit of period p counts p times, once for each of its points.
+
+    Raises
+    ------
+    SystemModelError
+        If the frequency or the period is none, the frequency lies outside the range that a branch
+        was followed in, there is no branch, they are of several systems, or a mode is not damped.
+
+    References
+    ----------
+    M. A. Krasnosel'skii (1968), *The Operator of Translation along the Trajectories of Differential
+    Equations*, American Mathematical Society.
+
+    Examples
+    --------
+    At 12.15 Hz the superharmonic resonance has two stable orbits and an unstable one.
+
+    >>> from nldyn import Stop, System, Unbalance, continue_branch, index_sum, solve_orbit
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> branch = continue_branch(solve_orbit(system, 13.0), (11.0, 14.0))
+    >>> [orbit.stable for orbit in branch.at(12.15)], index_sum([branch], 12.15)
+    ([True, False, True], 1)
+    """
+    given = _checked("index_sum", branches, period, frequency_hz, frequency_hz)
+    return sum_of_indices([o for branch in given for o in branch.at(frequency_hz)], period)
+
+
+def index_gaps(
+    branches: Iterable[Branch], range_hz: tuple[float, float], period: int = 1
+) -> list[tuple[float, float]]:
+    """Ranges of frequency in which the indices of the fixed points of Pⁿ do not add up to one.
+
+    Along each branch the index is that of the computed orbits; it changes at folds, where branches
+    cross and, for even multiples of the branch's period, at flips. So the sum is known all over the
+    range, without solving for any orbit. Within the ranges given orbits are missing, see
+    `index_sum`, or a closed branch that was broken off, behind where it had begun, is there twice.
+    Ranges narrower than 1e-8 of the frequency are left out: a branch may not end quite at the flip
+    where it is born.
+
+    Parameters
+    ----------
+    branches : iterable of Branch
+        Of one system, each of them once; those of a `Diagram`, for example.
+    range_hz : (float, float)
+        Frequencies in Hz, ascending, within the range that the branches were followed in.
+    period : int
+        Number n of excitation periods.
+
+    Returns
+    -------
+    list of (float, float)
+        In Hz, ascending; none if the sum is one everywhere.
+
+    Raises
+    ------
+    SystemModelError
+        As `index_sum`.
+
+    Examples
+    --------
+    From a flip of the harmonic branch on, its doubled branch is not among those given.
+
+    >>> from nldyn import Stop, System, Unbalance, continue_branch, solve_orbit
+    >>> from nldyn.search.fixed_point_index import index_gaps
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> branch = continue_branch(solve_orbit(system, 40.0), (30.0, 60.0))
+    >>> index_gaps([branch], (30.0, 60.0))
+    []
+    >>> [(round(a, 2), round(b, 2)) for a, b in index_gaps([branch], (30.0, 60.0), 2)]
+    [(33.65, 60.0)]
+    """
+    low, high = check_range(range_hz)
+    given = _checked("index_gaps", branches, period, low, high)
+    ends, rise = _changes(given, period)
+    first, last = np.log(2.0 * math.pi * np.array([low, high]))
+    wrong: list[tuple[float, float]] = []
+    order = np.argsort(ends, kind="stable")
+    ends = np.concatenate([[first], np.clip(ends[order], first, last), [last]])
+    sums = np.concatenate([[0], np.cumsum(rise[order])])
+    for a, b, total in zip(ends[:-1], ends[1:], sums, strict=True):
+        if total == 1 or b <= a:
+            continue
+        if wrong and wrong[-1][1] == a:
+            wrong[-1] = (wrong[-1][0], b)
+        else:
+            wrong.append((a, b))
+    wide = [np.exp(gap) / (2.0 * math.pi) for gap in wrong if gap[1] - gap[0] > RESOLVED]
+    return [(float(a), float(b)) for a, b in wide]
+
+
+def _checked(
+    caller: str, branches: Iterable[Branch], period: int, low: float, high: float
+) -> list[Branch]:
+    """Those of some branches whose period divides n, checked.
+
+    Raises
+    ------
+    SystemModelError
+        As `index_sum`.
+    """
+    branches = list(branches) if isinstance(branches, Iterable) else branches
+    check_branches("branches", branches)
+    check_frequency("frequency_hz", low)
+    check_whole("period", period, 1)
+    if not branches:
+        raise SystemModelError(f"{caller}: branches must not be empty")
+    for branch in branches:
+        a, b = branch.course.range_hz if branch.course else (0.0, math.inf)
+        if not a * (1.0 - 1e-12) <= low <= high <= b * (1.0 + 1e-12):
+            asked = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+            raise SystemModelError(
+                f"{caller}: branch '{branch.name}' was followed from {a:g} to {b:g} Hz, "
+                f"which does not tell of {asked} Hz"
+            )
+    flow = branches[0].nodes[0].orbit.problem.flow
+    if not all(same_flow(branch.nodes[0].orbit.problem.flow, flow) for branch in branches):
+        raise SystemModelError(f"{caller}: the branches must be of one system and accuracy")
+    counted = [branch for branch in branches if period % branch.period == 0]
+    if not is_damped(flow.system):
+        raise SystemModelError(
+            f"{caller}: the indices add up to one only where every mode is damped, but one is not"
+        )
+    return counted
+
+
+def _changes(branches: Sequence[Branch], period: int) -> tuple[Real, NDArray[np.int_]]:
+    """Values of ln ω at which the sum of the indices changes, and by how much."""
+    ends, rises = [np.empty(0)], [np.empty(0, dtype=int)]
+    for branch in branches:
+        x, signs = _along(branch, period // branch.period)
+        a, b = np.minimum(x[:-1], x[1:]), np.maximum(x[:-1], x[1:])
+        ends += [a, b]
+        rises += [branch.period * signs, -branch.period * signs]
+    return np.concatenate(ends), np.concatenate(rises)
+
+
+def _along(branch: Branch, times: int) -> tuple[Real, NDArray[np.int_]]:
+    """Values of ln ω at the places of a branch, and the index between each and the next one.
+
+    It is that of the end whose multipliers are clear of where it changes, or follows from what is
+    next to it along the branch. At a branch point it changes unless what is clear on both sides
+    says that it does not: a branch that leaves there to one side only comes back with the same.
+    """
+    places = list(branch.places.points)
+    if branch.stop_reasons[1] == CLOSED:
+        places[-1] = places[0]  # beyond which it lies
+    changing = {"LP", "BP", "PD"} if times % 2 == 0 else {"LP", "BP"}
+    special = {id(s.point): s.kind for s in branch.special_points if s.kind in changing}
+    kinds = [special.get(id(place), "") for place in places]
+    clear = [
+        0.0 if kind else _distance(place.orbit, times)
+        for place, kind in zip(places, kinds, strict=True)
+    ]
+    signs = []
+    for i in range(len(places) - 1):
+        best = i if clear[i] >= clear[i + 1] else i + 1
+        signs.append(index(places[best].orbit, times) if clear[best] > CLEAR else 0)
+    _fill(signs, kinds)
+    return np.array([place.orbit.point[-1] for place in places]), np.array(signs, dtype=int)
+
+
+def _fill(signs: list[int], kinds: Sequence[str]) -> None:
+    """Set the signs that are not clear, zero so far, from those that are.
+
+    `kinds` names the special points, among the places between them, at which the sign may change.
+    """
+    turn = [-1 if kind else 1 for kind in kinds]
+    known = [i for i, sign in enumerate(signs) if sign]
+    for a, b in pairwise(known):
+        crossings = [i for i in range(a + 1, b + 1) if kinds[i] == "BP"]
+        if crossings and signs[a] * math.prod(turn[a + 1 : b + 1]) != signs[b]:
+            turn[crossings[0]] = 1
+    for i in range(1, len(signs)):
+        signs[i] = signs[i] or signs[i - 1] * turn[i]
+    for i in range(len(signs) - 2, -1, -1):
+        signs[i] = signs[i] or signs[i + 1] * turn[i + 1]
+
+
+def _distance(orbit: Orbit, times: int) -> float:
+    """How far an orbit is from where its index changes: the smallest of |1 - μᵢ^times|."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(np.nanmin(np.abs(orbit.multipliers**times - 1.0), initial=math.inf))
+
+
+def index_note(branches: Sequence[Branch], range_hz: tuple[float, float], longest: int) -> str:
+    """Whether the indices of the fixed points of P to P^longest add up to one, in a sentence."""
+    powers = "P" if longest == 1 else f"P to {_power(longest)}"
+    told = f"{NOTE}{powers} add up to one from {range_hz[0]:g} to {range_hz[1]:g} Hz"
+    wrong = []
+    for n in range(1, longest + 1):
+        gaps = index_gaps(branches, range_hz, n) if branches else [range_hz]
+        if gaps:
+            ranges = f"in {len(gaps)} ranges " if len(gaps) > 1 else ""
+            wrong.append(f"{_power(n)} {ranges}from {gaps[0][0]:.10g} to {gaps[-1][1]:.10g} Hz")
+    if not wrong:
+        return f"{told}; isolas that are missing as a whole would not change that"
+    return f"{told} but for {', '.join(wrong)}: orbits are missing, or a branch was broken off"
+
+
+def _power(n: int) -> str:
+    return "P" if n == 1 else f"P^{n}"
+
+
+def without_index_note(notes: Iterable[str]) -> list[str]:
+    """Notes but those of `index_note`, which hold no longer once branches are added."""
+    return [note for note in notes if not note.startswith(NOTE)]
+
+
+def sum_of_indices(orbits: Iterable[Orbit], period: int) -> int:
+    """Sum of the indices of the fixed points of Pⁿ on orbits, whose own period divides n."""
+    return sum(o.period * index(o, period // o.period) for o in orbits if period % o.period == 0)
+
+
+def index(orbit: Orbit, times: int = 1) -> int:
+    """Sign of det(I - DPⁿ) with n = `times` periods of an orbit: the sign of ∏(1 - μᵢ^times).
+
+    Complex multipliers come in pairs that contribute a positive factor, so that only real ones
+    outside of the unit circle count.
+    """
+    real = np.real(orbit.multipliers[np.imag(orbit.multipliers) == 0.0])
+    outside = np.abs(real) > 1.0 if times % 2 == 0 else real > 1.0
+    return 1 - 2 * (int(np.count_nonzero(outside)) % 2)
+
+
+def is_damped(system: System) -> bool:
+    """Whether every mode of the structure without its stops loses energy."""
+    return system.linear.slowest_decay > 0.0

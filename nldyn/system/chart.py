@@ -1,0 +1,251 @@
+"""Numbers of a system that a continuation may change: read, set, and measured on a scale."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from nldyn.base.errors import (
+    LARGEST_FREQUENCY,
+    SMALLEST_FREQUENCY,
+    SystemModelError,
+    is_finite,
+    shown,
+)
+from nldyn.system.elements import LARGEST_EXPONENT
+from nldyn.system.parameters import SOURCES, Parameter, check_exact, check_index
+from nldyn.system.system import System
+
+FREQUENCY = "frequency_hz"
+EVERY_MODE = -1
+
+_OF_STOPS = ("gap", "stiffness", "exponent", "dissipation")
+_OF_DAMPERS = ("coefficient",)
+_OF_MODES = ("modal_damping", "natural_frequency_hz")
+UNITS = {
+    "frequency_hz": "Hz",
+    "gap": "m",
+    "stiffness": "N/m^exponent",
+    "exponent": "1",
+    "dissipation": "s/m",
+    "amplitude": "N",
+    "mass_times_radius": "kg m",
+    "coefficient": "N s/m",
+    "modal_damping": "1",
+    "natural_frequency_hz": "Hz",
+}
+BOUNDS = {
+    name: (0.0, math.inf)
+    for name in ("stiffness", "dissipation", *SOURCES, *_OF_DAMPERS, *_OF_MODES)
+} | {"exponent": (1.0, LARGEST_EXPONENT)}  # between which there are systems
+POSITIVE = ("stiffness", "natural_frequency_hz")  # there is no system where they are zero
+NAMES = (FREQUENCY, *_OF_STOPS, *SOURCES, *_OF_DAMPERS, *_OF_MODES)
+
+
+def has_exact_derivatives(parameter: Parameter) -> bool:
+    """Whether the flow map differentiates by the parameter itself."""
+    return parameter.name in (*_OF_STOPS, *SOURCES)
+
+
+def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
+    """A parameter, of which a name alone means index 0.
+
+    Parameters
+    ----------
+    system : System
+        The system that must have it.
+    parameter : str or Parameter
+        frequency_hz; gap, stiffness, exponent or dissipation of a stop; amplitude or
+        mass_times_radius of an excitation; coefficient of a damper; modal_damping (ratio) or
+        natural_frequency_hz of a mode. The index -1 of modal_damping means all modes, which then
+        have one ratio.
+
+    Raises
+    ------
+    SystemModelError
+        If there is no such number.
+    """
+    if isinstance(parameter, str):
+        parameter = Parameter(parameter)
+    if not isinstance(parameter, Parameter) or parameter.name not in NAMES:
+        name = parameter.name if isinstance(parameter, Parameter) else parameter
+        raise SystemModelError(f"unknown parameter {shown(name)}; there are: {', '.join(NAMES)}")
+    if has_exact_derivatives(parameter):
+        check_exact(system, parameter)
+    elif parameter.name in _OF_DAMPERS:
+        check_index(parameter, "damper", len(system.dampers))
+    elif parameter.name in _OF_MODES and parameter != Parameter("modal_damping", EVERY_MODE):
+        check_index(parameter, "mode", system.size)
+    if parameter.name == "modal_damping":
+        _damping_ratio(system, parameter.index)
+    return parameter
+
+
+def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float:
+    """Present value of a parameter.
+
+    Examples
+    --------
+    >>> from nldyn import System
+    >>> value_of(System.from_modal([10.0], {}, modal_damping=0.02), 5.0,
+    ...     Parameter("modal_damping"))
+    0.02
+    """
+    name, index = parameter.name, parameter.index
+    if name == FREQUENCY:
+        return frequency_hz
+    if name == "modal_damping":
+        return _damping_ratio(system, index)
+    if name == "natural_frequency_hz":
+        return float(system.frequencies_hz[index])
+    elements: Sequence[Any] = system.stops
+    if name in SOURCES:
+        elements = system.excitation
+    elif name in _OF_DAMPERS:
+        elements = system.dampers
+    return float(getattr(elements[index], name))
+
+
+def with_value(system: System, parameter: Parameter, value: float) -> System:
+    """The system with one number changed; a mode keeps its damping ratio with its frequency.
+
+    Raises
+    ------
+    SystemModelError
+        For a value that the number cannot have.
+    """
+    name, index = parameter.name, parameter.index
+    if name == FREQUENCY:
+        return system
+    if name in _OF_STOPS:
+        return system.with_elements(stops=_replaced(system.stops, index, name, value))
+    if name in SOURCES:
+        return system.with_elements(excitation=_replaced(system.excitation, index, name, value))
+    if name in _OF_DAMPERS:
+        return replace(system, dampers=_replaced(system.dampers, index, name, value))
+    modes = np.arange(system.size) if index == EVERY_MODE else np.array([index])
+    damping, natural = np.array(system.damping), np.array(system.natural_frequencies)
+    if name == "modal_damping":
+        damping[modes, modes] = 2.0 * value * natural[modes]
+    else:
+        if not value > 0.0:
+            raise SystemModelError(f"natural_frequency_hz must be positive, got {value:g}")
+        natural[index] = 2.0 * math.pi * value
+        damping[index, index] *= value / system.frequencies_hz[index]
+    return replace(system, natural_frequencies=natural, damping=damping)
+
+
+def _replaced(elements: tuple[Any, ...], index: int, name: str, value: float) -> tuple[Any, ...]:
+    changed = replace(elements[index], **{name: value})
+    return (*elements[:index], changed, *elements[index + 1 :])
+
+
+def _damping_ratio(system: System, index: int) -> float:
+    """Damping ratio of a mode, or of all modes if they have one.
+
+    Raises
+    ------
+    SystemModelError
+        For a mode at 0 Hz, or if all modes are asked for and their ratios differ.
+    """
+    modes = np.arange(system.size) if index == EVERY_MODE else np.array([index])
+    natural = system.natural_frequencies[modes]
+    if np.any(natural == 0.0):
+        raise SystemModelError("parameter 'modal_damping': a mode at 0 Hz has no damping ratio")
+    ratios = system.damping[modes, modes] / (2.0 * natural)
+    if np.ptp(ratios) > 1e-9 * np.abs(ratios).max():
+        raise SystemModelError(
+            "parameter 'modal_damping': the modes have different ratios; change one mode's"
+        )
+    return float(ratios[0])
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A parameter on the scale on which it is followed.
+
+    A positive range is followed in the logarithm of the value, so that a step of 0.1 is 10 % of
+    it; any other range in units of its width.
+
+    Parameters
+    ----------
+    parameter : Parameter
+        What is followed.
+    low, high : float
+        Values between which to stay.
+    """
+
+    parameter: Parameter
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, parameter: Parameter, limits: tuple[float, float]) -> Chart:
+        """Chart over a range that is checked.
+
+        Raises
+        ------
+        SystemModelError
+            If the limits are not two finite numbers, ascending, that the parameter can have.
+        """
+        name = parameter.name
+        try:
+            low, high = limits
+        except (TypeError, ValueError):
+            raise SystemModelError(
+                f"the range of {name} must be two numbers, got {shown(limits)}"
+            ) from None
+        if not (is_finite(low) and is_finite(high) and low < high):
+            raise SystemModelError(
+                f"the range of {name} must be two finite numbers, ascending; got {shown(limits)}"
+            )
+        if name == FREQUENCY and not SMALLEST_FREQUENCY <= low < high <= LARGEST_FREQUENCY:
+            raise SystemModelError(
+                f"the range of {name} must be positive, from {SMALLEST_FREQUENCY:g} to "
+                f"{LARGEST_FREQUENCY:g}, got {shown(limits)}"
+            )
+        if name in BOUNDS and not BOUNDS[name][0] <= low < high <= BOUNDS[name][1]:
+            least, most = BOUNDS[name]
+            upper = "" if most == math.inf else f" and {most:g} at most"
+            raise SystemModelError(
+                f"the range of {name} must be {least:g} at least{upper}, got {shown(limits)}"
+            )
+        if name in POSITIVE and low == 0.0:
+            raise SystemModelError(
+                f"the range of {name} must begin above zero, got {shown(limits)}"
+            )
+        return cls(parameter, float(low), float(high))
+
+    def check_start(self, value: float) -> None:
+        """Refuse a start outside the range."""
+        slack = 1e-9 * max(abs(self.low), abs(self.high))
+        if not self.low - slack <= value <= self.high + slack:
+            raise SystemModelError(
+                f"the start has {self.parameter.name} = {value:g}, outside its range "
+                f"({self.low:g}, {self.high:g})"
+            )
+
+    @property
+    def logarithmic(self) -> bool:
+        """Whether the logarithm is followed."""
+        return self.low > 0.0
+
+    def coordinate(self, value: float) -> float:
+        """Coordinate of a value."""
+        return math.log(value) if self.logarithmic else value / (self.high - self.low)
+
+    def value(self, coordinate: float) -> float:
+        """Value at a coordinate; rounding does not carry it past an end of the range."""
+        value = math.exp(coordinate) if self.logarithmic else coordinate * (self.high - self.low)
+        for end in (self.low, self.high):
+            if abs(value - end) <= 1e-14 * max(abs(self.low), abs(self.high)):
+                return end
+        return value
+
+    def slope(self, coordinate: float) -> float:
+        """Derivative of the value with respect to the coordinate."""
+        return math.exp(coordinate) if self.logarithmic else self.high - self.low

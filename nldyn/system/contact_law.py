@@ -1,0 +1,136 @@
+"""Contact laws written by the user, compiled so that the kernels can call them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+from nldyn.base.errors import SystemModelError
+
+ContactLaw = Callable[[float, float], tuple[float, float, float]]
+
+
+def check_law(owner: str, law: ContactLaw, stiffness: float, exponent: float) -> None:
+    """Refuse a law that is not finite, not smooth, not zero at its start, or has wrong slopes.
+
+    Penetrations and speeds are tried around those at which the power law gives 1 N.
+
+    Raises
+    ------
+    SystemModelError
+        With the first pair at which something is wrong.
+    """
+    unit = stiffness ** (-1.0 / exponent)
+    for share in (1e-3, 0.1, 1.0):
+        for speed in (0.0, 0.1, -0.1):
+            delta = share * unit
+            force, stiff, viscous = _values(owner, law, delta, speed)
+            step, jolt = 1e-6 * delta, 1e-6
+            rise = _values(owner, law, delta + step, speed)[0]
+            fall = _values(owner, law, delta - step, speed)[0]
+            faster = _values(owner, law, delta, speed + jolt)[0]
+            slower = _values(owner, law, delta, speed - jolt)[0]
+            for name, slope, change, width in (
+                ("penetration", stiff, rise - fall, 2.0 * step),
+                ("speed", viscous, faster - slower, 2.0 * jolt),
+            ):
+                rounding = 1e-14 * abs(force) / width
+                if abs(change / width - slope) > 1e-4 * abs(slope) + 100.0 * rounding:
+                    raise SystemModelError(
+                        f"{owner}: law says {slope:g} for the derivative by the {name} at "
+                        f"penetration {delta:g} m and speed {speed:g} m/s, but its force changes "
+                        f"by {change / width:g}"
+                    )
+    tiny = abs(_values(owner, law, 1e-9 * unit, 0.1)[0])
+    if tiny > 1e-4 * max(abs(_values(owner, law, unit, 0.1)[0]), 1.0):
+        raise SystemModelError(f"{owner}: law must vanish with the penetration")
+    _check_smooth(owner, law, unit)
+
+
+def _check_smooth(owner: str, law: ContactLaw, unit: float) -> None:
+    """Refuse a law whose force or slope jumps: panels resolve analytic laws only.
+
+    Sought on a grid of penetrations with eight points to an octave, from 1e-4 to 1e4 of the unit;
+    where neighbours differ by a twentieth, the larger half of the change is followed down to 1e-10
+    of the penetration, and one that is left there is a jump.
+    """
+
+    def values(exponent: float) -> tuple[float, float]:
+        force, stiff, _ = _values(owner, law, unit * 2.0**exponent, 0.1)
+        return force, stiff
+
+    points = [-13.25 + k / 8.0 for k in range(213)]
+    for which, name in enumerate(("force", "derivative by the penetration")):
+        known = []
+        for point in points:
+            try:
+                known.append(values(point)[which])
+            except SystemModelError:  # beyond what can be computed, as of an exponential law
+                break
+        for k in range(len(known) - 1):
+            if _differ(known[k], known[k + 1], 0.05):
+                low, high, below, above = points[k], points[k + 1], known[k], known[k + 1]
+                while high - low > 1e-10:
+                    middle = 0.5 * (low + high)
+                    between = values(middle)[which]
+                    if abs(between - below) > abs(above - between):
+                        high, above = middle, between
+                    else:
+                        low, below = middle, between
+                if _differ(below, above, 0.01):
+                    raise SystemModelError(
+                        f"{owner}: law is not smooth: its {name} jumps from {below:g} to {above:g} "
+                        f"at penetration {unit * 2.0**low:g} m; use several stops with gaps of "
+                        "their own instead"
+                    )
+
+
+def _differ(a: float, b: float, share: float) -> bool:
+    return abs(a - b) > share * max(abs(a), abs(b))
+
+
+def _values(owner: str, law: ContactLaw, delta: float, speed: float) -> tuple[float, float, float]:
+    try:
+        force, stiff, viscous = (float(x) for x in law(delta, speed))
+    except (TypeError, ValueError, ArithmeticError) as error:
+        raise SystemModelError(
+            f"{owner}: law({delta:g}, {speed:g}) must give three numbers "
+            f"(force, its derivatives by penetration and by speed): {error}"
+        ) from None
+    if not all(math.isfinite(x) for x in (force, stiff, viscous)):
+        raise SystemModelError(f"{owner}: law({delta:g}, {speed:g}) is not finite")
+    return force, stiff, viscous
+
+
+def law_address(law: ContactLaw | None) -> int:
+    """Address of the compiled law ``void (double, double, double[3])``; 0 for none.
+
+    Raises
+    ------
+    SystemModelError
+        If numba cannot compile it.
+    """
+    return 0 if law is None else int(_compiled(law).address)
+
+
+@cache
+def _compiled(law: ContactLaw) -> Any:
+    numba: Any = import_module("numba")  # its stubs lack what is needed here
+    inner = law if hasattr(law, "py_func") else numba.njit(law)
+
+    def call(delta: Any, speed: Any, out: Any) -> None:
+        out[0], out[1], out[2] = inner(delta, speed)  # whole numbers among them are converted
+
+    double = numba.types.float64
+    signature = numba.types.void(double, double, numba.types.CPointer(double))
+    try:
+        return numba.cfunc(signature)(call)
+    except numba.core.errors.NumbaError as error:
+        told = [line.strip() for line in str(error).splitlines()]
+        reasons = [line for line in told if line and not line.startswith(("Failed", "During"))]
+        raise SystemModelError(
+            f"the contact law '{law.__name__}' cannot be compiled: {(reasons or told)[0]}"
+        ) from None

@@ -1,0 +1,280 @@
+"""The linear part of a system: independent pairs of real coordinates, and its steady response."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg as sla
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from nldyn.base.arrays import Complex, Real
+from nldyn.base.errors import SystemModelError
+
+# |λ - iω| below this share of ω makes an eigenvalue λ near: a steady response is at most 1/NEAR
+# times as large as what the excitation brings about in 1/ω, and so are its rounding errors; in the
+# derivative by ω they are up to 1/NEAR² times as large
+NEAR = 3e-3
+
+
+# Beyond this condition number of the basis a Jacobian has fewer than eight digits left: its error
+# is about 200 roundings times the condition (the cases of `hard.modes`).
+_MAX_CONDITION = 2e5
+# Shares by which a frequency is moved where damping makes modes inseparable: the condition goes
+# with the inverse root of the share, and what a share of 1e-10 changes in a period of the mode is
+# within the promise of a flow map.
+_SPLITS = (1e-11, 3e-11, 1e-10)
+_LARGEST_RATE = 1e100  # its square is far from the largest floating-point number
+
+
+@dataclass(frozen=True)
+class LinearPart:
+    r"""Pairs of real coordinates that move by themselves between contacts.
+
+    The state :math:`x = (q, \dot q)` is ``right @ z`` and ``z = left @ x``; each pair follows
+    :math:`\dot z_b = A_b z_b` with a real 2×2 block. A mode that no damper couples to others is
+    a pair whatever its damping, also at 0 Hz and at critical damping; coupled modes are pairs of
+    the eigenvectors' planes. The length of z is a modal displacement.
+
+    Parameters
+    ----------
+    blocks : (n, 2, 2)
+        Matrices A_b in 1/s.
+    right, left : (2n, 2n)
+        Basis and its inverse.
+    growth : (n,)
+        Upper bounds of the norm of exp(A_b t) over t >= 0 (infinite for a free rigid body).
+    condition : float
+        Condition number of the basis in energy coordinates.
+    """
+
+    blocks: Real
+    right: Real
+    left: Real
+    growth: Real
+    condition: float
+
+    @property
+    def slowest_decay(self) -> float:
+        """Rate in 1/s of the free motion that decays last; not positive if one does not decay."""
+        return -float(np.linalg.eigvals(self.blocks).real.max())
+
+    def times_block(self, rows: Real) -> Real:
+        """Rows (..., 2n) times the block-diagonal matrix A."""
+        pairs = rows.reshape(*rows.shape[:-1], -1, 2)
+        product = np.einsum("...bi,bij->...bj", pairs, self.blocks)
+        return np.ascontiguousarray(product.reshape(rows.shape))
+
+    def response(self, drive: Complex, omega: float) -> tuple[Complex, Complex]:
+        """Response to Re(drive e^{iωt}), also where a mode has no steady response.
+
+        An eigenvalue λ with |λ - iω| < `NEAR` ω is near: the excitation along its eigenvector is
+        not divided by iω - λ.
+
+        Parameters
+        ----------
+        drive : (2n,) array
+            Amplitude of the excitation of z.
+        omega : float
+            Excitation frequency in rad/s.
+
+        Returns
+        -------
+        near : (k,)
+            The near eigenvalues λ.
+        response : (1 + k, 2n)
+            Amplitudes f, then s_k: Re(f e^{iωt} + Σ s_k e_k(t)) is a solution for every solution
+            of e_k' = λ_k e_k + e^{iωt}.
+        """
+        a, b, c, d, rates = self._entries
+        near = np.flatnonzero(np.abs(rates - 1j * omega) < NEAR * omega)
+        x, y = drive[0::2], drive[1::2]
+        first, last = 1j * omega - a, 1j * omega - d
+        determinant = first * last - b * c
+        determinant[near] = 1.0
+        response = np.zeros((1 + near.size, drive.size), dtype=complex)
+        response[0, 0::2] = (last * x + b * y) / determinant
+        response[0, 1::2] = (first * y + c * x) / determinant
+        for k, block in enumerate(near):
+            pair, rate = slice(2 * block, 2 * block + 2), rates[block]
+            turned = (self.blocks[block] - rate.real * np.eye(2)) @ drive[pair] / (1j * rate.imag)
+            response[1 + k, pair] = 0.5 * (drive[pair] + turned)
+            response[0, pair] = 0.5 * (drive[pair] - turned) / (1j * omega - rate.conjugate())
+        return rates[near], response
+
+    @cached_property
+    def _entries(self) -> tuple[Real, Real, Real, Real, Complex]:
+        """Entries of the blocks, row by row, and their upper eigenvalues (nan for two decays)."""
+        a, b, c, d = np.ascontiguousarray(self.blocks.reshape(-1, 4).T)
+        half = 0.5 * (a - d)
+        square = half * half + b * c
+        with np.errstate(invalid="ignore"):
+            return a, b, c, d, 0.5 * (a + d) + 1j * np.sqrt(-square)
+
+    def steady(self, drive: Complex, omega: float) -> Complex:
+        """Amplitude f (2n,) of the steady response Re(f e^{iωt}) to Re(drive e^{iωt}).
+
+        Raises
+        ------
+        SystemModelError
+            If an undamped mode is excited exactly at its frequency.
+        """
+        near, response = self.response(drive, omega)
+        exact = at_resonance(near, omega)
+        if np.any(response[1:][exact]):
+            raise SystemModelError(
+                f"the excitation at {omega / (2 * np.pi):g} Hz meets an undamped mode exactly; "
+                "give the mode some damping or move the frequency"
+            )
+        away = np.where(exact, 1.0, 1j * omega - near)
+        return np.asarray(response[0] + (1.0 / away) @ response[1:])
+
+
+def at_resonance(eigenvalues: Complex, omega: float) -> NDArray[np.bool_]:
+    """Which eigenvalues are iω but for rounding: of an undamped mode at its own frequency."""
+    return np.asarray(np.abs(eigenvalues - 1j * omega) < 1e-12 * omega)
+
+
+def linear_part(omega: Real, damping: Real) -> LinearPart:
+    """Linear part of modes with circular frequencies (n,) and a damping matrix (n, n).
+
+    Raises
+    ------
+    SystemModelError
+        If the damping feeds energy in, or makes coupled modes inseparable.
+    """
+    n = omega.size
+    if not (omega.max() < _LARGEST_RATE and abs(damping).max() < _LARGEST_RATE):
+        raise SystemModelError(
+            f"frequencies_hz or damping beyond {_LARGEST_RATE:g} 1/s cannot be computed with"
+        )
+    if np.linalg.eigvalsh(0.5 * (damping + damping.T))[0] < -1e-12 * (1.0 + abs(damping).max()):
+        raise SystemModelError("damping must not feed energy in (the matrix has a negative part)")
+    unit = np.maximum(omega, 1e-3 * (omega.max() or 1.0))
+    blocks, columns, scales = [], [], []
+    groups, group_of = connected_components(damping != 0.0, directed=False)
+    for group in range(groups):
+        modes = np.flatnonzero(group_of == group)
+        A, planes = _planes(omega[modes], unit[modes], damping[np.ix_(modes, modes)])
+        places = np.concatenate([modes, n + modes])
+        for plane in planes:
+            plane, block = _separated(plane, plane.T @ A @ plane)
+            column = np.zeros((2 * n, 2))
+            column[places] = plane
+            blocks.append(block)
+            columns.append(column)
+            scales.append(max(np.sqrt(abs(np.linalg.det(block))), unit[modes].min()))
+    energy_basis = np.hstack(columns)
+    condition = float(np.linalg.cond(energy_basis))
+    if not condition < _MAX_CONDITION:
+        raise SystemModelError(
+            "the linear part has (nearly) coinciding modes that damping makes inseparable "
+            f"(condition of their basis {condition:.1e}); change a frequency or damping slightly, "
+            "by 1e-9 of it say"
+        )
+    to_state = 1.0 / np.concatenate([unit, np.ones(n)])
+    scale = np.repeat(scales, 2)
+    return LinearPart(
+        np.array(blocks),
+        to_state[:, None] * energy_basis * scale,
+        np.linalg.inv(energy_basis) / scale[:, None] / to_state,
+        np.array([_growth(block) for block in blocks]),
+        condition,
+    )
+
+
+def _planes(omega: Real, unit: Real, damping: Real) -> tuple[Real, list[Real]]:
+    """Matrix of a group of modes in energy coordinates, and its invariant planes.
+
+    Where the planes (nearly) coincide a frequency is moved, the slowest that helps, which feeds no
+    energy in; a warning tells of it.
+    """
+    A = _energy_matrix(omega, unit, damping)
+    if omega.size == 1:
+        return A, [np.eye(2)]
+    planes = _invariant_planes(A)
+    if np.linalg.cond(np.hstack(planes)) < _MAX_CONDITION:
+        return A, planes
+    for share in _SPLITS:
+        for mode in np.argsort(omega):
+            other = omega.copy()
+            other[mode] *= 1.0 + share
+            moved = _energy_matrix(other, unit, damping)
+            split = _invariant_planes(moved)
+            if np.linalg.cond(np.hstack(split)) < _MAX_CONDITION:
+                hz = omega[mode] / (2.0 * np.pi)
+                warnings.warn(
+                    "damping makes two modes (nearly) coincide; to tell them apart, the frequency "
+                    f"of the mode at {hz:.6g} Hz is moved by {share:g} of itself",
+                    stacklevel=2,
+                )
+                return moved, split
+    return A, planes
+
+
+def _energy_matrix(omega: Real, unit: Real, damping: Real) -> Real:
+    """Matrix of the state (unit·q, q'), in which energy is half the squared length."""
+    n = omega.size
+    return np.block([[np.zeros((n, n)), np.diag(unit)], [-np.diag(omega**2 / unit), -damping]])
+
+
+def _invariant_planes(A: Real) -> list[Real]:
+    """Orthonormal bases (2n, 2) of planes that A maps into themselves, slowest first."""
+    values, vectors = sla.eig(A)
+    tiny = 1e-12 * np.abs(values).max()
+    pairs = [(v.real, v.imag) for v in vectors.T[values.imag > tiny]]
+    order = [abs(x) for x in values[values.imag > tiny]]
+    real = np.flatnonzero(np.abs(values.imag) <= tiny)
+    real = real[np.argsort(values[real].real)]
+    for first, second in zip(real[::2], real[1::2], strict=True):
+        pairs.append((vectors[:, first].real, vectors[:, second].real))
+        order.append(abs(values[second]))
+    planes = [np.linalg.qr(np.column_stack(pair))[0] for pair in pairs]
+    return [planes[i] for i in np.argsort(order, kind="stable")]
+
+
+def _separated(plane: Real, block: Real) -> tuple[Real, Real]:
+    """The same plane along the eigenvectors of its block if these are real and far apart.
+
+    A fast decay then leaves nothing in the coordinate of the slow one.
+    """
+    values, vectors = np.linalg.eig(block)
+    if np.iscomplexobj(values) or np.abs(values).max() <= 4.0 * np.abs(values).min():
+        return plane, block
+    if np.linalg.cond(vectors) > 10.0:
+        return plane, block
+    return plane @ vectors, np.diag(values)
+
+
+def _growth(block: Real) -> float:
+    """Upper bound of the norm of exp(Bt) over t >= 0 for a block B, at most three times too large.
+
+    With the slowest eigenvalue m, or the real part m of a pair m ± iω, and R = B - mI,
+
+    exp(Bt) = exp(mt) (I cos ωt + R sin(ωt)/ω), or exp(mt) I + R f(t) for real eigenvalues,
+
+    and f = exp(mt) sin(ωt)/ω or (exp(mt) - exp(at))/(m - a) has its largest value where f' = 0.
+    Without decay |R|/ω, the condition number of the eigenvectors, is sharper.
+    """
+    if np.linalg.eigvalsh(0.5 * (block + block.T))[-1] <= 1e-12 * np.abs(block).max():
+        return 1.0  # the length never grows
+    values = np.linalg.eigvals(block)
+    slow, fast = sorted(values, key=abs)
+    if fast == 0.0:
+        return np.inf
+    rest = float(np.linalg.norm(block - slow.real * np.eye(2), 2))
+    if slow.imag:
+        turn = abs(slow.imag)
+        top = np.exp(slow.real * np.arctan2(turn, -slow.real) / turn) / abs(fast)
+        return float(max(1.0, min(rest / turn, 1.0 + rest * top)))
+    excess = abs(fast) - abs(slow)
+    if not excess:
+        share = 1.0
+    elif abs(slow) > 1e-16 * abs(fast):
+        share = abs(slow) / excess * np.log1p(excess / abs(slow))
+    else:
+        share = 0.0
+    return float(1.0 + rest * np.exp(-share) / abs(fast))

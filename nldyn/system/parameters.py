@@ -1,0 +1,97 @@
+"""Numbers of a system with respect to which motions have exact derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nldyn.base.errors import SystemModelError, check_types, check_whole
+from nldyn.system.elements import Excitation
+from nldyn.system.system import System
+
+OF_STOPS = ("gap", "stiffness", "exponent", "dissipation")
+SOURCES = ("amplitude", "mass_times_radius")
+
+
+def size_of(source: Excitation) -> str:
+    """Name of the number that tells how strong a source of excitation is."""
+    return next(name for name in SOURCES if hasattr(source, name))
+
+
+def strength(source: Excitation) -> float:
+    """The number itself: in kg m of an unbalance, else in N."""
+    return float(getattr(source, size_of(source)))
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of a system.
+
+    Motions have exact derivatives by the numbers of stops and excitations. `continue_in`,
+    `by_detour` and the like know those of dampers and modes, too, see `nldyn.system.chart`.
+
+    Parameters
+    ----------
+    name : str
+        gap, stiffness, exponent or dissipation of a stop (not of one with a law of its own, but
+        for the gap), amplitude or mass_times_radius of an excitation.
+    index : int
+        Which of the stops, excitations, dampers or modes of the system.
+
+    Raises
+    ------
+    SystemModelError
+        If the name is no text, or the index no whole number of at least -1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from nldyn import FlowMap, Parameter, Stop, System, Unbalance
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> flow = FlowMap(system)
+    >>> segments = flow.shoot(np.zeros((1, 2)), np.array([0.0, 2 * np.pi]), 160.0,
+    ...     parameters=[Parameter("gap"), Parameter("mass_times_radius")])
+    >>> segments.d_parameters.shape
+    (1, 2, 2)
+    """
+
+    name: str
+    index: int = 0
+
+    def __post_init__(self) -> None:
+        check_types(**{"Parameter: name": (self.name, str)})
+        check_whole("Parameter: index", self.index, -1)
+
+
+def check_exact(system: System, parameter: Parameter) -> None:
+    """Refuse a parameter with exact derivatives that the system does not have.
+
+    Raises
+    ------
+    SystemModelError
+        As said.
+    """
+    name, index = parameter.name, parameter.index
+    if name in OF_STOPS:
+        check_index(parameter, "stop", len(system.stops))
+        if name != "gap" and system.stops[index].law is not None:
+            raise SystemModelError(
+                f"parameter '{name}': stop {index} has a law of its own, which knows no {name}"
+            )
+    elif name in SOURCES:
+        check_index(parameter, "excitation", len(system.excitation))
+        if not hasattr(system.excitation[index], name):
+            raise SystemModelError(f"parameter '{name}': excitation {index} has no {name}")
+    else:
+        known = ", ".join([*OF_STOPS, *SOURCES])
+        raise SystemModelError(f"unknown parameter '{name}'; there are: {known}")
+
+
+def check_index(parameter: Parameter, kind: str, count: int) -> None:
+    """Refuse the number of an element that there is not."""
+    if not 0 <= parameter.index < count:
+        known = f"there are {count}, counted from 0" if count else "the system has none"
+        raise SystemModelError(
+            f"parameter '{parameter.name}': there is no {kind} {parameter.index}; {known}"
+        )

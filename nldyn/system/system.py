@@ -1,0 +1,490 @@
+"""A reduced model with its stops, dampers and excitation, in modal form."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol, TypeVar
+
+import numpy as np
+import scipy.linalg as sla
+from numpy.typing import ArrayLike
+
+from nldyn.base.arrays import Complex, Real
+from nldyn.base.errors import SystemModelError, numbers, shown
+from nldyn.system.elements import Damper, Excitation, Stop
+from nldyn.system.linear import LinearPart, at_resonance, linear_part
+
+Element = TypeVar("Element")
+LARGEST_PARTICIPATION = 1e50  # its square is the mobility of a stop, and its fourth power occurs
+
+
+class ReducedModelLike(Protocol):
+    """What `System.from_reduced` needs: modal frequencies and participations."""
+
+    @property
+    def frequencies_hz(self) -> Real:
+        """Modal frequencies in Hz, shape (n,)."""
+
+    @property
+    def participation(self) -> Mapping[str, Real]:
+        """Displacement of each mass-normalised mode at each interface, shape (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    r"""Modal equations :math:`\ddot q + D\dot q + \Omega^2 q = \sum p f(t) - \sum c F(\delta)`.
+
+    Use `from_modal`, `from_matrices` or `from_reduced` to make one.
+
+    Parameters
+    ----------
+    natural_frequencies : (n,) array
+        Modal circular frequencies Ω in rad/s.
+    damping : (n, n) array
+        Modal damping matrix D in 1/s, without the point dampers.
+    participation : mapping of str to (n,) array
+        Displacement of each mass-normalised mode at each interface, 1/sqrt(kg).
+    stops, dampers, excitation : tuples
+        What acts at the interfaces.
+
+    Raises
+    ------
+    SystemModelError
+        If shapes disagree, a value is not finite or out of range, an interface is unknown,
+        or damping makes coupled modes inseparable.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System, Unbalance
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     stops=[Stop("middle", stiffness=5.17e9)], excitation=[Unbalance("middle", 4.92e-6)])
+    >>> system.size
+    1
+    """
+
+    natural_frequencies: Real
+    damping: Real
+    participation: Mapping[str, Real]
+    stops: tuple[Stop, ...] = ()
+    dampers: tuple[Damper, ...] = ()
+    excitation: tuple[Excitation, ...] = ()
+
+    def __repr__(self) -> str:
+        """One line: modes, interfaces, and what acts."""
+        hz = ", ".join(f"{value:.6g}" for value in self.frequencies_hz[:4])
+        more = ", ..." if self.size > 4 else ""
+        names = ", ".join(map(repr, self.interfaces)) or "none"
+        return (
+            f"<System of {self.size} modes at {hz}{more} Hz; interfaces {names}; "
+            f"{len(self.stops)} stops, {len(self.dampers)} dampers, "
+            f"{len(self.excitation)} excitations>"
+        )
+
+    def __post_init__(self) -> None:
+        self._check_shapes()
+        self._check_interfaces()
+        _ = self.linear
+
+    @classmethod
+    def from_modal(
+        cls,
+        frequencies_hz: ArrayLike,
+        participation: Mapping[str, ArrayLike],
+        *,
+        modal_damping: float | ArrayLike = 0.0,
+        stops: Sequence[Stop] = (),
+        dampers: Sequence[Damper] = (),
+        excitation: Sequence[Excitation] = (),
+    ) -> System:
+        """System from modal data typed in by hand.
+
+        Parameters
+        ----------
+        frequencies_hz : (n,) array_like
+            Modal frequencies in Hz.
+        participation : mapping of str to (n,) array_like
+            Displacement of each mass-normalised mode at each interface, 1/sqrt(kg).
+        modal_damping : float or (n,) array_like
+            Damping ratio of every mode.
+        stops, dampers, excitation : sequences
+            What acts at the interfaces.
+
+        Raises
+        ------
+        SystemModelError
+            See `System`.
+
+        Examples
+        --------
+        >>> System.from_modal([10.0, 20.0], {"tip": [1.0, -1.0]}, modal_damping=0.01).size
+        2
+        """
+        omega = 2.0 * np.pi * np.atleast_1d(numbers("frequencies_hz", frequencies_hz))
+        return cls(
+            omega,
+            _modal_damping(omega, modal_damping),
+            {
+                name: np.atleast_1d(numbers(name, phi))
+                for name, phi in _by_interface("participation", participation).items()
+            },
+            _listed("stops", stops),
+            _listed("dampers", dampers),
+            _listed("excitation", excitation),
+        )
+
+    @classmethod
+    def from_matrices(
+        cls,
+        mass: ArrayLike,
+        stiffness: ArrayLike,
+        interfaces: Mapping[str, ArrayLike],
+        *,
+        damping: ArrayLike | None = None,
+        modal_damping: float | ArrayLike = 0.0,
+        stops: Sequence[Stop] = (),
+        dampers: Sequence[Damper] = (),
+        excitation: Sequence[Excitation] = (),
+    ) -> System:
+        """System from mass, stiffness and damping matrices.
+
+        Parameters
+        ----------
+        mass, stiffness : (n, n) array_like
+            Symmetric; the mass positive definite, the stiffness positive semidefinite.
+        interfaces : mapping of str to (n,) array_like
+            Unit load vector of each interface.
+        damping : (n, n) array_like, optional
+            Symmetric damping matrix in N s/m, added to the modal damping.
+        modal_damping : float or (n,) array_like
+            Damping ratio of every mode.
+        stops, dampers, excitation : sequences
+            What acts at the interfaces.
+
+        Raises
+        ------
+        SystemModelError
+            If a matrix is not square, symmetric, finite or definite; see also `System`.
+
+        Examples
+        --------
+        >>> s = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]}, modal_damping=0.0142)
+        >>> f"{s.frequencies_hz[0]:.4f}"
+        '13.1293'
+        """
+        M = _symmetric("mass", mass)
+        K = _symmetric("stiffness", stiffness)
+        if K.shape != M.shape:
+            raise SystemModelError(f"stiffness is {K.shape} but mass is {M.shape}")
+        try:
+            squared, modes = sla.eigh(K, M)
+        except sla.LinAlgError:
+            raise SystemModelError("mass must be positive definite") from None
+        if not np.all(np.isfinite(squared)):
+            raise SystemModelError("mass is too small beside the stiffness to compute with")
+        rounding = 8.0 * squared.size * np.finfo(float).eps * squared[-1]
+        if squared[0] < -rounding and _negative(K):
+            raise SystemModelError("stiffness must not be negative in any direction")
+        omega = np.sqrt(np.maximum(squared, 0.0))
+        D = _modal_damping(omega, modal_damping)
+        if damping is not None:
+            C = _symmetric("damping", damping)
+            if C.shape != M.shape:
+                raise SystemModelError(f"damping is {C.shape} but mass is {M.shape}")
+            D = D + modes.T @ C @ modes
+        participation = {}
+        for name, vector in _by_interface("interfaces", interfaces).items():
+            b = np.atleast_1d(numbers(f"interface '{name}'", vector))
+            if b.shape != omega.shape:
+                raise SystemModelError(
+                    f"interface '{name}' has {b.size} entries "
+                    f"but the matrices have {omega.size} rows"
+                )
+            participation[name] = modes.T @ b
+        return cls(
+            omega,
+            D,
+            participation,
+            _listed("stops", stops),
+            _listed("dampers", dampers),
+            _listed("excitation", excitation),
+        )
+
+    @classmethod
+    def from_reduced(
+        cls,
+        reduced: ReducedModelLike,
+        *,
+        modal_damping: float | ArrayLike = 0.0,
+        stops: Sequence[Stop] = (),
+        dampers: Sequence[Damper] = (),
+        excitation: Sequence[Excitation] = (),
+    ) -> System:
+        """System from a reduced model (anything with frequencies and participations).
+
+        Parameters
+        ----------
+        reduced : object
+            With `frequencies_hz` (n,) and `participation` {name: (n,)}; its `damping` (n, n) in 1/s
+            is added to the modal damping, if it has one.
+        modal_damping, stops, dampers, excitation
+            As for `from_modal`.
+
+        Raises
+        ------
+        SystemModelError
+            If it is no reduced model, or part of its flexibility has no mass
+            (`residual_flexibility`), as by MacNeal's method: its interfaces would move at once
+            under a force. See also `System`.
+        """
+        if not (hasattr(reduced, "frequencies_hz") and hasattr(reduced, "participation")):
+            raise SystemModelError(
+                "reduced must be a reduced model, with frequencies_hz and participation, got "
+                f"{shown(reduced)}"
+            )
+        massless = getattr(reduced, "residual_flexibility", None)
+        if massless is not None and np.any(massless):
+            raise SystemModelError(
+                "part of the reduced model's flexibility has no mass "
+                f"(method '{getattr(reduced, 'method', 'unknown')}'), so that its interfaces have "
+                "no equation of motion; reduce by 'rubin' or 'craig-bampton' instead"
+            )
+        system = cls.from_modal(
+            reduced.frequencies_hz, reduced.participation, modal_damping=modal_damping
+        )
+        damping = getattr(reduced, "damping", None)
+        if damping is not None:
+            damping = _symmetric("damping", damping)
+            if damping.shape != system.damping.shape:
+                raise SystemModelError(f"damping is {damping.shape} for {system.size} modes")
+        return cls(
+            system.natural_frequencies,
+            system.damping if damping is None else system.damping + damping,
+            system.participation,
+            _listed("stops", stops),
+            _listed("dampers", dampers),
+            _listed("excitation", excitation),
+        )
+
+    @property
+    def size(self) -> int:
+        """Number of modes n."""
+        return int(self.natural_frequencies.size)
+
+    @property
+    def frequencies_hz(self) -> Real:
+        """Modal frequencies in Hz, shape (n,)."""
+        return self.natural_frequencies / (2.0 * np.pi)
+
+    @property
+    def interfaces(self) -> tuple[str, ...]:
+        """Names of the interfaces, in the order given."""
+        return tuple(self.participation)
+
+    @cached_property
+    def total_damping(self) -> Real:
+        """Modal damping matrix with the point dampers, (n, n), 1/s."""
+        D = np.array(self.damping)
+        for damper in self.dampers:
+            phi = self.participation[damper.at]
+            D += damper.coefficient * np.outer(phi, phi)
+        return D
+
+    @cached_property
+    def conservative(self) -> bool:
+        """Whether nothing takes energy out: no damping, and no stop whose force knows the speed."""
+        return not np.any(self.total_damping) and not any(s.depends_on_speed for s in self.stops)
+
+    @cached_property
+    def symmetric(self) -> bool:
+        """Whether -x(t + T/2) is a motion if x(t) is one: each stop has one opposite to it.
+
+        All excitation is harmonic, of the period T, and so changes its sign after half of that.
+        """
+        stops = [
+            (self.stop_vector(s), (s.stiffness, s.exponent, s.gap, s.dissipation, s.law))
+            for s in self.stops
+        ]
+        return all(
+            sum(same == law and np.array_equal(c, vector) for c, same in stops)
+            == sum(same == law and np.array_equal(-c, vector) for c, same in stops)
+            for vector, law in stops
+        )
+
+    @cached_property
+    def linear(self) -> LinearPart:
+        """Independent pairs of coordinates of the linear part."""
+        return linear_part(self.natural_frequencies, self.total_damping)
+
+    def stop_vector(self, stop: Stop) -> Real:
+        """Modal vector c with penetration ``c @ q - gap``, shape (n,)."""
+        c = self.participation[stop.at]
+        if stop.against is not None:
+            c = c - self.participation[stop.against]
+        return stop.direction * c
+
+    def displacement_row(self, phi: Real) -> Real:
+        """Row that gives the displacement ``phi @ q = row @ z``, shape (2n,)."""
+        return np.asarray(phi @ self.linear.right[: self.size])
+
+    def force_column(self, phi: Real) -> Real:
+        """Column by which a unit force on ``phi`` drives z, shape (2n,)."""
+        return np.asarray(self.linear.left[:, self.size :] @ phi)
+
+    @cached_property
+    def drive(self) -> Complex:
+        """Excitation of z: Re((drive[0] + ω² drive[1]) e^{iωt}), shape (2, 2n)."""
+        drive = np.zeros((2, 2 * self.size), dtype=complex)
+        for source in self.excitation:
+            column = self.force_column(self.participation[source.at])
+            drive[source.order // 2] += source.phasor * column
+        return drive
+
+    def steady(self, omega: float) -> Complex:
+        """Amplitude (2n,) of the steady linear response z = Re(steady e^{iωt}) at ω (rad/s).
+
+        Raises
+        ------
+        SystemModelError
+            If an undamped mode is excited exactly at its frequency: then there is none.
+        """
+        return self.linear.steady(self._drive_at(omega), omega)
+
+    def response(self, omega: float) -> tuple[Complex, Complex]:
+        """Linear response at ω (rad/s), near or at a resonance, too: see `LinearPart.response`."""
+        return self.linear.response(self._drive_at(omega), omega)
+
+    def grows(self, omega: float) -> bool:
+        """Whether an undamped mode is excited at its own frequency ω (rad/s), but for rounding."""
+        near, response = self.response(omega)
+        return bool(np.any(response[1:][at_resonance(near, omega)]))
+
+    def _drive_at(self, omega: float) -> Complex:
+        return np.asarray(self.drive[0] + omega**2 * self.drive[1])
+
+    def with_elements(
+        self,
+        *,
+        stops: tuple[Stop, ...] | None = None,
+        excitation: tuple[Excitation, ...] | None = None,
+    ) -> System:
+        """The same structure with stops or excitation whose numbers differ, at the same interfaces.
+
+        The linear part is shared, which saves most of the work of making a system.
+        """
+        other = copy.copy(self)
+        vars(other).pop("drive", None)
+        if stops is not None:
+            object.__setattr__(other, "stops", _listed("stops", stops))
+        if excitation is not None:
+            object.__setattr__(other, "excitation", _listed("excitation", excitation))
+        other._check_interfaces()
+        return other
+
+    def _check_shapes(self) -> None:
+        n = self.natural_frequencies.size
+        if self.natural_frequencies.ndim != 1:
+            raise SystemModelError(
+                f"frequencies_hz must be a list, got shape {self.natural_frequencies.shape}"
+            )
+        if n == 0:
+            raise SystemModelError("a system needs at least one mode")
+        if np.any(self.natural_frequencies < 0.0):
+            raise SystemModelError("frequencies_hz must not be negative")
+        if self.damping.shape != (n, n):
+            raise SystemModelError(f"damping must be ({n}, {n}), got {self.damping.shape}")
+        for name, phi in self.participation.items():
+            if phi.shape != (n,):
+                raise SystemModelError(
+                    f"participation of '{name}' has {phi.size} entries but there are {n} modes"
+                    if phi.ndim == 1
+                    else f"participation of '{name}' must be a list, got shape {phi.shape}"
+                )
+            if np.abs(phi).max() > LARGEST_PARTICIPATION:
+                raise SystemModelError(
+                    f"participation of '{name}' must be at most {LARGEST_PARTICIPATION:g} "
+                    f"1/kg^0.5, got {np.abs(phi).max():g}"
+                )
+
+    def _check_interfaces(self) -> None:
+        known = ", ".join(self.participation) or "none"
+        for kind, elements, classes in (
+            ("stop", self.stops, Stop),
+            ("damper", self.dampers, Damper),
+            ("excitation", self.excitation, Excitation),
+        ):
+            for element in elements:
+                if not isinstance(element, classes):
+                    raise SystemModelError(f"{kind} cannot be {shown(element)}")
+                names = [element.at]
+                if isinstance(element, Stop) and element.against is not None:
+                    names.append(element.against)
+                for name in names:
+                    if name not in self.participation:
+                        raise SystemModelError(
+                            f"{kind} at unknown interface '{name}'; there are: {known}"
+                        )
+
+
+def _listed(name: str, elements: Sequence[Element]) -> tuple[Element, ...]:
+    try:
+        return tuple(elements)
+    except TypeError:
+        raise SystemModelError(f"{name} must be a list, got {shown(elements)}") from None
+
+
+def _by_interface(name: str, vectors: Mapping[str, ArrayLike]) -> Mapping[str, ArrayLike]:
+    if not isinstance(vectors, Mapping):
+        raise SystemModelError(
+            f"{name} must be a dictionary from interfaces to numbers, got {shown(vectors)}"
+        )
+    return vectors
+
+
+def same_system(a: System, b: System) -> bool:
+    """Whether two systems have the same numbers, interfaces and laws.
+
+    Examples
+    --------
+    >>> twins = [System.from_modal([13.1], {"middle": [0.635]}) for _ in range(2)]
+    >>> same_system(*twins), same_system(twins[0], System.from_modal([13.1], {"middle": [0.6]}))
+    (True, False)
+    """
+    return a is b or (
+        np.array_equal(a.natural_frequencies, b.natural_frequencies)
+        and np.array_equal(a.damping, b.damping)
+        and a.interfaces == b.interfaces
+        and all(
+            np.array_equal(a.participation[name], b.participation[name]) for name in a.interfaces
+        )
+        and (a.stops, a.dampers, a.excitation) == (b.stops, b.dampers, b.excitation)
+    )
+
+
+def _negative(K: Real) -> bool:
+    """Whether a stiffness, scaled to a unit diagonal, is negative in a direction."""
+    diagonal = np.abs(np.diag(K))
+    scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, max(diagonal.max(), 1e-300)))
+    return bool(sla.eigvalsh(scale[:, None] * K * scale)[0] < -1e-10)
+
+
+def _symmetric(name: str, values: ArrayLike) -> Real:
+    matrix = np.atleast_2d(numbers(name, values))
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
+        raise SystemModelError(f"{name} must be a square matrix, got shape {matrix.shape}")
+    if not np.allclose(matrix, matrix.T, rtol=1e-10, atol=1e-12 * float(np.abs(matrix).max())):
+        raise SystemModelError(f"{name} must be symmetric")
+    return matrix
+
+
+def _modal_damping(omega: Real, ratios: float | ArrayLike) -> Real:
+    zeta = numbers("modal_damping", ratios)
+    if zeta.ndim > 1 or zeta.size not in (1, omega.size):
+        raise SystemModelError(
+            f"modal_damping must be one number or one per mode ({omega.size}), got {zeta.size}"
+        )
+    if np.any(zeta < 0.0):
+        raise SystemModelError("modal_damping must not be negative")
+    return np.diag(2.0 * zeta * omega)

@@ -1,0 +1,286 @@
+"""Whole branches, growth with the number of modes, grazing contacts, and the first call."""
+
+from __future__ import annotations
+
+import cProfile
+import os
+import pstats
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bench import native
+from bench.engines import flow_map
+from bench.measure import errors, median_seconds
+from bench.models import Case, Sensitivities, load_case, load_grazing
+from nldyn.base.arrays import Real
+from nldyn.branches.branch import Branch
+from nldyn.branches.continuation import continue_branch
+from nldyn.flow.flow_map import FlowMap
+from nldyn.flow.options import FlowOptions
+from nldyn.orbits.solve import solve_orbit
+from nldyn.system.system import System
+
+DEFAULT = FlowOptions()
+TIGHT = FlowOptions(rtol=1e-13)
+MODES = (4, 8, 16, 32, 64)
+MODES_HZ = 38.0
+
+
+@dataclass(frozen=True)
+class BranchTask:
+    """A harmonic branch to be timed: start in Hz, range in Hz."""
+
+    model: str
+    start_hz: float
+    range_hz: tuple[float, float]
+
+
+BRANCHES = (
+    BranchTask("one_dof", 26.0, (3.0, 90.0)),
+    BranchTask("four_dof", 38.0, (18.0, 40.0)),
+)
+
+
+@dataclass(frozen=True)
+class BranchTime:
+    """Time of a branch and how well its special points are located.
+
+    Parameters
+    ----------
+    task : BranchTask
+        What was computed.
+    seconds : float
+        Median, with the search for the first orbit.
+    points : int
+        Points of the branch.
+    special : int
+        Special points.
+    unmatched : int
+        Special points without a partner on the same branch at the tightest setting, either way.
+    error : float
+        Largest relative difference of their frequencies otherwise.
+    located : tuple of (str, float)
+        Kind and frequency in Hz of each special point.
+    """
+
+    task: BranchTask
+    seconds: float
+    points: int
+    special: int
+    unmatched: int
+    error: float
+    located: tuple[tuple[str, float], ...]
+
+
+def harmonic(system: System, task: BranchTask, options: FlowOptions = DEFAULT) -> Branch:
+    """The harmonic branch of a task."""
+    orbit = solve_orbit(FlowMap(system, options), task.start_hz)
+    return continue_branch(orbit, task.range_hz)
+
+
+def time_branch(task: BranchTask) -> BranchTime:
+    """Time a branch, and compare its special points with those of the tightest setting."""
+    system = load_case(task.model).system
+    branch = harmonic(system, task)
+    seconds, _ = median_seconds(lambda: harmonic(system, task), calm=1.0)
+    unmatched, error = compare_special_points(branch, harmonic(system, task, TIGHT))
+    located = tuple((p.kind, p.frequency_hz) for p in branch.special_points)
+    return BranchTime(task, seconds, len(branch.points), len(located), unmatched, error, located)
+
+
+def compare_special_points(branch: Branch, finer: Branch) -> tuple[int, float]:
+    """Special points without a partner of the same kind, and the largest relative difference."""
+    unmatched, error = 0, 0.0
+    for kind in ("LP", "PD", "NS", "BP", "GR"):
+        here, there = (
+            sorted(p.frequency_hz for p in b.special_points if p.kind == kind)
+            for b in (branch, finer)
+        )
+        a, b, alone = pair_up(np.array(here), np.array(there))
+        unmatched += alone
+        if a.size:
+            error = max(error, float(np.abs(a / b - 1.0).max()))
+    return unmatched, error
+
+
+def pair_up(a: Real, b: Real, rtol: float = 1e-5) -> tuple[Real, Real, int]:
+    """Pairs of nearly equal frequencies of two sorted lists, and how many are left over."""
+    pairs = []
+    i = j = 0
+    while i < a.size and j < b.size:
+        if abs(a[i] - b[j]) <= rtol * b[j]:
+            pairs.append((a[i], b[j]))
+            i, j = i + 1, j + 1
+        elif a[i] < b[j]:
+            i += 1
+        else:
+            j += 1
+    found = np.array(pairs).reshape(-1, 2)
+    return found[:, 0], found[:, 1], a.size + b.size - 2 * len(pairs)
+
+
+# Where the time of a branch goes
+
+SUBJECTS = {
+    "flow": "flow map",
+    "system": "flow map (steady response)",
+    "orbits": "corrector, extremes and multipliers",
+    "bifurcations": "special points",
+    "branches": "walk",
+    "linalg": "linear algebra (numpy)",
+}
+
+
+def profile_branch(task: BranchTask) -> dict[str, float]:
+    """Share of each subject in the time of a branch; the profiler favours compiled code."""
+    system = load_case(task.model).system
+    harmonic(system, task)
+    profiler = cProfile.Profile()
+    profiler.runcall(harmonic, system, task)
+    shares: dict[str, float] = {}
+    stats = pstats.Stats(profiler).stats  # type: ignore[attr-defined]
+    for (file, _, _), (_, _, own, _, _) in stats.items():
+        room = re.search(r"nldyn/(\w+)/", Path(file).as_posix())
+        key = room[1] if room else "linalg" if "linalg" in file else ""
+        subject = SUBJECTS.get(key, "the rest (numpy, scipy, Python)")
+        shares[subject] = shares.get(subject, 0.0) + own
+    total = sum(shares.values())
+    return {k: v / total for k, v in sorted(shares.items(), key=lambda item: -item[1])}
+
+
+# Number of modes
+
+
+@dataclass(frozen=True)
+class ModesTime:
+    """One orbit with its derivatives at a number of modes: median time and error."""
+
+    modes: int
+    seconds: float
+    closings: int
+    error: float
+
+
+def time_modes(numbers: Sequence[int] = MODES) -> list[ModesTime]:
+    """One period of the beam with more and more modes; errors against the tightest setting."""
+    import cms
+    from nldyn.base.resources import example
+    from nldyn.scene.build import build_component, build_system, load_scene
+
+    scene = load_scene(example("four_dof_xi_0.01.toml"))
+    component = build_component(scene)
+    guess: Real | None = None
+    found = []
+    for modes in numbers:
+        system = build_system(scene, cms.reduce(component, modes=modes - 1, residual=True))
+        if guess is not None:  # keep the free-interface modes, start the new ones at zero
+            halves = [np.append(half[:-1], np.zeros(modes - half.size + 1)) for half in guess]
+            guess = np.concatenate(halves)
+        orbit = solve_orbit(FlowMap(system, TIGHT), MODES_HZ, guess=guess)
+        tight = orbit.problem.flow
+        start = tight.to_modal(orbit.problem.nodes(orbit.point)[0])
+        guess = start.reshape(2, -1)
+        exact = native.sensitivities(tight, start, orbit.omega)
+        case = Case(f"{modes} modes", system, orbit.omega, start, exact, 12.0)
+        found.append(_time_case(case, DEFAULT, modes))
+    return found
+
+
+def _time_case(case: Case, options: FlowOptions, modes: int) -> ModesTime:
+    seconds, _ = median_seconds(flow_map(case, options)(case.start, case.omega).run, 5)
+    flow = FlowMap(case.system, options)
+    error = max(errors(case, native.sensitivities(flow, case.start, case.omega)))
+    return ModesTime(modes, seconds, native.closings(flow, case), error)
+
+
+# Grazing
+
+
+@dataclass(frozen=True)
+class GrazingError:
+    """A touch of a given depth, relative to the amplitude."""
+
+    depth: float
+    seconds: float
+    state: float
+    monodromy: float
+
+
+def grazing_errors(options: FlowOptions = DEFAULT) -> list[GrazingError]:
+    """Errors and times of slower and slower touches."""
+    found = []
+    for depth, case in load_grazing().items():
+        flow = FlowMap(case.system, options)
+        result: Sensitivities = native.sensitivities(flow, case.start, case.omega)
+        state, monodromy, _ = errors(case, result)
+        found.append(GrazingError(depth, _time_case(case, options, 1).seconds, state, monodromy))
+    return found
+
+
+# The first call
+
+FIRST_ORBIT = """
+import time
+import nldyn
+imported = time.process_time()
+system = nldyn.System.from_matrices(
+    [[2.48]], [[16877.0]], {"middle": [1.0]}, modal_damping=0.0142,
+    stops=[nldyn.Stop("middle", stiffness=5.17e9)],
+    excitation=[nldyn.Unbalance("middle", 4.92e-6)],
+)
+nldyn.solve_orbit(system, frequency_hz=20.0)
+print(imported, time.process_time())
+"""
+
+
+@dataclass(frozen=True)
+class FirstCall:
+    """Seconds of the import alone, and of import and first orbit, by state of the cache."""
+
+    cold_import: float
+    cold_orbit: float
+    warm_import: float
+    warm_orbit: float
+
+
+def first_call() -> FirstCall:
+    """Import and first orbit in new processes: compile cache empty, then filled."""
+    with tempfile.TemporaryDirectory() as folder:
+        times = []
+        for _ in range(2):
+            text = subprocess.run(
+                [sys.executable, "-c", FIRST_ORBIT],
+                env={**os.environ, "NUMBA_CACHE_DIR": folder},
+                capture_output=True,
+                text=True,
+                check=True,
+            ).stdout
+            times += [float(word) for word in text.split()]
+    return FirstCall(*times)
+
+
+# Against AUTO's special points
+
+
+def published_special_points() -> list[tuple[str, float, dict[str, float]]]:
+    """Kind, frequency in Hz by an independent shooting code, and AUTO's by setting."""
+    import csv
+    from importlib import resources
+
+    file = resources.files("nldyn.paper").joinpath("data/auto_special_points_harmonic.csv")
+    found = []
+    for row in csv.DictReader(file.read_text("utf-8").splitlines()):
+        auto = {
+            key.split("NTST")[1].split()[0]: float(value)
+            for key, value in row.items()
+            if "NTST" in key and value != "missed"
+        }
+        found.append((row["type"], float(row["fe_Hz_shooting"]), auto))
+    return found

@@ -1,0 +1,126 @@
+"""The rooms of nldyn: a room imports rooms to its right only."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+# from the roof to the ground; rooms on one floor do not know each other
+FLOORS = (
+    {"app"}, {"paper"}, {"report"}, {"plot", "scene"}, {"longterm", "reduction", "io"}, {"search"},
+    {"curves"}, {"branches"}, {"bifurcations"}, {"orbits"}, {"flow"}, {"runtime", "system"},
+    {"base"},
+)  # fmt: skip
+FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
+# who may import what of others
+KEPT_TO = {
+    "fem": {"reduction", "scene", "report", "paper", "app"},
+    "cms": {"reduction", "scene", "report", "paper", "app"},
+    "h5py": {"io"},
+    "matplotlib": {"plot", "report", "paper"},
+    "click": {"app"},
+    "pydantic": {"scene"},
+}
+ABOVE_IMPORTS_IN_FUNCTIONS = {"scene", "report", "paper", "app", "plot"}
+DOORS = {"__init__", "__main__"}  # of the package: the face and ``python -m nldyn``
+
+
+def modules(package: str) -> dict[str, ast.Module]:
+    """The modules of a package by name."""
+    found = {}
+    for path in sorted((ROOT / package).rglob("*.py")):
+        name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+        found[name.removesuffix(".__init__")] = ast.parse(path.read_text(encoding="utf-8"))
+    return found
+
+
+NLDYN = {
+    name: tree
+    for name, tree in modules("nldyn").items()
+    if name.split(".")[1:2] not in (["bench"], ["hard"])
+}
+
+
+def imports(tree: ast.AST, within: bool = False) -> Iterator[tuple[str, bool]]:
+    """What a module imports, and whether it does so within a function."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.Import):
+            yield from ((name.name, within) for name in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield from ((f"{node.module}.{name.name}", within) for name in node.names)
+        inside = within or isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        yield from imports(node, inside)
+
+
+def room_of(name: str) -> str | None:
+    """The room of a name of nldyn; none for the face."""
+    words = name.split(".")
+    return words[1] if words[0] == "nldyn" and len(words) > 1 and words[1] in FLOOR else None
+
+
+def test_every_module_is_in_a_room():
+    outside = [name for name in NLDYN if name != "nldyn" and room_of(name) is None]
+    assert [name for name in outside if name.split(".")[-1] not in DOORS] == []
+
+
+@pytest.mark.parametrize("room", FLOOR)
+def test_a_room_imports_rooms_below_only(room):
+    up = [
+        f"{name} imports {other}"
+        for name, tree in NLDYN.items()
+        if room_of(name) == room
+        for other, _ in imports(tree)
+        if (theirs := room_of(other)) not in (None, room) and FLOOR[theirs] <= FLOOR[room]
+    ]
+    assert up == []
+
+
+def test_below_the_scene_no_import_hides_in_a_function():
+    hidden = [
+        f"{name} imports {other}"
+        for name, tree in NLDYN.items()
+        if room_of(name) not in ABOVE_IMPORTS_IN_FUNCTIONS | {None}
+        for other, within in imports(tree)
+        if within and other.split(".")[0] in ("nldyn", "fem", "cms")
+    ]
+    assert hidden == []
+
+
+@pytest.mark.parametrize("package", KEPT_TO)
+def test_what_only_some_rooms_import(package):
+    elsewhere = [
+        name
+        for name, tree in NLDYN.items()
+        if room_of(name) not in KEPT_TO[package] | {None}
+        and any(other.split(".")[0] == package for other, _ in imports(tree))
+    ]
+    assert elsewhere == []
+
+
+@pytest.mark.parametrize(
+    ("package", "unknown"), [("fem", ("cms", "nldyn")), ("cms", ("fem", "nldyn"))]
+)
+def test_what_a_package_does_not_know(package, unknown):
+    for name, tree in modules(package).items():
+        known = {other.split(".")[0] for other, _ in imports(tree)}
+        assert not known & set(unknown), name
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    trees = {**NLDYN, **modules("fem"), **modules("cms")}
+    arrows = {
+        name: {
+            other if other in trees else other.rpartition(".")[0]
+            for other, within in imports(tree)
+            if not within
+        }
+        for name, tree in trees.items()
+    }
+    while ground := [name for name, below in arrows.items() if not (below - {name}) & set(arrows)]:
+        for name in ground:
+            del arrows[name]
+    assert sorted(arrows) == []
