@@ -495,6 +495,56 @@ def test_a_truss_is_no_beam_and_a_shell_no_sheet(tmp_path):
     assert fem.StructureModel(sheet, {"E": fem.SolidPart(STEEL, "stress", 0.1)}).is_plane
 
 
+def test_trusses_and_shells_of_the_deck_are_parts_of_their_kind(tmp_path):
+    """A hanging truss with a mass: sqrt(E A / (L m)); what it cannot turn is refused."""
+    text = (
+        "*NODE\n1, 0., 0.\n2, 0., -2.\n*ELEMENT, TYPE=T2D2, ELSET=ROD\n1, 1, 2\n"
+        "*ELEMENT, TYPE=MASS, ELSET=M\n2, 2\n*MASS, ELSET=M\n1e4\n*NSET, NSET=TOP\n1\n"
+        "*MATERIAL, NAME=S\n*ELASTIC\n2.1e11, 0.3\n*DENSITY\n7800.\n"
+        "*SOLID SECTION, ELSET=ROD, MATERIAL=S\n1e-4\n"
+    )
+    mesh = fem.read_mesh(deck(tmp_path, text))
+    assert mesh.described["ROD"]["kind"] == "truss" and mesh.described["ROD"]["area"] == 1e-4
+    parts = {"ROD": fem.TrussPart(STEEL, 1e-4)}
+    held = [fem.Support("TOP", ("x", "y")), fem.Support("node 2", "x")]
+    component = fem.assemble(fem.FrameModel(mesh, parts, held))
+    square = (component.stiffness / component.mass.toarray()[0, 0]).toarray()[0, 0]
+    assert square == pytest.approx(2.1e11 * 1e-4 / 2.0 / (1e4 + 7800 * 1e-4 * 2 / 3), rel=1e-12)
+    turned = text + "*ELEMENT, TYPE=ROTARYI, ELSET=R\n3, 2\n*ROTARY INERTIA, ELSET=R\n1., 1., 1.\n"
+    with pytest.raises(fem.ModelError, match="acts on a rotation, but only trusses meet"):
+        fem.FrameModel(fem.read_mesh(deck(tmp_path, turned)), parts)
+    plate = (
+        "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 1, 1, 0\n4, 0, 1, 0\n"
+        "*ELEMENT, TYPE=S4R, ELSET=E\n1, 1, 2, 3, 4\n*MATERIAL, NAME=S\n*ELASTIC\n2.1e11, 0.3\n"
+        "*DENSITY\n7800.\n*SHELL SECTION, ELSET=E, MATERIAL=S\n0.01, 5\n"
+    )
+    shell = fem.read_structure(deck(tmp_path, plate))
+    assert shell.described["E"]["thickness"] == 0.01 and shell.described["E"]["kind"] == "shell"
+    mass = fem.assemble(fem.StructureModel(shell, {"E": fem.ShellPart(STEEL, 0.01)})).mass
+    along = np.zeros(24)
+    along[:12:3] = 1.0
+    assert along @ mass @ along == pytest.approx(78.0, rel=1e-12)
+
+
+def test_wedges_and_pyramids_of_the_deck_keep_their_types(tmp_path):
+    for kind, name in (("wedge", "C3D6"), ("wedge15", "C3D15"), ("pyramid", "C3D5")):
+        rows, plain = box_rows((2, 1, 1), kind, name)
+        mesh = fem.read_structure(deck(tmp_path, rows))
+        assert np.array_equal(mesh.cells[kind], plain.cells[kind])
+        assert len(mesh.element_types[name][kind]) == len(plain.cells[kind])
+        assert solid_frequencies(mesh) == pytest.approx(solid_frequencies(plain), rel=1e-12)
+
+
+def test_a_collapsed_element_keeps_its_type(tmp_path):
+    text = (
+        "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n5, 0, 0, 1\n6, 1, 0, 1\n7, 0, 1, 1\n"
+        "*ELEMENT, TYPE=C3D8R, ELSET=E\n1, 1, 2, 3, 3, 5, 6, 7, 7\n"
+    )
+    mesh = fem.read_structure(deck(tmp_path, text))
+    assert {name: list(found) for name, found in mesh.element_types.items()} == {"C3D8R": ["wedge"]}
+    assert mesh.part("E")["wedge"].tolist() == [0]
+
+
 def test_what_the_file_attaches_is_saved_and_loaded(tmp_path):
     text = cantilever_deck() + "*ELEMENT, TYPE=MASS, ELSET=M\n99, 11\n*MASS, ELSET=M\n50.\n"
     text += "*ELEMENT, TYPE=DASHPOT1, ELSET=D\n24, 11\n*DASHPOT, ELSET=D\n2\n30.\n"
