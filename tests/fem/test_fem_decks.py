@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -253,6 +254,34 @@ def test_a_27_node_hexahedron_has_its_centre_and_faces_in_place(tmp_path):
     spoiled = text.replace(", ".join(words[14:]), ", ".join([*words[14:20], *words[:19:-1]]))
     with pytest.raises(fem.ModelError, match="nodes 21 to 27 are not its centre"):
         fem.read_structure(deck(tmp_path, spoiled))
+
+
+@pytest.mark.parametrize("kind", ["hexahedron27", "line3", "quad8", "wedge15"])
+def test_what_is_written_is_read_again_with_its_types(tmp_path, kind):
+    if kind == "line3":
+        cells = {"line3": [[0, 2, 1], [2, 4, 3]]}
+        mesh = fem.StructureMesh([[i, i, 0] for i in range(5)], cells, {"b": {kind: [0, 1]}})
+    else:
+        counts = (2, 1) if kind == "quad8" else (2, 1, 1)
+        mesh = fem.box_mesh("b", (2.0, 1.0, 1.0)[: len(counts)], counts, kind=kind)
+    fem.write_mesh(mesh, tmp_path / "a.inp")
+    back = fem.read_structure(tmp_path / "a.inp")
+    assert np.array_equal(back.cells[kind], mesh.cells[kind])
+    types = {"quad8": "S8R", "line3": "T3D3"}.get(kind, "C3D15R")
+    named = replace(mesh, element_types={types: {kind: [1]}})
+    if kind in ("quad8", "line3"):
+        fem.write_mesh(named, tmp_path / "b.inp")
+        again = fem.read_structure(tmp_path / "b.inp")
+        assert again.element_types[types][kind].tolist() == [1]
+        assert np.array_equal(again.cells[kind], mesh.cells[kind])
+
+
+def test_a_mesh_with_something_attached_is_not_written_without_it(tmp_path):
+    mesh = fem.box_mesh("b", (1.0, 1.0, 1.0), (1, 1, 1))
+    loaded = replace(mesh, attachments=fem.Attachments([fem.PointMass("x1", 2.0)]))
+    for end in ("vtu", "inp"):
+        with pytest.raises(fem.ModelError, match=r"attached to the mesh \(point masses: 1\)"):
+            fem.write_mesh(loaded, tmp_path / f"a.{end}")
 
 
 def test_a_mass_of_the_deck_is_the_models_own(tmp_path):
