@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import cache
 
 from fem.errors import ModelError, quoted
 from fem.mesh import IntArray
@@ -27,6 +28,7 @@ FITTING: Mapping[str, frozenset[str]] = {
 """The families of elements that a part of a model may hold, by the name of its class."""
 
 
+@cache
 def family(element_type: str) -> str:
     """The family of an element type; an empty text for one that no family is known of.
 

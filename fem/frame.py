@@ -149,6 +149,11 @@ def mechanism_warnings(model: FrameModel) -> Iterator[str]:
     held = np.repeat(model.turning[:, None], 3, axis=1).astype(np.int64)
     ties = [(s.point, d) for s in model.supports for d in s.directions]
     ties += [(spring.point, spring.direction) for spring in model.springs]
+    ties += [
+        (point, plane_direction(way))
+        for link in model.attached.links
+        for point, way, _ in link_terms(model.mesh, link)
+    ]
     for point, direction in ties:
         if direction != "rotation":
             held[model.mesh.nodes(point), DIRECTIONS.index(direction)] = 1

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fem.links import link_terms
 from fem.structure import StructureModel, axis_index
 from fem.trusses import loose_nodes, loose_sentences
 
@@ -34,7 +35,7 @@ def hinge_warnings(model: StructureModel) -> Iterator[str]:
     for _, kinds in model.solids.values():
         for nodes in kinds.values():
             solid[nodes] = True
-    for coupling in model.couplings:
+    for coupling in model.attached.couplings:
         if coupling.kind == "rigid" and len(coupling.directions) == 3:
             solid[model.mesh.nodes(coupling.face)] = False
     shells = [facets for _, kinds in model.shells.values() for facets in kinds.values()]
@@ -60,12 +61,17 @@ def mechanism_warnings(model: StructureModel) -> Iterator[str]:
             held[nodes] = 1
     for _, lines in model.beams.values():
         held[lines] = 1
-    for coupling in model.couplings:
+    for coupling in model.attached.couplings:
         held[model.mesh.nodes(coupling.face)] = held[model.mesh.node(coupling.point)] = 1
     for foundation in model.foundations:
         held[model.mesh.nodes(foundation.face)] |= np.array(foundation.stiffness) > 0.0
     ties = [(support.point, d) for support in model.supports for d in support.directions]
     ties += [(spring.point, spring.direction) for spring in model.springs]
+    brought = model.attached
+    ties += [
+        (p, d) for link in brought.links for p, d, _ in link_terms(model.mesh, link)
+    ]
+    ties += [(p, d) for equation in brought.equations for p, d, _ in equation.terms]
     for point, direction in ties:
         if axis_index(direction) < 3:
             held[model.mesh.nodes(point), axis_index(direction)] = 1

@@ -394,8 +394,14 @@ class FrameModel:
         """Refuse what acts on a rotation where only trusses meet."""
         named = [
             (f"point mass at {lump.point!r}", lump.point)
-            for lump in self.point_masses
-            if lump.rotary_inertia
+            for lump in self.attached.point_masses
+            if np.any(lump.rotary_inertia)
+        ]
+        named += [
+            (f"link at {link.first!r}", point)
+            for link in self.attached.links
+            for point, way in zip(link.points, link.directions or (), strict=False)
+            if plane_direction(way) == "rotation"
         ]
         named += [
             (f"spring at {spring.point!r}", spring.point)

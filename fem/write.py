@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
 from pathlib import Path
 
 import meshio
@@ -10,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from meshio._vtk_common import meshio_to_vtk_type
 
-from fem.abaqus.types import SOLIDS
+from fem.abaqus.types import ORDERS, SOLIDS
 from fem.errors import ModelError, quoted
 from fem.files import plain_write_errors
 from fem.mesh import FloatArray, FrameMesh, IntArray
@@ -30,13 +31,14 @@ def write_mesh(mesh: FrameMesh | StructureMesh, path: str | Path) -> None:
         The mesh. One of a structure is written as ``.vtu`` or ``.inp`` only.
     path
         File ending in ``.msh`` (Gmsh 2.2, ASCII), ``.vtu`` or ``.inp`` (Abaqus: B21 elements of a
-        frame; B31, CPS and C3D elements of a structure).
+        frame; of a structure elements of the types that the mesh knows of, else B31, CPS and C3D).
 
     Raises
     ------
     ModelError
-        For another extension, for parts that overlap in a Gmsh file, which cannot say so, for
-        cells that Abaqus has no elements for, or if the file cannot be written.
+        For another extension, for a mesh to which masses or springs are attached, for parts that
+        overlap in a Gmsh file, which cannot say so, for cells that Abaqus has no elements for, or
+        if the file cannot be written.
 
     Examples
     --------
@@ -48,6 +50,11 @@ def write_mesh(mesh: FrameMesh | StructureMesh, path: str | Path) -> None:
     {'a': array([0]), 'b': array([1])}
     """
     path = Path(path)
+    if mesh.attachments:
+        raise ModelError(
+            f"{path}: something is attached to the mesh ({mesh.attachments}), which a mesh file"
+            " would lose; write it without, by dataclasses.replace(mesh, attachments=Attachments())"
+        )
     if isinstance(mesh, StructureMesh):
         structures = {".vtu": _write_structure, ".inp": _write_abaqus_structure}
         if path.suffix.lower() not in structures:
@@ -148,9 +155,6 @@ def _write_abaqus(mesh: FrameMesh, path: Path) -> None:
 
 
 def _write_abaqus_structure(mesh: StructureMesh, path: Path) -> None:
-    for kind in mesh.cells:
-        if kind not in ABAQUS_TYPES:
-            raise ModelError(f"{path}: Abaqus has no elements for cells of kind {kind!r}")
     counts = [len(cells) for cells in mesh.cells.values()]
     first = dict(zip(mesh.cells, np.cumsum([0, *counts]).tolist(), strict=False))
     groups = {
@@ -158,8 +162,25 @@ def _write_abaqus_structure(mesh: StructureMesh, path: Path) -> None:
         for name, group in mesh.groups.items()
         if group
     }
-    elements = [(ABAQUS_TYPES[kind], cells) for kind, cells in mesh.cells.items()]
+    elements = [piece for kind in mesh.cells for piece in _by_type(mesh, kind, path)]
     _write_deck(path, mesh.points, elements, groups, mesh.point_sets)
+
+
+def _by_type(mesh: StructureMesh, kind: str, path: Path) -> Iterator[tuple[str, IntArray]]:
+    """Runs of cells of a kind that are of one type, in the order of nodes of a deck."""
+    names = np.full(len(mesh.cells[kind]), ABAQUS_TYPES.get(kind, ""), dtype=object)
+    for name, found in mesh.element_types.items():
+        names[found.get(kind, np.zeros(0, dtype=np.int64))] = name
+    if not all(names):
+        raise ModelError(f"{path}: Abaqus has no elements for cells of kind {kind!r}")
+    cells = mesh.cells[kind]
+    if kind in ORDERS:
+        cells = cells[:, np.argsort(ORDERS[kind])]
+    first = 0
+    for name, run in groupby(names):
+        last = first + len(list(run))
+        yield str(name), cells[first:last]
+        first = last
 
 
 def _write_deck(

@@ -68,7 +68,7 @@ def read_abaqus(path: str | Path, include_folders: Iterable[str | Path] = ()) ->
     ----------
     path
         Input file. Upper and lower case are the same, and a set keeps the spelling of its first
-        occurrence. ``docs/meshes.md`` lists the keywords and elements.
+        occurrence. ``docs/decks.md`` lists the keywords and elements.
     include_folders
         Folders below which included files may be, beside that of the file.
 

@@ -195,7 +195,7 @@ class Joints:
 
     def _coupling(self, body: Body, keyword: Keyword, following: Keyword | None) -> None:
         """``*COUPLING`` with ``*KINEMATIC`` or ``*DISTRIBUTING``."""
-        keyword.only("CONSTRAINT NAME", "REF NODE", "SURFACE")
+        keyword.only("CONSTRAINT NAME", "REF NODE", "SURFACE", "ORIENTATION")
         if following is None or following.name not in ("KINEMATIC", "DISTRIBUTING"):
             raise keyword.fail("is followed by neither *KINEMATIC nor *DISTRIBUTING")
         reference = keyword.name_of("REF NODE")
@@ -203,6 +203,8 @@ class Joints:
         surface = keyword.name_of("SURFACE")
         nodes = self.surfaces.nodes(body, surface, keyword)
         numbers = self._numbers(following)
+        if "ORIENTATION" in keyword.parameters and not self._in_all_axes(numbers):
+            raise keyword.fail("directions of axes of its own (ORIENTATION) are not read")
         if following.name == "KINEMATIC":
             following.only()
             self._kinematic(nodes, point, following, None, numbers)
@@ -213,6 +215,11 @@ class Joints:
                 raise following.fail(f"{key} other than {plain} is not read")
         weighting = "nodes" if self.surfaces.by_nodes(body, surface, keyword) else "area"
         self._averaging(nodes, point, following, numbers, weighting)
+
+    @staticmethod
+    def _in_all_axes(numbers: set[int]) -> bool:
+        """Whether directions are the same in any axes: all translations, all or no rotations."""
+        return {1, 2, 3} <= numbers and len(numbers & {4, 5, 6}) in (0, 3)
 
     def _numbers(self, keyword: Keyword) -> set[int]:
         """Directions from 1 to 6 given in rows of the first and the last; none: all."""

@@ -48,7 +48,12 @@ def collected_cells(deck: Deck, resolver: Resolver, position: dict[Label, int]) 
                 place = f"{element.place}, element {label}"
                 deck.refuse(f"elements of type {element.type.name}", place, f"a {kind} is not read")
                 continue
-            nodes = [position[node] for node in resolver.nodes_of((body.name, label))]
+            nodes = [
+                position.get((body.name, node), -1) if isinstance(node, int) else -1
+                for node in element.nodes
+            ]
+            if min(nodes) < 0:  # of another instance, or not there
+                nodes = [position[node] for node in resolver.nodes_of((body.name, label))]
             if len(nodes) != element.type.count:
                 raise deck.fail(
                     f"{element.place}: element {label} of type {element.type.name} has"

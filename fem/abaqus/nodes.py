@@ -19,12 +19,18 @@ def read_nodes(deck: Deck, scope: Scope, keyword: Keyword) -> None:
     if system not in ("R", "C"):
         raise keyword.fail(f"coordinates in SYSTEM={system} are not read; give Cartesian ones")
     labels = []
+    plain = system == "R" and scope.system is None
     for row, words in enumerate(keyword.rows):
-        if len(filled(words)) > 7:
+        if len(words) > 7 and len(filled(words)) > 7:
             raise keyword.fail("has more than a number, coordinates and a normal", row)
         if any(words[4:]):
             deck.leave_out("normals of *NODE", keyword.place(row), "the scene orients beams")
         label = keyword.whole(words[0], row)
+        if plain and label not in scope.nodes and len(words) > 3:
+            x, y, z = (keyword.number(word, row) for word in words[1:4])
+            scope.nodes[label] = (x, y, z)
+            labels.append(label)
+            continue
         place = np.array([keyword.number(word, row) for word in [*words[1:4], "", "", ""][:3]])
         if system == "C":
             angle = math.radians(place[1])

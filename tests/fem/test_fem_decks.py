@@ -2,6 +2,8 @@
 
 import math
 import re
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -53,6 +55,17 @@ def test_a_cantilever_of_elgen_has_all_its_elements(tmp_path):
     path = deck(tmp_path, cantilever_deck())
     assert len(fem.read_mesh(path).part("BEAM")) == 10
     assert frame_frequencies(path)[1][0] == pytest.approx(bending_hz(), rel=1e-4)
+
+
+def test_straight_lines_of_three_nodes_are_two_in_a_frame(tmp_path):
+    rows = "".join(f"{i}, {2 * i - 1}, {2 * i}, {2 * i + 1}\n" for i in range(1, 6))
+    text = cantilever_deck(f"*ELEMENT, TYPE=B22, ELSET=BEAM\n{rows}")
+    mesh = fem.read_mesh(deck(tmp_path, text))
+    plain = fem.read_mesh(deck(tmp_path, cantilever_deck()))
+    assert np.array_equal(mesh.lines, plain.lines) and mesh.part("BEAM").tolist() == list(range(10))
+    curved = text.replace("4, 0.3, 0.0", "4, 0.3, 0.01")
+    with pytest.raises(fem.ModelError, match=r"line3 1 .counted from 0. is not straight"):
+        fem.read_mesh(deck(tmp_path, curved))
 
 
 def test_elgen_makes_rows_and_layers(tmp_path):
@@ -241,6 +254,34 @@ def test_a_27_node_hexahedron_has_its_centre_and_faces_in_place(tmp_path):
     spoiled = text.replace(", ".join(words[14:]), ", ".join([*words[14:20], *words[:19:-1]]))
     with pytest.raises(fem.ModelError, match="nodes 21 to 27 are not its centre"):
         fem.read_structure(deck(tmp_path, spoiled))
+
+
+@pytest.mark.parametrize("kind", ["hexahedron27", "line3", "quad8", "wedge15"])
+def test_what_is_written_is_read_again_with_its_types(tmp_path, kind):
+    if kind == "line3":
+        cells = {"line3": [[0, 2, 1], [2, 4, 3]]}
+        mesh = fem.StructureMesh([[i, i, 0] for i in range(5)], cells, {"b": {kind: [0, 1]}})
+    else:
+        counts = (2, 1) if kind == "quad8" else (2, 1, 1)
+        mesh = fem.box_mesh("b", (2.0, 1.0, 1.0)[: len(counts)], counts, kind=kind)
+    fem.write_mesh(mesh, tmp_path / "a.inp")
+    back = fem.read_structure(tmp_path / "a.inp")
+    assert np.array_equal(back.cells[kind], mesh.cells[kind])
+    types = {"quad8": "S8R", "line3": "T3D3"}.get(kind, "C3D15R")
+    named = replace(mesh, element_types={types: {kind: [1]}})
+    if kind in ("quad8", "line3"):
+        fem.write_mesh(named, tmp_path / "b.inp")
+        again = fem.read_structure(tmp_path / "b.inp")
+        assert again.element_types[types][kind].tolist() == [1]
+        assert np.array_equal(again.cells[kind], mesh.cells[kind])
+
+
+def test_a_mesh_with_something_attached_is_not_written_without_it(tmp_path):
+    mesh = fem.box_mesh("b", (1.0, 1.0, 1.0), (1, 1, 1))
+    loaded = replace(mesh, attachments=fem.Attachments([fem.PointMass("x1", 2.0)]))
+    for end in ("vtu", "inp"):
+        with pytest.raises(fem.ModelError, match=r"attached to the mesh \(point masses: 1\)"):
+            fem.write_mesh(loaded, tmp_path / f"a.{end}")
 
 
 def test_a_mass_of_the_deck_is_the_models_own(tmp_path):
@@ -483,6 +524,56 @@ def test_a_truss_is_no_beam_and_a_shell_no_sheet(tmp_path):
     assert fem.StructureModel(sheet, {"E": fem.SolidPart(STEEL, "stress", 0.1)}).is_plane
 
 
+def test_trusses_and_shells_of_the_deck_are_parts_of_their_kind(tmp_path):
+    """A hanging truss with a mass: sqrt(E A / (L m)); what it cannot turn is refused."""
+    text = (
+        "*NODE\n1, 0., 0.\n2, 0., -2.\n*ELEMENT, TYPE=T2D2, ELSET=ROD\n1, 1, 2\n"
+        "*ELEMENT, TYPE=MASS, ELSET=M\n2, 2\n*MASS, ELSET=M\n1e4\n*NSET, NSET=TOP\n1\n"
+        "*MATERIAL, NAME=S\n*ELASTIC\n2.1e11, 0.3\n*DENSITY\n7800.\n"
+        "*SOLID SECTION, ELSET=ROD, MATERIAL=S\n1e-4\n"
+    )
+    mesh = fem.read_mesh(deck(tmp_path, text))
+    assert mesh.described["ROD"]["kind"] == "truss" and mesh.described["ROD"]["area"] == 1e-4
+    parts = {"ROD": fem.TrussPart(STEEL, 1e-4)}
+    held = [fem.Support("TOP", ("x", "y")), fem.Support("node 2", "x")]
+    component = fem.assemble(fem.FrameModel(mesh, parts, held))
+    square = (component.stiffness / component.mass.toarray()[0, 0]).toarray()[0, 0]
+    assert square == pytest.approx(2.1e11 * 1e-4 / 2.0 / (1e4 + 7800 * 1e-4 * 2 / 3), rel=1e-12)
+    turned = text + "*ELEMENT, TYPE=ROTARYI, ELSET=R\n3, 2\n*ROTARY INERTIA, ELSET=R\n1., 1., 1.\n"
+    with pytest.raises(fem.ModelError, match="acts on a rotation, but only trusses meet"):
+        fem.FrameModel(fem.read_mesh(deck(tmp_path, turned)), parts)
+    plate = (
+        "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 1, 1, 0\n4, 0, 1, 0\n"
+        "*ELEMENT, TYPE=S4R, ELSET=E\n1, 1, 2, 3, 4\n*MATERIAL, NAME=S\n*ELASTIC\n2.1e11, 0.3\n"
+        "*DENSITY\n7800.\n*SHELL SECTION, ELSET=E, MATERIAL=S\n0.01, 5\n"
+    )
+    shell = fem.read_structure(deck(tmp_path, plate))
+    assert shell.described["E"]["thickness"] == 0.01 and shell.described["E"]["kind"] == "shell"
+    mass = fem.assemble(fem.StructureModel(shell, {"E": fem.ShellPart(STEEL, 0.01)})).mass
+    along = np.zeros(24)
+    along[:12:3] = 1.0
+    assert along @ mass @ along == pytest.approx(78.0, rel=1e-12)
+
+
+def test_wedges_and_pyramids_of_the_deck_keep_their_types(tmp_path):
+    for kind, name in (("wedge", "C3D6"), ("wedge15", "C3D15"), ("pyramid", "C3D5")):
+        rows, plain = box_rows((2, 1, 1), kind, name)
+        mesh = fem.read_structure(deck(tmp_path, rows))
+        assert np.array_equal(mesh.cells[kind], plain.cells[kind])
+        assert len(mesh.element_types[name][kind]) == len(plain.cells[kind])
+        assert solid_frequencies(mesh) == pytest.approx(solid_frequencies(plain), rel=1e-12)
+
+
+def test_a_collapsed_element_keeps_its_type(tmp_path):
+    text = (
+        "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n5, 0, 0, 1\n6, 1, 0, 1\n7, 0, 1, 1\n"
+        "*ELEMENT, TYPE=C3D8R, ELSET=E\n1, 1, 2, 3, 3, 5, 6, 7, 7\n"
+    )
+    mesh = fem.read_structure(deck(tmp_path, text))
+    assert {name: list(found) for name, found in mesh.element_types.items()} == {"C3D8R": ["wedge"]}
+    assert mesh.part("E")["wedge"].tolist() == [0]
+
+
 def test_what_the_file_attaches_is_saved_and_loaded(tmp_path):
     text = cantilever_deck() + "*ELEMENT, TYPE=MASS, ELSET=M\n99, 11\n*MASS, ELSET=M\n50.\n"
     text += "*ELEMENT, TYPE=DASHPOT1, ELSET=D\n24, 11\n*DASHPOT, ELSET=D\n2\n30.\n"
@@ -538,3 +629,17 @@ def test_materials_and_sections_of_the_deck_are_described(tmp_path):
         assert text.replace(*change) != text
         told = fem.read_mesh(deck(tmp_path, text.replace(*change))).described["BEAM"]["refused"]
         assert re.search(reason, told), told
+
+
+def test_the_docs_list_every_keyword_where_it_belongs():
+    text = (Path(__file__).parents[2] / "docs" / "decks.md").read_text(encoding="utf-8")
+    known = fem.abaqus.known
+    read, rest = text.split("**Read:**")[1].split("**Left out by intention:**")
+    left, refused = rest.split("**Refused with advice**")
+
+    def words(part):
+        return set(re.findall(r"`([A-Z0-9-]+)`", part))
+
+    assert set(known.READ) <= words(read)
+    assert {word for word in known.LEFT_OUT if word} == words(left)
+    assert set(known.ADVICE) <= words(refused)

@@ -1,0 +1,109 @@
+"""Scenes whose mesh is a deck that says more than a mesh."""
+
+import math
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from nldyn.app.cli import main
+from nldyn.base.errors import SceneError
+from nldyn.scene.build import build_component, build_reduced, build_system, load_scene
+
+DECK = """*NODE
+{nodes}*ELEMENT, TYPE=B21, ELSET=BEAM
+1, 1, 2
+*ELGEN, ELSET=BEAM
+1, 10
+*NSET, NSET=ROOT
+1
+*NSET, NSET=TIP
+11
+*ELEMENT, TYPE=MASS, ELSET=LUMP
+21, 11
+*MASS, ELSET=LUMP
+40.0
+*ELEMENT, TYPE=DASHPOT1, ELSET=DAMPER
+22, 11
+*DASHPOT, ELSET=DAMPER
+2
+30.0
+*BOUNDARY
+ROOT, 1, 6
+*MATERIAL, NAME=STEEL
+*ELASTIC
+2.1e11, 0.3
+*DENSITY
+7800.0
+*BEAM SECTION, ELSET=BEAM, MATERIAL=STEEL, SECTION=RECT
+0.02, 0.01
+""".format(nodes="".join(f"{i + 1}, {i / 10!r}, 0.0\n" for i in range(11)))
+
+SCENE = """
+supports = [{at = "ROOT", fixed = ["x", "y", "rotation"]}]
+interfaces.tip = {at = "TIP", direction = "y"}
+reduction = {modes = 2}
+excitation = [{at = "tip", kind = "harmonic", amplitude = 1.0}]
+continuation = {range_hz = [0.5, 2.0]}
+"""
+FROM_FILE = SCENE + 'mesh = {file = "deck.inp", parts_from_file = ["BEAM"]}\n'
+PART = "youngs_modulus = 2.1e11\npoissons_ratio = 0.3\ndensity = 7800.0\nwidth = 0.02\n"
+GIVEN = SCENE + f'mesh = {{file = "deck.inp"}}\n[parts.BEAM]\n{PART}height = 0.01\n'
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "deck.inp").write_text(DECK)
+    (tmp_path / "file.toml").write_text(FROM_FILE)
+    (tmp_path / "given.toml").write_text(GIVEN + 'theory = "timoshenko"\n')
+    return tmp_path
+
+
+def test_a_damper_of_the_deck_damps_the_system(folder):
+    """A heavy mass on a cantilever: one oscillator with the ratio c / (2 m omega)."""
+    system = build_system(load_scene(folder / "given.toml"))
+    mass = 40.0 + 33 / 140 * 7800.0 * 0.02 * 0.01
+    stiffness = 3 * 2.1e11 * 0.02 * 0.01**3 / 12
+    omega = 2 * math.pi * system.frequencies_hz[0]
+    assert omega == pytest.approx(math.sqrt(stiffness / mass), rel=1e-3)
+    assert system.damping[0, 0] == pytest.approx(30.0 / mass, rel=1e-4)
+
+
+def test_parts_of_the_deck_are_those_given_by_hand(folder):
+    given, taken = (build_reduced(load_scene(folder / f"{n}.toml")) for n in ("given", "file"))
+    assert np.array_equal(given.frequencies_hz, taken.frequencies_hz)
+
+
+def test_a_finer_frame_keeps_what_the_deck_attaches(folder):
+    finer = build_component(load_scene(folder / "given.toml"), refinement=3)
+    assert len(finer.model.mesh.attachments.point_masses) == 1 and finer.damping is not None
+    assert len(finer.model.mesh.element_types["B21"]) == 30
+
+
+def test_check_tells_what_is_left_out_and_what_is_taken(folder):
+    result = CliRunner().invoke(main, ["check", str(folder / "file.toml")])
+    assert result.exit_code == 0, result.output
+    assert "left out of the mesh file: *BOUNDARY (1, first in line " in result.output
+    assert "taken from the mesh file: point masses: 1, links: 1" in result.output
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (('["BEAM"]', '["LUMP"]'), "names 'LUMP', which the mesh file does not describe.*'BEAM'"),
+        (('["BEAM"]', '["BEAM"]}\nparts = {BEAM = {youngs_modulus = 1.0, density = 1.0, area = 1.0,'
+          ' second_moment = 1.0}'), r"names 'BEAM', which \[parts\] gives, too"),
+        (('["BEAM"]', "[]"), "parts.* is missing: a mesh needs it"),
+    ],
+)  # fmt: skip
+def test_parts_that_cannot_be_taken_are_told(folder, change, sentence):
+    assert change[0] in FROM_FILE
+    (folder / "bad.toml").write_text(FROM_FILE.replace(*change))
+    with pytest.raises(SceneError, match=sentence):
+        build_component(load_scene(folder / "bad.toml"))
+
+
+def test_an_orthotropic_material_is_not_taken(folder):
+    (folder / "deck.inp").write_text(DECK.replace("*ELASTIC", "*ELASTIC, TYPE=LAMINA"))
+    with pytest.raises(SceneError, match=r"'BEAM': \*BEAM SECTION in line .* is not isotropic"):
+        build_component(load_scene(folder / "file.toml"))
