@@ -18,7 +18,13 @@ from fem.model import (
     TrussPart,
 )
 from fem.read import from_meshio, read_mesh, read_structure, structure_from_meshio
-from fem.sections import CircularSection, CrossSection, RectangularSection, Section
+from fem.sections import (
+    CircularSection,
+    CrossSection,
+    RectangularSection,
+    Section,
+    TaperedSection,
+)
 from fem.shells import ShellPart
 from fem.structure import Coupling, Foundation, SolidPart, StructureModel, symmetry
 from fem.structure_assembly import LockingWarning, StructureComponent
@@ -51,6 +57,7 @@ __all__ = [
     "StructureMesh",
     "StructureModel",
     "Support",
+    "TaperedSection",
     "TrussPart",
     "assemble",
     "box_mesh",
