@@ -751,28 +751,40 @@ def _beam(table: PartTable) -> fem.BeamPart:
     import fem
 
     material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
-    section: fem.CrossSection
-    if table.width is not None and table.height is not None:
-        section = fem.RectangularSection(table.width, table.height)
-    elif table.diameter is not None:
-        section = fem.CircularSection(table.diameter, table.bore or 0.0)
-    else:
-        assert table.area is not None and table.second_moment is not None
-        section = fem.Section(
-            table.area,
-            table.second_moment,
-            table.second_moment_across,
-            table.torsion_constant,
-            table.shear_area,
-            table.shear_area_across,
-        )
     return fem.BeamPart(
         material,
-        section,
+        _section(table),
         table.theory or "euler-bernoulli",
         table.axial_force or 0.0,
         table.orientation,
         table.offset if isinstance(table.offset, list) else (0.0, 0.0),
+    )
+
+
+def _section(table: PartTable) -> fem.CrossSection | fem.TaperedSection:
+    import fem
+
+    sections: list[fem.RectangularSection | fem.CircularSection] = []
+    for end in ("", "_end"):
+        width, height, diameter, bore = (
+            table.size(name, end) for name in ("width", "height", "diameter", "bore")
+        )
+        if width is not None and height is not None:
+            sections.append(fem.RectangularSection(width, height))
+        elif diameter is not None:
+            sections.append(fem.CircularSection(diameter, bore or 0.0))
+    if table.taper is not None:
+        return fem.TaperedSection(sections[0], sections[1], table.taper[0], table.taper[1])
+    if sections:
+        return sections[0]
+    assert table.area is not None and table.second_moment is not None
+    return fem.Section(
+        table.area,
+        table.second_moment,
+        table.second_moment_across,
+        table.torsion_constant,
+        table.shear_area,
+        table.shear_area_across,
     )
 
 
