@@ -18,7 +18,7 @@ from cms.component import (
     symmetric_matrix,
     times,
 )
-from cms.eigen import Shifted, lowest_modes, shifted_factor
+from cms.eigen import Shifted, lowest_modes, shifted_factor, without_offsets
 from cms.errors import ReductionError
 from cms.inertia import elastic_solutions, quotient
 from cms.model import ReducedModel
@@ -124,6 +124,7 @@ def check(
     pencil = checked_pencil(component)
     check_belongs(pencil, reduced)
     shifted = shifted_factor(pencil)
+    pencil = without_offsets(pencil, shifted)
     given = {
         name: interface_vector(vector, name, pencil.size)
         for name, vector in (directions or {}).items()
