@@ -122,6 +122,11 @@ class Pencil:
         """Number of degrees of freedom N."""
         return int(self.stiffness.shape[0])
 
+    @property
+    def digits(self) -> int | None:
+        """Decimal digits of the entries of K; None if they are those of double precision."""
+        return None if not self.rounding else round(1.0 - np.log10(2.0 * self.rounding))
+
     @cached_property
     def massless(self) -> FloatArray:
         """Directions without mass (N, z); not looked for beyond `MOST_DENSE` rows."""
@@ -205,6 +210,9 @@ def interface_vector(vector: Any, name: str, size: int) -> FloatArray:
     ReductionError
         If its shape is not (N,), an entry is not finite, or all are zero.
     """
+    if sparse.issparse(vector):
+        vector = vector.toarray()
+        vector = vector.ravel() if 1 in vector.shape else vector
     try:
         array = np.asarray(vector, dtype=np.float64)
     except (TypeError, ValueError) as error:

@@ -18,6 +18,7 @@ SAMPLE = 4000
 FEWEST_VALUES = 3
 SHARE = 0.25
 DEVIATIONS = 6.0
+EXACT = 3
 SECOND_ORDER = 2.0  # a mode is one of the rounded matrix and not of the exact one
 
 
@@ -50,7 +51,7 @@ def entry_digits(entries: FloatArray) -> int | None:
 
 def relative_rounding(digits: int | None) -> float:
     """Largest relative error of an entry that was rounded to so many decimal digits."""
-    return 0.0 if digits is None else 0.5 * 10.0 ** (1 - digits)
+    return 0.0 if digits is None or digits > MOST_DIGITS else 0.5 * 10.0 ** (1 - digits)
 
 
 def checked_digits(given: object) -> int | None:
@@ -68,14 +69,24 @@ def rounded_energies(matrix: Any, vectors: FloatArray, rounding: float) -> Float
     Entries of one size have one error e between plus and minus ``rounding`` times that size; with
     :math:`s = \sum \pm v_i v_j` over them, the sum of all :math:`|e s|` is a bound, and six
     standard deviations of errors that are spread evenly are the smaller one where there are many.
+    Entries that have three digits less than rounding left them are exact.
     """
     entries = matrix.tocoo()
     rows, columns = entries.coords
     sizes, group = np.unique(np.abs(entries.data), return_inverse=True)
     signs = np.sign(entries.data)
+    error_of = rounding * sizes * inexact(sizes, rounding)
     found = []
     for vector in vectors.T:
         share = signs * vector[rows] * vector[columns]
-        error = rounding * sizes * np.abs(np.bincount(group, share, sizes.size))
+        error = error_of * np.abs(np.bincount(group, share, sizes.size))
         found.append(min(np.sum(error), DEVIATIONS * np.sqrt(np.sum(error**2) / 3.0)))
     return SECOND_ORDER * np.array(found)
+
+
+def inexact(sizes: FloatArray, rounding: float) -> NDArray[np.bool_]:
+    """Whether numbers use the digits that rounding left them."""
+    digits = round(1.0 - np.log10(2.0 * rounding))
+    if sizes.size > SAMPLE:
+        return np.ones(sizes.size, dtype=np.bool_)
+    return np.array([significant_digits(size) > digits - EXACT for size in sizes])

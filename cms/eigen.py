@@ -14,8 +14,10 @@ from cms.massless import statically_split
 
 EPS = float(np.finfo(np.float64).eps)
 RIGID_TOLERANCE = 64 * EPS
-SUMMED = 16 * EPS  # relative error of an entry that double precision sums and factorises
+SUMMED = 64 * EPS  # relative error of an entry that double precision sums and factorises
 SHIFT_OVER_ROUNDING = 32.0
+CLEAR = 0.25  # of the rounding: w^2 above it is too large for a zero, too small for a frequency
+APART = 16.0  # w^2 of the first elastic mode over the rounding
 MOSTLY = 0.99  # a row whose unit vector lies in the massless directions to so much has no mass
 ERROR_TOLERANCE = 1e-8
 LARGEST_ERROR = 1e-3
@@ -134,11 +136,33 @@ def rigid_rounding(pencil: Pencil, vectors: FloatArray, fastest: float) -> Float
     return pencil.undetermined(vectors, SUMMED)
 
 
-def zeroed(squares: FloatArray, rounding: FloatArray) -> FloatArray:
-    """The w^2, ascending, with those of the first modes zero that are so but for rounding."""
+def zeroed(squares: FloatArray, rounding: FloatArray, pencil: Pencil) -> FloatArray:
+    """The w^2, ascending, with those of the first modes zero that are so but for rounding.
+
+    Raises
+    ------
+    ReductionError
+        If few digits leave it open which modes these are: a mode lies just within the rounding, or
+        the rounding is a sixteenth of the next w^2 or more.
+    """
     inside = np.abs(squares) <= rounding
     count = inside.size if np.all(inside) else int(np.argmin(inside))
+    if count and pencil.digits is not None:
+        bound = float(np.max(rounding[:count]))
+        following = float(squares[count]) if count < squares.size else np.inf
+        if np.max(squares[:count]) > CLEAR * bound or bound * APART > following:
+            raise ReductionError(undecided(squares[: count + 1], bound, pencil.digits))
     return np.where(np.arange(squares.size) < count, 0.0, squares)
+
+
+def undecided(squares: FloatArray, bound: float, digits: int) -> str:
+    """The sentence for modes of which few digits leave open whether they are rigid."""
+    listed = ", ".join(f"{np.sqrt(max(square, 0.0)) / (2 * np.pi):.4g}" for square in squares)
+    return (
+        f"the {digits} digits of the stiffness leave open which modes are rigid-body modes: they "
+        f"may move one of 0 Hz to {np.sqrt(bound) / (2 * np.pi):.3g} Hz, and the lowest lie at "
+        f"{listed} Hz; give more digits, or state digits = 17 if the entries are exact"
+    )
 
 
 def lowest_modes(pencil: Pencil, shifted: Shifted, count: int) -> Modes:
@@ -182,7 +206,7 @@ def lowest_modes(pencil: Pencil, shifted: Shifted, count: int) -> Modes:
             squares = np.where(np.arange(squares.size) < shifted.rigid, 0.0, squares)
         else:
             rounding = rigid_rounding(pencil, vectors, shifted.fastest)
-            squares = zeroed(squares, rounding + RIGID_TOLERANCE * shifted.shift)
+            squares = zeroed(squares, rounding + RIGID_TOLERANCE * shifted.shift, pencil)
     check_stable(pencil, squares, vectors, shifted.fastest)
     if not shifted.rigid and squares[0] == 0.0:
         rigid = replace(shifted, rigid_modes=vectors[:, squares == 0.0])
@@ -455,9 +479,12 @@ def ritz(
     squares = np.where(slow, squares, direct)
     directions = np.where(slow, directions, direct_directions)
     vectors = mass_orthonormal(basis @ directions, pencil.mass)
+    loose = pencil.natural is None and squares[0] <= rigid_rounding(pencil, vectors, fastest)[0]
+    if not shift and loose:
+        return ritz(basis, pencil, fastest, shift_over_rounding(pencil, fastest))
     if shift:
         rounding = rigid_rounding(pencil, vectors, fastest)
-        squares = zeroed(squares, rounding + RIGID_TOLERANCE * shift)
+        squares = zeroed(squares, rounding + RIGID_TOLERANCE * shift, pencil)
     check_stable(pencil, squares, vectors, fastest)
     return squares, vectors
 

@@ -48,6 +48,7 @@ METHODS = (
 )
 FIXED = ("craig-bampton", "guyan")
 NEGLIGIBLE_PARTICIPATION = 1e-9
+MASS_ERROR = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +193,20 @@ def reduce(
                 "the modes cannot be computed, as the entries of the stiffness or of the mass "
                 f"differ too much in size ({reason})"
             ) from error
+    check_masses(pencil, reduced)
     return with_component_damping(reduced, component)
+
+
+def check_masses(pencil: Pencil, reduced: ReducedModel) -> None:
+    """Raise ReductionError where modes do not have unit masses or are not orthogonal."""
+    V = reduced.basis
+    error = np.abs(V.T @ times(pencil.mass, V) - np.eye(reduced.size))
+    if not error.max(initial=0.0) <= MASS_ERROR:
+        mode, other = np.unravel_index(int(np.argmax(error)), error.shape)
+        raise ReductionError(
+            f"the masses of modes {mode + 1} and {other + 1} by '{reduced.method}' are wrong by "
+            f"{error[mode, other]:.1e}: the mass matrix is too near to a singular one"
+        )
 
 
 def chosen_method(method: str, residual: bool) -> str:
