@@ -167,7 +167,6 @@ class Collector:
     done: float = 0.0  # share of the whole computation
     ahead: Ahead | None = None
     outlook: Outlook = field(default_factory=Outlook)
-    doubled: Callable[[int], bool] = lambda period: False  # whether to follow the flips of one
     starts: dict[int, tuple[SpecialPoint, BranchPoint | LocateError]] = field(
         default_factory=dict
     )  # of the branches born at flips, by the flips' ids
@@ -423,6 +422,7 @@ class Collector:
         course = self._course(start, options)
         ahead = self.ahead or Ahead(self.flow)
         group = "period", start.orbit.period
+        progress(start.orbit.frequency_hz)
         ahead.take(group, leg_key(start, course))
         branch = self.checkpoint.branch_from(start.orbit, course)
         if branch is not None:
@@ -441,8 +441,11 @@ class Collector:
         """Add the branch that was at work, unless it is a known one."""
         if not self._repeats(branch):
             self._add(branch)
-            if self.doubled(branch.period):
+            if 2 * branch.period in self.outlook.doubled:
                 self.offer_flips(branch)
+                flips = [s for b in self.of_period(branch.period) for s in b.special_points
+                         if s.kind == "PD"]  # fmt: skip
+                self.outlook.flips(2 * branch.period, len(flips))
         self.checkpoint.work = None
 
 
@@ -581,7 +584,6 @@ def diagram(
         progress or silent,
     )
     box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flow, (low, high))
-    box.doubled = lambda period: 2 * period in wanted
     with box.checkpoint, computing_ahead(flow, jobs, executor) as box.ahead:
         effort = search or SearchOptions()
         box.outlook = Outlook(wanted, search_points if wanted else 0, len(seeds))
@@ -621,14 +623,11 @@ def _search(
     found = _searched(box, frequencies, periods, effort)
     for frequency, (failures, _) in zip(frequencies, found, strict=True):
         _note_failures(box, frequency, failures, effort)
-    at_flips = [period for period in periods if period % 2 == 0 and period // 2 in periods]
     for period in periods:
-        orbits = [orbit for _, of_period in found for orbit in of_period[period]]
-        box.outlook.orbits(period, len(orbits))
-        if period not in at_flips:
-            box.offer_orbits(orbits)
+        if period not in box.outlook.doubled:
+            box.offer_orbits(orbit for _, of_period in found for orbit in of_period[period])
     for period in periods:
-        if period in at_flips:
+        if period in box.outlook.doubled:
             box.outlook.flips(period, 0)
             _follow_flips(box, box.of_period(period // 2))
         for _, of_period in found:
@@ -643,8 +642,15 @@ def _searched(
     """What simulations at some frequencies come near, on all processes."""
     ahead = box.ahead or Ahead(box.flow)
 
-    def told(done: int) -> None:
-        box.reach("search", done)
+    counts = Counter({period: int(box.outlook.reached[f"1/{period}"]) for period in periods})
+
+    def told(done: int, found: Found) -> None:
+        box.outlook.searched(frequencies, done)
+        box.done = box.outlook.done
+        for period, orbits in found[1].items():
+            counts[period] += len(orbits)
+            if done > 1:
+                box.outlook.found(period, counts[period] * len(frequencies) / done)
         box.tell("search", frequencies[done - 1])
 
     if frequencies:
