@@ -278,8 +278,9 @@ class Collector:
                 start = start_point(orbit, 1.0, self.range_hz)
             except ConvergenceError:
                 continue
-            group = "period", orbit.period
-            offer_branch(self.ahead, start, self._course(start, None), group)
+            if not self.known(start.orbit):
+                group = "period", orbit.period
+                offer_branch(self.ahead, start, self._course(start, None), group)
 
     def offer_flips(
         self, branch: Branch, options: ContinuationOptions | None = None
@@ -293,7 +294,9 @@ class Collector:
         flips = [special for special in branch.special_points if special.kind == "PD"]
         for special in flips[::2]:
             start = self._start_at(special)
-            if isinstance(start, BranchPoint) and self._is_within(start.orbit):
+            if not isinstance(start, BranchPoint) or not self._is_within(start.orbit):
+                continue
+            if not self.known(start.orbit):
                 offer_branch(self.ahead, start, self._course(start, options))
 
     def _start_at(self, special: SpecialPoint) -> BranchPoint | LocateError:
@@ -431,11 +434,13 @@ class Collector:
             branch = complete("", None, None, start, course, progress, self.checkpoint, ahead)
         self.take_in(branch)
         ahead.release(group)
-        ahead.drop(self._is_followed)
+        ahead.drop(self._is_of_last)
 
-    def _is_followed(self, task: Task) -> bool:
-        """Whether the leg of a task is one of a branch that is known by now."""
-        return task.function is walked_leg and self.known(task.arguments[0].orbit)
+    def _is_of_last(self, task: Task) -> bool:
+        """Whether the leg of a task is one of the branch that was found last."""
+        if task.function is not walked_leg or not self.branches:
+            return False
+        return self.branches[-1].contains(task.arguments[0].orbit)
 
     def take_in(self, branch: Branch) -> None:
         """Add the branch that was at work, unless it is a known one."""
@@ -593,12 +598,13 @@ def diagram(
         if places and _contact_is_missing(box):
             more = replace(effort, starts=MORE_STARTS * effort.starts, seed=effort.seed + 1)
             _search(box, places, wanted, more)
-        for seed in seeds:
-            key, given = _seed_task(box, seed, seed.near_hz, effort)
-            box.ahead.offer(key, search_at, *given)
         for number, seed in enumerate(seeds, 1):
             _follow_seed(box, seed, effort)
             box.reach("seeds", number)
+            if number == 1:  # which has compiled what the others need
+                for other in seeds[1:]:
+                    key, given = _seed_task(box, other, other.near_hz, effort)
+                    box.ahead.offer(key, search_at, *given)
         _follow_branch_points(box)
         _follow_flips_of_new(box, wanted, doublings)
         _follow_branch_points(box)

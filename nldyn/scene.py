@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from nldyn.errors import SceneError, SystemModelError
-from nldyn.progress import Progress
+from nldyn.progress import Progress, Shares, silent
 from nldyn.resources import data_directory
 from nldyn.scene_checks import (
     check_computable,
@@ -58,6 +58,7 @@ __all__ = [
 ]
 
 logger = logging.getLogger("nldyn")
+CHOICE = 1.0  # time to choose modes by a tolerance, relative to that of the diagram
 LARGE = 20000  # degrees of freedom from which on the factorisation takes seconds
 LARGEST_SCENE = 10_000_000  # bytes or letters
 _WORD = r"""(?:(?<![\w-])[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
@@ -228,7 +229,9 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
 
 
 def build_reduced(
-    scene: Scene, component: fem.Component | fem.StructureComponent | None = None
+    scene: Scene,
+    component: fem.Component | fem.StructureComponent | None = None,
+    progress: Progress | None = None,
 ) -> cms.ReducedModel:
     """Reduce the mesh of a scene to the modes that it asks for.
 
@@ -238,6 +241,8 @@ def build_reduced(
         A scene with a ``[mesh]`` and a ``[reduction]``.
     component : fem.Component or fem.StructureComponent, optional
         What `build_component` gave for this scene, if it is at hand.
+    progress : callable, optional
+        As for `nldyn.reduce_for`, which chooses the modes of a scene with a tolerance.
 
     Returns
     -------
@@ -262,7 +267,7 @@ def build_reduced(
     table = scene.reduction
     assert table is not None
     if table.tolerance is not None:
-        selection = build_selection(scene, component)
+        selection = build_selection(scene, component, progress)
         logger.info(selection.report())
         return selection.reduced
     pieces = _count_pieces(len(component.model.mesh.points), component.model.links)
@@ -313,7 +318,9 @@ def build_candidates(
 
 
 def build_selection(
-    scene: Scene, component: fem.Component | fem.StructureComponent | None = None
+    scene: Scene,
+    component: fem.Component | fem.StructureComponent | None = None,
+    progress: Progress | None = None,
 ) -> Selection:
     """Choose the modes of a scene by the tolerance of its ``[reduction]``.
 
@@ -323,6 +330,8 @@ def build_selection(
         A scene with a ``[mesh]`` and ``tolerance`` in ``[reduction]``.
     component : fem.Component or fem.StructureComponent, optional
         What `build_component` gave for this scene, if it is at hand.
+    progress : callable, optional
+        As for `nldyn.reduce_for`.
 
     Returns
     -------
@@ -345,7 +354,7 @@ def build_selection(
     component = component or build_component(scene)
     faults = (cms.ReductionError, ConvergenceError, SystemModelError)
     with _told_as(scene, ("reduction",), *faults):
-        return reduce_for(component, setting, tolerance=table.tolerance)
+        return reduce_for(component, setting, tolerance=table.tolerance, progress=progress)
 
 
 def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> System:
@@ -461,7 +470,8 @@ def compute(
     """
     if scene.explore is not None:
         return explore_scene(scene, progress, checkpoint, jobs).diagram
-    flow, table = _to_follow(scene)
+    shares = _shares(scene, progress)
+    flow, table = _to_follow(scene, shares)
     from nldyn.diagrams import Seed, diagram
     from nldyn.step_control import ContinuationOptions
 
@@ -474,7 +484,7 @@ def compute(
             search_points=table.search_points,
             doublings=table.follow_doublings,
             options=ContinuationOptions(max_step=table.max_step),
-            progress=progress,
+            progress=shares.part("branches"),
             checkpoint=checkpoint,
             jobs=jobs,
         )
@@ -532,7 +542,8 @@ def explore_scene(
     >>> explore_scene(scene).settled_share
     1.0
     """
-    flow, table = _to_follow(scene)
+    shares = _shares(scene, progress)
+    flow, table = _to_follow(scene, shares)
     from nldyn.exploration import ExploreOptions
     from nldyn.step_control import ContinuationOptions
     from nldyn.survey import explore
@@ -547,17 +558,27 @@ def explore_scene(
             efforts.pop("max_period"),
             effort=ExploreOptions(**efforts),
             options=ContinuationOptions(max_step=table.max_step),
-            progress=progress,
+            progress=shares.part("branches"),
             checkpoint=checkpoint,
             jobs=jobs,
         )
     return replace(found, diagram=_remarked(scene, flow, found.diagram))
 
 
-def _to_follow(scene: Scene) -> tuple[FlowMap, ContinuationTable]:
+def _shares(scene: Scene, progress: Progress | None) -> Shares:
+    """The parts of a computation: to choose modes takes a while if a tolerance is given."""
+    chosen = scene.reduction is not None and scene.reduction.tolerance is not None
+    return Shares(progress or silent, {"model": CHOICE if chosen else 0.0, "branches": 1.0})
+
+
+def _to_follow(scene: Scene, shares: Shares) -> tuple[FlowMap, ContinuationTable]:
     """Flow map of a scene that says what to compute."""
     check_computable(scene, scene.file)
-    system = build_system(scene)
+    model = None
+    if scene.mesh is not None:
+        model = build_reduced(scene, progress=shares.part("model"))
+    system = build_system(scene, model)
+    shares.end("model")
     from nldyn.flow import FlowMap, FlowOptions
 
     table = scene.continuation
