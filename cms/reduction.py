@@ -11,14 +11,6 @@ from typing import Any
 import numpy as np
 
 from cms.component import ComponentLike, FloatArray, Pencil, checked_pencil, symmetric_matrix, times
-from cms.component import (
-    ComponentLike,
-    FloatArray,
-    Pencil,
-    checked_pencil,
-    symmetric_matrix,
-    times,
-)
 from cms.condensed import condensed
 from cms.constraint import fixed_interface, fixed_interface_errors
 from cms.eigen import (

@@ -32,7 +32,7 @@ class Fault(NamedTuple):
 FAULTS = [
     Fault(
         "the first segment has the other sign in the monodromy matrix",
-        "nldyn/orbit.py",
+        "nldyn/orbits/orbit.py",
         "found, jacobians = spectrum(self.jacobians), self.jacobians",
         "found, jacobians = spectrum(np.concatenate([-self.jacobians[:1], self.jacobians[1:]])), "
         "self.jacobians",
@@ -40,21 +40,21 @@ FAULTS = [
     ),
     Fault(
         "contacts of the last of several stops are missed",
-        "nldyn/_kernels.py",
+        "nldyn/flow/kernels/all.py",
         "    for s in range(closed.size):\n        noise = output_noise(fl, s, w)",
         "    for s in range(max(1, closed.size - 1)):\n        noise = output_noise(fl, s, w)",
         "nldyn/test_nldyn_contacts.py",
     ),
     Fault(
         "the tolerance of the flow map is loosened by 100",
-        "nldyn/flow.py",
+        "nldyn/flow/flow_map.py",
         "    rtol: float = 1e-9",
         "    rtol: float = 1e-7",
         "nldyn/test_nldyn_contacts.py",
     ),
     Fault(
         "at a branch point the branch is taken that one comes from",
-        "nldyn/normal_forms.py",
+        "nldyn/bifurcations/normal_forms.py",
         "tangents[int(np.argmin(along))]",
         "tangents[int(np.argmax(along))]",
         "nldyn/test_nldyn_normal_forms.py",
@@ -75,7 +75,7 @@ FAULTS = [
     ),
     Fault(
         "multipliers are paired with the moduli of others",
-        "nldyn/multipliers.py",
+        "nldyn/orbits/multipliers.py",
         "return Spectrum(values, logarithms, squeeze)",
         "return Spectrum(values, logarithms[::-1].copy(), squeeze)",
         "nldyn/test_nldyn_multipliers.py",
@@ -96,21 +96,21 @@ FAULTS = [
     ),
     Fault(
         "the test function of a flip has no sign",
-        "nldyn/special.py",
+        "nldyn/bifurcations/locate.py",
         "PD=flip_test(mu)",
         "PD=abs(flip_test(mu))",
         "nldyn/test_nldyn_harmonic_branch.py",
     ),
     Fault(
         "between recorded instants a motion is 1e-4 of the time late",
-        "nldyn/_sample.py",
+        "nldyn/flow/kernels/sample.py",
         "        t = (phases[i] - rec_phase[piece]) / omega\n        state_at",
         "        t = 0.9999 * (phases[i] - rec_phase[piece]) / omega\n        state_at",
         "nldyn/test_nldyn_simulation.py",
     ),
     Fault(
         "an index counts once, not for each point of its orbit",
-        "nldyn/fixed_point_index.py",
+        "nldyn/search/fixed_point_index.py",
         "sum(o.period * index(o",
         "sum(index(o",
         "nldyn/test_nldyn_fixed_point_index.py",
@@ -124,21 +124,21 @@ FAULTS = [
     ),
     Fault(
         "explore does not search again where the indices do not add up",
-        "nldyn/survey.py",
+        "nldyn/search/explore.py",
         "for again in range(AGAIN if up else 0)",
         "for again in range(0)",
         "nldyn/test_nldyn_exploration.py",
     ),
     Fault(
         "explore makes no further guesses on the way down",
-        "nldyn/survey.py",
+        "nldyn/search/explore.py",
         "self._follow_guesses(frequency, (self.effort.seed, turn, place))",
         "pass",
         "nldyn/test_nldyn_exploration.py",
     ),
     Fault(
         "explore does not look beside short motions",
-        "nldyn/survey.py",
+        "nldyn/search/explore.py",
         "self._beside(runs, known, BESIDE_PASSING)",
         "pass",
         "nldyn/test_nldyn_exploration.py",

@@ -25,6 +25,7 @@ from nldyn import (
     normal_form,
     solve_orbit,
 )
+from nldyn.bifurcations.chord import CROSSING_ERROR
 from nldyn.bifurcations.critical import (
     CoefficientError,
     Estimate,
@@ -44,10 +45,6 @@ from nldyn.branches.cascades import FEIGENBAUM, cascades_in
 from nldyn.branches.leg import trace
 from nldyn.orbits.newton import refine
 from nldyn.orbits.shooting import shooting_problem
-from nldyn.normal_forms import is_symmetric, resonance
-from nldyn.orbit import refine, shooting_problem
-from nldyn.special import CROSSING_ERROR
-from nldyn.trail import trace
 
 
 def of_kind(branch, kind):
