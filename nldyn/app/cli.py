@@ -146,7 +146,6 @@ def run(
 ) -> None:
     """Compute the branches of a scene, and write tables and a diagram."""
     with plain_errors():
-        from nldyn.io.checkpoint import CheckpointFile
         from nldyn.runtime.progress import progress_line
         from nldyn.runtime.result_directory import check_directory
         from nldyn.scene.build import compute, explore_scene, load_scene
@@ -154,6 +153,8 @@ def run(
         start = time.perf_counter()
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)
+        from nldyn.io.checkpoint import CheckpointFile
+
         with kept_at_interrupt(out) as unfinished:
             kept = CheckpointFile(unfinished)
             with progress_line(quiet) as report:
@@ -252,14 +253,14 @@ def render(
     if period != 1 and frequency_hz is None:
         raise click.UsageError("'--period' needs '--frequency-hz'")
     with plain_errors():
-        from fem.gl import RenderError
-        from nldyn.report.render import render_scene
         from nldyn.runtime.progress import progress_line
         from nldyn.runtime.result_directory import check_directory
         from nldyn.scene.build import load_scene
 
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)
+        from fem.gl import RenderError
+        from nldyn.report.render import render_scene
 
         try:
             with progress_line(quiet) as report:
@@ -345,15 +346,15 @@ def converge(
 ) -> None:
     """Compute the harmonic branch with more and more modes, and compare."""
     with plain_errors():
-        from nldyn.reduction.convergence import COUNTS
-        from nldyn.report.convergence import write_study
         from nldyn.runtime.progress import progress_line
         from nldyn.runtime.result_directory import check_directory
         from nldyn.scene.build import load_scene
-        from nldyn.scene.convergence import convergence_study_of
 
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)
+        from nldyn.reduction.convergence import COUNTS
+        from nldyn.report.convergence import write_study
+        from nldyn.scene.convergence import convergence_study_of
 
         with progress_line(quiet) as report:
             study = convergence_study_of(

@@ -11,7 +11,7 @@ from nldyn.base.resources import example
 SLOW = {
     "numba",
     "llvmlite",
-    "nldyn.flow.kernels.all",
+    "nldyn.flow.kernels.newton",
     "nldyn.flow.flow_map",
     "matplotlib",
     "pyvista",

@@ -140,7 +140,7 @@ def test_a_tolerance_asks_for_a_selection_in_the_scenes_setting(monkeypatch, cap
     ],
 )
 def test_a_tolerance_that_cannot_be_met_is_told(old, new, sentence, monkeypatch):
-    monkeypatch.setattr("nldyn.reduction.selection.MOST_MODES", 3)
+    monkeypatch.setattr("nldyn.reduction.candidates.MOST_MODES", 3)
     with pytest.raises(SceneError, match=sentence):
         build_selection(with_tolerance((old, new)))
 

@@ -122,7 +122,7 @@ def test_no_directory_if_the_picture_fails(tmp_path, monkeypatch):
     def fail(*_, **__):
         raise RuntimeError("no font")
 
-    monkeypatch.setattr("nldyn.plot.diagram.save_diagram", fail)
+    monkeypatch.setattr("nldyn.report.results.save_diagram", fail)
     with pytest.raises(RuntimeError, match="no font"):
         write_results(diagram(), tmp_path / "out")
     assert list(tmp_path.iterdir()) == []
