@@ -28,6 +28,7 @@ from nldyn import (
 )
 from nldyn.branches.arclength import Stepper
 from nldyn.branches.branch import CLOSED, NOT_FINISHED
+from nldyn.branches.checkpoint import Checkpoint
 from nldyn.io.branches import load_branch, load_branches
 from nldyn.runtime import keeper
 from nldyn.runtime.result_directory import OutputError
@@ -196,7 +197,7 @@ def test_every_checkpoint_on_the_way_goes_on_to_the_same_branch(
 
 KILLED = """
 import os, signal
-from nldyn import continue_branch, solve_orbit
+from nldyn import CheckpointFile, continue_branch, solve_orbit
 from nldyn.runtime import keeper
 from one_dof import RANGE_HZ, make_one_dof
 
@@ -303,7 +304,7 @@ def test_checkpoints_are_not_written_more_often_than_a_share_of_the_time(monkeyp
         now[0] += 1.0
 
     monkeypatch.setattr(keeper.time, "monotonic", lambda: now[0])
-    kept = keeper.Checkpoint(write)
+    kept = Checkpoint(write)
     for _ in range(1000):
         now[0] += 0.1
         kept.offer()
