@@ -120,7 +120,7 @@ def with_tolerance(*changes):
 def test_a_tolerance_asks_for_a_selection_in_the_scenes_setting(monkeypatch, caplog):
     asked = {}
 
-    def select_modes(component, setting, *, tolerance):
+    def select_modes(component, setting, *, tolerance, progress):
         assert set(component.interfaces) == {"middle"}
         asked.update(range=setting.range_hz, tolerance=tolerance)
         return SimpleNamespace(reduced="the model", report=lambda: "modes kept: 1")
