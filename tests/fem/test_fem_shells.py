@@ -7,7 +7,9 @@ from structures import CLAMP, STEEL, cantilever, flexibility, lowest_hz
 
 import cms
 import fem
+from fem.colouring import surface_values
 from fem.shells import corner_normals, shell_kinds
+from fem.structure_surface import structure_surface
 
 KINDS = sorted(shell_kinds())
 E, NU, RHO = 2.0e11, 0.3, 8000.0
@@ -400,3 +402,20 @@ def test_a_shell_keeps_its_digits_however_thin_it_is():
         )
         found.append(cms.reduce(fem.assemble(model), modes=2).frequencies_hz[0] / t)
     assert (found[0] - found[1]) / (found[1] - found[2]) == pytest.approx(100.0, rel=0.01)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_stress_of_constant_states_is_that_of_plane_stress(kind):
+    """Von Mises' on the outer face: strains (1e-3, -2e-3), and the curvature 1/m at t/2."""
+    flat, _ = distorted(kind)
+    points, turn = turned(flat.points)
+    component = shell(flat.with_points(points), E, NU, 0.01, ())
+    dofs = component.numbering.dofs(np.arange(len(points)))
+    for state, strains in (("stretch", (1e-3, -2e-3)), ("bending", (-0.005, 0.0))):
+        local = np.array([STATES[state](x, y) for x, y, _ in flat.points])
+        u = np.zeros(len(component.free))
+        u[dofs] = np.hstack([local[:, :3] @ turn.T, local[:, 3:] @ turn.T])
+        first, second = E / (1 - NU**2) * np.array([[1, NU], [NU, 1]]) @ strains
+        wanted = np.sqrt(first**2 - first * second + second**2)
+        found = surface_values(structure_surface(component), u, "stress")
+        np.testing.assert_allclose(found, wanted, rtol=1e-9)
