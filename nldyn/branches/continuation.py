@@ -39,6 +39,7 @@ from nldyn.runtime.threads import one_thread
 FROM_FOLD = 1e-4  # arclength from a fold to the point at which a branch through it begins
 MIDDLE = 0.1  # of that, within which it lies
 NEARLY_FLAT = 1e-3  # frequency part of a tangent, up to which it may be that of a fold
+ALONG = 0.99  # least cosine between two tangents of a branch at one place
 MET_AGAIN = 1e-6  # longest Newton step by which a solved orbit is met again across its branch
 
 
@@ -329,9 +330,14 @@ def start_point(orbit: Orbit, direction: float, range_hz: tuple[float, float]) -
     towards = np.zeros(orbit.point.size)
     towards[-1] = direction
     found = problem.correct(orbit.point, towards)
-    if not found.converged and np.isfinite(found.along).all() and found.along.any():
-        across = problem.metric(orbit.point) * problem.tangent(found, towards)
-        found = problem.correct(orbit.point, across, longest=MET_AGAIN)
+    if np.isfinite(found.along).all() and found.along.any():
+        along = problem.tangent(found, towards)
+        across = problem.metric(orbit.point) * along
+        again = problem.correct(orbit.point, across, longest=MET_AGAIN)
+        # exactly at a fold the frequency may hold the orbit and give a direction that is rounding
+        astray = again.converged and abs(float(problem.tangent(again, along) @ across)) < ALONG
+        if astray or not found.converged:
+            found = again
     if not found.converged:
         raise ConvergenceError(f"no orbit at {orbit.frequency_hz:g} Hz: {found.failure}")
     here = BranchPoint(orbit, problem.tangent(found, towards), 0.0)

@@ -397,10 +397,14 @@ def _read_points(group: Group, problem: ShootingProblem, observe: str) -> list[B
     jacobians = group.array("jacobians", count, problem.segments, size, size)
     error = group.array("error", count)
     motions = _read_motions(group.group("motion"), count, problem.flow)
+    # each in memory of its own, as in the run that computed it: some kernels of BLAS sum in an
+    # order that depends on where in memory a vector begins
     return [
         BranchPoint(
-            Orbit(problem, point[i], jacobians[i], float(error[i]), observe, motions[i]),
-            tangent[i],
+            Orbit(
+                problem, point[i].copy(), jacobians[i].copy(), float(error[i]), observe, motions[i]
+            ),
+            tangent[i].copy(),
             float(arclength[i]),
         )
         for i in range(count)
