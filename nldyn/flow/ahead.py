@@ -184,16 +184,24 @@ class Ahead:
             if meanwhile is not None:
                 meanwhile()
             if other := next(filter(self._is_free, self.waiting), None):
-                self.waiting.remove(other)
-                self.ready[other.key] = other, other.function(
-                    self.flow, *other.arguments, look=self.look
-                )
+                self._prepare(other)
         self.look()
         try:
             return (_loaded(future.result(), self.flow),)
         except BrokenProcessPool:
             self.executor = None
             return None
+
+    def _prepare(self, task: Task) -> None:
+        """Compute a task here that may be asked for; an error is told only if it is."""
+        self.waiting.remove(task)
+        try:
+            value = task.function(self.flow, *task.arguments, look=self.look)
+        except Exception as error:
+            if interrupted(error):
+                raise
+        else:
+            self.ready[task.key] = task, value
 
     def values(
         self,

@@ -171,6 +171,21 @@ def test_what_waits_is_computed_here_while_another_is_waited_for(ahead):
     assert ahead.value("c", doubled, 3) == 6
 
 
+def test_an_error_is_told_only_where_its_value_is_asked_for(ahead):
+    ahead.offer("a", doubled, 1)
+    ahead.offer("b", doubled, 2)
+    ahead.offer("c", doubled, None)  # computed here, in vain, while a is waited for
+
+    def meanwhile():
+        if not ahead.waiting:
+            ahead.executor.work()
+
+    assert ahead.value("a", doubled, 1, meanwhile=meanwhile) == 2
+    assert not ahead.is_begun("c")
+    with pytest.raises(TypeError):
+        ahead.value("c", doubled, None)
+
+
 def test_values_come_in_order_and_the_first_is_computed_here(ahead):
     told = []
 
