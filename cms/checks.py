@@ -51,6 +51,10 @@ class Checks:
     mac : (n,) array
         Modal assurance criterion of that mode with the space of the model's modes of the same
         frequency (rigid-body modes are one space): the squared cosine of the angle between them.
+    rigid_bound_hz : float
+        As `ReducedModel.rigid_bound_hz`.
+    unseen_modes : tuple of int
+        As `ReducedModel.unseen_modes`.
     """
 
     mass_orthogonality: float
@@ -62,6 +66,8 @@ class Checks:
     effective_mass: Mapping[str, FloatArray]
     frequency_errors: FloatArray
     mac: FloatArray
+    rigid_bound_hz: float = 0.0
+    unseen_modes: tuple[int, ...] = ()
 
     def report(self) -> str:
         """The checks as text, a line each."""
@@ -70,6 +76,11 @@ class Checks:
             f"stiffness {self.stiffness_orthogonality:.1e}",
             "rigid-body modes: {} of the model, {} of the component".format(*self.rigid_body_modes),
         ]
+        if self.rigid_bound_hz:
+            lines.append(f"few digits leave these undetermined up to {self.rigid_bound_hz:.3g} Hz")
+        if self.unseen_modes:
+            numbers = ", ".join(map(str, self.unseen_modes))
+            lines.append(f"kept modes that move no interface: {numbers}")
         for name, error in self.static_recovery.items():
             lines.append(f"static recovery of a load at '{name}': error {error:.1e}")
         for name, mass in self.direction_mass.items():
@@ -153,6 +164,8 @@ def check(
         },
         frequency_errors=errors,
         mac=values,
+        rigid_bound_hz=reduced.rigid_bound_hz,
+        unseen_modes=reduced.unseen_modes,
     )
 
 

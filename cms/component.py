@@ -144,7 +144,7 @@ class Pencil:
         return found - self.inertia @ (self.offset[:, None] * (self.inertia.T @ vectors))
 
     def undetermined(self, vectors: FloatArray, double: float) -> FloatArray:
-        """Change of ``v^T K v`` (k,) that rounding may make, ``double`` that of double precision."""
+        """Change of ``v^T K v`` (k,) by rounding, of double precision by ``double``."""
         if self.origin is not None:
             before, expansion = self.origin
             return before.undetermined(np.asarray(expansion @ vectors), double)

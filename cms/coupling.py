@@ -200,7 +200,8 @@ def rigid_motions(rows: FloatArray, omega: FloatArray) -> int:
     moved = length > RIGID_RANK * np.linalg.norm(rows, axis=1)
     if not rigid.shape[1] or not np.any(moved):
         return int(rigid.shape[1])
-    return int(rigid.shape[1] - np.linalg.matrix_rank(rigid[moved] / length[moved, None], tol=RIGID_RANK))
+    scaled = rigid[moved] / length[moved, None]
+    return int(rigid.shape[1] - np.linalg.matrix_rank(scaled, tol=RIGID_RANK))
 
 
 def check_coupled(
@@ -234,8 +235,8 @@ def check_coupled(
         )
     if rigid < omega.size and omega[rigid] <= 4 * np.finfo(float).eps * omega[-1]:
         raise ReductionError(
-            f"mode {rigid + 1} of the coupled model has no stiffness beside its fastest one, though "
-            f"the parts and joints leave {rigid} rigid-body modes: the stiffnesses differ too much"
+            f"mode {rigid + 1} of the coupled model has no stiffness beside its fastest one, "
+            f"though the parts and joints leave {rigid} rigid-body modes: the stiffnesses differ too much"
         )
     mass = np.abs(vectors.T @ vectors - np.eye(omega.size)).max()
     energy = np.abs(stretch.T @ stretch - np.diag(omega**2)).max() / max(omega[-1] ** 2, 1e-300)

@@ -17,6 +17,7 @@ from cms.errors import ReductionError
 
 FORMAT = "cms.ReducedModel"
 FORMAT_VERSION = 2
+INVISIBLE = 1e-9
 OPTIONAL = ("damping", "residual_flexibility", "residual_shapes")
 
 
@@ -59,6 +60,9 @@ class ReducedModel:
         ``basis @ q + residual_shapes @ f``.
     components : dict of str to (int, int)
         Rows of the basis that belong to each component of a coupled model.
+    rigid_bound_hz : float
+        Up to where the few digits of given matrices leave the frequency of rigid-body modes
+        undetermined; those below are zero. 0 for matrices in double precision.
 
     Examples
     --------
@@ -81,6 +85,7 @@ class ReducedModel:
     residual_flexibility: FloatArray | None = None
     residual_shapes: FloatArray | None = None
     components: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    rigid_bound_hz: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the shapes and make the arrays read-only."""
@@ -130,6 +135,16 @@ class ReducedModel:
     def rigid_body_modes(self) -> int:
         """Number of modes of zero frequency."""
         return int(np.count_nonzero(self.frequencies_hz == 0.0))
+
+    @property
+    def unseen_modes(self) -> tuple[int, ...]:
+        """Numbers, from 1, of the kept modes that move no interface: no force there finds them."""
+        if not self.participation:
+            return ()
+        rows = np.abs(np.array(list(self.participation.values())))
+        largest = rows.max(axis=1, keepdims=True)
+        seen = np.any(rows > INVISIBLE * np.where(largest > 0.0, largest, 1.0), axis=0)
+        return tuple(int(number) + 1 for number in np.flatnonzero(~seen[: self.modes]))
 
     @property
     def interfaces(self) -> tuple[str, ...]:
@@ -342,6 +357,7 @@ class ReducedModel:
             "interfaces": np.array(self.interfaces, dtype=np.str_),
             "participation": np.array(list(self.participation.values())).reshape(-1, self.size),
             "method": np.array(self.method),
+            "rigid_bound_hz": np.array(self.rigid_bound_hz),
             "components": np.array(list(self.components), dtype=np.str_),
             "component_rows": np.array(list(self.components.values()), dtype=np.int64),
         }
@@ -432,6 +448,7 @@ def later_fields(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
     return {
         "method": str(arrays["method"]),
         "components": dict(zip(names, rows, strict=True)),
+        "rigid_bound_hz": float(arrays.get("rigid_bound_hz", 0.0)),
         **{name: arrays[name] for name in OPTIONAL if name in arrays},
     }
 

@@ -14,6 +14,7 @@ from cms.component import ComponentLike, FloatArray, Pencil, checked_pencil, sym
 from cms.condensed import condensed
 from cms.constraint import fixed_interface, fixed_interface_errors
 from cms.eigen import (
+    SUMMED,
     Modes,
     Shifted,
     fastest_square,
@@ -25,7 +26,7 @@ from cms.eigen import (
     without_offsets,
 )
 from cms.errors import ReductionError
-from cms.factor import Progress, announced
+from cms.factor import Progress, announce, announced
 from cms.model import ReducedModel
 from cms.residual import residual_flexibility, residual_modes
 from cms.threads import one_thread
@@ -187,7 +188,24 @@ def reduce(
                 f"differ too much in size ({reason})"
             ) from error
     check_masses(pencil, reduced)
-    return with_component_damping(reduced, component)
+    with announced(progress):
+        return with_component_damping(told(reduced, pencil), component)
+
+
+def told(reduced: ReducedModel, pencil: Pencil) -> ReducedModel:
+    """The model with the bound of its rigid-body modes; says that, and which modes are unseen."""
+    if reduced.unseen_modes:
+        numbers = ", ".join(map(str, reduced.unseen_modes))
+        announce(f"kept modes that move no interface: {numbers}")
+    rigid = reduced.basis[:, reduced.frequencies_hz == 0.0]
+    if pencil.digits is None or not rigid.shape[1]:
+        return reduced
+    bound = float(np.sqrt(np.max(pencil.undetermined(rigid, SUMMED)))) / (2.0 * np.pi)
+    announce(
+        f"{counted(rigid.shape[1])}: zero within the {pencil.digits} digits of the stiffness, "
+        f"which leave {bound:.3g} Hz undetermined"
+    )
+    return replace(reduced, rigid_bound_hz=bound)
 
 
 def check_masses(pencil: Pencil, reduced: ReducedModel) -> None:

@@ -83,7 +83,7 @@ def residual_modes(pencil: Pencil, shifted: Shifted, modes: FloatArray) -> Resid
     residual = without_modes(static, modes, pencil)
     basis = independent_part(residual, pencil, pencil.size - modes.shape[1])
     basis = without_modes(basis, modes, pencil)
-    squares, vectors, massless = diagonalised(basis, pencil)
+    squares, vectors, massless = diagonalised(basis, pencil, shifted.fastest)
     return ResidualModes(squares, vectors, massless, pencil.loads.shape[1] - basis.shape[1])
 
 
@@ -95,7 +95,9 @@ def independent_part(residual: FloatArray, pencil: Pencil, at_most: int) -> Floa
     return (residual @ directions[:, kept]) / np.sqrt(share[kept])
 
 
-def diagonalised(basis: FloatArray, pencil: Pencil) -> tuple[FloatArray, FloatArray, FloatArray]:
+def diagonalised(
+    basis: FloatArray, pencil: Pencil, fastest: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """w^2 (p,) and mass-normalised vectors (N, p) of K and M projected on the basis (N, p + z).
 
     The z directions whose mass is rounding come apart, with ``V^T K V = I``.
@@ -107,5 +109,6 @@ def diagonalised(basis: FloatArray, pencil: Pencil) -> tuple[FloatArray, FloatAr
     nu, vectors = nu[::-1], basis @ directions[:, ::-1]
     large = np.abs(vectors)
     sizes = np.sum(large * times(abs(pencil.mass), large), axis=0)
+    sizes = np.maximum(sizes, 1.0 / fastest if fastest > 0.0 else 0.0)
     heavy = nu > max(MASSLESS, pencil.mass_rounding) * sizes
     return 1.0 / nu[heavy], vectors[:, heavy] / np.sqrt(nu[heavy]), vectors[:, ~heavy]

@@ -108,7 +108,7 @@ class Errors:
     Parameters
     ----------
     eigenfrequency : float
-        Largest of the first three that an interface sees; infinite if there are fewer.
+        Largest of the first three that an interface sees, or of as many as the model has.
     receptance : float
         ``norm(H - H_ref) / norm(H_ref)`` over the range.
     peak_hz, peak_m : float
@@ -669,14 +669,7 @@ def errors_of(model: Measured, reference: Measured, best: Measured, full: bool) 
 
     The orbit is compared with that of the full model if there is one.
     """
-    count = min(EIGENFREQUENCIES, reference.frequencies_hz.size)
-    exact = reference.frequencies_hz[:count]
-    own = model.frequencies_hz[:count]
-    eigenfrequency = (
-        float(np.max(np.abs(own - exact) / np.maximum(exact, 1e-300)))
-        if own.size == count
-        else np.inf
-    )
+    eigenfrequency = frequency_error(model.frequencies_hz, reference.frequencies_hz)
     fold_flip, counts = np.nan, None
     if model.special_hz is not None and best.special_hz is not None:
         fold_flip, *lacking = matched(model.special_hz, best.special_hz)
@@ -692,6 +685,19 @@ def errors_of(model: Measured, reference: Measured, best: Measured, full: bool) 
         relative(model.orbit, orbit, largest_force),
         relative(model.orbit, orbit, contact_time),
     )
+
+
+def frequency_error(own: Real, exact: Real) -> float:
+    """Largest relative error of the first three frequencies, or of as many as the model has.
+
+    That of a rigid-body mode is relative to the first frequency above zero. nan if there are none.
+    """
+    count = min(EIGENFREQUENCIES, exact.size, own.size)
+    if not count:
+        return np.nan
+    elastic = exact[exact > 0.0]
+    scale = np.where(exact > 0.0, exact, elastic[0] if elastic.size else 1.0)
+    return float(np.max(np.abs(own[:count] - exact[:count]) / scale[:count]))
 
 
 def distance(given: Complex, known: Complex) -> float:

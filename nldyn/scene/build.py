@@ -330,6 +330,9 @@ def build_reduced(
             count = reduced.rigid_body_modes
             modes = f"{count} rigid-body mode{'s' if count > 1 else ''}"
             raise cms.ReductionError(f"the component floats ({modes})")
+        if reduced.unseen_modes:
+            numbers = ", ".join(map(str, reduced.unseen_modes))
+            logger.info(f"kept modes that no interface can see: {numbers}; they change nothing")
         return reduced
 
 

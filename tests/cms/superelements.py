@@ -66,7 +66,7 @@ def exact_hz(stiffness, mass, count, digits=60, least=1e-10):
     with mpmath.workdps(digits):
         K, M = mpmath.matrix(stiffness.tolist()), mpmath.matrix(mass.tolist())
         n = K.rows
-        d = [1 / mpmath.sqrt(M[i, i]) for i in range(n)]
+        d = [1 / mpmath.sqrt(M[i, i]) if M[i, i] else mpmath.mpf(1) for i in range(n)]
         for i in range(n):
             for j in range(n):
                 K[i, j], M[i, j] = K[i, j] * d[i] * d[j], M[i, j] * d[i] * d[j]
@@ -74,7 +74,8 @@ def exact_hz(stiffness, mass, count, digits=60, least=1e-10):
         K = vectors.T * K * vectors
         none = sum(1 for i in range(n) if values[i] <= least)
         if none:
-            K = K[none:, none:] - K[none:, :none] * mpmath.inverse(K[:none, :none]) * K[:none, none:]
+            through = mpmath.inverse(K[:none, :none]) * K[:none, none:]
+            K = K[none:, none:] - K[none:, :none] * through
         root = [1 / mpmath.sqrt(values[none + i]) for i in range(n - none)]
         for i in range(n - none):
             for j in range(n - none):

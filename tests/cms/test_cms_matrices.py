@@ -1,0 +1,215 @@
+"""Matrices of other codes: few digits, massless directions, mixed units."""
+
+import numpy as np
+import pytest
+from scipy import linalg, sparse
+from superelements import exact_hz, free_beam, joined, rounded, superelement
+
+import cms
+from cms.coupling import check_coupled
+
+METHODS = ("rubin", "craig-bampton", "macneal", "truncation")
+
+
+def ends(K, M, **other):
+    """The component with both ends, displacement and turn, as interfaces."""
+    unit = np.eye(K.shape[0])
+    named = {"left": unit[0], "left turn": unit[1], "right": unit[-2], "right turn": unit[-1]}
+    return cms.Matrices(K, M, named, **other)
+
+
+@pytest.mark.parametrize("method", ["rubin", "craig-bampton"])
+@pytest.mark.parametrize("digits", [17, 16, 15, 14, 12, 9, 7])
+@pytest.mark.parametrize("elements", [3, 10, 40, 100])
+def test_free_beam_of_few_digits(elements, digits, method):
+    """Rigid-body modes are zero, elastic ones those of the rounded matrices."""
+    K, M = (rounded(A, digits) for A in free_beam(elements))
+    tip = cms.Matrices(K, M, {"tip": np.eye(K.shape[0])[0]})
+    modes = 4 if method == "rubin" else K.shape[0] - 1
+    found = cms.reduce(tip, modes=modes, method=method)
+    exact = linalg.eigh(K, M, eigvals_only=True, subset_by_index=[2, 3])
+    assert found.rigid_body_modes == 2
+    floor = 1e-13 * elements**4  # of the direct solution in double precision
+    np.testing.assert_allclose(
+        found.frequencies_hz[2:4], np.sqrt(exact) / (2 * np.pi), rtol=max(1e-9, floor)
+    )
+
+
+def test_the_bound_of_rigid_modes_is_told_and_kept():
+    K, M = (rounded(A, 7) for A in free_beam(100))
+    said = []
+    found = cms.reduce(
+        cms.Matrices(K, M, {"tip": np.eye(202)[0]}), modes=4, progress=said.append
+    )
+    lowest = linalg.eigh(K, M, eigvals_only=True, subset_by_index=[0, 1])
+    assert np.sqrt(np.abs(lowest).max()) / (2 * np.pi) < found.rigid_bound_hz < 300.0
+    assert any("2 rigid-body modes: zero within the 7 digits" in text for text in said)
+
+
+def test_digits_that_leave_the_modes_open_are_refused():
+    K, M = (rounded(A, 6) for A in free_beam(200))
+    with pytest.raises(cms.ReductionError, match="the 6 digits of the stiffness leave open which"):
+        cms.reduce(cms.Matrices(K, M, {"tip": np.eye(402)[0]}), modes=4)
+
+
+def test_an_unstable_structure_of_few_digits_is_told_as_such():
+    K, M = free_beam(10)
+    K[0, 0] -= 1e5
+    K, M = rounded(K, 7), rounded(M, 7)
+    with pytest.raises(cms.ReductionError, match="beyond its buckling load"):
+        cms.reduce(ends(K, M), modes=4)
+
+
+def test_a_softly_held_beam_of_exact_entries_is_held():
+    """The spring is far below what 7 digits would leave; entries of double precision have it."""
+    K, M = free_beam(10)
+    K[0, 0] += 100.0
+    K[-2, -2] += 100.0
+    found = cms.reduce(ends(K, M), modes=4)
+    assert found.rigid_body_modes == 0
+    np.testing.assert_allclose(found.frequencies_hz[:4], exact_hz(K, M, 4), rtol=1e-6)
+
+
+def test_stated_digits_hold_in_other_units():
+    """Converted to other units the entries look like those of double precision."""
+    K, M = (rounded(A, 8) for A in free_beam(8))
+    inch = np.tile([1.0, 0.0254], 9) / 0.3048
+    K, M = K * np.outer(inch, inch), M * np.outer(inch, inch)
+    found = cms.reduce(ends(K, M, digits=8), modes=4)
+    assert found.rigid_body_modes == 2
+    np.testing.assert_allclose(found.frequencies_hz[2:4], exact_hz(K, M, 4)[2:], rtol=1e-8)
+    with pytest.raises(cms.ReductionError, match="digits = 2 must be a whole number from 3 to 17"):
+        cms.reduce(ends(K, M, digits=2), modes=4)
+
+
+@pytest.mark.parametrize("units", [1.0, 1e12])
+@pytest.mark.parametrize("noise", [0.0, 1e-12, 1e-11])
+def test_superelement_whose_mass_is_semidefinite_but_for_rounding(noise, units):
+    K, M, _ = superelement(kept=9, heavy=14, noise=noise, units=units)
+    exact = exact_hz(K, M, 8)
+    for method in METHODS:
+        model = cms.reduce(ends(K, M), cutoff_hz=1e9, method=method)
+        found = np.sort(model.frequencies_hz)
+        assert model.rigid_body_modes == 2
+        assert np.count_nonzero(model.frequencies_hz < 1e12) == model.size
+        np.testing.assert_allclose(found[2:8], exact[2:], rtol=1e-8)
+
+
+@pytest.mark.parametrize("methods", [("craig-bampton",) * 2, ("craig-bampton", "rubin")])
+@pytest.mark.parametrize("noise", [0.0, 6e-12])
+def test_coupled_superelements_are_those_of_the_joined_matrices(noise, methods):
+    parts = [superelement(kept=9, heavy=14, noise=noise, seed=seed)[:2] for seed in (1, 8)]
+    K, M = (joined(a, b, [16, 17], [0, 1]) for a, b in zip(*parts, strict=True))
+    models = [
+        cms.reduce(ends(*part), cutoff_hz=1e12, method=method)
+        for part, method in zip(parts, methods, strict=True)
+    ]
+    joints = [cms.Joint(("a", f"right{x}"), ("b", f"left{x}")) for x in ("", " turn")]
+    whole = cms.couple(dict(zip("ab", models, strict=True)), joints)
+    assert whole.rigid_body_modes == 2
+    np.testing.assert_allclose(whole.frequencies_hz[2:6], exact_hz(K, M, 6)[2:], rtol=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("units", [1.0, 1e12])
+@pytest.mark.parametrize("seed", range(3))
+def test_superelements_of_46_degrees_of_freedom(seed, units):
+    K, M, _ = superelement(seed=seed, units=units, noise=2e-11)
+    exact = exact_hz(K, M, 8)
+    for method in METHODS:
+        model = cms.reduce(ends(K, M), cutoff_hz=1e9, method=method)
+        assert model.rigid_body_modes == 2
+        np.testing.assert_allclose(np.sort(model.frequencies_hz)[2:8], exact[2:], rtol=1e-8)
+
+
+def test_more_modes_than_have_mass_are_refused_with_their_number():
+    K, M, _ = superelement(kept=9, heavy=14)
+    with pytest.raises(cms.ReductionError, match="only 10 degrees of freedom that have mass"):
+        cms.reduce(ends(K, M), modes=14, method="craig-bampton")
+    with pytest.raises(cms.ReductionError, match="only 14 have mass"):
+        cms.reduce(ends(K, M), modes=15)
+
+
+def test_an_indefinite_mass_is_refused():
+    K, M, _ = superelement(kept=9, heavy=14)
+    values, vectors = linalg.eigh(M)
+    M -= 1e-6 * values[-1] * np.outer(vectors[:, 0], vectors[:, 0])
+    with pytest.raises(cms.ReductionError, match="mass matrix is not positive: scaled to"):
+        cms.reduce(ends(K, M), modes=4)
+
+
+def test_statics_of_a_massless_interface_are_exact():
+    """Springs of 3, 4 and 5 N/m in series, the last one to a point without mass."""
+    K = np.array([[7.0, -4.0, 0.0], [-4.0, 9.0, -5.0], [0.0, -5.0, 5.0]])
+    M = np.diag([2.0, 1.0, 0.0])
+    exact = np.sqrt(linalg.eigvalsh(K[:2, :2] - np.diag([0.0, 5.0]), M[:2, :2])) / (2 * np.pi)
+    for method, modes in (("rubin", 2), ("craig-bampton", 1)):
+        model = cms.reduce(cms.Matrices(K, M, {"end": np.eye(3)[2]}), modes=modes, method=method)
+        known = 1 / 3 + 1 / 4 + 1 / 5
+        assert model.static_flexibility("end") == pytest.approx(known, rel=1e-12)
+        np.testing.assert_allclose(model.frequencies_hz, exact, rtol=1e-12)
+        assert model.has_massless_part
+
+
+def test_rigid_modes_are_compared_as_a_space():
+    K, M = free_beam(12)
+    model = cms.reduce(ends(K, M), modes=6)
+    turned = cms.Matrices(K, M, dict(reversed(ends(K, M).interfaces.items())))
+    other = cms.reduce(turned, modes=6, method="craig-bampton")
+    for component, reduced in ((ends(K, M), model), (turned, other)):
+        found = cms.check(component, reduced, modes=2)
+        np.testing.assert_allclose(found.mac, 1.0, atol=1e-9)
+    angle = 0.7
+    turn = np.eye(model.size)
+    turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    rows = {name: row @ turn for name, row in model.participation.items()}
+    rotated = cms.ReducedModel(
+        model.frequencies_hz, rows, model.basis @ turn, model.residuals, model.modes
+    )
+    np.testing.assert_allclose(cms.check(ends(K, M), rotated, modes=2).mac, 1.0, atol=1e-9)
+
+
+def test_rigid_modes_of_coupled_models_are_counted():
+    """A hinge leaves two free beams three rigid-body modes, a hinge and an equal turn two."""
+    model = cms.reduce(ends(*free_beam(8)), modes=6)
+    hinge = cms.Joint(("a", "right"), ("b", "left"))
+    weld = cms.Joint(("a", "right turn"), ("b", "left turn"))
+    parts = {"a": model, "b": model}
+    assert cms.couple(parts, [hinge]).rigid_body_modes == 3
+    assert cms.couple(parts, [hinge, weld]).rigid_body_modes == 2
+
+
+def test_rigid_modes_that_do_not_fit_at_the_joints_are_told():
+    """Rigid-body modes that rounding has given 0.5 Hz leave the other part's at a spring."""
+    omega, vectors = np.array([0.0, 3.0, 100.0]), np.eye(3)
+    with pytest.raises(cms.ReductionError, match="leave 2 rigid-body modes, but mode 2 of the"):
+        check_coupled(omega, 2, vectors, np.zeros((0, 3)), np.diag(omega))
+    with pytest.raises(cms.ReductionError, match="the energy of the coupled model differs"):
+        check_coupled(omega, 1, vectors, np.zeros((0, 3)), 1.001 * np.diag(omega))
+    with pytest.raises(cms.ReductionError, match="the mass of the coupled model differs"):
+        check_coupled(omega, 1, 1.001 * vectors, np.zeros((0, 3)), np.diag(omega))
+    with pytest.raises(cms.ReductionError, match="the displacement at a joint of the coupled"):
+        check_coupled(omega, 1, vectors, np.array([[0.0, 1.0, 0.0]]), np.diag(omega))
+
+
+def test_a_mode_that_no_interface_sees_is_told():
+    K = linalg.block_diag([[2.0, -1.0], [-1.0, 2.0]], [[9.0]])
+    said = []
+    component = cms.Matrices(K, np.eye(3), {"one": [1.0, 0.0, 0.0]})
+    found = cms.reduce(component, modes=3, progress=said.append)
+    assert found.unseen_modes == (3,)
+    assert "kept modes that move no interface: 3" in said
+    assert "kept modes that move no interface: 3" in cms.check(component, found).report()
+
+
+@pytest.mark.parametrize("kind", [sparse.csr_array, sparse.coo_matrix, sparse.dia_array])
+def test_sparse_matrices_and_vectors(kind):
+    K, M = free_beam(6)
+    tip = np.eye(14)[:1]
+    dense = cms.Matrices(K, M, {"tip": tip[0]}, damping=1e-3 * M)
+    given = cms.Matrices(kind(K), kind(M), {"tip": sparse.csr_array(tip)}, damping=kind(1e-3 * M))
+    for method in METHODS[:2]:
+        a, b = (cms.reduce(c, modes=4, method=method) for c in (dense, given))
+        np.testing.assert_allclose(b.frequencies_hz, a.frequencies_hz)
+        np.testing.assert_allclose(b.damping, 1e-3 * np.eye(b.size), atol=1e-9)
+    assert cms.check(given, b, modes=3).mac.shape == (3,)
