@@ -14,7 +14,7 @@ import pytest
 from nldyn import command, progress
 from nldyn.compilation import COMPILING, Compilations, compilations
 from nldyn.kernel_cache import ensure_cache
-from nldyn.paper.workers import _ended_at_failure
+from nldyn.paper.workers import ended_at_failure
 
 
 def stop_loading(_):
@@ -143,7 +143,7 @@ def test_shares_add_up_with_their_weights():
 def test_worker_processes_end_with_the_work():
     worker = multiprocessing.get_context("spawn").Process(target=time.sleep, args=(60.0,))
     worker.start()
-    with pytest.raises(KeyboardInterrupt), _ended_at_failure():
+    with pytest.raises(KeyboardInterrupt), ended_at_failure():
         raise KeyboardInterrupt
     worker.join(10.0)
     assert not worker.is_alive()
