@@ -375,14 +375,24 @@ def converge(
 
 @main.command()
 @out_option
-def paper(out: Path) -> None:
+@click.option("--atlas", is_flag=True, help="All known branches instead, which takes hours.")
+@click.option(
+    "--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Processes."
+)
+@quiet_option
+def paper(out: Path, atlas: bool, jobs: int, quiet: bool) -> None:
     """Reproduce the figures and numbers of the paper."""
     with plain_errors():
-        from nldyn.paper import main as reproduce
+        import nldyn.paper
+        from nldyn.paper.atlas import has_charts
         from nldyn.paper.kept import has_values, unfinished_folder
 
-        with told_what_is_kept(unfinished_folder(out), has_values):
-            reproduce(out)
+        if atlas:
+            with told_what_is_kept(out, has_charts):
+                nldyn.paper.atlas(out, jobs, quiet=quiet)
+        else:
+            with told_what_is_kept(unfinished_folder(out), has_values):
+                nldyn.paper.main(out, jobs, quiet=quiet)
 
 
 def describe(diagram: Diagram, seconds: float, out: Path) -> str:

@@ -7,11 +7,11 @@ import sys
 import time
 from pathlib import Path
 
-__all__ = ["main"]
+__all__ = ["atlas", "main"]
 
 
-def main(out: str | Path, workers: int = 2) -> None:
-    """Compute all models and write figures, the table of claims and a page.
+def main(out: str | Path, workers: int = 2, *, quiet: bool = False) -> None:
+    """Compute what the paper shows, and write figures, the table of claims and a page.
 
     Parameters
     ----------
@@ -20,6 +20,8 @@ def main(out: str | Path, workers: int = 2) -> None:
         it until then, and the same call goes on from there.
     workers : int
         Number of processes.
+    quiet : bool
+        Show no progress.
 
     Raises
     ------
@@ -30,25 +32,29 @@ def main(out: str | Path, workers: int = 2) -> None:
     --------
     >>> main("results/paper")        # doctest: +SKIP
     """
-    from nldyn.paper.chaos import chaos_of, submit_sweeps, write_chaos_figure
+    from nldyn.paper.chaos import (
+        joined_chaos,
+        tasks_of_chaos,
+        write_chaos_figure,
+    )
     from nldyn.paper.claims import evaluate, verdict_counts, write_claims
     from nldyn.paper.figures import write_figures
-    from nldyn.paper.jobs import joined, submit_diagrams
+    from nldyn.paper.jobs import JOBS, compile_kernels, diagrams_of, tasks_of
     from nldyn.paper.kept import kept_folder
     from nldyn.paper.page import write_page
-    from nldyn.paper.workers import worker_processes
+    from nldyn.paper.workers import alone, worker_processes
     from nldyn.runtime.interruption import ignored_interruption
     from nldyn.runtime.result_directory import check_directory, result_directory
 
     check_directory(out)
     folder_kept = kept_folder(out)
     start = time.perf_counter()
-    with worker_processes(workers, folder_kept) as processes:
+    alone(compile_kernels, quiet)
+    with worker_processes(workers, quiet) as processes:
         with ignored_interruption():  # a terminal sends it to all processes
-            diagrams = submit_diagrams(processes)
-            sweeps = submit_sweeps(processes)
-        chaos = chaos_of(processes.values(sweeps, "sweeps"), processes)
-        results = joined(processes.values(diagrams, "diagrams"))
+            tasks = (*tasks_of(JOBS, folder_kept), *tasks_of_chaos(folder_kept))
+        values = processes.values(tasks)
+    results, chaos = diagrams_of(values), joined_chaos(values)
     with result_directory(out, "paper") as folder:
         rows = evaluate(results, chaos)
         write_claims(rows, folder / "claims.csv")
@@ -59,3 +65,36 @@ def main(out: str | Path, workers: int = 2) -> None:
     seconds = time.perf_counter() - start
     counts = verdict_counts(rows)
     print(f"{len(rows)} claims: {counts}; {seconds:.0f} s; written to {out}", file=sys.stderr)
+
+
+def atlas(out: str | Path, workers: int = 2, *, quiet: bool = False) -> None:
+    """Follow all branches that are known of the larger models, which takes hours.
+
+    Parameters
+    ----------
+    out : str or Path
+        Directory of results. Each start's branches are a file in it once they are followed; the
+        same call goes on with the starts left.
+    workers : int
+        Number of processes.
+    quiet : bool
+        Show no progress.
+
+    Raises
+    ------
+    OutputError
+        If the directory cannot be written or holds something else.
+
+    Examples
+    --------
+    >>> atlas("results/atlas")        # doctest: +SKIP
+    """
+    from nldyn.paper.atlas import atlas_folder, write_atlas
+    from nldyn.paper.jobs import compile_kernels
+    from nldyn.paper.workers import alone, worker_processes
+
+    folder = atlas_folder(out)
+    alone(compile_kernels, quiet)
+    with worker_processes(workers, quiet) as processes:
+        write_atlas(folder, processes)
+    print(f"written to {out}", file=sys.stderr)

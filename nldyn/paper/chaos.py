@@ -3,33 +3,36 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
-from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from nldyn.longterm.attractors import Attractor, AttractorOptions
+from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.longterm.attractors import Attractor, AttractorOptions, attractor_from
 from nldyn.longterm.lifetimes import ChaosLifetime, chaos_lifetime, two_digits
-from nldyn.longterm.poincare import BruteForce, brute_force
+from nldyn.orbits.orbit import check_observe
 from nldyn.paper.evidence import Finding, published_claims
 from nldyn.paper.jobs import scene_system
-from nldyn.paper.workers import Workers
+from nldyn.paper.kept import kept_numbers
+from nldyn.paper.workers import Task
 from nldyn.plot.diagram import save_figure
+from nldyn.runtime.progress import Progress
 
 Way = Literal["up", "down"]
-Task = tuple[str, Way]
 
-RANGE_HZ, POINTS = (18.0, 90.0), 145
-EFFORT = AttractorOptions(periods=500)
-# motions from each chaotic one, and for how long they are followed: in published ranges, elsewhere
-CLAIMED, ELSEWHERE = (4, 2500), (4, 1000)
+RANGE_HZ = (18.0, 90.0)
+STEP_HZ, CLAIMED_STEP_HZ = 1.0, 0.5  # outside, and within the ranges that the paper names
+# Ends of the pieces that are swept apart, between two frequencies; none cuts a published range.
+EDGES_HZ = (17.75, 23.75, 29.75, 38.25, 44.25, 50.75, 57.75, 66.25, 74.25, 82.25, 90.25)
+EFFORT = AttractorOptions(periods=128)  # and up to eight times as many where they do not decide
+STATES, LASTING = 4, 1000  # motions from each chaotic one, and for how many periods
 MODELS = ("four_dof_xi_0.001", "four_dof_xi_0.01", "two_dof_xi_0.001", "two_dof_xi_0.01")
 NAMES = {"two_dof": "2-DOF model", "four_dof": "4-DOF model"}
 DAMPINGS = {"0.01": "#0072b2", "0.001": "#b03a00"}
@@ -43,107 +46,139 @@ SHADED = {
 }
 CLAIMS = {"fig4.chaos": "two_dof_xi_0.01", "fig7.chaos": "four_dof_xi_0.01"}
 FIGURE = "chaos"
-CAPTION = (
-    "Largest Lyapunov exponents: the damping reduces the chaotic ranges "
-    f"(hollow: chaos that does not last for {ELSEWHERE[1]} periods more)"
-)
+CAPTION = "Largest Lyapunov exponents: the damping reduces the chaotic ranges"
 
 
-@dataclass(frozen=True, eq=False)
-class Chaos:
-    """Attractors of the four models over the frequency, swept up and down.
+@dataclass(frozen=True)
+class Settled:
+    """What a motion of a sweep settles on at one frequency.
 
     Parameters
     ----------
-    diagrams : mapping of str to BruteForce
-        By the name of the model's scene.
-    lifetimes : mapping of str to list of ChaosLifetime
-        How long chaos lasts at each chaotic frequency; longest followed in the ranges that
-        `CLAIMS` name.
+    frequency_hz : float
+        Excitation frequency in Hz.
+    way : {"up", "down"}
+        Whether the motion begins at that of the frequency below or above.
+    kind : str
+        As `Attractor.kind`.
+    exponent, error : float
+        Largest Lyapunov exponent in 1/s and its standard error; nan where the simulation failed.
+    ended : tuple of int
+        Of motions from states of a chaotic one as `ChaosLifetime.ended`; empty if not followed.
     """
 
-    diagrams: Mapping[str, BruteForce]
-    lifetimes: Mapping[str, Sequence[ChaosLifetime]]
+    frequency_hz: float
+    way: Way
+    kind: str
+    exponent: float
+    error: float
+    ended: tuple[int, ...] = ()
+
+    @property
+    def chaotic(self) -> bool:
+        """Whether the largest exponent is positive by three standard errors, twice."""
+        return self.kind == "chaotic"
+
+    @property
+    def lifetime(self) -> ChaosLifetime:
+        """How long the chaos lasts."""
+        return ChaosLifetime(self.frequency_hz, LASTING, np.array(self.ended, dtype=np.int64))
+
+    @property
+    def lasts(self) -> bool:
+        """Whether more than half of the motions from states of it are chaotic to the end."""
+        return bool(self.ended) and 2 * self.lifetime.lasting > self.lifetime.count
+
+
+@dataclass(frozen=True)
+class Chaos:
+    """What motions of the four models settle on over the frequency.
+
+    Parameters
+    ----------
+    swept : mapping of str to sequence of Settled
+        By the name of the model's scene.
+    """
+
+    swept: Mapping[str, Sequence[Settled]]
+
+    def share(self, model: str, low: float, high: float) -> tuple[int, int]:
+        """At how many frequencies from low to high (Hz) a motion is chaotic, and of how many."""
+        inside = [s for s in self.swept[model] if low <= s.frequency_hz <= high]
+        chaotic = {s.frequency_hz for s in inside if s.chaotic}
+        return len(chaotic), len({s.frequency_hz for s in inside})
 
     def ranges(self, figure: str) -> list[tuple[float, float]]:
-        """Chaotic ranges in Hz that a figure shows."""
-        return self.diagrams[SHADED[figure]].ranges() if figure in SHADED else []
+        """Chaotic ranges in Hz that a figure shows.
+
+        They reach half way to the neighbouring frequencies.
+        """
+        swept = self.swept[SHADED[figure]] if figure in SHADED else ()
+        frequencies = sorted({s.frequency_hz for s in swept})
+        chaotic = {s.frequency_hz for s in swept if s.chaotic}
+        found: list[tuple[float, float]] = []
+        for i, hz in enumerate(frequencies):
+            if hz in chaotic:
+                low = 0.5 * (frequencies[max(i - 1, 0)] + hz)
+                high = 0.5 * (frequencies[min(i + 1, len(frequencies) - 1)] + hz)
+                joins = found and found[-1][1] == low
+                found = [*found[:-1], (found[-1][0], high)] if joins else [*found, (low, high)]
+        return found
 
     def finding(self, model: str, published: str) -> Finding:
-        """Whether chaos lasts at most frequencies of each published range.
-
-        A motion is chaotic if its largest Lyapunov exponent is positive by three standard errors.
-        Chaos lasts where more than half of four motions from states of it are chaotic for 2500
-        periods more (`CLAIMED`).
-        """
-        states, periods = CLAIMED
-        found = self.diagrams[model]
+        """Whether chaos lasts at most frequencies of each published range."""
         inside, texts, holds = 0, [], True
         for low, high in published_ranges(published):
-            count, total = found.share(low, high)
-            lives = [x for x in self.lifetimes[model] if low <= x.frequency_hz <= high]
-            lasting = sum(2 * life.lasting > life.count for life in lives)
+            count, total = self.share(model, low, high)
+            within = [s for s in self.swept[model] if low <= s.frequency_hz <= high]
+            lasting = len({s.frequency_hz for s in within if s.lasts})
             inside += count
             holds = holds and 2 * lasting > total
             texts.append(
-                f"{low:g}-{high:g} Hz: {count} of {total}{_typical(found, low, high)}; it lasts at "
-                f"{lasting} of them{_settling(lives)}"
+                f"{low:g}-{high:g} Hz: {count} of {total}{_typical(within)}; it lasts at "
+                f"{lasting} of them{_settling(within)}"
             )
-        everywhere, _ = found.share(*RANGE_HZ)
+        everywhere, total = self.share(model, *RANGE_HZ)
         return Finding(
             holds=holds,
             text="frequencies with a chaotic motion, " + "; ".join(texts),
-            note=f"swept up and down in steps of {_step(found):g} Hz; chaotic means a largest "
+            note=f"swept up and down in steps of {CLAIMED_STEP_HZ:g} Hz; chaotic means a largest "
             "Lyapunov exponent above zero by three standard errors; it lasts where more than half "
-            f"of {states} motions from states of it are chaotic for {periods} periods more; the "
+            f"of {STATES} motions from states of it are chaotic for {LASTING} periods more; the "
             "statement holds if it lasts at more than half of the frequencies of each range. "
-            f"Outside, {everywhere - inside} of the other frequencies from {RANGE_HZ[0]:g} to "
-            f"{RANGE_HZ[1]:g} Hz have a chaotic motion, too",
+            f"Outside, in steps of {STEP_HZ:g} Hz, {everywhere - inside} of the other frequencies "
+            f"from {RANGE_HZ[0]:g} to {RANGE_HZ[1]:g} Hz have a chaotic motion, too",
         )
-
-    def transients(self, model: str) -> set[float]:
-        """Frequencies in Hz at which chaos does not last for 1000 periods, for half of the motions.
-
-        So long motions are followed at every frequency (`ELSEWHERE`). One that is neither settled
-        nor chaotic at the end has not lasted.
-        """
-        return {
-            life.frequency_hz
-            for life in self.lifetimes[model]
-            if 2 * life.lasting_for(ELSEWHERE[1]) <= life.count
-        }
 
     def damping(self) -> tuple[bool, str]:
         """Whether more damping leaves fewer chaotic frequencies in both models, and the numbers.
 
-        Frequencies at which chaos does not last do not count.
+        Those of the sweeps up are compared, at the frequencies that all models have.
         """
+        common = set(frequencies_hz("")[0])
         smaller, texts = True, []
         for model in NAMES:
-            counts, parts = [], []
+            counts = []
             for xi in ("0.01", "0.001"):
-                found, total = self.diagrams[f"{model}_xi_{xi}"].share(*RANGE_HZ)
-                counts.append(found - len(self.transients(f"{model}_xi_{xi}")))
-                parts.append(f"{found} of {total} frequencies at ξ = {xi}, lasting at {counts[-1]}")
+                up = [s for s in self.swept[f"{model}_xi_{xi}"] if s.way == "up"]
+                counts.append(sum(s.chaotic for s in up if s.frequency_hz in common))
             smaller = smaller and counts[0] < counts[1]
-            texts.append(f"{model}: chaotic at {'; at '.join(parts)}")
+            texts.append(
+                f"{model}: chaotic at {counts[0]} of {len(common)} frequencies at ξ = 0.01, at "
+                f"{counts[1]} at ξ = 0.001"
+            )
         return smaller, "; ".join(texts)
 
     def with_damping(self, flips: Finding) -> Finding:
         """The claim on the damping: fewer flips, and smaller chaotic ranges."""
         smaller, text = self.damping()
         note = flips.note.partition(";")[0] + (
-            "; chaotic frequencies from 18 to 90 Hz, lasting where more than half of the motions "
-            f"from states of it are chaotic for {ELSEWHERE[1]} periods more"
+            f"; chaotic frequencies in sweeps up from {RANGE_HZ[0]:g} to {RANGE_HZ[1]:g} Hz in "
+            f"steps of {STEP_HZ:g} Hz"
         )
         return replace(
             flips, holds=bool(flips.holds) and smaller, text=f"{flips.text}; {text}", note=note
         )
-
-
-def _step(found: BruteForce) -> float:
-    """Distance of neighbouring frequencies in Hz."""
-    return (RANGE_HZ[1] - RANGE_HZ[0]) / (found.share(*RANGE_HZ)[1] - 1)
 
 
 def published_ranges(text: str) -> list[tuple[float, float]]:
@@ -158,8 +193,105 @@ def published_ranges(text: str) -> list[tuple[float, float]]:
     return [(float(low), float(high)) for low, high in ends]
 
 
-def _settling(lives: Sequence[ChaosLifetime]) -> str:
+@cache
+def claimed_ranges(model: str) -> tuple[tuple[float, float], ...]:
+    """Ends in Hz of the ranges in which the paper finds a model chaotic."""
+    texts = [row["published"] for row in published_claims() if CLAIMS.get(row["id"]) == model]
+    return tuple(ends for text in texts for ends in published_ranges(text))
+
+
+def frequencies_hz(model: str) -> tuple[list[float], list[float]]:
+    """Frequencies at which a model is swept up, and those at which it is swept down, too."""
+    low, high = RANGE_HZ
+    ends = claimed_ranges(model)
+    claimed = [np.arange(a, b + 0.5 * CLAIMED_STEP_HZ, CLAIMED_STEP_HZ).tolist() for a, b in ends]
+    down = sorted(hz for part in claimed for hz in part)
+    up = np.arange(low, high + 0.5 * STEP_HZ, STEP_HZ).tolist()
+    return sorted({*up, *down}), down
+
+
+def piece_name(model: str, piece: int) -> str:
+    """Name of what is swept of a model in one go."""
+    return f"chaos_{model}_{piece}"
+
+
+def sweep_piece(model: str, piece: int, progress: Progress) -> list[dict[str, Any]]:
+    """Sweep a model up, then down, between two of `EDGES_HZ`; see how long its chaos lasts.
+
+    Chaos is followed where the paper says so, at each frequency from the first chaotic motion.
+    """
+    low, high = EDGES_HZ[piece : piece + 2]
+    up, down = ([hz for hz in ways if low < hz < high] for ways in frequencies_hz(model))
+    flow = flow_of(scene_system(model))
+    followed: set[float] = set()
+    found = []
+    ways: tuple[tuple[Way, list[float]], ...] = (("up", up), ("down", down[::-1]))
+    for way, frequencies in ways:
+        for attractor in _swept(flow, frequencies):
+            hz = attractor.frequency_hz
+            progress("chaos", hz, len(found) / (len(up) + len(down)))
+            ended: tuple[int, ...] = ()
+            if attractor.kind == "chaotic" and hz in down and hz not in followed:
+                followed.add(hz)
+                ended = tuple(chaos_lifetime(attractor, states=STATES, periods=LASTING).ended)
+            largest = attractor.largest_exponent
+            settled = Settled(hz, way, attractor.kind, *largest, tuple(map(int, ended)))
+            found.append(asdict(settled))
+    return found
+
+
+def _swept(flow: FlowMap, frequencies: Sequence[float]) -> Iterator[Attractor]:
+    """What motions settle on, each from the end of the one before."""
+    state = np.zeros(2 * flow.system.size)
+    observe = check_observe(flow.system, None)
+    for hz in frequencies:
+        attractor = attractor_from(flow, hz, observe, EFFORT, state)
+        failed = attractor.kind == "failed"
+        state = np.zeros_like(state) if failed else attractor.states[-1]
+        yield attractor
+
+
+def kept_piece(model: str, piece: int, folder: Path, progress: Progress) -> list[dict[str, Any]]:
+    """As `sweep_piece`, unless the folder keeps it."""
+    path = folder / f"{piece_name(model, piece)}.json"
+    found: list[dict[str, Any]] = kept_numbers(path, lambda: sweep_piece(model, piece, progress))
+    return found
+
+
+def tasks_of_chaos(folder: Path) -> tuple[Task, ...]:
+    """What is to be swept; the folder keeps it."""
+    return tuple(
+        Task(piece_name(model, piece), kept_piece, (model, piece, folder), _weight(model, piece))
+        for model in MODELS
+        for piece in range(len(EDGES_HZ) - 1)
+    )
+
+
+def _weight(model: str, piece: int) -> float:
+    """Periods that are simulated, in thousands, if half of the motions are chaotic."""
+    low, high = EDGES_HZ[piece : piece + 2]
+    up, down = (sum(low < hz < high for hz in ways) for ways in frequencies_hz(model))
+    return 1.5 * (up + down) + 1e-3 * STATES * LASTING * down / 2
+
+
+def joined_chaos(values: Mapping[str, Any]) -> Chaos:
+    """The pieces that were swept, together."""
+    pieces = range(len(EDGES_HZ) - 1)
+    swept = {
+        model: [_settled(s) for piece in pieces for s in values[piece_name(model, piece)]]
+        for model in MODELS
+    }
+    return Chaos(swept)
+
+
+def _settled(values: Mapping[str, Any]) -> Settled:
+    """As `sweep_piece` wrote it."""
+    return Settled(**{**values, "ended": tuple(values["ended"])})
+
+
+def _settling(within: Sequence[Settled]) -> str:
     """How long chaos lasts where some of the motions settle, in words."""
+    lives = [s.lifetime for s in within if s.ended]
     ending = [life.lifetime for life in lives if life.settled]
     if not ending:
         return ""
@@ -168,81 +300,13 @@ def _settling(lives: Sequence[ChaosLifetime]) -> str:
     return f" (some motions settle at {len(ending)} {many}, after {ends} periods in the mean)"
 
 
-def _typical(found: BruteForce, low: float, high: float) -> str:
-    """The median chaotic exponent in a range with its error, in words."""
-    values = [
-        c.attractor.largest_exponent
-        for c in found.columns
-        if c.attractor.kind == "chaotic" and low <= c.frequency_hz <= high
-    ]
+def _typical(within: Sequence[Settled]) -> str:
+    """The median chaotic exponent with its error, in words."""
+    values = sorted((s.exponent, s.error) for s in within if s.chaotic)
     if not values:
         return ""
-    value, error = sorted(values)[len(values) // 2]
+    value, error = values[len(values) // 2]
     return f" (median exponent {value:.3g} ± {error:.1g} 1/s)"
-
-
-def _swept(points: int, task: Task) -> BruteForce:
-    model, direction = task
-    return brute_force(
-        scene_system(model), RANGE_HZ, points=points, directions=[direction], recorded=1,
-        options=EFFORT,
-    )  # fmt: skip
-
-
-def chaotic_places(diagrams: Mapping[str, BruteForce]) -> dict[tuple[str, float], Attractor]:
-    """A chaotic attractor at each frequency that has one, by its model and the frequency in Hz."""
-    found: dict[tuple[str, float], Attractor] = {}
-    for model, diagram in diagrams.items():
-        for column in diagram.columns:
-            if column.attractor.kind == "chaotic":
-                found.setdefault((model, round(column.frequency_hz, 9)), column.attractor)
-    return dict(sorted(found.items()))
-
-
-def effort_at(model: str, frequency_hz: float) -> tuple[int, int]:
-    """How many motions are followed, and for how many periods: more where the paper says chaos."""
-    inside = any(low <= frequency_hz <= high for low, high in claimed_ranges(model))
-    return CLAIMED if inside else ELSEWHERE
-
-
-@cache
-def claimed_ranges(model: str) -> tuple[tuple[float, float], ...]:
-    """Ends in Hz of the ranges in which the paper finds a model chaotic."""
-    texts = [row["published"] for row in published_claims() if CLAIMS.get(row["id"]) == model]
-    return tuple(ends for text in texts for ends in published_ranges(text))
-
-
-def submit_sweeps(workers: Workers, points: int = POINTS) -> dict[Task, Future[BruteForce]]:
-    """Begin to sweep all models up and down."""
-    tasks: list[Task] = [(model, way) for model in MODELS for way in get_args(Way)]
-    return {
-        (model, way): workers.submit(f"sweep_{way}_{model}_{points}", _swept, points, (model, way))
-        for model, way in tasks
-    }
-
-
-def chaos_of(halves: Mapping[Task, BruteForce], workers: Workers) -> Chaos:
-    """Join the sweeps up and down, and see how chaos lasts."""
-    diagrams = {
-        model: BruteForce(
-            halves[model, "up"].observe,
-            halves[model, "up"].columns + halves[model, "down"].columns,
-        )
-        for model in MODELS
-    }
-    futures = {}
-    for (model, hz), attractor in chaotic_places(diagrams).items():
-        futures[model, hz] = workers.submit(
-            f"lifetime_{model}_{hz:.9g}", _lifetime, attractor, *effort_at(model, hz)
-        )
-    lifetimes: dict[str, list[ChaosLifetime]] = {model: [] for model in MODELS}
-    for (model, _), life in workers.values(futures, "times that chaos lasts").items():
-        lifetimes[model].append(life)
-    return Chaos(diagrams, lifetimes)
-
-
-def _lifetime(attractor: Attractor, states: int, periods: int) -> ChaosLifetime:
-    return chaos_lifetime(attractor, states=states, periods=periods)
 
 
 def write_chaos_figure(chaos: Chaos, folder: Path) -> None:
@@ -252,8 +316,7 @@ def write_chaos_figure(chaos: Chaos, folder: Path) -> None:
     axes = figure.subplots(2, 1, sharex=True)
     for ax, (model, name) in zip(axes, NAMES.items(), strict=True):
         for xi, colour in DAMPINGS.items():
-            scene = f"{model}_xi_{xi}"
-            _draw(ax, chaos.diagrams[scene], chaos.transients(scene), f"ξ = {xi}", colour)
+            _draw(ax, chaos.swept[f"{model}_xi_{xi}"], f"ξ = {xi}", colour)
         ax.axhline(0.0, color="0.4", linewidth=0.8)
         ax.set_ylabel("largest exponent (1/s)")
         ax.set_title(name)
@@ -263,21 +326,17 @@ def write_chaos_figure(chaos: Chaos, folder: Path) -> None:
     save_figure(axes[0], folder / FIGURE)
 
 
-def _draw(
-    ax: Axes, found: BruteForce, transients: Collection[float], label: str, colour: str
-) -> None:
+def _draw(ax: Axes, swept: Sequence[Settled], label: str, colour: str) -> None:
+    """Draw the larger of the exponents at each frequency."""
     largest: dict[float, tuple[float, float]] = {}
-    for column in found.columns:
-        value, error = column.attractor.largest_exponent
-        if math.isfinite(value):
-            hz = column.frequency_hz
-            largest[hz] = max((value, error), largest.get(hz, (-math.inf, 0.0)))
+    for settled in swept:
+        if math.isfinite(settled.exponent):
+            here = settled.exponent, settled.error
+            before = largest.get(settled.frequency_hz, (-math.inf, 0.0))
+            largest[settled.frequency_hz] = max(here, before)
     frequencies = sorted(largest)
-    values = np.array([largest[hz] for hz in frequencies])
+    values = np.array([largest[hz] for hz in frequencies]).reshape(-1, 2)
     ax.errorbar(
         frequencies, *values.T, color=colour, label=label, linewidth=0.8, elinewidth=0.8,
         marker=".", markersize=4.0,
     )  # fmt: skip
-    ended = [hz for hz in frequencies if any(math.isclose(hz, other) for other in transients)]
-    heights = [largest[hz][0] for hz in ended]
-    ax.plot(ended, heights, "o", color=colour, markersize=5.0, markerfacecolor="white", zorder=3)

@@ -120,7 +120,7 @@ def _third_folds(results: Results) -> Finding:
 
 
 def _flips(results: Results) -> Finding:
-    branches = list(results["one_dof"].branches)
+    branches = [b for b in results["one_dof"].branches if b.period <= 3]  # not the doubled ones
     branches += [b for b in results["one_dof.listed"].branches if b.period > 1]
     without = [f"1/{b.period} near {b.frequency_hz.mean():.1f} Hz" for b in branches
                if len(special(b, "PD")) < 2]  # fmt: skip

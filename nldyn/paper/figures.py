@@ -12,6 +12,7 @@ from nldyn.branches.branch import Branch
 from nldyn.orbits.orbit import Orbit
 from nldyn.paper.chaos import CAPTION, FIGURE, SHADED, Chaos
 from nldyn.paper.evidence import orbits_at
+from nldyn.paper.jobs import is_wide
 from nldyn.plot.diagram import new_axes_pair, plot_diagram, plot_orbit, save_figure
 from nldyn.plot.longterm import shade_ranges
 from nldyn.search.diagram import Diagram
@@ -33,7 +34,7 @@ CAPTIONS = {
     FIGURE: CAPTION,
 }
 
-# The computations that a diagram shows; the first one's range is that of its harmonic branches.
+# The computations that a diagram shows.
 SHOWN = {
     "figure_2": ("one_dof", "one_dof.listed"),
     "figure_4": ("two_dof_xi_0.01",),
@@ -45,11 +46,20 @@ SHOWN = {
 
 def title(name: str, results: Results) -> str:
     """The caption of a figure, with the range that was computed if it is a diagram."""
-    job = SHOWN.get(name, ("",))[0]
-    if job not in results:
+    branches = shown(name, results)
+    if not branches:
         return CAPTIONS[name]
-    low, high = results[job].range_hz
-    return f"{CAPTIONS[name]}, computed from {low:g} to {high:g} Hz"
+    low = min(float(branch.frequency_hz.min()) for branch in branches)
+    return f"{CAPTIONS[name]}, computed from {low:.3g} to 90 Hz"
+
+
+def shown(name: str, results: Results) -> list[Branch]:
+    """Branches of a figure: the harmonic ones, the wide subharmonic ones and all doubled ones."""
+    found = [branch for job in SHOWN.get(name, ()) if job in results
+             for branch in results[job].branches]  # fmt: skip
+    if name == "figure_2":
+        return found
+    return [b for b in found if b.period not in (2, 3) or is_wide(b)]
 
 
 def legend_text(name: str) -> str:
@@ -66,8 +76,7 @@ def legend_text(name: str) -> str:
 def write_figures(results: Results, folder: Path, chaos: Chaos | None = None) -> None:
     """Write all figures to a folder; those of the larger models with their chaotic ranges."""
     for name, jobs in SHOWN.items():
-        branches = [branch for job in jobs for branch in results[job].branches]
-        ax = _diagram(branches, title(name, results))
+        ax = _diagram(shown(name, results), title(name, results))
         if chaos is not None:
             shade_ranges(ax, chaos.ranges(name))
         if name in DASHED:

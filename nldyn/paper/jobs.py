@@ -1,29 +1,42 @@
-"""The diagrams behind the figures."""
+"""The diagrams behind the figures: what the paper shows, and no more."""
 
 from __future__ import annotations
 
-from collections import Counter
+import math
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 import cms
 from nldyn.base.resources import example
-from nldyn.branches.continuation import broken_off
+from nldyn.branches.branch import Branch
 from nldyn.branches.options import ContinuationOptions
-from nldyn.paper.starts import follow_starts, keep_numbers, longest_whole, read_starts
-from nldyn.paper.workers import Workers, tell
-from nldyn.runtime.progress import Progress
+from nldyn.flow.flow_map import flow_of
+from nldyn.longterm.attractors import AttractorOptions, classify
+from nldyn.orbits.orbit import check_observe
+from nldyn.orbits.starts import orbit_near
+from nldyn.paper.kept import kept_diagram
+from nldyn.paper.starts import LOST, is_at, keep_numbers, read_starts
+from nldyn.paper.workers import Task
+from nldyn.runtime.compilation import compilations
+from nldyn.runtime.progress import Progress, silent
 from nldyn.scene.build import build_component, build_system, load_scene
-from nldyn.search.diagram import Diagram, Seed, diagram, notes_on_ends
-from nldyn.search.fixed_point_index import index_note
+from nldyn.search.diagram import Collector, Diagram, Seed, diagram
 from nldyn.system.elements import Stop
 from nldyn.system.system import System
 
 BILINEAR_ALPHA = 790.0  # section 3, from equation 3.2
 STIFFNESS = 16877.0  # N/m, section 3
 HERTZ_STIFFNESS = 5.17e9  # N/m^1.5, half of what sections 2 and 3 print for the whole beam
+LOWEST_HZ = 5.0
+WIDE_HZ = 4.0  # width of the subharmonic branches that the figures show
+
+FINE = ContinuationOptions()
+# Steps as long as smooth curves and the special points allow. A branch that is cut off by
+# max_points would be found and followed again from the next orbit.
+COARSE = ContinuationOptions(max_angle=0.3, max_miss=0.2, grazing_step=0.02, max_points=6000)
 
 
 @dataclass(frozen=True)
@@ -44,11 +57,16 @@ class Job:
         Further orbits to look for.
     search_points : int
         Frequencies searched.
-    options : ContinuationOptions, optional
+    options : ContinuationOptions
         Step control.
-    doubled : (int, int), optional
-        If given, the branches through the starts that the search of this model gave, and doubled
-        ones as `follow_starts` says.
+    quarters_hz : float, optional
+        Frequency from which on flips of wide 1/2 branches are followed to 1/4 branches.
+    starts : tuple of (int, float)
+        Period multiples, and for each the frequency in Hz from which on kept starts are followed
+        (in the range; the harmonic branches reach down to `LOWEST_HZ`). If there are any, nothing
+        is searched.
+    weight : float
+        Time that it takes, in proportion to others.
     """
 
     name: str
@@ -57,75 +75,10 @@ class Job:
     periods: tuple[int, ...] = (1,)
     seeds: tuple[Seed, ...] = ()
     search_points: int = 12
-    options: ContinuationOptions | None = None
-    doubled: tuple[int, int] | None = None
-
-    @property
-    def families(self) -> tuple[int, ...]:
-        """Odd parts of the periods of its starts; no branch of one leads to one of another."""
-        if self.doubled is None:
-            return (1,)
-        return tuple(sorted({odd_part(start.period) for start in read_starts(self.name)}))
-
-    def run(self, family: int, folder: Path, progress: Progress | None = None) -> Diagram:
-        """Compute the diagram, or of one with starts the branches of one family.
-
-        The folder keeps what each start leads to.
-        """
-        if self.doubled is not None:
-            starts = [s for s in read_starts(self.name) if odd_part(s.period) == family]
-            return follow_starts(
-                self.system(),
-                starts,
-                self.range_hz,
-                LONG,
-                self.doubled,
-                progress,
-                keep_at=lambda number: folder / f"{self.name}.{family}.{number}.pickle",
-            )
-        found = diagram(
-            self.system(),
-            self.range_hz,
-            self.periods,
-            seeds=self.seeds,
-            search_points=self.search_points,
-            options=self.options,
-            progress=progress,
-        )
-        keep_numbers(found.branches)
-        return found
-
-
-def odd_part(period: int) -> int:
-    """A period without its factors of two, which flips add."""
-    return period // (period & -period)
-
-
-def joined(parts: Mapping[tuple[str, int], Diagram]) -> dict[str, Diagram]:
-    """The diagrams of some jobs, from those of their families."""
-    return {name: _whole(name, parts) for name in dict.fromkeys(name for name, _ in parts)}
-
-
-def _whole(name: str, parts: Mapping[tuple[str, int], Diagram]) -> Diagram:
-    """The diagram of a job from those of its families, with what all of them together tell."""
-    first, *others = (part for (job, _), part in parts.items() if job == name)
-    doubled = job_named(name).doubled
-    if doubled is None:
-        return first
-    both = (first, *others)
-    branches = tuple(branch for part in both for branch in part.branches)
-    notes = tuple(note for part in both for note in part.notes)
-    found = replace(first, branches=branches, notes=notes)
-    told = index_note(branches, first.range_hz, longest_whole(doubled[0]))
-    return replace(found, notes=(*_summed_up(found), told))
-
-
-def _summed_up(found: Diagram) -> list[str]:
-    """How many ends of branches were broken off for which reason, and all other notes."""
-    reasons = Counter(reason for branch in found.branches for _, reason in broken_off(branch))
-    each = {note for branch in found.branches for note in notes_on_ends(branch)}
-    counted = [f"{n} ends of branches broken off: {why}" for why, n in reasons.items()]
-    return counted + [note for note in found.notes if note not in each]
+    options: ContinuationOptions = FINE
+    quarters_hz: float | None = None
+    starts: tuple[tuple[int, float], ...] = ()
+    weight: float = 1.0
 
 
 def scene_system(name: str) -> System:
@@ -168,24 +121,34 @@ LISTED = (
     Seed(10, 83.0), Seed(3, 18.4), Seed(5, 31.0), Seed(9, 56.0), Seed(13, 81.0),
 )  # fmt: skip
 
-# Branches of the larger models are long. One that is cut off by max_points would be found and
-# followed again from the next orbit.
-LONG = ContinuationOptions(max_points=20000)
-
-# Flips are followed to period 8. Branches of period 6 and 8, whose own flips are not, have up to 25
-# points each way; those of the model with several thousand flips up to 10.
-DOUBLED, MANY_DOUBLED = (8, 25), (8, 10)
-
-JOBS = (
-    Job("four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (18.0, 90.0), doubled=MANY_DOUBLED),
-    Job("two_dof_xi_0.01", _scene("two_dof_xi_0.01"), (15.0, 90.0), doubled=DOUBLED),
-    Job("two_dof_xi_0.001", _scene("two_dof_xi_0.001"), (18.0, 90.0), doubled=DOUBLED),
-    Job("four_dof_xi_0.01", _scene("four_dof_xi_0.01"), (15.0, 90.0), doubled=DOUBLED),
-    Job("one_dof.listed", _scene("one_dof"), (5.0, 90.0), (), LISTED),
-    Job("one_dof", _scene("one_dof"), (5.0, 90.0), (1, 2), (Seed(3, 76.0),)),
-    Job("five_dof_xi_0.01", five_dof_system, (15.0, 90.0), search_points=6),
-    Job("two_dof.undamped", undamped_system, (20.0, 60.0), (1,), search_points=6),
-    Job("two_dof.bilinear", bilinear_system, (22.0, 70.0), (1,), search_points=6),
+JOBS: tuple[Job, ...] = (
+    Job(
+        "four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (18.0, 90.0), options=COARSE,
+        starts=((1, 18.0), (2, 36.0), (3, 49.0)), quarters_hz=44.0, weight=90.0,
+    ),
+    Job(
+        "four_dof_xi_0.01", _scene("four_dof_xi_0.01"), (15.0, 90.0), options=COARSE,
+        starts=((1, 15.0), (2, 15.0), (3, 15.0)), quarters_hz=36.0, weight=80.0,
+    ),
+    Job(
+        "two_dof_xi_0.001", _scene("two_dof_xi_0.001"), (18.0, 90.0), options=COARSE,
+        starts=((1, 18.0), (2, 18.0), (3, 18.0)), quarters_hz=36.0, weight=80.0,
+    ),
+    Job(
+        "two_dof_xi_0.01", _scene("two_dof_xi_0.01"), (15.0, 90.0), options=COARSE,
+        starts=((1, 15.0), (2, 15.0), (3, 15.0)), quarters_hz=36.0, weight=50.0,
+    ),
+    Job("one_dof.listed", _scene("one_dof"), (5.0, 90.0), (), LISTED, weight=20.0),
+    Job(
+        "one_dof", _scene("one_dof"), (5.0, 90.0), (1, 2), (Seed(3, 76.0),), quarters_hz=36.0,
+        weight=15.0,
+    ),
+    Job(
+        "five_dof_xi_0.01", five_dof_system, (18.0, 70.0), search_points=3, options=COARSE,
+        weight=15.0,
+    ),
+    Job("two_dof.undamped", undamped_system, (20.0, 60.0), (1,), search_points=3, weight=8.0),
+    Job("two_dof.bilinear", bilinear_system, (22.0, 70.0), (1,), search_points=3, weight=8.0),
     Job(
         "two_dof.sub14",
         _scene("two_dof_xi_0.001"),
@@ -193,8 +156,12 @@ JOBS = (
         (),
         (Seed(14, 56.75), Seed(14, 57.0)),
         options=ContinuationOptions(max_points=150),
+        weight=10.0,
     ),
-    Job("two_dof.high", _scene("two_dof_xi_0.01"), (60.0, 135.0), (1,), search_points=4),
+    Job(
+        "two_dof.high", _scene("two_dof_xi_0.01"), (60.0, 135.0), (1,), search_points=3,
+        weight=5.0,
+    ),
 )
 
 
@@ -203,28 +170,80 @@ def job_named(name: str) -> Job:
     return next(job for job in JOBS if job.name == name)
 
 
-def run_job(name: str, family: int, folder: Path) -> Diagram:
-    """Compute a family of a job (in a worker process), with what the figures need of it.
+def tasks_of(jobs: Sequence[Job], folder: Path) -> tuple[Task, ...]:
+    """What is to be computed of some jobs; the folder keeps it."""
+    return tuple(Task(job.name, run_job, (job.name, folder), job.weight) for job in jobs)
 
-    The folder keeps what an interrupted run has computed.
-    """
+
+def run_job(name: str, folder: Path, progress: Progress) -> Diagram:
+    """Compute a job unless the folder keeps it, with what the figures and checks need of it."""
     job = job_named(name)
-
-    def progress(what: str, frequency_hz: float, done: float) -> None:
-        tell(f"{name}: {what}", frequency_hz)
-
-    return job.run(family, folder, progress)
+    found = kept_diagram(folder / f"{name}.h5", lambda: computed(job, progress))
+    keep_numbers(found.branches)
+    return found
 
 
-def submit_diagrams(
-    workers: Workers, jobs: Sequence[Job] = JOBS
-) -> dict[tuple[str, int], Future[Diagram]]:
-    """Begin each family of some jobs, the longest jobs first; see `joined`."""
-    scene_system("one_dof")  # fail early, before any process is started
-    return {
-        (job.name, family): workers.submit(
-            f"{job.name}.{family}", run_job, job.name, family, workers.folder
+def computed(job: Job, progress: Progress = silent) -> Diagram:
+    """The diagram of a job."""
+    system = job.system()
+    found = (
+        follow_kept(job, system, progress)
+        if job.starts
+        else diagram(
+            system,
+            job.range_hz,
+            job.periods,
+            seeds=job.seeds,
+            search_points=job.search_points,
+            options=job.options,
+            progress=progress,
         )
-        for job in jobs
-        for family in job.families
-    }
+    )
+    return found if job.quarters_hz is None else with_quarters(found, job, system, progress)
+
+
+def with_quarters(found: Diagram, job: Job, system: System, progress: Progress) -> Diagram:
+    """A diagram with the 1/4 branches that are born at flips of its wide 1/2 branches."""
+    box = Collector(flow_of(system), job.range_hz, found.observe, job.options, progress, done=0.9)
+    box.take(found.branches, found.notes)
+    for branch in box.of_period(2):
+        for special in branch.special_points if is_wide(branch) else ():
+            if special.kind == "PD" and special.frequency_hz >= (job.quarters_hz or 0.0):
+                box.from_flip(special)
+    return replace(found, branches=tuple(box.branches), notes=tuple(box.notes))
+
+
+def follow_kept(job: Job, system: System, progress: Progress) -> Diagram:
+    """Follow the branches through the kept starts of a job."""
+    low, high = job.range_hz
+    flow, observe = flow_of(system), check_observe(system, None)
+    box = Collector(flow, (low, high), observe, job.options, progress)
+    lowest = dict(job.starts)
+    starts = [s for s in read_starts(job.name) if s.frequency_hz >= lowest.get(s.period, math.inf)]
+    for number, start in enumerate(starts):
+        box.done = number / len(starts)
+        box.range_hz = (LOWEST_HZ if start.period == 1 else low, high)
+        orbit = orbit_near(flow, start.state, start.period, start.omega, observe)
+        if orbit is not None and orbit.period == start.period and is_at(orbit, start.state):
+            box.from_orbits([orbit])
+        else:
+            box.notes.append(f"{LOST} {start.period} at {start.frequency_hz:.6g} Hz")
+    return Diagram(tuple(box.branches), (low, high), observe, tuple(box.notes))
+
+
+def is_wide(branch: Branch) -> bool:
+    """Whether a branch reaches over so many frequencies that the figures show it."""
+    return bool(np.ptp(branch.frequency_hz) >= WIDE_HZ)
+
+
+def diagrams_of(values: Mapping[str, object]) -> dict[str, Diagram]:
+    """The diagrams among the values of tasks, by their names."""
+    return {name: found for name, found in values.items() if isinstance(found, Diagram)}
+
+
+def compile_kernels(quiet: bool = False) -> None:
+    """Compute a little of all kinds, so that the kernels are compiled once, for all processes."""
+    with compilations.silenced(quiet):
+        system = scene_system("one_dof")
+        diagram(system, (33.0, 34.5), (1, 2), search_points=1)
+        classify(system, 36.0, options=AttractorOptions(periods=32))

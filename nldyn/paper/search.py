@@ -32,7 +32,8 @@ from nldyn.io.checkpoint import CheckpointFile
 from nldyn.io.store import save
 from nldyn.orbits.homotopy import checked_factors
 from nldyn.orbits.starts import MOST_COUNT
-from nldyn.paper.jobs import JOBS, LONG, Job, job_named
+from nldyn.paper.atlas import CHARTS, LONG, Chart, chart_named
+from nldyn.paper.jobs import scene_system
 from nldyn.paper.starts import LONGEST, Start, follow_starts, read_starts, starts_path, write_starts
 from nldyn.report.console import plain_errors, told_what_is_kept
 from nldyn.runtime.files import write_whole
@@ -54,7 +55,7 @@ WAYS: dict[str, Callable[..., Diagram]] = {  # searches beside known branches, b
     "crossover": by_crossover,
     "closed_walks": by_closed_walks,
 }
-MODELS = tuple(job.name for job in JOBS if job.doubled)
+MODELS = tuple(chart.name for chart in CHARTS)
 
 
 def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Exploration:
@@ -62,18 +63,18 @@ def search(name: str, folder: Path, effort: ExploreOptions = EFFORT) -> Explorat
 
     The states at random differ between searches, also of those that begin beside the same starts.
     """
-    job = job_named(name)
+    chart = chart_named(name)
     with progress_line() as report:
-        known, place, seed = known_branches(job, folder, report)
+        known, place, seed = known_branches(chart, folder, report)
         kept, ended = place.with_suffix(".searched.h5"), place.with_suffix(".searches.csv")
         before = ended.read_text(encoding="utf-8") if ended.exists() else "seed,new branches\n"
         effort = replace(effort, seed=seed + before.count("\n"))
         with told_what_is_kept(kept):
             found = explore(
-                job.system(), job.range_hz, LONGEST, effort=effort, options=LONG,
+                scene_system(chart.name), chart.range_hz, LONGEST, effort=effort, options=LONG,
                 known=known, progress=report, checkpoint=CheckpointFile(kept),
             )  # fmt: skip
-    write_found(found.diagram, job, folder)
+    write_found(found.diagram, chart, folder)
     line = f"{effort.seed},{len(found.diagram.branches) - found.stage.given}\n"
     write_whole(ended, (before + line).encode())
     kept.unlink(missing_ok=True)
@@ -88,50 +89,50 @@ def search_by_detour(name: str, folder: Path, factors: Mapping[str | Parameter, 
 
 def _search_beside(name: str, folder: Path, way: str, look: Callable[..., Diagram]) -> Diagram:
     """Look for branches of a model beside the known ones, and write the starts of all."""
-    job = job_named(name)
+    chart = chart_named(name)
     with progress_line() as report:
-        known, place, _ = known_branches(job, folder, report)
+        known, place, _ = known_branches(chart, folder, report)
         kept = place.with_suffix(f".{way}.h5")
         with told_what_is_kept(kept):
             found = look(known, options=LONG, progress=report, checkpoint=CheckpointFile(kept))
     if len(found.branches) > len(known.branches) or not starts_path(name, folder).exists():
-        write_found(found, job, folder)
+        write_found(found, chart, folder)
     kept.unlink(missing_ok=True)
     return found
 
 
-def known_branches(job: Job, folder: Path, progress: Progress) -> tuple[Diagram, Path, int]:
+def known_branches(chart: Chart, folder: Path, progress: Progress) -> tuple[Diagram, Path, int]:
     """Branches that the starts known lead to, their file, and a number made of these starts."""
-    path = starts_path(job.name, folder)
-    starts = read_starts(job.name, folder) if path.exists() else read_starts(job.name)
-    place, seed = branches_path(job, folder, starts)
+    path = starts_path(chart.name, folder)
+    starts = read_starts(chart.name, folder) if path.exists() else read_starts(chart.name)
+    place, seed = branches_path(chart, folder, starts)
     if not place.exists():
         doubled = (LONGEST, LONG.max_points)
-        system = job.system()
-        known = follow_starts(system, starts, job.range_hz, LONG, doubled, progress, whole=True)
+        system = scene_system(chart.name)
+        known = follow_starts(system, starts, chart.range_hz, LONG, doubled, progress, whole=True)
         save(known, place)
     known = load_diagram(place)
-    if not _is_of(known, job):
+    if not _is_of(known, chart):
         raise SystemModelError(f"{folder}: {place.stem}* are of another model; delete them")
     return known, place, seed
 
 
-def write_found(found: Diagram, job: Job, folder: Path) -> None:
+def write_found(found: Diagram, chart: Chart, folder: Path) -> None:
     """Write the starts of branches, and the branches for the next search."""
-    write_starts(starts_path(job.name, folder), found.branches)
-    save(found, branches_path(job, folder, read_starts(job.name, folder))[0])
+    write_starts(starts_path(chart.name, folder), found.branches)
+    save(found, branches_path(chart, folder, read_starts(chart.name, folder))[0])
 
 
-def branches_path(job: Job, folder: Path, starts: Sequence[Start]) -> tuple[Path, int]:
+def branches_path(chart: Chart, folder: Path, starts: Sequence[Start]) -> tuple[Path, int]:
     """File of the branches through some starts, named after these, and a number made of them."""
     texts = [f"{s.period} {s.frequency_hz!r} {s.state.tolist()}" for s in starts]
     digest = hashlib.sha256("\n".join(texts).encode()).hexdigest()[:12]
-    return folder / f"{job.name}.{digest}.h5", int(digest, 16)
+    return folder / f"{chart.name}.{digest}.h5", int(digest, 16)
 
 
-def _is_of(found: Diagram, job: Job) -> bool:
+def _is_of(found: Diagram, chart: Chart) -> bool:
     """Whether branches are of the model as it is now."""
-    flow = flow_of(job.system())
+    flow = flow_of(scene_system(chart.name))
     return all(same_flow(branch.points[0].problem.flow, flow) for branch in found.branches)
 
 
@@ -259,13 +260,13 @@ def main() -> None:
     names = given.models or MODELS
     for name in names if factors else ():
         try:
-            checked_factors(job_named(name).system(), factors)
+            checked_factors(chart_named(name).system(), factors)
         except SystemModelError as error:
             parser.error(f"argument --detour: {name}: {error}")
     try:
         numbers = numbers_of(given)
         for name in names:
-            range_within(job_named(name).range_hz, numbers.get("range_hz"))
+            range_within(chart_named(name).range_hz, numbers.get("range_hz"))
     except SystemModelError as error:
         parser.error(str(error))
     for option in ("range", "periods", "spacing", "tries"):

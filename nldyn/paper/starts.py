@@ -21,10 +21,11 @@ from nldyn.base.errors import SystemModelError, check_frequency, check_whole, nu
 from nldyn.branches.branch import Branch
 from nldyn.branches.options import ContinuationOptions
 from nldyn.flow.flow_map import flow_of
+from nldyn.io.store import save
 from nldyn.orbits.orbit import Orbit, check_observe, stroboscopic
 from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.orbits.starts import orbit_near
-from nldyn.paper.kept import keep, read_kept
+from nldyn.paper.kept import read_diagram
 from nldyn.runtime.files import write_whole
 from nldyn.runtime.progress import Progress, silent
 from nldyn.search.diagram import Collector, Diagram, middle_orbit
@@ -33,6 +34,7 @@ from nldyn.system.system import System
 DATA = Path(__file__).parent / "data"
 LONGEST = 3  # period of the orbits looked for
 AT_START = 1e-6  # largest relative distance of an orbit from its start
+LOST = "no orbit leads on from the start of period"
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +54,11 @@ class Start:
     period: int
     frequency_hz: float
     state: Real
+
+    @property
+    def omega(self) -> float:
+        """Excitation frequency in rad/s."""
+        return 2.0 * math.pi * self.frequency_hz
 
 
 def read_starts(name: str, folder: Path = DATA) -> list[Start]:
@@ -129,8 +136,9 @@ def follow_starts(
     whole : bool
         Whether the branches are to be followed any further; if not, see `keep_numbers`.
     keep_at : callable, optional
-        Gives the file that keeps what the start of a number leads to. What an interrupted run of
-        the same system, starts and options has kept there is taken from it.
+        Gives the file that keeps what the start of a number leads to, as `Diagram.save` writes it.
+        What an interrupted run of the same system, starts and options has kept there is taken from
+        it.
 
     Returns
     -------
@@ -142,6 +150,8 @@ def follow_starts(
     ------
     SystemModelError
         If a state is not one of the system.
+    OutputError
+        If a file cannot be written.
     """
     flow = flow_of(system)
     for number, start in enumerate(starts, 1):
@@ -156,55 +166,36 @@ def follow_starts(
     for number, start in enumerate(starts):
         box.done = number / len(starts)
         path = keep_at(number) if keep_at else None
-        found: Followed | None = read_kept(path) if path else None
+        found = read_diagram(path) if path else None
         if found is not None:
             box.take_back(found.branches, found.notes)
         else:
-            found = _follow(box, start, doubled, whole)
+            found = _follow(box, start, doubled)
             if path:
-                keep(path, found)
-        lost += found.lost
+                save(found, path)
+        if not whole:
+            keep_numbers(found.branches)
+        lost += any(note.startswith(LOST) for note in found.notes)
     periods = ", ".join(map(str, sorted({start.period for start in starts})))
     what = f"{lost} of which {'is no orbit' if lost == 1 else 'are no orbits'}"
     note = f"from {len(starts)} starts of period {periods}, {what if lost else 'each an orbit'}"
     return Diagram(tuple(box.branches), range_hz, observe, (note, *box.notes))
 
 
-@dataclass(frozen=True)
-class Followed:
-    """What a start leads to.
-
-    Parameters
-    ----------
-    branches : tuple of Branch
-        Not known from the starts before.
-    notes : tuple of str
-        On them.
-    lost : bool
-        Whether it is no orbit.
-    """
-
-    branches: tuple[Branch, ...]
-    notes: tuple[str, ...]
-    lost: bool
-
-
-def _follow(box: Collector, start: Start, doubled: tuple[int, int], whole: bool) -> Followed:
+def _follow(box: Collector, start: Start, doubled: tuple[int, int]) -> Diagram:
     """Follow the branch of a start and those that it leads to, see `follow_starts`."""
     longest, most = doubled
     count, told = len(box.branches), len(box.notes)
-    omega = 2.0 * math.pi * start.frequency_hz
-    orbit = orbit_near(box.flow, start.state, start.period, omega, box.observe)
-    found = orbit is not None and orbit.period == start.period and _is_at(orbit, start.state)
-    if orbit is not None and found:
+    orbit = orbit_near(box.flow, start.state, start.period, start.omega, box.observe)
+    if orbit is not None and orbit.period == start.period and is_at(orbit, start.state):
         box.follow(orbit, longest, longest_whole(longest), most)
-    branches = tuple(box.branches[count:])
-    if not whole:
-        keep_numbers(branches)
-    return Followed(branches, tuple(box.notes[told:]), lost=not found)
+    else:
+        box.notes.append(f"{LOST} {start.period} at {start.frequency_hz:.6g} Hz")
+    branches, notes = tuple(box.branches[count:]), tuple(box.notes[told:])
+    return Diagram(branches, box.range_hz, box.observe, notes)
 
 
-def _is_at(orbit: Orbit, state: Real) -> bool:
+def is_at(orbit: Orbit, state: Real) -> bool:
     """Whether an orbit begins at a state, but for rounding."""
     off = float(np.linalg.norm(stroboscopic(orbit)[0] - state))
     return off <= AT_START * float(np.linalg.norm(state))

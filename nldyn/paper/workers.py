@@ -5,21 +5,42 @@ from __future__ import annotations
 import multiprocessing
 import os
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.queues import SimpleQueue
-from pathlib import Path
 from typing import TypeVar
 
-from nldyn.paper.kept import kept
-from nldyn.runtime.progress import Progress, progress_line
+from nldyn.runtime.compilation import compilations
+from nldyn.runtime.progress import Progress, Shares, progress_line
 
-Key = TypeVar("Key")
 Value = TypeVar("Value")
-Message = tuple[str, float]
+Message = tuple[str, str, float, float]  # task, what it is at, frequency in Hz, share done
 _messages: SimpleQueue[Message] | None = None  # of a worker process, to its parent
+
+
+@dataclass(frozen=True)
+class Task:
+    """Something to compute in one of the processes.
+
+    Parameters
+    ----------
+    name : str
+        Its name, also for the reader.
+    function : callable
+        Called as ``function(*arguments, progress)``.
+    arguments : tuple
+        Its arguments.
+    weight : float
+        Time that it takes, in proportion to others.
+    """
+
+    name: str
+    function: Callable[..., object]
+    arguments: tuple[object, ...]
+    weight: float
 
 
 @dataclass(frozen=True)
@@ -31,64 +52,77 @@ class Workers:
     pool : ProcessPoolExecutor
         Takes what is to be computed.
     messages : SimpleQueue
-        What each of them is at, with a frequency in Hz.
+        What each of them is at.
     report : callable
         Called as ``report(what, frequency_hz, done)``.
-    folder : Path
-        Keeps what is computed.
     """
 
     pool: ProcessPoolExecutor
     messages: SimpleQueue[Message]
     report: Progress
-    folder: Path
 
-    def submit(
-        self, name: str, function: Callable[..., Value], *arguments: object
-    ) -> Future[Value]:
-        """Compute a function in one of the processes, unless its value is kept under this name."""
-        return self.pool.submit(kept, self.folder / f"{name}.pickle", function, *arguments)
-
-    def values(self, futures: Mapping[Key, Future[Value]], what: str) -> dict[Key, Value]:
-        """Results of computations of one kind, once all are done; a failure is raised at once."""
-        waiting = set(futures.values())
+    def values(self, tasks: tuple[Task, ...]) -> dict[str, object]:
+        """Values of tasks by their names, the heaviest begun first; a failure is raised at once."""
+        shares = Shares(self.report, {task.name: task.weight for task in tasks})
+        futures = {
+            task.name: self.pool.submit(_computed, task)
+            for task in sorted(tasks, key=lambda task: -task.weight)
+        }
+        waiting: set[Future[object]] = set(futures.values())
         while waiting:
             ended, waiting = wait(waiting, timeout=0.1, return_when=FIRST_EXCEPTION)
             for future in ended:
                 future.result()  # or the error that ended it
-            done = f"{len(futures) - len(waiting)} of {len(futures)} {what}"
-            while not self.messages.empty():
-                at, frequency_hz = self.messages.get()
-                self.report(f"{done}, {at}", frequency_hz, 0.0)
-            if ended:
-                self.report(done, 0.0, 1.0 - len(waiting) / max(len(futures), 1))
-        return {key: future.result() for key, future in futures.items()}
+            self._tell(shares)
+        return {task.name: futures[task.name].result() for task in tasks}
+
+    def _tell(self, shares: Shares) -> None:
+        """Report what the processes have told."""
+        while not self.messages.empty():
+            name, what, frequency_hz, done = self.messages.get()
+            shares.part(name)(f"{name}: {what}", frequency_hz, done)
+
+
+def _computed(task: Task) -> object:
+    """Value of a task, in a worker process."""
+    value = task.function(*task.arguments, partial(tell, task.name))
+    tell(task.name, "done", 0.0, 1.0)
+    return value
+
+
+def tell(name: str, what: str, frequency_hz: float, done: float) -> None:
+    """Say from within a worker process how far a task is; nobody listens elsewhere."""
+    if _messages is not None:
+        _messages.put((name, what, frequency_hz, done))
 
 
 @contextmanager
-def worker_processes(count: int, folder: Path) -> Iterator[Workers]:
+def worker_processes(count: int, quiet: bool = False) -> Iterator[Workers]:
     """Processes that end with their parent and at once when something goes wrong."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: threads only hinder
     context = multiprocessing.get_context("spawn")
     messages: SimpleQueue[Message] = context.SimpleQueue()
     with (
-        progress_line() as report,
+        progress_line(quiet) as report,
         ProcessPoolExecutor(count, context, _prepare, (messages,)) as pool,
-        _ended_at_failure(),
+        ended_at_failure(),
     ):
-        yield Workers(pool, messages, report, folder)
+        yield Workers(pool, messages, report)
 
 
-def tell(what: str, frequency_hz: float) -> None:
-    """Say from within a worker process what it is at; nobody listens elsewhere."""
-    if _messages is not None:
-        _messages.put((what, frequency_hz))
+def alone(function: Callable[[bool], None], quiet: bool) -> None:
+    """Call a function in a process of its own, whose memory is free afterwards."""
+    with ended_at_failure():
+        process = multiprocessing.get_context("spawn").Process(target=function, args=(quiet,))
+        process.start()
+        process.join()
 
 
 def _prepare(messages: SimpleQueue[Message]) -> None:
     """Let a worker process tell what it computes, and end when its parent ends."""
     global _messages
     _messages = messages
+    compilations.muted = True  # the parent's `alone` has told of them
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
@@ -100,7 +134,7 @@ def _end_with_parent() -> None:
 
 
 @contextmanager
-def _ended_at_failure() -> Iterator[None]:
+def ended_at_failure() -> Iterator[None]:
     """End the worker processes at once when something goes wrong."""
     try:
         yield

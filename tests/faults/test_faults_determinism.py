@@ -12,7 +12,7 @@ from killing import same_results
 
 from nldyn import Plane, basins, parameter_study, simulate, sweep
 from nldyn.base.resources import example
-from nldyn.paper.jobs import JOBS, joined, submit_diagrams
+from nldyn.paper.jobs import JOBS, diagrams_of, tasks_of
 from nldyn.paper.workers import worker_processes
 from nldyn.scene.build import build_system, load_scene
 
@@ -43,8 +43,8 @@ def test_diagrams_of_the_paper_are_the_same_with_any_number_of_workers(tmp_path)
     found = {}
     for workers in (1, 3):
         (tmp_path / str(workers)).mkdir()
-        with worker_processes(workers, tmp_path / str(workers)) as processes:
-            diagrams = joined(processes.values(submit_diagrams(processes, jobs), "diagrams"))
+        with worker_processes(workers, quiet=True) as processes:
+            diagrams = diagrams_of(processes.values(tasks_of(jobs, tmp_path / str(workers))))
         for name, diagram in diagrams.items():
             found[name, workers] = [contents(branch) for branch in diagram.branches]
     for name in names:

@@ -13,7 +13,7 @@ import pytest
 from bilinear import Bilinear
 
 from nldyn import HarmonicForce, Stop, System, continue_branch, continue_in, solve_orbit
-from nldyn.special import CROSSING_ERROR
+from nldyn.bifurcations.chord import CROSSING_ERROR
 
 SAMPLES = 20000
 GAP, STIFFNESS, DAMPING, NATURAL_HZ = 2e-4, 2e5, 0.03, 10.0

@@ -1,8 +1,8 @@
 """Orbits from which the branches of the larger models are followed."""
 
-import math
 import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,10 +12,20 @@ from nldyn.branches.continuation import broken_off
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.orbit import stroboscopic
 from nldyn.orbits.starts import orbit_near
-from nldyn.paper.jobs import LONG, job_named, joined, scene_system
+from nldyn.paper.atlas import (
+    LONG,
+    atlas_folder,
+    chart_named,
+    follow_family,
+    joined,
+    odd_part,
+    start_path,
+)
+from nldyn.paper.jobs import scene_system
 from nldyn.paper.search import MODELS, known_branches, main, search, search_by_detour
 from nldyn.paper.starts import Start, follow_starts, read_starts, starts_path, write_starts
 from nldyn.runtime.progress import silent
+from nldyn.runtime.result_directory import OutputError
 from nldyn.search.diagram import middle_orbit
 from nldyn.search.exploration import steps_between
 from nldyn.search.fixed_point_index import index_note
@@ -32,15 +42,15 @@ def found():
 
 @pytest.mark.parametrize("name", MODELS)
 def test_starts_are_orbits_of_their_period(name):
-    job = job_named(name)
-    flow = FlowMap(job.system())
+    """Every tenth of them; `nldyn paper` and the atlas solve for all, and tell which are none."""
+    chart = chart_named(name)
+    flow = FlowMap(scene_system(name))
     starts = read_starts(name)
     assert {start.period for start in starts} == {1, 2, 3}
     for start in starts:
-        assert job.range_hz[0] <= start.frequency_hz <= job.range_hz[1]
-    for start in starts:
-        omega = 2.0 * math.pi * start.frequency_hz
-        orbit = orbit_near(flow, start.state, start.period, omega, "middle")
+        assert chart.range_hz[0] <= start.frequency_hz <= chart.range_hz[1]
+    for start in starts[::10]:
+        orbit = orbit_near(flow, start.state, start.period, start.omega, "middle")
         assert orbit is not None and orbit.period == start.period
         off = np.linalg.norm(stroboscopic(orbit)[0] - start.state)
         assert off < 1e-7 * np.linalg.norm(start.state)
@@ -109,23 +119,37 @@ def test_starts_of_another_model_are_refused(found):
         )  # fmt: skip
 
 
-def test_families_followed_apart_are_the_diagram_followed_at_once(found, monkeypatch, tmp_path):
-    """Flips lead from periods 1 and 2 to 4, but not from period 3 to these or back."""
+@pytest.fixture
+def short_chart(found, monkeypatch, tmp_path):
+    """A chart of a short range, with the starts that the search gave."""
     name = "two_dof_xi_0.01"
-    job = replace(job_named(name), range_hz=found.range_hz, doubled=(4, 10))
+    chart = replace(chart_named(name), range_hz=found.range_hz, doubled=(4, 10))
     write_starts(starts_path(name, tmp_path), found.branches)
     starts = read_starts(name, tmp_path)
-    monkeypatch.setattr("nldyn.paper.jobs.JOBS", (job,))
-    monkeypatch.setattr("nldyn.paper.jobs.read_starts", lambda name: starts)
-    assert job.families == (1, 3)
-    (whole,) = joined(
-        {(name, family): job.run(family, tmp_path) for family in job.families}
-    ).values()
-    once = follow_starts(job.system(), starts, job.range_hz, LONG, job.doubled)
+    monkeypatch.setattr("nldyn.paper.atlas.CHARTS", (chart,))
+    monkeypatch.setattr("nldyn.paper.atlas.read_starts", lambda name: starts)
+    return chart, starts
+
+
+def family_of(chart, starts, family, folder):
+    place = partial(start_path, folder, chart.name, family)
+    (folder / chart.name).mkdir(exist_ok=True)
+    chosen = [start for start in starts if odd_part(start.period) == family]
+    system = scene_system(chart.name)
+    return follow_starts(system, chosen, chart.range_hz, LONG, chart.doubled, keep_at=place)
+
+
+def test_families_followed_apart_are_the_diagram_followed_at_once(short_chart, tmp_path):
+    """Flips lead from periods 1 and 2 to 4, but not from period 3 to these or back."""
+    chart, starts = short_chart
+    assert chart.families == (1, 3)
+    parts = [family_of(chart, starts, family, tmp_path) for family in chart.families]
+    whole = joined(parts, chart)
+    system = scene_system(chart.name)
+    once = follow_starts(system, starts, chart.range_hz, LONG, chart.doubled)
     assert sorted(b.period for b in whole.branches) == sorted(b.period for b in once.branches)
     for branch in once.branches:
         assert any(other.contains(middle_orbit(branch)) for other in whole.branches)
-    assert len({branch.name for branch in whole.branches}) == len(whole.branches)
     assert whole.notes[-1].endswith(
         "of P to P^3 add up to one from 35.5 to 36.5 Hz; isolas that are missing as a whole would "
         "not change that"
@@ -134,17 +158,16 @@ def test_families_followed_apart_are_the_diagram_followed_at_once(found, monkeyp
     assert whole.notes[0] == f"{ends} ends of branches broken off: 10 points"
 
 
-def test_what_starts_lead_to_is_kept_when_a_run_is_interrupted(found, monkeypatch, tmp_path):
+def test_what_starts_lead_to_is_kept_when_an_atlas_is_interrupted(
+    short_chart, monkeypatch, tmp_path
+):
     """The resumed run asks only for the starts left, and gives what one at once gives.
 
     The first start leads to no orbit.
     """
-    name = "two_dof_xi_0.01"
-    job = replace(job_named(name), range_hz=found.range_hz, doubled=(4, 10))
-    write_starts(starts_path(name, tmp_path), found.branches)
-    starts = [start for start in read_starts(name, tmp_path) if start.period < 3]
+    chart, starts = short_chart
+    starts[:] = [start for start in starts if start.period < 3]
     starts.insert(0, replace(starts[0], state=np.array([1.0, -1.0, 1.0, -1.0])))
-    monkeypatch.setattr("nldyn.paper.jobs.read_starts", lambda name: starts)
     asked = []
 
     def orbit_until_interrupted(*arguments):
@@ -153,20 +176,19 @@ def test_what_starts_lead_to_is_kept_when_a_run_is_interrupted(found, monkeypatc
         asked.append(arguments)
         return orbit_near(*arguments)
 
-    (folder := tmp_path / "kept").mkdir()
     with monkeypatch.context() as patch:
         patch.setattr("nldyn.paper.starts.orbit_near", orbit_until_interrupted)
         with pytest.raises(KeyboardInterrupt):
-            job.run(1, folder)
-    (folder / f"{name}.1.1.pickle").write_bytes(b"cut")  # that one is followed again
+            follow_family(chart.name, 1, tmp_path, silent)
+    start_path(tmp_path, chart.name, 1, 1).write_bytes(b"cut")  # that one is followed again
     calls = []
     monkeypatch.setattr(
         "nldyn.paper.starts.orbit_near", lambda *a: calls.append(a) or orbit_near(*a)
     )
-    resumed = job.run(1, folder)
+    resumed = family_of(chart, starts, 1, tmp_path)
     assert len(calls) == len(starts) - 2 > 2
     (other := tmp_path / "other").mkdir()
-    once = job.run(1, other)
+    once = family_of(chart, starts, 1, other)
     assert resumed.notes == once.notes
     assert resumed.notes[0].endswith(", 1 of which is no orbit")
     assert [branch.name for branch in resumed.branches] == [branch.name for branch in once.branches]
@@ -176,12 +198,24 @@ def test_what_starts_lead_to_is_kept_when_a_run_is_interrupted(found, monkeypatc
         np.testing.assert_array_equal(*points)
 
 
+def test_the_atlas_of_other_code_is_refused(tmp_path, monkeypatch):
+    place = tmp_path / "atlas"
+    assert atlas_folder(place) == atlas_folder(place) == place
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "thesis.tex").touch()
+    with pytest.raises(OutputError, match="other: holds something else than an atlas"):
+        atlas_folder(tmp_path / "other")
+    monkeypatch.setattr("nldyn.paper.atlas.stamp", lambda: "another")
+    with pytest.raises(OutputError, match="is an atlas of another version"):
+        atlas_folder(place)
+
+
 @pytest.fixture
 def two_known(monkeypatch, tmp_path):
     """A short range of the 2-DOF model, and a directory with two starts."""
-    job = job_named("two_dof_xi_0.01")
+    job = chart_named("two_dof_xi_0.01")
     low, high = 35.5, 35.95
-    monkeypatch.setattr("nldyn.paper.jobs.JOBS", (replace(job, range_hz=(low, high)),))
+    monkeypatch.setattr("nldyn.paper.atlas.CHARTS", (replace(job, range_hz=(low, high)),))
     head, *rows = starts_path(job.name).read_text(encoding="utf-8").splitlines(keepends=True)
     within = [row for row in rows if low < float(row.split(",")[1]) < high]
     starts_path(job.name, tmp_path).write_text("".join([head, *within[:2]]), encoding="utf-8")
@@ -250,16 +284,17 @@ def test_the_command_tells_all_notes(two_known, monkeypatch, capsys):
     assert last.startswith("at 0.5 of the damping and 1.01 of natural_frequency_hz[1]: ")
 
 
-def test_branches_of_another_model_are_refused(two_known):
+def test_branches_of_another_model_are_refused(two_known, monkeypatch):
     """Their file is named after the starts, which lead to orbits of a changed model as well."""
     name, folder = two_known
-    job = job_named(name)
-    known, _, _ = known_branches(job, folder, silent)
+    chart = chart_named(name)
+    known, _, _ = known_branches(chart, folder, silent)
     assert len(known.branches) == 2
-    system = job.system()
-    changed = replace(job, system=lambda: replace(system, damping=1.001 * system.damping))
+    system = scene_system(name)
+    changed = replace(system, damping=1.001 * system.damping)
+    monkeypatch.setattr("nldyn.paper.search.scene_system", lambda name: changed)
     with pytest.raises(SystemModelError, match="are of another model; delete them"):
-        known_branches(changed, folder, silent)
+        known_branches(chart, folder, silent)
 
 
 @pytest.mark.parametrize(

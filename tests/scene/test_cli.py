@@ -16,7 +16,7 @@ from nldyn.app.cli import main
 from nldyn.base.resources import example, mesh
 from nldyn.branches.arclength import Stepper
 from nldyn.io.branches import load_branches, load_diagram, load_exploration, save_branches
-from nldyn.paper.kept import kept, kept_folder
+from nldyn.paper.kept import kept_folder, write_numbers
 from nldyn.search import explore as survey
 
 ONE_DOF = str(example("one_dof.toml"))
@@ -264,14 +264,21 @@ def test_check_tells_the_residual_mode_from_the_others():
 
 def test_paper_is_handed_on(tmp_path, monkeypatch):
     given = []
-    monkeypatch.setattr(nldyn.paper, "main", given.append)
+
+    def take(out, jobs, quiet):
+        given.append((out, jobs, quiet))
+
+    monkeypatch.setattr(nldyn.paper, "main", take)
+    monkeypatch.setattr(nldyn.paper, "atlas", take)
     assert invoke("paper", "--out", tmp_path).exit_code == 0
-    assert given == [tmp_path]
+    assert invoke("paper", "--atlas", "--out", tmp_path, "--jobs", "3", "--quiet").exit_code == 0
+    assert given == [(tmp_path, 2, False), (tmp_path, 3, True)]
+    assert invoke("paper", "--out", tmp_path, "--jobs", "0").exit_code == 2
 
 
 def test_ctrl_c_in_the_paper_names_what_is_kept(tmp_path, monkeypatch):
-    def interrupted_after_a_while(out):
-        kept(kept_folder(out) / "one.pickle", int)
+    def interrupted_after_a_while(out, jobs, quiet):
+        write_numbers(kept_folder(out) / "one.json", 1)
         raise KeyboardInterrupt
 
     monkeypatch.setattr(nldyn.paper, "main", interrupted_after_a_while)

@@ -12,7 +12,7 @@ import numba
 import pytest
 
 from nldyn.app import command
-from nldyn.paper.workers import _ended_at_failure
+from nldyn.paper.workers import ended_at_failure
 from nldyn.runtime import progress
 from nldyn.runtime.compilation import COMPILING, Compilations, compilations
 from nldyn.runtime.kernel_cache import ensure_cache
@@ -149,7 +149,7 @@ def test_shares_add_up_with_their_weights():
 def test_worker_processes_end_with_the_work():
     worker = multiprocessing.get_context("spawn").Process(target=time.sleep, args=(60.0,))
     worker.start()
-    with pytest.raises(KeyboardInterrupt), _ended_at_failure():
+    with pytest.raises(KeyboardInterrupt), ended_at_failure():
         raise KeyboardInterrupt
     worker.join(10.0)
     assert not worker.is_alive()
