@@ -15,7 +15,7 @@ def test_sparse_matrices_of_a_system():
 
 def test_large_sparse_matrices_are_to_be_reduced_first():
     large = sparse.eye_array(501)
-    with pytest.raises(SystemModelError, match="sparse matrix of 501 rows, .* reduce the comp"):
+    with pytest.raises(SystemModelError, match=r"sparse matrix of 501 rows, .* reduce the comp"):
         System.from_matrices(large, large, {"x": np.eye(501)[0]})
 
 
