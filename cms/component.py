@@ -211,7 +211,8 @@ def interface_vector(vector: Any, name: str, size: int) -> FloatArray:
         If its shape is not (N,), an entry is not finite, or all are zero.
     """
     if sparse.issparse(vector):
-        vector = vector.toarray()
+        given: Any = vector
+        vector = given.toarray()
         vector = vector.ravel() if 1 in vector.shape else vector
     try:
         array = np.asarray(vector, dtype=np.float64)
@@ -262,7 +263,7 @@ def checked_pencil(component: ComponentLike) -> Pencil:
         for number, matrix in enumerate((component.stiffness, component.mass)):
             found = entry_digits(sparse.csc_array(matrix).data) if given is None else given
             rounding[number] = relative_rounding(found)
-    return Pencil(stiffness, mass, names, loads, natural, *rounding)
+    return Pencil(stiffness, mass, names, loads, natural, rounding[0], rounding[1])
 
 
 def checked_form(form: Any, stiffness: SparseMatrix) -> NaturalForm | None:

@@ -236,7 +236,8 @@ def check_coupled(
     if rigid < omega.size and omega[rigid] <= 4 * np.finfo(float).eps * omega[-1]:
         raise ReductionError(
             f"mode {rigid + 1} of the coupled model has no stiffness beside its fastest one, "
-            f"though the parts and joints leave {rigid} rigid-body modes: the stiffnesses differ too much"
+            f"though the parts and joints leave {rigid} rigid-body modes: the stiffnesses differ "
+            "too much"
         )
     mass = np.abs(vectors.T @ vectors - np.eye(omega.size)).max()
     energy = np.abs(stretch.T @ stretch - np.diag(omega**2)).max() / max(omega[-1] ** 2, 1e-300)

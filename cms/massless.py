@@ -59,11 +59,12 @@ def least_eigenvalue(scaled: FloatArray) -> float:
         lower = linalg.cholesky(scaled, lower=True)
     except linalg.LinAlgError:
         return 0.0
-    vector = np.random.default_rng(0).standard_normal(scaled.shape[0])
-    growth = 1.0
+    vector = np.random.default_rng(0).standard_normal((scaled.shape[0], 1))
+    growth: float = 1.0
     for _ in range(ESTIMATES):
-        vector = linalg.cho_solve((lower, True), vector / linalg.norm(vector))
-        growth = float(linalg.norm(vector))
+        unit = np.asarray(vector / np.linalg.norm(vector), dtype=np.float64)
+        vector = np.asarray(linalg.cho_solve((lower, True), unit))
+        growth = float(np.linalg.norm(vector))
     return 1.0 / growth
 
 

@@ -64,9 +64,9 @@ def check_range(range_hz: tuple[float, float]) -> tuple[float, float]:
 
 def numbers(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """An array of finite floats, or a SystemModelError under the name."""
+    if sparse.issparse(values):
+        values = dense(name, values)
     try:
-        if sparse.issparse(values):
-            values = dense(name, values)
         if values is None or np.iscomplexobj(values):
             raise TypeError
         array = np.array(values, dtype=float)  # a copy: the caller may change the original
