@@ -127,3 +127,20 @@ def curved_beam(kind, counts):
     ends = along_edge(mesh, "x1", square, 1)
     moved = deflection(component, [(node, 0, share) for node, share in ends], (slice(None), 0))
     return sum(share * moved[node] for node, share in ends)
+
+
+def straight_beam(kind, times, shape):
+    """A beam of 6 by 0.2, bent in its plane, of six slanting cells, each cut into times²."""
+    leans = {"trapezoids": (0.1, -0.1), "parallelograms": (0.1, 0.1)}[shape]
+
+    def place(a, b):
+        column = min(int(6 * a + 1e-9), 5)
+        share = 6 * a - column
+        left, right = (0.0 if i in (0, 6) else leans[i % 2] for i in (column, column + 1))
+        return 6 * a + ((1 - share) * left + share * right) * (2 * b - 1), 0.2 * b, 0.0
+
+    mesh, square = mapped(kind, (6 * times, times), place)
+    component = shell(mesh, 1e7, 0.3, 0.1, [fem.Support("x0", CLAMP)])
+    ends = along_edge(mesh, "x1", square, 1)
+    moved = deflection(component, [(node, 1, share) for node, share in ends], (slice(None), 1))
+    return sum(share * moved[node] for node, share in ends)

@@ -11,7 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from shells import curved_beam, hemisphere, pinched_cylinder, roof, twisted_beam
+from shells import (
+    curved_beam,
+    hemisphere,
+    pinched_cylinder,
+    roof,
+    straight_beam,
+    twisted_beam,
+)
 
 DOC = Path(__file__).resolve().parents[2] / "docs" / "structures.md"
 
@@ -24,7 +31,21 @@ CASES = [
         curved_beam,
         ((6, 1), (12, 2)),
         0.08734,
-        (0.08, 0.05),
+        (0.11, 0.02),
+    ),
+    (
+        "straight beam in its plane, six trapezoids",
+        lambda kind, n: straight_beam(kind, n[1], "trapezoids"),
+        ((6, 1), (24, 4)),
+        0.1081,
+        (0.25, 0.13),
+    ),
+    (
+        "straight beam in its plane, six parallelograms",
+        lambda kind, n: straight_beam(kind, n[1], "parallelograms"),
+        ((6, 1), (24, 4)),
+        0.1081,
+        (0.45, 0.2),
     ),
     (
         "twisted beam, t = 0.32, along the width",
