@@ -24,12 +24,15 @@ from fem.model import (
     Support,
     TrussPart,
 )
+from fem.pieces import Pieces, pieces_of
+from fem.places import node_at, nodes_inside
 from fem.read import from_meshio, read_mesh, read_structure, structure_from_meshio
 from fem.sections import CircularSection, CrossSection, RectangularSection, Section
 from fem.shells import ShellPart
 from fem.structure import Foundation, SolidPart, StructureModel, symmetry
 from fem.structure_assembly import DistortionWarning, LockingWarning, StructureComponent
 from fem.structure_mesh import StructureMesh, box_mesh, joined, structure_mesh
+from fem.summary import MassProperties, mass_properties, summary
 from fem.write import write_mesh
 
 __all__ = [
@@ -51,8 +54,10 @@ __all__ = [
     "LinearEquation",
     "Link",
     "LockingWarning",
+    "MassProperties",
     "Material",
     "ModelError",
+    "Pieces",
     "PointMass",
     "PointSpring",
     "RectangularSection",
@@ -70,11 +75,16 @@ __all__ = [
     "frame_mesh",
     "from_meshio",
     "joined",
+    "mass_properties",
+    "node_at",
+    "nodes_inside",
+    "pieces_of",
     "read_abaqus",
     "read_mesh",
     "read_structure",
     "structure_from_meshio",
     "structure_mesh",
+    "summary",
     "symmetry",
     "write_mesh",
 ]

@@ -26,6 +26,7 @@ from fem.natural import (
     line_rows,
     natural_form,
 )
+from fem.pieces import check_joined
 from fem.scatter import displacement_of
 from fem.store import load_model, save_model
 from fem.trusses import loose_nodes, loose_sentences
@@ -107,6 +108,7 @@ class Component:
 
 def assemble_frame(model: FrameModel) -> Component:
     """Assemble a plane frame; `fem.assemble` calls it."""
+    check_joined(model)
     for text in mechanism_warnings(model):
         warnings.warn(text, JointWarning, stacklevel=3)
     element_dofs = number_dofs(model)
@@ -119,6 +121,22 @@ def assemble_frame(model: FrameModel) -> Component:
     M = _scatter(mass, element_dofs, lumps, free)
     C = _squares(elongations, damping)[free][:, free] if damping.any() else None
     return Component(K, M, _interface_vectors(model, free), model, free, element_dofs, C)
+
+
+def rigid_body_mass(component: Component) -> FloatArray:
+    """Mass matrix (3, 3) of the rigid motions, supports apart: along x, along y, about z."""
+    model, dofs = component.model, component.element_dofs
+    every = np.arange(_dof_count(model))
+    lumps = sparse.diags_array(_mass_diagonal(model), format="csr")
+    mass = _scatter(_element_matrices(model)[1], dofs, lumps, every)
+    x, y = model.mesh.points[:, 0], model.mesh.points[:, 1]
+    motions = np.zeros((len(every), 3))
+    ends = 3 * np.arange(len(x))
+    motions[ends, 0] = motions[ends + 1, 1] = 1.0
+    motions[ends, 2], motions[ends + 1, 2] = -y, x
+    motions[ends + 2, 2] = 1.0
+    motions[3 * len(x) :, 2] = 1.0  # own rotations at hinges
+    return np.asarray(motions.T @ (mass @ motions))
 
 
 def mechanism_warnings(model: FrameModel) -> Iterator[str]:

@@ -23,6 +23,7 @@ from fem.mesh import FloatArray, IntArray
 
 VERSIONS = {"2": "2.2", "2.2": "2.2", "4": "4.1", "4.1": "4.1"}
 _DIMENSIONS = {"vert": 0, "line": 1, "tria": 2, "quad": 2}  # by the beginning of a kind's name
+WORDS = ("point", "curve", "surface", "volume")
 DIMENSION = {kind: _DIMENSIONS.get(kind[:4], 3) for kind in _gmsh_to_meshio_type.values()}
 NODES = {
     "tetra10": (*range(8), 9, 8),
@@ -96,11 +97,15 @@ class _Numbers:
 
 @dataclass
 class _Block:
-    """Elements of a type: numbers of their nodes (e, b) and physical groups (e, g), 0 for none."""
+    """Elements of a type: numbers of their nodes (e, b) and physical groups (e, g), 0 for none.
+
+    And the numbers of the curves, surfaces or volumes that they are of, (e,), 0 if not told.
+    """
 
     kind: str
     nodes: IntArray
     groups: IntArray
+    entities: IntArray
 
 
 def read_gmsh(path: Path) -> meshio.Mesh:
@@ -174,14 +179,33 @@ def _cell_sets(
 ) -> dict[str, list[IntArray]]:
     """Elements of each physical group, one list for each block."""
     sets: dict[str, list[IntArray]] = {}
+    called = _told_apart(
+        names, {(DIMENSION[b.kind], int(g)) for b in blocks for g in np.unique(b.groups)}
+    )
     for number, block in enumerate(blocks):
         for group in np.unique(block.groups[block.groups != 0]):
-            name = names.get((DIMENSION[block.kind], int(group)), str(group))
+            name = called[DIMENSION[block.kind], int(group)]
             empty = [np.zeros(0, dtype=np.int64)] * len(blocks)
             found = np.flatnonzero((block.groups == group).any(axis=1))
             of_blocks = sets.setdefault(name, empty)
             of_blocks[number] = np.union1d(of_blocks[number], found)
     return sets
+
+
+def _told_apart(
+    names: dict[tuple[int, int], str], groups: set[tuple[int, int]]
+) -> dict[tuple[int, int], str]:
+    """Names of groups by dimension and number; one of two dimensions says which it is of."""
+    found = {group: names.get(group, str(group[1])) for group in groups if group[1]}
+    dimensions: dict[str, set[int]] = {}
+    for (dimension, _), name in found.items():
+        dimensions.setdefault(name, set()).add(dimension)
+    return {
+        group: f"{name} ({WORDS[group[0]]})"
+        if group[0] and len(dimensions[name] - {0}) > 1
+        else name
+        for group, name in found.items()
+    }
 
 
 def _sections(content: bytes) -> dict[str, bytes]:
@@ -283,20 +307,23 @@ def _lines_22(body: bytes) -> list[_Block]:
     count, *lines = body.strip().splitlines()
     if len(lines) != _whole(count):
         raise ValueError(f"{_whole(count)} elements are declared, but {len(lines)} are there")
-    runs: list[tuple[str, list[list[int]], list[int]]] = []
+    runs: list[tuple[str, list[list[int]], list[int], list[int]]] = []
     for line in lines:
         label, code, tags, *rest = (_whole(word) for word in line.split())
         kind = _kind(code)
         if tags < 0 or len(rest) != tags + num_nodes_per_cell[kind]:
             raise ValueError(f"element {label} does not have the numbers of its type")
         if not runs or runs[-1][0] != kind:
-            runs.append((kind, [], []))
+            runs.append((kind, [], [], []))
         runs[-1][1].append(rest[tags:])
         runs[-1][2].append(abs(rest[0]) if tags else 0)
-    return [
-        _Block(kind, np.array(nodes, dtype=np.int64), np.array(groups, dtype=np.int64)[:, None])
-        for kind, nodes, groups in runs
-    ]
+        runs[-1][3].append(rest[1] if tags > 1 else 0)
+    return _united(
+        [
+            _Block(kind, *(np.array(each, dtype=np.int64) for each in (nodes, groups, entities)))
+            for kind, nodes, groups, entities in runs
+        ]
+    )
 
 
 def _binary_22(numbers: _Numbers) -> list[_Block]:
@@ -308,11 +335,45 @@ def _binary_22(numbers: _Numbers) -> list[_Block]:
             raise ValueError("a block of elements is empty")
         width = 1 + tags + num_nodes_per_cell[kind]
         rows = numbers.integers(here * width).reshape(here, width)
-        groups = np.abs(rows[:, 1:2]) if tags else np.zeros((here, 1), dtype=np.int64)
-        blocks.append(_Block(kind, rows[:, 1 + tags :], groups))
+        groups = np.abs(rows[:, 1]) if tags else np.zeros(here, dtype=np.int64)
+        entities = rows[:, 2] if tags > 1 else np.zeros(here, dtype=np.int64)
+        blocks.append(_Block(kind, rows[:, 1 + tags :], groups, entities))
         count -= here
     numbers.end()
-    return blocks
+    return _united(blocks)
+
+
+def _united(blocks: list[_Block]) -> list[_Block]:
+    """Elements once, where version 2.2 writes one of several groups once for each of them.
+
+    It has then the same nodes in the same order, and is of the same curve, surface or volume. What
+    stands twice in one group is left so.
+    """
+    first: dict[tuple[str, int, bytes], tuple[int, int]] = {}
+    kept = [np.ones(len(block.nodes), dtype=np.bool_) for block in blocks]
+    groups = [[[int(group)] for group in block.groups] for block in blocks]
+    for number, block in enumerate(blocks):
+        for row, nodes in enumerate(block.nodes):
+            key = (block.kind, int(block.entities[row]), nodes.tobytes())
+            home, place = first.setdefault(key, (number, row))
+            group = int(block.groups[row])
+            if (home, place) != (number, row) and group not in groups[home][place]:
+                groups[home][place].append(group)
+                kept[number][row] = False
+    return [
+        _Block(block.kind, block.nodes[keep], _padded(own, keep), block.entities[keep])
+        for block, keep, own in zip(blocks, kept, groups, strict=True)
+        if keep.any()
+    ]
+
+
+def _padded(groups: list[list[int]], keep: np.ndarray) -> IntArray:
+    """Groups of the elements that are kept, (e, g), filled up with 0."""
+    rows = [row for row, wanted in zip(groups, keep, strict=True) if wanted]
+    found = np.zeros((len(rows), max(map(len, rows), default=1)), dtype=np.int64)
+    for i, row in enumerate(rows):
+        found[i, : len(row)] = row
+    return found
 
 
 def _entities(numbers: _Numbers) -> Groups:
@@ -354,7 +415,8 @@ def _elements_41(numbers: _Numbers, groups: Groups) -> list[_Block]:
         width = 1 + num_nodes_per_cell[kind]
         rows = numbers.sizes(here * width).reshape(here, width)
         of_entity = groups.get((dimension, tag), np.zeros(0, dtype=np.int64))
-        found.append(_Block(kind, rows[:, 1:], np.tile(of_entity, (here, 1))))
+        own = np.full(here, tag, dtype=np.int64)
+        found.append(_Block(kind, rows[:, 1:], np.tile(of_entity, (here, 1)), own))
     numbers.end()
     if sum(len(block.nodes) for block in found) != count:
         raise ValueError(f"{count} elements are declared, but others are there")

@@ -42,6 +42,8 @@ class FrameMesh:
         Material and section of parts, by the name of the part, as far as the file gives them.
     left_out
         What the file holds and the mesh, by intention, does not.
+    notes
+        What was left out on request, a sentence each.
 
     Raises
     ------
@@ -67,6 +69,7 @@ class FrameMesh:
     element_types: Mapping[str, IntArray] = field(default_factory=dict)
     described: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     left_out: Sequence[LeftOut] = ()
+    notes: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         points = numbers(f"{self.source}: points", self.points, np.float64)
@@ -136,6 +139,17 @@ class FrameMesh:
         """
         return replace(self, points=np.asarray(points, dtype=np.float64))
 
+    def with_point_sets(self, sets: Mapping[str, npt.ArrayLike]) -> FrameMesh:
+        """The same mesh with further point sets, or others of the same names.
+
+        Examples
+        --------
+        >>> mesh = frame_mesh({"a": (0, 0), "b": (1, 0)}, [("rod", "a", "b", 2)])
+        >>> mesh.with_point_sets({"middle": [2]}).node("middle")
+        2
+        """
+        return replace(self, point_sets={**self.point_sets, **sets})  # type: ignore[dict-item]
+
     def _check_arrays(self) -> None:
         if self.points.ndim != 2 or self.points.shape[1] != 3:
             raise ModelError(
@@ -172,7 +186,6 @@ class FrameMesh:
             twice = first[np.argmax(count > 1)]
             raise ModelError(
                 f"{self.source}: element {twice} appears twice between the same two nodes"
-                " (is a line in two physical groups?)"
             )
         loose = np.setdiff1d(np.arange(len(self.points)), self.lines)
         if len(loose):

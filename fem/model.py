@@ -224,6 +224,9 @@ class FrameModel:
         What holds, loads and joins the named points of the mesh.
     interfaces
         The named directions that a reduction keeps and a load may act on.
+    separate
+        Whether nodes at one place may belong to pieces that nothing joins; else `fem.assemble`
+        refuses such pieces.
 
     Raises
     ------
@@ -252,6 +255,7 @@ class FrameModel:
     springs: Sequence[PointSpring] = ()
     hinges: Sequence[Hinge] = ()
     interfaces: Mapping[str, Interface] = field(default_factory=dict)
+    separate: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.mesh, FrameMesh):

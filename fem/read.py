@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import redirect_stderr
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +21,7 @@ from fem.cells import KINDS, SPANS
 from fem.collapsed import uncollapsed
 from fem.errors import ModelError, quoted
 from fem.gmsh import read_gmsh
+from fem.ignored import without_cells
 from fem.mesh import FloatArray, FrameMesh, IntArray
 from fem.structure_mesh import StructureMesh
 from fem.unpacking import bounded_unpacking
@@ -59,7 +60,9 @@ DECK = ".inp"
 EXTENSIONS = (*READERS, DECK)
 
 
-def read_mesh(path: str | Path, include_folders: Iterable[str | Path] = ()) -> FrameMesh:
+def read_mesh(
+    path: str | Path, include_folders: Iterable[str | Path] = (), ignore: Sequence[str] = ()
+) -> FrameMesh:
     """Read a line mesh with its named parts and points.
 
     Parameters
@@ -76,6 +79,9 @@ def read_mesh(path: str | Path, include_folders: Iterable[str | Path] = ()) -> F
 
     include_folders
         Folders from which an Abaqus file may ``*INCLUDE`` others, beside its own.
+    ignore
+        Cells to leave out: names of groups, kinds of cells such as "quad", element types of
+        Abaqus such as "S4R", or "ungrouped" for those in no group.
 
     Returns
     -------
@@ -97,11 +103,11 @@ def read_mesh(path: str | Path, include_folders: Iterable[str | Path] = ()) -> F
     >>> sorted(mesh.parts), sorted(mesh.point_sets)
     (['beam', 'leaf'], ['corner', 'foot', 'middle'])
     """
-    return _read(path, from_meshio, include_folders)
+    return _read(path, from_meshio, include_folders, ignore)
 
 
 def read_structure(
-    path: str | Path, include_folders: Iterable[str | Path] = ()
+    path: str | Path, include_folders: Iterable[str | Path] = (), ignore: Sequence[str] = ()
 ) -> StructureMesh:
     """Read a mesh of lines, surfaces and volumes with its named groups and points.
 
@@ -111,7 +117,7 @@ def read_structure(
         A file as for `read_mesh`. In ``.msh`` files all physical groups are groups of cells, and
         physical points are point sets; in ``.vtu`` files the arrays ``set:NAME``; in ``.inp``
         files ELSET are groups and NSET point sets.
-    include_folders
+    include_folders, ignore
         As for `read_mesh`.
 
     Returns
@@ -132,13 +138,14 @@ def read_structure(
     >>> sorted(fem.read_structure("meshes/half_beam.msh").groups)
     ['beam', 'leaf']
     """
-    return _read(path, structure_from_meshio, include_folders)
+    return _read(path, structure_from_meshio, include_folders, ignore)
 
 
 def _read(
     path: str | Path,
     build: Callable[[meshio.Mesh, str], Mesh],
     include_folders: Iterable[str | Path],
+    ignore: Sequence[str],
 ) -> Mesh:
     path = Path(path)
     extension = path.suffix.lower()
@@ -153,8 +160,9 @@ def _read(
         raise ModelError(f"{path}: the mesh file is empty")
     try:
         if extension == DECK:
-            return _deck_mesh(path, build, include_folders)
-        return build(READERS[extension][1](path), str(path))
+            return _deck_mesh(path, build, include_folders, ignore)
+        content, said = without_cells(READERS[extension][1](path), ignore, str(path))
+        return _noted(build(content, str(path)), said)
     except ModelError:
         raise
     except (Exception, SystemExit) as error:
@@ -166,16 +174,25 @@ def _read(
 
 
 def _deck_mesh(
-    path: Path, build: Callable[[meshio.Mesh, str], Mesh], include_folders: Iterable[str | Path]
+    path: Path,
+    build: Callable[[meshio.Mesh, str], Mesh],
+    include_folders: Iterable[str | Path],
+    ignore: Sequence[str],
 ) -> Mesh:
     """The mesh of an Abaqus file, with what the file attaches to it."""
     found = read_abaqus(path, include_folders)
+    content, said = without_cells(found.content, ignore, str(path))
     return replace(
-        build(found.content, str(path)),
+        _noted(build(content, str(path)), said),
         attachments=found.attachments,
         described=found.described,
         left_out=found.left_out,
     )
+
+
+def _noted(mesh: Mesh, said: Sequence[str]) -> Mesh:
+    """A mesh with further notes."""
+    return replace(mesh, notes=[*mesh.notes, *said]) if said else mesh
 
 
 def _reason(error: BaseException) -> str:
@@ -234,7 +251,12 @@ def structure_from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> 
     {'triangle': array([0])}
     """
     points = _three_coordinates(content, source)
-    _check_kinds(content, {*KINDS, "vertex"}, source, f"known are {quoted(KINDS)}")
+    _check_kinds(
+        content,
+        {*KINDS, "vertex"},
+        source,
+        f"known are {quoted(KINDS)}; or ignore these by their names",
+    )
     cells: dict[str, list[IntArray]] = {}
     groups: dict[str, dict[str, list[IntArray]]] = {}
     for index, block in enumerate(content.cells):
@@ -336,7 +358,7 @@ def _lines_and_parts(content: meshio.Mesh, source: str) -> tuple[IntArray, dict[
             f"{source}: elements of type {quoted(curved)} are not straight two-node lines;"
             " make the mesh of first order"
         )
-    advice = "a frame has lines only; read it as a structure, or leave these out by their groups"
+    advice = "a frame has lines only; read it as a structure, or ignore these by their names"
     if any(block.type in SPANS and len(block.data) for block in content.cells):
         _check_kinds(content, {*SPANS, "vertex"}, source, advice)
     lines: list[IntArray] = []
@@ -357,9 +379,7 @@ def _lines_and_parts(content: meshio.Mesh, source: str) -> tuple[IntArray, dict[
     return np.concatenate(lines), {name: np.concatenate(p) for name, p in parts.items()}
 
 
-def straight_pieces(
-    content: meshio.Mesh, kind: str, cells: ArrayLike, source: str
-) -> IntArray:
+def straight_pieces(content: meshio.Mesh, kind: str, cells: ArrayLike, source: str) -> IntArray:
     """Two-node lines (e, 2) of lines with two or three nodes; a curved one is refused."""
     nodes = np.asarray(cells, dtype=np.int64)
     _check_nodes(kind, nodes, len(content.points), source)

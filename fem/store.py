@@ -183,6 +183,7 @@ def _attached(model: FrameModel | StructureModel, lists: Lists) -> dict[str, Any
         },
         "parts": {name: _part(part) for name, part in model.parts.items()},
         "interfaces": {name: asdict(item) for name, item in model.interfaces.items()},
+        "separate": model.separate,
         **{name: [asdict(item) for item in getattr(model, name)] for name in lists},
     }
 
@@ -198,6 +199,7 @@ def _items(attached: dict[str, Any], lists: Lists) -> dict[str, Any]:
     return {
         "parts": {name: _part_from(part) for name, part in attached["parts"].items()},
         "interfaces": {name: Interface(**item) for name, item in attached["interfaces"].items()},
+        "separate": bool(attached["separate"]),
         **{name: [kind(**item) for item in attached[name]] for name, kind in lists.items()},
     }
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from fem.attachments import Attachments, Coupling, PointMass, PointSpring, vector
 from fem.cells import KINDS, SPANS
+from fem.doubled import check_no_doubles
 from fem.element_types import check_family, counted
 from fem.errors import ModelError, by_name, check_positive, listed, quoted
 from fem.mesh import FloatArray, FrameMesh, IntArray
@@ -147,6 +148,9 @@ class StructureModel:
         Elastic foundations.
     interfaces
         The named directions that a reduction keeps and a load may act on.
+    separate
+        Whether nodes at one place may belong to pieces that nothing joins. Else `fem.assemble`
+        refuses such pieces: as a rule their nodes were to be one.
 
     Raises
     ------
@@ -178,6 +182,7 @@ class StructureModel:
     couplings: Sequence[Coupling] = ()
     foundations: Sequence[Foundation] = ()
     interfaces: Mapping[str, Interface] = field(default_factory=dict)
+    separate: bool = False
 
     def __post_init__(self) -> None:
         if isinstance(self.mesh, FrameMesh):
@@ -322,11 +327,25 @@ class StructureModel:
                 raise ModelError(
                     f"{mesh.source}: {kind} {np.argmax(count > 1)} is in more than one part"
                 )
+        self._check_doubles()
         for name, (_, lines) in self.beams.items():
             spans = mesh.points[lines[:, 1]] - mesh.points[lines[:, 0]]
             short = np.flatnonzero(np.linalg.norm(spans, axis=1) <= 1e-12 * mesh.size)
             if len(short):
                 raise ModelError(f"{mesh.source}: line {short[0]} of {name!r} has zero length")
+
+    def _check_doubles(self) -> None:
+        """No part, and no two of solids, may hold a cell twice; beams may lie side by side."""
+        solids: dict[str, list[IntArray]] = {}
+        for name, part in self.parts.items():
+            for kind, at in self.mesh.part(name).items():
+                if isinstance(part, SolidPart):
+                    solids.setdefault(kind, []).append(at)
+                else:
+                    check_no_doubles(self.mesh.source, self.mesh.points, kind, at, self.mesh.cells)
+        for kind, blocks in solids.items():
+            at = np.concatenate(blocks)
+            check_no_doubles(self.mesh.source, self.mesh.points, kind, at, self.mesh.cells)
 
     @staticmethod
     def _kinds_for(part: Part) -> set[str]:

@@ -38,6 +38,7 @@ from fem.natural import (
     natural_form,
     solid_rows,
 )
+from fem.pieces import check_joined
 from fem.scatter import SparseArray, block_pattern, dense_scatter, displacement_of
 from fem.shell_assembly import facet_matrices, facet_rows
 from fem.solids import checked_volumes, gradients_and_volumes, mass_matrices, stiffness_matrices
@@ -155,6 +156,7 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
         If a shell meets solids at an edge only, about which it can turn, or a truss has a node
         that is not held in all directions.
     """
+    check_joined(model)
     check_conforming(model)
     for text in (*hinge_warnings(model), *mechanism_warnings(model)):
         warnings.warn(text, JointWarning, stacklevel=3)
@@ -164,10 +166,7 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
         warnings.warn(text, DistortionWarning, stacklevel=3)
     numbering = number_blocks(model)
     constraints = constrain(model, numbering)
-    stiffness, mass = solid_matrices(model, numbering)
-    for others in (facet_matrices, truss_matrices, attached_matrices):
-        more = others(model, numbering)
-        stiffness, mass = _sum(stiffness, more[0]), _sum(mass, more[1])
+    stiffness, mass = unconstrained_matrices(model, numbering)
     K = constraints.reduced(stiffness)
     del stiffness
     M = constraints.reduced(mass)
@@ -175,6 +174,34 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     interfaces = _interface_vectors(model, numbering, constraints)
     damping = _damping(model, numbering, constraints)
     return StructureComponent(K, M, interfaces, model, numbering, constraints, damping)
+
+
+def unconstrained_matrices(
+    model: StructureModel, numbering: Numbering
+) -> tuple[SparseArray, SparseArray]:
+    """Stiffness and mass for all degrees of freedom, as if nothing were held or coupled."""
+    stiffness, mass = solid_matrices(model, numbering)
+    for others in (facet_matrices, truss_matrices, attached_matrices):
+        more = others(model, numbering)
+        stiffness, mass = _sum(stiffness, more[0]), _sum(mass, more[1])
+    return stiffness, mass
+
+
+def rigid_body_mass(component: StructureComponent) -> FloatArray:
+    """Mass matrix (6, 6) of the rigid motions, supports apart: along and about x, y and z."""
+    model, numbering = component.model, component.numbering
+    _, mass = unconstrained_matrices(model, numbering)
+    motions = np.zeros((3 * numbering.count, 6))
+    moving, turning = numbering.translation >= 0, numbering.rotation >= 0
+    blocks = numbering.translation[moving]
+    for i in range(3):
+        motions[3 * blocks + i, i] = 1.0
+        swing = np.cross(np.eye(3)[i], model.mesh.points[moving])
+        for j in range(3):
+            motions[3 * blocks + j, 3 + i] = swing[:, j]
+        turns = np.concatenate([numbering.rotation[turning], numbering.hinged])
+        motions[3 * turns + i, 3 + i] = 1.0
+    return np.asarray(motions.T @ (mass @ motions))
 
 
 def _check_nothing_empty(

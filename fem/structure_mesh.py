@@ -15,6 +15,9 @@ from fem.cells import CUBE, KINDS, PYRAMID, TETRAHEDRON, TRIANGLE, WEDGE
 from fem.errors import ModelError, quoted
 from fem.mesh import FloatArray, FrameMesh, IntArray, index_sets, numbers
 
+POINTS, CELLS = " (points)", " (cells)"
+"""After a name that a point set and a group share, to tell which is meant."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StructureMesh:
@@ -128,13 +131,18 @@ class StructureMesh:
         Raises
         ------
         ModelError
-            If there is neither of the name, or it is empty.
+            If there is neither of the name, both with other nodes, or it is empty. ``NAME
+            (points)`` and ``NAME (cells)`` tell the two apart.
         """
         if name in self.point_sets:
             found = self.point_sets[name]
+            self._check_one_meaning(name)
         elif name in self.groups:
-            cells = [self.cells[kind][at].ravel() for kind, at in self.groups[name].items()]
-            found = np.unique(np.concatenate(cells)) if cells else np.zeros(0, dtype=np.int64)
+            found = self._nodes_of_group(name)
+        elif name.removesuffix(POINTS) in self.point_sets:
+            found = self.point_sets[name.removesuffix(POINTS)]
+        elif name.removesuffix(CELLS) in self.groups:
+            found = self._nodes_of_group(name.removesuffix(CELLS))
         else:
             raise ModelError(
                 f"{self.source}: there is no point or face {name!r}; there are {quoted(self.names)}"
@@ -142,6 +150,21 @@ class StructureMesh:
         if len(found) == 0:
             raise ModelError(f"{self.source}: {name!r} holds no node")
         return found
+
+    def _nodes_of_group(self, name: str) -> IntArray:
+        cells = [self.cells[kind][at].ravel() for kind, at in self.groups[name].items()]
+        return np.unique(np.concatenate(cells)) if cells else np.zeros(0, dtype=np.int64)
+
+    def _check_one_meaning(self, name: str) -> None:
+        """Refuse a name of a point set and of a group of cells that have other nodes."""
+        if name in self.groups:
+            points, group = self.point_sets[name], self._nodes_of_group(name)
+            if not np.array_equal(points, group):
+                raise ModelError(
+                    f"{self.source}: {name!r} means two things, a set of {len(points)} points and a"
+                    f" group of cells with {len(group)} nodes; use {name + POINTS!r} or"
+                    f" {name + CELLS!r}"
+                )
 
     def node(self, name: str) -> int:
         """The one node of a name; a `ModelError` says so if it holds more."""

@@ -177,6 +177,7 @@ def run(
 def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
     """Check a scene, and print the modes of its structure."""
     with plain_errors():
+        import fem
         from nldyn.runtime.progress import messages_shown
         from nldyn.scene.build import (
             build_candidates,
@@ -197,10 +198,8 @@ def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
             elif component is not None:
                 reduced = build_reduced(loaded, component)
             system = build_system(loaded, reduced)
-        for item in () if component is None else component.model.mesh.left_out:
-            click.echo(f"left out of the mesh file: {item}")
-        if component is not None and (brought := component.model.mesh.attachments):
-            click.echo(f"taken from the mesh file: {brought}")
+        if component is not None:
+            click.echo(fem.summary(component))
         click.echo(describe_system(system, 0 if reduced is None else reduced.residual_modes))
         check_computable(loaded, scene)
         if candidates is not None and loaded.reduction is not None:

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -209,10 +209,16 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
 
     if scene.mesh is None:
         raise scene_error(scene.file, ("mesh",), "is missing: the structure is not given by a mesh")
-    path = _mesh_path(scene, scene.mesh.file)
+    path, ignore = _mesh_path(scene, scene.mesh.file), scene.mesh.ignore
     if scene.mesh.model == "structure":
         with _told_as(scene, ("mesh", "file"), fem.ModelError):
-            structure = fem.read_structure(path, _mesh_places(scene))
+            structure = fem.read_structure(path, _mesh_places(scene), ignore)
+            structure = _in_metres(scene, structure)
+            if scene.mesh.merge:
+                structure = fem.joined(
+                    [structure], None if scene.mesh.merge is True else scene.mesh.merge
+                )
+        structure = _with_places(scene, structure)
         scene = with_described_parts(scene, structure)
         check_structure_names(scene, structure, scene.file)
         if refinement > 1:
@@ -223,13 +229,47 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
         with _told_as(scene, (), fem.ModelError):
             return fem.assemble(_structure_model(scene, structure))
     with _told_as(scene, ("mesh", "file"), fem.ModelError):
-        mesh = fem.read_mesh(path, _mesh_places(scene))
+        mesh = _in_metres(scene, fem.read_mesh(path, _mesh_places(scene), ignore))
+    mesh = _with_places(scene, mesh)
     scene = with_described_parts(scene, mesh)
     check_mesh_names(scene, mesh, scene.file)
     with _told_as(scene, (), fem.ModelError):
         if refinement > 1:
             mesh = refined_mesh(mesh, refinement)
         return fem.assemble(_frame_model(scene, mesh))
+
+
+Mesh = TypeVar("Mesh", "fem.FrameMesh", "fem.StructureMesh")
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
+
+
+def _in_metres(scene: Scene, mesh: Mesh) -> Mesh:
+    """The mesh with its coordinates in m; what else a file holds cannot be converted."""
+    assert scene.mesh is not None
+    unit = scene.mesh.unit
+    if unit == "m":
+        return mesh
+    if mesh.attachments or scene.mesh.parts_from_file:
+        fault = f"'{unit}' tells the unit of lengths alone, but masses, springs or parts are taken"
+        raise scene_error(scene.file, ("mesh", "unit"), f"{fault} from the file, too")
+    return mesh.with_points(METRES[unit] * mesh.points)
+
+
+def _with_places(scene: Scene, mesh: Mesh) -> Mesh:
+    """The mesh with the point sets of ``[places]``."""
+    import fem
+
+    sets = {}
+    for name, place in scene.places.items():
+        with _told_as(scene, ("places", name), fem.ModelError):
+            if name in mesh.point_sets:
+                raise fem.ModelError(f"{mesh.source}: has a point set of this name already")
+            if place.at is not None:
+                sets[name] = fem.node_at(mesh.points, place.at, mesh.source)
+            else:
+                assert place.box is not None
+                sets[name] = fem.nodes_inside(mesh.points, place.box, mesh.source)
+    return mesh.with_point_sets(sets) if sets else mesh
 
 
 def build_reduced(
@@ -593,7 +633,8 @@ def _frame_model(scene: Scene, mesh: fem.FrameMesh) -> fem.FrameModel:
         name: _truss(table) if table.kind == "truss" else _beam(table)
         for name, table in scene.parts.items()
     }
-    return fem.FrameModel(mesh, parts, **_attached(scene))
+    separate = scene.mesh is not None and scene.mesh.separate
+    return fem.FrameModel(mesh, parts, separate=separate, **_attached(scene))
 
 
 def _structure_model(scene: Scene, mesh: fem.StructureMesh) -> fem.StructureModel:
@@ -607,6 +648,7 @@ def _structure_model(scene: Scene, mesh: fem.StructureMesh) -> fem.StructureMode
             for c in scene.couplings
         ],
         foundations=[fem.Foundation(f.at, f.stiffness) for f in scene.foundations],
+        separate=scene.mesh is not None and scene.mesh.separate,
         **_attached(scene),
     )
 

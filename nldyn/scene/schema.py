@@ -57,6 +57,30 @@ class MeshTable(Table):
     model: Literal["frame", "structure"] = "frame"
     mirror: str | None = None
     parts_from_file: list[str] = []
+    unit: Literal["m", "cm", "mm", "inch"] = "m"
+    ignore: list[str] = []
+    merge: bool | Positive = False
+    separate: bool = False
+
+    @model_validator(mode="after")
+    def _one_mesh(self) -> MeshTable:
+        if self.merge and self.separate:
+            raise ValueError("has both 'merge' and 'separate'; keep one")
+        if self.merge and self.model == "frame":
+            raise ValueError("has 'merge', which needs model = \"structure\"")
+        return self
+
+
+class PlaceTable(Table):
+    """``[places.NAME]``: a point set by coordinates or by a box, where the mesh has no name."""
+
+    at: Triple | None = None
+    box: Annotated[list[Triple], Field(min_length=2, max_length=2)] | None = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> PlaceTable:
+        _exactly_one(self, "at", "box")
+        return self
 
 
 class PartTable(Table):
@@ -423,6 +447,7 @@ class Scene(Table):
 
     title: str = ""
     mesh: MeshTable | None = None
+    places: dict[str, PlaceTable] = {}
     parts: dict[str, PartTable] = {}
     supports: list[SupportTable] = []
     point_masses: list[PointMassTable] = []

@@ -326,7 +326,7 @@ SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0]]
         (lambda: fem.ShellPart(STEEL, 0.1, offset=np.inf), "offset must be finite"),
         (
             lambda: fem.assemble(shell_of(SQUARE, [[0, 1, 1, 3]])),
-            "m: part 's': the quad with the nodes 0, 1, 1, 3 is flat, folded or has a corner",
+            r"m: quad 0 at \(0.5, 0.25, 0\) has a node twice",
         ),
         (
             lambda: fem.assemble(shell_of(SQUARE, [[0, 1, 4]])),

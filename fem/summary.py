@@ -1,0 +1,121 @@
+"""What was read and assembled, for a person: cells, names, mass, centre, extents, pieces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem.frame import Component
+from fem.frame import rigid_body_mass as frame_mass
+from fem.pieces import described, place_of
+from fem.structure_assembly import StructureComponent
+from fem.structure_assembly import rigid_body_mass as structure_mass
+
+MOST_NAMES = 30
+
+
+@dataclass(frozen=True)
+class MassProperties:
+    """Mass of a component without regard to its supports.
+
+    Parameters
+    ----------
+    mass
+        In kg.
+    centre
+        Centre of mass (x, y, z) in m.
+
+    Examples
+    --------
+    >>> import fem
+    >>> model = fem.StructureModel(
+    ...     fem.box_mesh("bar", (2.0, 0.1, 0.1), (2, 1, 1)),
+    ...     {"bar": fem.SolidPart(fem.Material(2.1e11, 7800.0, 0.3))})
+    >>> mass_properties(fem.assemble(model))
+    MassProperties(mass=156.0, centre=(1.0, 0.05, 0.05))
+    """
+
+    mass: float
+    centre: tuple[float, float, float]
+
+
+def mass_properties(component: Component | StructureComponent) -> MassProperties:
+    """Mass and centre of mass of everything that a component is made of, supports apart.
+
+    Notes
+    -----
+    With the mass matrix M of all degrees of freedom, t the translation and r the rotation about an
+    axis, m = tᵀMt, and tᵀMr is m times a coordinate of the centre.
+    """
+    if isinstance(component, Component):
+        rigid = frame_mass(component)
+        mass = rigid[0, 0]
+        moments = np.array([rigid[1, 2], -rigid[0, 2], mass * component.model.mesh.points[0, 2]])
+    else:
+        rigid = structure_mass(component)
+        mass = rigid[0, 0]
+        moments = np.array([rigid[1, 5], -rigid[0, 5], rigid[0, 4]])
+    x, y, z = (float(f"{value:.12g}") + 0.0 for value in (moments / mass if mass else np.zeros(3)))
+    return MassProperties(float(f"{mass:.12g}"), (x, y, z))
+
+
+def summary(component: Component | StructureComponent) -> str:
+    """What a component was made of, in lines for a person.
+
+    Examples
+    --------
+    >>> import fem
+    >>> model = fem.StructureModel(
+    ...     fem.box_mesh("bar", (2.0, 0.1, 0.1), (2, 1, 1)),
+    ...     {"bar": fem.SolidPart(fem.Material(2.1e11, 7800.0, 0.3))})
+    >>> print(summary(fem.assemble(model)).splitlines()[0])
+    mesh box_mesh: 32 nodes; 2 hexahedron20
+    """
+    mesh = component.model.mesh
+    used = mesh.points
+    low, high = used.min(axis=0), used.max(axis=0)
+    properties = mass_properties(component)
+    lines = [
+        f"mesh {mesh.source}: {len(mesh.points)} nodes; {_cells(component)}",
+        f"extents: {place_of(low)} to {place_of(high)} m",
+        f"mass: {properties.mass:.8g} kg, centre at {place_of(np.array(properties.centre))} m",
+        *_names(component),
+        *described(component.model),
+        *getattr(mesh, "notes", ()),
+        *(f"left out of the file: {item}" for item in mesh.left_out),
+    ]
+    if mesh.attachments:
+        lines.append(f"taken from the file: {mesh.attachments}")
+    return "\n".join(lines)
+
+
+def _cells(component: Component | StructureComponent) -> str:
+    """Cells by kind."""
+    if isinstance(component, Component):
+        return f"{len(component.model.mesh.lines)} line"
+    cells = component.model.mesh.cells
+    return ", ".join(f"{len(nodes)} {kind}" for kind, nodes in cells.items())
+
+
+def _names(component: Component | StructureComponent) -> list[str]:
+    """Groups of cells and sets of points, each with how much it holds."""
+    mesh = component.model.mesh
+    if isinstance(component, Component):
+        groups = {name: f"{len(cells)} line" for name, cells in component.model.mesh.parts.items()}
+    else:
+        groups = {
+            name: ", ".join(f"{len(at)} {kind}" for kind, at in found.items())
+            for name, found in component.model.mesh.groups.items()
+        }
+    parts = set(component.model.parts)
+    told = [
+        f"{name!r} ({what}{', a part' if name in parts else ''})" for name, what in groups.items()
+    ]
+    points = [f"{name!r} ({len(nodes)})" for name, nodes in mesh.point_sets.items()]
+    return [
+        f"{what}: {', '.join(names[:MOST_NAMES])}"
+        + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
+        for what, names in (("groups of cells", told), ("sets of points", points))
+        if names
+    ]
