@@ -494,6 +494,27 @@ def test_what_is_not_read_is_named_with_its_place(tmp_path, text, sentence):
         fem.read_structure(path)
 
 
+def test_what_is_refused_can_be_ignored_by_name(tmp_path):
+    text = cantilever_deck() + (
+        "*ELEMENT, TYPE=GAPUNI, ELSET=GAPS\n50, 1, 2\n51, 3, 4\n*GAP, ELSET=GAPS\n0.1\n"
+        "*ELSET, ELSET=ALL\nBEAM, GAPS, 51\n*Contact  pair\na, b\n"
+    )
+    path = deck(tmp_path, text)
+    with pytest.raises(fem.ModelError, match=r"GAPUNI .*GAP .*CONTACT PAIR"):
+        fem.read_mesh(path)
+    with pytest.raises(fem.ModelError, match=r"not read: \*GAP \(1, first in line 24\)"):
+        fem.read_mesh(path, ignore=["gapuni", "*CONTACT PAIR"])
+    mesh = fem.read_mesh(path, ignore=["GAPUNI", "CONTACT PAIR", "*GAP"])
+    assert len(mesh.part("ALL")) == 10
+    told = [str(item) for item in mesh.left_out]
+    assert told[0] == (
+        "elements of type GAPUNI (2, first in line 22, element 50): it is to be ignored"
+    )
+    assert len(told) == 3
+    with pytest.raises(fem.ModelError, match=r"no cell of '.ROTTEN' to ignore"):
+        fem.read_mesh(path, ignore=["GAPUNI", "CONTACT PAIR", "*GAP", "*ROTTEN"])
+
+
 def test_what_is_left_out_by_intention_is_listed(tmp_path):
     text = (
         cantilever_deck() + "*BOUNDARY\n1, 1, 6\n*STEP\n*FREQUENCY\n3\n*BOUNDARY\n2, 1\n*END STEP\n"
