@@ -241,6 +241,16 @@ def test_a_surface_of_faces_is_a_set_of_nodes(tmp_path):
         assert np.array_equal(mesh.nodes("HULL"), np.unique(sides))
 
 
+def test_a_surface_and_a_set_of_one_name_stay_apart(tmp_path):
+    rows, plain = box_rows((1, 1, 1))
+    text = f"{rows}*SURFACE, NAME=x0, TYPE=NODE\nx1\n"
+    mesh = fem.read_structure(deck(tmp_path, text))
+    assert np.array_equal(mesh.nodes("x0"), plain.nodes("x0"))
+    assert np.array_equal(mesh.nodes("surface x0"), plain.nodes("x1"))
+    with pytest.raises(fem.ModelError, match=r"'X0' is defined twice, first in line \d+"):
+        fem.read_structure(deck(tmp_path, text + "*SURFACE, NAME=X0\nBOX, S1\n"))
+
+
 def test_a_27_node_hexahedron_has_its_centre_and_faces_in_place(tmp_path):
     mesh = fem.box_mesh("BOX", (1.0, 1.0, 1.0), (1, 1, 1), kind="hexahedron27")
     cell = mesh.cells["hexahedron27"][0]
