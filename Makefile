@@ -1,11 +1,12 @@
 # `make paper` reproduces the paper's figures, `make test` runs the tests, `make bench` measures
 # speed against error, `make hard` computes the hard cases, `make faults` tries thousands of bad
-# inputs and hundreds of kills. All set up a virtual environment in .venv first.
+# inputs and hundreds of kills, `make slow` runs all tests that are too long for `make test`.
+# All set up a virtual environment in .venv first.
 PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 
-.PHONY: paper test check bench hard faults clean
+.PHONY: paper test slow check bench hard faults clean
 
 $(VENV)/.installed: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -16,9 +17,14 @@ paper: $(VENV)/.installed
 	$(BIN)/nldyn paper --out results/paper
 
 # the workers share the cores: with two threads each, exponentials of 2 x 2 matrices took 200 times as
-# long on a busy machine
+# long on a busy machine; the order of the files is that of tests/conftest.py
+PYTEST = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
+
 test: $(VENV)/.installed
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile
+	$(PYTEST)
+
+slow: $(VENV)/.installed
+	$(PYTEST) -m slow
 
 check: $(VENV)/.installed
 	$(BIN)/ruff check .

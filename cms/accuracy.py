@@ -12,7 +12,7 @@ from scipy import linalg
 from cms.checks import check_belongs
 from cms.component import ComponentLike, FloatArray, Pencil, checked_pencil, times
 from cms.constraint import FixedInterface, fixed_interface
-from cms.eigen import Modes, lowest_modes, shifted_factor
+from cms.eigen import Modes, lowest_modes, shifted_factor, without_offsets
 from cms.errors import ReductionError
 from cms.inertia import elastic_solutions
 from cms.model import ReducedModel, positive
@@ -223,6 +223,7 @@ def accuracy(component: ComponentLike, reduced: ReducedModel) -> Accuracy:
     if reduced.method in ("craig-bampton", "guyan"):
         return accuracy_fixed(pencil, reduced)
     shifted = shifted_factor(pencil)
+    pencil = without_offsets(pencil, shifted)
     modes = lowest_modes(pencil, shifted, min(reduced.modes + 1, pencil.size))
     kept = modes.vectors[:, : reduced.modes]
     if reduced.method in ("truncation", "macneal"):

@@ -18,10 +18,12 @@ from cms.component import (
     symmetric_matrix,
     times,
 )
-from cms.eigen import Shifted, lowest_modes, shifted_factor
+from cms.eigen import Shifted, lowest_modes, shifted_factor, without_offsets
 from cms.errors import ReductionError
 from cms.inertia import elastic_solutions, quotient
 from cms.model import ReducedModel
+
+ONE_FREQUENCY = 1e-6  # modes nearer than this may be turned among each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +49,8 @@ class Checks:
     frequency_errors : (n,) array
         Relative error of the frequency nearest in shape to each compared mode of the component.
     mac : (n,) array
-        Modal assurance criterion of that pair.
+        Modal assurance criterion of that mode with the space of the model's modes of the same
+        frequency (rigid-body modes are one space): the squared cosine of the angle between them.
     """
 
     mass_orthogonality: float
@@ -124,6 +127,7 @@ def check(
     pencil = checked_pencil(component)
     check_belongs(pencil, reduced)
     shifted = shifted_factor(pencil)
+    pencil = without_offsets(pencil, shifted)
     given = {
         name: interface_vector(vector, name, pencil.size)
         for name, vector in (directions or {}).items()
@@ -206,8 +210,10 @@ def compared(
     alike = mac(full.vectors, reduced.basis, pencil.mass)
     nearest = np.argmax(alike, axis=1)
     exact = np.sqrt(full.squares) / (2.0 * np.pi)
-    error = quotient(reduced.frequencies_hz[nearest] - exact, exact)
-    return error, alike[np.arange(modes), nearest]
+    own = reduced.frequencies_hz
+    error = quotient(own[nearest] - exact, exact)
+    same = np.abs(own[None, :] - own[nearest][:, None]) <= ONE_FREQUENCY * own[nearest][:, None]
+    return error, np.minimum(np.sum(alike, axis=1, where=same), 1.0)
 
 
 def mac(a: ArrayLike, b: ArrayLike, mass: SparseMatrix | ArrayLike | None = None) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -11,13 +12,16 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, aslinearoperator
 
+from cms.digits import checked_digits, entry_digits, relative_rounding, rounded_energies
 from cms.errors import ReductionError
+from cms.massless import massless_directions
 
 FloatArray = NDArray[np.float64]
 SparseMatrix = sparse.csc_array[np.float64]
 
 SYMMETRY_TOLERANCE = 1e-9
 NATURAL_TOLERANCE = 1e-6
+MOST_DENSE = 1500
 MOST_BYTES = 3e8  # of deformations at a time
 
 
@@ -37,6 +41,8 @@ class ComponentLike(Protocol):
     A ``natural_form`` is optional: an object whose ``deformations`` A, an (m, N) matrix or linear
     operator, and ``stiffness`` d, (m,), give ``K = A^T d A``. Where A keeps the digits of
     deformations beside those of rigid motion, all results do, whatever the condition of K.
+    ``digits`` are optional, too: how many decimal digits the entries have. Where they are not
+    given they are read off the entries.
     """
 
     @property
@@ -91,7 +97,13 @@ class NaturalForm:
 class Pencil:
     """The checked matrices K and M (N, N) and the interface vectors B, one column per name.
 
-    Products with K go by its natural form where there is one; K itself is for factors.
+    Products with K go by its natural form where there is one; K itself is for factors. They are
+    those of ``K - F diag(w^2) F^T`` with the inertia F = M R of rigid-body modes R that rounding
+    of the entries has given the ``offset`` w^2.
+
+    ``rounding`` is the largest relative error of an entry of K, ``mass_rounding`` that of M,
+    beyond that of double precision. A pencil in other coordinates has its ``origin``: another one
+    and the matrix (N', N) that expands to its degrees of freedom, where these roundings are.
     """
 
     stiffness: SparseMatrix
@@ -99,23 +111,54 @@ class Pencil:
     names: tuple[str, ...]
     loads: FloatArray
     natural: NaturalForm | None = None
+    rounding: float = 0.0
+    mass_rounding: float = 0.0
+    inertia: FloatArray | None = None
+    offset: FloatArray | None = None
+    origin: tuple[Pencil, Any] | None = None
 
     @property
     def size(self) -> int:
         """Number of degrees of freedom N."""
         return int(self.stiffness.shape[0])
 
+    @property
+    def digits(self) -> int | None:
+        """Decimal digits of the entries of K; None if they are those of double precision."""
+        return None if not self.rounding else round(1.0 - np.log10(2.0 * self.rounding))
+
+    @cached_property
+    def massless(self) -> FloatArray:
+        """Directions without mass (N, z); not looked for beyond `MOST_DENSE` rows."""
+        if self.size > MOST_DENSE:
+            return np.zeros((self.size, 0))
+        return massless_directions(self.mass, self.mass_rounding)
+
     def forces(self, vectors: FloatArray) -> FloatArray:
         """``K V``, (N, k)."""
-        if self.natural is None:
-            return times(self.stiffness, vectors)
-        return self.natural.forces(vectors)
+        if self.natural is not None:
+            return self.natural.forces(vectors)
+        found = times(self.stiffness, vectors)
+        if self.inertia is None or self.offset is None:
+            return found
+        return found - self.inertia @ (self.offset[:, None] * (self.inertia.T @ vectors))
+
+    def undetermined(self, vectors: FloatArray, double: float) -> FloatArray:
+        """Change of ``v^T K v`` (k,) that rounding may make, ``double`` that of double precision."""
+        if self.origin is not None:
+            before, expansion = self.origin
+            return before.undetermined(np.asarray(expansion @ vectors), double)
+        large = np.abs(vectors)
+        summed = double * np.sum(large * times(abs(self.stiffness), large), axis=0)
+        if self.rounding == 0.0:
+            return np.asarray(summed)
+        return np.asarray(summed + rounded_energies(self.stiffness, vectors, self.rounding))
 
     def energies(self, vectors: FloatArray) -> FloatArray:
         """``V^T K V``, (k, k)."""
         if self.natural is not None:
             return self.natural.energies(vectors)
-        found = vectors.T @ times(self.stiffness, vectors)
+        found = vectors.T @ self.forces(vectors)
         return np.asarray((found + found.T) / 2)
 
 
@@ -167,6 +210,9 @@ def interface_vector(vector: Any, name: str, size: int) -> FloatArray:
     ReductionError
         If its shape is not (N,), an entry is not finite, or all are zero.
     """
+    if sparse.issparse(vector):
+        vector = vector.toarray()
+        vector = vector.ravel() if 1 in vector.shape else vector
     try:
         array = np.asarray(vector, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -210,7 +256,13 @@ def checked_pencil(component: ComponentLike) -> Pencil:
     vectors = [interface_vector(component.interfaces[name], name, size) for name in names]
     loads = np.column_stack(vectors) if vectors else np.zeros((size, 0))
     natural = checked_form(getattr(component, "natural_form", None), stiffness)
-    return Pencil(stiffness, mass, names, loads, natural)
+    given = checked_digits(getattr(component, "digits", None))
+    rounding = [0.0, 0.0]
+    if natural is None:
+        for number, matrix in enumerate((component.stiffness, component.mass)):
+            found = entry_digits(sparse.csc_array(matrix).data) if given is None else given
+            rounding[number] = relative_rounding(found)
+    return Pencil(stiffness, mass, names, loads, natural, *rounding)
 
 
 def checked_form(form: Any, stiffness: SparseMatrix) -> NaturalForm | None:

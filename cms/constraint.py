@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 
 from cms.component import FloatArray, Pencil, SparseMatrix, times
-from cms.eigen import Shifted, shifted_factor
+from cms.eigen import Shifted, shifted_factor, without_offsets
 from cms.errors import ReductionError
 from cms.inertia import elastic_solutions
 
@@ -83,8 +83,18 @@ def fixed_interface(pencil: Pencil) -> FixedInterface:
     n = inner.size
     coupling = K[:n, n:].toarray()
     natural = None if pencil.natural is None else pencil.natural.after(turn[:, :n])
-    interior = Pencil(symmetric(K[:n, :n]), symmetric(M[:n, :n]), (), np.zeros((n, 0)), natural)
+    interior = Pencil(
+        symmetric(K[:n, :n]),
+        symmetric(M[:n, :n]),
+        (),
+        np.zeros((n, 0)),
+        natural,
+        pencil.rounding,
+        pencil.mass_rounding,
+        origin=(pencil, turn[:, :n]),
+    )
     shifted = shifted_factor(interior)
+    interior = without_offsets(interior, shifted)
     shapes = np.vstack([elastic_solutions(interior, shifted, -coupling), np.eye(m)])
     if natural is not None:
         left = times(sparse.csc_array(turn.T), pencil.forces(times(turn, shapes)))[:n]

@@ -17,6 +17,9 @@ Place = tuple[str, str]
 
 DUAL = "dual-craig-bampton"
 RIGID_JOINT = 1e-12
+RIGID_RANK = 1e-9
+RIGID_GAP = 1e-5  # frequency of a rigid-body mode that is rounding, beside the first elastic one
+COUPLED_ERROR = 1e-8
 
 
 @dataclass(frozen=True)
@@ -106,8 +109,9 @@ def couple(components: Mapping[str, ReducedModel], joints: Sequence[Joint]) -> R
     Raises
     ------
     ReductionError
-        If a component or an interface is unknown, the same interfaces are joined twice, or methods
-        do not go together.
+        If a component or an interface is unknown, the same interfaces are joined twice, methods
+        do not go together, or the model does not have the masses, the energy, or the rigid-body
+        modes of its parts.
 
     Notes
     -----
@@ -168,7 +172,9 @@ def coupled_primally(assembly: Assembly, joints: Sequence[Joint]) -> ReducedMode
     order = np.argsort(omega, kind="stable")
     vectors = free @ turn[order].T
     omega = omega[order]
-    omega = np.where(omega <= 64 * np.finfo(float).eps * omega[-1], 0.0, omega)
+    expected = rigid_motions(A, assembly.omega)
+    check_coupled(omega, expected, vectors, directions[:, ~soft].T @ A, stacked @ turn[order].T)
+    omega[:expected] = 0.0
     force = compliant.T @ compliant
     through = J @ assembly.flexibility
     rows = (assembly.rows - through.T @ force @ A) @ vectors
@@ -185,6 +191,61 @@ def coupled_primally(assembly: Assembly, joints: Sequence[Joint]) -> ReducedMode
         shapes=shapes,
         method="coupled",
     )
+
+
+def rigid_motions(rows: FloatArray, omega: FloatArray) -> int:
+    """How many motions of the components at 0 Hz (n,) open no joint, by its rows (j, n)."""
+    rigid = rows[:, omega == 0.0]
+    length = np.linalg.norm(rigid, axis=1)
+    moved = length > RIGID_RANK * np.linalg.norm(rows, axis=1)
+    if not rigid.shape[1] or not np.any(moved):
+        return int(rigid.shape[1])
+    return int(rigid.shape[1] - np.linalg.matrix_rank(rigid[moved] / length[moved, None], tol=RIGID_RANK))
+
+
+def check_coupled(
+    omega: FloatArray, rigid: int, vectors: FloatArray, closed: FloatArray, stretch: FloatArray
+) -> None:
+    """Compare a coupled model with its parts, and raise ReductionError where something is off.
+
+    Parameters
+    ----------
+    omega : (r,) array
+        Its circular frequencies, ascending.
+    rigid : int
+        Number of rigid-body modes that the parts leave it.
+    vectors : (n, r) array
+        Its modes in the coordinates of the parts, whose masses are 1.
+    closed : (j, n) array
+        Rows of the rigid joints.
+    stretch : (k, r) array
+        ``S V``, where ``S^T S`` is the stiffness of parts and springs.
+    """
+    if omega.size == 0:
+        return
+    if rigid > omega.size:
+        raise ReductionError(f"{rigid} rigid-body modes are left of {omega.size} modes")
+    elastic = omega[rigid] if rigid < omega.size else omega[-1]
+    if rigid and omega[rigid - 1] > RIGID_GAP * elastic:
+        hz = omega[rigid - 1] / (2 * np.pi)
+        raise ReductionError(
+            f"the parts and joints leave {rigid} rigid-body modes, but mode {rigid} of the coupled "
+            f"model has {hz:.4g} Hz: the parts' rigid-body modes do not fit at the joints"
+        )
+    if rigid < omega.size and omega[rigid] <= 4 * np.finfo(float).eps * omega[-1]:
+        raise ReductionError(
+            f"mode {rigid + 1} of the coupled model has no stiffness beside its fastest one, though "
+            f"the parts and joints leave {rigid} rigid-body modes: the stiffnesses differ too much"
+        )
+    mass = np.abs(vectors.T @ vectors - np.eye(omega.size)).max()
+    energy = np.abs(stretch.T @ stretch - np.diag(omega**2)).max() / max(omega[-1] ** 2, 1e-300)
+    size = np.linalg.norm(closed, axis=1)[:, None] * np.linalg.norm(vectors, axis=0)
+    gap = np.max(np.abs(closed @ vectors) / np.where(size > 0.0, size, 1.0), initial=0.0)
+    for what, error in (("mass", mass), ("energy", energy), ("displacement at a joint", gap)):
+        if not error <= COUPLED_ERROR:
+            raise ReductionError(
+                f"the {what} of the coupled model differs from that of its parts by {error:.1e}"
+            )
 
 
 def coupled_dually(components: Mapping[str, ReducedModel], joints: Sequence[Joint]) -> ReducedModel:

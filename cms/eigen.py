@@ -10,9 +10,15 @@ from scipy import linalg
 from cms.component import FloatArray, Pencil, SparseMatrix, times
 from cms.errors import ReductionError
 from cms.factor import DENSE_LIMIT, SUSPECT_PIVOT, Factor, factorise
+from cms.massless import statically_split
 
 EPS = float(np.finfo(np.float64).eps)
 RIGID_TOLERANCE = 64 * EPS
+SUMMED = 64 * EPS  # relative error of an entry that double precision sums and factorises
+SHIFT_OVER_ROUNDING = 32.0
+CLEAR = 0.25  # of the rounding: w^2 above it is too large for a zero, too small for a frequency
+APART = 16.0  # w^2 of the first elastic mode over the rounding
+MOSTLY = 0.99  # a row whose unit vector lies in the massless directions to so much has no mass
 ERROR_TOLERANCE = 1e-8
 LARGEST_ERROR = 1e-3
 GUARD_MODES = 2
@@ -65,6 +71,9 @@ def fastest_square(pencil: Pencil) -> float:
     """Largest K_ii / M_ii: a lower bound of the largest w^2 and the scale of its rounding."""
     mass = pencil.mass.diagonal()
     heavy = mass > 0.0
+    if pencil.massless.shape[1]:
+        turn, _ = linalg.qr(pencil.massless * np.sqrt(mass + ~heavy)[:, None], mode="economic")
+        heavy &= np.sum(turn**2, axis=1) < MOSTLY
     if not np.any(heavy):
         raise ReductionError("the mass matrix has no positive diagonal entry")
     return float(np.max(pencil.stiffness.diagonal()[heavy] / mass[heavy]))
@@ -84,9 +93,9 @@ def shifted_factor(pencil: Pencil) -> Shifted:
     fastest = fastest_square(pencil)
     factor = factorise(pencil.stiffness)
     none = np.zeros((pencil.size, 0))
-    if factor is not None and not factor.suspect:
+    if factor is not None and not factor.suspect and not pencil.rounding:
         return Shifted(factor, 0.0, fastest, none)
-    shift = np.sqrt(EPS) * (fastest if fastest > 0.0 else 1.0)
+    shift = shift_over_rounding(pencil, fastest)
     moved = factorise(pencil.stiffness + shift * pencil.mass)
     if moved is None:
         raise ReductionError(
@@ -98,6 +107,62 @@ def shifted_factor(pencil: Pencil) -> Shifted:
     if few.squares.size == 0 and factor is not None:
         return Shifted(factor, 0.0, fastest, none)
     return replace(shifted, rigid_modes=few.vectors)
+
+
+def shift_over_rounding(pencil: Pencil, fastest: float) -> float:
+    """A shift in rad^2/s^2 that makes K + s M positive, whatever rounding has left of zero."""
+    rounding = max(np.sqrt(EPS), SHIFT_OVER_ROUNDING * pencil.rounding)
+    return float(rounding * (fastest if fastest > 0.0 else 1.0))
+
+
+def without_offsets(pencil: Pencil, shifted: Shifted) -> Pencil:
+    """The pencil in which nothing holds the rigid-body modes, not even rounding.
+
+    With rigid-body modes R of w^2 = o, ``K - M R diag(o) R^T M`` has the same modes as K, and the
+    same frequencies but for those, which are zero.
+    """
+    rigid = shifted.rigid_modes
+    if pencil.natural is not None or not rigid.shape[1]:
+        return pencil
+    inertia = times(pencil.mass, rigid)
+    offset = np.sum(rigid * times(pencil.stiffness, rigid), axis=0)
+    return replace(pencil, inertia=inertia, offset=offset)
+
+
+def rigid_rounding(pencil: Pencil, vectors: FloatArray, fastest: float) -> FloatArray:
+    """Largest |w^2| (k,) that the rounding of K alone may give mass-normalised modes (N, k)."""
+    if pencil.natural is not None:
+        return np.full(vectors.shape[1], RIGID_TOLERANCE * fastest)
+    return pencil.undetermined(vectors, SUMMED)
+
+
+def zeroed(squares: FloatArray, rounding: FloatArray, pencil: Pencil) -> FloatArray:
+    """The w^2, ascending, with those of the first modes zero that are so but for rounding.
+
+    Raises
+    ------
+    ReductionError
+        If few digits leave it open which modes these are: a mode lies just within the rounding, or
+        the rounding is a sixteenth of the next w^2 or more.
+    """
+    inside = np.abs(squares) <= rounding
+    count = inside.size if np.all(inside) else int(np.argmin(inside))
+    if count and pencil.digits is not None:
+        bound = float(np.max(rounding[:count]))
+        following = float(squares[count]) if count < squares.size else np.inf
+        if np.max(squares[:count]) > CLEAR * bound or bound * APART > following:
+            raise ReductionError(undecided(squares[: count + 1], bound, pencil.digits))
+    return np.where(np.arange(squares.size) < count, 0.0, squares)
+
+
+def undecided(squares: FloatArray, bound: float, digits: int) -> str:
+    """The sentence for modes of which few digits leave open whether they are rigid."""
+    listed = ", ".join(f"{np.sqrt(max(square, 0.0)) / (2 * np.pi):.4g}" for square in squares)
+    return (
+        f"the {digits} digits of the stiffness leave open which modes are rigid-body modes: they "
+        f"may move one of 0 Hz to {np.sqrt(bound) / (2 * np.pi):.3g} Hz, and the lowest lie at "
+        f"{listed} Hz; give more digits, or state digits = 17 if the entries are exact"
+    )
 
 
 def lowest_modes(pencil: Pencil, shifted: Shifted, count: int) -> Modes:
@@ -137,26 +202,43 @@ def lowest_modes(pencil: Pencil, shifted: Shifted, count: int) -> Modes:
         squares, vectors = lanczos_modes(pencil, shifted, count)
     vectors = mass_orthonormal(vectors, pencil.mass)
     if shifted.shift > 0.0:
-        rounding = RIGID_TOLERANCE * shifted.shift / np.sqrt(EPS)
-        squares = np.where(np.abs(squares) <= rounding, 0.0, squares)
-    if squares[0] < 0.0:
-        raise ReductionError(
-            "the stiffness matrix is not positive, as of a structure beyond its buckling load: its "
-            f"lowest w^2 is {squares[0]:.3g} rad^2/s^2"
-        )
+        if pencil.natural is None and shifted.rigid:
+            squares = np.where(np.arange(squares.size) < shifted.rigid, 0.0, squares)
+        else:
+            rounding = rigid_rounding(pencil, vectors, shifted.fastest)
+            squares = zeroed(squares, rounding + RIGID_TOLERANCE * shifted.shift, pencil)
+    check_stable(pencil, squares, vectors, shifted.fastest)
+    if not shifted.rigid and squares[0] == 0.0:
+        rigid = replace(shifted, rigid_modes=vectors[:, squares == 0.0])
+        pencil = without_offsets(pencil, rigid)
     modes = refined(pencil, shifted, squares, vectors)
     check_errors(modes.errors, modes.squares, shifted)
     return modes
 
 
+def check_stable(
+    pencil: Pencil, squares: FloatArray, vectors: FloatArray, fastest: float
+) -> None:
+    """Raise ReductionError where the lowest w^2, ascending, is negative."""
+    if squares.size == 0 or squares[0] >= 0.0:
+        return
+    rounding = float(rigid_rounding(pencil, vectors[:, :1], fastest)[0])
+    raise ReductionError(
+        "the stiffness matrix is not positive, as of a structure beyond its buckling load: its "
+        f"lowest w^2 is {squares[0]:.3g} rad^2/s^2, and the rounding of its entries explains "
+        f"{rounding:.1g}; if it floats, state how many digits the entries have (digits = ...)"
+    )
+
+
 def modes_up_to(pencil: Pencil, shifted: Shifted, cutoff: float) -> Modes:
     """All modes with w^2 (rad^2/s^2) not above ``cutoff``; see :func:`lowest_modes`."""
-    count = min(8, pencil.size)
+    most = pencil.size - pencil.massless.shape[1]
+    count = min(8, most)
     while True:
         modes = lowest_modes(pencil, shifted, count)
-        if modes.squares[-1] > cutoff or count == pencil.size:
+        if modes.squares[-1] > cutoff or count == most:
             return first_modes(modes, int(np.searchsorted(modes.squares, cutoff, side="right")))
-        count = min(2 * count, pencil.size)
+        count = min(2 * count, most)
 
 
 def first_modes(modes: Modes, count: int) -> Modes:
@@ -172,6 +254,8 @@ def dense_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatArra
             f"{count} modes are more than a quarter of the component's {size} degrees of "
             f"freedom, which is done only up to {DENSE_AT_MOST} degrees of freedom"
         )
+    if pencil.massless.shape[1]:
+        return massive_modes(pencil, shifted, count)
     if size > DENSE_LIMIT and factorise(pencil.mass) is not None:
         return direct_modes(pencil, shifted, count)
     mass, matrix = pencil.mass.toarray(), shifted.factor.matrix.toarray()
@@ -188,6 +272,35 @@ def dense_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatArra
             )
         return 1.0 / nu - shifted.shift, vectors / np.sqrt(nu)
     return with_fast_modes(pencil, shifted, nu, vectors)
+
+
+def massive_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatArray, FloatArray]:
+    """w^2 (k,) and modes (N, k) where directions without mass follow the others statically."""
+    if count > pencil.size - pencil.massless.shape[1]:
+        raise ReductionError(
+            f"{count} modes are asked for, but only {pencil.size - pencil.massless.shape[1]} "
+            "have mass"
+        )
+    _, massive = statically_split(shifted.factor.matrix, pencil.massless)
+    energy = massive.T @ times(shifted.factor.matrix, massive)
+    mass = massive.T @ times(pencil.mass, massive)
+    squares, directions = dense_pair(energy, mass)
+    order = np.argsort(squares, kind="stable")[:count]
+    return squares[order] - shifted.shift, massive @ directions[:, order]
+
+
+def dense_pair(stiffness: FloatArray, mass: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """All w^2 (n,) ascending and mass-normalised modes (n, n) of two positive definite matrices.
+
+    Slow ones come from the inverse problem, fast ones from the direct one.
+    """
+    K, M = (stiffness + stiffness.T) / 2, (mass + mass.T) / 2
+    direct, direct_directions = linalg.eigh(K, M)
+    nu, directions = linalg.eigh(M, K)
+    nu, directions = np.maximum(nu[::-1], EPS * nu[-1]), directions[:, ::-1]
+    slow = direct <= np.sqrt(1.0 / (nu[0] * nu[-1]))
+    squares = np.where(slow, 1.0 / nu, direct)
+    return squares, np.where(slow, directions / np.sqrt(nu), direct_directions)
 
 
 def with_fast_modes(
@@ -353,23 +466,41 @@ def ritz(
             rounding = 8 * EPS * np.sum(sizes, axis=0)
         else:
             rounding = RIGID_TOLERANCE**2 * fastest * np.diag(M)
-        held = np.all(np.diag(K) > rounding) and definite(K)
-        shift = 0.0 if held else np.sqrt(EPS) * fastest
+        held = np.all(np.diag(K) > rounding) and definite(K) and not pencil.rounding
+        shift = 0.0 if held else shift_over_rounding(pencil, fastest)
     try:
         direct, direct_directions = linalg.eigh(K, M)
     except linalg.LinAlgError as error:
-        raise ReductionError(
-            "an interface has no mass to move, or one that rounding hides beside the others'"
-        ) from error
+        raise ReductionError(no_mass(pencil, basis, M)) from error
     nu, directions = linalg.eigh(M, K + shift * M)
     nu, directions = np.maximum(nu[::-1], EPS * nu[-1]), directions[:, ::-1]
     squares, directions = 1.0 / nu - shift, directions / np.sqrt(nu)
     slow = direct + shift <= np.sqrt(1.0 / (nu[0] * nu[-1]))
     squares = np.where(slow, squares, direct)
     directions = np.where(slow, directions, direct_directions)
+    vectors = mass_orthonormal(basis @ directions, pencil.mass)
+    loose = pencil.natural is None and squares[0] <= rigid_rounding(pencil, vectors, fastest)[0]
+    if not shift and loose:
+        return ritz(basis, pencil, fastest, shift_over_rounding(pencil, fastest))
     if shift:
-        squares = np.where(np.abs(squares) <= RIGID_TOLERANCE * fastest, 0.0, squares)
-    return squares, mass_orthonormal(basis @ directions, pencil.mass)
+        rounding = rigid_rounding(pencil, vectors, fastest)
+        squares = zeroed(squares, rounding + RIGID_TOLERANCE * shift, pencil)
+    check_stable(pencil, squares, vectors, fastest)
+    return squares, vectors
+
+
+def no_mass(pencil: Pencil, basis: FloatArray, mass: FloatArray) -> str:
+    """The sentence for a motion without mass, with the interface that it moves most."""
+    diagonal = np.diag(mass)
+    scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, np.inf))
+    scale = np.where(diagonal > 0.0, scale, 1.0)
+    motion = basis @ (scale * linalg.eigh(scale[:, None] * mass * scale)[1][:, 0])
+    moved = np.abs(pencil.loads.T @ motion) / np.linalg.norm(pencil.loads, axis=0)
+    name = pencil.names[int(np.argmax(moved))] if pencil.names else "unknown"
+    return (
+        f"interface '{name}' has no mass to move, or one that rounding hides beside the others'; "
+        "use method 'macneal', or give it some mass"
+    )
 
 
 def definite(matrix: FloatArray) -> bool:

@@ -31,6 +31,7 @@ SUPERLU_BYTES = 40.0  # memory per such entry, with the copy from which the pivo
 
 SUSPECT_PIVOT = 1e-11  # of a matrix scaled to a unit diagonal: what rounding leaves of none
 SUSPECT_EIGENVALUE = 1e-13  # the same of an eigenvalue, which is smaller than every pivot
+DENSE_SUSPECT = 1e-12  # where the pivots are those of LAPACK, an eigenvalue costs little
 
 Solver = Callable[[FloatArray], FloatArray]
 
@@ -216,7 +217,8 @@ def dense_solver(matrix: SparseMatrix) -> tuple[Solver, bool] | None:
     def solver(right: FloatArray) -> FloatArray:
         return np.asarray(linalg.cho_solve((lower, True), right), dtype=np.float64)
 
-    return solver, float(np.min(np.diag(lower))) ** 2 <= SUSPECT_PIVOT
+    small = float(np.min(np.diag(lower))) ** 2 <= SUSPECT_PIVOT
+    return solver, small or smallest_eigenvalue(solver, matrix) <= DENSE_SUSPECT
 
 
 def cholesky_solver(matrix: SparseMatrix) -> tuple[Solver, bool] | None:

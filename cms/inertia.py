@@ -103,7 +103,8 @@ def check_solution(
         worst = float(np.max(quotient(error, np.sqrt(whole))))
         raise ReductionError(
             f"the static solution with inertia relief fails its residual check ({worst:.1e} > "
-            f"{RESIDUAL_TOLERANCE:.0e}): the stiffnesses of the component differ too much"
+            f"{RESIDUAL_TOLERANCE:.0e}): the stiffnesses of the component differ too much for double "
+            "precision; use a coarser mesh or stiffnesses that differ less"
         )
 
 

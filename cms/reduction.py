@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from cms.component import ComponentLike, FloatArray, Pencil, checked_pencil, symmetric_matrix, times
+from cms.condensed import condensed
 from cms.constraint import fixed_interface, fixed_interface_errors
 from cms.eigen import (
     Modes,
@@ -21,6 +22,7 @@ from cms.eigen import (
     modes_up_to,
     ritz,
     shifted_factor,
+    without_offsets,
 )
 from cms.errors import ReductionError
 from cms.factor import Progress, announced
@@ -39,6 +41,7 @@ METHODS = (
 )
 FIXED = ("craig-bampton", "guyan")
 NEGLIGIBLE_PARTICIPATION = 1e-9
+MASS_ERROR = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +56,10 @@ class Matrices:
         Load and displacement vector of each interface.
     damping : (N, N) sparse or dense matrix, optional
         Symmetric, in N s/m for translations.
+    digits : int, optional
+        How many decimal digits the entries of stiffness and mass have, 3 to 17; read off the
+        entries unless given. State it where they were rounded and then converted to other units,
+        or where exact entries look rounded (17).
 
     Examples
     --------
@@ -66,6 +73,7 @@ class Matrices:
     mass: Any
     interfaces: Mapping[str, Any]
     damping: Any = None
+    digits: int | None = None
 
 
 def reduce(
@@ -178,7 +186,20 @@ def reduce(
                 "the modes cannot be computed, as the entries of the stiffness or of the mass "
                 f"differ too much in size ({reason})"
             ) from error
+    check_masses(pencil, reduced)
     return with_component_damping(reduced, component)
+
+
+def check_masses(pencil: Pencil, reduced: ReducedModel) -> None:
+    """Raise ReductionError where modes do not have unit masses or are not orthogonal."""
+    V = reduced.basis
+    error = np.abs(V.T @ times(pencil.mass, V) - np.eye(reduced.size))
+    if not error.max(initial=0.0) <= MASS_ERROR:
+        mode, other = np.unravel_index(int(np.argmax(error)), error.shape)
+        raise ReductionError(
+            f"the masses of modes {mode + 1} and {other + 1} by '{reduced.method}' are wrong by "
+            f"{error[mode, other]:.1e}: the mass matrix is too near to a singular one"
+        )
 
 
 def chosen_method(method: str, residual: bool) -> str:
@@ -197,6 +218,7 @@ def reduced_free(
 ) -> ReducedModel:
     """Free-interface modes, with what the method adds to them."""
     shifted = shifted_factor(pencil)
+    pencil = without_offsets(pencil, shifted)
     if method != "truncation":
         check_rigid_kept(modes, shifted)
     kept = kept_modes(pencil, shifted, modes, cutoff_hz)
@@ -221,19 +243,28 @@ def reduced_free(
         raise ReductionError(nothing_kept(cutoff_hz))
     errors = mode_errors(pencil, shifted, extra.squares, extra.vectors)
     added = Modes(extra.squares, extra.vectors, errors)
-    return assembled(pencil, kept, extra.dropped, method, added)
+    whole = assembled(pencil, kept, extra.dropped, method, added)
+    if not extra.massless.shape[1]:
+        return whole
+    direct = extra.massless.T @ pencil.loads
+    return replace(
+        whole, residual_flexibility=direct.T @ direct, residual_shapes=extra.massless @ direct
+    )
 
 
 def reduced_fixed(
     pencil: Pencil, modes: int | None, cutoff_hz: float | None, method: str
 ) -> ReducedModel:
     """Constraint modes and fixed-interface modes, projected and diagonalised."""
+    parts = condensed(pencil)
+    if parts is not None:
+        return parts.expanded(reduced_fixed(parts.pencil, modes, cutoff_hz, method))
     fixed = fixed_interface(pencil)
     inner = fixed.interior
     if modes is not None and modes > inner.size:
         raise ReductionError(
             f"modes = {modes}, but with its interfaces held the component has only {inner.size} "
-            "degrees of freedom"
+            f"degrees of freedom{'' if pencil.origin is None else ' that have mass'}"
         )
     if modes is not None and modes < fixed.shifted.rigid and method != "guyan":
         raise ReductionError(

@@ -9,8 +9,8 @@ from scipy import linalg
 
 from cms.component import FloatArray, Pencil, times
 from cms.eigen import Shifted
-from cms.errors import ReductionError
 from cms.inertia import elastic_solutions, quotient
+from cms.massless import MASSLESS
 
 DEPENDENCE_TOLERANCE = 1e-12
 
@@ -25,12 +25,16 @@ class ResidualModes:
         Their w^2 in rad^2/s^2, ascending.
     vectors : (N, p) array
         K- and M-orthogonal to the kept modes and to each other, ``V^T M V = I``.
+    massless : (N, z) array
+        Shapes without mass, ``V^T K V = I``: the flexibility that is left of the interfaces when
+        all modes with mass are kept.
     dropped : int
         How many of the interfaces' residuals vanish or depend on the others.
     """
 
     squares: FloatArray
     vectors: FloatArray
+    massless: FloatArray
     dropped: int
 
 
@@ -66,11 +70,6 @@ def residual_modes(pencil: Pencil, shifted: Shifted, modes: FloatArray) -> Resid
     -------
     ResidualModes
 
-    Raises
-    ------
-    ReductionError
-        If a residual mode has no mass.
-
     Notes
     -----
     The residual ``psi_j`` of each interface is measured in strain energy against its whole static
@@ -84,8 +83,8 @@ def residual_modes(pencil: Pencil, shifted: Shifted, modes: FloatArray) -> Resid
     residual = without_modes(static, modes, pencil)
     basis = independent_part(residual, pencil, pencil.size - modes.shape[1])
     basis = without_modes(basis, modes, pencil)
-    squares, vectors = diagonalised(basis, pencil)
-    return ResidualModes(squares, vectors, pencil.loads.shape[1] - squares.size)
+    squares, vectors, massless = diagonalised(basis, pencil)
+    return ResidualModes(squares, vectors, massless, pencil.loads.shape[1] - basis.shape[1])
 
 
 def independent_part(residual: FloatArray, pencil: Pencil, at_most: int) -> FloatArray:
@@ -96,13 +95,17 @@ def independent_part(residual: FloatArray, pencil: Pencil, at_most: int) -> Floa
     return (residual @ directions[:, kept]) / np.sqrt(share[kept])
 
 
-def diagonalised(basis: FloatArray, pencil: Pencil) -> tuple[FloatArray, FloatArray]:
-    """w^2 (p,) and mass-normalised vectors (N, p) of K and M projected on the basis (N, p)."""
+def diagonalised(basis: FloatArray, pencil: Pencil) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """w^2 (p,) and mass-normalised vectors (N, p) of K and M projected on the basis (N, p + z).
+
+    The z directions whose mass is rounding come apart, with ``V^T K V = I``.
+    """
     if basis.shape[1] == 0:
-        return np.zeros(0), basis
+        return np.zeros(0), basis, basis
     mass = basis.T @ times(pencil.mass, basis)
     nu, directions = linalg.eigh((mass + mass.T) / 2, pencil.energies(basis))
-    nu, directions = nu[::-1], directions[:, ::-1]
-    if nu[-1] <= 0.0:
-        raise ReductionError("a residual mode has no mass: give its interface some mass")
-    return 1.0 / nu, basis @ directions / np.sqrt(nu)
+    nu, vectors = nu[::-1], basis @ directions[:, ::-1]
+    large = np.abs(vectors)
+    sizes = np.sum(large * times(abs(pencil.mass), large), axis=0)
+    heavy = nu > max(MASSLESS, pencil.mass_rounding) * sizes
+    return 1.0 / nu[heavy], vectors[:, heavy] / np.sqrt(nu[heavy]), vectors[:, ~heavy]

@@ -27,7 +27,13 @@ from fem.model import (
 from fem.pieces import Pieces, pieces_of
 from fem.places import node_at, nodes_inside
 from fem.read import from_meshio, read_mesh, read_structure, structure_from_meshio
-from fem.sections import CircularSection, CrossSection, RectangularSection, Section
+from fem.sections import (
+    CircularSection,
+    CrossSection,
+    RectangularSection,
+    Section,
+    TaperedSection,
+)
 from fem.shells import ShellPart
 from fem.structure import Foundation, SolidPart, StructureModel, symmetry
 from fem.structure_assembly import DistortionWarning, LockingWarning, StructureComponent
@@ -68,6 +74,7 @@ __all__ = [
     "StructureMesh",
     "StructureModel",
     "Support",
+    "TaperedSection",
     "TrussPart",
     "assemble",
     "box_mesh",

@@ -6,11 +6,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.elements import bending_matrices, congruent, stretching_matrices
+from fem.elements import (
+    bending_matrices,
+    bending_numbers,
+    congruent,
+    mean,
+    stretching_matrices,
+)
 from fem.errors import ModelError
 from fem.mesh import FloatArray
 from fem.model import BeamPart, TrussPart
-from fem.sections import CircularSection, section_number, shear_areas
+from fem.sections import (
+    CircularSection,
+    SectionRun,
+    TaperedSection,
+    section_number,
+    shear_areas,
+)
 from fem.trusses import plane_truss_matrices
 
 UPRIGHT = np.array([0, 0, 1.0])
@@ -22,28 +34,36 @@ TURNED_SIGNS = np.array([1.0, -1.0, 1.0, -1.0])
 
 @dataclass(frozen=True)
 class Bending:
-    """Numbers of bending in one plane: EI in N m², kGA in N or None, rho I in kg m or None."""
+    """Numbers of bending in one plane: EI in N m², kGA in N or None, rho I in kg m or None.
 
-    stiffness: float
-    shear_stiffness: float | None
-    inertia_per_length: float | None
+    Of a tapered part they are arrays (e, q) at the places of integration.
+    """
+
+    stiffness: float | FloatArray
+    shear_stiffness: float | FloatArray | None
+    inertia_per_length: float | FloatArray | None
 
     def matrices(
-        self, lengths: FloatArray, mass_per_length: float, axial_force: float
+        self, lengths: FloatArray, mass_per_length: float | FloatArray, axial_force: float
     ) -> tuple[FloatArray, FloatArray]:
         """Stiffness and mass (e, 4, 4) of elements of these lengths (e,)."""
 
-        def each(value: float | None) -> FloatArray | None:
-            return None if value is None else np.full(len(lengths), value)
+        def or_none(value: float | FloatArray | None) -> FloatArray | None:
+            return None if value is None else each(value, lengths)
 
         return bending_matrices(
             lengths,
-            np.full(len(lengths), self.stiffness),
-            np.full(len(lengths), mass_per_length),
-            each(self.shear_stiffness),
-            each(self.inertia_per_length),
-            each(axial_force or None),
+            each(self.stiffness, lengths),
+            each(mass_per_length, lengths),
+            or_none(self.shear_stiffness),
+            or_none(self.inertia_per_length),
+            or_none(axial_force or None),
         )
+
+
+def each(value: float | FloatArray, lengths: FloatArray) -> FloatArray:
+    """A number for every element, shape (e,); those at places along it, (e, q), as they are."""
+    return value if isinstance(value, np.ndarray) else np.full(len(lengths), value)
 
 
 def plane_bending(part: BeamPart, what: str) -> Bending:
@@ -96,7 +116,6 @@ def spatial_matrices(
     material, section = part.material, part.section
     torsion = shear_modulus(part, what) * section_number(section, "torsion_constant", what)
     polar = section.second_moment + section_number(section, "second_moment_across", what)
-    ones = np.ones(len(lengths))
     return _composed(
         12,
         [
@@ -105,7 +124,9 @@ def spatial_matrices(
             (OUT_OF_PLANE, (across[0] * signs, across[1] * signs)),
             (
                 np.array([3, 9]),
-                stretching_matrices(lengths, torsion * ones, material.density * polar * ones),
+                stretching_matrices(
+                    lengths, each(torsion, lengths), each(material.density * polar, lengths)
+                ),
             ),
         ],
     )
@@ -123,7 +144,7 @@ def plane_rows(
         only[:, 0] = part.material.youngs_modulus * part.area / lengths
         return np.tile(np.diag([1.0, 0.0, 0.0, 0.0]), (len(lengths), 1, 1)), only
     bending, stiffness = bending_rows(plane_bending(part, what), lengths, part.axial_force)
-    stretching = part.material.youngs_modulus * part.section.area / lengths
+    stretching = part.material.youngs_modulus * mean(each(part.section.area, lengths)) / lengths
     rows = np.zeros((len(lengths), 4, 4))
     rows[:, 0, 0] = 1.0
     rows[:, 1:, 1:] = bending
@@ -132,8 +153,9 @@ def plane_rows(
 
 def spatial_rows(part: BeamPart, lengths: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
     """The same in space, (e, 8, 9) and (e, 8), for (u, v, w)2 - (u, v, w)1 and six rotations."""
-    torsion = shear_modulus(part, what) * section_number(part.section, "torsion_constant", what)
-    stretching = part.material.youngs_modulus * part.section.area
+    constant = section_number(part.section, "torsion_constant", what)
+    torsion = shear_modulus(part, what) * mean(each(constant, lengths))
+    stretching = part.material.youngs_modulus * mean(each(part.section.area, lengths))
     upright, first = bending_rows(plane_bending(part, what), lengths, part.axial_force)
     across, second = bending_rows(across_bending(part, what), lengths, part.axial_force)
     rows = np.zeros((len(lengths), 8, 9))
@@ -151,27 +173,30 @@ def bending_rows(
 
     The rows are r1 - r2, r1 + r2 less twice the chord's turn c, and c. With p as in
     `fem.elements.bending_matrices` and the axial force P the numbers are EI/L + PL/12,
-    3 EI/(L (1 + p)) + PL/(20 (1 + p)²) and PL.
+    3 EI/(L (1 + p)) + PL/(20 (1 + p)²) and PL. A taper mixes the first two; the first row then
+    takes so much of the second that they do not mix.
     """
-    ratio = np.zeros(len(lengths))
+    first, mixed, odd = bending_numbers(lengths, each(numbers.stiffness, lengths))
+    tension = axial_force * lengths
+    sheared, leaning = np.ones(len(lengths)), np.zeros(len(lengths))
     if numbers.shear_stiffness is not None:
-        ratio = 12.0 * numbers.stiffness / (numbers.shear_stiffness * lengths**2)
-    own, tension = numbers.stiffness / lengths, axial_force * lengths
-    even = own + tension / 12.0
-    odd = 3.0 * own / (1.0 + ratio) + tension / (20.0 * (1.0 + ratio) ** 2)
+        carried = mean(each(numbers.shear_stiffness, lengths)) * lengths
+        sheared = 1.0 / (1.0 + 4.0 * odd / carried)
+        leaning = 4.0 * mixed / carried * sheared
+    even = first - leaning * mixed + tension / 12.0 + tension / 20.0 * leaning**2
+    mixed = mixed * sheared - tension / 20.0 * sheared * leaning
+    odd = odd * sheared + tension / 20.0 * sheared**2
     rows = np.zeros((len(lengths), 3, 3))
     rows[:, 0] = 0.0, 1.0, -1.0
     rows[:, 1] = 0.0, 1.0, 1.0
     rows[:, 1, 0], rows[:, 2, 0] = -2.0 / lengths, 1.0 / lengths
-    return rows, np.column_stack([even, odd, tension])
+    rows[:, 0] += (mixed / even)[:, None] * rows[:, 1]
+    return rows, np.column_stack([even, odd - mixed**2 / even, tension])
 
 
 def _stretching(part: BeamPart, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
-    ones, area = np.ones(len(lengths)), part.section.area
-    material = part.material
-    return stretching_matrices(
-        lengths, material.youngs_modulus * area * ones, material.density * area * ones
-    )
+    material, area = part.material, each(part.section.area, lengths)
+    return stretching_matrices(lengths, material.youngs_modulus * area, material.density * area)
 
 
 def _bending(
@@ -202,7 +227,9 @@ def local_axes(part: BeamPart, spans: FloatArray, what: str) -> FloatArray:
     x = spans / np.linalg.norm(spans, axis=1)[:, None]
     if part.orientation is None:
         z = UPRIGHT - x * x[:, 2:]
-        if isinstance(part.section, CircularSection) and not any(part.offset):
+        section = part.section.taper if isinstance(part.section, SectionRun) else part.section
+        section = section.start if isinstance(section, TaperedSection) else section
+        if isinstance(section, CircularSection) and not any(part.offset):
             z[np.linalg.norm(z, axis=1) < 1e-6] = (1.0, 0.0, 0.0)  # round: any direction will do
         fault = "runs along z, so it needs an orientation (the direction of the section's height)"
     else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from fem.cells import KINDS
 from fem.elements import rotations
 from fem.errors import ModelError, quoted
 from fem.mesh import FloatArray
-from fem.model import BeamPart
 from fem.shell_assembly import shell_pieces
 from fem.shell_stress import outer_stress
 from fem.shells import facet_batches
@@ -20,6 +20,7 @@ from fem.structure import SolidPart
 from fem.structure_assembly import StructureComponent
 from fem.structure_surface import StructureSurface, swept_parts
 from fem.sweep import FrameSurface, outline
+from fem.tapers import along
 
 COLOURS = {"displacement": "m", "stress": "Pa", "moment": "N m"}
 """Quantities by which a picture can be coloured, with their units."""
@@ -133,16 +134,20 @@ def _frame_values(drawing: FrameSurface, u: FloatArray, colour: str) -> Iterator
     local = np.einsum("eij,ej->ei", rotations(directions), ends)
     for swept in drawing.parts:
         name = next(n for n, e in model.element_parts().items() if e is swept.elements)
-        part, elements = model.parts[name], swept.elements
-        K, _ = plane_matrices(part, model.mesh.lengths[elements], f"part {name!r}")
+        part, elements, what = model.parts[name], swept.elements, f"part {name!r}"
+        lines = model.mesh.lines[elements]
+        K, _ = plane_matrices(
+            along(part, model.mesh, lines, what), model.mesh.lengths[elements], what
+        )
         forces = np.einsum("eij,ej->ei", K, local[elements])
         moment = _along(-forces[:, 2], forces[:, 5], swept.places)
         values = np.abs(moment)
         if colour == "stress":
-            corners = outline(part.section)
-            axial = np.abs(forces[:, 3:4]) / part.section.area
-            values = axial + values * corners[:, 0].max() / part.section.second_moment
-        yield np.repeat(values[..., None], len(swept.outline), axis=-1).ravel()
+            section = along(part, model.mesh, lines, what, swept.places).section
+            height = outline(section)[..., 0].max(axis=-1)
+            axial = np.abs(forces[:, 3:4]) / section.area
+            values = axial + values * height / section.second_moment
+        yield np.repeat(values[..., None], swept.shape[2], axis=-1).ravel()
 
 
 def _beam_values(drawing: StructureSurface, u: FloatArray, colour: str) -> Iterator[FloatArray]:
@@ -151,23 +156,25 @@ def _beam_values(drawing: StructureSurface, u: FloatArray, colour: str) -> Itera
         if name in model.trusses:
             force = truss_forces(drawing.component, u, name)
             area = model.trusses[name][0].area if colour == "stress" else np.inf
-            yield np.repeat(np.abs(force) / area, len(swept.places) * len(swept.outline))
+            yield np.repeat(np.abs(force) / area, len(swept.places) * swept.shape[2])
             continue
         part, lines = model.beams[name]
         spans = model.mesh.points[lines[:, 1]] - model.mesh.points[lines[:, 0]]
         what = f"{model.mesh.source}: part {name!r}"
         T = to_nodes(part, local_axes(part, spans, what))
         ends = drawing.component.element_shape(u, name).reshape(-1, 12)
-        K, _ = spatial_matrices(part, np.linalg.norm(spans, axis=1), what)
+        K, _ = spatial_matrices(
+            along(part, model.mesh, lines, what), np.linalg.norm(spans, axis=1), what
+        )
         forces = np.einsum("eij,ejk,ek->ei", K, T, ends)
         about_z = np.abs(_along(-forces[:, 5], forces[:, 11], swept.places))
         about_y = np.abs(_along(-forces[:, 4], forces[:, 10], swept.places))
         values = np.hypot(about_y, about_z)
         if colour == "stress":
-            values = np.abs(forces[:, 6:7]) / part.section.area + _bending_stress(
-                part, about_z, about_y
-            )
-        yield np.repeat(values[..., None], len(swept.outline), axis=-1).ravel()
+            section = along(part, model.mesh, lines, what, swept.places).section
+            axial = np.abs(forces[:, 6:7]) / section.area
+            values = axial + _bending_stress(section, about_z, about_y)
+        yield np.repeat(values[..., None], swept.shape[2], axis=-1).ravel()
 
 
 def truss_forces(component: StructureComponent, u: FloatArray, name: str) -> FloatArray:
@@ -180,10 +187,10 @@ def truss_forces(component: StructureComponent, u: FloatArray, name: str) -> Flo
     return np.asarray(part.material.youngs_modulus * part.area * strain, dtype=np.float64)
 
 
-def _bending_stress(part: BeamPart, about_z: FloatArray, about_y: FloatArray) -> FloatArray:
-    height, width = outline(part.section).max(axis=0)
-    across: float = part.section.second_moment_across  # type: ignore[attr-defined]
-    found = about_z * height / part.section.second_moment + about_y * width / across
+def _bending_stress(section: Any, about_z: FloatArray, about_y: FloatArray) -> FloatArray:
+    height, width = np.moveaxis(outline(section).max(axis=-2), -1, 0)
+    found = about_z * height / section.second_moment
+    found = found + about_y * width / section.second_moment_across
     return np.asarray(found, dtype=np.float64)
 
 

@@ -5,34 +5,57 @@ from __future__ import annotations
 import numpy as np
 import skfem
 from skfem.helpers import d, dd, ddot, dot, grad
+from skfem.quadrature import get_quadrature
 
 from fem.mesh import FloatArray
 
 
 @skfem.BilinearForm
 def _bending(u, v, w):  # type: ignore[no-untyped-def]
-    return ddot(dd(u), dd(v))
+    return w.factor * ddot(dd(u), dd(v))
 
 
 @skfem.BilinearForm
 def _stretching(u, v, w):  # type: ignore[no-untyped-def]
-    return dot(grad(u), grad(v))
+    return w.factor * dot(grad(u), grad(v))
 
 
 @skfem.BilinearForm
 def _product(u, v, w):  # type: ignore[no-untyped-def]
-    return u * v
+    return w.factor * u * v
 
 
 @skfem.BilinearForm
 def _turning(u, v, w):  # type: ignore[no-untyped-def]
-    return dot(d(u), d(v))
+    return w.factor * dot(d(u), d(v))
+
+
+ORDER = 8
+"""Polynomial order that is integrated exactly along beams: a mass that changes with the square."""
+_PLACES, WEIGHTS = get_quadrature(skfem.ElementLineP1(), ORDER)
+PLACES = _PLACES[0]
+"""Places of integration along a line between 0 and 1, shape (q,), with the weights (q,)."""
+
+
+def _integrals(form: skfem.BilinearForm, basis: skfem.Basis, factor: FloatArray) -> FloatArray:
+    """Element matrices of a form times a factor: one for each element, (e,), or each place."""
+    if factor.ndim == 1:
+        matrices = form.elemental(basis, factor=1.0).tolocal()
+        return np.asarray(factor[:, None, None] * matrices, dtype=np.float64)
+    return np.asarray(form.elemental(basis, factor=factor).tolocal(), dtype=np.float64)
+
+
+def mean(values: FloatArray) -> FloatArray:
+    """Means (e,) over elements of values for each element, (e,), or for each place, (e, q)."""
+    return values if values.ndim == 1 else np.asarray(values @ WEIGHTS, dtype=np.float64)
 
 
 def stretching_matrices(
     lengths: FloatArray, stiffness: FloatArray, mass_per_length: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Linear stretching, or twisting: stiffness and mass (e, 2, 2) from EA or GJ, and rho A.
+
+    These are numbers of every element, shape (e,), or at all `PLACES` along it, (e, q).
 
     All elements are one disconnected `skfem.MeshLine` in which each lies on [0, L], because
     scikit-fem's line meshes have neither y nor z.
@@ -44,10 +67,11 @@ def stretching_matrices(
     array([[ 1., -1.],
            [-1.,  1.]])
     """
-    basis = skfem.Basis(_disconnected_lines(lengths), skfem.ElementLineP1(), intorder=2)
+    order = 2 if stiffness.ndim == 1 else ORDER
+    basis = skfem.Basis(_disconnected_lines(lengths), skfem.ElementLineP1(), intorder=order)
     return (
-        stiffness[:, None, None] * _stretching.elemental(basis).tolocal(),
-        mass_per_length[:, None, None] * _product.elemental(basis).tolocal(),
+        _integrals(_stretching, basis, stiffness),
+        _integrals(_product, basis, mass_per_length),
     )
 
 
@@ -64,7 +88,8 @@ def bending_matrices(
     Parameters
     ----------
     lengths, bending_stiffness, mass_per_length
-        L in m, EI in N m², rho A in kg/m of every element, each of shape (e,).
+        L in m, EI in N m², rho A in kg/m of every element, each of shape (e,); all but the length
+        may be given at all `PLACES` along it, shape (e, q).
     shear_stiffness
         Area that carries shear times G in N; infinite without shear deformation, the default.
     inertia_per_length
@@ -78,7 +103,9 @@ def bending_matrices(
     Timoshenko element whose shear strain g is constant and in equilibrium with the moments
     [1]_: g = s ((w2 - w1)/L - (r1 + r2)/2) with s = p/(1 + p), p = 12 EI / (kGA L²). Its
     displacement is Hermite's cubic with the slopes r + g at the ends and its rotation is w' - g,
-    so all matrices follow from Hermite's. Statics are exact at any length.
+    so all matrices follow from Hermite's. Statics are exact at any length. Where the section
+    changes along the element g is the constant strain of least energy; frequencies then are upper
+    bounds.
 
     .. [1] Z. Friedman and J. B. Kosmatka, An improved two-node Timoshenko beam finite element,
        Computers & Structures 47 (1993) 473-481.
@@ -100,28 +127,42 @@ def bending_matrices(
     >>> round(float(np.linalg.inv(k[0, 2:, 2:])[0, 0]), 12) == round(1 / 3 + 2, 12)
     True
     """
-    basis = skfem.Basis(_disconnected_lines(lengths), skfem.ElementLineHermite(), intorder=6)
-    stiffness = bending_stiffness[:, None, None] * _bending.elemental(basis).tolocal()
-    mass = mass_per_length[:, None, None] * _product.elemental(basis).tolocal()
+    order = 6 if bending_stiffness.ndim == 1 else ORDER
+    basis = skfem.Basis(_disconnected_lines(lengths), skfem.ElementLineHermite(), intorder=order)
+    stiffness = _integrals(_bending, basis, bending_stiffness)
+    mass = _integrals(_product, basis, mass_per_length)
     if shear_stiffness is None and inertia_per_length is None and axial_force is None:
         return stiffness, mass
     count = len(lengths)
     strain = _shear_strain(lengths, bending_stiffness, shear_stiffness)
     turn = np.tile(np.eye(4), (count, 1, 1))
     turn[:, [1, 3], :] += strain[:, None, :]
-    slopes = congruent(_turning.elemental(basis).tolocal(), turn)
+    slopes = congruent(_integrals(_turning, basis, np.ones(count)), turn)
     stiffness, mass = congruent(stiffness, turn), congruent(mass, turn)
     squared = strain[:, :, None] * strain[:, None, :]
     if shear_stiffness is not None:
-        sheared = np.isfinite(shear_stiffness)
-        stiffness[sheared] += (shear_stiffness * lengths)[sheared, None, None] * squared[sheared]
+        carried = mean(shear_stiffness)
+        sheared = np.isfinite(carried)
+        stiffness[sheared] += (carried * lengths)[sheared, None, None] * squared[sheared]
     if inertia_per_length is not None:
-        mixed = strain[:, :, None] * np.array([-1.0, 0.0, 1.0, 0.0])
-        rotation = slopes - mixed - mixed.transpose(0, 2, 1) + lengths[:, None, None] * squared
-        mass += inertia_per_length[:, None, None] * rotation
+        mixed = strain[:, :, None] * _turn_integrals(lengths, inertia_per_length, turn)[:, None, :]
+        rotation = congruent(_integrals(_turning, basis, inertia_per_length), turn)
+        mass += rotation - mixed - mixed.transpose(0, 2, 1)
+        mass += (mean(inertia_per_length) * lengths)[:, None, None] * squared
     if axial_force is not None:
         stiffness += axial_force[:, None, None] * slopes
     return stiffness, mass
+
+
+def _turn_integrals(lengths: FloatArray, factor: FloatArray, turn: FloatArray) -> FloatArray:
+    """Integrals (e, 4) of the slope w' times a factor, from (w, rotation) at both ends."""
+    if factor.ndim == 1:
+        return np.asarray(factor[:, None] * np.array([-1.0, 0.0, 1.0, 0.0]), dtype=np.float64)
+    s, L = PLACES, lengths[:, None]
+    cubic = np.stack([6 * s**2 - 6 * s, 1 - 4 * s + 3 * s**2, 6 * s - 6 * s**2, 3 * s**2 - 2 * s])
+    found = (factor * WEIGHTS) @ cubic.T
+    found[:, [1, 3]] *= L
+    return np.asarray(np.einsum("ei,eij->ej", found, turn), dtype=np.float64)
 
 
 def _shear_strain(
@@ -130,10 +171,36 @@ def _shear_strain(
     """The rows (e, 4) that give the shear strain from (w, rotation) at both ends."""
     if shear_stiffness is None:
         return np.zeros((len(lengths), 4))
-    ratio = 12.0 * bending_stiffness / (shear_stiffness * lengths**2)
-    half, one = np.full(len(lengths), -0.5), 1.0 / lengths
-    rows = np.stack([-one, half, one, half], axis=1)
-    return np.asarray((ratio / (1.0 + ratio))[:, None] * rows, dtype=np.float64)
+    _, mixed, odd = bending_numbers(lengths, bending_stiffness)
+    carried = mean(shear_stiffness) * lengths
+    infinite = ~np.isfinite(carried)
+    share = np.where(infinite, 0.0, -2.0 / np.where(infinite, 1.0, 4.0 * odd + carried))
+    one = np.ones(len(lengths))
+    even_row = np.stack([0.0 * one, one, 0.0 * one, -one], axis=1)
+    odd_row = np.stack([2.0 / lengths, one, -2.0 / lengths, one], axis=1)
+    rows = share[:, None] * (mixed[:, None] * even_row + odd[:, None] * odd_row)
+    return np.asarray(rows, dtype=np.float64)
+
+
+def bending_numbers(
+    lengths: FloatArray, bending_stiffness: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Stiffness of Hermite's bending for r1 - r2 and r1 + r2 - 2 c: its 11, 12 and 22, each (e,).
+
+    c is the turn of the chord. With s along the element these are the means of EI/L, of
+    -3 EI (2 s - 1)/L and of 9 EI (2 s - 1)²/L.
+
+    Examples
+    --------
+    >>> [float(x) for (x,) in bending_numbers(np.ones(1), np.ones(1))]
+    [1.0, 0.0, 3.0]
+    """
+    own = mean(bending_stiffness) / lengths
+    if bending_stiffness.ndim == 1:
+        return own, np.zeros(len(lengths)), 3.0 * own
+    lever = 3.0 * (2.0 * PLACES - 1.0)
+    mixed = -mean(bending_stiffness * lever) / lengths
+    return own, mixed, mean(bending_stiffness * lever**2) / lengths
 
 
 def congruent(matrices: FloatArray, T: FloatArray) -> FloatArray:

@@ -29,6 +29,7 @@ from fem.natural import (
 from fem.pieces import check_joined
 from fem.scatter import displacement_of
 from fem.store import load_model, save_model
+from fem.tapers import along
 from fem.trusses import loose_nodes, loose_sentences
 
 SparseArray = sparse.csr_array
@@ -201,7 +202,8 @@ def _element_matrices(model: FrameModel) -> tuple[FloatArray, FloatArray]:
     stiffness, mass = np.zeros((count, 6, 6)), np.zeros((count, 6, 6))
     for name, elements in model.element_parts().items():
         what = f"{mesh.source}: part {name!r}"
-        pair = plane_matrices(model.parts[name], mesh.lengths[elements], what)
+        part = along(model.parts[name], mesh, mesh.lines[elements], what)
+        pair = plane_matrices(part, mesh.lengths[elements], what)
         stiffness[elements], mass[elements] = pair
     return turn(stiffness, directions), turn(mass, directions)
 
@@ -212,7 +214,8 @@ def frame_form(model: FrameModel, element_dofs: IntArray, free: IntArray) -> Nat
     rows, stiffness = np.zeros((len(mesh.lines), 4, 4)), np.zeros((len(mesh.lines), 4))
     for name, elements in model.element_parts().items():
         what = f"{mesh.source}: part {name!r}"
-        pair = plane_rows(model.parts[name], mesh.lengths[elements], what)
+        part = along(model.parts[name], mesh, mesh.lines[elements], what)
+        pair = plane_rows(part, mesh.lengths[elements], what)
         rows[elements], stiffness[elements] = pair
     turn = np.tile(np.eye(4), (len(rows), 1, 1))
     turn[:, :2, :2] = rotations(mesh.spans[:, :2] / mesh.lengths[:, None])[:, :2, :2]

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +24,7 @@ from fem.attachments import (
 from fem.element_types import check_family, counted
 from fem.errors import ModelError, by_name, check_positive, is_finite, listed, quoted
 from fem.mesh import FrameMesh, IntArray
-from fem.sections import CircularSection, CrossSection
+from fem.sections import CircularSection, CrossSection, SectionRun, TaperedSection
 
 THEORIES = ("euler-bernoulli", "timoshenko")
 
@@ -71,7 +72,7 @@ class BeamPart:
     Parameters
     ----------
     material, section
-        What it is made of.
+        What it is made of; the section is a `CrossSection` or a `TaperedSection`.
     theory
         "euler-bernoulli", or "timoshenko" with shear deformation and rotary inertia.
     axial_force
@@ -86,7 +87,7 @@ class BeamPart:
     """
 
     material: Material
-    section: CrossSection
+    section: Any
     theory: str = "euler-bernoulli"
     axial_force: float = 0.0
     orientation: Sequence[float] | None = None
@@ -95,11 +96,8 @@ class BeamPart:
     def __post_init__(self) -> None:
         if not isinstance(self.material, Material):
             raise ModelError(f"part: material must be a Material, not {self.material!r}")
-        if not (hasattr(self.section, "area") and hasattr(self.section, "second_moment")):
-            raise ModelError(
-                f"part: section must have an area and a second_moment, not be {self.section!r}"
-            )
-        check_positive("section", area=self.section.area, second_moment=self.section.second_moment)
+        if not isinstance(self.section, TaperedSection | SectionRun):
+            self._check_section(self.section)
         if self.theory not in THEORIES:
             raise ModelError(f"part: theory must be one of {quoted(THEORIES)}, not {self.theory!r}")
         if not is_finite(self.axial_force):
@@ -111,6 +109,14 @@ class BeamPart:
             )
             if not any(self.orientation):
                 raise ModelError("part: orientation must not be the zero vector")
+
+    @staticmethod
+    def _check_section(section: CrossSection) -> None:
+        if not (hasattr(section, "area") and hasattr(section, "second_moment")):
+            raise ModelError(
+                f"part: section must have an area and a second_moment, not be {section!r}"
+            )
+        check_positive("section", area=section.area, second_moment=section.second_moment)
 
 
 @dataclass(frozen=True)

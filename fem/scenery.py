@@ -15,6 +15,7 @@ from fem.frame import Component
 from fem.mesh import FloatArray
 from fem.model import Support
 from fem.sweep import FrameSurface, nodes_on, outline, reflected, symmetry_normal
+from fem.tapers import along
 
 BLOCK_DENSITY = 7800.0
 MARK_FRACTION = 0.02
@@ -97,8 +98,12 @@ def reach(component: Component, node: int, direction: FloatArray) -> tuple[float
     mesh = component.model.mesh
     across, width = 0.0, 0.0
     for name, elements in component.model.element_parts().items():
-        corners = outline(component.model.parts[name].section)
         for element in elements[np.any(mesh.lines[elements] == node, axis=1)]:
+            line = mesh.lines[[element]]
+            ends = along(component.model.parts[name], mesh, line, name, np.array([0.0, 1.0]))
+            corners = outline(ends.section)
+            if corners.ndim > 2:
+                corners = corners[0, int(np.argmax(line[0] == node))]
             tangent = mesh.spans[element, :2] / mesh.lengths[element]
             normal = np.array([-tangent[1], tangent[0]])
             across = max(across, abs(float(direction @ normal)) * float(corners[:, 0].max()))

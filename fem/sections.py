@@ -5,7 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
 
 from fem.errors import ModelError, check_positive, is_finite
 
@@ -181,7 +185,108 @@ class CircularSection:
         return area, area
 
 
-def section_number(section: CrossSection, name: str, what: str) -> float:
+@dataclass(frozen=True)
+class TaperedSection:
+    """A section that changes along a part, linearly in its dimensions, between two named points.
+
+    Parameters
+    ----------
+    start, end
+        Rectangles, or round bars and tubes, both of the same kind.
+    from_point, to_point
+        Points of the mesh where they are. In between a dimension follows the share of the way from
+        one to the other, on the straight line that joins them.
+
+    Raises
+    ------
+    ModelError
+        If the sections are of other kinds, or the two points are the same.
+
+    Examples
+    --------
+    >>> wedge = TaperedSection(
+    ...     RectangularSection(1.0, 2.0), RectangularSection(1.0, 1.0), "root", "tip"
+    ... )
+    >>> wedge.at(0.25)
+    RectangularSection(width=1.0, height=1.75)
+    """
+
+    start: RectangularSection | CircularSection
+    end: RectangularSection | CircularSection
+    from_point: str
+    to_point: str
+
+    def __post_init__(self) -> None:
+        known = isinstance(self.start, RectangularSection | CircularSection)
+        if not known or type(self.start) is not type(self.end):
+            raise ModelError(
+                "tapered section: start and end must be two RectangularSection or two"
+                f" CircularSection, not {self.start!r} and {self.end!r}"
+            )
+        if self.from_point == self.to_point:
+            raise ModelError(f"tapered section: it starts and ends at {self.from_point!r}")
+
+    def at(self, share: float) -> RectangularSection | CircularSection:
+        """The section at a share of the way between 0 and 1."""
+        sizes = zip(vars(self.start).items(), vars(self.end).values(), strict=True)
+        return type(self.start)(**{n: (1.0 - share) * a + share * b for (n, a), b in sizes})
+
+
+@dataclass(frozen=True, eq=False)
+class SectionRun:
+    """The numbers of a tapered section at places along lines, as arrays of the shape of `shares`.
+
+    Parameters
+    ----------
+    taper
+        The section.
+    shares
+        Of the way from its start to its end, shape (e, q).
+    """
+
+    taper: TaperedSection
+    shares: npt.NDArray[np.float64]
+
+    @cached_property
+    def sections(self) -> list[RectangularSection | CircularSection]:
+        """One after the other."""
+        return [self.taper.at(float(share)) for share in self.shares.ravel()]
+
+    def numbers(self, name: str) -> npt.NDArray[np.float64]:
+        """An attribute of all sections, shape (e, q)."""
+        values = np.array([getattr(section, name) for section in self.sections], dtype=np.float64)
+        return values.reshape(self.shares.shape)
+
+    @property
+    def area(self) -> npt.NDArray[np.float64]:
+        """In m²."""
+        return self.numbers("area")
+
+    @property
+    def second_moment(self) -> npt.NDArray[np.float64]:
+        """In m⁴, along the height."""
+        return self.numbers("second_moment")
+
+    @property
+    def second_moment_across(self) -> npt.NDArray[np.float64]:
+        """In m⁴, along the width."""
+        return self.numbers("second_moment_across")
+
+    @property
+    def torsion_constant(self) -> npt.NDArray[np.float64]:
+        """In m⁴."""
+        return self.numbers("torsion_constant")
+
+    def shear_areas(
+        self, poissons_ratio: float
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """In m², along the height and the width."""
+        pairs = [section.shear_areas(poissons_ratio) for section in self.sections]
+        first, second = np.array(pairs).T.reshape(2, *self.shares.shape)
+        return first, second
+
+
+def section_number(section: CrossSection, name: str, what: str) -> Any:
     """A number of a section, or a ModelError that says which one is missing.
 
     Examples
@@ -192,16 +297,18 @@ def section_number(section: CrossSection, name: str, what: str) -> float:
     value = getattr(section, name, None)
     if value is None:
         raise ModelError(f"{what}: a beam in space needs the section's {name}")
+    if isinstance(section, SectionRun):
+        return value
     check_positive(f"{what}: section", **{name: value})
     return float(value)
 
 
 def shear_areas(
     section: CrossSection, poissons_ratio: float, what: str, directions: int = 2
-) -> Sequence[float]:
+) -> Sequence[Any]:
     """The areas that carry shear, or a ModelError that says that they are missing."""
     given = getattr(section, "shear_areas", lambda _: (None, None))(poissons_ratio)[:directions]
     if any(value is None for value in given):
         names = ("shear_area", "shear_area_across")[:directions]
         raise ModelError(f"{what}: a Timoshenko beam needs the section's {' and '.join(names)}")
-    return [float(value) for value in given if value is not None]
+    return [value for value in given if value is not None]

@@ -18,7 +18,13 @@ from fem.files import draft_of, plain_write_errors
 from fem.mesh import FrameMesh
 from fem.model import LISTS as FRAME_LISTS
 from fem.model import BeamPart, FrameModel, Interface, Material, TrussPart
-from fem.sections import CircularSection, CrossSection, RectangularSection, Section
+from fem.sections import (
+    CircularSection,
+    CrossSection,
+    RectangularSection,
+    Section,
+    TaperedSection,
+)
 from fem.shells import ShellPart
 from fem.structure import LISTS as STRUCTURE_LISTS
 from fem.structure import Part, SolidPart, StructureModel
@@ -36,7 +42,10 @@ BROUGHT: Lists = {
     "equations": LinearEquation,
 }
 PARTS = {kind.__name__: kind for kind in (BeamPart, TrussPart, SolidPart, ShellPart)}
-SECTIONS = {kind.__name__: kind for kind in (RectangularSection, CircularSection, Section)}
+SECTIONS = {
+    kind.__name__: kind
+    for kind in (RectangularSection, CircularSection, Section, TaperedSection)
+}
 
 
 def save_model(model: FrameModel, path: str | os.PathLike[str]) -> None:
@@ -207,7 +216,7 @@ def _items(attached: dict[str, Any], lists: Lists) -> dict[str, Any]:
 def _part(part: Part) -> dict[str, Any]:
     plain = {"part": type(part).__name__, **asdict(part)}
     if isinstance(part, BeamPart):
-        plain.update(_section(part))
+        plain["section"] = _section(part.section, part.material.poissons_ratio)
     return plain
 
 
@@ -215,15 +224,25 @@ def _part_from(plain: dict[str, Any]) -> Any:
     plain = {**plain, "material": Material(**plain["material"])}
     sort = PARTS[plain.pop("part")]
     if sort is BeamPart:
-        plain["section"] = SECTIONS[plain.pop("kind")](**plain["section"])
+        plain["section"] = _section_from(plain["section"])
     return sort(**plain)
 
 
-def _section(part: BeamPart) -> dict[str, Any]:
-    section, kind = part.section, type(part.section).__name__
-    if not isinstance(section, RectangularSection | CircularSection | Section):
-        section, kind = _plain_section(section, part.material.poissons_ratio), "Section"
-    return {"kind": kind, "section": asdict(section)}
+def _section_from(plain: dict[str, Any]) -> Any:
+    plain = dict(plain)
+    sort = SECTIONS[plain.pop("kind")]
+    if sort is TaperedSection:
+        plain |= {end: _section_from(plain[end]) for end in ("start", "end")}
+    return sort(**plain)
+
+
+def _section(section: Any, poissons_ratio: float | None) -> dict[str, Any]:
+    if isinstance(section, TaperedSection):
+        ends = {end: _section(getattr(section, end), None) for end in ("start", "end")}
+        return {"kind": "TaperedSection", **asdict(section), **ends}
+    if type(section).__name__ not in SECTIONS:
+        section = _plain_section(section, poissons_ratio)
+    return {"kind": type(section).__name__, **asdict(section)}
 
 
 def _plain_section(section: CrossSection, poissons_ratio: float | None) -> Section:

@@ -44,6 +44,7 @@ from fem.shell_assembly import facet_matrices, facet_rows
 from fem.solids import checked_volumes, gradients_and_volumes, mass_matrices, stiffness_matrices
 from fem.store import load_structure, save_structure
 from fem.structure import AXES, SolidPart, StructureModel
+from fem.tapers import along
 from fem.truss_assembly import truss_form, truss_matrices
 
 BATCH_BYTES = 1e8
@@ -273,7 +274,8 @@ def attached_rows(model: StructureModel, numbering: Numbering) -> Iterator[Rows]
     size = 3 * numbering.count
     for name, (part, lines) in model.beams.items():
         spans = model.mesh.points[lines[:, 1]] - model.mesh.points[lines[:, 0]]
-        rows, stiffness = element_rows(part, spans, f"{model.mesh.source}: part {name!r}")
+        what = f"{model.mesh.source}: part {name!r}"
+        rows, stiffness = element_rows(along(part, model.mesh, lines, what), spans, what)
         yield line_rows(rows, stiffness, beam_dofs(model, numbering, name), size, 3)
     elongations, given, _ = link_rows(model, numbering)
     if given.any():
@@ -328,7 +330,8 @@ def attached_matrices(
     for name, (part, lines) in model.beams.items():
         points = model.mesh.points
         spans = points[lines[:, 1]] - points[lines[:, 0]]
-        K, M = element_matrices(part, spans, f"{model.mesh.source}: part {name!r}")
+        what = f"{model.mesh.source}: part {name!r}"
+        K, M = element_matrices(along(part, model.mesh, lines, what), spans, what)
         dofs = beam_dofs(model, numbering, name)
         stiffness = _sum(stiffness, dense_scatter(K, dofs, size))
         mass = _sum(mass, dense_scatter(M, dofs, size))

@@ -16,6 +16,7 @@ from fem.model import BeamPart
 from fem.structure import StructureModel
 from fem.structure_assembly import StructureComponent
 from fem.sweep import PartSurface, hermite, hermite_slope, open_ends, outline
+from fem.tapers import along
 from fem.trusses import chords
 
 SHARP_DEGREES = 30.0
@@ -128,8 +129,8 @@ class StructureSurface:
         along[..., 0] = swept.places * np.linalg.norm(spans, axis=1)[:, None]
         axis = along + offset + scale * moved
         frame = section_frames(scale * slope, scale * twist)
-        corners = shrinkage * swept.outline
-        local_points = axis[:, :, None, :] + np.einsum("kc,emcj->emkj", corners, frame)
+        corners = np.broadcast_to(shrinkage * swept.outline, (*swept.shape, 2))
+        local_points = axis[:, :, None, :] + np.einsum("emkc,emcj->emkj", corners, frame)
         points = start[:, None, None, :] + np.einsum("emkj,ejx->emkx", local_points, axes)
         size = np.repeat(np.linalg.norm(moved, axis=-1)[..., None], len(corners), axis=-1)
         return points.reshape(-1, 3), size.ravel()
@@ -233,7 +234,7 @@ def structure_surface(component: StructureComponent, places: int | None = None) 
 def _beams(component: StructureComponent, s: FloatArray) -> Iterator[tuple[str, PartSurface]]:
     nobody = np.zeros(len(component.model.mesh.points), dtype=np.bool_)
     for name, (part, lines) in swept_parts(component.model).items():
-        shape = outline(part.section)
+        shape = outline(along(part, component.model.mesh, lines, f"part {name!r}", s).section)
         yield name, PartSurface(np.arange(len(lines)), shape, s, open_ends(lines, nobody))
 
 

@@ -12,7 +12,8 @@ from fem.errors import ModelError
 from fem.frame import Component
 from fem.mesh import FloatArray, IntArray
 from fem.model import TrussPart
-from fem.sections import CircularSection, CrossSection, RectangularSection
+from fem.sections import CircularSection, CrossSection, RectangularSection, SectionRun
+from fem.tapers import along
 
 CIRCLE_POINTS = 32
 BoolArray = npt.NDArray[np.bool_]
@@ -90,11 +91,15 @@ def deflection(
     return displacement, derivative
 
 
-def outline(section: CrossSection) -> FloatArray:
+def outline(section: CrossSection | SectionRun) -> FloatArray:
     """Corners of a cross-section as (across the axis in the plane, z), shape (k, 2).
 
-    A section known only by its area and second moment becomes the rectangle that has both.
+    A section known only by its area and second moment becomes the rectangle that has both; those
+    of a taper at places (e, m) have their corners, (e, m, k, 2).
     """
+    if isinstance(section, SectionRun):
+        found = np.array([outline(each) for each in section.sections])
+        return found.reshape(*section.shares.shape, *found.shape[1:])
     if isinstance(section, CircularSection):
         angle = 2 * np.pi * np.arange(CIRCLE_POINTS) / CIRCLE_POINTS
         return section.diameter / 2 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
@@ -108,7 +113,10 @@ def outline(section: CrossSection) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class PartSurface:
-    """Elements of one part, each with its outline at m places: points (e, m, k) in this order."""
+    """Elements of one part, each with its outline at m places: points (e, m, k) in this order.
+
+    The outline is the same everywhere, (k, 2), or is given at each place, (e, m, k, 2).
+    """
 
     elements: IntArray
     outline: FloatArray
@@ -118,7 +126,7 @@ class PartSurface:
     @property
     def shape(self) -> tuple[int, int, int]:
         """Elements, places along each, corners of the outline."""
-        return len(self.elements), len(self.places), len(self.outline)
+        return len(self.elements), len(self.places), self.outline.shape[-2]
 
     def faces(self) -> Iterator[IntArray]:
         """Arrays of polygons, (f, 4) for the sides and (1, k) for each open end."""
@@ -132,7 +140,7 @@ class PartSurface:
     def edges(self) -> Iterator[IntArray]:
         """Index pairs (f, 2) of the sharp edges: along the corners and around the open ends."""
         index = np.arange(np.prod(self.shape)).reshape(self.shape)
-        if len(self.outline) < CIRCLE_POINTS:
+        if self.shape[2] < CIRCLE_POINTS:
             yield np.stack([index[:, :-1], index[:, 1:]], axis=-1).reshape(-1, 2)
         for element, end in self.open_ends:
             ring = index[element, -end]
@@ -210,8 +218,8 @@ class FrameSurface:
         normal = np.stack([-tangent[..., 1], tangent[..., 0]], axis=-1)
         corners = shrinkage * part.outline
         points = np.empty((*part.shape, 3))
-        points[..., :2] = axis[:, :, None, :] + corners[:, :1] * normal[:, :, None, :]
-        points[..., 2] = start[:, None, None, 2] + corners[:, 1]
+        points[..., :2] = axis[:, :, None, :] + corners[..., :1] * normal[:, :, None, :]
+        points[..., 2] = start[:, None, None, 2] + corners[..., 1]
         size = np.repeat(np.linalg.norm(moved, axis=-1)[..., None], part.shape[2], axis=-1)
         return points.reshape(-1, 3), size.ravel()
 
@@ -292,7 +300,11 @@ def frame_surface(
     parts = tuple(
         PartSurface(
             elements,
-            outline(model.parts[name].section),
+            outline(
+                along(
+                    model.parts[name], model.mesh, model.mesh.lines[elements], f"part {name!r}", s
+                ).section
+            ),
             s,
             open_ends(model.mesh.lines[elements], joined),
         )

@@ -237,6 +237,7 @@ def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
     help="Kind of animation; mp4 needs imageio-ffmpeg.",
 )
 @quiet_option
+@jobs_option
 def render(
     scene: Path,
     out: Path,
@@ -245,6 +246,7 @@ def render(
     period: int,
     video: str,
     quiet: bool,
+    jobs: int,
 ) -> None:
     """Draw mode shapes, deepest contact and one period in motion of a scene with a mesh."""
     if period != 1 and frequency_hz is None:
@@ -268,6 +270,7 @@ def render(
                     period=period,
                     video=video,
                     progress=report,
+                    jobs=jobs,
                 )
         except RenderError as error:
             click.echo(f"nldyn: {error}", err=True)
@@ -326,6 +329,7 @@ def number_list(
 @click.option("--at-hz", type=click.FloatRange(1e-6, 1e12), metavar="HZ", help="Orbit to compare.")
 @click.option("--full", is_flag=True, help="Find this orbit in the full model, too (minutes).")
 @quiet_option
+@jobs_option
 def converge(
     scene: Path,
     out: Path,
@@ -337,6 +341,7 @@ def converge(
     at_hz: float | None,
     full: bool,
     quiet: bool,
+    jobs: int,
 ) -> None:
     """Compute the harmonic branch with more and more modes, and compare."""
     with plain_errors():
@@ -360,6 +365,7 @@ def converge(
                 at_hz=at_hz,
                 full=full,
                 progress=report,
+                jobs=jobs,
             )
         write_study(study, out, loaded.title)
         click.echo(study.report())

@@ -10,8 +10,10 @@ from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
 
 SMALLEST_FREQUENCY, LARGEST_FREQUENCY = 1e-12, 1e12  # Hz, of an excitation
+LARGEST_DENSE = 500  # rows of a sparse matrix that is taken as it is
 
 
 class SystemModelError(ValueError):
@@ -63,6 +65,8 @@ def check_range(range_hz: tuple[float, float]) -> tuple[float, float]:
 def numbers(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """An array of finite floats, or a SystemModelError under the name."""
     try:
+        if sparse.issparse(values):
+            values = dense(name, values)
         if values is None or np.iscomplexobj(values):
             raise TypeError
         array = np.array(values, dtype=float)  # a copy: the caller may change the original
@@ -71,6 +75,16 @@ def numbers(name: str, values: ArrayLike) -> NDArray[np.float64]:
     if not np.all(np.isfinite(array)):
         raise SystemModelError(f"{name} has an entry that is not finite")
     return array
+
+
+def dense(name: str, values: Any) -> NDArray[Any]:
+    """A sparse matrix as an array, or a SystemModelError where it is too large for a system."""
+    if max(values.shape) > LARGEST_DENSE:
+        raise SystemModelError(
+            f"{name} is a sparse matrix of {values.shape[0]} rows, more than {LARGEST_DENSE}: "
+            "reduce the component first, by cms.reduce, and use System.from_reduced"
+        )
+    return np.asarray(values.toarray())
 
 
 def check_types(**arguments: tuple[Any, ...]) -> None:

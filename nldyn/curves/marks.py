@@ -23,6 +23,7 @@ from nldyn.system.chart import FREQUENCY, Chart, checked_parameter, value_of
 from nldyn.system.parameters import Parameter
 
 POLE = 1e-3  # of its values beside it: what a test is not below where it has no root but a pole
+NOISY = 0.1  # the same for a coefficient made of differences, whose rounding is a hundredth of them
 ALIKE = 1e-6  # share of a step within which touches are those of one orbit by symmetry
 
 
@@ -175,7 +176,8 @@ def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], lis
         try:
             sigma, error = root(lambda x, test=test: test(chord.at(x)))  # type: ignore[misc]
             point = chord.at(sigma)
-            if abs(test(point)) > POLE * max(abs(test(a)), abs(test(b))):
+            least = NOISY if name == "GPD" else POLE
+            if abs(test(point)) > least * max(abs(test(a)), abs(test(b))):
                 if name != "GPD":  # whose coefficient has a pole where a flip meets a fold
                     notes.append(_missing(name, a, "its test jumps there"))
                 continue

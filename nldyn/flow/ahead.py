@@ -19,8 +19,7 @@ from multiprocessing import get_context
 from typing import Any, TypeVar
 
 from nldyn.flow.flow_map import FlowMap
-from nldyn.runtime.compilation import compilations
-from nldyn.runtime.executors import ended_with_parent, stop_processes
+from nldyn.runtime.executors import quiet_process, stop_processes
 from nldyn.runtime.interruption import ignored_interruption, interrupted
 from nldyn.runtime.threads import one_thread
 
@@ -82,7 +81,7 @@ class Ahead:
     begun: dict[Hashable, Task] = field(default_factory=dict)
     busy: dict[Hashable, Hashable] = field(default_factory=dict)  # member of a group at work
     ready: dict[Hashable, tuple[Task, Any]] = field(default_factory=dict)  # computed here
-    useless: list[Future[bytes]] = field(default_factory=list)  # still running
+    taken: list[Future[bytes]] = field(default_factory=list)  # waited for, or useless by now
 
     @cached_property
     def _sent_flow(self) -> bytes:
@@ -114,7 +113,8 @@ class Ahead:
         """Begin what there is room for; to be called now and then."""
         if not self.waiting:
             return
-        futures = [task.future for task in self.begun.values() if task.future] + self.useless
+        self.taken = [future for future in self.taken if not future.done()]
+        futures = [task.future for task in self.begun.values() if task.future] + self.taken
         running = sum(not future.done() for future in futures)
         for task in list(self.waiting):
             if running >= self.places or self.executor is None:
@@ -156,8 +156,9 @@ class Ahead:
             value: Value = self.ready.pop(key)[1]
             return value
         task = self.begun.pop(key, None)
-        if task is not None:
-            found = self._received(task, meanwhile)
+        if task is not None and task.future is not None:
+            self.taken.append(task.future)
+            found = self._received(task.future, meanwhile)
             if found is not None:
                 value = found[0]
                 return value
@@ -172,14 +173,13 @@ class Ahead:
         return key in self.begun or key in self.ready
 
     def _received(
-        self, task: Task, meanwhile: Callable[[], None] | None
+        self, future: Future[bytes], meanwhile: Callable[[], None] | None
     ) -> tuple[Any] | None:
         """The value that comes from elsewhere; None if nothing comes, as from a killed process.
 
         Until it comes, others that wait are computed here.
         """
-        assert task.future is not None
-        while not wait([task.future], timeout=LOOK).done:
+        while not wait([future], timeout=LOOK).done:
             self.look()
             if meanwhile is not None:
                 meanwhile()
@@ -190,7 +190,7 @@ class Ahead:
                 )
         self.look()
         try:
-            return (_loaded(task.future.result(), self.flow),)
+            return (_loaded(future.result(), self.flow),)
         except BrokenProcessPool:
             self.executor = None
             return None
@@ -200,16 +200,17 @@ class Ahead:
         keys: Sequence[Hashable],
         function: Callable[..., Value],
         arguments: Sequence[tuple[Any, ...]],
-        each: Callable[[int], None],
+        each: Callable[[int, Value], None],
     ) -> list[Value]:
-        """Values of one function for several arguments; ``each`` is called with how many are done.
+        """Values of one function for several arguments; ``each`` is called with how many are done,
+        and the last of them.
 
         The first is computed here: if kernels must be compiled, others find them ready.
         """
         if not keys:
             return []
         found: dict[Hashable, Value] = {keys[0]: function(self.flow, *arguments[0])}
-        each(1)
+        each(1, found[keys[0]])
         rest = list(zip(keys, arguments, strict=True))[1:]
         for key, given in rest:
             self.offer(key, function, *given)
@@ -217,11 +218,11 @@ class Ahead:
             self.look()
             if not self.is_begun(key):
                 found[key] = self.value(key, function, *given)
-                each(len(found))
+                each(len(found), found[key])
         for key, given in rest:
             if key not in found:
                 found[key] = self.value(key, function, *given)
-                each(len(found))
+                each(len(found), found[key])
         return [found[key] for key in keys]
 
     def drop(self, unneeded: Callable[[Task], bool]) -> None:
@@ -233,7 +234,7 @@ class Ahead:
         for task in list(self.begun.values()):
             if unneeded(task) and task.future is not None:
                 if not task.future.cancel():
-                    self.useless.append(task.future)
+                    self.taken.append(task.future)
                 del self.begun[task.key]
 
     def take(self, group: Hashable, member: Hashable) -> None:
@@ -305,10 +306,9 @@ def computing_ahead(
     if jobs == 1 or not _can_be_sent(flow):
         yield Ahead(flow)
         return
-    pool = ProcessPoolExecutor(jobs - 1, get_context("spawn"), _prepare)
-    ahead = Ahead(flow, pool, jobs - 1)
+    pool = ProcessPoolExecutor(jobs - 1, get_context("spawn"), quiet_process)
     try:
-        yield ahead
+        yield Ahead(flow, pool, jobs - 1)
     finally:
         stop_processes(pool)
 
@@ -327,9 +327,3 @@ def _can_be_sent(flow: FlowMap) -> bool:
             raise
         return False
     return True
-
-
-def _prepare() -> None:
-    """Let a process be silent, and end with its parent."""
-    compilations.muted = True
-    ended_with_parent()

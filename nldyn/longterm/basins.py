@@ -40,6 +40,7 @@ from nldyn.system.system import System, same_system
 
 CHUNK = 16  # periods between two looks at where a motion is
 CELLS = 250  # initial states in one computation
+MOTION = 10  # cells that take as long as a motion that is looked at closely
 SHELLS = (1.0, 0.5, 0.2)  # of a neighbourhood, on which its contraction is tried
 LINGERS = 48  # periods in a row near an attractor that is not periodic
 MOST_CELLS = 10**7
@@ -484,8 +485,9 @@ def basins(
     executor : concurrent.futures.Executor, optional
         Where to compute; here unless given.
     progress : callable, optional
-        Called as ``progress(done, total)`` in each stage, counted anew: after each motion that
-        looks for attractors, after every 250 cells, after each check.
+        Called as ``progress(done, total)`` after each motion that looks for an attractor or checks
+        a cell, which counts as 10 cells, and after every 250 cells. The total grows where cells
+        must be looked at again because another attractor was found.
 
     Returns
     -------
@@ -543,9 +545,11 @@ def basins(
     rng = np.random.default_rng(seed)
     picked = rng.choice(len(modal), min(starts, len(modal)), replace=False)
     known = list(attractors)
+    cells = len(modal)
+    count = _Count(progress, MOTION * (len(picked) + min(checks, cells)) + cells)
     shares = find_attractors(
         flow, frequency_hz, starts=modal[picked], observe=name, options=options,
-        executor=executor, progress=progress,
+        executor=executor, progress=count.stage(MOTION * len(picked)),
     )  # fmt: skip
     for share in shares:
         _add(known, share.attractor)
@@ -560,7 +564,8 @@ def basins(
         targets = [target_of(attractor) for attractor in known]
         pieces = [left[k : k + CELLS] for k in range(0, len(left), CELLS)]
         task = partial(settle, flow, omega, targets, longest)
-        ends = values_of(task, [states[piece] for piece in pieces], executor, progress)
+        stage = count.stage(len(left), more=0 if len(left) == cells else len(left))
+        ends = values_of(task, [states[piece] for piece in pieces], executor, stage)
         for piece, settled in zip(pieces, ends, strict=True):
             labels[piece], states[piece] = settled.labels, settled.ends
             failures[piece] = settled.failures
@@ -569,11 +574,14 @@ def basins(
         done = len(known)
         left = order[labels[order] == UNDECIDED]
         new = partial(attractor_from, flow, frequency_hz, name, options)
-        for attractor in values_of(new, list(states[left[:starts]]), executor, progress):
+        more = MOTION * len(left[:starts])
+        stage = count.stage(more, more=more)
+        for attractor in values_of(new, list(states[left[:starts]]), executor, stage):
             _add(known, attractor)
     checked = rng.choice(len(modal), min(checks, len(modal)), replace=False)
     again = partial(_index_of, flow, frequency_hz, name, options, known)
-    results = values_of(again, [flow.to_state(modal[cell]) for cell in checked], executor, progress)
+    stage = count.stage(MOTION * len(checked))
+    results = values_of(again, [flow.to_state(modal[cell]) for cell in checked], executor, stage)
     wrong = sum(index != labels[cell] for cell, index in zip(checked, results, strict=True))
     counts = np.array([max(attractor.period, 1) for attractor in known] + [1])
     notes += _told(Counter(failures[failures != ""].tolist()), len(modal), "cells")
@@ -588,6 +596,25 @@ def basins(
         int(wrong),
         tuple(notes),
     )
+
+
+class _Count:
+    """How much of the work of several stages is done, in cells."""
+
+    def __init__(self, tell: Callable[[int, int], None] | None, total: int) -> None:
+        self._tell, self._total, self._done = tell, total, 0
+
+    def stage(self, size: int, more: int = 0) -> Callable[[int, int], None]:
+        """What a stage of so many cells calls, of which ``more`` were not expected."""
+        before = self._done
+        self._done += size
+        self._total += more
+
+        def tell(done: int, total: int) -> None:
+            if self._tell is not None:
+                self._tell(before + size * done // total, self._total)
+
+        return tell
 
 
 def _told(failures: Mapping[str, int], total: int, what: str) -> list[str]:

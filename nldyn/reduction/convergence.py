@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,8 +21,13 @@ from nldyn.orbits.newton import refine
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
 from nldyn.reduction.load_case import LoadCase
+from nldyn.runtime.executors import as_finished, own_processes
 from nldyn.runtime.progress import Progress, Shares, silent
+from nldyn.runtime.threads import one_thread
 from nldyn.system.system import System
+
+if TYPE_CHECKING:
+    import cms
 
 COUNTS = (*range(1, 11), 12, 16, 20, 30, 40)
 GRID = 400
@@ -283,6 +290,7 @@ def convergence_study(
     at_hz: float | None = None,
     full: bool = False,
     progress: Progress | None = None,
+    jobs: int = 1,
 ) -> ConvergenceStudy:
     """Compute the same with more and more modes, and compare.
 
@@ -304,6 +312,8 @@ def convergence_study(
         see, and compare with that; this takes minutes for some hundred modes.
     progress : callable, optional
         Called as ``progress(what, frequency_hz, done)``.
+    jobs : int
+        Processes that share the models; their number changes nothing but the times.
 
     Returns
     -------
@@ -343,23 +353,15 @@ def convergence_study(
         )
     whole = reference_model(finest, max(modes))
     linear = measured_linear("", FULL if is_full(whole) else REFERENCE, whole, setting)
-    models: list[Measured] = []
     counts = sorted(set(modes))
     cases = [
-        (name, method, count)
-        for name in components
+        (name, reduced)
+        for name, component in components.items()
         for method in methods
-        for count in (counts[:1] if method == "guyan" else counts)
+        for reduced in reductions(component, counts, method)
     ]
-    shares = Shares(progress or silent)
-    for number, (_, _, count) in enumerate(cases):
-        shares.weigh(str(number), ONE_MODE + count)
-    for name, component in components.items():
-        for method in methods:
-            for reduced in reductions(component, counts, method):
-                part = str(len(models))
-                models.append(measured(name, reduced, setting, at_hz, shares.part(part)))
-                shares.end(part)
+    shares = Shares(progress or silent, {str(k): _cost(case[1]) for k, case in enumerate(cases)})
+    models = _measured_all(cases, setting, at_hz, shares, jobs)
     best = best_of([model for model in models if model.mesh == mesh], linear)
     if full and best.orbit is not None:
         shares.weigh(FULL, 0.0)
@@ -368,6 +370,53 @@ def convergence_study(
     errors = tuple(errors_of(model, linear, best, full) for model in models)
     known = 0.0 if is_full(whole) else receptance_bound(finest, whole, linear, setting)
     return ConvergenceStudy(setting, at_hz, tuple(models), errors, best, known)
+
+
+def _cost(reduced: cms.ReducedModel) -> float:
+    """Time to follow a branch of a model, relative to that of others."""
+    return ONE_MODE + len(reduced.frequencies_hz)
+
+
+def _measured_all(
+    cases: Sequence[tuple[str, cms.ReducedModel]],
+    setting: LoadCase,
+    at_hz: float,
+    shares: Shares,
+    jobs: int,
+) -> list[Measured]:
+    """What each model answers; those after the first on several processes, if wanted."""
+    models: dict[int, Measured] = {}
+
+    def one(number: int) -> None:
+        name, reduced = cases[number]
+        models[number] = measured(name, reduced, setting, at_hz, shares.part(str(number)))
+        shares.end(str(number))
+
+    if cases:
+        one(0)  # compiles what the others need
+    with own_processes(min(jobs, len(cases) - 1)) as pool:
+        if pool is None:
+            for number in range(1, len(cases)):
+                one(number)
+        else:
+            task = partial(_measured_case, setting, at_hz)
+            for outcome in as_finished(task, cases[1:], pool):
+                number = outcome.index + 1
+                if outcome.value is None:
+                    one(number)  # or the error that it ends with
+                    continue
+                models[number] = outcome.value
+                shares.part(str(number))(models[number].label, 0.0, 1.0)
+    return [models[number] for number in range(len(cases))]
+
+
+def _measured_case(
+    setting: LoadCase, at_hz: float, case: tuple[str, cms.ReducedModel]
+) -> Measured:
+    """As `measured`, in another process."""
+    with one_thread():
+        return measured(*case, setting, at_hz)
+
 
 
 def best_of(models: Sequence[Measured], full: Measured) -> Measured:

@@ -57,6 +57,7 @@ def render_scene(
     period: int = 1,
     video: str = "gif",
     progress: Progress | None = None,
+    jobs: int = 1,
 ) -> Rendering:
     """Draw the mode shapes, the deepest contact and the motion of a scene with a mesh.
 
@@ -78,6 +79,8 @@ def render_scene(
         Kind of animation.
     progress : callable, optional
         Called as ``progress(what, frequency_hz, done)``; the frequency is 0 where none applies.
+    jobs : int
+        Processes that share the search for the orbit.
 
     Returns
     -------
@@ -118,7 +121,7 @@ def render_scene(
     orbit = None
     if scene.continuation is not None:
         tell = shares.part("orbit")
-        orbit = orbit_to_draw(scene, build_system(scene, reduced), frequency_hz, period, tell)
+        orbit = orbit_to_draw(scene, build_system(scene, reduced), frequency_hz, period, tell, jobs)
     shares.end("orbit")
     with result_directory(directory, "render") as folder:
         write_modes(reduced, folder / "modes.csv")
@@ -136,6 +139,7 @@ def orbit_to_draw(
     frequency_hz: float | None,
     period: int = 1,
     progress: Progress | None = None,
+    jobs: int = 1,
 ) -> Orbit:
     """Find the orbit to draw: at a frequency, or where the harmonic orbits are largest."""
     from nldyn.base.errors import ConvergenceError
@@ -149,8 +153,8 @@ def orbit_to_draw(
             raise SceneError(f"{scene.file}: {error}") from error
     assert scene.continuation is not None
     low, high = scene.continuation.range_hz
-    branches = diagram(system, (low, high), [1], search_points=4, progress=progress).branches
-    orbits = [orbit for branch in branches for orbit in branch.points]
+    found = diagram(system, (low, high), [1], search_points=4, progress=progress, jobs=jobs)
+    orbits = [orbit for branch in found.branches for orbit in branch.points]
     if not orbits:
         raise SceneError(f"{scene.file}: no harmonic orbit is found from {low:g} to {high:g} Hz")
     return max(orbits, key=lambda orbit: orbit.max_abs_displacement)

@@ -15,6 +15,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from nldyn.base.errors import check_types
+from nldyn.runtime.compilation import compilations
 from nldyn.runtime.interruption import ignored_interruption, interrupted
 
 Item = TypeVar("Item")
@@ -230,6 +231,25 @@ def _end_processes(executor: Executor | None) -> None:
             process.terminate()
 
 
+@contextmanager
+def own_processes(jobs: int) -> Iterator[ProcessPoolExecutor | None]:
+    """So many processes of this package's own, that end with the block; None for one."""
+    if jobs <= 1:
+        yield None
+        return
+    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), quiet_process)
+    try:
+        yield pool
+    finally:
+        stop_processes(pool)
+
+
+def quiet_process() -> None:
+    """Let this process tell of no compilation, and end when the one that started it ends."""
+    compilations.muted = True
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
 def stop_processes(pool: ProcessPoolExecutor) -> None:
     """End a pool and its processes at once, whatever they are at."""
     processes = list((getattr(pool, "_processes", None) or {}).values())
@@ -239,11 +259,6 @@ def stop_processes(pool: ProcessPoolExecutor) -> None:
             process.terminate()
         for process in processes:
             process.join()
-
-
-def ended_with_parent() -> None:
-    """Let this process end when the one that started it ends, however that is killed."""
-    threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
 def _end_with_parent() -> None:

@@ -20,7 +20,7 @@ from pydantic import ValidationError
 
 from nldyn.base.errors import SceneError, SystemModelError
 from nldyn.base.resources import data_directory
-from nldyn.runtime.progress import Progress
+from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.scene.checks import (
     check_computable,
     check_mesh_names,
@@ -61,6 +61,7 @@ __all__ = [
 ]
 
 logger = logging.getLogger("nldyn")
+CHOICE = 1.0  # time to choose modes by a tolerance, relative to that of the diagram
 LARGE = 20000  # degrees of freedom from which on the factorisation takes seconds
 LARGEST_SCENE = 10_000_000  # bytes or letters
 _WORD = r"""(?:(?<![\w-])[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
@@ -273,7 +274,9 @@ def _with_places(scene: Scene, mesh: Mesh) -> Mesh:
 
 
 def build_reduced(
-    scene: Scene, component: fem.Component | fem.StructureComponent | None = None
+    scene: Scene,
+    component: fem.Component | fem.StructureComponent | None = None,
+    progress: Progress | None = None,
 ) -> cms.ReducedModel:
     """Reduce the mesh of a scene to the modes that it asks for.
 
@@ -283,6 +286,8 @@ def build_reduced(
         A scene with a ``[mesh]`` and a ``[reduction]``.
     component : fem.Component or fem.StructureComponent, optional
         What `build_component` gave for this scene, if it is at hand.
+    progress : callable, optional
+        As for `nldyn.select_modes`, which chooses the modes of a scene with a tolerance.
 
     Returns
     -------
@@ -307,7 +312,7 @@ def build_reduced(
     table = scene.reduction
     assert table is not None
     if table.tolerance is not None:
-        selection = build_selection(scene, component)
+        selection = build_selection(scene, component, progress)
         logger.info(selection.report())
         return selection.reduced
     pieces = _count_pieces(len(component.model.mesh.points), component.model.links)
@@ -358,7 +363,9 @@ def build_candidates(
 
 
 def build_selection(
-    scene: Scene, component: fem.Component | fem.StructureComponent | None = None
+    scene: Scene,
+    component: fem.Component | fem.StructureComponent | None = None,
+    progress: Progress | None = None,
 ) -> ModeSelection:
     """Choose the modes of a scene by the tolerance of its ``[reduction]``.
 
@@ -368,6 +375,8 @@ def build_selection(
         A scene with a ``[mesh]`` and ``tolerance`` in ``[reduction]``.
     component : fem.Component or fem.StructureComponent, optional
         What `build_component` gave for this scene, if it is at hand.
+    progress : callable, optional
+        As for `nldyn.select_modes`.
 
     Returns
     -------
@@ -390,7 +399,7 @@ def build_selection(
     component = component or build_component(scene)
     faults = (cms.ReductionError, ConvergenceError, SystemModelError)
     with _told_as(scene, ("reduction",), *faults):
-        return select_modes(component, setting, tolerance=table.tolerance)
+        return select_modes(component, setting, tolerance=table.tolerance, progress=progress)
 
 
 def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> System:
@@ -506,7 +515,8 @@ def compute(
     """
     if scene.explore is not None:
         return explore_scene(scene, progress, checkpoint, jobs).diagram
-    flow, table = _to_follow(scene)
+    shares = _shares(scene, progress)
+    flow, table = _to_follow(scene, shares)
     from nldyn.branches.options import ContinuationOptions
     from nldyn.search.diagram import Seed, diagram
 
@@ -519,7 +529,7 @@ def compute(
             search_points=table.search_points,
             doublings=table.follow_doublings,
             options=ContinuationOptions(max_step=table.max_step),
-            progress=progress,
+            progress=shares.part("branches"),
             checkpoint=checkpoint,
             jobs=jobs,
         )
@@ -577,7 +587,8 @@ def explore_scene(
     >>> explore_scene(scene).settled_share
     1.0
     """
-    flow, table = _to_follow(scene)
+    shares = _shares(scene, progress)
+    flow, table = _to_follow(scene, shares)
     from nldyn.branches.options import ContinuationOptions
     from nldyn.search.exploration import ExploreOptions
     from nldyn.search.explore import explore
@@ -592,17 +603,27 @@ def explore_scene(
             efforts.pop("max_period"),
             effort=ExploreOptions(**efforts),
             options=ContinuationOptions(max_step=table.max_step),
-            progress=progress,
+            progress=shares.part("branches"),
             checkpoint=checkpoint,
             jobs=jobs,
         )
     return replace(found, diagram=_remarked(scene, flow, found.diagram))
 
 
-def _to_follow(scene: Scene) -> tuple[FlowMap, ContinuationTable]:
+def _shares(scene: Scene, progress: Progress | None) -> Shares:
+    """The parts of a computation: to choose modes takes a while if a tolerance is given."""
+    chosen = scene.reduction is not None and scene.reduction.tolerance is not None
+    return Shares(progress or silent, {"model": CHOICE if chosen else 0.0, "branches": 1.0})
+
+
+def _to_follow(scene: Scene, shares: Shares) -> tuple[FlowMap, ContinuationTable]:
     """Flow map of a scene that says what to compute."""
     check_computable(scene, scene.file)
-    system = build_system(scene)
+    model = None
+    if scene.mesh is not None:
+        model = build_reduced(scene, progress=shares.part("model"))
+    system = build_system(scene, model)
+    shares.end("model")
     from nldyn.flow.flow_map import FlowMap
     from nldyn.flow.options import FlowOptions
 
@@ -751,28 +772,40 @@ def _beam(table: PartTable) -> fem.BeamPart:
     import fem
 
     material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
-    section: fem.CrossSection
-    if table.width is not None and table.height is not None:
-        section = fem.RectangularSection(table.width, table.height)
-    elif table.diameter is not None:
-        section = fem.CircularSection(table.diameter, table.bore or 0.0)
-    else:
-        assert table.area is not None and table.second_moment is not None
-        section = fem.Section(
-            table.area,
-            table.second_moment,
-            table.second_moment_across,
-            table.torsion_constant,
-            table.shear_area,
-            table.shear_area_across,
-        )
     return fem.BeamPart(
         material,
-        section,
+        _section(table),
         table.theory or "euler-bernoulli",
         table.axial_force or 0.0,
         table.orientation,
         table.offset if isinstance(table.offset, list) else (0.0, 0.0),
+    )
+
+
+def _section(table: PartTable) -> fem.CrossSection | fem.TaperedSection:
+    import fem
+
+    sections: list[fem.RectangularSection | fem.CircularSection] = []
+    for end in ("", "_end"):
+        width, height, diameter, bore = (
+            table.size(name, end) for name in ("width", "height", "diameter", "bore")
+        )
+        if width is not None and height is not None:
+            sections.append(fem.RectangularSection(width, height))
+        elif diameter is not None:
+            sections.append(fem.CircularSection(diameter, bore or 0.0))
+    if table.taper is not None:
+        return fem.TaperedSection(sections[0], sections[1], table.taper[0], table.taper[1])
+    if sections:
+        return sections[0]
+    assert table.area is not None and table.second_moment is not None
+    return fem.Section(
+        table.area,
+        table.second_moment,
+        table.second_moment_across,
+        table.torsion_constant,
+        table.shear_area,
+        table.shear_area_across,
     )
 
 

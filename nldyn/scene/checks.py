@@ -313,6 +313,8 @@ def _points_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
             yield (table, number, "at"), entry.at
     for name, interface in scene.interfaces.items():
         yield ("interfaces", name, "at"), interface.at
+    for name, part in scene.parts.items():
+        yield from ((("parts", name, "taper"), point) for point in part.taper or ())
     if scene.mesh is not None and scene.mesh.mirror is not None:
         yield ("mesh", "mirror"), scene.mesh.mirror
 

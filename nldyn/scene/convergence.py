@@ -28,6 +28,7 @@ def convergence_study_of(
     at_hz: float | None = None,
     full: bool = False,
     progress: Progress | None = None,
+    jobs: int = 1,
 ) -> ConvergenceStudy:
     """The convergence study of a scene with a mesh, see `convergence_study`.
 
@@ -35,7 +36,7 @@ def convergence_study_of(
     ----------
     scene : Scene
         Its ``[reduction]`` is not used.
-    modes, methods, at_hz, full, progress
+    modes, methods, at_hz, full, progress, jobs
         As for `convergence_study`.
     refinements : sequence of int
         Meshes: every line is cut into so many.
@@ -71,6 +72,7 @@ def convergence_study_of(
             at_hz=at_hz,
             full=full,
             progress=progress,
+            jobs=jobs,
         )
     except (cms.ReductionError, ConvergenceError) as error:
         raise scene_error(scene.file, ("reduction",), str(error), sep=": ") from None

@@ -96,6 +96,11 @@ class PartTable(Table):
     height: Positive | None = None
     diameter: Positive | None = None
     bore: Positive | None = None
+    taper: Annotated[list[str], Field(min_length=2, max_length=2)] | None = None
+    width_end: Positive | None = None
+    height_end: Positive | None = None
+    diameter_end: Positive | None = None
+    bore_end: NotNegative | None = None
     area: Positive | None = None
     second_moment: Positive | None = None
     second_moment_across: Positive | None = None
@@ -157,6 +162,28 @@ class PartTable(Table):
             _refuse(self, (*numbers, "shear_area_across"), "a section given by its dimensions")
         if self.bore and self.diameter and self.bore >= self.diameter:
             raise ValueError(f"has a 'bore' of {self.bore:g}, not less than its 'diameter'")
+        return self._one_taper()
+
+    def size(self, name: str, end: str) -> float | None:
+        """A dimension of the section at its start or end; one that is not given stays the same."""
+        value: float | None = getattr(self, name + end)
+        start: float | None = getattr(self, name)
+        return start if value is None else value
+
+    def _one_taper(self) -> PartTable:
+        keys = ("width_end", "height_end", "diameter_end", "bore_end")
+        given = [key for key in keys if getattr(self, key) is not None]
+        for key in given:
+            if getattr(self, key.removesuffix("_end")) is None:
+                raise ValueError(f"has '{key}' without '{key.removesuffix('_end')}'")
+        if bool(given) != (self.taper is not None):
+            raise ValueError(
+                "needs 'taper' (the two points between which the section changes) together with"
+                f" one of {quoted(keys)}"
+            )
+        outer, inner = self.size("diameter", "_end"), self.size("bore", "_end")
+        if given and outer and inner and inner >= outer:
+            raise ValueError("has a bore at its end that is not less than the diameter there")
         return self
 
 

@@ -159,7 +159,6 @@ class Collector:
     done: float = 0.0  # share of the whole computation
     ahead: Ahead | None = None
     outlook: Outlook = field(default_factory=Outlook)
-    doubled: Callable[[int], bool] = lambda period: False  # whether to follow the flips of one
     starts: dict[int, tuple[SpecialPoint, BranchPoint | LocateError]] = field(
         default_factory=dict
     )  # of the branches born at flips, by the flips' ids
@@ -271,8 +270,9 @@ class Collector:
                 start = start_point(orbit, 1.0, self.range_hz)
             except ConvergenceError:
                 continue
-            group = "period", orbit.period
-            offer_branch(self.ahead, start, self._course(start, None), group)
+            if not self.known(start.orbit):
+                group = "period", orbit.period
+                offer_branch(self.ahead, start, self._course(start, None), group)
 
     def offer_flips(
         self, branch: Branch, options: ContinuationOptions | None = None
@@ -286,7 +286,9 @@ class Collector:
         flips = [special for special in branch.special_points if special.kind == "PD"]
         for special in flips[::2]:
             start = self._start_at(special)
-            if isinstance(start, BranchPoint) and self._is_within(start.orbit):
+            if not isinstance(start, BranchPoint) or not self._is_within(start.orbit):
+                continue
+            if not self.known(start.orbit):
                 offer_branch(self.ahead, start, self._course(start, options))
 
     def _start_at(self, special: SpecialPoint) -> BranchPoint | LocateError:
@@ -415,6 +417,7 @@ class Collector:
         course = self._course(start, options)
         ahead = self.ahead or Ahead(self.flow)
         group = "period", start.orbit.period
+        progress(start.orbit.frequency_hz)
         ahead.take(group, leg_key(start, course))
         branch = self.checkpoint.branch_from(start.orbit, course)
         if branch is not None:
@@ -423,18 +426,23 @@ class Collector:
             branch = complete("", None, None, start, course, progress, self.checkpoint, ahead)
         self.take_in(branch)
         ahead.release(group)
-        ahead.drop(self._is_followed)
+        ahead.drop(self._is_of_last)
 
-    def _is_followed(self, task: Task) -> bool:
-        """Whether the leg of a task is one of a branch that is known by now."""
-        return task.function is walked_leg and self.known(task.arguments[0].orbit)
+    def _is_of_last(self, task: Task) -> bool:
+        """Whether the leg of a task is one of the branch that was found last."""
+        if task.function is not walked_leg or not self.branches:
+            return False
+        return self.branches[-1].contains(task.arguments[0].orbit)
 
     def take_in(self, branch: Branch) -> None:
         """Add the branch that was at work, unless it is a known one."""
         if not self._repeats(branch):
             self._add(branch)
-            if self.doubled(branch.period):
+            if 2 * branch.period in self.outlook.doubled:
                 self.offer_flips(branch)
+                flips = [s for b in self.of_period(branch.period) for s in b.special_points
+                         if s.kind == "PD"]  # fmt: skip
+                self.outlook.flips(2 * branch.period, len(flips))
         self.checkpoint.work = None
 
 
@@ -573,7 +581,6 @@ def diagram(
         progress or silent,
     )
     box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flow, (low, high))
-    box.doubled = lambda period: 2 * period in wanted
     with box.checkpoint, computing_ahead(flow, jobs, executor) as box.ahead:
         effort = search or SearchOptions()
         box.outlook = Outlook(wanted, search_points if wanted else 0, len(seeds))
@@ -583,12 +590,13 @@ def diagram(
         if places and _contact_is_missing(box):
             more = replace(effort, starts=MORE_STARTS * effort.starts, seed=effort.seed + 1)
             _search(box, places, wanted, more)
-        for seed in seeds:
-            key, given = _seed_task(box, seed, seed.near_hz, effort)
-            box.ahead.offer(key, search_at, *given)
         for number, seed in enumerate(seeds, 1):
             _follow_seed(box, seed, effort)
             box.reach("seeds", number)
+            if number == 1:  # which has compiled what the others need
+                for other in seeds[1:]:
+                    key, given = _seed_task(box, other, other.near_hz, effort)
+                    box.ahead.offer(key, search_at, *given)
         _follow_branch_points(box)
         _follow_flips_of_new(box, wanted, doublings)
         _follow_branch_points(box)
@@ -613,14 +621,11 @@ def _search(
     found = _searched(box, frequencies, periods, effort)
     for frequency, (failures, _) in zip(frequencies, found, strict=True):
         _note_failures(box, frequency, failures, effort)
-    at_flips = [period for period in periods if period % 2 == 0 and period // 2 in periods]
     for period in periods:
-        orbits = [orbit for _, of_period in found for orbit in of_period[period]]
-        box.outlook.orbits(period, len(orbits))
-        if period not in at_flips:
-            box.offer_orbits(orbits)
+        if period not in box.outlook.doubled:
+            box.offer_orbits(orbit for _, of_period in found for orbit in of_period[period])
     for period in periods:
-        if period in at_flips:
+        if period in box.outlook.doubled:
             box.outlook.flips(period, 0)
             _follow_flips(box, box.of_period(period // 2))
         for _, of_period in found:
@@ -635,8 +640,15 @@ def _searched(
     """What simulations at some frequencies come near, on all processes."""
     ahead = box.ahead or Ahead(box.flow)
 
-    def told(done: int) -> None:
-        box.reach("search", done)
+    counts = Counter({period: int(box.outlook.reached[f"1/{period}"]) for period in periods})
+
+    def told(done: int, found: Found) -> None:
+        box.outlook.searched(frequencies, done)
+        box.done = box.outlook.done
+        for period, orbits in found[1].items():
+            counts[period] += len(orbits)
+            if done > 1:
+                box.outlook.found(period, counts[period] * len(frequencies) / done)
         box.tell("search", frequencies[done - 1])
 
     if frequencies:

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-# What follows a search, in units of the search at one frequency, found with the examples: it takes
-# as long to follow the branches of so many orbits that were found, or of flips, some of which
-# belong to the same branch.
-ONE_ORBIT = {1: 0.25}
-ONE_LONGER_ORBIT = 0.5
+# What follows a search, in units of the search at one frequency, found with the examples: so long
+# it takes to follow the branch of an orbit that was found, or of a flip; many have the same one.
+ONE_HARMONIC_ORBIT, ONE_ORBIT, ONE_DOUBLED_ORBIT = 0.4, 0.9, 0.1
 ONE_FLIP = 0.55
 ONE_SEED = 2.0
-LIKELY_ORBITS = 1.5  # of each period at each frequency
-LIKELY_FLIPS = 2.0  # for each frequency
+LIKELY_ORBITS = 1.0  # of each period at each frequency
+FLIPS_OF_ORBIT = 2.0  # for each orbit of the doubled period
 
 
 @dataclass
@@ -31,11 +29,11 @@ class Outlook:
 
     Examples
     --------
-    >>> outlook = Outlook([1], 12)
-    >>> outlook.reach("search", 12)
-    >>> outlook.orbits(1, 12)
-    >>> outlook.done
-    0.8
+    >>> outlook = Outlook([1], 10)
+    >>> outlook.reach("search", 10)
+    >>> outlook.found(1, 10)
+    >>> outlook.done == 10 / (10 + 10 * ONE_HARMONIC_ORBIT)
+    True
     """
 
     periods: Sequence[int] = ()
@@ -49,9 +47,8 @@ class Outlook:
         self._weigh("search", 1.0, self.places)
         self._weigh("seeds", ONE_SEED, self.seeds)
         for period in self.periods:
-            self._weigh(f"1/{period}", _one_orbit(period), LIKELY_ORBITS * self.places)
-            if 2 * period in self.periods:
-                self._weigh(f"flips to 1/{2 * period}", ONE_FLIP, LIKELY_FLIPS * self.places)
+            self._weigh(f"1/{period}", self._one_orbit(period), 0.0)
+            self.found(period, LIKELY_ORBITS * self.places)
 
     def _weigh(self, part: str, weight: float, count: float) -> None:
         self.weights[part], self.counts[part] = weight, count
@@ -64,11 +61,16 @@ class Outlook:
         done = sum(self.weights[part] * self.reached[part] for part in self.weights)
         return done / total if total else 0.0
 
-    def orbits(self, period: int, count: int) -> None:
-        """So many orbits of a period are found, in a first search or a second one."""
-        part = f"1/{period}"
-        first = not self.reached[part]
-        self.counts[part] = count if first else self.counts[part] + count
+    def found(self, period: int, count: float) -> None:
+        """So many orbits of a period are found in all, or likely will be."""
+        self.counts[f"1/{period}"] = max(count, self.reached[f"1/{period}"])
+        if period in self.doubled:
+            self._weigh(f"flips to 1/{period}", ONE_FLIP, FLIPS_OF_ORBIT * count)
+
+    @property
+    def doubled(self) -> list[int]:
+        """The periods whose branches are followed from flips of other ones, too."""
+        return [p for p in self.periods if p % 2 == 0 and p // 2 in self.periods]
 
     def orbit_done(self, period: int) -> tuple[str, int]:
         """The part of an orbit's branch that is followed, and how many are by now."""
@@ -78,15 +80,22 @@ class Outlook:
     def flips(self, period: int, count: int) -> str:
         """So many flips lead to a period; the part that they are."""
         part = f"flips to 1/{period}"
-        self._weigh(part, ONE_FLIP, count)
+        self.weights[part], self.counts[part] = ONE_FLIP, count
+        self.reached[part] = min(self.reached.get(part, 0.0), count)
         return part
 
-    def reach(self, part: str, count: int) -> None:
+    def searched(self, frequencies: Sequence[float], done: int) -> None:
+        """So many of the frequencies are searched; lower ones, with more contacts, take longer."""
+        times = [hz**-0.5 for hz in frequencies]
+        self.reach("search", self.places * sum(times[:done]) / sum(times))
+
+    def reach(self, part: str, count: float) -> None:
         """So much of a part is done."""
         self.counts[part] = max(self.counts.setdefault(part, count), count)
         self.weights.setdefault(part, 1.0)
         self.reached[part] = count
 
-
-def _one_orbit(period: int) -> float:
-    return ONE_ORBIT.get(period, ONE_LONGER_ORBIT)
+    def _one_orbit(self, period: int) -> float:
+        if period == 1:
+            return ONE_HARMONIC_ORBIT
+        return ONE_DOUBLED_ORBIT if period in self.doubled else ONE_ORBIT

@@ -68,6 +68,7 @@ def test_examples_of_structures_run_in_order(monkeypatch, tmp_path):
         "structure_assembly",
         "structure_mesh",
         "structure_surface",
+        "tapers",
         "trusses",
         "write",
     ],

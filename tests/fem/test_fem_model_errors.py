@@ -75,8 +75,7 @@ def two_bars(**rest):
         ),
         (
             lambda: two_bars(parts=["first"]),
-            r"bars.msh: parts must be a dictionary of BeamPart and TrussPart by name, not"
-            r" \['first'\]",
+            r"parts must be a dictionary of BeamPart and TrussPart by name, not \['first'\]",
         ),
         (
             lambda: two_bars(interfaces={"tip": ("a", "y")}),

@@ -5,6 +5,7 @@ import pytest
 from shells import deflection, mapped, nearest, shell
 from structures import CLAMP, STEEL, cantilever, flexibility, lowest_hz
 
+import cms
 import fem
 from fem.shells import corner_normals, shell_kinds
 
@@ -383,3 +384,19 @@ def test_a_foundation_carries_a_shell():
     tips = wanted / np.sqrt(1 + 0.05**2)
     found = lowest_hz(fem.assemble(model), 3)
     np.testing.assert_allclose(found, [tips, tips, wanted], rtol=1e-6)
+
+
+def test_a_shell_keeps_its_digits_however_thin_it_is():
+    """With the thickness t a frequency is a t - b t³: the differences fall by 100 with t/10."""
+    mesh = fem.box_mesh("strip", (1.0, 0.1), (20, 2), kind="quad")
+    mesh = mesh.with_point_sets({"tip": [nearest(mesh.points[:, :2], (1.0, 0.05))]})
+    found = []
+    for t in (1e-3, 1e-4, 1e-5):
+        model = fem.StructureModel(
+            mesh,
+            {"strip": fem.ShellPart(fem.Material(E, RHO, 0.0), t)},
+            supports=[fem.Support("x0", CLAMP)],
+            interfaces={"tip": fem.Interface("tip", "z")},
+        )
+        found.append(cms.reduce(fem.assemble(model), modes=2).frequencies_hz[0] / t)
+    assert (found[0] - found[1]) / (found[1] - found[2]) == pytest.approx(100.0, rel=0.01)

@@ -354,6 +354,55 @@ def test_a_line_of_three_nodes_is_two_beams():
     np.testing.assert_allclose(lowest_hz(three, 6), lowest_hz(fem.assemble(two), 6), rtol=1e-9)
 
 
+def threes(points, cells, **sets):
+    return fem.StructureMesh(
+        points, {"line3": cells}, {"arm": {"line3": np.arange(len(cells))}}, sets, "arm"
+    )
+
+
+@pytest.mark.parametrize("middle", [0.5, 0.3])
+def test_a_middle_node_anywhere_on_a_straight_beam_keeps_statics_and_mass(middle):
+    """One line of three nodes, clamped: the tip under a unit load, and its rigid body's inertia."""
+    mesh = threes([[0, 0, 0], [1, 0, 0], [middle, 0, 0]], [[0, 1, 2]], root=[0], tip=[1])
+    model = fem.StructureModel(
+        mesh,
+        {"arm": BAR},
+        supports=[fem.Support("root", CLAMP)],
+        interfaces={"tip": fem.Interface("tip", "y")},
+    )
+    wanted = 1.0 / (3.0 * STEEL.youngs_modulus * BAR.section.second_moment)
+    assert flexibility(fem.assemble(model), "tip") == pytest.approx(wanted, rel=1e-12)
+    free = fem.assemble(fem.StructureModel(mesh, {"arm": BAR}))
+    dofs = free.numbering.dofs(np.arange(3))
+    turn = np.zeros(len(free.free))
+    turn[dofs[:, 1]], turn[dofs[:, 5]] = mesh.points[:, 0], 1.0
+    mass = STEEL.density * BAR.section.area
+    assert turn @ free.mass @ turn == pytest.approx(mass / 3.0, rel=1e-12)
+
+
+def test_curved_lines_of_three_nodes_follow_a_quarter_of_a_ring():
+    """Its tip under a radial force moves by pi P R³/(4 E I), and R P pi/(4 E A) by stretching."""
+    errors = []
+    for count in (4, 8):
+        turn = np.linspace(0.0, np.pi / 2, 2 * count + 1)
+        points = np.column_stack([np.sin(turn), np.cos(turn), 0.0 * turn])
+        first = 2 * np.arange(count)
+        mesh = threes(
+            points, np.column_stack([first, first + 2, first + 1]), root=[0], tip=[2 * count]
+        )
+        model = fem.StructureModel(
+            mesh,
+            {"arm": BAR},
+            supports=[fem.Support("root", CLAMP)],
+            interfaces={"tip": fem.Interface("tip", "x")},
+        )
+        E, section = STEEL.youngs_modulus, BAR.section
+        wanted = np.pi / 4 / (E * section.second_moment) + np.pi / 4 / (E * section.area)
+        errors.append(flexibility(fem.assemble(model), "tip") / wanted - 1)
+    assert abs(errors[1]) < 0.005
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+
+
 def test_a_round_bar_along_z_needs_no_orientation():
     round_bar = replace(BAR, section=fem.CircularSection(0.03, bore=0.02))
     upright = fem.assemble(cantilever(round_bar, (0.0, 0.0, 1.0)))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Callable
 
-from nldyn import System
+from nldyn import FlowMap, System
 
 
 def square(value: float) -> float:
@@ -34,3 +35,14 @@ def frequencies(system: System) -> dict[str, float]:
 def lossy_spring(depth: float, speed: float) -> tuple[float, float, float]:
     """A law of the user's own: 5e7 N/m, with a force that grows with the speed."""
     return 5e7 * depth * (1.0 + 0.1 * speed), 5e7 * (1.0 + 0.1 * speed), 5e6 * depth
+
+
+def doubled(flow: FlowMap, number: int, look: Callable[[], None] | None = None) -> int:
+    assert isinstance(flow, FlowMap)
+    return 2 * number
+
+
+def die_elsewhere(flow: FlowMap, process: int, look: Callable[[], None] | None = None) -> str:
+    if os.getpid() != process:
+        os._exit(1)
+    return "here"

@@ -133,19 +133,23 @@ def test_a_branch_started_at_one_of_its_folds_has_the_same_special_points(
 
 
 def test_a_branch_started_at_a_fold_stays_in_the_range(harmonic_branch):
-    """At its end it has one point if both sides of the fold lie beyond."""
+    """Beside its end it has few points if both sides of the fold lie beyond.
+
+    Not at the very end, where rounding decides on which side of it the fold lies.
+    """
     folds = [s for s in harmonic_branch.special_points if s.kind == "LP"]
     assert len(folds) > 2
     for fold in folds:
         hz = fold.frequency_hz
         counts = []
-        for range_hz in ((0.99 * hz, hz), (hz, 1.01 * hz)):
+        beside = 1e-9 * hz
+        for range_hz in ((0.99 * hz, hz + beside), (hz - beside, 1.01 * hz)):
             branch = continue_branch(fold.orbit, range_hz)
             met = [node.orbit.frequency_hz for node in branch.nodes]
             assert min(met) >= range_hz[0] * (1.0 - 1e-14)
             assert max(met) <= range_hz[1] * (1.0 + 1e-14)
             counts.append(len(met))
-        assert min(counts) == 1 < max(counts)
+        assert min(counts) <= 5 < 10 < max(counts)
 
 
 def test_a_flat_flank_is_no_fold():

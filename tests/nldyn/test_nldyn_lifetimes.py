@@ -21,9 +21,12 @@ def lasting() -> Attractor:
 
 @pytest.fixture(scope="module")
 def passing() -> Attractor:
-    """Chaos near 35.38 Hz that ends on an orbit of period 9, from a start where it lasts."""
+    """Chaos near 35.38 Hz that ends on an orbit of period 9, from a start where it lasts.
+
+    So it does from nearly half of them.
+    """
     short = AttractorOptions(transient=200, periods=200, confirmations=0)
-    starts = ([s * 1e-6, 0.0] for s in range(12))
+    starts = ([s * 1e-6, 0.0] for s in range(40))
     runs = (classify(make_one_dof(), 35.38, start=s, options=short) for s in starts)
     return next(found for found in runs if found.kind == "chaotic")
 

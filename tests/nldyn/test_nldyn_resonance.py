@@ -145,7 +145,7 @@ def test_contacts_at_resonance_agree_with_runge_kutta(hz, detuning):
     system = two_modes(stops=2)
     flow, omega = FlowMap(system, EXACT), 2 * np.pi * hz * (1.0 + detuning)
     x0, phases = np.array([1e-3, 5e-4, 0.05, 0.3]), (0.3, 0.3 + 3.0 * np.pi)
-    exact, exact_jacobian = Motion(system).run(x0, phases, omega)
+    exact, exact_jacobian = Motion(system).run(x0, phases, omega, max_step=0.02)
     found = flow.shoot(flow.to_state(x0)[None], np.array(phases), omega)
     assert found.closings.any()
     error = np.abs(flow.to_modal(found.ends[0]) - exact) / size(exact)

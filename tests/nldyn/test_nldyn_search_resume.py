@@ -90,7 +90,8 @@ def test_what_it_has_found_is_not_lost_and_changes_nothing_where_it_goes_on(thre
     """Interrupted just after a branch was found: its orbits are used from the next frequency on."""
     (left_out,) = three.of_period(2)
     known, place = without(three, left_out), tmp_path / "found.h5"
-    search = partial(WAYS[way], tries=30)
+    many = {"states": 400} if way == "closed walks" else {}
+    search = partial(WAYS[way], tries=30, spacing=0.012, **many)
     whole = Frequencies(way)
     wanted = search(known, progress=whole)
     tried: list[float] = []

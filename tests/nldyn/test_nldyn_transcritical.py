@@ -183,7 +183,10 @@ def test_a_branch_begun_beside_a_branch_point_has_it_once(beside):
 
 
 @pytest.mark.parametrize("preload_y", [1.0, 1e-3])
-@pytest.mark.parametrize("beside", [-3e-5, -3e-6, -5e-7, 5e-7, 2e-6, 1e-4])
+@pytest.mark.parametrize(
+    "beside",
+    [-3e-5, 5e-7, 1e-4, *(pytest.param(b, marks=pytest.mark.slow) for b in (-3e-6, -5e-7, 2e-6))],
+)
 def test_a_walk_begun_beside_the_point_stays_on_its_branch_and_finds_it(preload_y, beside):
     """Also where the other branch crosses at an angle of 0.08."""
     special = branch_without_y(preload_y).special_points[0]

@@ -30,7 +30,7 @@ def invoke(*arguments):
 def computed(monkeypatch):
     """Let every scene give the same ready diagram."""
 
-    def compute(scene, progress, checkpoint):
+    def compute(scene, progress, checkpoint, jobs):
         progress("harmonic branch", 25.3, 0.5)
         return replace(diagram(), notes=("no 1/5 orbit found near 62.2 Hz",))
 
@@ -125,7 +125,8 @@ def test_a_run_goes_on_after_ctrl_c(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Stepper, "_advance", counted)
     limit = 60
-    stopped = invoke("run", scene, "--out", out, "--quiet")
+    own = ("--quiet", "--jobs", "1")  # the steps of this process are counted
+    stopped = invoke("run", scene, "--out", out, *own)
     unfinished = tmp_path / "new" / "out.unfinished.h5"
     assert stopped.exit_code == 130
     assert stopped.stderr == (
@@ -136,7 +137,7 @@ def test_a_run_goes_on_after_ctrl_c(tmp_path, monkeypatch):
     known = len(load_branches(unfinished)[0].nodes)
     steps.clear()
     limit = None
-    assert invoke("run", scene, "--out", out, "--quiet").exit_code == 0
+    assert invoke("run", scene, "--out", out, *own).exit_code == 0
     assert [entry.name for entry in out.parent.iterdir()] == ["out"]
     for name in ("branches.csv", "special_points.csv", "branches.h5", "summary.json"):
         assert (out / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()

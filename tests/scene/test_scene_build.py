@@ -442,3 +442,62 @@ def test_a_scene_of_trusses(tmp_path):
     ):
         with pytest.raises(SceneError, match=sentence):
             parse_scene(text.replace(old, new), tmp_path / "bars.toml")
+
+
+TAPER = """
+[mesh]
+file = "arm.msh"
+[parts.arm]
+youngs_modulus = 2.1e11
+density = 7800.0
+width = 0.03
+height = 0.04
+taper = ["root", "tip"]
+height_end = 0.02
+[[supports]]
+at = "root"
+fixed = ["x", "y", "rotation"]
+[interfaces.tip]
+at = "tip"
+direction = "y"
+[reduction]
+modes = 2
+"""
+
+
+@pytest.fixture
+def arm_file(tmp_path):
+    import fem
+
+    frame = fem.frame_mesh({"root": (0, 0), "tip": (1, 0)}, [("arm", "root", "tip", 4)])
+    fem.write_mesh(frame, tmp_path / "arm.msh")
+    return tmp_path / "arm.toml"
+
+
+def test_a_scene_of_a_tapered_beam(arm_file):
+    import fem
+
+    component = build_component(parse_scene(TAPER, arm_file))
+    ends = fem.RectangularSection(0.03, 0.04), fem.RectangularSection(0.03, 0.02)
+    assert component.model.parts["arm"].section == fem.TaperedSection(*ends, "root", "tip")
+    tube = TAPER.replace("width = 0.03", "diameter = 0.04").replace("height = 0.04", "bore = 0.02")
+    tube = tube.replace("height_end = 0.02", "bore_end = 0.0")
+    section = build_component(parse_scene(tube, arm_file)).model.parts["arm"].section
+    assert section.end == fem.CircularSection(0.04)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ('taper = ["root", "tip"]', "", "needs 'taper' .* together with one of 'width_end'"),
+        ("height_end = 0.02", "", "needs 'taper' .* together with one of 'width_end'"),
+        ("height_end = 0.02", "bore_end = 0.02", "has 'bore_end' without 'bore'"),
+        ('["root", "tip"]', '["root", "top"]', r"parts.arm.taper.*'top' is not a point"),
+        ('["root", "tip"]', '["root", "root"]', "it starts and ends at 'root'"),
+        ('["root", "tip"]', '["root"]', r"parts\.arm\.taper"),
+    ],
+)
+def test_a_fault_in_a_taper_is_told(arm_file, old, new, sentence):
+    with pytest.raises(SceneError, match=sentence) as caught:
+        build_component(parse_scene(TAPER.replace(old, new), arm_file))
+    assert "\n" not in str(caught.value)

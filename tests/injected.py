@@ -1,0 +1,177 @@
+"""Do the tests notice? Faults put into a copy of the program by hand, one at a time.
+
+``python tests/injected.py [NUMBER ...]`` tells for each which test notices it first. It takes ten
+minutes of processor time for all; the exit code is 1 if one is not noticed.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[1]
+LEFT_OUT = shutil.ignore_patterns(".git", ".venv", "results", "images")
+
+
+class Fault(NamedTuple):
+    """A piece of a file, what takes its place, and the tests that are run."""
+
+    what: str
+    file: str
+    right: str
+    wrong: str
+    tests: str
+
+
+FAULTS = [
+    Fault(
+        "the first segment has the other sign in the monodromy matrix",
+        "nldyn/orbits/orbit.py",
+        "found, jacobians = spectrum(self.jacobians), self.jacobians",
+        "found, jacobians = spectrum(np.concatenate([-self.jacobians[:1], self.jacobians[1:]])), "
+        "self.jacobians",
+        "nldyn/test_nldyn_mathieu.py",
+    ),
+    Fault(
+        "contacts of the last of several stops are missed",
+        "nldyn/flow/kernels/all.py",
+        "    for s in range(closed.size):\n        noise = output_noise(fl, s, w)",
+        "    for s in range(max(1, closed.size - 1)):\n        noise = output_noise(fl, s, w)",
+        "nldyn/test_nldyn_contacts.py",
+    ),
+    Fault(
+        "the tolerance of the flow map is loosened by 100",
+        "nldyn/flow/flow_map.py",
+        "    rtol: float = 1e-9",
+        "    rtol: float = 1e-7",
+        "nldyn/test_nldyn_contacts.py",
+    ),
+    Fault(
+        "at a branch point the branch is taken that one comes from",
+        "nldyn/bifurcations/normal_forms.py",
+        "tangents[int(np.argmin(along))]",
+        "tangents[int(np.argmax(along))]",
+        "nldyn/test_nldyn_normal_forms.py",
+    ),
+    Fault(
+        "all physical groups of a Gmsh file but the first are lost",
+        "fem/gmsh.py",
+        "np.unique(block.groups[block.groups != 0])",
+        "np.unique(block.groups[block.groups != 0])[:1]",
+        "fem/test_fem_meshes.py",
+    ),
+    Fault(
+        "the last node of a generated Abaqus set is lost",
+        "fem/abaqus.py",
+        "list(range(first, last + 1, step))",
+        "list(range(first, last, step))",
+        "fem/test_fem_meshes.py",
+    ),
+    Fault(
+        "multipliers are paired with the moduli of others",
+        "nldyn/orbits/multipliers.py",
+        "return Spectrum(values, logarithms, squeeze)",
+        "return Spectrum(values, logarithms[::-1].copy(), squeeze)",
+        "nldyn/test_nldyn_multipliers.py",
+    ),
+    Fault(
+        "mass is lost where solid cells share a node",
+        "fem/structure_assembly.py",
+        "np.add.at(mass, at, M.ravel())",
+        "mass[at] += M.ravel()",
+        "fem/test_fem_structures.py",
+    ),
+    Fault(
+        "the residual flexibility has a mode that is kept",
+        "cms/reduction.py",
+        "residual_flexibility(pencil, shifted, kept.vectors)",
+        "residual_flexibility(pencil, shifted, kept.vectors[:, 1:])",
+        "cms/test_cms_methods.py",
+    ),
+    Fault(
+        "the test function of a flip has no sign",
+        "nldyn/bifurcations/locate.py",
+        "PD=flip_test(mu)",
+        "PD=abs(flip_test(mu))",
+        "nldyn/test_nldyn_harmonic_branch.py",
+    ),
+    Fault(
+        "between recorded instants a motion is 1e-4 of the time late",
+        "nldyn/flow/kernels/sample.py",
+        "        t = (phases[i] - rec_phase[piece]) / omega\n        state_at",
+        "        t = 0.9999 * (phases[i] - rec_phase[piece]) / omega\n        state_at",
+        "nldyn/test_nldyn_simulation.py",
+    ),
+    Fault(
+        "an index counts once, not for each point of its orbit",
+        "nldyn/search/fixed_point_index.py",
+        "sum(o.period * index(o",
+        "sum(index(o",
+        "nldyn/test_nldyn_fixed_point_index.py",
+    ),
+    Fault(
+        "damping is lost where components are coupled",
+        "cms/coupling.py",
+        "if model.damping is None else model.damping",
+        "if True else model.damping",
+        "cms/test_cms_coupling.py",
+    ),
+    Fault(
+        "explore does not search again where the indices do not add up",
+        "nldyn/search/explore.py",
+        "for again in range(AGAIN if up else 0)",
+        "for again in range(0)",
+        "nldyn/test_nldyn_exploration.py",
+    ),
+    Fault(
+        "explore makes no further guesses on the way down",
+        "nldyn/search/explore.py",
+        "self._follow_guesses(frequency, (self.effort.seed, turn, place))",
+        "pass",
+        "nldyn/test_nldyn_exploration.py",
+    ),
+    Fault(
+        "explore does not look beside short motions",
+        "nldyn/search/explore.py",
+        "self._beside(runs, known, BESIDE_PASSING)",
+        "pass",
+        "nldyn/test_nldyn_exploration.py",
+    ),
+]
+
+
+def noticed_by(fault: Fault, folder: Path) -> str:
+    """The first test that fails with a fault in a copy of the program; empty if none does."""
+    copy = folder / "copy"
+    shutil.copytree(ROOT, copy, ignore=LEFT_OUT)  # with the compiled kernels
+    file = copy / fault.file
+    text = file.read_text("utf-8")
+    if text.count(fault.right) != 1:
+        raise ValueError(f"{fault.file} does not hold {fault.right!r} once")
+    file.write_text(text.replace(fault.right, fault.wrong), "utf-8")
+    command = [sys.executable, "-m", "pytest", "-n", "0", "-x", f"tests/{fault.tests}"]
+    environment = {**os.environ, "PYTHONPATH": str(copy), "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True)
+    failed = re.search(r"^(?:FAILED|ERROR) tests/(.+?)(?: - .*)?$", done.stdout, re.MULTILINE)
+    return failed[1] if failed else ""
+
+
+def main() -> int:
+    """Try the faults whose numbers are given, or all."""
+    missed = 0
+    for number in map(int, sys.argv[1:] or range(len(FAULTS))):
+        with tempfile.TemporaryDirectory() as folder:
+            test = noticed_by(FAULTS[number], Path(folder))
+        missed += not test
+        print(f"{number}: {FAULTS[number].what}: {test or 'NOT NOTICED'}", flush=True)
+    return int(missed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
