@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 import fem.meshio_kinds  # noqa: F401  (completes meshio's tables)
 from fem.abaqus import read_abaqus
+from fem.abaqus.deck import bare
 from fem.abaqus.mesh import TYPE_PREFIX
 from fem.cells import KINDS, SPANS
 from fem.collapsed import uncollapsed
@@ -81,7 +82,8 @@ def read_mesh(
         Folders from which an Abaqus file may ``*INCLUDE`` others, beside its own.
     ignore
         Cells to leave out: names of groups, kinds of cells such as "quad", element types of
-        Abaqus such as "S4R", or "ungrouped" for those in no group.
+        Abaqus such as "S4R", or "ungrouped" for those in no group. Of an Abaqus file also what is
+        refused: element types and keywords such as "GAPUNI" and "*CONTACT PAIR".
 
     Returns
     -------
@@ -180,8 +182,9 @@ def _deck_mesh(
     ignore: Sequence[str],
 ) -> Mesh:
     """The mesh of an Abaqus file, with what the file attaches to it."""
-    found = read_abaqus(path, include_folders)
-    content, said = without_cells(found.content, ignore, str(path))
+    found = read_abaqus(path, include_folders, ignore)
+    others = [name for name in ignore if bare(name) not in found.ignored]
+    content, said = without_cells(found.content, others, str(path))
     return replace(
         _noted(build(content, str(path)), said),
         attachments=found.attachments,

@@ -16,7 +16,7 @@ import meshio
 
 from fem.abaqus.assembly import read_scopes
 from fem.abaqus.attached import Gathered, read_point_elements, read_transforms
-from fem.abaqus.deck import Deck
+from fem.abaqus.deck import Deck, bare
 from fem.abaqus.joints import Joints
 from fem.abaqus.keywords import Reading
 from fem.abaqus.mesh import collected_cells, content_of, numbered_nodes
@@ -42,12 +42,15 @@ class AbaqusFile:
         the key "refused" and a reason where they cannot be taken.
     left_out
         Keywords that are left out by intention.
+    ignored
+        What of the names to ignore was met, in capitals and without blanks and asterisk.
     """
 
     content: meshio.Mesh
     attachments: Attachments = field(default_factory=Attachments)
     described: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     left_out: tuple[LeftOut, ...] = ()
+    ignored: frozenset[str] = frozenset()
 
     def __repr__(self) -> str:
         cells = ", ".join(f"{len(block.data)} {block.type}" for block in self.content.cells)
@@ -61,7 +64,11 @@ def _no_cells(deck: Deck) -> str:
     return f"the mesh has no line elements, surfaces or volumes (its elements: {told})"
 
 
-def read_abaqus(path: str | Path, include_folders: Iterable[str | Path] = ()) -> AbaqusFile:
+def read_abaqus(
+    path: str | Path,
+    include_folders: Iterable[str | Path] = (),
+    ignore: Iterable[str] = (),
+) -> AbaqusFile:
     """Read an input file of Abaqus or CalculiX.
 
     Parameters
@@ -71,6 +78,9 @@ def read_abaqus(path: str | Path, include_folders: Iterable[str | Path] = ()) ->
         occurrence. ``docs/decks.md`` lists the keywords and elements.
     include_folders
         Folders below which included files may be, beside that of the file.
+    ignore
+        Keywords and element types that are not read, such as "GAPUNI" or "*CONTACT PAIR", and
+        that are left out instead of refused; other names in it have no effect here.
 
     Returns
     -------
@@ -91,7 +101,7 @@ def read_abaqus(path: str | Path, include_folders: Iterable[str | Path] = ()) ->
     """
     folders = [Path(path).parent, *map(Path, include_folders)]
     reading = Reading(Path(path), [folder.resolve() for folder in folders])
-    deck = Deck(Path(path))
+    deck = Deck(Path(path), ignore=frozenset(map(bare, ignore)))
     read_scopes(deck, reading.keywords())
     position, places = numbered_nodes(deck)
     if not position:
@@ -114,4 +124,5 @@ def read_abaqus(path: str | Path, include_folders: Iterable[str | Path] = ()) ->
         gathered.attachments,
         described_parts(deck, resolver),
         tuple(LeftOut(p.what, p.count, p.place, p.advice) for p in deck.left_out.values()),
+        frozenset(deck.ignored),
     )

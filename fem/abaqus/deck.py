@@ -64,6 +64,7 @@ class Scope:
     )
     later: list[Keyword] = field(default_factory=list)
     system: tuple[FloatArray, FloatArray] | None = None
+    ignored: set[int] = field(default_factory=set)
 
     def grow(self, kind: str, name: str, members: list[Member]) -> NamedSet:
         """Add members to a set, which keeps the spelling of its first occurrence."""
@@ -112,6 +113,10 @@ class Body:
             label in (scope.nodes if kind == "NSET" else scope.elements) for scope in self.scopes
         )
 
+    def ignores(self, kind: str, label: int) -> bool:
+        """Whether an element is of a type that is to be ignored."""
+        return kind == "ELSET" and any(label in scope.ignored for scope in self.scopes)
+
     def element(self, label: int) -> Element:
         """An element by its number."""
         return next(s.elements[label] for s in self.scopes if label in s.elements)
@@ -130,6 +135,17 @@ class Body:
             if self.turned or self.shift.any():
                 places = places @ self.rotation.T + self.shift
             yield from zip(scope.nodes, places, strict=True)
+
+
+def bare(what: str) -> str:
+    """A keyword or an element type in capitals, without what stands around it.
+
+    Examples
+    --------
+    >>> bare("elements of type gapuni"), bare("*Contact Pair"), bare("contactpair")
+    ('GAPUNI', 'CONTACTPAIR', 'CONTACTPAIR')
+    """
+    return "".join(what.removeprefix("elements of type ").split()).lstrip("*").upper()
 
 
 @dataclass
@@ -154,13 +170,20 @@ class Deck:
     left_out: dict[str, Problem] = field(default_factory=dict)
     materials: list[Keyword] = field(default_factory=list)
     generated: int = 0
+    ignore: frozenset[str] = frozenset()
+    ignored: set[str] = field(default_factory=set)
 
     def fail(self, text: str) -> ModelError:
         """An error that names the file."""
         return ModelError(f"{self.path}: {text}")
 
     def refuse(self, what: str, place: str, advice: str, count: int = 1) -> None:
-        """Keep what is refused, to be told together with all else."""
+        """Keep what is refused, to be told together with all else, unless it is to be ignored."""
+        word = bare(what)
+        if word in self.ignore:
+            self.ignored.add(word)
+            self.leave_out(what, place, "it is to be ignored", count)
+            return
         known = self.problems.setdefault(what, Problem(what, 0, place, advice))
         known.count += count
 

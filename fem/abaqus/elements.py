@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from itertools import product
 
-from fem.abaqus.deck import Deck, Element, Member, Scope
+from fem.abaqus.deck import Deck, Element, Member, Scope, bare
 from fem.abaqus.keywords import Keyword, filled
 from fem.abaqus.known import ELEMENT_ADVICE, OTHER_ELEMENT
 from fem.abaqus.sets import labels_now
@@ -18,7 +18,7 @@ def read_elements(deck: Deck, scope: Scope, keyword: Keyword) -> None:
     name = keyword.name_of("TYPE").upper()
     kind = element_type(name)
     if kind is None:
-        _refuse(deck, keyword, name)
+        _refuse(deck, scope, keyword, name)
         return
     labels, row = [], 0
     while row < len(keyword.rows):
@@ -52,7 +52,7 @@ def _element(keyword: Keyword, row: int, kind: ElementType, words: list[str]) ->
     return Element(kind, tuple(own), keyword.place(row))
 
 
-def _refuse(deck: Deck, keyword: Keyword, name: str) -> None:
+def _refuse(deck: Deck, scope: Scope, keyword: Keyword, name: str) -> None:
     """Note a type that is not read; a row that ends in a comma goes on in the next."""
     advice = (said for pattern, said in ELEMENT_ADVICE if re.fullmatch(pattern, name))
     starts = [True, *(row[-1] != "" for row in keyword.rows[:-1])][: len(keyword.rows)]
@@ -60,6 +60,11 @@ def _refuse(deck: Deck, keyword: Keyword, name: str) -> None:
     place = f"{keyword.place(0 if keyword.rows else None)}, element {first}"
     what = f"elements of type {name}"
     deck.refuse(what, place, next(advice, OTHER_ELEMENT), max(1, sum(starts)))
+    if bare(what) in deck.ignore:
+        rows = (row for row, start in zip(keyword.rows, starts, strict=True) if start)
+        scope.ignored.update(int(row[0]) for row in rows if row[0].isdigit())
+        if "ELSET" in keyword.parameters:
+            scope.grow("ELSET", keyword.name_of("ELSET"), [])
 
 
 def read_elgen(deck: Deck, scope: Scope, keyword: Keyword) -> None:

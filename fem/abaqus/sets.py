@@ -102,7 +102,7 @@ class Resolver:
             if isinstance(member.item, range):
                 # a range is of those numbers that there are
                 own = [(owner.name, n) for n in member.item if owner.has(kind, n)]
-                if not own:
+                if not own and not any(owner.ignores(kind, n) for n in member.item):
                     last = f"{member.item.start} to {member.item.stop - 1}"
                     raise self.deck.fail(
                         f"{member.place}: set {named.name!r} runs from {last}, but no"
@@ -127,6 +127,8 @@ class Resolver:
         """What a word stands for: a number, a set, or either of an instance (INSTANCE.NAME)."""
         word = word.strip("\"'")
         if word.isdigit():
+            if body.ignores(kind, int(word)):
+                return []
             if not body.has(kind, int(word)):
                 raise self.deck.fail(
                     f"{place}: {what} holds {OTHER[kind]} {word}, which is not defined"

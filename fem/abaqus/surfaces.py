@@ -19,7 +19,11 @@ class Surfaces:
         for body in resolver.deck.bodies.values():
             for keyword in (k for scope in body.scopes for k in scope.later):
                 if keyword.name == "SURFACE":
-                    self.named[body.name, keyword.name_of("NAME").upper()] = keyword
+                    key = (body.name, keyword.name_of("NAME").upper())
+                    if key in self.named:
+                        first = self.named[key].place()
+                        raise keyword.fail(f"{key[1]!r} is defined twice, first in {first}")
+                    self.named[key] = keyword
         self._known: dict[tuple[str, str], list[Label]] = {}
         self._free: set[frozenset[Label]] | None = None
 

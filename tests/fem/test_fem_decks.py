@@ -241,6 +241,16 @@ def test_a_surface_of_faces_is_a_set_of_nodes(tmp_path):
         assert np.array_equal(mesh.nodes("HULL"), np.unique(sides))
 
 
+def test_a_surface_and_a_set_of_one_name_stay_apart(tmp_path):
+    rows, plain = box_rows((1, 1, 1))
+    text = f"{rows}*SURFACE, NAME=x0, TYPE=NODE\nx1\n"
+    mesh = fem.read_structure(deck(tmp_path, text))
+    assert np.array_equal(mesh.nodes("x0"), plain.nodes("x0"))
+    assert np.array_equal(mesh.nodes("surface x0"), plain.nodes("x1"))
+    with pytest.raises(fem.ModelError, match=r"'X0' is defined twice, first in line \d+"):
+        fem.read_structure(deck(tmp_path, text + "*SURFACE, NAME=X0\nBOX, S1\n"))
+
+
 def test_a_27_node_hexahedron_has_its_centre_and_faces_in_place(tmp_path):
     mesh = fem.box_mesh("BOX", (1.0, 1.0, 1.0), (1, 1, 1), kind="hexahedron27")
     cell = mesh.cells["hexahedron27"][0]
@@ -492,6 +502,27 @@ def test_what_is_not_read_is_named_with_its_place(tmp_path, text, sentence):
     path = deck(tmp_path, cantilever_deck() + text)
     with pytest.raises(fem.ModelError, match=sentence):
         fem.read_structure(path)
+
+
+def test_what_is_refused_can_be_ignored_by_name(tmp_path):
+    text = cantilever_deck() + (
+        "*ELEMENT, TYPE=GAPUNI, ELSET=GAPS\n50, 1, 2\n51, 3, 4\n*GAP, ELSET=GAPS\n0.1\n"
+        "*ELSET, ELSET=ALL\nBEAM, GAPS, 51\n*Contact  pair\na, b\n"
+    )
+    path = deck(tmp_path, text)
+    with pytest.raises(fem.ModelError, match=r"GAPUNI .*GAP .*CONTACT PAIR"):
+        fem.read_mesh(path)
+    with pytest.raises(fem.ModelError, match=r"not read: \*GAP \(1, first in line 24\)"):
+        fem.read_mesh(path, ignore=["gapuni", "*CONTACT PAIR"])
+    mesh = fem.read_mesh(path, ignore=["GAPUNI", "CONTACT PAIR", "*GAP"])
+    assert len(mesh.part("ALL")) == 10
+    told = [str(item) for item in mesh.left_out]
+    assert told[0] == (
+        "elements of type GAPUNI (2, first in line 22, element 50): it is to be ignored"
+    )
+    assert len(told) == 3
+    with pytest.raises(fem.ModelError, match=r"no cell of '.ROTTEN' to ignore"):
+        fem.read_mesh(path, ignore=["GAPUNI", "CONTACT PAIR", "*GAP", "*ROTTEN"])
 
 
 def test_what_is_left_out_by_intention_is_listed(tmp_path):

@@ -83,8 +83,8 @@ def test_a_finer_frame_keeps_what_the_deck_attaches(folder):
 def test_check_tells_what_is_left_out_and_what_is_taken(folder):
     result = CliRunner().invoke(main, ["check", str(folder / "file.toml")])
     assert result.exit_code == 0, result.output
-    assert "left out of the mesh file: *BOUNDARY (1, first in line " in result.output
-    assert "taken from the mesh file: point masses: 1, links: 1" in result.output
+    assert "left out of the file: *BOUNDARY (1, first in line " in result.output
+    assert "taken from the file: point masses: 1, links: 1" in result.output
 
 
 @pytest.mark.parametrize(
