@@ -261,8 +261,16 @@ def test_ctrl_c_from_the_terminal(tmp_path):
 )
 def test_ctrl_c_while_a_suite_is_computed(tmp_path, arguments):
     start = [sys.executable, "-m", *arguments, "--out", str(tmp_path / "out")]
-    child = subprocess.Popen(start, stderr=subprocess.PIPE, text=True, start_new_session=True)
-    workers = arguments[0] == "nldyn.hard"  # they do the work, once they are loaded
+    suites = str(Path(__file__).parents[1])
+    path = os.pathsep.join([suites, *filter(None, [os.environ.get("PYTHONPATH")])])
+    child = subprocess.Popen(
+        start,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "PYTHONPATH": path},
+    )
+    workers = arguments[0] == "hard"  # they do the work, once they are loaded
     wait_until_it_had(child, 4.0, {child.pid} if workers else set())
     os.killpg(child.pid, signal.SIGINT)  # as a terminal does, to its processes too
     _, said = child.communicate(timeout=300.0)
