@@ -11,6 +11,7 @@ import nldyn.diagrams
 from nldyn.errors import SceneError
 from nldyn.resources import example, examples, mesh
 from nldyn.scene import (
+    build_candidates,
     build_component,
     build_reduced,
     build_selection,
@@ -120,7 +121,7 @@ def with_tolerance(*changes):
 def test_a_tolerance_asks_for_a_selection_in_the_scenes_setting(monkeypatch, caplog):
     asked = {}
 
-    def reduce_for(component, setting, *, tolerance):
+    def reduce_for(component, setting, *, tolerance, progress):
         assert set(component.interfaces) == {"middle"}
         asked.update(range=setting.range_hz, tolerance=tolerance)
         return SimpleNamespace(reduced="the model", report=lambda: "modes kept: 1")
@@ -139,10 +140,11 @@ def test_a_tolerance_asks_for_a_selection_in_the_scenes_setting(monkeypatch, cap
         ("tolerance = 0.3", "tolerance = 0.01", "may matter, more than 3; reduce by hand"),
     ],
 )
-def test_a_tolerance_that_cannot_be_met_is_told(old, new, sentence, monkeypatch):
-    monkeypatch.setattr("nldyn.selection.MOST_MODES", 3)
+@pytest.mark.parametrize("build", [build_selection, build_candidates])
+def test_a_tolerance_that_cannot_be_met_is_told(old, new, sentence, build, monkeypatch):
+    monkeypatch.setattr("nldyn.candidates.MOST_MODES", 3)
     with pytest.raises(SceneError, match=sentence):
-        build_selection(with_tolerance((old, new)))
+        build(with_tolerance((old, new)))
 
 
 def test_sections_of_every_kind(tmp_path):
