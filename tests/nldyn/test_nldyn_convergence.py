@@ -40,7 +40,7 @@ from nldyn.reduction.convergence import (
 )
 from nldyn.report.convergence import write_study
 from nldyn.scene.build import build_component, load_scene
-from nldyn.scene.convergence import with_mesh
+from nldyn.scene.convergence import convergence_study_of, with_mesh
 
 
 @pytest.fixture(scope="module")
@@ -350,3 +350,14 @@ def test_massless_interfaces_are_refused():
         System.from_reduced(macneal)
     wrong = replace(cms.reduce(string(), modes=3), damping=np.full((4, 4), 1.0) + np.eye(4))
     assert System.from_reduced(wrong).size == 4
+
+
+def test_two_processes_give_the_same_study():
+    scene = load_scene(example("portal.toml"))
+    studies = [convergence_study_of(scene, modes=(1, 2, 3), jobs=jobs) for jobs in (1, 2)]
+    for one, other in zip(*(study.models for study in studies), strict=True):
+        assert (one.label, one.modes, one.note) == (other.label, other.modes, other.note)
+        assert one.special_hz == other.special_hz
+        assert (one.peak is None) == (other.peak is None)
+        if one.peak is not None and other.peak is not None:
+            assert np.array_equal(one.peak.point, other.peak.point)

@@ -11,6 +11,7 @@ import nldyn.search.diagram
 from nldyn.base.errors import SceneError
 from nldyn.base.resources import example, examples, mesh
 from nldyn.scene.build import (
+    build_candidates,
     build_component,
     build_reduced,
     build_selection,
@@ -139,10 +140,11 @@ def test_a_tolerance_asks_for_a_selection_in_the_scenes_setting(monkeypatch, cap
         ("tolerance = 0.3", "tolerance = 0.01", "may matter, more than 3; reduce by hand"),
     ],
 )
-def test_a_tolerance_that_cannot_be_met_is_told(old, new, sentence, monkeypatch):
+@pytest.mark.parametrize("build", [build_selection, build_candidates])
+def test_a_tolerance_that_cannot_be_met_is_told(old, new, sentence, build, monkeypatch):
     monkeypatch.setattr("nldyn.reduction.candidates.MOST_MODES", 3)
     with pytest.raises(SceneError, match=sentence):
-        build_selection(with_tolerance((old, new)))
+        build(with_tolerance((old, new)))
 
 
 def test_sections_of_every_kind(tmp_path):
