@@ -1,6 +1,9 @@
 """The order of the files of tests: so that workers end together and compile nothing twice."""
 
+from contextlib import suppress
 from pathlib import Path
+
+import pytest
 
 HERE = Path(__file__).parent
 
@@ -34,3 +37,29 @@ def rank(item):
 def pytest_collection_modifyitems(items):
     """Sort the files, and leave the tests of each in their order."""
     items.sort(key=rank)
+
+
+@pytest.fixture(scope="session")
+def kernels(tmp_path_factory, worker_id):
+    """The kernels, compiled or read from the disk; by one worker at a time, so that one compiles."""
+    from nldyn import Stop, System, Unbalance, continue_branch, solve_orbit
+
+    place = tmp_path_factory.getbasetemp()
+    with ((place if worker_id == "master" else place.parent) / "kernels.lock").open("w") as file:
+        with suppress(ImportError):  # only there where the system has such locks
+            from fcntl import LOCK_EX, flock
+
+            flock(file, LOCK_EX)  # until the file is closed
+        system = System.from_modal(
+            [10.0], {"tip": [1.0]}, modal_damping=0.05, stops=[Stop("tip", 1e9)],
+            excitation=[Unbalance("tip", 1e-5)],
+        )  # fmt: skip
+        assert continue_branch(solve_orbit(system, 12.0), (11.9, 12.1)).points
+
+
+@pytest.fixture(scope="module", autouse=True)
+def kernels_where_needed(request):
+    """Before the first test of a file that may need them; no limit of time is for compiling."""
+    file = request.path.relative_to(HERE).as_posix()
+    if not file.startswith(NEEDS_NO_KERNELS):
+        request.getfixturevalue("kernels")

@@ -423,7 +423,15 @@ def test_each_round_lies_between_those_before(whole):
     np.testing.assert_allclose(shares, np.repeat([[0.5], [0.25], [0.75]], 3, axis=1), rtol=1e-9)
 
 
-@pytest.mark.parametrize("places", [[(1,)], [(1, 40)], [(11,)], [(1, 60), (1, 90), (4, 2), (6, 3)]])
+@pytest.mark.parametrize(
+    "places",
+    [
+        pytest.param([(1,)], marks=pytest.mark.slow),
+        pytest.param([(1, 40)], marks=pytest.mark.slow),
+        [(11,)],
+        [(1, 60), (1, 90), (4, 2), (6, 3)],
+    ],
+)
 def test_an_interrupted_exploration_goes_on_to_the_last_digit(whole, tmp_path, places):
     """Stopped before anything is found, on a branch, in the second round, and several times."""
     path = tmp_path / "found.h5"
@@ -492,7 +500,7 @@ def test_what_known_branches_lead_to_is_followed(monkeypatch):
     assert np.abs(ends - flip.frequency_hz).min() < 1e-6
 
 
-@pytest.mark.parametrize("place", [(1, 30), (3,)])
+@pytest.mark.parametrize("place", [pytest.param((1, 30), marks=pytest.mark.slow), (3,)])
 def test_exploration_beside_known_branches_goes_on_to_the_last_digit(harmonic, tmp_path, place):
     path = tmp_path / "found.h5"
     ask = partial(explore, system_of("one_dof"), **QUESTION, effort=EFFORT, known=harmonic)
