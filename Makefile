@@ -1,11 +1,12 @@
-# `make paper` reproduces the paper's figures, `make test` runs the tests, `make bench` measures
+# `make paper` reproduces the paper's figures, `make atlas` follows all known branches of its larger
+# models (hours; it goes on where it was interrupted), `make test` runs the tests, `make bench` measures
 # speed against error, `make hard` computes the hard cases, `make faults` tries thousands of bad
 # inputs and hundreds of kills. All set up a virtual environment in .venv first.
 PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 
-.PHONY: paper test check bench hard faults clean
+.PHONY: paper atlas test check bench hard faults clean
 
 $(VENV)/.installed: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -14,6 +15,9 @@ $(VENV)/.installed: pyproject.toml
 
 paper: $(VENV)/.installed
 	$(BIN)/nldyn paper --out results/paper
+
+atlas: $(VENV)/.installed
+	$(BIN)/nldyn paper --atlas --out results/atlas
 
 # the workers share the cores: with two threads each, exponentials of 2 x 2 matrices took 200 times as
 # long on a busy machine

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -28,7 +28,7 @@ from nldyn.progress import Progress
 Way = Literal["up", "down"]
 
 RANGE_HZ = (18.0, 90.0)
-STEP_HZ, CLAIMED_STEP_HZ = 1.0, 0.5  # outside, and within the ranges that the paper names
+STEP_HZ, CLAIMED_STEP_HZ = 2.0, 0.5  # outside, and within the ranges that the paper names
 # Ends of the pieces that are swept apart, between two frequencies; none cuts a published range.
 EDGES_HZ = (17.75, 23.75, 29.75, 38.25, 44.25, 50.75, 57.75, 66.25, 74.25, 82.25, 90.25)
 EFFORT = AttractorOptions(periods=128)  # and up to eight times as many where they do not decide
@@ -223,21 +223,19 @@ def sweep_piece(model: str, piece: int, progress: Progress) -> list[dict[str, An
     low, high = EDGES_HZ[piece : piece + 2]
     up, down = ([hz for hz in ways if low < hz < high] for ways in frequencies_hz(model))
     flow = flow_of(scene_system(model))
-    followed: set[float] = set()
-    found = []
-    ways: tuple[tuple[Way, list[float]], ...] = (("up", up), ("down", down[::-1]))
-    for way, frequencies in ways:
+    found: list[Settled] = []
+    for way, frequencies in (("up", up), ("down", down[::-1])):
         for attractor in _swept(flow, frequencies):
             hz = attractor.frequency_hz
-            progress("chaos", hz, len(found) / (len(up) + len(down)))
+            followed = any(s.frequency_hz == hz and s.chaotic for s in found)
             ended: tuple[int, ...] = ()
-            if attractor.kind == "chaotic" and hz in down and hz not in followed:
-                followed.add(hz)
-                ended = tuple(chaos_lifetime(attractor, states=STATES, periods=LASTING).ended)
+            if attractor.kind == "chaotic" and hz in down and not followed:
+                life = chaos_lifetime(attractor, states=STATES, periods=LASTING)
+                ended = tuple(life.ended.tolist())
             largest = attractor.largest_exponent
-            settled = Settled(hz, way, attractor.kind, *largest, tuple(map(int, ended)))
-            found.append(asdict(settled))
-    return found
+            found.append(Settled(hz, cast(Way, way), attractor.kind, *largest, ended))
+            progress("chaos", hz, len(found) / (len(up) + len(down)))
+    return [asdict(settled) for settled in found]
 
 
 def _swept(flow: FlowMap, frequencies: Sequence[float]) -> Iterator[Attractor]:
