@@ -34,6 +34,7 @@ EDGES_HZ = (17.75, 23.75, 29.75, 38.25, 44.25, 50.75, 57.75, 66.25, 74.25, 82.25
 EFFORT = AttractorOptions(periods=128)  # and up to eight times as many where they do not decide
 STATES, LASTING = 4, 1000  # motions from each chaotic one, and for how many periods
 MODELS = ("four_dof_xi_0.001", "four_dof_xi_0.01", "two_dof_xi_0.001", "two_dof_xi_0.01")
+SECONDS = {"two": 1.6e-4, "four": 2.5e-4}  # for a period, about
 NAMES = {"two_dof": "2-DOF model", "four_dof": "4-DOF model"}
 DAMPINGS = {"0.01": "#0072b2", "0.001": "#b03a00"}
 
@@ -266,10 +267,11 @@ def tasks_of_chaos(folder: Path) -> tuple[Task, ...]:
 
 
 def _weight(model: str, piece: int) -> float:
-    """Periods that are simulated, in thousands, if half of the motions are chaotic."""
+    """Seconds that a piece takes, about, if half of the motions are chaotic."""
     low, high = EDGES_HZ[piece : piece + 2]
     up, down = (sum(low < hz < high for hz in ways) for ways in frequencies_hz(model))
-    return 1.5 * (up + down) + 1e-3 * STATES * LASTING * down / 2
+    periods = 1500 * (up + down) + STATES * LASTING * down / 2
+    return periods * SECONDS[model.partition("_")[0]]
 
 
 def joined_chaos(values: Mapping[str, Any]) -> Chaos:
