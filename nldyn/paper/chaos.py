@@ -28,7 +28,7 @@ from nldyn.progress import Progress
 Way = Literal["up", "down"]
 
 RANGE_HZ = (18.0, 90.0)
-STEP_HZ, CLAIMED_STEP_HZ = 2.0, 0.5  # outside, and within the ranges that the paper names
+STEP_HZ, CLAIMED_STEP_HZ = 1.0, 0.5  # outside, and within the ranges that the paper names
 # Ends of the pieces that are swept apart, between two frequencies; none cuts a published range.
 EDGES_HZ = (17.75, 23.75, 29.75, 38.25, 44.25, 50.75, 57.75, 66.25, 74.25, 82.25, 90.25)
 EFFORT = AttractorOptions(periods=128)  # and up to eight times as many where they do not decide

@@ -76,7 +76,7 @@ def test_half_of_the_motions_is_not_more_than_half():
 def test_damping_counts_flips_and_chaotic_frequencies(chaos):
     found = chaos.with_damping(Finding(holds=True, text="flips", note="counted; not decided"))
     assert found.holds
-    text = "two_dof: chaotic at 7 of 37 frequencies at ξ = 0.01, at 20 at ξ = 0.001"
+    text = "two_dof: chaotic at 13 of 73 frequencies at ξ = 0.01, at 39 at ξ = 0.001"
     assert text in found.text
     assert not chaos.with_damping(Finding(holds=False, text="flips")).holds
     alike = Chaos({model: swept(model, (30.0, 37.0)) for model in MODELS})
@@ -105,7 +105,7 @@ def test_chaotic_ranges_are_shaded(chaos, tmp_path, monkeypatch):
         "figure_4", "figure_5", "figure_7", "figure_8",
     }  # fmt: skip
     left = [patch.get_x() for patch in axes["figure_4"].patches]
-    assert left == [pytest.approx(29.0), pytest.approx(57.0)]
+    assert left == [pytest.approx(29.5), pytest.approx(57.5)]
 
 
 def test_the_figure_shows_both_models_at_both_dampings(chaos, tmp_path, monkeypatch):
