@@ -1,4 +1,5 @@
-# `make paper` reproduces the paper's figures, `make test` runs the tests, `make bench` measures
+# `make paper` reproduces the paper's figures, `make atlas` follows all known branches of its larger
+# models (hours; it goes on where it was interrupted), `make test` runs the tests, `make bench` measures
 # speed against error, `make hard` computes the hard cases, `make faults` tries thousands of bad
 # inputs and hundreds of kills, `make slow` runs all tests that are too long for `make test`.
 # All set up a virtual environment in .venv first.
@@ -6,7 +7,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 
-.PHONY: paper test slow check bench hard faults clean
+.PHONY: paper atlas test slow check bench hard faults clean
 
 $(VENV)/.installed: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -15,6 +16,9 @@ $(VENV)/.installed: pyproject.toml
 
 paper: $(VENV)/.installed
 	$(BIN)/nldyn paper --out results/paper
+
+atlas: $(VENV)/.installed
+	$(BIN)/nldyn paper --atlas --out results/atlas
 
 # the workers share the cores: with two threads each, exponentials of 2 x 2 matrices took 200 times as
 # long on a busy machine; the order of the files is that of tests/conftest.py

@@ -389,7 +389,7 @@ def paper(out: Path, atlas: bool, jobs: int, quiet: bool) -> None:
 
         if atlas:
             with told_what_is_kept(out, has_charts):
-                nldyn.paper.atlas(out, jobs, quiet=quiet)
+                nldyn.paper.compute_atlas(out, jobs, quiet=quiet)
         else:
             with told_what_is_kept(unfinished_folder(out), has_values):
                 nldyn.paper.main(out, jobs, quiet=quiet)

@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-__all__ = ["atlas", "main"]
+__all__ = ["compute_atlas", "main"]
 
 
 def main(out: str | Path, workers: int = 2, *, quiet: bool = False) -> None:
@@ -67,7 +67,7 @@ def main(out: str | Path, workers: int = 2, *, quiet: bool = False) -> None:
     print(f"{len(rows)} claims: {counts}; {seconds:.0f} s; written to {out}", file=sys.stderr)
 
 
-def atlas(out: str | Path, workers: int = 2, *, quiet: bool = False) -> None:
+def compute_atlas(out: str | Path, workers: int = 2, *, quiet: bool = False) -> None:
     """Follow all branches that are known of the larger models, which takes hours.
 
     Parameters
@@ -87,7 +87,7 @@ def atlas(out: str | Path, workers: int = 2, *, quiet: bool = False) -> None:
 
     Examples
     --------
-    >>> atlas("results/atlas")        # doctest: +SKIP
+    >>> compute_atlas("results/atlas")        # doctest: +SKIP
     """
     from nldyn.paper.atlas import atlas_folder, write_atlas
     from nldyn.paper.jobs import compile_kernels

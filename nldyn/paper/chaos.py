@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -34,6 +34,7 @@ EDGES_HZ = (17.75, 23.75, 29.75, 38.25, 44.25, 50.75, 57.75, 66.25, 74.25, 82.25
 EFFORT = AttractorOptions(periods=128)  # and up to eight times as many where they do not decide
 STATES, LASTING = 4, 1000  # motions from each chaotic one, and for how many periods
 MODELS = ("four_dof_xi_0.001", "four_dof_xi_0.01", "two_dof_xi_0.001", "two_dof_xi_0.01")
+SECONDS = {"two": 1.6e-4, "four": 2.5e-4}  # for a period, about
 NAMES = {"two_dof": "2-DOF model", "four_dof": "4-DOF model"}
 DAMPINGS = {"0.01": "#0072b2", "0.001": "#b03a00"}
 
@@ -223,21 +224,19 @@ def sweep_piece(model: str, piece: int, progress: Progress) -> list[dict[str, An
     low, high = EDGES_HZ[piece : piece + 2]
     up, down = ([hz for hz in ways if low < hz < high] for ways in frequencies_hz(model))
     flow = flow_of(scene_system(model))
-    followed: set[float] = set()
-    found = []
-    ways: tuple[tuple[Way, list[float]], ...] = (("up", up), ("down", down[::-1]))
-    for way, frequencies in ways:
+    found: list[Settled] = []
+    for way, frequencies in (("up", up), ("down", down[::-1])):
         for attractor in _swept(flow, frequencies):
             hz = attractor.frequency_hz
-            progress("chaos", hz, len(found) / (len(up) + len(down)))
+            followed = any(s.frequency_hz == hz and s.chaotic for s in found)
             ended: tuple[int, ...] = ()
-            if attractor.kind == "chaotic" and hz in down and hz not in followed:
-                followed.add(hz)
-                ended = tuple(chaos_lifetime(attractor, states=STATES, periods=LASTING).ended)
+            if attractor.kind == "chaotic" and hz in down and not followed:
+                life = chaos_lifetime(attractor, states=STATES, periods=LASTING)
+                ended = tuple(life.ended.tolist())
             largest = attractor.largest_exponent
-            settled = Settled(hz, way, attractor.kind, *largest, tuple(map(int, ended)))
-            found.append(asdict(settled))
-    return found
+            found.append(Settled(hz, cast(Way, way), attractor.kind, *largest, ended))
+            progress("chaos", hz, len(found) / (len(up) + len(down)))
+    return [asdict(settled) for settled in found]
 
 
 def _swept(flow: FlowMap, frequencies: Sequence[float]) -> Iterator[Attractor]:
@@ -268,10 +267,11 @@ def tasks_of_chaos(folder: Path) -> tuple[Task, ...]:
 
 
 def _weight(model: str, piece: int) -> float:
-    """Periods that are simulated, in thousands, if half of the motions are chaotic."""
+    """Seconds that a piece takes, about, if half of the motions are chaotic."""
     low, high = EDGES_HZ[piece : piece + 2]
     up, down = (sum(low < hz < high for hz in ways) for ways in frequencies_hz(model))
-    return 1.5 * (up + down) + 1e-3 * STATES * LASTING * down / 2
+    periods = 1500 * (up + down) + STATES * LASTING * down / 2
+    return periods * SECONDS[model.partition("_")[0]]
 
 
 def joined_chaos(values: Mapping[str, Any]) -> Chaos:

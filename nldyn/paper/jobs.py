@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,6 +29,7 @@ from nldyn.system.system import System
 BILINEAR_ALPHA = 790.0  # section 3, from equation 3.2
 STIFFNESS = 16877.0  # N/m, section 3
 HERTZ_STIFFNESS = 5.17e9  # N/m^1.5, half of what sections 2 and 3 print for the whole beam
+PART = ", period "  # between the name of a job and what of it is computed
 LOWEST_HZ = 5.0
 WIDE_HZ = 4.0  # width of the subharmonic branches that the figures show
 
@@ -61,12 +61,12 @@ class Job:
         Step control.
     quarters_hz : float, optional
         Frequency from which on flips of wide 1/2 branches are followed to 1/4 branches.
-    starts : tuple of (int, float)
+    starts : tuple of (int, float, float)
         Period multiples, and for each the frequency in Hz from which on kept starts are followed
-        (in the range; the harmonic branches reach down to `LOWEST_HZ`). If there are any, nothing
-        is searched.
+        (in the range; the harmonic branches reach down to `LOWEST_HZ`), and the time that it takes
+        in proportion to others. If there are any, nothing is searched.
     weight : float
-        Time that it takes, in proportion to others.
+        Time that it takes otherwise, in proportion to others.
     """
 
     name: str
@@ -77,7 +77,7 @@ class Job:
     search_points: int = 12
     options: ContinuationOptions = FINE
     quarters_hz: float | None = None
-    starts: tuple[tuple[int, float], ...] = ()
+    starts: tuple[tuple[int, float, float], ...] = ()
     weight: float = 1.0
 
 
@@ -124,19 +124,19 @@ LISTED = (
 JOBS: tuple[Job, ...] = (
     Job(
         "four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (18.0, 90.0), options=COARSE,
-        starts=((1, 18.0), (2, 36.0), (3, 49.0)), quarters_hz=44.0, weight=90.0,
+        starts=((1, 18.0, 60.0), (2, 36.0, 30.0), (3, 49.0, 20.0)), quarters_hz=44.0,
     ),
     Job(
         "four_dof_xi_0.01", _scene("four_dof_xi_0.01"), (15.0, 90.0), options=COARSE,
-        starts=((1, 15.0), (2, 15.0), (3, 15.0)), quarters_hz=36.0, weight=80.0,
+        starts=((1, 15.0, 34.0), (2, 36.0, 15.0), (3, 42.0, 15.0)), quarters_hz=36.0,
     ),
     Job(
         "two_dof_xi_0.001", _scene("two_dof_xi_0.001"), (18.0, 90.0), options=COARSE,
-        starts=((1, 18.0), (2, 18.0), (3, 18.0)), quarters_hz=36.0, weight=80.0,
+        starts=((1, 18.0, 10.0), (2, 20.0, 15.0), (3, 20.0, 40.0)), quarters_hz=36.0,
     ),
     Job(
         "two_dof_xi_0.01", _scene("two_dof_xi_0.01"), (15.0, 90.0), options=COARSE,
-        starts=((1, 15.0), (2, 15.0), (3, 15.0)), quarters_hz=36.0, weight=50.0,
+        starts=((1, 15.0, 8.0), (2, 20.0, 12.0), (3, 20.0, 20.0)), quarters_hz=36.0,
     ),
     Job("one_dof.listed", _scene("one_dof"), (5.0, 90.0), (), LISTED, weight=20.0),
     Job(
@@ -171,23 +171,31 @@ def job_named(name: str) -> Job:
 
 
 def tasks_of(jobs: Sequence[Job], folder: Path) -> tuple[Task, ...]:
-    """What is to be computed of some jobs; the folder keeps it."""
-    return tuple(Task(job.name, run_job, (job.name, folder), job.weight) for job in jobs)
+    """What is to be computed of some jobs, kept starts by period; the folder keeps it."""
+    return tuple(
+        Task(f"{job.name}{PART}{period}", run_job, (job.name, period, folder), weight)
+        for job in jobs
+        for period, _, weight in job.starts or ((0, 0.0, job.weight),)
+    )
 
 
-def run_job(name: str, folder: Path, progress: Progress) -> Diagram:
-    """Compute a job unless the folder keeps it, with what the figures and checks need of it."""
+def run_job(name: str, period: int, folder: Path, progress: Progress) -> Diagram:
+    """Compute a job, or its kept starts of one period, unless the folder keeps that.
+
+    Of the orbits the numbers are left that figures and checks need.
+    """
     job = job_named(name)
-    found = kept_diagram(folder / f"{name}.h5", lambda: computed(job, progress))
+    path = folder / f"{name}.{period}.h5"
+    found = kept_diagram(path, lambda: computed(job, period, progress))
     keep_numbers(found.branches)
     return found
 
 
-def computed(job: Job, progress: Progress = silent) -> Diagram:
-    """The diagram of a job."""
+def computed(job: Job, period: int, progress: Progress = silent) -> Diagram:
+    """The diagram of a job, or the branches through its kept starts of one period."""
     system = job.system()
     found = (
-        follow_kept(job, system, progress)
+        follow_kept(job, period, system, progress)
         if job.starts
         else diagram(
             system,
@@ -213,16 +221,15 @@ def with_quarters(found: Diagram, job: Job, system: System, progress: Progress) 
     return replace(found, branches=tuple(box.branches), notes=tuple(box.notes))
 
 
-def follow_kept(job: Job, system: System, progress: Progress) -> Diagram:
-    """Follow the branches through the kept starts of a job."""
-    low, high = job.range_hz
+def follow_kept(job: Job, period: int, system: System, progress: Progress) -> Diagram:
+    """Follow the branches through the kept starts of a job of one period."""
+    low, high = LOWEST_HZ if period == 1 else job.range_hz[0], job.range_hz[1]
     flow, observe = flow_of(system), check_observe(system, None)
     box = Collector(flow, (low, high), observe, job.options, progress)
-    lowest = dict(job.starts)
-    starts = [s for s in read_starts(job.name) if s.frequency_hz >= lowest.get(s.period, math.inf)]
+    lowest = next(hz for n, hz, _ in job.starts if n == period)
+    starts = [s for s in read_starts(job.name) if s.period == period and s.frequency_hz >= lowest]
     for number, start in enumerate(starts):
         box.done = number / len(starts)
-        box.range_hz = (LOWEST_HZ if start.period == 1 else low, high)
         orbit = orbit_near(flow, start.state, start.period, start.omega, observe)
         if orbit is not None and orbit.period == start.period and is_at(orbit, start.state):
             box.from_orbits([orbit])
@@ -237,8 +244,23 @@ def is_wide(branch: Branch) -> bool:
 
 
 def diagrams_of(values: Mapping[str, object]) -> dict[str, Diagram]:
-    """The diagrams among the values of tasks, by their names."""
-    return {name: found for name, found in values.items() if isinstance(found, Diagram)}
+    """The diagrams among the values of tasks, by the names of their jobs."""
+    parts: dict[str, list[Diagram]] = {}
+    for task, found in values.items():
+        if isinstance(found, Diagram):
+            parts.setdefault(task.partition(PART)[0], []).append(found)
+    return {name: _joined(found) for name, found in parts.items()}
+
+
+def _joined(parts: Sequence[Diagram]) -> Diagram:
+    """The parts of a job as one."""
+    low = min(part.range_hz[0] for part in parts)
+    return replace(
+        parts[0],
+        range_hz=(low, parts[0].range_hz[1]),
+        branches=tuple(branch for part in parts for branch in part.branches),
+        notes=tuple(note for part in parts for note in part.notes),
+    )
 
 
 def compile_kernels(quiet: bool = False) -> None:

@@ -260,7 +260,7 @@ def main() -> None:
     names = given.models or MODELS
     for name in names if factors else ():
         try:
-            checked_factors(chart_named(name).system(), factors)
+            checked_factors(scene_system(name), factors)
         except SystemModelError as error:
             parser.error(f"argument --detour: {name}: {error}")
     try:

@@ -139,6 +139,7 @@ def family_of(chart, starts, family, folder):
     return follow_starts(system, chosen, chart.range_hz, LONG, chart.doubled, keep_at=place)
 
 
+@pytest.mark.slow  # 12 s
 def test_families_followed_apart_are_the_diagram_followed_at_once(short_chart, tmp_path):
     """Flips lead from periods 1 and 2 to 4, but not from period 3 to these or back."""
     chart, starts = short_chart
@@ -253,6 +254,7 @@ def test_guesses_give_starts(way, what, two_known, monkeypatch, capsys):
     assert len(read_starts(name, folder)) == 2 + added > 2
 
 
+@pytest.mark.slow  # 27 s
 def test_a_search_is_kept_and_gives_starts_from_which_the_next_one_begins(two_known, monkeypatch):
     name, folder = two_known
     first = starts_path(name, folder).read_bytes()

@@ -269,7 +269,7 @@ def test_paper_is_handed_on(tmp_path, monkeypatch):
         given.append((out, jobs, quiet))
 
     monkeypatch.setattr(nldyn.paper, "main", take)
-    monkeypatch.setattr(nldyn.paper, "atlas", take)
+    monkeypatch.setattr(nldyn.paper, "compute_atlas", take)
     assert invoke("paper", "--out", tmp_path).exit_code == 0
     assert invoke("paper", "--atlas", "--out", tmp_path, "--jobs", "3", "--quiet").exit_code == 0
     assert given == [(tmp_path, 2, False), (tmp_path, 3, True)]

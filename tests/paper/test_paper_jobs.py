@@ -1,0 +1,101 @@
+"""The diagrams behind the figures: which are computed, from what, and what is kept of them."""
+
+import inspect
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import nldyn.paper.checks
+from nldyn.paper.figures import SHOWN
+from nldyn.paper.jobs import (
+    COARSE,
+    JOBS,
+    LOWEST_HZ,
+    diagrams_of,
+    is_wide,
+    job_named,
+    run_job,
+    tasks_of,
+)
+from nldyn.paper.starts import read_starts
+from nldyn.runtime.progress import silent
+
+NAME = "two_dof_xi_0.001"
+
+
+@pytest.fixture
+def short_job(monkeypatch):
+    """The harmonic branches of a model near their peak, and one of period 2."""
+    job = replace(
+        job_named(NAME), range_hz=(42.0, 44.0), starts=((1, 21.0, 1.0), (2, 42.0, 1.0)),
+        quarters_hz=None,
+    )  # fmt: skip
+    starts = [s for s in read_starts(NAME) if 21.0 <= s.frequency_hz <= 22.0 or s.period == 2]
+    monkeypatch.setattr("nldyn.paper.jobs.JOBS", (job,))
+    monkeypatch.setattr("nldyn.paper.jobs.read_starts", lambda name: starts)
+    return job
+
+
+def test_the_figures_and_checks_ask_for_diagrams_that_are_computed():
+    names = {job.name for job in JOBS}
+    assert {job for jobs in SHOWN.values() for job in jobs} <= names
+    source = inspect.getsource(nldyn.paper.checks)
+    asked = set(re.findall(r'results\["([\w.]+)"\]', source))
+    asked |= set(re.findall(r'partial\(_\w+, "([\w.]+)"', source))
+    assert len(asked) > 5
+    assert asked <= names
+
+
+def test_every_period_of_a_job_has_starts_within_its_range():
+    for job in JOBS:
+        for period, lowest, _ in job.starts:
+            chosen = [s for s in read_starts(job.name) if s.period == period]
+            chosen = [s for s in chosen if s.frequency_hz >= lowest]
+            assert chosen
+            assert all(job.range_hz[0] <= s.frequency_hz <= job.range_hz[1] for s in chosen)
+
+
+def test_a_job_is_followed_from_its_starts_once(short_job, tmp_path, monkeypatch):
+    """The separate harmonic branch near 23 Hz is closed, with two folds and two flips."""
+    tasks = tasks_of((short_job,), tmp_path)
+    values = {task.name: task.function(*task.arguments, silent) for task in tasks}
+    found = diagrams_of(values)[NAME]
+    harmonic = found.of_period(1)
+    assert len(harmonic) == 1
+    assert found.range_hz == (LOWEST_HZ, 44.0)
+    kinds = [special.kind for special in harmonic[0].special_points]
+    assert (kinds.count("LP"), kinds.count("PD")) == (2, 2)
+    assert not is_wide(harmonic[0])
+    assert all(orbit.motion is None for orbit in harmonic[0].points)
+    assert len(found.of_period(2)) == 1
+    monkeypatch.setattr("nldyn.paper.jobs.computed", None)  # what is kept is not computed again
+    again = run_job(NAME, 1, tmp_path, silent)
+    points = [[orbit.point for orbit in d.of_period(1)[0].points] for d in (found, again)]
+    np.testing.assert_array_equal(*points)
+
+
+def test_a_start_that_is_no_orbit_is_told(short_job, tmp_path, monkeypatch):
+    (start,) = [s for s in read_starts(NAME) if s.period == 1 and 21.0 < s.frequency_hz < 22.0]
+    wrong = replace(start, state=np.array([1.0, -1.0, 1.0, -1.0]))
+    monkeypatch.setattr("nldyn.paper.jobs.read_starts", lambda name: [wrong])
+    found = run_job(NAME, 1, tmp_path, silent)
+    assert not found.branches
+    (note,) = found.notes
+    assert note.startswith("no orbit leads on from the start of period 1 at 21.45")
+
+
+def test_longer_steps_locate_the_same_special_points(short_job, tmp_path):
+    """Shorter ones have more points between them, and the special points where they were."""
+    fine = replace(short_job, options=replace(COARSE, max_angle=0.1, grazing_step=0.004))
+    marks = []
+    for number, job in enumerate((short_job, fine)):
+        (folder := tmp_path / str(number)).mkdir()
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("nldyn.paper.jobs.JOBS", (job,))
+            (branch,) = run_job(NAME, 1, folder, silent).branches
+        marks.append(sorted((s.kind, s.frequency_hz) for s in branch.special_points))
+    assert [kind for kind, _ in marks[0]] == [kind for kind, _ in marks[1]]
+    for (_, coarse), (_, finer) in zip(*marks, strict=True):
+        assert coarse == pytest.approx(finer, rel=1e-7)
