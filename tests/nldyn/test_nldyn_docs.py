@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
+
 from nldyn.tables import UNITS
 
 ROOT = Path(__file__).parents[2]
@@ -66,6 +68,7 @@ def test_every_column_of_a_table_is_documented():
     assert dict(rows) == {"type": "", **{key: u.strip("1") for key, u in UNITS.items()}}
 
 
+@pytest.mark.slow
 def test_example_of_exploring_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "exploring.md").read_text(encoding="utf-8")

@@ -33,7 +33,7 @@ from nldyn.pseudo_orbits import FARTHEST, NEAR, NODES, Pieces
 from nldyn.search import nearest_orbit
 
 
-@pytest.mark.parametrize("period", [1, 2, 3])
+@pytest.mark.parametrize("period", [pytest.param(1, marks=pytest.mark.slow), 2, 3])
 def test_a_branch_is_found_from_pieces_of_the_others(three, period):
     (left_out,) = three.of_period(period)
     done = by_pseudo_orbits(without(three, left_out), tries=50)
