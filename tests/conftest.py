@@ -41,7 +41,7 @@ def pytest_collection_modifyitems(items):
 
 @pytest.fixture(scope="session")
 def kernels(tmp_path_factory, worker_id):
-    """The kernels, compiled or read from the disk, by one worker at a time."""
+    """The kernels, compiled or read from the disk by one worker at a time: so one compiles."""
     from nldyn import Stop, System, Unbalance, continue_branch, solve_orbit
 
     place = tmp_path_factory.getbasetemp()

@@ -11,9 +11,9 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 # from the roof to the ground; rooms on one floor do not know each other
 FLOORS = (
-    {"app"}, {"paper"}, {"report"}, {"plot", "scene"}, {"longterm", "reduction", "io"}, {"search"},
-    {"curves"}, {"branches"}, {"bifurcations"}, {"orbits"}, {"flow"}, {"runtime", "system"},
-    {"base"},
+    ("app",), ("paper",), ("report",), ("plot", "scene"), ("longterm", "reduction", "io"),
+    ("search",), ("curves",), ("branches",), ("bifurcations",), ("orbits",), ("flow",),
+    ("runtime", "system"), ("base",),
 )  # fmt: skip
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
 # who may import what of others

@@ -99,7 +99,7 @@ def response(system):
     return {"size": float(np.abs(found).sum())}
 
 
-@pytest.mark.parametrize("workers", [1, 2, 3])
+@pytest.mark.parametrize("workers", [2, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 3))])
 def test_a_study_is_the_same_with_any_number_of_workers(workers):
     values = {
         "excitation.0.amplitude": [0.1, 0.2, 0.3],

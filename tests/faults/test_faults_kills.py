@@ -36,7 +36,7 @@ def place(tmp_path_factory):
     shutil.rmtree(folder, ignore_errors=True)
 
 
-@pytest.fixture(scope="module", params=["run", "explore"])
+@pytest.fixture(scope="module", params=["run", pytest.param("explore", marks=pytest.mark.slow)])
 def task(request, place):
     """A scene, its results when nobody disturbs it, how long that takes, and its file accesses."""
     kind = request.param

@@ -95,7 +95,7 @@ def test_an_undamped_resonance_ends_the_branch_with_residual_and_last_point(tmp_
         {"force": 1e40},
         {"gap": -1e4},
         pytest.param({"gap": -1e10}, marks=pytest.mark.slow),  # 50 s of steps in contact
-        {"stiffness": 1e20, "force": 1e6},
+        pytest.param({"stiffness": 1e20, "force": 1e6}, marks=pytest.mark.slow),  # 15 s
     ],
 )
 def test_a_hopeless_scene_says_so(tmp_path, values):

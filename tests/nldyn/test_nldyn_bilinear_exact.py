@@ -69,7 +69,10 @@ def test_flip_of_doubled_orbits_is_where_the_piecewise_solution_has_it(branch):
 @pytest.mark.parametrize(("kind", "index"), [("LP", 0), ("PD", -1), ("GR", 0)])
 @pytest.mark.parametrize(
     ("parameter", "field", "window"),
-    [("gap", "gap", (-0.2, 0.3)), ("stiffness", "stop", (25.0, 60.0))],
+    [
+        ("gap", "gap", (-0.2, 0.3)),
+        pytest.param("stiffness", "stop", (25.0, 60.0), marks=pytest.mark.slow),
+    ],
 )
 def test_curve_in_two_parameters_is_that_of_the_piecewise_solution(
     branch, kind, index, parameter, field, window

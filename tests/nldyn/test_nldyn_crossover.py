@@ -18,7 +18,9 @@ from nldyn.search.mixtures import BEYOND, NEIGHBOURS, Loops, near_mixtures
 from nldyn.search.pseudo_orbits import NODES
 
 
-@pytest.mark.parametrize(("period", "tries"), [(1, 50), (2, 50), (3, 200)])
+@pytest.mark.parametrize(
+    ("period", "tries"), [pytest.param(1, 50, marks=pytest.mark.slow), (2, 50), (3, 200)]
+)
 def test_a_branch_is_found_from_mixtures_of_the_others(three, period, tries):
     """Period 3 from stretches of period 2 that do not close, to which one in 200 or so leads."""
     (left_out,) = three.of_period(period)

@@ -6,6 +6,9 @@ import re
 from pathlib import Path
 
 from nldyn.branches.tables import UNITS
+import pytest
+
+from nldyn.tables import UNITS
 
 ROOT = Path(__file__).parents[2]
 BRANCHES = (ROOT / "docs" / "branches.md").read_text(encoding="utf-8")
@@ -66,6 +69,7 @@ def test_every_column_of_a_table_is_documented():
     assert dict(rows) == {"type": "", **{key: u.strip("1") for key, u in UNITS.items()}}
 
 
+@pytest.mark.slow
 def test_example_of_exploring_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "exploring.md").read_text(encoding="utf-8")

@@ -58,7 +58,7 @@ def system_of(name):
 @pytest.fixture(scope="module")
 def around_37():
     """The 1-DOF model where section 3 of the paper has a 1/3 branch that nothing leads to."""
-    return explore(system_of("one_dof"), (36.6, 37.6), 4)
+    return explore(system_of("one_dof"), (36.6, 37.6), 4, effort=ExploreOptions(spacing=0.01))
 
 
 def test_isolated_third_subharmonic_is_found_unaided(around_37):
@@ -81,7 +81,7 @@ def test_listed_subharmonics_are_found_unaided(near, period):
 
 def test_both_harmonic_branches_of_two_modes_are_found():
     """Section 4 of the paper: two separate harmonic branches near 23 Hz, three orbits there."""
-    effort = ExploreOptions(spacing=0.01)
+    effort = ExploreOptions(spacing=0.02)
     found = explore(system_of("two_dof_xi_0.01"), (22.0, 24.0), 1, effort=effort)
     assert sum(len(branch.at(23.0)) for branch in found.diagram.of_period(1)) >= 3
     assert len(found.diagram.of_period(1)) >= 2
@@ -96,7 +96,7 @@ def test_no_branch_is_found_twice(around_37):
 def test_every_simulation_is_accounted_for(around_37):
     """Twelve random starts at each frequency, and those carried over from the one before."""
     frequencies = np.array([c.frequency_hz for c in around_37.coverage])
-    assert (frequencies[1:] / frequencies[:-1]).max() <= 1.005 * (1 + 1e-12)
+    assert (frequencies[1:] / frequencies[:-1]).max() <= 1.01 * (1 + 1e-12)
     for c in around_37.coverage:
         assert c.settled + c.unsettled + c.failed >= 12
         assert all(period <= 4 for period in c.periods)

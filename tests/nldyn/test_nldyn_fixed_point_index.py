@@ -69,6 +69,7 @@ def test_there_is_no_gap_beside_the_pitchforks_of_a_broken_symmetry(first_step):
     assert index_gaps(found.branches, found.range_hz) == []
 
 
+@pytest.mark.slow
 def test_a_crossing_found_from_the_other_branch_has_its_place_on_this_one():
     """One of four crossings of a 1/3 branch is approached along the branch that turns there."""
     stops = [Stop("y", stiffness=5e8, gap=2e-6, direction=side) for side in (1, -1)]

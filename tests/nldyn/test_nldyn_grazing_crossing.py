@@ -135,7 +135,12 @@ def branch_point(grazing, share):
 
 @pytest.mark.parametrize(
     ("force", "rel", "together"),
-    [(5.2824, 3e-10, True), (5.285, 1e-11, True), (5.287, 1e-11, True), (5.32, 1e-11, False)],
+    [
+        (5.2824, 3e-10, True),
+        pytest.param(5.285, 1e-11, True, marks=pytest.mark.slow),
+        pytest.param(5.287, 1e-11, True, marks=pytest.mark.slow),
+        (5.32, 1e-11, False),
+    ],
 )
 def test_grazing_and_branch_point_are_both_where_the_piecewise_solution_has_them(
     by_force, force, rel, together

@@ -34,7 +34,7 @@ from nldyn.search.fixed_point_index import index_gaps
 from nldyn.search.pseudo_orbits import FARTHEST, NEAR, NODES, Pieces
 
 
-@pytest.mark.parametrize("period", [1, 2, 3])
+@pytest.mark.parametrize("period", [pytest.param(1, marks=pytest.mark.slow), 2, 3])
 def test_a_branch_is_found_from_pieces_of_the_others(three, period):
     (left_out,) = three.of_period(period)
     done = by_pseudo_orbits(without(three, left_out), tries=50)
