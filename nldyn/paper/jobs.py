@@ -128,7 +128,7 @@ JOBS: tuple[Job, ...] = (
     ),
     Job(
         "four_dof_xi_0.01", _scene("four_dof_xi_0.01"), (15.0, 90.0), options=COARSE,
-        starts=((1, 15.0, 34.0), (2, 36.0, 15.0), (3, 42.0, 15.0)), quarters_hz=36.0,
+        starts=((1, 15.0, 34.0), (2, 28.0, 15.0), (3, 42.0, 10.0)), quarters_hz=40.0,
     ),
     Job(
         "two_dof_xi_0.001", _scene("two_dof_xi_0.001"), (18.0, 90.0), options=COARSE,
