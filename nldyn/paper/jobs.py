@@ -132,7 +132,7 @@ JOBS: tuple[Job, ...] = (
     ),
     Job(
         "two_dof_xi_0.001", _scene("two_dof_xi_0.001"), (18.0, 90.0), options=COARSE,
-        starts=((1, 18.0, 10.0), (2, 20.0, 20.0), (3, 20.0, 70.0)), quarters_hz=40.0,
+        starts=((1, 18.0, 28.0), (2, 20.0, 20.0), (3, 20.0, 70.0)), quarters_hz=40.0,
     ),
     Job(
         "two_dof_xi_0.01", _scene("two_dof_xi_0.01"), (15.0, 90.0), options=COARSE,
