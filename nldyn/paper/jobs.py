@@ -36,7 +36,7 @@ WIDE_HZ = 4.0  # width of the subharmonic branches that the figures show
 FINE = ContinuationOptions()
 # Steps as long as smooth curves and the special points allow. A branch that is cut off by
 # max_points would be found and followed again from the next orbit.
-COARSE = ContinuationOptions(max_angle=0.3, max_miss=0.2, grazing_step=0.02, max_points=6000)
+COARSE = ContinuationOptions(max_angle=0.3, max_miss=0.2, grazing_step=0.02, max_points=8000)
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ LISTED = (
 JOBS: tuple[Job, ...] = (
     Job(
         "four_dof_xi_0.001", _scene("four_dof_xi_0.001"), (18.0, 90.0), options=COARSE,
-        starts=((1, 18.0, 60.0), (2, 36.0, 80.0), (3, 49.0, 37.0)), quarters_hz=44.0,
+        starts=((1, 18.0, 70.0), (2, 36.0, 80.0), (3, 49.0, 37.0)), quarters_hz=44.0,
     ),
     Job(
         "four_dof_xi_0.01", _scene("four_dof_xi_0.01"), (15.0, 90.0), options=COARSE,
