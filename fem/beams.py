@@ -267,9 +267,7 @@ def cross_matrix(vectors: FloatArray) -> FloatArray:
     )
 
 
-def element_rows(
-    part: BeamPart, spans: FloatArray, what: str
-) -> tuple[FloatArray, FloatArray]:
+def element_rows(part: BeamPart, spans: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
     """Rows (e, 8, 9) of the natural form for the nodes' displacements, and stiffness (e, 8)."""
     rows, stiffness = spatial_rows(part, np.linalg.norm(spans, axis=1), what)
     T = to_nodes(part, local_axes(part, spans, what))

@@ -187,8 +187,7 @@ class CellKind:
         {'triangle': (2, 3), 'quad': (3, 4)}
         """
         return {
-            kind: cells[:, local].reshape(-1, local.shape[1])
-            for kind, local in self.facets.items()
+            kind: cells[:, local].reshape(-1, local.shape[1]) for kind, local in self.facets.items()
         }
 
     @cached_property

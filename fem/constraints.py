@@ -162,8 +162,10 @@ def constrain(model: StructureModel, numbering: Numbering) -> Constraints:
         rows.append(slaves[at[0]])
         columns.append(masters[at[1]])
         values.append(matrix[at])
-    entries = [np.concatenate([*each, np.zeros(0, kind)])
-               for each, kind in ((values, np.float64), (rows, np.int64), (columns, np.int64))]
+    entries = [
+        np.concatenate([*each, np.zeros(0, kind)])
+        for each, kind in ((values, np.float64), (rows, np.int64), (columns, np.int64))
+    ]
     whole = sparse.csr_array((entries[0], (entries[1], entries[2])), shape=(size, size))
     used = entries[2]
     circle = np.flatnonzero(owner[used] >= 0)
@@ -309,9 +311,7 @@ def _held(model: StructureModel, numbering: Numbering) -> IntArray:
     return found[found >= 0]
 
 
-def _check_turns(
-    model: StructureModel, support: Support, nodes: IntArray, dofs: IntArray
-) -> None:
+def _check_turns(model: StructureModel, support: Support, nodes: IntArray, dofs: IntArray) -> None:
     """Rotations that no node has must be held by the translations: a face held in x cannot tip."""
     columns = [axis_index(direction) for direction in support.directions]
     lacking = [c for at, c in enumerate(columns) if (dofs[:, at] < 0).all()]

@@ -23,7 +23,6 @@ from fem.mesh import FloatArray, IntArray
 
 VERSIONS = {"2": "2.2", "2.2": "2.2", "4": "4.1", "4.1": "4.1"}
 _DIMENSIONS = {"vert": 0, "line": 1, "tria": 2, "quad": 2}  # by the beginning of a kind's name
-WORDS = ("point", "curve", "surface", "volume")
 DIMENSION = {kind: _DIMENSIONS.get(kind[:4], 3) for kind in _gmsh_to_meshio_type.values()}
 NODES = {
     "tetra10": (*range(8), 9, 8),
@@ -39,6 +38,11 @@ NODES = {
 }
 """Where Gmsh has the nodes of a cell in VTK's order; meshio 5.3 leaves out two of the kinds."""
 Groups = dict[tuple[int, int], IntArray]
+DIMENSION_NAMES = ("point", "curve", "surface", "volume")
+WITHOUT_CELLS = ("Comments", "GhostElements", "Periodic", "Parametrizations", "NodeData",
+                 "ElementData", "ElementNodeData", "InterpolationScheme")  # fmt: skip
+"""Sections that say nothing about nodes, cells or groups; ghosts are cells told already."""
+READ = ("MeshFormat", "PhysicalNames", "Entities", "PartitionedEntities", "Nodes", "Elements")
 SECTION = re.compile(rb"^[ \t]*\$(\w+)[ \t\r]*$", re.MULTILINE)
 
 
@@ -97,15 +101,12 @@ class _Numbers:
 
 @dataclass
 class _Block:
-    """Elements of a type: numbers of their nodes (e, b) and physical groups (e, g), 0 for none.
-
-    And the numbers of the curves, surfaces or volumes that they are of, (e,), 0 if not told.
-    """
+    """Elements of a type: numbers of their nodes (e, b) and physical groups (e, g), 0 for none."""
 
     kind: str
     nodes: IntArray
     groups: IntArray
-    entities: IntArray
+    entities: IntArray | None = None  # (e,), of version 2.2
 
 
 def read_gmsh(path: Path) -> meshio.Mesh:
@@ -151,6 +152,9 @@ def _mesh(content: bytes) -> meshio.Mesh:
     for name in ("MeshFormat", "Nodes", "Elements"):
         if name not in sections:
             raise ValueError(f"there is no ${name}")
+    unknown = sorted(set(sections) - {*READ, *WITHOUT_CELLS})
+    if unknown:
+        raise ValueError(f"its section ${unknown[0]} is not understood")
     version, binary, size_type = _header(sections["MeshFormat"])
     nodes, elements, entities = (
         _Numbers(sections.get(name, b""), binary, size_type)
@@ -159,9 +163,13 @@ def _mesh(content: bytes) -> meshio.Mesh:
     if version == "2.2":
         labels, points = _nodes_22(nodes)
         blocks = _binary_22(elements) if binary else _lines_22(sections["Elements"])
+        blocks = _once(blocks)
     else:
         labels, points = _nodes_41(nodes)
         groups = _entities(entities) if "Entities" in sections else {}
+        if "PartitionedEntities" in sections:
+            parts = _Numbers(sections["PartitionedEntities"], binary, size_type)
+            groups |= _partitioned(parts, groups)
         blocks = _elements_41(elements, groups)
     order = np.argsort(labels, kind="stable")
     if (np.diff(labels[order]) == 0).any():
@@ -179,12 +187,10 @@ def _cell_sets(
 ) -> dict[str, list[IntArray]]:
     """Elements of each physical group, one list for each block."""
     sets: dict[str, list[IntArray]] = {}
-    called = _told_apart(
-        names, {(DIMENSION[b.kind], int(g)) for b in blocks for g in np.unique(b.groups)}
-    )
+    named = _apart(blocks, names)
     for number, block in enumerate(blocks):
         for group in np.unique(block.groups[block.groups != 0]):
-            name = called[DIMENSION[block.kind], int(group)]
+            name = named[DIMENSION[block.kind], int(group)]
             empty = [np.zeros(0, dtype=np.int64)] * len(blocks)
             found = np.flatnonzero((block.groups == group).any(axis=1))
             of_blocks = sets.setdefault(name, empty)
@@ -192,20 +198,65 @@ def _cell_sets(
     return sets
 
 
-def _told_apart(
-    names: dict[tuple[int, int], str], groups: set[tuple[int, int]]
-) -> dict[tuple[int, int], str]:
-    """Names of groups by dimension and number; one of two dimensions says which it is of."""
-    found = {group: names.get(group, str(group[1])) for group in groups if group[1]}
+def _apart(blocks: list[_Block], names: dict[tuple[int, int], str]) -> dict[tuple[int, int], str]:
+    """A name for each group; with the dimension where curves, surfaces or volumes share it.
+
+    A point set and one group of cells may share a name, since a mesh keeps them apart.
+    """
+    used = {
+        (DIMENSION[block.kind], int(group))
+        for block in blocks
+        for group in np.unique(block.groups[block.groups != 0])
+    }
+    plain = {key: names.get(key, str(key[1])) for key in used}
     dimensions: dict[str, set[int]] = {}
-    for (dimension, _), name in found.items():
+    for (dimension, _), name in plain.items():
         dimensions.setdefault(name, set()).add(dimension)
     return {
-        group: f"{name} ({WORDS[group[0]]})"
-        if group[0] and len(dimensions[name] - {0}) > 1
-        else name
-        for group, name in found.items()
+        key: f"{name} ({DIMENSION_NAMES[key[0]]})" if len(dimensions[name] - {0}) > 1 else name
+        for key, name in plain.items()
     }
+
+
+def _once(blocks: list[_Block]) -> list[_Block]:
+    """Elements of version 2.2 that stand once for each of their groups, as one in all of these.
+
+    They have the same type, the same nodes in the same order and the same geometrical entity. One
+    that stands twice for the same group, or for none, stays twice.
+    """
+    by_kind: dict[str, list[_Block]] = {}
+    for block in blocks:
+        by_kind.setdefault(block.kind, []).append(block)
+    found = {kind: _in_all_groups(kind, of_kind) for kind, of_kind in by_kind.items()}
+    if all(sum(len(b.nodes) for b in by_kind[kind]) == len(b.nodes) for kind, b in found.items()):
+        return blocks
+    return list(found.values())
+
+
+def _in_all_groups(kind: str, blocks: list[_Block]) -> _Block:
+    nodes = np.concatenate([block.nodes for block in blocks])
+    groups = np.concatenate([block.groups[:, 0] for block in blocks])
+    entities = np.concatenate(
+        [np.zeros(len(b.nodes), np.int64) if b.entities is None else b.entities for b in blocks]
+    )
+    of_element: dict[tuple[int, ...], list[tuple[int, int]]] = {}
+    for row, key in enumerate(np.column_stack([entities, nodes]).tolist()):
+        of_element.setdefault(tuple(key), []).append((row, int(groups[row])))
+    kept: list[tuple[int, list[int]]] = []
+    for same in of_element.values():
+        rows = {group: row for row, group in reversed(same)}  # the first of each group
+        if 0 in rows:
+            rows = {}
+        elif rows:
+            kept.append((min(rows.values()), list(rows)))
+        taken = set(rows.values())
+        kept.extend((row, [group]) for row, group in same if row not in taken)
+    kept.sort()
+    widest = max(len(numbers) for _, numbers in kept)
+    table = np.zeros((len(kept), widest), dtype=np.int64)
+    for row, (_, numbers) in enumerate(kept):
+        table[row, : len(numbers)] = numbers
+    return _Block(kind, nodes[[row for row, _ in kept]], table)
 
 
 def _sections(content: bytes) -> dict[str, bytes]:
@@ -318,12 +369,15 @@ def _lines_22(body: bytes) -> list[_Block]:
         runs[-1][1].append(rest[tags:])
         runs[-1][2].append(abs(rest[0]) if tags else 0)
         runs[-1][3].append(rest[1] if tags > 1 else 0)
-    return _united(
-        [
-            _Block(kind, *(np.array(each, dtype=np.int64) for each in (nodes, groups, entities)))
-            for kind, nodes, groups, entities in runs
-        ]
-    )
+    return [
+        _Block(
+            kind,
+            np.array(nodes, dtype=np.int64),
+            np.array(groups, dtype=np.int64)[:, None],
+            np.array(entities, dtype=np.int64),
+        )
+        for kind, nodes, groups, entities in runs
+    ]
 
 
 def _binary_22(numbers: _Numbers) -> list[_Block]:
@@ -335,45 +389,12 @@ def _binary_22(numbers: _Numbers) -> list[_Block]:
             raise ValueError("a block of elements is empty")
         width = 1 + tags + num_nodes_per_cell[kind]
         rows = numbers.integers(here * width).reshape(here, width)
-        groups = np.abs(rows[:, 1]) if tags else np.zeros(here, dtype=np.int64)
+        groups = np.abs(rows[:, 1:2]) if tags else np.zeros((here, 1), dtype=np.int64)
         entities = rows[:, 2] if tags > 1 else np.zeros(here, dtype=np.int64)
         blocks.append(_Block(kind, rows[:, 1 + tags :], groups, entities))
         count -= here
     numbers.end()
-    return _united(blocks)
-
-
-def _united(blocks: list[_Block]) -> list[_Block]:
-    """Elements once, where version 2.2 writes one of several groups once for each of them.
-
-    It has then the same nodes in the same order, and is of the same curve, surface or volume. What
-    stands twice in one group is left so.
-    """
-    first: dict[tuple[str, int, bytes], tuple[int, int]] = {}
-    kept = [np.ones(len(block.nodes), dtype=np.bool_) for block in blocks]
-    groups = [[[int(group)] for group in block.groups] for block in blocks]
-    for number, block in enumerate(blocks):
-        for row, nodes in enumerate(block.nodes):
-            key = (block.kind, int(block.entities[row]), nodes.tobytes())
-            home, place = first.setdefault(key, (number, row))
-            group = int(block.groups[row])
-            if (home, place) != (number, row) and group not in groups[home][place]:
-                groups[home][place].append(group)
-                kept[number][row] = False
-    return [
-        _Block(block.kind, block.nodes[keep], _padded(own, keep), block.entities[keep])
-        for block, keep, own in zip(blocks, kept, groups, strict=True)
-        if keep.any()
-    ]
-
-
-def _padded(groups: list[list[int]], keep: np.ndarray) -> IntArray:
-    """Groups of the elements that are kept, (e, g), filled up with 0."""
-    rows = [row for row, wanted in zip(groups, keep, strict=True) if wanted]
-    found = np.zeros((len(rows), max(map(len, rows), default=1)), dtype=np.int64)
-    for i, row in enumerate(rows):
-        found[i, : len(row)] = row
-    return found
+    return blocks
 
 
 def _entities(numbers: _Numbers) -> Groups:
@@ -390,16 +411,38 @@ def _entities(numbers: _Numbers) -> Groups:
     return groups
 
 
+def _partitioned(numbers: _Numbers, whole: Groups) -> Groups:
+    """Physical groups of the pieces into which entities are partitioned.
+
+    A piece without groups of its own has those of its parent of the same dimension.
+    """
+    groups: Groups = {}
+    numbers.sizes(1)
+    numbers.integers(2 * int(numbers.sizes(1)[0]))
+    for dimension, count in enumerate(numbers.sizes(4).tolist()):
+        for _ in range(count):
+            tag, *parent = numbers.integers(3).tolist()
+            numbers.integers(int(numbers.sizes(1)[0]))
+            numbers.reals(6 if dimension else 3)
+            own = np.abs(numbers.integers(int(numbers.sizes(1)[0])))
+            if dimension:
+                numbers.integers(int(numbers.sizes(1)[0]))
+            if not len(own) and parent[0] == dimension:
+                own = whole.get((dimension, parent[1]), own)
+            groups[dimension, tag] = own
+    numbers.end()
+    return groups
+
+
 def _nodes_41(numbers: _Numbers) -> tuple[IntArray, FloatArray]:
     blocks, count = numbers.sizes(4).tolist()[:2]
     labels, points = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 3))]
     for _ in range(blocks):
-        parametric = int(numbers.integers(3)[2])
-        if parametric:
-            raise ValueError("its nodes have parametric coordinates, which are not read")
+        dimension, _, parametric = numbers.integers(3).tolist()
+        width = 3 + (dimension if parametric else 0)
         here = int(numbers.sizes(1)[0])
         labels.append(numbers.sizes(here))
-        points.append(numbers.reals(3 * here).reshape(here, 3))
+        points.append(numbers.reals(width * here).reshape(here, width)[:, :3])
     numbers.end()
     if sum(map(len, labels)) != count:
         raise ValueError(f"{count} nodes are declared, but {sum(map(len, labels))} are there")
@@ -415,8 +458,7 @@ def _elements_41(numbers: _Numbers, groups: Groups) -> list[_Block]:
         width = 1 + num_nodes_per_cell[kind]
         rows = numbers.sizes(here * width).reshape(here, width)
         of_entity = groups.get((dimension, tag), np.zeros(0, dtype=np.int64))
-        own = np.full(here, tag, dtype=np.int64)
-        found.append(_Block(kind, rows[:, 1:], np.tile(of_entity, (here, 1)), own))
+        found.append(_Block(kind, rows[:, 1:], np.tile(of_entity, (here, 1))))
     numbers.end()
     if sum(len(block.nodes) for block in found) != count:
         raise ValueError(f"{count} elements are declared, but others are there")

@@ -68,15 +68,11 @@ def mechanism_warnings(model: StructureModel) -> Iterator[str]:
     ties = [(support.point, d) for support in model.supports for d in support.directions]
     ties += [(spring.point, spring.direction) for spring in model.springs]
     brought = model.attached
-    ties += [
-        (p, d) for link in brought.links for p, d, _ in link_terms(model.mesh, link)
-    ]
+    ties += [(p, d) for link in brought.links for p, d, _ in link_terms(model.mesh, link)]
     ties += [(p, d) for equation in brought.equations for p, d, _ in equation.terms]
     for point, direction in ties:
         if axis_index(direction) < 3:
             held[model.mesh.nodes(point), axis_index(direction)] = 1
     trusses = [nodes for _, kinds in model.trusses.values() for nodes in kinds.values()]
     dimension = 2 if model.is_plane else 3
-    yield from loose_sentences(
-        model.mesh, loose_nodes(model.mesh.points, trusses, held, dimension)
-    )
+    yield from loose_sentences(model.mesh, loose_nodes(model.mesh.points, trusses, held, dimension))

@@ -93,9 +93,7 @@ def mean_strains(corners: FloatArray, area: FloatArray) -> FloatArray:
         # the sides next to the corner: from it to k and from j to it
         found[:, 0, 3 * i + 2] = LIFT / 6.0 * y_jk * ((y - yk) - (yj - y))
         found[:, 1, 3 * i + 2] = LIFT / 6.0 * x_kj * ((xk - x) - (x - xj))
-        found[:, 2, 3 * i + 2] = (
-            LIFT / 3.0 * ((xk - x) * (y - yk) - (x - xj) * (yj - y))
-        )
+        found[:, 2, 3 * i + 2] = LIFT / 3.0 * ((xk - x) * (y - yk) - (x - xj) * (yj - y))
     return np.asarray(found / (2.0 * area[:, None, None]), dtype=np.float64)
 
 

@@ -450,8 +450,7 @@ class FrameModel:
         return [
             name
             for name, elements in self.element_parts().items()
-            if isinstance(self.parts[name], BeamPart)
-            and (self.mesh.lines[elements] == node).any()
+            if isinstance(self.parts[name], BeamPart) and (self.mesh.lines[elements] == node).any()
         ]
 
     def _check_interfaces(self) -> None:

@@ -148,9 +148,7 @@ def line_rows(
     return MatrixRows(stiffness.ravel(), block_diagonal(rows), sparse.csr_array(differences))
 
 
-def node_rows(
-    rows: FloatArray, stiffness: FloatArray, dofs: IntArray, size: int
-) -> MatrixRows:
+def node_rows(rows: FloatArray, stiffness: FloatArray, dofs: IntArray, size: int) -> MatrixRows:
     """Rows (e, r, b m) of cells, by the moves of their nodes from that of the first one.
 
     Parameters

@@ -121,6 +121,22 @@ def check_joined(model: Joined) -> None:
         )
 
 
+def slit_warnings(model: Joined) -> list[str]:
+    """A sentence about nodes of one piece at one place that nothing joins directly, if any are."""
+    found = pieces_of(model)
+    links = np.sort(model.links, axis=1)
+    joined = set(map(tuple, links.tolist()))
+    open_pairs = [pair for pair in found.coincident.tolist() if tuple(pair) not in joined]
+    if not open_pairs or model.separate:
+        return []
+    return [
+        f"{model.mesh.source}: {len({node for pair in open_pairs for node in pair})} nodes are at"
+        " the place of another one that they are not joined with, the first at"
+        f" {place_of(model.mesh.points[open_pairs[0][0]])}: the model has a slit there unless they"
+        " are merged"
+    ]
+
+
 def described(model: Joined) -> list[str]:
     """Sentences about the pieces, nodes at one place and loose nodes of a model, for a person."""
     found, points = pieces_of(model), model.mesh.points

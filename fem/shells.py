@@ -225,9 +225,7 @@ def local_mass(part: ShellPart, kind: CellKind, plane: FloatArray) -> FloatArray
     gradient = np.matmul(slopes, np.linalg.inv(J))
     turn[..., 0], turn[..., 1] = gradient[..., 1] / 2.0, -gradient[..., 0] / 2.0
     turn[..., 5] = values
-    M += np.einsum(
-        "eq,eqai,eqcj->eaicj", density * t**3 / 12.0 * volume, turn, turn, optimize=True
-    )
+    M += np.einsum("eq,eqai,eqcj->eaicj", density * t**3 / 12.0 * volume, turn, turn, optimize=True)
     return M
 
 
@@ -256,9 +254,7 @@ def corner_normals(points: FloatArray, kinds: Sequence[IntArray]) -> list[FloatA
     mean = sparse.csr_array((weight, (one, other)), shape=pairs.shape) @ normal
     mean = unit(mean)
     ends = np.cumsum([n.size for n in kinds])[:-1]
-    return [
-        part.reshape(*n.shape, 3) for part, n in zip(np.split(mean, ends), kinds, strict=True)
-    ]
+    return [part.reshape(*n.shape, 3) for part, n in zip(np.split(mean, ends), kinds, strict=True)]
 
 
 def curvature_reduction(part: ShellPart, cells: FlatCells, normals: FloatArray) -> FloatArray:

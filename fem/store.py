@@ -43,8 +43,7 @@ BROUGHT: Lists = {
 }
 PARTS = {kind.__name__: kind for kind in (BeamPart, TrussPart, SolidPart, ShellPart)}
 SECTIONS = {
-    kind.__name__: kind
-    for kind in (RectangularSection, CircularSection, Section, TaperedSection)
+    kind.__name__: kind for kind in (RectangularSection, CircularSection, Section, TaperedSection)
 }
 
 

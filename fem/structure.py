@@ -13,6 +13,7 @@ from fem.cells import KINDS, SPANS
 from fem.doubled import check_no_doubles
 from fem.element_types import check_family, counted
 from fem.errors import ModelError, by_name, check_positive, listed, quoted
+from fem.lost import check_nothing_lost
 from fem.mesh import FloatArray, FrameMesh, IntArray
 from fem.model import BeamPart, Hinge, Interface, Material, Support, TrussPart
 from fem.shells import ShellPart, facets_of, shell_kinds
@@ -327,6 +328,7 @@ class StructureModel:
                 raise ModelError(
                     f"{mesh.source}: {kind} {np.argmax(count > 1)} is in more than one part"
                 )
+        check_nothing_lost(mesh, {k: n > 0 for k, n in owners.items() if k in KINDS})
         self._check_doubles()
         for name, (_, lines) in self.beams.items():
             spans = mesh.points[lines[:, 1]] - mesh.points[lines[:, 0]]

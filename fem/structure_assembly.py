@@ -38,7 +38,7 @@ from fem.natural import (
     natural_form,
     solid_rows,
 )
-from fem.pieces import check_joined
+from fem.pieces import check_joined, slit_warnings
 from fem.scatter import SparseArray, block_pattern, dense_scatter, displacement_of
 from fem.shell_assembly import facet_matrices, facet_rows
 from fem.solids import checked_volumes, gradients_and_volumes, mass_matrices, stiffness_matrices
@@ -159,7 +159,7 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     """
     check_joined(model)
     check_conforming(model)
-    for text in (*hinge_warnings(model), *mechanism_warnings(model)):
+    for text in (*hinge_warnings(model), *mechanism_warnings(model), *slit_warnings(model)):
         warnings.warn(text, JointWarning, stacklevel=3)
     for text in locking_warnings(model):
         warnings.warn(text, LockingWarning, stacklevel=3)

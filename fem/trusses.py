@@ -31,9 +31,7 @@ def truss_rows(
     return rows, part.material.youngs_modulus * part.area * lengths * weights
 
 
-def truss_mass(
-    part: TrussPart, kind: CellKind, coordinates: FloatArray, what: str
-) -> FloatArray:
+def truss_mass(part: TrussPart, kind: CellKind, coordinates: FloatArray, what: str) -> FloatArray:
     """Consistent mass (e, b, b) of lines for one direction, the same in all, in kg."""
     _, lengths, weights, values = _along(kind, coordinates, what)
     density = part.material.density * part.area
@@ -58,9 +56,7 @@ def _along(
     return slopes[..., 0], np.linalg.norm(run, axis=2), weights, values
 
 
-def plane_truss_matrices(
-    part: TrussPart, lengths: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def plane_truss_matrices(part: TrussPart, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Stiffness and mass (e, 6, 6) along the axis, for (u, w, rotation) at both ends.
 
     Examples

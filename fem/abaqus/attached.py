@@ -95,9 +95,7 @@ def read_point_elements(gathered: Gathered) -> None:
             raise keyword.fail(f"names element {label}, which is not of its type")
 
 
-def _give(
-    gathered: Gathered, body: Body, keyword: Keyword, numbers: dict[Label, Keyword]
-) -> None:
+def _give(gathered: Gathered, body: Body, keyword: Keyword, numbers: dict[Label, Keyword]) -> None:
     name = keyword.name_of("ELSET")
     place = keyword.place()
     for label in gathered.resolver.reference("ELSET", body, name, place, keyword.shown):

@@ -192,9 +192,7 @@ class Deck:
         known = self.left_out.setdefault(what.upper(), Problem(what, 0, place, reason))
         known.count += count
 
-    def count_generated(
-        self, keyword: Keyword, row: int | None, count: int, what: str
-    ) -> None:
+    def count_generated(self, keyword: Keyword, row: int | None, count: int, what: str) -> None:
         """Refuse a file that makes more numbers than any mesh has."""
         self.generated += count
         if count < 0 or self.generated > LONGEST_RANGE:

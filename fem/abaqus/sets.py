@@ -47,9 +47,7 @@ def _ranges(deck: Deck, keyword: Keyword, instance: str) -> Iterator[Member]:
         yield Member(range(first, last + 1, step), instance, keyword.place(row))
 
 
-def labels_now(
-    scope: Scope, kind: str, keyword: Keyword, row: int | None, word: str
-) -> list[int]:
+def labels_now(scope: Scope, kind: str, keyword: Keyword, row: int | None, word: str) -> list[int]:
     """Numbers of a set, or the one number, as they are known where a keyword makes others."""
     if word.isdigit():
         return [int(word)]
@@ -112,9 +110,7 @@ class Resolver:
             else:
                 what = f"set {named.name!r}"
                 word = str(member.item)
-                labels.update(
-                    dict.fromkeys(self.reference(kind, owner, word, member.place, what))
-                )
+                labels.update(dict.fromkeys(self.reference(kind, owner, word, member.place, what)))
         for member in named.elements:
             owner = self.body(member.instance, member.place) if member.instance else body
             for element in self.reference("ELSET", owner, str(member.item), member.place, "*NSET"):

@@ -277,3 +277,35 @@ def test_mass_and_centre_of_a_frame():
     assert found.centre == pytest.approx(
         ((1.5 * beam + 3.0 * post + 300.0) / total, (2.0 * post + 400.0) / total, 0.0), rel=1e-9
     )
+
+
+def test_a_line_that_is_no_edge_of_a_solid_is_lost_and_one_that_is_names_a_place():
+    box = fem.box_mesh("bar", (1.0, 0.1, 0.1), (1, 1, 1), kind="hexahedron")
+    (cell,) = box.cells["hexahedron"]
+
+    def with_line(ends):
+        cells = {**box.cells, "line": np.array([ends])}
+        return fem.StructureMesh(box.points, cells, {**box.groups, "brace": {"line": [0]}})
+
+    edge = fem.StructureModel(with_line([cell[0], cell[1]]), BAR)
+    assert edge.mesh.nodes("brace").tolist() == sorted([cell[0], cell[1]])
+    far = len(box.points)
+    mesh = fem.StructureMesh(
+        np.vstack([box.points, [[2.0, 0.0, 0.0]]]),
+        {**box.cells, "line": np.array([[cell[1], far]])},
+        {**box.groups, "brace": {"line": [0]}},
+    )
+    with pytest.raises(
+        fem.ModelError, match=r"1 line \(in 'brace'\) are in no part of the model, the first line 0"
+    ):
+        fem.StructureModel(mesh, BAR)
+
+
+def test_a_slit_within_one_piece_is_told():
+    """Two boxes joined by a coupling of their far ends, with unmerged nodes between them."""
+    mesh = two_boxes()
+    ends = np.concatenate([mesh.point_sets["left"], mesh.point_sets["right"]])
+    mesh = mesh.with_point_sets({"ends": ends})
+    model = fem.StructureModel(mesh, BAR, couplings=[fem.Coupling("frame", "ends")])
+    with pytest.warns(fem.JointWarning, match="16 nodes are at the place of another one that they"):
+        fem.assemble(model)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from nldyn.branches.tables import UNITS
 import pytest
 
-from nldyn.tables import UNITS
+from nldyn.branches.tables import UNITS
 
 ROOT = Path(__file__).parents[2]
 BRANCHES = (ROOT / "docs" / "branches.md").read_text(encoding="utf-8")
