@@ -91,7 +91,8 @@ def shifted_factor(pencil: Pencil) -> Shifted:
         If even the shifted matrix is not positive definite.
     """
     fastest = fastest_square(pencil)
-    factor = factorise(pencil.stiffness)
+    # the natural form keeps what the entries of K have lost: there the pivots alone are asked
+    factor = factorise(pencil.stiffness, *([] if pencil.natural is None else [0.0]))
     none = np.zeros((pencil.size, 0))
     if factor is not None and not factor.suspect and not pencil.rounding:
         return Shifted(factor, 0.0, fastest, none)

@@ -116,7 +116,9 @@ def backward_error(
     return float(error) if np.isfinite(error) else np.inf
 
 
-def factorise(matrix: SparseMatrix) -> Factor | None:
+def factorise(
+    matrix: SparseMatrix, dense_suspect: float = DENSE_SUSPECT
+) -> Factor | None:
     """Factorise A, or None where A is not numerically positive definite.
 
     A is first scaled to a unit diagonal, so that metres and radians weigh the same. Up to 1500
@@ -137,7 +139,7 @@ def factorise(matrix: SparseMatrix) -> Factor | None:
     scaling = sparse.diags_array(scale)
     scaled = sparse.csc_array(scaling @ matrix @ scaling)
     small = scaled.shape[0] <= DENSE_LIMIT
-    found = dense_solver(scaled) if small else chosen_solver(scaled)
+    found = dense_solver(scaled, dense_suspect) if small else chosen_solver(scaled)
     if found is None:
         return None
     solver, suspect = found
@@ -207,8 +209,11 @@ def available_memory() -> float:
     return 1024.0 * float(kilobytes[0]) if kilobytes else math.inf
 
 
-def dense_solver(matrix: SparseMatrix) -> tuple[Solver, bool] | None:
-    """Cholesky solver, and whether the matrix may be singular, or None if it is not positive."""
+def dense_solver(matrix: SparseMatrix, suspect: float) -> tuple[Solver, bool] | None:
+    """Cholesky solver, and whether the matrix may be singular, or None if it is not positive.
+
+    It may where a pivot is as small as rounding leaves one, or an eigenvalue is up to `suspect`.
+    """
     try:
         lower = linalg.cholesky(matrix.toarray(), lower=True)
     except linalg.LinAlgError:
@@ -218,7 +223,7 @@ def dense_solver(matrix: SparseMatrix) -> tuple[Solver, bool] | None:
         return np.asarray(linalg.cho_solve((lower, True), right), dtype=np.float64)
 
     small = float(np.min(np.diag(lower))) ** 2 <= SUSPECT_PIVOT
-    return solver, small or smallest_eigenvalue(solver, matrix) <= DENSE_SUSPECT
+    return solver, small or smallest_eigenvalue(solver, matrix) <= suspect
 
 
 def cholesky_solver(matrix: SparseMatrix) -> tuple[Solver, bool] | None:
