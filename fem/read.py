@@ -154,7 +154,7 @@ def _read(
     if extension not in EXTENSIONS:
         raise ModelError(
             f"{path}: unknown mesh extension {path.suffix!r}; known are {quoted(EXTENSIONS)};"
-            " convert it in the mesher, so that its names stay, or by 'meshio convert'"
+            " export it as one of these from the program that made it: converters lose the names"
         )
     if not path.is_file():
         raise ModelError(f"{path}: there is no such mesh file")
