@@ -116,8 +116,8 @@ def check_joined(model: Joined) -> None:
         raise ModelError(
             f"{model.mesh.source}: {found.count} pieces of the mesh touch but share no node:"
             f" {nodes} nodes are at the place of another one, the first at"
-            f" {place_of(model.mesh.points[found.touching[0, 0]])}; merge them, or say that the"
-            " pieces are separate"
+            f" {place_of(model.mesh.points[found.touching[0, 0]])}; merge them"
+            " ('merge' in a scene, fem.joined), or say that they are meant ('separate')"
         )
 
 
