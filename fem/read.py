@@ -23,6 +23,7 @@ from fem.collapsed import uncollapsed
 from fem.errors import ModelError, quoted
 from fem.gmsh import read_gmsh
 from fem.ignored import without_cells
+from fem.med import read_med
 from fem.mesh import FloatArray, FrameMesh, IntArray
 from fem.structure_mesh import StructureMesh
 from fem.unpacking import bounded_unpacking
@@ -52,9 +53,21 @@ def read_vtu(path: Path) -> meshio.Mesh:
     return content
 
 
+def read_vtk(path: Path) -> meshio.Mesh:
+    """Read a VTK legacy file; what meshio would leave out is an error."""
+    said = io.StringIO()
+    with redirect_stderr(said):
+        content = meshio.vtk.read(path)
+    if said.getvalue():
+        raise ValueError(" ".join(said.getvalue().split()).removeprefix("Warning: "))
+    return content
+
+
 READERS: dict[str, tuple[str, Callable[[Path], meshio.Mesh]]] = {
     ".msh": ("Gmsh", read_gmsh),
     ".vtu": ("VTK", read_vtu),
+    ".vtk": ("VTK", read_vtk),
+    ".med": ("MED", read_med),
 }
 DECK = ".inp"
 """The extension of files that hold more than a mesh."""
@@ -73,9 +86,10 @@ def read_mesh(
 
         - ``.msh``: Gmsh 2.2 or 4.1, ASCII or binary. Physical curves are the parts, physical
           points the points; a group without a name goes by its number.
-        - ``.vtu``: VTK unstructured grid. Neither cell sets nor point sets exist in VTK, so a
-          cell array ``set:NAME`` that is 1 on the elements of a part, else 0, names the part, and
-          a point array ``set:NAME`` that is 1 at one node names a point.
+        - ``.vtu``, ``.vtk``: VTK unstructured grid. VTK has neither cell sets nor point sets, so
+          a cell array ``set:NAME`` that is 1 on the elements of a part, else 0, names the part,
+          and a point array ``set:NAME`` that is 1 at one node names a point.
+        - ``.med``: MED of version 3 or later. Groups of edges and of nodes are parts and points.
         - ``.inp``: Abaqus input. ELSET and NSET, also those given on ``*ELEMENT`` and ``*NODE``.
 
     include_folders

@@ -1,0 +1,111 @@
+"""Read MED files, as Salome and Code_Aster have them, with the names of their groups.
+
+meshio 5.3 has a reader of its own, but it cannot hold cells of which some kinds are in a group and
+others in none, which is how these programs write them, and keeps the families, not the groups.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import meshio
+import numpy as np
+
+from fem.errors import ModelError, quoted
+from fem.mesh import IntArray
+
+KINDS = {
+    "PO1": "vertex", "SE2": "line", "SE3": "line3", "TR3": "triangle", "TR6": "triangle6",
+    "QU4": "quad", "QU8": "quad8", "QU9": "quad9", "TE4": "tetra", "T10": "tetra10",
+    "HE8": "hexahedron", "H20": "hexahedron20", "PY5": "pyramid", "P13": "pyramid13",
+    "PE6": "wedge", "P15": "wedge15",
+}  # fmt: skip
+"""Kinds of cells by MED's name; its nodes are in VTK's order, but for the handedness of solids."""
+
+
+def read_med(path: Path) -> meshio.Mesh:
+    """Read the nodes, cells and groups of a MED file with one mesh.
+
+    Parameters
+    ----------
+    path
+        Version 3 or later (HDF5).
+
+    Returns
+    -------
+    meshio.Mesh
+        One block for each kind of cell; groups of cells as cell sets, groups of nodes as point
+        sets.
+
+    Raises
+    ------
+    ModelError
+        If it is not a MED file, holds several meshes or steps, or cells of a kind that is not read.
+
+    References
+    ----------
+    *MED file format*, the layout of ``ENS_MAA`` and ``FAS``, https://docs.salome-platform.org.
+    """
+    try:
+        file = h5py.File(path, "r")
+    except OSError:
+        raise ModelError(f"{path}: is not a MED file, or is cut off") from None
+    with file:
+        if "ENS_MAA" not in file:
+            raise ModelError(f"{path}: is not a MED file with a mesh (there is no ENS_MAA)")
+        names = list(file["ENS_MAA"])
+        if len(names) != 1:
+            raise ModelError(f"{path}: holds {len(names)} meshes, not one: {quoted(names)}")
+        mesh = file["ENS_MAA"][names[0]]
+        step = mesh if "NOE" in mesh else _only_step(path, mesh)
+        families = file["FAS"][names[0]] if "FAS" in file and names[0] in file["FAS"] else {}
+        return _content(path, step, families, int(mesh.attrs["ESP"]))
+
+
+def _only_step(path: Path, mesh: Any) -> Any:
+    if len(mesh) != 1:
+        raise ModelError(f"{path}: holds {len(mesh)} steps of its mesh, not one")
+    return next(iter(mesh.values()))
+
+
+def _content(path: Path, step: Any, families: Any, dimension: int) -> meshio.Mesh:
+    coordinates = step["NOE"]["COO"][()]
+    points = coordinates.reshape((dimension, -1)).T
+    unknown = [kind for kind in step.get("MAI", {}) if kind not in KINDS]
+    if unknown:
+        told = ", ".join(f"{_count(step['MAI'][kind])} {kind}" for kind in unknown)
+        raise ModelError(f"{path}: has cells of kinds that are not read: {told}")
+    cells, numbers = [], []
+    for name, group in step.get("MAI", {}).items():
+        count = _count(group)
+        cells.append((KINDS[name], group["NOD"][()].reshape(-1, count).T - 1))
+        numbers.append(group["FAM"][()] if "FAM" in group else np.zeros(count, dtype=np.int64))
+    sets: dict[str, list[IntArray]] = {}
+    for number, family in _groups(families, "ELEME"):
+        found = [np.flatnonzero(of_block == number) for of_block in numbers]
+        if family in sets:
+            found = [np.union1d(a, b) for a, b in zip(sets[family], found, strict=True)]
+        sets[family] = found
+    nodes = step["NOE"]["FAM"][()] if "FAM" in step["NOE"] else np.zeros(len(points), np.int64)
+    point_sets: dict[str, IntArray] = {}
+    for number, family in _groups(families, "NOEUD"):
+        found = np.flatnonzero(nodes == number)
+        point_sets[family] = np.union1d(point_sets.get(family, found), found)
+    return meshio.Mesh(np.ascontiguousarray(points), cells, cell_sets=sets, point_sets=point_sets)
+
+
+def _count(group: Any) -> int:
+    return int(group["NOD"].attrs["NBR"])
+
+
+def _groups(families: Any, what: str) -> Iterator[tuple[int, str]]:
+    """Number of each family and the names of its groups, one after the other."""
+    for family in families.get(what, {}).values():
+        if "GRO" not in family:
+            continue
+        for letters in family["GRO"]["NOM"][()]:
+            name = bytes(np.asarray(letters, dtype=np.uint8)).split(b"\0")[0]
+            yield int(family.attrs["NUM"]), name.decode("utf-8", "replace").strip()

@@ -1,0 +1,157 @@
+"""One mesh in several formats is one component, with the same names."""
+
+from __future__ import annotations
+
+import h5py
+import meshio
+import numpy as np
+import pytest
+from structures import lowest_hz
+
+import fem
+
+STEEL = fem.Material(2.1e11, 7800.0, 0.3)
+
+
+def block() -> fem.StructureMesh:
+    """Two parts of second-order solids, a face and two sets of points."""
+    mesh = fem.box_mesh("whole", (0.4, 0.1, 0.05), (4, 2, 1))
+    kind = "hexahedron20"
+    face = mesh.cells[kind][:, [0, 1, 5, 4, 8, 17, 12, 16]]
+    root = face[(mesh.points[face][..., 1] == 0.0).all(axis=1)]
+    return fem.StructureMesh(
+        mesh.points,
+        {kind: mesh.cells[kind], "quad8": root},
+        {
+            "left": {kind: np.arange(4)},
+            "right": {kind: np.arange(4, 8)},
+            "skin": {"quad8": np.arange(len(root))},
+        },
+        {"root": mesh.point_sets["x0"], "tip": mesh.point_sets["x1"][:1]},
+    )
+
+
+def as_meshio(mesh: fem.StructureMesh) -> meshio.Mesh:
+    """The mesh as meshio has it, with names as arrays."""
+    kinds = list(mesh.cells)
+    marks = {
+        f"set:{name}": [
+            np.isin(np.arange(len(mesh.cells[kind])), group.get(kind, [])).astype(int)
+            for kind in kinds
+        ]
+        for name, group in mesh.groups.items()
+    }
+    points = {
+        f"set:{name}": np.isin(np.arange(len(mesh.points)), nodes).astype(int)
+        for name, nodes in mesh.point_sets.items()
+    }
+    return meshio.Mesh(
+        mesh.points, [(kind, mesh.cells[kind]) for kind in kinds], points, cell_data=marks
+    )
+
+
+def write_med(mesh: fem.StructureMesh, path) -> None:
+    """As Salome writes it: the kind of cell that is in no group has no families."""
+    names = {"hexahedron20": "H20", "quad8": "QU8"}
+    with h5py.File(path, "w") as file:
+        root = file.create_group("ENS_MAA/block")
+        root.attrs["ESP"] = 3
+        step = root.create_group("-0000000000000000001-0000000000000000001")
+        step["NOE/COO"] = mesh.points.T.ravel()
+        numbers = {"ELEME": {"left": -1, "right": -2, "skin": -3}, "NOEUD": {"root": 1, "tip": 2}}
+        families = np.zeros(len(mesh.points), dtype=np.int64)
+        for name, nodes in mesh.point_sets.items():
+            families[nodes] = numbers["NOEUD"][name]
+        step["NOE/FAM"] = families
+        for kind, nodes in mesh.cells.items():
+            cells = step.create_dataset(f"MAI/{names[kind]}/NOD", data=nodes.T.ravel() + 1)
+            cells.attrs["NBR"] = len(nodes)
+            families = np.zeros(len(nodes), dtype=np.int64)
+            for name, group in mesh.groups.items():
+                families[group.get(kind, [])] = numbers["ELEME"][name]
+            if families.any():
+                step[f"MAI/{names[kind]}/FAM"] = families
+        for what, of_names in numbers.items():
+            for name, number in of_names.items():
+                family = file.create_group(f"FAS/block/{what}/FAM_{number}_{name}")
+                family.attrs["NUM"] = number
+                letters = np.zeros((1, 80), dtype=np.int8)
+                letters[0, : len(name)] = list(name.encode())
+                family["GRO/NOM"] = letters
+
+
+def write(mesh: fem.StructureMesh, path) -> None:
+    if path.suffix == ".med":
+        write_med(mesh, path)
+    elif path.suffix == ".vtk":
+        meshio.write(path, as_meshio(mesh), file_format="vtk")
+    else:
+        fem.write_mesh(mesh, path)
+
+
+def component(mesh: fem.StructureMesh):
+    part = fem.SolidPart(STEEL)
+    return fem.assemble(
+        fem.StructureModel(
+            mesh,
+            {"left": part, "right": part},
+            [fem.Support("root", ("x", "y", "z"))],
+            interfaces={"tip": fem.Interface("tip", "z")},
+        )
+    )
+
+
+@pytest.mark.parametrize("extension", [".vtu", ".vtk", ".med"])
+def test_every_format_gives_the_same_component(tmp_path, extension):
+    mesh, path = block(), tmp_path / f"block{extension}"
+    write(mesh, path)
+    found = fem.read_structure(path)
+    assert set(found.groups) == set(mesh.groups)
+    for name in mesh.groups:
+        assert {k: len(at) for k, at in found.part(name).items()} == {
+            k: len(at) for k, at in mesh.part(name).items()
+        }
+    for name, nodes in mesh.point_sets.items():
+        assert found.point_sets[name].tolist() == nodes.tolist()
+    known, read = component(mesh), component(found)
+    assert fem.mass_properties(read).mass == pytest.approx(15.6, rel=1e-12)
+    np.testing.assert_allclose(lowest_hz(read, 4), lowest_hz(known, 4), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda file: file.move("ENS_MAA", "OTHER"), "is not a MED file with a mesh"),
+        (lambda file: file.copy("ENS_MAA/block", "ENS_MAA/again"), "holds 2 meshes, not one"),
+        (
+            lambda file: file.copy(
+                next(iter(file["ENS_MAA/block"].values()))["MAI/QU8"],
+                next(iter(file["ENS_MAA/block"].values()))["MAI"],
+                "POG",
+            ),
+            "has cells of kinds that are not read: 4 POG",
+        ),
+    ],
+)
+def test_what_a_med_file_holds_otherwise_is_refused(tmp_path, change, said):
+    path = tmp_path / "block.med"
+    write_med(block(), path)
+    with h5py.File(path, "a") as file:
+        change(file)
+    with pytest.raises(fem.ModelError, match=said):
+        fem.read_structure(path)
+
+
+def test_what_is_no_med_file_is_refused(tmp_path):
+    path = tmp_path / "block.med"
+    path.write_text("no")
+    with pytest.raises(fem.ModelError, match="is not a MED file, or is cut off"):
+        fem.read_structure(path)
+
+
+@pytest.mark.parametrize("extension", [".bdf", ".unv"])
+def test_other_formats_are_refused_with_what_to_do(tmp_path, extension):
+    path = tmp_path / f"block{extension}"
+    path.write_text("")
+    with pytest.raises(fem.ModelError, match="export it as one of these from the program that"):
+        fem.read_structure(path)
