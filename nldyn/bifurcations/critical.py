@@ -28,6 +28,7 @@ NEAR_CROSSING = 5e-3  # of an orbit's size: a turn within it may be a crossing
 RATIO = 1.6  # of successive steps
 STEPS = 8
 ENOUGH = 1e-6  # relative error of a coefficient that needs no more steps
+SAFETY = 3.0  # times the error seen in a table of differences, of which rounding is a part
 LEAST_ERROR = 1e-8  # relative, of a coefficient: special points are located no better
 
 Evaluation = tuple[Real, Real, Hashable]
@@ -213,7 +214,7 @@ def estimated(value: Callable[[float], float], *lines: Line) -> Estimate:
         except CoefficientError:
             h /= RATIO
             continue
-        return Estimate(found.value, found.error + LEAST_ERROR * abs(found.value))
+        return Estimate(found.value, SAFETY * found.error + LEAST_ERROR * abs(found.value))
     raise CoefficientError(
         "a contact begins, ends or grazes so close by that the flow map has no second derivative "
         "of use"
