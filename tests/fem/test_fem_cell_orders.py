@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from mixed import FAMILIES, mixed_block
 from structures import STEEL, lowest_hz
+from with_gmsh import gmsh_at_work
 
 import fem
 from fem.cells import KINDS
@@ -34,12 +35,8 @@ def same_cell(kind, places):
 
 @pytest.mark.parametrize("kind", CODES)
 def test_gmsh_tells_the_nodes_where_they_are_taken_from(kind):
-    gmsh = pytest.importorskip("gmsh")
-    gmsh.initialize(interruptible=False)
-    try:
+    with gmsh_at_work() as gmsh:
         _, dimension, order, count, places, _ = gmsh.model.mesh.getElementProperties(CODES[kind])
-    finally:
-        gmsh.finalize()
     assert (dimension, order, count) == (
         KINDS[kind].dimension, KINDS[kind].order, KINDS[kind].node_count
     )  # fmt: skip
@@ -140,11 +137,8 @@ def test_a_cell_that_a_format_has_not_is_told(tmp_path):
 @pytest.fixture(scope="module")
 def gmsh_files(tmp_path_factory):
     """Prisms, and pyramids between quadrilaterals and tetrahedra, as Gmsh meshes them."""
-    gmsh = pytest.importorskip("gmsh")
     folder = tmp_path_factory.mktemp("gmsh")
-    gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
+    with gmsh_at_work() as gmsh:
         for shape in ("wedge", "pyramid"):
             for order, incomplete in ((1, 0), (2, 0), (2, 1)):
                 gmsh.clear()
@@ -154,8 +148,6 @@ def gmsh_files(tmp_path_factory):
                     gmsh.option.setNumber("Mesh.Binary", binary)
                     name = f"{shape}{order}{incomplete}_{version}_{binary}.msh"
                     gmsh.write(str(folder / name))
-    finally:
-        gmsh.finalize()
     return folder
 
 

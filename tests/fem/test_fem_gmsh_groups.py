@@ -3,19 +3,16 @@
 import numpy as np
 import pytest
 from structures import STEEL, lowest_hz
+from with_gmsh import gmsh_at_work
 
 import fem
-
-gmsh = pytest.importorskip("gmsh")
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A box in two groups, with a surface and a curve of one name, in all dialects."""
     place = tmp_path_factory.mktemp("gmsh")
-    gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
+    with gmsh_at_work() as gmsh:
         box = gmsh.model.occ.addBox(0, 0, 0, 0.3, 0.1, 0.1)
         gmsh.model.occ.synchronize()
         model = gmsh.model
@@ -41,8 +38,6 @@ def folder(tmp_path_factory):
         for version in (2.2, 4.1):
             gmsh.option.setNumber("Mesh.MshFileVersion", version)
             gmsh.write(str(place / f"partitioned_{version}.msh"))
-    finally:
-        gmsh.finalize()
     return place
 
 

@@ -44,9 +44,9 @@ from nldyn.orbits.starts import random_states, settling_periods
 from nldyn.runtime import keeper
 from nldyn.runtime.progress import silent
 from nldyn.scene.build import build_system, load_scene
+from nldyn.search import explore as survey
 from nldyn.search.diagram import Collector, middle_orbit
 from nldyn.search.exploration import chao_lower_bound
-from nldyn.search.explore import explore as survey
 
 NOTHING_MORE = {"pseudo_orbits": 0, "mixtures": 0, "walks": 0}  # beside motions and deflation
 

@@ -33,8 +33,8 @@ from nldyn.io.branches import load_exploration
 from nldyn.orbits.starts import orbit_near
 from nldyn.paper.jobs import scene_system
 from nldyn.paper.starts import read_starts
+from nldyn.search import explore as survey
 from nldyn.search.explore import _Survey
-from nldyn.search.explore import explore as survey
 from nldyn.search.folds import connected_folds, leading_parameter
 
 
