@@ -200,7 +200,7 @@ def test_states_that_cannot_be_carried_on_are_left_out(monkeypatch):
     )
     nothing = StateGraph.of(flow, OMEGA, cloud, 200, np.random.default_rng(0))
     assert list(nothing.closed_walks(3, np.random.default_rng(0))) == []
-    box = SimpleNamespace(flow=flow, progress=lambda *_: None)
+    box = SimpleNamespace(flow=flow, tell=lambda *_: None)
     walks = near_closed_walks(box, [], 37.0, range(1, 3), 50, 5, np.random.default_rng(0))
     assert list(walks) == []
 
