@@ -55,7 +55,7 @@ def test_an_executor_finds_the_same(alone):
 
 
 def test_an_interrupted_run_goes_on_with_another_number_of_processes(alone, tmp_path, monkeypatch):
-    monkeypatch.setattr("nldyn.io.checkpoint.PAUSE", 0.0)
+    monkeypatch.setattr("nldyn.runtime.keeper.PAUSE", 0.0)
     path = tmp_path / "kept.h5"
 
     def stop(what, *_):
