@@ -92,8 +92,8 @@ def _content(path: Path, step: Any, families: Any, dimension: int) -> meshio.Mes
     nodes = step["NOE"]["FAM"][()] if "FAM" in step["NOE"] else np.zeros(len(points), np.int64)
     point_sets: dict[str, IntArray] = {}
     for number, family in _groups(families, "NOEUD"):
-        found = np.flatnonzero(nodes == number)
-        point_sets[family] = np.union1d(point_sets.get(family, found), found)
+        marked = np.flatnonzero(nodes == number)
+        point_sets[family] = np.union1d(point_sets.get(family, marked), marked)
     return meshio.Mesh(np.ascontiguousarray(points), cells, cell_sets=sets, point_sets=point_sets)
 
 
