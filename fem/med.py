@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import h5py
 import meshio
 import numpy as np
 
@@ -49,6 +48,8 @@ def read_med(path: Path) -> meshio.Mesh:
     ----------
     *MED file format*, the layout of ``ENS_MAA`` and ``FAS``, https://docs.salome-platform.org.
     """
+    import h5py  # slow to import, and only this format needs it
+
     try:
         file = h5py.File(path, "r")
     except OSError:
@@ -74,6 +75,9 @@ def _only_step(path: Path, mesh: Any) -> Any:
 def _content(path: Path, step: Any, families: Any, dimension: int) -> meshio.Mesh:
     coordinates = step["NOE"]["COO"][()]
     points = coordinates.reshape((dimension, -1)).T
+    others = [name for name in step if name not in ("NOE", "MAI")]
+    if others:
+        raise ModelError(f"{path}: has cells under names that are not read: {quoted(others)}")
     unknown = [kind for kind in step.get("MAI", {}) if kind not in KINDS]
     if unknown:
         told = ", ".join(f"{_count(step['MAI'][kind])} {kind}" for kind in unknown)
@@ -82,19 +86,35 @@ def _content(path: Path, step: Any, families: Any, dimension: int) -> meshio.Mes
     for name, group in step.get("MAI", {}).items():
         count = _count(group)
         cells.append((KINDS[name], group["NOD"][()].reshape(-1, count).T - 1))
-        numbers.append(group["FAM"][()] if "FAM" in group else np.zeros(count, dtype=np.int64))
+        numbers.append(_family_numbers(path, group, name, count, families, "ELEME"))
     sets: dict[str, list[IntArray]] = {}
     for number, family in _groups(families, "ELEME"):
         found = [np.flatnonzero(of_block == number) for of_block in numbers]
         if family in sets:
             found = [np.union1d(a, b) for a, b in zip(sets[family], found, strict=True)]
         sets[family] = found
-    nodes = step["NOE"]["FAM"][()] if "FAM" in step["NOE"] else np.zeros(len(points), np.int64)
+    nodes = _family_numbers(path, step["NOE"], "NOE", len(points), families, "NOEUD")
     point_sets: dict[str, IntArray] = {}
     for number, family in _groups(families, "NOEUD"):
         marked = np.flatnonzero(nodes == number)
         point_sets[family] = np.union1d(point_sets.get(family, marked), marked)
     return meshio.Mesh(np.ascontiguousarray(points), cells, cell_sets=sets, point_sets=point_sets)
+
+
+def _family_numbers(
+    path: Path, group: Any, name: str, count: int, families: Any, what: str
+) -> IntArray:
+    """Family of each cell or node of one kind, 0 for none."""
+    if "FAM" not in group:
+        return np.zeros(count, dtype=np.int64)
+    numbers: IntArray = group["FAM"][()].astype(np.int64)
+    if len(numbers) != count:
+        raise ModelError(f"{path}: {name} has {count} members, but families for {len(numbers)}")
+    defined = [0, *(int(family.attrs["NUM"]) for family in families.get(what, {}).values())]
+    undefined = np.setdiff1d(numbers, defined)
+    if len(undefined):
+        raise ModelError(f"{path}: {name} is in family {undefined[0]}, which FAS does not define")
+    return numbers
 
 
 def _count(group: Any) -> int:

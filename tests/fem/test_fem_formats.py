@@ -118,19 +118,35 @@ def test_every_format_gives_the_same_component(tmp_path, extension):
     np.testing.assert_allclose(lowest_hz(read, 4), lowest_hz(known, 4), rtol=1e-9)
 
 
+def step_of(file):
+    return next(iter(file["ENS_MAA/block"].values()))
+
+
+def lose_families(file):
+    families = step_of(file)["MAI/H20/FAM"][:-1]
+    del step_of(file)["MAI/H20/FAM"]
+    step_of(file)["MAI/H20/FAM"] = families
+
+
+def undefine_the_skin(file):
+    del file["FAS/block/ELEME/FAM_-3_skin"]
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
         (lambda file: file.move("ENS_MAA", "OTHER"), "is not a MED file with a mesh"),
         (lambda file: file.copy("ENS_MAA/block", "ENS_MAA/again"), "holds 2 meshes, not one"),
         (
-            lambda file: file.copy(
-                next(iter(file["ENS_MAA/block"].values()))["MAI/QU8"],
-                next(iter(file["ENS_MAA/block"].values()))["MAI"],
-                "POG",
-            ),
+            lambda file: file.copy(step_of(file)["MAI/QU8"], step_of(file)["MAI"], "POG"),
             "has cells of kinds that are not read: 4 POG",
         ),
+        (
+            lambda file: step_of(file).move("MAI/QU8", "FAC/QU8"),
+            "has cells under names that are not read: 'FAC'",
+        ),
+        (lose_families, "H20 has 8 members, but families for 7"),
+        (undefine_the_skin, "QU8 is in family -3, which FAS does not define"),
     ],
 )
 def test_what_a_med_file_holds_otherwise_is_refused(tmp_path, change, said):

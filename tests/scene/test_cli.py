@@ -258,7 +258,8 @@ def test_a_range_above_the_modes_of_a_mesh_is_remarked(tmp_path):
 
 def test_check_tells_the_residual_mode_from_the_others():
     """The two-DOF model has one of each."""
-    rows = invoke("check", example("two_dof_xi_0.01.toml")).stdout.splitlines()[2:4]
+    lines = invoke("check", example("two_dof_xi_0.01.toml")).stdout.splitlines()
+    rows = [line for line in lines if line.split()[0] in ("1", "2")]
     assert [row.endswith("  residual") for row in rows] == [False, True]
 
 
