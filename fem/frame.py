@@ -26,7 +26,7 @@ from fem.natural import (
     line_rows,
     natural_form,
 )
-from fem.pieces import check_joined, slit_warnings
+from fem.pieces import check_joined
 from fem.scatter import displacement_of
 from fem.store import load_model, save_model
 from fem.tapers import along
@@ -109,8 +109,8 @@ class Component:
 
 def assemble_frame(model: FrameModel) -> Component:
     """Assemble a plane frame; `fem.assemble` calls it."""
-    check_joined(model)
-    for text in (*mechanism_warnings(model), *slit_warnings(model)):
+    slits = check_joined(model)
+    for text in (*mechanism_warnings(model), *slits):
         warnings.warn(text, JointWarning, stacklevel=3)
     element_dofs = number_dofs(model)
     free = _free_dofs(model)

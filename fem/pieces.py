@@ -57,7 +57,7 @@ class Pieces:
     touching
         Pairs of nodes of different pieces at one place, shape (m, 2).
     coincident
-        Pairs of nodes of one piece at one place, shape (k, 2).
+        Pairs of nodes of one piece at one place that nothing joins directly, shape (k, 2).
     """
 
     of_node: IntArray
@@ -97,11 +97,21 @@ def pieces_of(model: Joined) -> Pieces:
     pairs = np.sort(used[np.asarray(near, dtype=np.int64).reshape(-1, 2)], axis=1)
     pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
     apart = of_node[pairs[:, 0]] != of_node[pairs[:, 1]]
-    return Pieces(of_node, pairs[apart], pairs[~apart])
+    return Pieces(of_node, pairs[apart], _not_linked(pairs[~apart], links))
 
 
-def check_joined(model: Joined) -> None:
-    """Refuse pieces that touch but share no node, unless the model says that they are separate.
+def _not_linked(pairs: IntArray, links: IntArray) -> IntArray:
+    """Those of some pairs of nodes, each in ascending order, that are no link."""
+    if not len(pairs):
+        return pairs
+    base = int(links.max()) + 1
+    return pairs[~np.isin(pairs @ [base, 1], np.sort(links, axis=1) @ [base, 1])]
+
+
+def check_joined(model: Joined) -> list[str]:
+    """Refuse pieces that touch but share no node; a sentence about slits within one, if any are.
+
+    Neither if the model says that nodes at one place are meant.
 
     Raises
     ------
@@ -109,7 +119,7 @@ def check_joined(model: Joined) -> None:
         With how many nodes there are at one place, and the first of them.
     """
     if model.separate:
-        return
+        return []
     found = pieces_of(model)
     if len(found.touching):
         nodes = len(np.unique(found.touching))
@@ -119,21 +129,13 @@ def check_joined(model: Joined) -> None:
             f" {place_of(model.mesh.points[found.touching[0, 0]])}; merge them"
             " ('merge' in a scene, fem.joined), or say that they are meant ('separate')"
         )
-
-
-def slit_warnings(model: Joined) -> list[str]:
-    """A sentence about nodes of one piece at one place that nothing joins directly, if any are."""
-    found = pieces_of(model)
-    links = np.sort(model.links, axis=1)
-    joined = set(map(tuple, links.tolist()))
-    open_pairs = [pair for pair in found.coincident.tolist() if tuple(pair) not in joined]
-    if not open_pairs or model.separate:
+    if not len(found.coincident):
         return []
     return [
-        f"{model.mesh.source}: {len({node for pair in open_pairs for node in pair})} nodes are at"
-        " the place of another one that they are not joined with, the first at"
-        f" {place_of(model.mesh.points[open_pairs[0][0]])}: the model has a slit there unless they"
-        " are merged"
+        f"{model.mesh.source}: {len(np.unique(found.coincident))} nodes are at the place of another"
+        " one that they are not joined with, the first at"
+        f" {place_of(model.mesh.points[found.coincident[0, 0]])}: the model has a slit there unless"
+        " they are merged"
     ]
 
 

@@ -38,7 +38,7 @@ from fem.natural import (
     natural_form,
     solid_rows,
 )
-from fem.pieces import check_joined, slit_warnings
+from fem.pieces import check_joined
 from fem.scatter import SparseArray, block_pattern, dense_scatter, displacement_of
 from fem.shell_assembly import facet_matrices, facet_rows
 from fem.solids import checked_volumes, gradients_and_volumes, mass_matrices, stiffness_matrices
@@ -157,9 +157,9 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
         If a shell meets solids at an edge only, about which it can turn, or a truss has a node
         that is not held in all directions.
     """
-    check_joined(model)
+    slits = check_joined(model)
     check_conforming(model)
-    for text in (*hinge_warnings(model), *mechanism_warnings(model), *slit_warnings(model)):
+    for text in (*hinge_warnings(model), *mechanism_warnings(model), *slits):
         warnings.warn(text, JointWarning, stacklevel=3)
     for text in locking_warnings(model):
         warnings.warn(text, LockingWarning, stacklevel=3)

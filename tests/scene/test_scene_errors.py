@@ -409,12 +409,17 @@ def test_a_byte_order_mark_is_passed_over(tmp_path):
 
 
 def test_parts_that_only_touch(tmp_path):
-    """Two nodes in one place do not join the parts."""
+    """Two nodes in one place do not join the parts: refused, or if meant the model floats."""
     points = {"middle": (0, 0), "corner": (1, 0), "top": (1, 0), "foot": (1, -0.1)}
     loose = fem.frame_mesh(points, [("beam", "middle", "corner", 2), ("leaf", "top", "foot", 2)])
     fem.write_mesh(loose, tmp_path / "loose.vtu")
     text = BEAM.replace(mesh("half_beam.msh").as_posix(), "loose.vtu")
-    said = check(tmp_path, text)
+    assert check(tmp_path, text) == (
+        "scene.toml: loose.vtu: 2 pieces of the mesh touch but share no node: 2 nodes are at the "
+        "place of another one, the first at (1, 0, 0); merge them ('merge' in a scene, "
+        "fem.joined), or say that they are meant ('separate')"
+    )
+    said = check(tmp_path, text.replace('"loose.vtu"', '"loose.vtu"\nseparate = true'))
     assert said == (
         "scene.toml: reduction: the component floats (1 rigid-body mode); "
         "the mesh is in 2 pieces that share no node"
