@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
 from fem.abaqus.deck import Body, Deck, Scope
 from fem.abaqus.elements import read_elcopy, read_elements, read_elgen
 from fem.abaqus.keywords import Keyword
-from fem.abaqus.known import ADVICE, LEFT_OUT, READ, UNKNOWN
+from fem.abaqus.known import ADVICE, LEFT_OUT, MATERIALS, READ, UNKNOWN
 from fem.abaqus.nodes import read_ncopy, read_nfill, read_ngen, read_nodes, read_system, turning
 from fem.abaqus.sets import read_set
 from fem.errors import ModelError
@@ -29,46 +28,41 @@ AT_ONCE: dict[str, Action] = {
     "ELSET": read_set,
 }
 """Keywords that are carried out where they stand; the others wait until all is known."""
-MATERIAL_WORDS = ("MATERIAL", "ELASTIC", "DENSITY", "DISTRIBUTION", "DAMPING", "USERMATERIAL")
-TOGETHER = {"KINEMATIC": "COUPLING", "DISTRIBUTING": "COUPLING"}
-
-
-@dataclass
-class _Place:
-    """Which scope the keywords belong to that come next."""
-
-    scope: Scope
-    part: bool = False
 
 
 def read_scopes(deck: Deck, keywords: Iterable[Keyword]) -> None:
     """Read all keywords into the scopes that they stand in; note those that are refused."""
-    at = _Place(deck.root)
-    in_material = False
+    scope, in_material = deck.root, False
     for keyword in keywords:
         name = keyword.name
-        if name == "MATERIAL":
-            in_material = True
-        elif name in AT_ONCE or name.endswith(("SECTION", "STEP")):
-            in_material = False
+        in_material = name == "MATERIAL" or (in_material and _of_material(name))
         if in_material:
             deck.materials.append(keyword)
         if name in LEFT_OUT:
-            _leave_out(deck, at.scope, keyword)
+            _leave_out(deck, scope, keyword)
         elif name not in READ:
             advice = ADVICE.get(name, UNKNOWN)
             deck.refuse(_canonical(keyword), keyword.place(), advice)
         elif name in AT_ONCE:
             try:
-                AT_ONCE[name](deck, at.scope, keyword)
+                AT_ONCE[name](deck, scope, keyword)
             except ModelError:
                 if not deck.problems:  # else it may follow from what is refused already
                     raise
         elif name in ("PART", "ENDPART", "INSTANCE", "ENDINSTANCE", "ASSEMBLY", "ENDASSEMBLY"):
-            _enter(deck, at, keyword)
+            scope = _entered(deck, keyword)
         else:
-            at.scope.later.append(keyword)
+            scope.later.append(keyword)
     _finish(deck)
+
+
+def _of_material(name: str) -> bool:
+    """Whether a keyword goes on with the material before it; one that is not known does."""
+    if name.endswith("SECTION") or name in ADVICE:
+        return False
+    return name in ("ELASTIC", "DENSITY") or (
+        name not in READ and LEFT_OUT.get(name, MATERIALS) == MATERIALS
+    )
 
 
 def _canonical(keyword: Keyword) -> str:
@@ -81,19 +75,17 @@ def _leave_out(deck: Deck, scope: Scope, keyword: Keyword) -> None:
         scope.later.append(keyword)
 
 
-def _enter(deck: Deck, at: _Place, keyword: Keyword) -> None:
-    """Begin or end a part, an instance or the assembly."""
+def _entered(deck: Deck, keyword: Keyword) -> Scope:
+    """The scope that begins where a part, an instance or the assembly begins or ends."""
     name = keyword.name
     if name == "PART":
         keyword.only("NAME", "INTERNAL")
         called = keyword.name_of("NAME")
         if called.upper() in deck.parts:
             raise keyword.fail(f"part {called!r} is defined twice")
-        at.scope = deck.parts[called.upper()] = Scope(called)
-    elif name == "INSTANCE":
-        at.scope = _instance(deck, keyword)
-    else:
-        at.scope = deck.root
+        deck.parts[called.upper()] = Scope(called)
+        return deck.parts[called.upper()]
+    return _instance(deck, keyword) if name == "INSTANCE" else deck.root
 
 
 def _instance(deck: Deck, keyword: Keyword) -> Scope:

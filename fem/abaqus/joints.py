@@ -225,11 +225,7 @@ class Joints:
         """Directions from 1 to 6 given in rows of the first and the last; none: all."""
         found: set[int] = set()
         for row, words in enumerate(keyword.rows):
-            given = [keyword.whole(word, row) for word in filled(words)]
-            first, last = [*given, given[0]][:2] if given else (1, 6)
-            if len(given) > 2 or not 1 <= first <= last <= 6:
-                raise keyword.fail("needs the first and the last direction, from 1 to 6", row)
-            found.update(range(first, last + 1))
+            found.update(_span(keyword, row, filled(words)))
         return found or set(range(1, 7))
 
     def _kinematic(
@@ -282,10 +278,9 @@ class Joints:
         directions: dict[Label, set[int]] = {}
         for row, words in enumerate(keyword.rows):
             name, *ends = filled(words)
-            given = [keyword.whole(word, row) for word in ends]
-            first, last = [*given, given[0]][:2] if given else (1, 6)
+            span = _span(keyword, row, ends)
             for node in self.resolver.reference("NSET", body, name, place, keyword.shown):
-                directions.setdefault(node, set()).update(range(first, last + 1))
+                directions.setdefault(node, set()).update(span)
         for node, numbers in directions.items():
             groups.setdefault(tuple(sorted(numbers)), []).append(node)
         for chosen, nodes in groups.items():
@@ -338,6 +333,15 @@ class Joints:
             if master != slave:
                 turns = "NO ROTATION" not in keyword.parameters
                 self._tied(slave, master, keyword, row, turns)
+
+
+def _span(keyword: Keyword, row: int, words: list[str]) -> range:
+    """Directions from 1 to 6 from the first to the last that a row gives; none: all."""
+    given = [keyword.whole(word, row) for word in words]
+    first, last = [*given, given[0]][:2] if given else (1, 6)
+    if len(given) > 2 or not 1 <= first <= last <= 6:
+        raise keyword.fail("needs the first and the last direction, from 1 to 6", row)
+    return range(first, last + 1)
 
 
 _READERS: dict[str, Callable[[Joints, Body, Keyword], None]] = {

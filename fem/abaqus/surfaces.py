@@ -29,6 +29,15 @@ class Surfaces:
 
     def nodes(self, body: Body, name: str, keyword: Keyword) -> list[Label]:
         """Nodes of a surface by name, of a body or of an instance (INSTANCE.NAME)."""
+        return self.of(*self._found(body, name, keyword))
+
+    def by_nodes(self, body: Body, name: str, keyword: Keyword) -> bool:
+        """Whether a surface by name is of nodes and not of faces."""
+        _, surface = self._found(body, name, keyword)
+        return surface.parameters.get("TYPE", "").upper() == "NODE"
+
+    def _found(self, body: Body, name: str, keyword: Keyword) -> tuple[Body, Keyword]:
+        """The body that a surface is of, and the keyword that defines it."""
         owner = body
         if (body.name, name.upper()) not in self.named and "." in name:
             first, _, rest = name.partition(".")
@@ -36,12 +45,7 @@ class Surfaces:
         found = self.named.get((owner.name, name.upper()))
         if found is None:
             raise keyword.fail(f"names the surface {name!r}, which is not defined")
-        return self.of(owner, found)
-
-    def by_nodes(self, body: Body, name: str, keyword: Keyword) -> bool:
-        """Whether a surface is of nodes and not of faces."""
-        found = self.named.get((body.name, name.upper()))
-        return bool(found and found.parameters.get("TYPE", "").upper() == "NODE")
+        return owner, found
 
     def of(self, body: Body, keyword: Keyword) -> list[Label]:
         """Nodes of the surface that a keyword defines."""
@@ -71,15 +75,15 @@ class Surfaces:
 
     def _face(self, keyword: Keyword, row: int, element: Label, face: str) -> list[Label]:
         nodes = self.resolver.nodes_of(element)
-        kind = self.resolver.deck.bodies[element[0].upper()].element(element[1]).type.kind
+        element_type = self.resolver.deck.bodies[element[0].upper()].element(element[1]).type
+        kind = element_type.kind
         if kind is None:
             raise keyword.fail(f"element {element[1]} is a point and has no face", row)
         if kind not in CORNERS:
             return nodes
         plane = kind.startswith(("triangle", "quad"))
-        name = self.resolver.deck.bodies[element[0].upper()].element(element[1]).type.name
-        shell = plane and not name.startswith("CP")
-        if shell and (face in ("", "SPOS", "SNEG", "S1", "S2") or not face):
+        shell = plane and not element_type.name.startswith("CP")
+        if shell and face in ("", "SPOS", "SNEG", "S1", "S2"):
             return nodes
         local = faces(kind)
         if face == "":

@@ -469,6 +469,16 @@ def test_couplings_of_the_deck_are_those_of_the_model(tmp_path, how):
     assert cms.reduce(found, modes=4).frequencies_hz[:4] == pytest.approx(expected, rel=1e-10)
 
 
+def test_a_surface_of_nodes_within_an_instance_weighs_its_nodes(tmp_path):
+    rows, _ = box_rows()
+    text = f"*PART, NAME=P\n{rows}*SURFACE, NAME=S, TYPE=NODE\nx1\n*END PART\n"
+    text += "*ASSEMBLY, NAME=A\n*INSTANCE, NAME=I, PART=P\n*END INSTANCE\n"
+    text += "*NODE\n900, 0.4, 0., 0.\n"
+    text += "*COUPLING, REF NODE=900, SURFACE=I.S, CONSTRAINT NAME=C\n*DISTRIBUTING\n1, 6\n"
+    mesh = fem.read_structure(deck(tmp_path, text + "*END ASSEMBLY\n"))
+    assert [coupling.weighting for coupling in mesh.attachments.couplings] == ["nodes"]
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
@@ -492,6 +502,8 @@ def test_couplings_of_the_deck_are_those_of_the_model(tmp_path, how):
         ("*EQUATION\n2\n1, 1, 1., 2\n", "line 22: .*an equation of 2 terms needs 6 words"),
         ("*TRANSFORM, NSET=TIP\n1, 0, 0, 0, 1, 0\n*EQUATION\n2\n11, 1, 1., 2, 1, 1.\n",
          r"line 24: .*node 11 has axes of its own by \*TRANSFORM in line 21"),
+        *((f"*KINEMATIC COUPLING, REF NODE=1\nTIP{ends}\n", "line 22: .* from 1 to 6")
+          for ends in (", 0, 3", ", 1, 9", ", 3, 1", ", 1, 3, 5")),
         ("*RIGID BODY, NSET=TIP\n", "line 21: .*has no REF NODE"),
         ("*RELEASE\n1, S1, ALLM\n", r"\*RELEASE .*\[\[hinges\]\]"),
         ("*NODE\n77, 1, 1, 0\n*SURFACE, NAME=A, TYPE=NODE\n77\n*SURFACE, NAME=B, TYPE=NODE\nTIP\n"
@@ -660,6 +672,20 @@ def test_materials_and_sections_of_the_deck_are_described(tmp_path):
         assert text.replace(*change) != text
         told = fem.read_mesh(deck(tmp_path, text.replace(*change))).described["BEAM"]["refused"]
         assert re.search(reason, told), told
+
+
+@pytest.mark.parametrize(
+    "after",
+    ["*BOUNDARY\nROOT, 1, 6\n", "*AMPLITUDE, NAME=A\n0., 0., 1., 1.\n",
+     "*SURFACE INTERACTION, NAME=I\n", "*ORIENTATION, NAME=O\n1., 0., 0., 0., 1., 0.\n",
+     "*SURFACE, NAME=S, TYPE=NODE\nTIP\n"],
+)  # fmt: skip
+def test_a_material_ends_where_something_else_begins(tmp_path, after):
+    """Abaqus/CAE writes interactions and boundary conditions after the materials."""
+    section = "*BEAM SECTION, ELSET=BEAM, MATERIAL=STEEL, SECTION=RECT\n0.02, 0.01\n0., 0., -1.\n"
+    material = "*MATERIAL, NAME=STEEL\n*DENSITY\n7800.\n*ELASTIC\n2.1E11, .3\n"
+    mesh = fem.read_mesh(deck(tmp_path, cantilever_deck() + section + material + after))
+    assert mesh.described["BEAM"]["density"] == 7800.0
 
 
 def test_the_docs_list_every_keyword_where_it_belongs():
