@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -263,3 +263,34 @@ The nodes are the corners, the middles of the edges, and where there are more, t
 faces: of a wedge18 in the order (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5), of a hexahedron27 -x, +x,
 -y, +y, -z, +z and then its own middle, both as in VTK; of a pyramid14 its base.
 """
+
+
+def all_facets(parts: Iterable[Mapping[str, IntArray]]) -> dict[str, IntArray]:
+    """Nodes (f, k) of all facets of the cells (e, b) by kind of some parts, by the facets' kind.
+
+    Examples
+    --------
+    >>> facets = all_facets([{"triangle": np.array([[0, 1, 2]])}, {"quad": np.arange(4)[None]}])
+    >>> facets["line"].shape
+    (7, 2)
+    """
+    found: dict[str, list[IntArray]] = {}
+    for cells in parts:
+        for kind, nodes in cells.items():
+            for facet_kind, facets in KINDS[kind].facets_of(nodes).items():
+                found.setdefault(facet_kind, []).append(facets)
+    return {kind: np.concatenate(blocks) for kind, blocks in found.items()}
+
+
+def facet_keys(corners: IntArray) -> IntArray:
+    """A number for each facet (f, k) by its first two corners and its last, in ascending order.
+
+    Examples
+    --------
+    >>> facet_keys(np.array([[0, 1, 2], [0, 1, 3], [0, 1, 2]]))
+    array([0, 1, 0])
+    """
+    size = int(corners.max()) + 1
+    _, pair = np.unique(corners[:, 0] * size + corners[:, 1], return_inverse=True)
+    _, key = np.unique(pair.ravel() * size + corners[:, -1], return_inverse=True)
+    return np.asarray(key.ravel(), dtype=np.int64)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fem.cells import KINDS
+from fem.cells import KINDS, all_facets, facet_keys
 from fem.errors import ModelError
 from fem.mesh import IntArray
 from fem.structure import StructureModel
@@ -44,15 +44,9 @@ def check_conforming(model: StructureModel) -> None:
 
 
 def _mismatches(model: StructureModel) -> Iterator[Mismatch]:
-    facets: dict[str, list[IntArray]] = {}
-    for _, kinds in model.solids.values():
-        for kind, nodes in kinds.items():
-            for facet_kind, found in KINDS[kind].facets_of(nodes).items():
-                facets.setdefault(facet_kind, []).append(found)
     by_corners: dict[int, list[tuple[str, IntArray]]] = {}
-    for kind, blocks in facets.items():
-        count = len(KINDS[kind].corners)
-        by_corners.setdefault(count, []).append((kind, np.concatenate(blocks)))
+    for kind, nodes in all_facets(kinds for _, kinds in model.solids.values()).items():
+        by_corners.setdefault(len(KINDS[kind].corners), []).append((kind, nodes))
     for of_one_shape in by_corners.values():
         yield from _of_other_nodes(of_one_shape)
     if not model.is_plane:
@@ -89,17 +83,3 @@ def _cut_in_two(outer: dict[str, IntArray]) -> Iterator[Mismatch]:
             cut = np.isin(keys[len(known) :], keys[: len(known)]).reshape(4, -1).any(axis=0)
             if cut.any():
                 yield nodes[cut, :4], f"a {kind}", "two triangles"
-
-
-def facet_keys(corners: IntArray) -> IntArray:
-    """A number for each facet (f, k) by its first two corners and its last, in ascending order.
-
-    Examples
-    --------
-    >>> facet_keys(np.array([[0, 1, 2], [0, 1, 3], [0, 1, 2]]))
-    array([0, 1, 0])
-    """
-    size = int(corners.max()) + 1
-    _, pair = np.unique(corners[:, 0] * size + corners[:, 1], return_inverse=True)
-    _, key = np.unique(pair.ravel() * size + corners[:, -1], return_inverse=True)
-    return np.asarray(key.ravel(), dtype=np.int64)

@@ -15,7 +15,7 @@ from fem.attachments import DIRECTIONS, plane_direction
 from fem.beams import plane_matrices, plane_rows
 from fem.elements import rotations, turn
 from fem.errors import JointWarning, ModelError
-from fem.links import link_terms
+from fem.links import link_rows, link_terms
 from fem.mesh import FloatArray, IntArray
 from fem.model import FrameModel, TrussPart
 from fem.natural import (
@@ -27,12 +27,10 @@ from fem.natural import (
     natural_form,
 )
 from fem.pieces import check_joined
-from fem.scatter import displacement_of
+from fem.scatter import SparseArray, displacement_of, squares
 from fem.store import load_model, save_model
 from fem.tapers import along
 from fem.trusses import loose_nodes, loose_sentences
-
-SparseArray = sparse.csr_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,10 +115,10 @@ def assemble_frame(model: FrameModel) -> Component:
     stiffness, mass = _element_matrices(model)
     springs = sparse.diags_array(_spring_diagonal(model), format="csr")
     elongations, given, damping = _link_rows(model)
-    K = _scatter(stiffness, element_dofs, springs + _squares(elongations, given), free)
+    K = _scatter(stiffness, element_dofs, springs + squares(elongations, given), free)
     lumps = sparse.diags_array(_mass_diagonal(model), format="csr")
     M = _scatter(mass, element_dofs, lumps, free)
-    C = _squares(elongations, damping)[free][:, free] if damping.any() else None
+    C = squares(elongations, damping)[free][:, free] if damping.any() else None
     return Component(K, M, _interface_vectors(model, free), model, free, element_dofs, C)
 
 
@@ -238,22 +236,11 @@ def _spring_diagonal(model: FrameModel) -> FloatArray:
 
 def _link_rows(model: FrameModel) -> tuple[SparseArray, FloatArray, FloatArray]:
     """Elongations (m, n) of all links, and their stiffness and damping, shape (m,)."""
-    links = model.attached.links
-    rows, columns, values = [], [], []
-    for row, link in enumerate(links):
-        for point, direction, value in link_terms(model.mesh, link):
-            rows.append(row)
-            columns.append(_dof(model, point, plane_direction(direction)))
-            values.append(value)
-    shape = len(links), _dof_count(model)
-    elongations = sparse.csr_array((np.array(values, dtype=np.float64), (rows, columns)), shape)
-    stiffness, damping = np.array([(k.stiffness, k.damping) for k in links]).reshape(-1, 2).T
-    return elongations, stiffness, damping
 
+    def dof(point: str, direction: str) -> int:
+        return _dof(model, point, plane_direction(direction))
 
-def _squares(rows: SparseArray, weights: FloatArray) -> SparseArray:
-    """The sparse matrix BᵀwB."""
-    return sparse.csr_array(rows.T @ sparse.diags_array(weights) @ rows)
+    return link_rows(model.mesh, model.attached.links, _dof_count(model), dof)
 
 
 def _mass_diagonal(model: FrameModel) -> FloatArray:

@@ -14,6 +14,9 @@ from fem.mesh import IntArray
 UNGROUPED = "ungrouped"
 """Stands for the cells that are in no group."""
 TYPE_PREFIX = "abaqus:"
+"""Before the names of the cell sets that hold the cells of an element type of a deck."""
+SET_PREFIX = "set:"
+"""Before the names of groups and point sets where a format has data of cells and points only."""
 
 Mask = NDArray[np.bool_]
 
@@ -66,7 +69,7 @@ def without_cells(
 
 def _known(content: meshio.Mesh) -> list[str]:
     names = [str(name).removeprefix(TYPE_PREFIX) for name in content.cell_sets]
-    names += [n.removeprefix("set:") for n in content.cell_data if n.startswith("set:")]
+    names += [n.removeprefix(SET_PREFIX) for n in content.cell_data if n.startswith(SET_PREFIX)]
     return list(dict.fromkeys(names))
 
 
@@ -94,8 +97,8 @@ def _named(content: meshio.Mesh, index: int) -> Iterator[tuple[str, IntArray]]:
             if str(name).startswith(TYPE_PREFIX):
                 yield str(name).removeprefix(TYPE_PREFIX), cells
     for name, blocks in content.cell_data.items():
-        if name.startswith("set:"):
-            yield name.removeprefix("set:"), np.flatnonzero(np.asarray(blocks[index]).ravel())
+        if name.startswith(SET_PREFIX):
+            yield name.removeprefix(SET_PREFIX), np.flatnonzero(np.asarray(blocks[index]).ravel())
 
 
 def _kept(content: meshio.Mesh, keep: list[Mask]) -> meshio.Mesh:

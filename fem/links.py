@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
+from scipy import sparse
 
 from fem.attachments import Link
 from fem.errors import ModelError
 from fem.mesh import FloatArray
+from fem.scatter import SparseArray
 
 Term = tuple[str, str, float]
 
@@ -55,3 +58,31 @@ def link_terms(mesh: PlacedNodes, link: Link) -> list[Term]:
         for axis, part in zip("xyz", along, strict=True)
         if part
     ]
+
+
+def link_rows(
+    mesh: PlacedNodes, links: Sequence[Link], size: int, dof: Callable[[str, str], int]
+) -> tuple[SparseArray, FloatArray, FloatArray]:
+    """Elongations (m, size) of links, and their stiffness and damping, shape (m,).
+
+    Parameters
+    ----------
+    mesh
+        Where the named points are.
+    links
+        Springs and dampers between two points or directions.
+    size
+        Number of degrees of freedom.
+    dof
+        The degree of freedom of a point and a direction.
+    """
+    rows, columns, values = [], [], []
+    for row, link in enumerate(links):
+        for point, direction, value in link_terms(mesh, link):
+            rows.append(row)
+            columns.append(dof(point, direction))
+            values.append(value)
+    shape = len(links), size
+    elongations = sparse.csr_array((np.array(values, dtype=np.float64), (rows, columns)), shape)
+    stiffness, damping = np.array([(k.stiffness, k.damping) for k in links]).reshape(-1, 2).T
+    return elongations, stiffness, damping

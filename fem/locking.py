@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from fem.cells import KINDS
+from fem.cells import KINDS, all_facets
 from fem.constraints import facet_products
 from fem.mesh import FloatArray, IntArray
 from fem.structure import SolidPart, StructureModel, once
@@ -46,13 +46,8 @@ def stiffening(part: SolidPart, ratio: float) -> float:
 
 def thickness(points: FloatArray, kinds: Mapping[str, IntArray]) -> float:
     """Of a part in m: twice the volume of its cells over the surface around all of them."""
-    facets: dict[str, list[IntArray]] = {}
-    volume = 0.0
-    for kind, nodes in kinds.items():
-        volume += float(facet_products(kind, points[nodes]).sum())
-        for facet_kind, found in KINDS[kind].facets_of(nodes).items():
-            facets.setdefault(facet_kind, []).append(found)
-    outer = {kind: once(np.concatenate(found), kind) for kind, found in facets.items()}
+    volume = sum(float(facet_products(kind, points[nodes]).sum()) for kind, nodes in kinds.items())
+    outer = {kind: once(facets, kind) for kind, facets in all_facets([kinds]).items()}
     surface = sum(float(facet_products(kind, points[nodes]).sum()) for kind, nodes in outer.items())
     return 2.0 * volume / surface
 

@@ -112,7 +112,7 @@ def rotation_stiffness(
     corners: FloatArray, area: FloatArray, law: FloatArray, poissons_ratio: float
 ) -> FloatArray:
     """Stiffness (e, 3, 3) against the corners' rotations less that of the triangle."""
-    natural = split_strains(from_edges(corners, area))
+    natural = split_strains(from_edges(corners))
     weight = max((1.0 - 4.0 * poissons_ratio**2) / 2.0, 0.01)
     sides = corners[:, [1, 2, 0]] - corners[:, [0, 1, 2]]
     scale = (2.0 * area[:, None] / 3.0) / np.sum(sides**2, axis=2)
@@ -125,7 +125,7 @@ def rotation_stiffness(
     return np.asarray(0.75 * weight * area[:, None, None] * found, dtype=np.float64)
 
 
-def from_edges(corners: FloatArray, area: FloatArray) -> FloatArray:
+def from_edges(corners: FloatArray) -> FloatArray:
     """The matrices (e, 3, 3) from strains along the edges 12, 23, 31 to (xx, yy, 2 xy)."""
     sides = corners[:, [1, 2, 0]] - corners[:, [0, 1, 2]]
     x, y = sides[..., 0], sides[..., 1]

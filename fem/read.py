@@ -17,12 +17,11 @@ from numpy.typing import ArrayLike
 import fem.meshio_kinds  # noqa: F401  (completes meshio's tables)
 from fem.abaqus import read_abaqus
 from fem.abaqus.deck import bare
-from fem.abaqus.mesh import TYPE_PREFIX
 from fem.cells import KINDS, SPANS
 from fem.collapsed import uncollapsed
 from fem.errors import ModelError, quoted
 from fem.gmsh import read_gmsh
-from fem.ignored import without_cells
+from fem.ignored import SET_PREFIX, TYPE_PREFIX, without_cells
 from fem.med import read_med
 from fem.mesh import FloatArray, FrameMesh, IntArray
 from fem.structure_mesh import StructureMesh
@@ -30,7 +29,6 @@ from fem.unpacking import bounded_unpacking
 
 Mesh = TypeVar("Mesh", FrameMesh, StructureMesh)
 
-SET_PREFIX = "set:"
 FARTHEST = 1e50
 
 # What Python's and numpy's errors say about the words of a file, for one who wrote the file.
@@ -45,19 +43,19 @@ FAULTS = (
 
 def read_vtu(path: Path) -> meshio.Mesh:
     """Read a VTK file, without unpacking endlessly; what meshio would leave out is an error."""
-    said = io.StringIO()
-    with bounded_unpacking(path), redirect_stderr(said):
-        content = meshio.vtu.read(path)
-    if said.getvalue():
-        raise ValueError(" ".join(said.getvalue().split()).removeprefix("Warning: "))
-    return content
+    with bounded_unpacking(path):
+        return _without_warning(meshio.vtu.read, path)
 
 
 def read_vtk(path: Path) -> meshio.Mesh:
     """Read a VTK legacy file; what meshio would leave out is an error."""
+    return _without_warning(meshio.vtk.read, path)
+
+
+def _without_warning(read: Callable[[Path], meshio.Mesh], path: Path) -> meshio.Mesh:
     said = io.StringIO()
     with redirect_stderr(said):
-        content = meshio.vtk.read(path)
+        content = read(path)
     if said.getvalue():
         raise ValueError(" ".join(said.getvalue().split()).removeprefix("Warning: "))
     return content

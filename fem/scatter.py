@@ -79,6 +79,18 @@ def dense_scatter(matrices: FloatArray, dofs: IntArray, count: int) -> SparseArr
     return sparse.csr_array(full.tocsr())
 
 
+def added(first: SparseArray, second: SparseArray) -> SparseArray:
+    """The sum of two matrices, one of which may be empty."""
+    if second.nnz == 0:
+        return first
+    return sparse.csr_array(first + second) if first.nnz else second
+
+
+def squares(rows: SparseArray, weights: FloatArray) -> SparseArray:
+    """The sparse matrix BᵀwB."""
+    return sparse.csr_array(rows.T @ sparse.diags_array(weights) @ rows)
+
+
 class HasFree(Protocol):
     """What `displacement_of` needs of a component."""
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from fem.attachments import Attachments, Coupling, PointMass, PointSpring, vector
-from fem.cells import KINDS, SPANS
+from fem.cells import KINDS, SPANS, all_facets, facet_keys
 from fem.doubled import check_no_doubles
 from fem.element_types import check_family, counted
 from fem.errors import ModelError, by_name, check_positive, listed, quoted
@@ -206,7 +206,7 @@ class StructureModel:
         """Whether the structure lies and moves in the x-y plane, because a part does."""
         return any(isinstance(part, SolidPart) and part.plane for part in self.parts.values())
 
-    @property
+    @cached_property
     def beams(self) -> dict[str, tuple[BeamPart, IntArray]]:
         """Beam parts with the node pairs (e, 2) of their lines; one of three nodes is two beams."""
         return {
@@ -238,7 +238,7 @@ class StructureModel:
         own = Attachments(self.point_masses, couplings=self.couplings)
         return self.mesh.attachments + own
 
-    @property
+    @cached_property
     def trusses(self) -> dict[str, tuple[TrussPart, dict[str, IntArray]]]:
         """Truss parts with the nodes (e, 2) and (e, 3) of their lines by kind."""
         return {
@@ -247,7 +247,7 @@ class StructureModel:
             if isinstance(part, TrussPart)
         }
 
-    @property
+    @cached_property
     def shells(self) -> dict[str, tuple[ShellPart, dict[str, IntArray]]]:
         """Shell parts with the nodes (e, 3) and (e, 4) of their facets by kind."""
         return {
@@ -280,12 +280,8 @@ class StructureModel:
     @cached_property
     def facets(self) -> dict[str, IntArray]:
         """Faces (in the plane: edges) of solids that no second cell shares, (f, k) by kind."""
-        found: dict[str, list[IntArray]] = {}
-        for _, cells in self.solids.values():
-            for kind, nodes in cells.items():
-                for facet_kind, facets in KINDS[kind].facets_of(nodes).items():
-                    found.setdefault(facet_kind, []).append(facets)
-        return {kind: once(np.concatenate(blocks), kind) for kind, blocks in found.items()}
+        found = all_facets(cells for _, cells in self.solids.values())
+        return {kind: once(facets, kind) for kind, facets in found.items()}
 
     def facets_on(self, name: str) -> dict[str, IntArray]:
         """The outer facets, and those of shells, all of whose nodes are in a point set or group."""
@@ -447,9 +443,7 @@ def once(facets: IntArray, kind: str) -> IntArray:
     array([[2, 1]])
     """
     lowest = np.sort(facets[:, : len(KINDS[kind].corners)], axis=1)[:, :3]
-    _, key = np.unique(lowest[:, 0] * (facets.max() + 1) + lowest[:, 1], return_inverse=True)
-    key = key * (facets.max() + 1) + lowest[:, -1]
-    _, index, count = np.unique(key, return_index=True, return_counts=True)
+    _, index, count = np.unique(facet_keys(lowest), return_index=True, return_counts=True)
     return np.asarray(facets[np.sort(index[count == 1])], dtype=np.int64)
 
 

@@ -6,7 +6,7 @@ import os
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy import sparse
@@ -22,11 +22,12 @@ from fem.constraints import (
     facet_products,
     number_blocks,
     point_dof,
+    rigid_motions,
 )
 from fem.distorted import distortion_warnings
 from fem.errors import JointWarning, ModelError
 from fem.joints import hinge_warnings, mechanism_warnings
-from fem.links import link_terms
+from fem.links import link_rows
 from fem.locking import locking_warnings
 from fem.mesh import FloatArray, IntArray
 from fem.natural import (
@@ -39,7 +40,14 @@ from fem.natural import (
     solid_rows,
 )
 from fem.pieces import check_joined
-from fem.scatter import SparseArray, block_pattern, dense_scatter, displacement_of
+from fem.scatter import (
+    SparseArray,
+    added,
+    block_pattern,
+    dense_scatter,
+    displacement_of,
+    squares,
+)
 from fem.shell_assembly import facet_matrices, facet_rows
 from fem.solids import checked_volumes, gradients_and_volumes, mass_matrices, stiffness_matrices
 from fem.store import load_structure, save_structure
@@ -74,6 +82,8 @@ class StructureComponent:
         The structure that was assembled.
     numbering, constraints
         Which degrees of freedom there are, and how they follow from the free ones.
+    rigid_mass
+        Mass matrix (6, 6) of the rigid motions, supports apart: along and about x, y and z.
     damping
         Matrix in N s/m of the dampers that the file of the mesh holds; None without any.
     """
@@ -84,6 +94,7 @@ class StructureComponent:
     model: StructureModel
     numbering: Numbering
     constraints: Constraints
+    rigid_mass: FloatArray
     damping: SparseArray | None = None
 
     @property
@@ -174,7 +185,8 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     _check_nothing_empty(K, M, model, numbering, constraints)
     interfaces = _interface_vectors(model, numbering, constraints)
     damping = _damping(model, numbering, constraints)
-    return StructureComponent(K, M, interfaces, model, numbering, constraints, damping)
+    rigid = rigid_body_mass(model, numbering, mass)
+    return StructureComponent(K, M, interfaces, model, numbering, constraints, rigid, damping)
 
 
 def unconstrained_matrices(
@@ -184,24 +196,19 @@ def unconstrained_matrices(
     stiffness, mass = solid_matrices(model, numbering)
     for others in (facet_matrices, truss_matrices, attached_matrices):
         more = others(model, numbering)
-        stiffness, mass = _sum(stiffness, more[0]), _sum(mass, more[1])
+        stiffness, mass = added(stiffness, more[0]), added(mass, more[1])
     return stiffness, mass
 
 
-def rigid_body_mass(component: StructureComponent) -> FloatArray:
-    """Mass matrix (6, 6) of the rigid motions, supports apart: along and about x, y and z."""
-    model, numbering = component.model, component.numbering
-    _, mass = unconstrained_matrices(model, numbering)
+def rigid_body_mass(model: StructureModel, numbering: Numbering, mass: SparseArray) -> FloatArray:
+    """Mass matrix (6, 6) of the rigid motions, given that of all degrees of freedom."""
+    axes = np.arange(3)
     motions = np.zeros((3 * numbering.count, 6))
     moving, turning = numbering.translation >= 0, numbering.rotation >= 0
     blocks = numbering.translation[moving]
-    for i in range(3):
-        motions[3 * blocks + i, i] = 1.0
-        swing = np.cross(np.eye(3)[i], model.mesh.points[moving])
-        for j in range(3):
-            motions[3 * blocks + j, 3 + i] = swing[:, j]
-        turns = np.concatenate([numbering.rotation[turning], numbering.hinged])
-        motions[3 * turns + i, 3 + i] = 1.0
+    motions[3 * blocks[:, None] + axes] = rigid_motions(model.mesh.points[moving])
+    turns = np.concatenate([numbering.rotation[turning], numbering.hinged])
+    motions[3 * turns[:, None] + axes, 3 + axes] = 1.0
     return np.asarray(motions.T @ (mass @ motions))
 
 
@@ -224,12 +231,6 @@ def _check_nothing_empty(
         f"{model.mesh.source}: nothing is joined to the direction {AXES[axis]!r} of {what};"
         " support it or couple it in all directions"
     )
-
-
-def _sum(first: SparseArray, second: SparseArray) -> SparseArray:
-    if second.nnz == 0:
-        return first
-    return sparse.csr_array(first + second) if first.nnz else second
 
 
 def solid_matrices(model: StructureModel, numbering: Numbering) -> tuple[SparseArray, SparseArray]:
@@ -277,7 +278,7 @@ def attached_rows(model: StructureModel, numbering: Numbering) -> Iterator[Rows]
         what = f"{model.mesh.source}: part {name!r}"
         rows, stiffness = element_rows(along(part, model.mesh, lines, what), spans, what)
         yield line_rows(rows, stiffness, beam_dofs(model, numbering, name), size, 3)
-    elongations, given, _ = link_rows(model, numbering)
+    elongations, given, _ = _link_rows(model, numbering)
     if given.any():
         yield MatrixRows(given, sparse.eye_array(len(given), format="csr"), elongations)
     for matrices, dofs in (*_foundations(model, numbering), *_springs(model, numbering)):
@@ -333,15 +334,15 @@ def attached_matrices(
         what = f"{model.mesh.source}: part {name!r}"
         K, M = element_matrices(along(part, model.mesh, lines, what), spans, what)
         dofs = beam_dofs(model, numbering, name)
-        stiffness = _sum(stiffness, dense_scatter(K, dofs, size))
-        mass = _sum(mass, dense_scatter(M, dofs, size))
-    elongations, given, _ = link_rows(model, numbering)
-    stiffness = _sum(stiffness, _squares(elongations, given))
+        stiffness = added(stiffness, dense_scatter(K, dofs, size))
+        mass = added(mass, dense_scatter(M, dofs, size))
+    elongations, given, _ = _link_rows(model, numbering)
+    stiffness = added(stiffness, squares(elongations, given))
     for matrices, dofs in (*_foundations(model, numbering), *_springs(model, numbering)):
-        stiffness = _sum(stiffness, dense_scatter(matrices, dofs, size))
+        stiffness = added(stiffness, dense_scatter(matrices, dofs, size))
     for lump in model.attached.point_masses:
         matrix, dofs = _lumped(model, numbering, lump)
-        mass = _sum(mass, dense_scatter(matrix, dofs, size))
+        mass = added(mass, dense_scatter(matrix, dofs, size))
     return stiffness, mass
 
 
@@ -361,34 +362,20 @@ def _springs(model: StructureModel, numbering: Numbering) -> Iterator[tuple[Floa
         yield np.array([[[spring.stiffness]]]), np.array([[dof]])
 
 
-def link_rows(
+def _link_rows(
     model: StructureModel, numbering: Numbering
 ) -> tuple[SparseArray, FloatArray, FloatArray]:
     """Elongations (m, n) of all links, and their stiffness and damping, shape (m,)."""
-    links = model.attached.links
-    rows, columns, values = [], [], []
-    for row, link in enumerate(links):
-        for point, direction, value in link_terms(model.mesh, link):
-            rows.append(row)
-            columns.append(point_dof(model, numbering, point, direction))
-            values.append(value)
-    shape = len(links), 3 * numbering.count
-    elongations = sparse.csr_array((np.array(values, dtype=np.float64), (rows, columns)), shape)
-    stiffness, damping = np.array([(k.stiffness, k.damping) for k in links]).reshape(-1, 2).T
-    return elongations, stiffness, damping
-
-
-def _squares(rows: SparseArray, weights: FloatArray) -> SparseArray:
-    """The sparse matrix BᵀwB."""
-    return sparse.csr_array(rows.T @ sparse.diags_array(weights) @ rows)
+    at = partial(point_dof, model, numbering)
+    return link_rows(model.mesh, model.attached.links, 3 * numbering.count, at)
 
 
 def _damping(
     model: StructureModel, numbering: Numbering, constraints: Constraints
 ) -> SparseArray | None:
     """Damping matrix of the links, if one has any."""
-    elongations, _, damping = link_rows(model, numbering)
-    return constraints.reduced(_squares(elongations, damping)) if damping.any() else None
+    elongations, _, damping = _link_rows(model, numbering)
+    return constraints.reduced(squares(elongations, damping)) if damping.any() else None
 
 
 def _lumped(

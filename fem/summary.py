@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.frame import Component
-from fem.frame import rigid_body_mass as frame_mass
+from fem.frame import Component, rigid_body_mass
 from fem.pieces import described, place_of
 from fem.structure_assembly import StructureComponent
-from fem.structure_assembly import rigid_body_mass as structure_mass
 
 MOST_NAMES = 30
 
@@ -49,11 +47,11 @@ def mass_properties(component: Component | StructureComponent) -> MassProperties
     axis, m = tᵀMt, and tᵀMr is m times a coordinate of the centre.
     """
     if isinstance(component, Component):
-        rigid = frame_mass(component)
+        rigid = rigid_body_mass(component)
         mass = rigid[0, 0]
         moments = np.array([rigid[1, 2], -rigid[0, 2], mass * component.model.mesh.points[0, 2]])
     else:
-        rigid = structure_mass(component)
+        rigid = component.rigid_mass
         mass = rigid[0, 0]
         moments = np.array([rigid[1, 5], -rigid[0, 5], rigid[0, 4]])
     x, y, z = (float(f"{value:.12g}") + 0.0 for value in (moments / mass if mass else np.zeros(3)))

@@ -12,7 +12,7 @@ from fem.constraints import Numbering
 from fem.mesh import IntArray
 from fem.model import TrussPart
 from fem.natural import Rows, node_rows
-from fem.scatter import SparseArray, dense_scatter
+from fem.scatter import SparseArray, added, dense_scatter
 from fem.structure import StructureModel
 from fem.trusses import truss_mass, truss_rows
 
@@ -36,8 +36,8 @@ def truss_matrices(model: StructureModel, numbering: Numbering) -> tuple[SparseA
         M = truss_mass(part, kind, coordinates, what)
         M = np.einsum("eab,ij->eaibj", M, np.eye(3)).reshape(K.shape)
         dofs = numbering.dofs(nodes)[..., :3].reshape(len(nodes), -1)
-        stiffness = sparse.csr_array(stiffness + dense_scatter(K, dofs, size))
-        mass = sparse.csr_array(mass + dense_scatter(M, dofs, size))
+        stiffness = added(stiffness, dense_scatter(K, dofs, size))
+        mass = added(mass, dense_scatter(M, dofs, size))
     return stiffness, mass
 
 

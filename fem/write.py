@@ -14,8 +14,8 @@ from meshio._vtk_common import meshio_to_vtk_type
 from fem.abaqus.types import ORDERS, SOLIDS
 from fem.errors import ModelError, quoted
 from fem.files import plain_write_errors
+from fem.ignored import SET_PREFIX
 from fem.mesh import FloatArray, FrameMesh, IntArray
-from fem.read import SET_PREFIX
 from fem.structure_mesh import StructureMesh
 
 ABAQUS_TYPES = {kind: name for name, kind in SOLIDS.items() if not name.startswith("CPE")}

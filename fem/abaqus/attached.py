@@ -64,7 +64,7 @@ class Gathered:
 def read_transforms(gathered: Gathered) -> None:
     """Note the nodes whose axes a ``*TRANSFORM`` turns; they matter where something is attached."""
     for body in gathered.deck.bodies.values():
-        for keyword in (k for scope in body.scopes for k in scope.later):
+        for keyword in body.later():
             if keyword.name == "TRANSFORM":
                 name = keyword.name_of("NSET")
                 place = keyword.place()
@@ -79,7 +79,7 @@ def read_point_elements(gathered: Gathered) -> None:
             label: element for label, element in body.elements() if element.type.name in PROPERTY_OF
         }
         numbers: dict[Label, Keyword] = {}
-        for keyword in (k for scope in body.scopes for k in scope.later):
+        for keyword in body.later():
             if keyword.name in PROPERTY_OF.values():
                 _give(gathered, body, keyword, numbers)
         for label, element in elements.items():

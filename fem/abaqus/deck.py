@@ -81,7 +81,9 @@ class Scope:
             return
         self.nodes[label] = (float(place[0]), float(place[1]), float(place[2]))
 
-    def add_element(self, keyword: Keyword, row: int, label: int, element: Element) -> None:
+    def add_element(
+        self, keyword: Keyword, row: int | None, label: int, element: Element
+    ) -> None:
         """A new element; a number that is taken already is an error."""
         if label in self.elements:
             raise keyword.fail(f"element {label} is defined twice", row)
@@ -125,6 +127,11 @@ class Body:
         """All elements with their numbers."""
         for scope in self.scopes:
             yield from scope.elements.items()
+
+    def later(self) -> Iterator[Keyword]:
+        """The keywords that wait until all nodes and sets are known, in their order."""
+        for scope in self.scopes:
+            yield from scope.later
 
     def nodes(self) -> Iterator[tuple[int, FloatArray]]:
         """All nodes with their places in the whole."""

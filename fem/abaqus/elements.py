@@ -115,6 +115,4 @@ def _copy(
         raise keyword.fail(f"element {old} is not defined before it", row)
     element = scope.elements[old]
     nodes = tuple(node + by if isinstance(node, int) else node for node in element.nodes)
-    if new in scope.elements:
-        raise keyword.fail(f"element {new} is defined twice", row)
-    scope.elements[new] = Element(element.type, nodes, keyword.place(row))
+    scope.add_element(keyword, row, new, Element(element.type, nodes, keyword.place(row)))

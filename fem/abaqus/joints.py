@@ -43,7 +43,7 @@ class Joints:
     def read(self) -> None:
         """Read all keywords that join."""
         for body in self.gathered.deck.bodies.values():
-            keywords = [k for scope in body.scopes for k in scope.later]
+            keywords = list(body.later())
             for at, keyword in enumerate(keywords):
                 if keyword.name in _READERS:
                     _READERS[keyword.name](self, body, keyword)
@@ -187,10 +187,10 @@ class Joints:
             for element in self.resolver.reference("ELSET", body, name, place, keyword.shown):
                 nodes += self.resolver.nodes_of(element)
         reference = keyword.name_of("REF NODE")
-        point = self.resolver.one("NSET", body, reference, keyword, None)
+        point = self.resolver.node(body, reference, keyword)
         turn = keyword.parameters.get("ROT NODE", "")
         if turn:
-            self.rotation_nodes[self.resolver.one("NSET", body, turn, keyword, None)] = keyword
+            self.rotation_nodes[self.resolver.node(body, turn, keyword)] = keyword
         self._rigid(list(dict.fromkeys(nodes)), point, keyword, None)
 
     def _coupling(self, body: Body, keyword: Keyword, following: Keyword | None) -> None:
@@ -199,7 +199,7 @@ class Joints:
         if following is None or following.name not in ("KINEMATIC", "DISTRIBUTING"):
             raise keyword.fail("is followed by neither *KINEMATIC nor *DISTRIBUTING")
         reference = keyword.name_of("REF NODE")
-        point = self.resolver.one("NSET", body, reference, keyword, None)
+        point = self.resolver.node(body, reference, keyword)
         surface = keyword.name_of("SURFACE")
         nodes = self.surfaces.nodes(body, surface, keyword)
         numbers = self._numbers(following)
@@ -207,7 +207,7 @@ class Joints:
             raise keyword.fail("directions of axes of its own (ORIENTATION) are not read")
         if following.name == "KINEMATIC":
             following.only()
-            self._kinematic(nodes, point, following, None, numbers)
+            self._kinematic(nodes, point, following, numbers)
             return
         following.only("WEIGHTING METHOD", "COUPLING", "ROTATIONAL COUPLING")
         for key, plain in (("WEIGHTING METHOD", "UNIFORM"), ("COUPLING", "CONTINUUM")):
@@ -229,31 +229,25 @@ class Joints:
         return found or set(range(1, 7))
 
     def _kinematic(
-        self,
-        nodes: list[Label],
-        point: Label,
-        keyword: Keyword,
-        row: int | None,
-        numbers: set[int],
+        self, nodes: list[Label], point: Label, keyword: Keyword, numbers: set[int]
     ) -> None:
         turning = self.turning.intersection(nodes) - {point}
         if turning and not {4, 5, 6} <= numbers:
             raise keyword.fail(
-                "nodes of beams or shells keep rotations of their own, which is not read", row
+                "nodes of beams or shells keep rotations of their own, which is not read"
             )
         if turning and not {1, 2, 3} <= numbers:
             raise keyword.fail(
                 "nodes of beams or shells follow in rotations but not in all translations, which"
-                " is not read",
-                row,
+                " is not read"
             )
         ways = tuple(DIRECTIONS[n - 1] for n in sorted(numbers) if n <= 3)
         if not ways:
-            raise keyword.fail("no translation follows, which is not read", row)
+            raise keyword.fail("no translation follows, which is not read")
         if len(ways) < 3:
             for node in nodes:
-                self.gathered.direction("1", node, keyword, row)
-        self._rigid(nodes, point, keyword, row, ways)
+                self.gathered.direction("1", node, keyword, None)
+        self._rigid(nodes, point, keyword, None, ways)
 
     def _averaging(
         self, nodes: list[Label], point: Label, keyword: Keyword, numbers: set[int], weighting: str
@@ -272,7 +266,7 @@ class Joints:
         """``*KINEMATIC COUPLING``: rows of a node or set, the first and the last direction."""
         keyword.only("REF NODE")
         reference = keyword.name_of("REF NODE")
-        point = self.resolver.one("NSET", body, reference, keyword, None)
+        point = self.resolver.node(body, reference, keyword)
         place = keyword.place()
         groups: dict[tuple[int, ...], list[Label]] = {}
         directions: dict[Label, set[int]] = {}
@@ -284,7 +278,7 @@ class Joints:
         for node, numbers in directions.items():
             groups.setdefault(tuple(sorted(numbers)), []).append(node)
         for chosen, nodes in groups.items():
-            self._kinematic(nodes, point, keyword, None, set(chosen))
+            self._kinematic(nodes, point, keyword, set(chosen))
 
     def distributing_coupling(self, body: Body, keyword: Keyword) -> None:
         """``*DISTRIBUTING COUPLING``: rows of a node or set and its weight."""

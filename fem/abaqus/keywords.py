@@ -30,8 +30,6 @@ class Keyword:
     rows, lines
         Words of the data lines, and where each stands (after ``file``, unless ``INPUT`` names
         another).
-    in_step
-        Whether it stands between ``*STEP`` and ``*END STEP``.
     """
 
     name: str
@@ -42,7 +40,6 @@ class Keyword:
     line: int
     rows: list[list[str]] = field(default_factory=list)
     lines: list[int] = field(default_factory=list)
-    in_step: bool = False
 
     def place(self, row: int | None = None) -> str:
         """Where the keyword or one of its rows is: "line 12", with the file if it is another."""
@@ -125,7 +122,6 @@ class Reading:
     source: Path
     folders: list[Path]
     included: int = 0
-    in_step: bool = False
 
     def keywords(self) -> Iterator[Keyword]:
         """All keywords, with those of included files in place."""
@@ -157,11 +153,6 @@ class Reading:
 
     def _ready(self, keyword: Keyword) -> Iterator[Keyword]:
         """A keyword whose lines are complete, with those of another file if it names one."""
-        if keyword.name == "STEP":
-            self.in_step = True
-        keyword.in_step = self.in_step
-        if keyword.name == "ENDSTEP":
-            self.in_step = False
         if keyword.name == "INCLUDE":
             keyword.only("INPUT", "FILE")
             yield from self._of(self._other(keyword))

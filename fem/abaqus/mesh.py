@@ -12,12 +12,9 @@ from fem.abaqus.deck import Body, Deck, Label
 from fem.abaqus.keywords import Keyword
 from fem.abaqus.sets import Resolver
 from fem.abaqus.surfaces import Surfaces
-from fem.abaqus.types import NODE_COUNTS, ORDERS
-from fem.cells import KINDS
+from fem.abaqus.types import ORDERS
+from fem.ignored import TYPE_PREFIX
 from fem.mesh import FloatArray, IntArray
-
-TYPE_PREFIX = "abaqus:"
-"""Before the names of the cell sets that hold the cells of an element type."""
 
 
 @dataclass
@@ -37,16 +34,12 @@ def numbered_nodes(deck: Deck) -> tuple[dict[Label, int], dict[Label, FloatArray
 
 
 def collected_cells(deck: Deck, resolver: Resolver, position: dict[Label, int]) -> Cells:
-    """All elements that are cells; kinds of cells that `fem` does not have are refused."""
+    """All elements that are cells."""
     cells = Cells()
     for body in deck.bodies.values():
         for label, element in body.elements():
             kind = element.type.kind
             if kind is None:
-                continue
-            if kind not in KINDS:
-                place = f"{element.place}, element {label}"
-                deck.refuse(f"elements of type {element.type.name}", place, f"a {kind} is not read")
                 continue
             nodes = [
                 position.get((body.name, node), -1) if isinstance(node, int) else -1
@@ -115,7 +108,7 @@ def _sets_of(
 
 
 def _surfaces_of(body: Body) -> list[Keyword]:
-    return [k for scope in body.scopes for k in scope.later if k.name == "SURFACE"]
+    return [keyword for keyword in body.later() if keyword.name == "SURFACE"]
 
 
 def content_of(
@@ -127,11 +120,8 @@ def content_of(
     surfaces: Surfaces,
 ) -> meshio.Mesh:
     """The mesh as meshio has it."""
-    kinds = list(cells.nodes) or ["line"]
-    blocks = [
-        (kind, np.array(cells.nodes.get(kind, []), np.int64).reshape(-1, NODE_COUNTS[kind]))
-        for kind in kinds
-    ]
+    kinds = list(cells.nodes)
+    blocks = [(kind, np.array(nodes, dtype=np.int64)) for kind, nodes in cells.nodes.items()]
     points = np.array(list(places.values()), dtype=np.float64).reshape(-1, 3)
     _check_centres(deck, dict(blocks), points, cells)
     nodes = named_sets(deck, gathered.resolver, "NSET", surfaces) | gathered.sets

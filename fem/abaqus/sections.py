@@ -34,7 +34,7 @@ def described_parts(deck: Deck, resolver: Resolver) -> dict[str, dict[str, objec
     materials = _materials(deck)
     found: dict[str, dict[str, object]] = {}
     for body in deck.bodies.values():
-        for keyword in (k for scope in body.scopes for k in scope.later):
+        for keyword in body.later():
             if keyword.name not in SECTIONS or "ELSET" not in keyword.parameters:
                 continue
             name = keyword.parameters["ELSET"]
@@ -155,7 +155,7 @@ def _beam(body: Body, keyword: Keyword, families: set[str]) -> dict[str, object]
     else:
         said = f"has a section {shape!r} of {len(size)} numbers"
         raise NotTakenError(f"{said}, which is not taken over")
-    return {"kind": "beam", "theory": _theory(body, keyword), **numbers, **_axis(body, keyword)}
+    return {"kind": "beam", "theory": _theory(body), **numbers, **_axis(body, keyword)}
 
 
 ORIENTING = ("NORMALS OF *NODE", "*NORMAL", "ORIENTATION NODES OF BEAMS")
@@ -175,7 +175,7 @@ def _is_plane(body: Body) -> bool:
     return all(name.startswith(("B2", "PIPE2", "FRAME2")) for name in beams)
 
 
-def _theory(body: Body, keyword: Keyword) -> str:
+def _theory(body: Body) -> str:
     """Euler and Bernoulli's for the cubic beams, Timoshenko's for the others."""
     names = {e.type.name for _, e in body.elements() if family(e.type.name) == "beam"}
     cubic = {name for name in names if name[:3] in ("B23", "B33", "FRA")}
@@ -210,7 +210,7 @@ def _general(body: Body, keyword: Keyword, families: set[str]) -> dict[str, obje
         raise NotTakenError("has a product of inertia, or no density, or no moduli")
     if _is_plane(body):
         first, second = second, first
-    theory = _theory(body, keyword)
+    theory = _theory(body)
     areas = {"shear_area": area, "shear_area_across": area} if theory == "timoshenko" else {}
     return {
         "kind": "beam",

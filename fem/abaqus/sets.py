@@ -144,11 +144,11 @@ class Resolver:
             raise self.deck.fail(f"{place}: names the instance {name!r}, which is not defined")
         return found
 
-    def one(self, kind: str, body: Body, word: str, keyword: Keyword, row: int | None) -> Label:
-        """The one node or element that a word stands for."""
-        found = self.reference(kind, body, word, keyword.place(row), keyword.shown)
+    def node(self, body: Body, word: str, keyword: Keyword) -> Label:
+        """The one node that a word stands for."""
+        found = self.reference("NSET", body, word, keyword.place(), keyword.shown)
         if len(found) != 1:
-            raise keyword.fail(f"{word!r} holds {len(found)} nodes, and must be one", row)
+            raise keyword.fail(f"{word!r} holds {len(found)} nodes, and must be one")
         return found[0]
 
     def nodes_of(self, element: Label) -> list[Label]:

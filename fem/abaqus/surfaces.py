@@ -7,7 +7,8 @@ from collections import Counter
 from fem.abaqus.deck import Body, Label
 from fem.abaqus.keywords import Keyword, filled
 from fem.abaqus.sets import Resolver
-from fem.abaqus.types import CORNERS, faces
+from fem.abaqus.types import faces
+from fem.cells import KINDS
 
 
 class Surfaces:
@@ -17,7 +18,7 @@ class Surfaces:
         self.resolver = resolver
         self.named: dict[tuple[str, str], Keyword] = {}
         for body in resolver.deck.bodies.values():
-            for keyword in (k for scope in body.scopes for k in scope.later):
+            for keyword in body.later():
                 if keyword.name == "SURFACE":
                     key = (body.name, keyword.name_of("NAME").upper())
                     if key in self.named:
@@ -79,7 +80,7 @@ class Surfaces:
         kind = element_type.kind
         if kind is None:
             raise keyword.fail(f"element {element[1]} is a point and has no face", row)
-        if kind not in CORNERS:
+        if KINDS[kind].dimension == 1:
             return nodes
         plane = kind.startswith(("triangle", "quad"))
         shell = plane and not element_type.name.startswith("CP")
@@ -105,9 +106,10 @@ class Surfaces:
             count: Counter[frozenset[Label]] = Counter()
             for body in self.resolver.deck.bodies.values():
                 for label, element in body.elements():
-                    if element.type.kind in CORNERS:
+                    kind = element.type.kind
+                    if kind is not None and KINDS[kind].dimension > 1:
                         nodes = self.resolver.nodes_of((body.name, label))
-                        for each in faces(element.type.kind):
+                        for each in faces(kind):
                             count[frozenset(nodes[i] for i in each)] += 1
             self._free = {nodes for nodes, times in count.items() if times == 1}
         return face in self._free

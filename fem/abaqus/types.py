@@ -6,6 +6,8 @@ import re
 from dataclasses import dataclass
 from functools import cache
 
+from fem.cells import KINDS
+
 TWO_NODE_LINES: tuple[str, ...] = ("B21", "B23", "B31", "B31OS", "B33", "FRAME2D", "FRAME3D")
 TWO_NODE_LINES += ("PIPE21", "PIPE31", "T2D2", "T3D2")
 THREE_NODE_LINES = ("B22", "B32", "B32OS", "PIPE22", "PIPE32", "T2D3", "T3D3")
@@ -20,11 +22,6 @@ SHELLS = {f"{p}{count}": kind for p in ("S", "M3D") for count, kind in _PLANE.it
 SHELLS |= {"STRI3": "triangle", "STRI65": "triangle6", "S8R5": "quad8", "S4R5": "quad"}
 SHELLS |= {"S9R5": "quad9", "M3D9": "quad9"}
 """Shells and membranes by the kind of their cells."""
-
-NODE_COUNTS = {"line": 2, "line3": 3, "triangle": 3, "quad": 4, "triangle6": 6, "quad8": 8}
-NODE_COUNTS |= {"quad9": 9, "tetra": 4, "pyramid": 5, "wedge": 6, "hexahedron": 8}
-NODE_COUNTS |= {"tetra10": 10, "pyramid13": 13, "wedge15": 15, "hexahedron20": 20}
-NODE_COUNTS |= {"hexahedron27": 27}
 
 ORDERS = {"line3": (0, 2, 1), "hexahedron27": (*range(20), 26, 24, 23, 25, 21, 22, 20)}
 """Where meshio's nodes are among those of the file, for kinds whose order is another.
@@ -66,7 +63,7 @@ def element_type(name: str) -> ElementType | None:
     for table, suffix in ((SOLIDS, "[RIHMTS]*"), (SHELLS, "[RST]*")):
         for known, kind in table.items():
             if re.fullmatch(known + suffix, name):
-                return ElementType(name, kind, NODE_COUNTS[kind])
+                return ElementType(name, kind, KINDS[kind].node_count)
     return None
 
 
@@ -75,12 +72,7 @@ _TETRAHEDRON = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
 _PYRAMID = ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0))
 _WEDGE = ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0))
 _CUBE = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
-CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4, "tetra": 4}
-CORNERS |= {"tetra10": 4, "pyramid": 5, "pyramid13": 5, "wedge": 6, "wedge15": 6}
-CORNERS |= {"hexahedron": 8, "hexahedron20": 8, "hexahedron27": 8}
 _FACES = {3: _TRIANGLE, 4: _SQUARE, 5: _PYRAMID, 6: _WEDGE, 8: _CUBE}
-_UPRIGHT = {4: ((0, 3), (1, 3), (2, 3)), 5: ((0, 4), (1, 4), (2, 4), (3, 4))}
-_UPRIGHT |= {6: ((0, 3), (1, 4), (2, 5)), 8: ((0, 4), (1, 5), (2, 6), (3, 7))}
 
 
 @cache
@@ -92,11 +84,12 @@ def faces(kind: str) -> tuple[tuple[int, ...], ...]:
     >>> faces("tetra10")[1]
     (0, 3, 1, 7, 8, 4)
     """
-    count = CORNERS[kind]
+    cell = KINDS[kind]
+    count = len(cell.corners)
     found = _TETRAHEDRON if kind.startswith("tetra") else _FACES[count]
-    middle = {frozenset(edge): count + i for i, edge in enumerate(_edges(kind))}
-    if NODE_COUNTS[kind] <= count + 1:
+    if cell.order == 1:
         return tuple(found)
+    middle = {frozenset(edge): node for node, edge in enumerate(cell.edges, count)}
     return tuple(
         face + tuple(middle[frozenset(pair)] for pair in dict.fromkeys(_around(face)))
         for face in found
@@ -106,13 +99,3 @@ def faces(kind: str) -> tuple[tuple[int, ...], ...]:
 def _around(face: tuple[int, ...]) -> list[tuple[int, int]]:
     pairs = list(zip(face, face[1:] + face[:1], strict=True))
     return pairs if len(face) > 2 else pairs[:1]
-
-
-def _edges(kind: str) -> tuple[tuple[int, int], ...]:
-    """Pairs of corners in the order of the nodes between them."""
-    count = CORNERS[kind]
-    if kind.startswith(("triangle", "quad")):
-        return _TRIANGLE if count == 3 else _SQUARE
-    base = _TRIANGLE if count in (4, 6) else _SQUARE
-    top = tuple((a + count // 2, b + count // 2) for a, b in base) if count in (6, 8) else ()
-    return (*base, *top, *_UPRIGHT[count])
