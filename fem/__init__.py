@@ -27,6 +27,7 @@ from fem.model import (
 from fem.pieces import Pieces, pieces_of
 from fem.places import node_at, nodes_inside
 from fem.read import from_meshio, read_mesh, read_structure, structure_from_meshio
+from fem.refine import refined
 from fem.sections import (
     CircularSection,
     CrossSection,
@@ -89,6 +90,7 @@ __all__ = [
     "read_abaqus",
     "read_mesh",
     "read_structure",
+    "refined",
     "structure_from_meshio",
     "structure_mesh",
     "summary",

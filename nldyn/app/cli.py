@@ -148,12 +148,13 @@ def run(
     with plain_errors():
         from nldyn.runtime.progress import progress_line
         from nldyn.runtime.result_directory import check_directory
-        from nldyn.scene.build import compute, explore_scene, load_scene
+        from nldyn.scene.read import load_scene
 
         start = time.perf_counter()
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)
         from nldyn.io.checkpoint import CheckpointFile
+        from nldyn.scene.run import compute, explore_scene
 
         with kept_at_interrupt(out) as unfinished:
             kept = CheckpointFile(unfinished)
@@ -180,14 +181,10 @@ def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
     with plain_errors():
         import fem
         from nldyn.runtime.progress import messages_shown
-        from nldyn.scene.build import (
-            build_candidates,
-            build_component,
-            build_reduced,
-            build_system,
-            load_scene,
-        )
+        from nldyn.scene.build import build_candidates, build_reduced, build_system
         from nldyn.scene.checks import check_computable, range_remark
+        from nldyn.scene.component import build_component
+        from nldyn.scene.read import load_scene
 
         loaded = load_scene(scene, mesh_folders)
         with messages_shown():
@@ -255,7 +252,7 @@ def render(
     with plain_errors():
         from nldyn.runtime.progress import progress_line
         from nldyn.runtime.result_directory import check_directory
-        from nldyn.scene.build import load_scene
+        from nldyn.scene.read import load_scene
 
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)
@@ -348,7 +345,7 @@ def converge(
     with plain_errors():
         from nldyn.runtime.progress import progress_line
         from nldyn.runtime.result_directory import check_directory
-        from nldyn.scene.build import load_scene
+        from nldyn.scene.read import load_scene
 
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)

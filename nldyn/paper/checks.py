@@ -24,7 +24,8 @@ from nldyn.paper.evidence import (
     unstable_share,
 )
 from nldyn.paper.jobs import BILINEAR_ALPHA, HERTZ_STIFFNESS, STIFFNESS
-from nldyn.scene.build import build_component, load_scene
+from nldyn.scene.component import build_component
+from nldyn.scene.read import load_scene
 from nldyn.search.diagram import Diagram
 from nldyn.system.elements import hertz_stiffness
 

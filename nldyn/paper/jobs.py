@@ -21,7 +21,9 @@ from nldyn.paper.starts import LOST, is_at, keep_numbers, read_starts
 from nldyn.paper.workers import Task
 from nldyn.runtime.compilation import compilations
 from nldyn.runtime.progress import Progress, silent
-from nldyn.scene.build import build_component, build_system, load_scene
+from nldyn.scene.build import build_system
+from nldyn.scene.component import build_component
+from nldyn.scene.read import load_scene
 from nldyn.search.diagram import Collector, Diagram, Seed, diagram
 from nldyn.system.elements import Stop
 from nldyn.system.system import System

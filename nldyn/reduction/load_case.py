@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
+
+from numpy.typing import ArrayLike
 
 from nldyn.base.errors import SystemModelError, check_frequency
 from nldyn.system.elements import Damper, Excitation, Stop
@@ -73,10 +76,10 @@ class LoadCase:
         SystemModelError
             As `System.from_reduced`.
         """
-        if any(self.rayleigh):
-            reduced = reduced.with_damping(rayleigh=self.rayleigh)
-        return System.from_reduced(
-            with_first(reduced, self.observe) if self.observe else reduced,
+        return system_of_reduced(
+            reduced,
+            self.observe,
+            self.rayleigh,
             modal_damping=self.modal_damping,
             stops=self.stops,
             dampers=self.dampers,
@@ -84,7 +87,35 @@ class LoadCase:
         )
 
 
-def with_first(reduced: cms.ReducedModel, observed: str) -> cms.ReducedModel:
+def system_of_reduced(
+    reduced: cms.ReducedModel,
+    observe: str | None,
+    rayleigh: tuple[float, float],
+    *,
+    modal_damping: float | ArrayLike,
+    stops: Sequence[Stop],
+    dampers: Sequence[Damper],
+    excitation: Sequence[Excitation],
+) -> System:
+    """The system of a reduced model, for parameters as those of `LoadCase`.
+
+    Raises
+    ------
+    SystemModelError
+        As `System.from_reduced`.
+    """
+    if any(rayleigh):
+        reduced = reduced.with_damping(rayleigh=rayleigh)
+    return System.from_reduced(
+        _with_first(reduced, observe) if observe else reduced,
+        modal_damping=modal_damping,
+        stops=stops,
+        dampers=dampers,
+        excitation=excitation,
+    )
+
+
+def _with_first(reduced: cms.ReducedModel, observed: str) -> cms.ReducedModel:
     """The reduced model with one interface before the others."""
     order = sorted(reduced.interfaces, key=lambda name: name != observed)
     changed = replace(reduced, participation={n: reduced.participation[n] for n in order})

@@ -13,8 +13,9 @@ from nldyn.base.errors import SceneError
 from nldyn.report.results import write_table
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.runtime.result_directory import result_directory
-from nldyn.scene.build import build_component, build_reduced, build_system
+from nldyn.scene.build import build_reduced, build_system
 from nldyn.scene.checks import check_computable
+from nldyn.scene.component import build_component
 from nldyn.scene.messages import scene_error
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def render_scene(
     --------
     >>> import tempfile
     >>> from nldyn.base.resources import example
-    >>> from nldyn.scene.build import load_scene
+    >>> from nldyn.scene.read import load_scene
     >>> scene = load_scene(example("two_dof_xi_0.01.toml"))
     >>> made = render_scene(scene, tempfile.mkdtemp(), frequency_hz=23.0)   # doctest: +SKIP
     """

@@ -81,7 +81,7 @@ def write_results(
     Parameters
     ----------
     found : Diagram or Exploration
-        What `nldyn.scene.build.compute` or `nldyn.scene.build.explore_scene` gave.
+        What `nldyn.scene.run.compute` or `nldyn.scene.run.explore_scene` gave.
     directory : str or Path
         New, empty, or written by an earlier run, whose files are replaced; other files in it
         are kept. Gets ``branches.csv``, ``special_points.csv``, ``ends.csv``, ``branches.h5``,

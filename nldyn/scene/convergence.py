@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import cms
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_choice
 from nldyn.reduction.convergence import COUNTS, METHODS, ConvergenceStudy, convergence_study
-from nldyn.scene.build import build_component
+from nldyn.scene.component import build_component
 from nldyn.scene.load_case import load_case_of
 from nldyn.scene.messages import scene_error
 

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from nldyn.reduction.load_case import LoadCase
-from nldyn.scene.build import acting_elements
 from nldyn.scene.checks import check_computable
+from nldyn.scene.elements import acting_elements
 from nldyn.scene.messages import scene_error
-
-if TYPE_CHECKING:
-    from nldyn.scene.schema import Scene
+from nldyn.scene.schema import Scene
 
 
 def load_case_of(scene: Scene) -> LoadCase:
-    """The setting of a scene.
+    """The load case of a scene.
 
     Raises
     ------
@@ -30,13 +26,10 @@ def load_case_of(scene: Scene) -> LoadCase:
         raise scene_error(scene.file, ("damping", "modal_ratio"), fault)
     assert scene.continuation is not None
     low, high = scene.continuation.range_hz
-    stops, dampers, excitation = acting_elements(scene)
     return LoadCase(
         (low, high),
-        stops,
-        dampers,
-        excitation,
-        scene.damping.modal_ratio,
-        scene.observed,
-        scene.damping.rayleigh,
+        *acting_elements(scene),
+        modal_damping=scene.damping.modal_ratio,
+        observe=scene.observed,
+        rayleigh=scene.damping.rayleigh,
     )

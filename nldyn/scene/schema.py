@@ -466,7 +466,7 @@ class Scene(Table):
     Examples
     --------
     >>> from nldyn.base.resources import example
-    >>> from nldyn.scene.build import load_scene
+    >>> from nldyn.scene.read import load_scene
     >>> scene = load_scene(example("one_dof.toml"))
     >>> scene.stops[0].stiffness
     5170000000.0

@@ -28,7 +28,8 @@ from nldyn.base.errors import (
 )
 from nldyn.base.version import software_version
 from nldyn.runtime.executors import as_finished, check_execution
-from nldyn.scene.build import build_system, load_scene, scene_from_tables
+from nldyn.scene.build import build_system
+from nldyn.scene.read import load_scene, scene_from_tables
 from nldyn.scene.schema import Scene
 from nldyn.scene.study_keys import case_keys
 from nldyn.system.system import System

@@ -53,7 +53,9 @@ def model_system(name: str) -> System:
     """The beam with 1, 2, 4 or 16 degrees of freedom, from the example scenes."""
     import cms
     from nldyn.base.resources import example
-    from nldyn.scene.build import build_component, build_system, load_scene
+    from nldyn.scene.build import build_system
+    from nldyn.scene.component import build_component
+    from nldyn.scene.read import load_scene
 
     if name == "one_dof":
         return build_system(load_scene(example("one_dof.toml")))

@@ -172,7 +172,9 @@ def time_modes(numbers: Sequence[int] = MODES) -> list[ModesTime]:
     """One period of the beam with more and more modes; errors against the tightest setting."""
     import cms
     from nldyn.base.resources import example
-    from nldyn.scene.build import build_component, build_system, load_scene
+    from nldyn.scene.build import build_system
+    from nldyn.scene.component import build_component
+    from nldyn.scene.read import load_scene
 
     scene = load_scene(example("four_dof_xi_0.01.toml"))
     component = build_component(scene)

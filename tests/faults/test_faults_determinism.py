@@ -14,7 +14,8 @@ from nldyn import Plane, basins, parameter_study, simulate, sweep
 from nldyn.base.resources import example
 from nldyn.paper.jobs import JOBS, diagrams_of, tasks_of
 from nldyn.paper.workers import worker_processes
-from nldyn.scene.build import build_system, load_scene
+from nldyn.scene.build import build_system
+from nldyn.scene.read import load_scene
 
 START = "from nldyn.app.command import main; main()"
 

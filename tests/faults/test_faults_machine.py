@@ -130,7 +130,7 @@ def test_files_that_the_system_refuses_to_grow(scene, tmp_path):
 
 
 def test_a_folder_that_cannot_be_written_to_is_told_before_the_work(scene, tmp_path, monkeypatch):
-    monkeypatch.setattr("nldyn.scene.build.compute", lambda *_: pytest.fail("computed"))
+    monkeypatch.setattr("nldyn.scene.run.compute", lambda *_: pytest.fail("computed"))
     (tmp_path / "closed").mkdir(mode=0o555)
     for place in (tmp_path / "closed" / "out", "/proc/out", tmp_path / ("x" * 300)):
         said = refusal(invoke(scene, place))
@@ -184,7 +184,7 @@ def stopped_at(monkeypatch, owner, name, call):
 
 
 STAGES = {
-    "scene": ("nldyn.scene.build", "load_scene", 1, False),
+    "scene": ("nldyn.scene.read", "load_scene", 1, False),
     "search": ("nldyn.search.diagram", "simulate_strobe", 1, False),
     "walk": ("nldyn.branches.arclength.Stepper", "_advance", 20, True),
     "tables": ("nldyn.report.results", "write_table", 2, True),

@@ -12,7 +12,9 @@ from small_meshes import fuzz, write_meshes
 
 import cms
 import fem
-from nldyn.scene.build import build_component, build_system, load_scene
+from nldyn.scene.build import build_system
+from nldyn.scene.component import build_component
+from nldyn.scene.read import load_scene
 
 QUICK, FULL = 50, 4000
 

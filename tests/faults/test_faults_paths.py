@@ -13,7 +13,8 @@ from small_meshes import write_meshes
 import fem
 from fem.page import write_page
 from nldyn.base.errors import SceneError
-from nldyn.scene.build import build_component, load_scene, parse_scene
+from nldyn.scene.component import build_component
+from nldyn.scene.read import load_scene, parse_scene
 
 IN_FOLDER = "outside the folder of the scene and the current one"
 

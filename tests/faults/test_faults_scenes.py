@@ -13,7 +13,9 @@ from scene_mutations import TEXTS, document, spoil, tweak
 from small_meshes import fuzz, write_meshes
 
 from nldyn.base.resources import mesh
-from nldyn.scene.build import build_component, build_system, load_scene
+from nldyn.scene.build import build_system
+from nldyn.scene.component import build_component
+from nldyn.scene.read import load_scene
 
 QUICK, FULL = 50, 4000
 KEYS = {name: tomllib.loads(text) for name, text in TEXTS.items()}

@@ -20,7 +20,8 @@ from nldyn.base.resources import mesh as mesh_file
 from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import continue_branch
 from nldyn.orbits.solve import solve_orbit
-from nldyn.scene.build import build_system, load_scene
+from nldyn.scene.build import build_system
+from nldyn.scene.read import load_scene
 from nldyn.system.elements import Stop, Unbalance
 from nldyn.system.system import System
 

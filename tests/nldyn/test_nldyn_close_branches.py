@@ -38,7 +38,8 @@ from nldyn.branches.arclength import BY_TOLERANCE
 from nldyn.branches.continuation import _without_repeat, start_point
 from nldyn.branches.leg import Leg
 from nldyn.orbits.shooting import asymmetry, metric_length
-from nldyn.scene.build import build_system, load_scene
+from nldyn.scene.build import build_system
+from nldyn.scene.read import load_scene
 
 SHORT = ContinuationOptions(first_step=0.005, max_step=0.005)
 LONG = ContinuationOptions(first_step=0.05)

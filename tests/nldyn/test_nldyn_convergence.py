@@ -39,8 +39,9 @@ from nldyn.reduction.convergence import (
     receptance_bound,
 )
 from nldyn.report.convergence import write_study
-from nldyn.scene.build import build_component, load_scene
+from nldyn.scene.component import build_component
 from nldyn.scene.convergence import convergence_study_of, with_mesh
+from nldyn.scene.read import load_scene
 
 
 @pytest.fixture(scope="module")

@@ -41,7 +41,8 @@ from nldyn.orbits.bordered import OrbitFamily
 from nldyn.orbits.conditions import Singular, bialternate, max_abs_displacement, peak_force
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import shooting_problem
-from nldyn.scene.build import build_system, load_scene
+from nldyn.scene.build import build_system
+from nldyn.scene.read import load_scene
 from nldyn.system.chart import EVERY_MODE, Chart, value_of, with_value
 
 MASS, NATURAL, RATIO = 2.0, 2.0 * math.pi * 10.0, 0.03

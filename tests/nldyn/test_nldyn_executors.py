@@ -39,7 +39,8 @@ from nldyn.base.resources import example
 from nldyn.longterm.wear import measures_table
 from nldyn.runtime import executors
 from nldyn.runtime.executors import TaskError, as_finished
-from nldyn.scene.build import build_system, load_scene
+from nldyn.scene.build import build_system
+from nldyn.scene.read import load_scene
 
 
 def processes(workers: int) -> ProcessPoolExecutor:

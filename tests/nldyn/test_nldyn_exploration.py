@@ -43,7 +43,8 @@ from nldyn.orbits.orbit import stroboscopic
 from nldyn.orbits.starts import random_states, settling_periods
 from nldyn.runtime import keeper
 from nldyn.runtime.progress import silent
-from nldyn.scene.build import build_system, load_scene
+from nldyn.scene.build import build_system
+from nldyn.scene.read import load_scene
 from nldyn.search import explore as survey
 from nldyn.search.diagram import Collector, middle_orbit
 from nldyn.search.exploration import chao_lower_bound

@@ -127,7 +127,8 @@ def test_free_vibration_under_forcing_is_quasi_periodic():
 
 def test_a_torus_of_a_damped_structure_is_quasi_periodic():
     from nldyn.base.resources import example
-    from nldyn.scene.build import build_system, load_scene
+    from nldyn.scene.build import build_system
+    from nldyn.scene.read import load_scene
 
     found = classify(build_system(load_scene(example("four_dof_xi_0.01.toml"))), 62.0)
     assert found.kind == "quasi-periodic"
@@ -326,7 +327,8 @@ def test_points_of_a_stable_manifold_lie_on_the_edge_between_the_phases(one_dof,
 
 def test_two_stable_orbits_share_the_plane_and_unstable_ones_sit_on_the_edge():
     from nldyn.base.resources import example
-    from nldyn.scene.build import build_system, load_scene
+    from nldyn.scene.build import build_system
+    from nldyn.scene.read import load_scene
 
     system = build_system(load_scene(example("two_dof_xi_0.01.toml")))
     plane = Plane.at_interface(system, (-3e-5, 1e-5), (-0.006, 0.006))
@@ -357,7 +359,8 @@ def test_two_stable_orbits_share_the_plane_and_unstable_ones_sit_on_the_edge():
 @pytest.mark.parametrize("ratio", ["0.01", "0.001"])
 def test_of_the_two_stable_branches_below_23_hz_one_is_left_at_23_hz(ratio):
     from nldyn.base.resources import example
-    from nldyn.scene.build import build_system, load_scene
+    from nldyn.scene.build import build_system
+    from nldyn.scene.read import load_scene
 
     system = build_system(load_scene(example(f"two_dof_xi_{ratio}.toml")))
     for hz, impacts_of in ((22.8, {1, 2}), (23.0, {2})):

@@ -17,8 +17,9 @@ from nldyn.base.resources import example
 from nldyn.branches.peaks import resonance_peaks
 from nldyn.reduction.candidates import contact_duration
 from nldyn.reduction.convergence import harmonic_branch, largest_force, matched, special_points_of
-from nldyn.scene.build import build_component, load_scene
+from nldyn.scene.component import build_component
 from nldyn.scene.load_case import load_case_of
+from nldyn.scene.read import load_scene
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,8 @@ import cms
 import fem
 from nldyn.app.cli import main
 from nldyn.base.resources import example
-from nldyn.scene.build import build_component, load_scene
+from nldyn.scene.component import build_component
+from nldyn.scene.read import load_scene
 
 
 def first_hz(name):

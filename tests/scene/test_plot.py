@@ -12,7 +12,8 @@ from nldyn.base.resources import example
 from nldyn.branches.continuation import continue_branch
 from nldyn.orbits.solve import solve_orbit
 from nldyn.plot.diagram import branch_curve, length_unit, plot_diagram, plot_orbit, stability_runs
-from nldyn.scene.build import build_system, load_scene
+from nldyn.scene.build import build_system
+from nldyn.scene.read import load_scene
 from nldyn.system.elements import Stop, Unbalance
 from nldyn.system.system import System
 

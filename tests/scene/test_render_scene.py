@@ -15,7 +15,8 @@ from nldyn.report.render import (
     render_scene,
     stop_to_draw,
 )
-from nldyn.scene.build import build_system, load_scene, parse_scene
+from nldyn.scene.build import build_system
+from nldyn.scene.read import load_scene, parse_scene
 
 BEAM = example("two_dof_xi_0.01.toml")
 

@@ -7,20 +7,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import nldyn.search.diagram
+import nldyn.scene.run
 from nldyn.base.errors import SceneError
 from nldyn.base.resources import example, examples, mesh
-from nldyn.scene.build import (
-    build_candidates,
-    build_component,
-    build_reduced,
-    build_selection,
-    build_system,
-    compute,
-    load_scene,
-    parse_scene,
-)
+from nldyn.scene.build import build_candidates, build_reduced, build_selection, build_system
+from nldyn.scene.component import build_component
 from nldyn.scene.load_case import load_case_of
+from nldyn.scene.read import load_scene, parse_scene
+from nldyn.scene.run import compute
 
 MODAL = """
 [modal]
@@ -230,7 +224,7 @@ def test_tolerance_of_a_scene_is_that_of_its_flow_map(monkeypatch):
     scene = load_scene(example("one_dof.toml"))
     text = scene.text.replace("[continuation]", "[continuation]\nrtol = 1e-6")
     taken = []
-    monkeypatch.setattr(nldyn.search.diagram, "diagram", lambda flow, *_, **__: taken.append(flow))
+    monkeypatch.setattr(nldyn.scene.run, "diagram", lambda flow, *_, **__: taken.append(flow))
     compute(parse_scene(text, scene.file))
     assert taken[0].options.rtol == 1e-6
 

@@ -8,7 +8,9 @@ from click.testing import CliRunner
 
 from nldyn.app.cli import main
 from nldyn.base.errors import SceneError
-from nldyn.scene.build import build_component, build_reduced, build_system, load_scene
+from nldyn.scene.build import build_reduced, build_system
+from nldyn.scene.component import build_component
+from nldyn.scene.read import load_scene
 
 DECK = """*NODE
 {nodes}*ELEMENT, TYPE=B21, ELSET=BEAM

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from nldyn.base.resources import example, examples
-from nldyn.scene.build import load_scene, parse_scene
 from nldyn.scene.messages import all_keys, table_at
+from nldyn.scene.read import load_scene, parse_scene
 from nldyn.scene.schema import Scene
 
 DOC = (Path(__file__).parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")

@@ -7,7 +7,8 @@ from click.testing import CliRunner
 import fem
 from nldyn.app.cli import main
 from nldyn.base.errors import SceneError
-from nldyn.scene.build import build_component, parse_scene
+from nldyn.scene.component import build_component
+from nldyn.scene.read import parse_scene
 
 SCENE = """
 [mesh]

@@ -11,7 +11,7 @@ from fakes import FakeBranch, FakeDiagram, FakeNode, FakeOrbit, FakeSpecialPoint
 from nldyn.base.resources import example
 from nldyn.orbits.multipliers import Stability
 from nldyn.report.results import write_results
-from nldyn.scene.build import load_scene
+from nldyn.scene.read import load_scene
 
 FILES = {
     "branches.csv",

@@ -1,0 +1,221 @@
+"""From the mesh of a scene to a component."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, TypeVar
+
+import fem
+from nldyn.base.errors import SceneError
+from nldyn.base.resources import data_directory
+from nldyn.scene.checks import check_mesh_names, check_structure_names
+from nldyn.scene.described_parts import with_described_parts
+from nldyn.scene.faults import check_regular, told_as, unreadable
+from nldyn.scene.messages import scene_error
+from nldyn.scene.schema import PartTable, Scene
+
+Mesh = TypeVar("Mesh", fem.FrameMesh, fem.StructureMesh)
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
+
+
+def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.StructureComponent:
+    """Assemble the mesh of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with a ``[mesh]``.
+    refinement : int
+        Cut every line of a frame, or of a structure of lines alone, into this many.
+
+    Returns
+    -------
+    fem.Component or fem.StructureComponent
+        Sparse stiffness (N/m) and mass (kg), and the interfaces.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no mesh, or the mesh is unreadable, empty or lacks a name used, or is of a
+        structure and to be refined.
+
+    Examples
+    --------
+    >>> from nldyn.base.resources import example
+    >>> from nldyn.scene.read import load_scene
+    >>> list(build_component(load_scene(example("two_dof_xi_0.01.toml"))).interfaces)
+    ['middle']
+    """
+    if scene.mesh is None:
+        raise scene_error(scene.file, ("mesh",), "is missing: the structure is not given by a mesh")
+    path, ignore = _mesh_path(scene, scene.mesh.file), scene.mesh.ignore
+    if scene.mesh.model == "structure":
+        with told_as(scene, ("mesh", "file"), fem.ModelError):
+            structure = fem.read_structure(path, _mesh_places(scene), ignore)
+            structure = _in_metres(scene, structure)
+            if scene.mesh.merge:
+                structure = fem.joined(
+                    [structure], None if scene.mesh.merge is True else scene.mesh.merge
+                )
+        structure = _with_places(scene, structure)
+        scene = with_described_parts(scene, structure)
+        check_structure_names(scene, structure, scene.file)
+        if refinement > 1:
+            with told_as(scene, ("mesh", "file"), fem.ModelError, hint=": --meshes"):
+                structure = fem.refined(structure, refinement)
+        with told_as(scene, (), fem.ModelError):
+            return fem.assemble(_structure_model(scene, structure))
+    with told_as(scene, ("mesh", "file"), fem.ModelError):
+        mesh = _in_metres(scene, fem.read_mesh(path, _mesh_places(scene), ignore))
+    mesh = _with_places(scene, mesh)
+    scene = with_described_parts(scene, mesh)
+    check_mesh_names(scene, mesh, scene.file)
+    with told_as(scene, (), fem.ModelError):
+        if refinement > 1:
+            mesh = fem.refined(mesh, refinement)
+        return fem.assemble(_frame_model(scene, mesh))
+
+
+def _in_metres(scene: Scene, mesh: Mesh) -> Mesh:
+    """The mesh with its coordinates in m; what else a file holds cannot be converted."""
+    assert scene.mesh is not None
+    unit = scene.mesh.unit
+    if unit == "m":
+        return mesh
+    if mesh.attachments or scene.mesh.parts_from_file:
+        fault = f"'{unit}' tells the unit of lengths alone, but masses, springs or parts are taken"
+        raise scene_error(scene.file, ("mesh", "unit"), f"{fault} from the file, too")
+    return mesh.with_points(METRES[unit] * mesh.points)
+
+
+def _with_places(scene: Scene, mesh: Mesh) -> Mesh:
+    """The mesh with the point sets of ``[places]``."""
+    sets = {}
+    for name, place in scene.places.items():
+        with told_as(scene, ("places", name), fem.ModelError):
+            if name in mesh.point_sets:
+                raise fem.ModelError(f"{mesh.source}: has a point set of this name already")
+            if place.at is not None:
+                sets[name] = fem.node_at(mesh.points, place.at, mesh.source)
+            else:
+                assert place.box is not None
+                sets[name] = fem.nodes_inside(mesh.points, place.box, mesh.source)
+    return mesh.with_point_sets(sets) if sets else mesh
+
+
+def _frame_model(scene: Scene, mesh: fem.FrameMesh) -> fem.FrameModel:
+    parts = {
+        name: _truss(table) if table.kind == "truss" else _beam(table)
+        for name, table in scene.parts.items()
+    }
+    separate = scene.mesh is not None and scene.mesh.separate
+    return fem.FrameModel(mesh, parts, separate=separate, **_attached(scene))
+
+
+def _structure_model(scene: Scene, mesh: fem.StructureMesh) -> fem.StructureModel:
+    return fem.StructureModel(
+        mesh,
+        parts={name: _part(table) for name, table in scene.parts.items()},
+        couplings=[
+            fem.Coupling(c.at, c.face, c.kind, c.place, tuple(c.directions))
+            for c in scene.couplings
+        ],
+        foundations=[fem.Foundation(f.at, f.stiffness) for f in scene.foundations],
+        separate=scene.mesh is not None and scene.mesh.separate,
+        **_attached(scene),
+    )
+
+
+def _attached(scene: Scene) -> dict[str, Any]:
+    """What holds, loads and joins the points of a frame or a structure."""
+    return {
+        "supports": [fem.Support(s.at, tuple(s.fixed)) for s in scene.supports],
+        "point_masses": [
+            fem.PointMass(m.at, m.mass, m.rotary_inertia, m.offset or (0.0, 0.0, 0.0))
+            for m in scene.point_masses
+        ],
+        "springs": [fem.PointSpring(s.at, s.direction, s.stiffness) for s in scene.springs],
+        "hinges": [fem.Hinge(h.at, h.part) for h in scene.hinges],
+        "interfaces": {
+            name: fem.Interface(i.at, i.direction) for name, i in scene.interfaces.items()
+        },
+    }
+
+
+def _truss(table: PartTable) -> fem.TrussPart:
+    assert table.area is not None
+    material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
+    return fem.TrussPart(material, table.area)
+
+
+def _part(table: PartTable) -> fem.BeamPart | fem.TrussPart | fem.SolidPart | fem.ShellPart:
+    material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
+    if table.kind == "solid":
+        return fem.SolidPart(material, table.plane, table.thickness)
+    if table.kind == "shell":
+        assert table.thickness is not None and not isinstance(table.offset, list)
+        return fem.ShellPart(material, table.thickness, table.offset or 0.0)
+    return _truss(table) if table.kind == "truss" else _beam(table)
+
+
+def _beam(table: PartTable) -> fem.BeamPart:
+    material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
+    return fem.BeamPart(
+        material,
+        _section(table),
+        table.theory or "euler-bernoulli",
+        table.axial_force or 0.0,
+        table.orientation,
+        table.offset if isinstance(table.offset, list) else (0.0, 0.0),
+    )
+
+
+def _section(table: PartTable) -> fem.CrossSection | fem.TaperedSection:
+    sections: list[fem.RectangularSection | fem.CircularSection] = []
+    for end in ("", "_end"):
+        width, height, diameter, bore = (
+            table.size(name, end) for name in ("width", "height", "diameter", "bore")
+        )
+        if width is not None and height is not None:
+            sections.append(fem.RectangularSection(width, height))
+        elif diameter is not None:
+            sections.append(fem.CircularSection(diameter, bore or 0.0))
+    if table.taper is not None:
+        return fem.TaperedSection(sections[0], sections[1], table.taper[0], table.taper[1])
+    if sections:
+        return sections[0]
+    assert table.area is not None and table.second_moment is not None
+    return fem.Section(
+        table.area,
+        table.second_moment,
+        table.second_moment_across,
+        table.torsion_constant,
+        table.shear_area,
+        table.shear_area_across,
+    )
+
+
+def _mesh_path(scene: Scene, name: str) -> Path:
+    """Where the mesh is: a file that can be read, in one of the places it may come from."""
+    path = scene.file.parent / name
+    try:
+        real = path.resolve()
+        if not any(real.is_relative_to(place) for place in _mesh_places(scene)):
+            advice = f"if that is meant, allow it with --mesh-folder {real.parent}"
+            if not real.is_file():
+                advice = "there is no such file: copy the mesh beside the scene"
+            fault = f"leads to {real}, outside the folder of the scene and the current one"
+            raise scene_error(scene.file, ("mesh", "file"), f"{fault}; {advice}")
+        check_regular(path)
+        path.open("rb").close()
+    except SceneError:
+        raise
+    except (OSError, ValueError, RuntimeError) as error:  # the last one of links in a circle
+        fault = f"names {path}, which {unreadable(error)}"
+        raise scene_error(scene.file, ("mesh", "file"), fault) from None
+    return path
+
+
+def _mesh_places(scene: Scene) -> list[Path]:
+    """Folders below which the mesh of a scene may be: those asked for, and the package's own."""
+    return [*scene.mesh_folders, (data_directory() / "meshes").resolve()]

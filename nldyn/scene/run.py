@@ -1,0 +1,187 @@
+"""Compute what a scene asks for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from nldyn.base.errors import SystemModelError
+from nldyn.branches.options import ContinuationOptions
+from nldyn.flow.flow_map import FlowMap
+from nldyn.flow.options import FlowOptions
+from nldyn.io.checkpoint import CheckpointFile
+from nldyn.runtime.progress import Progress, Shares, silent
+from nldyn.scene.build import build_reduced, build_system
+from nldyn.scene.checks import check_computable, range_remark
+from nldyn.scene.faults import told_as
+from nldyn.scene.messages import scene_error
+from nldyn.scene.schema import ContinuationTable, Scene
+from nldyn.search.diagram import Diagram, Seed, diagram
+from nldyn.search.exploration import Exploration, ExploreOptions
+from nldyn.search.explore import explore
+
+CHOICE = 1.0  # time to choose modes by a tolerance, relative to that of the diagram
+
+
+def compute(
+    scene: Scene,
+    progress: Progress | None = None,
+    checkpoint: CheckpointFile | None = None,
+    jobs: int = 1,
+) -> Diagram:
+    """Compute all branches that a scene asks for.
+
+    The whole scene is built and checked before the first orbit is sought.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with an ``[[excitation]]`` and a ``[continuation]``.
+    progress : callable, optional
+        Called as ``progress(what, frequency_hz, done)`` at every orbit.
+    checkpoint : CheckpointFile, optional
+        File that keeps what is computed, see `nldyn.diagram`.
+    jobs : int
+        Processes that share the work, see `nldyn.diagram`.
+
+    Returns
+    -------
+    Diagram
+        Branches with their points and special points.
+
+    Raises
+    ------
+    SceneError
+        As for `build_system`, and if the scene has nothing to compute.
+
+    Examples
+    --------
+    >>> from nldyn.scene.read import parse_scene
+    >>> scene = parse_scene('''
+    ... [modal]
+    ... frequencies_hz = [13.1]
+    ... participation.tip = [0.6]
+    ... [damping]
+    ... modal_ratio = 0.02
+    ... [[excitation]]
+    ... at = "tip"
+    ... kind = "harmonic"
+    ... amplitude = 1.0
+    ... [continuation]
+    ... range_hz = [10.0, 16.0]
+    ... periods = [1]
+    ... ''')
+    >>> len(compute(scene).branches)     # without a stop there is only the resonance curve
+    1
+    """
+    if scene.explore is not None:
+        return explore_scene(scene, progress, checkpoint, jobs).diagram
+    shares = _shares(scene, progress)
+    flow, table = _to_follow(scene, shares)
+
+    with told_as(scene, ("continuation",), SystemModelError):
+        found = diagram(
+            flow,
+            (table.range_hz[0], table.range_hz[1]),
+            table.periods,
+            seeds=[Seed(seed.period, seed.near_hz) for seed in scene.subharmonics],
+            search_points=table.search_points,
+            doublings=table.follow_doublings,
+            options=ContinuationOptions(max_step=table.max_step),
+            progress=shares.part("branches"),
+            checkpoint=checkpoint,
+            jobs=jobs,
+        )
+    return _remarked(scene, flow, found)
+
+
+def explore_scene(
+    scene: Scene,
+    progress: Progress | None = None,
+    checkpoint: CheckpointFile | None = None,
+    jobs: int = 1,
+) -> Exploration:
+    """Find the branches of a scene with an ``[explore]`` table, and tell how well it was searched.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with an ``[[excitation]]``, a ``[continuation]`` and an ``[explore]``.
+    progress, checkpoint, jobs
+        As for `nldyn.explore`.
+
+    Returns
+    -------
+    Exploration
+
+    Raises
+    ------
+    SceneError
+        As for `compute`.
+
+    Examples
+    --------
+    >>> from nldyn.scene.read import parse_scene
+    >>> scene = parse_scene('''
+    ... [modal]
+    ... frequencies_hz = [13.1]
+    ... participation.tip = [0.6]
+    ... [damping]
+    ... modal_ratio = 0.02
+    ... [[excitation]]
+    ... at = "tip"
+    ... kind = "harmonic"
+    ... amplitude = 1.0
+    ... [continuation]
+    ... range_hz = [10.0, 16.0]
+    ... [explore]
+    ... max_period = 2
+    ... spacing = 0.1
+    ... ''')
+    >>> explore_scene(scene).settled_share
+    1.0
+    """
+    shares = _shares(scene, progress)
+    flow, table = _to_follow(scene, shares)
+
+    if scene.explore is None:
+        raise scene_error(scene.file, ("explore",), "is missing")
+    efforts = scene.explore.model_dump()
+    with told_as(scene, ("explore",), SystemModelError):
+        found = explore(
+            flow,
+            (table.range_hz[0], table.range_hz[1]),
+            efforts.pop("max_period"),
+            effort=ExploreOptions(**efforts),
+            options=ContinuationOptions(max_step=table.max_step),
+            progress=shares.part("branches"),
+            checkpoint=checkpoint,
+            jobs=jobs,
+        )
+    return replace(found, diagram=_remarked(scene, flow, found.diagram))
+
+
+def _to_follow(scene: Scene, shares: Shares) -> tuple[FlowMap, ContinuationTable]:
+    """Flow map of a scene that says what to compute."""
+    check_computable(scene, scene.file)
+    model = None
+    if scene.mesh is not None:
+        model = build_reduced(scene, progress=shares.part("model"))
+    system = build_system(scene, model)
+    shares.end("model")
+
+    table = scene.continuation
+    assert table is not None
+    with told_as(scene, ("continuation",), SystemModelError):
+        return FlowMap(system, FlowOptions(table.rtol)), table
+
+
+def _shares(scene: Scene, progress: Progress | None) -> Shares:
+    """The parts of a computation: to choose modes takes a while if a tolerance is given."""
+    chosen = scene.reduction is not None and scene.reduction.tolerance is not None
+    return Shares(progress or silent, {"model": CHOICE if chosen else 0.0, "branches": 1.0})
+
+
+def _remarked(scene: Scene, flow: FlowMap, found: Diagram) -> Diagram:
+    """A diagram with a note on what the model of the structure is not good for."""
+    remark = range_remark(scene, float(flow.system.frequencies_hz.max()))
+    return replace(found, notes=(*found.notes, remark)) if remark else found
