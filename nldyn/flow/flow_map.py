@@ -37,6 +37,7 @@ from nldyn.flow.kernels.layout import (
     TOO_MANY_PIECES,
     TOO_MANY_STEPS,
     Record,
+    StopRow,
     SystemData,
 )
 from nldyn.flow.kernels.newton import Corrector, newton
@@ -45,7 +46,7 @@ from nldyn.flow.options import FlowOptions, _floats, _nodes_for_switch
 from nldyn.flow.packing import parameter_tables
 from nldyn.runtime.interruption import behind
 from nldyn.runtime.kernel_cache import first_call
-from nldyn.system.contact_law import law_address
+from nldyn.system.contact_law import duration_factor, law_address
 from nldyn.system.parameters import Parameter
 from nldyn.system.system import System, same_system
 
@@ -238,14 +239,14 @@ class FlowMap:
         bounds = np.multiply(thirds, growth, out=np.zeros_like(thirds), where=thirds > 0.0)
         force = np.array([s.force_column(v) for v in vectors]).reshape(-1, 2 * s.size)
         stops = [
-            (
-                stop.gap,
-                stop.stiffness,
-                stop.exponent,
-                stop.dissipation,
-                v @ v,
-                _duration_factor(stop.exponent),
-                self.options.instant(stop.exponent),
+            StopRow(
+                gap=stop.gap,
+                stiffness=stop.stiffness,
+                exponent=stop.exponent,
+                dissipation=stop.dissipation,
+                mobility=float(v @ v),
+                duration=duration_factor(stop.exponent),
+                instant=self.options.instant(stop.exponent),
             )
             for stop, v in zip(s.stops, vectors, strict=True)
         ]
@@ -255,7 +256,7 @@ class FlowMap:
             bounds,
             np.ascontiguousarray(force.T),
             s.drive,
-            np.array(stops, dtype=float).reshape(-1, 7),
+            np.array(stops, dtype=float).reshape(-1, len(StopRow._fields)),
             np.array([law_address(stop.law) for stop in s.stops], dtype=np.int64),
             self.options.panel_tail,
             self.options.node_angle,
@@ -714,12 +715,3 @@ class Trajectory:
             *arguments,
         )
         return np.asarray(found)
-
-
-def _duration_factor(p: float) -> float:
-    """Contact duration of a free impact over (peak penetration / speed) for F = k δ^p.
-
-    2 ∫ dx / sqrt(1 - x^(p+1)) from 0 to 1 = 2.94 for Hertz's law (Johnson 1985, eq. 11.24).
-    """
-    q = 1.0 / (p + 1.0)
-    return 2.0 * math.sqrt(math.pi) * math.gamma(1.0 + q) / math.gamma(0.5 + q)

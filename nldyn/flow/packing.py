@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Complex
 from nldyn.base.errors import check_types
-from nldyn.flow.kernels.layout import DISSIPATION, EXPONENT, GAP, STIFFNESS
+from nldyn.flow.kernels.layout import StopRow
 from nldyn.system.elements import turn
 from nldyn.system.parameters import OF_STOPS, Parameter, check_exact
 from nldyn.system.system import System
 
-_COLUMNS = dict(zip(OF_STOPS, (GAP, STIFFNESS, EXPONENT, DISSIPATION), strict=True))
+_COLUMNS = {name: StopRow._fields.index(name) for name in OF_STOPS}
 _EXCITATION = -1
 
 

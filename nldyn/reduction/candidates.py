@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import beta
 
 import cms
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError
 from nldyn.reduction.load_case import LoadCase
+from nldyn.system.contact_law import duration_factor
 from nldyn.system.elements import Stop
 
 INVISIBLE = 1e-6
@@ -111,7 +111,7 @@ def contact_duration(stop: Stop, mass: float, speed: float) -> float:
     """
     power = stop.exponent + 1.0
     depth = (power * mass * speed**2 / (2.0 * stop.stiffness)) ** (1.0 / power)
-    return float(2.0 * depth / speed * beta(1.0 / power, 0.5) / power)
+    return duration_factor(stop.exponent) * float(depth) / speed
 
 
 def in_use(model: cms.ReducedModel, setting: LoadCase) -> Real:

@@ -1,4 +1,4 @@
-"""Contact laws written by the user, compiled so that the kernels can call them."""
+"""Contact laws of stops: the power law, and those written by the user and compiled for kernels."""
 
 from __future__ import annotations
 
@@ -11,6 +11,50 @@ from typing import Any
 from nldyn.base.errors import SystemModelError
 
 ContactLaw = Callable[[float, float], tuple[float, float, float]]
+
+
+def power_law(
+    stiffness: float, exponent: float, dissipation: float, delta: float, speed: float
+) -> tuple[float, float, float]:
+    """The law of a stop without one of its own: its force, and the force's two derivatives.
+
+    The kernels compile this very function.
+
+    Parameters
+    ----------
+    stiffness, exponent, dissipation : float
+        k in N/m^p, p and a in s/m of the force k δ^p (1 + a v) [Hunt and Crossley 1975, eq. 9].
+    delta, speed : float
+        Penetration δ in m and its rate v in m/s.
+
+    Returns
+    -------
+    force, slope, viscosity : float
+        In N, N/m and N s/m; zero where the stop is open.
+
+    Examples
+    --------
+    >>> power_law(2.0, 1.0, 0.5, 3.0, 1.0)
+    (9.0, 3.0, 3.0)
+    """
+    if delta <= 0.0:
+        return 0.0, 0.0, 0.0
+    slope = stiffness
+    if exponent == 1.5:
+        slope *= math.sqrt(delta)
+    elif exponent != 1.0:
+        slope *= delta ** (exponent - 1.0)
+    factor = 1.0 + dissipation * speed
+    return slope * delta * factor, exponent * slope * factor, dissipation * slope * delta
+
+
+def duration_factor(p: float) -> float:
+    """Contact duration of a free impact over (peak penetration / speed) for F = k δ^p.
+
+    2 ∫ dx / sqrt(1 - x^(p+1)) from 0 to 1 = 2.94 for Hertz's law (Johnson 1985, eq. 11.24).
+    """
+    q = 1.0 / (p + 1.0)
+    return 2.0 * math.sqrt(math.pi) * math.gamma(1.0 + q) / math.gamma(0.5 + q)
 
 
 def check_law(owner: str, law: ContactLaw, stiffness: float, exponent: float) -> None:

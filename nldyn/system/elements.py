@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy.optimize import brentq
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, is_finite, shown
-from nldyn.system.contact_law import ContactLaw, check_law
+from nldyn.system.contact_law import ContactLaw, check_law, power_law
 
 LARGEST_EXPONENT = 4.0
 LARGEST_PHASE = 1e6  # in degrees: rounded to 1e-10 degrees
@@ -261,16 +262,13 @@ class Stop:
 
     def _evaluate(self, penetration: ArrayLike, speed: ArrayLike) -> tuple[Real, Real]:
         delta, rate = np.broadcast_arrays(np.asarray(penetration, float), np.asarray(speed, float))
-        if self.law is not None:
-            law = self.law
-            values = [
-                law(x, v) if x > 0.0 else (0.0, 0.0, 0.0)
-                for x, v in zip(delta.ravel().tolist(), rate.ravel().tolist(), strict=True)
-            ]
-            table = np.array(values, dtype=float).reshape((*delta.shape, 3))
-            return table[..., 0], table[..., 2]
-        elastic = self.stiffness * np.maximum(delta, 0.0) ** self.exponent
-        return elastic * (1.0 + self.dissipation * rate), self.dissipation * elastic
+        law = self.law or partial(power_law, self.stiffness, self.exponent, self.dissipation)
+        values = [
+            (0.0, 0.0, 0.0) if x <= 0.0 else law(x, v)
+            for x, v in zip(delta.ravel().tolist(), rate.ravel().tolist(), strict=True)
+        ]
+        table = np.array(values, dtype=float).reshape((*delta.shape, 3))
+        return table[..., 0], table[..., 2]
 
     @classmethod
     def hertz(

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from nldyn.base.arrays import Complex, Real
+from nldyn.system.contact_law import power_law
 from nldyn.system.elements import Stop
 from nldyn.system.system import System
 
@@ -76,8 +77,7 @@ def tangent_stiffness(system: System, q: Real) -> Real:
     """Stiffness (n, n) of the structure with its closed stops at modal displacements q."""
     matrix = np.diag(system.natural_frequencies**2)
     for stop, c, depth in _closed(system, q):
-        slope = stop.stiffness * stop.exponent * depth ** (stop.exponent - 1.0)
-        matrix += slope * np.outer(c, c)
+        matrix += _elastic(stop, depth)[1] * np.outer(c, c)
     return matrix
 
 
@@ -90,10 +90,16 @@ def _closed(system: System, q: Real) -> Iterator[tuple[Stop, Real, float]]:
             yield stop, c, depth
 
 
+def _elastic(stop: Stop, depth: float) -> tuple[float, float]:
+    """Force and stiffness of a closed stop at rest."""
+    force, stiffness, _ = power_law(stop.stiffness, stop.exponent, 0.0, depth, 0.0)
+    return force, stiffness
+
+
 def _slope(system: System, q: Real) -> Real:
     slope = system.natural_frequencies**2 * q
     for stop, c, depth in _closed(system, q):
-        slope = slope + stop.stiffness * depth**stop.exponent * c
+        slope = slope + _elastic(stop, depth)[0] * c
     return np.asarray(slope)
 
 
@@ -104,5 +110,5 @@ def _steepness(system: System, q: Real) -> float:
 def _potential(system: System, q: Real) -> float:
     energy = 0.5 * float(system.natural_frequencies**2 @ q**2)
     for stop, _, depth in _closed(system, q):
-        energy += stop.stiffness * depth ** (stop.exponent + 1.0) / (stop.exponent + 1.0)
+        energy += _elastic(stop, depth)[0] * depth / (stop.exponent + 1.0)
     return energy

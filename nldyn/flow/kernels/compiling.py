@@ -10,12 +10,13 @@ from numba import types
 from numba.extending import intrinsic
 
 from nldyn.runtime.kernel_cache import ensure_cache, resting_on
-from nldyn.system import linear
+from nldyn.system import contact_law, linear
 
 ensure_cache()
 
 # the compile cache looks at the file of a function alone, not at those of the kernels it calls
-FILES = (*sorted(map(str, Path(__file__).parent.glob("*.py"))), linear.__file__)
+OURS = sorted(map(str, Path(__file__).parent.glob("*.py")))
+FILES = (*OURS, linear.__file__, contact_law.__file__)
 
 njit: Any = numba.njit  # its stubs lack the options that spare what only Python callers need
 # a kernel that Python calls

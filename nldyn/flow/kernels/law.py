@@ -9,8 +9,11 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from nldyn.flow.kernels.compiling import inner
+from nldyn.flow.kernels.compiling import inlined, inner
 from nldyn.flow.kernels.layout import DISSIPATION, EXPONENT, GAP, ROUND, STIFFNESS
+from nldyn.system import contact_law
+
+power_law = inlined(contact_law.power_law)
 
 
 @intrinsic
@@ -37,15 +40,8 @@ def law(fl, stop, delta, speed):
         return 0.0, 0.0, 0.0
     if fl.laws[stop] != 0:
         return call_law(fl.laws[stop], delta, speed)
-    exponent = fl.stops[stop, EXPONENT]
-    slope = fl.stops[stop, STIFFNESS]
-    if exponent == 1.5:
-        slope *= math.sqrt(delta)
-    elif exponent != 1.0:
-        slope *= delta ** (exponent - 1.0)
-    loss = fl.stops[stop, DISSIPATION]
-    factor = 1.0 + loss * speed
-    return slope * delta * factor, exponent * slope * factor, loss * slope * delta
+    numbers = fl.stops[stop]
+    return power_law(numbers[STIFFNESS], numbers[EXPONENT], numbers[DISSIPATION], delta, speed)
 
 
 @inner

@@ -32,8 +32,21 @@ HALF_CONTACT = 2.5  # phase of the stiffness of a stop in half a contact, at mos
 # the share of a slope in a Jacobian's error, kick (4 tail)², is less than rtol, (tail / 0.3)², as
 # long as KICK kick is less than one
 KICK = 1.5
-# columns of `stops`
-GAP, STIFFNESS, EXPONENT, DISSIPATION, MOBILITY, DURATION, INSTANT = range(7)
+
+
+class StopRow(NamedTuple):
+    """Numbers of a stop: the columns of `stops`, in this order."""
+
+    gap: float
+    stiffness: float
+    exponent: float
+    dissipation: float
+    mobility: float  # velocity jump per unit impulse in 1/kg
+    duration: float  # of a free contact, over (peak penetration / speed)
+    instant: float  # error allowed in the instant of an event, as a share of the panel
+
+
+GAP, STIFFNESS, EXPONENT, DISSIPATION, MOBILITY, DURATION, INSTANT = range(len(StopRow._fields))
 
 
 class SystemData(NamedTuple):
@@ -47,10 +60,7 @@ class SystemData(NamedTuple):
     bound3: Real  # (n_out, 2n) |third derivative| <= Σ_b |bound3_b| |w_b| at any later time
     force: Real  # (2n, n_stops): w' = A w - force @ F
     drive: Complex  # (2, 2n) excitation Re((drive[0] + ω² drive[1]) e^{iωt}) of z
-    # (n_stops, 7): gap; stiffness, exponent and dissipation; velocity jump per unit impulse in
-    # 1/kg; duration of a free contact over (peak penetration / speed); error allowed in the
-    # instant of an event, as a share of the panel
-    stops: Real
+    stops: Real  # (n_stops, 7), rows as `StopRow`
     laws: NDArray[np.int64]  # (n_stops,) address of a compiled law, or 0 for the power law
     tail: float  # largest relative Legendre tail accepted on a contact panel
     node_angle: float  # phase of the fastest mode from node to node, in rad
