@@ -9,6 +9,7 @@ from contextlib import redirect_stderr
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
+from urllib.parse import unquote
 
 import meshio
 import numpy as np
@@ -31,6 +32,11 @@ Mesh = TypeVar("Mesh", FrameMesh, StructureMesh)
 
 FARTHEST = 1e50
 
+LEGACY_ARRAY = re.compile(
+    rb"^(?:SCALARS +)?(set\S+) +(?:\d+ +\d+ +)?[a-z]\w*(?: +\d+)?[ \r]*$", re.MULTILINE
+)
+"""The line before an array of marks in a VTK legacy file, of a FIELD or by itself."""
+
 # What Python's and numpy's errors say about the words of a file, for one who wrote the file.
 FAULTS = (
     (r"invalid literal for int\(\) with base 10: (.*)", r"\1 is not a whole number"),
@@ -43,13 +49,40 @@ FAULTS = (
 
 def read_vtu(path: Path) -> meshio.Mesh:
     """Read a VTK file, without unpacking endlessly; what meshio would leave out is an error."""
+    for _, arrays in re.findall(
+        rb"<(PointData|CellData)\b(.*?)</\1>", path.read_bytes(), re.DOTALL
+    ):
+        found = re.findall(rb"<DataArray\b[^>]*?\bName=[\"']([^\"']*)[\"']", arrays)
+        _check_each_once(found, path)
     with bounded_unpacking(path):
         return _without_warning(meshio.vtu.read, path)
 
 
 def read_vtk(path: Path) -> meshio.Mesh:
-    """Read a VTK legacy file; what meshio would leave out is an error."""
-    return _without_warning(meshio.vtk.read, path)
+    """Read a VTK legacy file; what meshio would leave out is an error.
+
+    VTK writes a blank in a name as %20, a percent sign as %25, and so on; meshio leaves it so.
+    """
+    for arrays in re.split(rb"^(?:POINT|CELL)_DATA\b", path.read_bytes(), flags=re.MULTILINE)[1:]:
+        _check_each_once(LEGACY_ARRAY.findall(arrays), path)
+    try:
+        content = _without_warning(meshio.vtk.read, path)
+    except (meshio.ReadError, KeyError) as error:
+        raise ModelError(
+            f"{path}: is cut off, or holds what is not read of VTK legacy files; save it as '.vtu'"
+        ) from error
+    for data in (content.point_data, content.cell_data):
+        for name in list(data):
+            data[unquote(name)] = data.pop(name)
+    return content
+
+
+def _check_each_once(arrays: Sequence[bytes], path: Path) -> None:
+    """Refuse two arrays of one name, of which meshio would take the last one."""
+    names = [unquote(name) for name in arrays]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise ModelError(f"{path}: has two arrays {twice!r}")
 
 
 def _without_warning(read: Callable[[Path], meshio.Mesh], path: Path) -> meshio.Mesh:
@@ -197,8 +230,9 @@ def _deck_mesh(
     found = read_abaqus(path, include_folders, ignore)
     others = [name for name in ignore if bare(name) not in found.ignored]
     content, said = without_cells(found.content, others, str(path))
+    notes = list(found.notes) + said
     return replace(
-        _noted(build(content, str(path)), said),
+        _noted(build(content, str(path)), notes),
         attachments=found.attachments,
         described=found.described,
         left_out=found.left_out,
@@ -354,6 +388,8 @@ def _check_far(points: FloatArray, source: str) -> None:
 
 def _check_nodes(what: str, nodes: IntArray, count: int, source: str) -> None:
     """Refuse nodes that are not there, which numpy would count from the end."""
+    if not len(nodes):
+        return
     bad = np.flatnonzero(((nodes < 0) | (nodes >= count)).reshape(len(nodes), -1).any(axis=1))
     if len(bad):
         raise ModelError(f"{source}: {what} {bad[0]} (counted from 0) has a node that is not there")

@@ -42,6 +42,8 @@ class AbaqusFile:
         the key "refused" and a reason where they cannot be taken.
     left_out
         Keywords that are left out by intention.
+    notes
+        Sentences on what means more than it says.
     ignored
         What of the names to ignore was met, in capitals and without blanks and asterisk.
     """
@@ -50,6 +52,7 @@ class AbaqusFile:
     attachments: Attachments = field(default_factory=Attachments)
     described: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     left_out: tuple[LeftOut, ...] = ()
+    notes: tuple[str, ...] = ()
     ignored: frozenset[str] = frozenset()
 
     def __repr__(self) -> str:
@@ -124,5 +127,6 @@ def read_abaqus(
         gathered.attachments,
         described_parts(deck, resolver),
         tuple(LeftOut(p.what, p.count, p.place, p.advice) for p in deck.left_out.values()),
+        tuple(surfaces.notes()),
         frozenset(deck.ignored),
     )

@@ -46,6 +46,8 @@ class Joints:
             keywords = list(body.later())
             for at, keyword in enumerate(keywords):
                 if keyword.name in _READERS:
+                    if keyword.name != "RIGIDBODY" and not any(map(filled, keyword.rows)):
+                        raise keyword.fail("has no data line")
                     _READERS[keyword.name](self, body, keyword)
                 elif keyword.name == "COUPLING":
                     following = keywords[at + 1] if at + 1 < len(keywords) else None
@@ -118,8 +120,8 @@ class Joints:
     def constraints(self, body: Body, keyword: Keyword) -> None:
         """``*MPC`` of the types BEAM, TIE and PIN."""
         keyword.only()
-        for row, words in enumerate(keyword.rows):
-            kind, *names = filled(words)
+        for row in range(len(keyword.rows)):
+            kind, *names = keyword.words(row)
             if kind.upper() not in ("BEAM", "TIE", "PIN"):
                 advice = "of these only BEAM, TIE and PIN are read; write it as *EQUATION"
                 self.gathered.deck.refuse(f"*MPC {kind.upper()}", keyword.place(row), advice)
@@ -214,6 +216,9 @@ class Joints:
             if following.parameters.get(key, plain).upper() != plain:
                 raise following.fail(f"{key} other than {plain} is not read")
         weighting = "nodes" if self.surfaces.by_nodes(body, surface, keyword) else "area"
+        more = self.surfaces.others(body, surface, keyword)
+        if weighting == "area" and more:
+            raise keyword.fail(f"the nodes of {surface!r} have {more} faces that are not in it")
         self._averaging(nodes, point, following, numbers, weighting)
 
     @staticmethod
@@ -270,8 +275,8 @@ class Joints:
         place = keyword.place()
         groups: dict[tuple[int, ...], list[Label]] = {}
         directions: dict[Label, set[int]] = {}
-        for row, words in enumerate(keyword.rows):
-            name, *ends = filled(words)
+        for row in range(len(keyword.rows)):
+            name, *ends = keyword.words(row)
             span = _span(keyword, row, ends)
             for node in self.resolver.reference("NSET", body, name, place, keyword.shown):
                 directions.setdefault(node, set()).update(span)
@@ -290,8 +295,8 @@ class Joints:
             raise keyword.fail(f"{name!r} must hold one element, not {len(elements)}")
         point = self.resolver.nodes_of(elements[0])[0]
         weights: dict[Label, float] = {}
-        for row, words in enumerate(keyword.rows):
-            node_or_set, *weight = filled(words)
+        for row in range(len(keyword.rows)):
+            node_or_set, *weight = keyword.words(row)
             value = keyword.number(weight[0], row) if weight else 1.0
             for node in self.resolver.reference("NSET", body, node_or_set, place, keyword.shown):
                 weights[node] = value

@@ -91,6 +91,13 @@ class Keyword:
         except ValueError:
             raise self.fail(f"{word!r} is not a number{_commas(word)}", row) from None
 
+    def words(self, row: int) -> list[str]:
+        """The words of a row without the empty ones at its end; an empty row is an error."""
+        found = filled(self.rows[row])
+        if not found or not found[0]:
+            raise self.fail("a line has nothing before its first comma", row)
+        return found
+
     def numbers(self, row: int) -> list[float]:
         """All words of a row as numbers."""
         return [self.number(word, row) for word in filled(self.rows[row])]

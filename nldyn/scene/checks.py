@@ -16,7 +16,8 @@ from nldyn.scene.schema import Matrix, Scene
 Report = Callable[[KeyPath, str], SceneError]
 LONGEST_NAME, LONGEST_TITLE = 100, 1000
 NAMED_BY = (
-    "names are physical groups in .msh, arrays 'set:NAME' in .vtu, ELSET and NSET in .inp files"
+    "the file has no names; they are physical groups in .msh, arrays 'set:NAME' in .vtu and .vtk,"
+    " groups in .med, ELSET and NSET in .inp files, and points may have coordinates in [places]"
 )
 STRUCTURE_ONLY = ("couplings", "foundations")
 MESH_ONLY = (

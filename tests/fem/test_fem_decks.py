@@ -700,3 +700,40 @@ def test_the_docs_list_every_keyword_where_it_belongs():
     assert set(known.READ) <= words(read)
     assert {word for word in known.LEFT_OUT if word} == words(left)
     assert set(known.ADVICE) <= words(refused)
+
+
+@pytest.mark.parametrize(
+    ("keyword", "row"),
+    [
+        ("*SURFACE, NAME=S", "S1"),
+        ("*SURFACE, NAME=S, TYPE=NODE", "1.0"),
+        ("*MPC", "1, 2"),
+        ("*KINEMATIC COUPLING, REF NODE=1", "1, 3"),
+    ],
+)
+def test_a_row_without_its_first_word_is_told_with_its_line(tmp_path, keyword, row):
+    text = cantilever_deck()
+    line = text.count("\n") + 1
+    with pytest.raises(fem.ModelError, match=f"line {line}: .*has no data line"):
+        fem.read_mesh(deck(tmp_path, f"{text}{keyword}\n"))
+    with pytest.raises(fem.ModelError, match=f"line {line + 1}: .*nothing before its first comma"):
+        fem.read_mesh(deck(tmp_path, f"{text}{keyword}\n, {row}\n"))
+
+
+def test_an_empty_set_is_read_as_one(tmp_path):
+    text = cantilever_deck() + "*NSET, NSET=EMPTY\n"
+    assert len(fem.read_mesh(deck(tmp_path, text)).point_sets["EMPTY"]) == 0
+
+
+def test_a_surface_whose_nodes_have_other_faces_tells_how_many(tmp_path):
+    """Of one brick the lower and the upper face have all nodes, and so those of four more."""
+    cube = fem.box_mesh("BOX", (1.0, 1.0, 1.0), (1, 1, 1), kind="hexahedron")
+    fem.write_mesh(cube, tmp_path / "cube.inp")
+    text = (tmp_path / "cube.inp").read_text() + "*SURFACE, NAME=ENDS\nBOX, S1\nBOX, S2\n"
+    mesh = fem.read_structure(deck(tmp_path, text))
+    assert "'ENDS'" in mesh.notes[0] and "4 outer faces that it does not name" in mesh.notes[0]
+    joined = "*NODE\n99, 0.5, 0.5, 0.5\n*COUPLING, REF NODE=99, SURFACE=ENDS, CONSTRAINT NAME=C\n"
+    with pytest.raises(fem.ModelError, match="the nodes of 'ENDS' have 4 faces that are not in it"):
+        fem.read_structure(deck(tmp_path, text + joined + "*DISTRIBUTING\n1, 6\n"))
+    one = text.replace("BOX, S2\n", "")
+    assert not fem.read_structure(deck(tmp_path, one)).notes

@@ -171,3 +171,53 @@ def test_other_formats_are_refused_with_what_to_do(tmp_path, extension):
     path.write_text("")
     with pytest.raises(fem.ModelError, match="export it as one of these from the program that"):
         fem.read_structure(path)
+
+
+LEGACY = """# vtk DataFile Version 4.2
+one brick
+ASCII
+DATASET UNSTRUCTURED_GRID
+POINTS 8 double
+0 0 0  1 0 0  1 1 0  0 1 0  0 0 1  1 0 1  1 1 1  0 1 1
+CELLS 1 9
+8 0 1 2 3 4 5 6 7
+CELL_TYPES 1
+12
+CELL_DATA 1
+FIELD FieldData 2
+set:left%20side 1 1 int
+1
+set:100%25 1 1 int
+1
+POINT_DATA 8
+FIELD FieldData 1
+set:root 1 8 int
+1 0 0 1 1 0 0 1
+"""
+
+
+def test_names_of_vtk_legacy_files_are_as_they_were_given(tmp_path):
+    path = tmp_path / "brick.vtk"
+    path.write_text(LEGACY)
+    mesh = fem.read_structure(path)
+    assert set(mesh.groups) == {"left side", "100%"}
+    assert mesh.nodes("root").tolist() == [0, 3, 4, 7]
+
+
+@pytest.mark.parametrize("extension", [".vtk", ".vtu"])
+def test_two_arrays_of_one_name_are_refused(tmp_path, extension):
+    path = tmp_path / f"brick{extension}"
+    if extension == ".vtk":
+        path.write_text(LEGACY.replace("set:100%25", "set:left%20side"))
+    else:
+        write(block(), path)
+        path.write_bytes(path.read_bytes().replace(b'"set:right"', b'"set:left"'))
+    with pytest.raises(fem.ModelError, match=r"has two arrays 'set:left"):
+        fem.read_structure(path)
+
+
+def test_a_vtk_legacy_file_that_is_not_understood_is_refused_with_advice(tmp_path):
+    path = tmp_path / "brick.vtk"
+    path.write_text(LEGACY.replace("POINTS 8 double", "POINTS 8 quaternion"))
+    with pytest.raises(fem.ModelError, match=r"not read of VTK legacy .* as '\.vtu'"):
+        fem.read_structure(path)
