@@ -2,6 +2,10 @@
 
 import numpy as np
 import pytest
+import skfem
+from scipy.sparse.linalg import eigsh
+from skfem.helpers import dot
+from skfem.models.elasticity import lame_parameters, linear_elasticity
 from structures import STEEL, lowest_hz
 from with_gmsh import gmsh_at_work
 
@@ -90,3 +94,48 @@ def test_a_section_that_is_not_understood_is_refused_by_name(folder, tmp_path):
     path.write_text((folder / "4.1_0.msh").read_text() + "$Springs\n1\n$EndSprings\n")
     with pytest.raises(fem.ModelError, match=r"section \$Springs is not understood"):
         fem.read_structure(path)
+
+
+@pytest.fixture(scope="module")
+def boxes(tmp_path_factory):
+    """Two boxes that touch, each meshed by itself, in one group."""
+    path = tmp_path_factory.mktemp("boxes") / "boxes.msh"
+    with gmsh_at_work() as gmsh:
+        both = [gmsh.model.occ.addBox(x, 0, 0, 0.2, 0.04, 0.02) for x in (0.0, 0.2)]
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(3, both, name="all")
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.03)
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(2)
+        gmsh.write(str(path))
+    mesh = fem.read_structure(path)
+    x = mesh.points[:, 0]
+    return mesh.with_point_sets({"ends": np.flatnonzero((x < 1e-9) | (x > 0.4 - 1e-9))})
+
+
+def conforming_hz(boxes):
+    """Lowest frequency by scikit-fem's own quadratic tetrahedra between the corners, each once."""
+    tetrahedra = boxes.cells["tetra10"][:, :4]
+    used, corners = np.unique(tetrahedra, return_inverse=True)
+    places, first, same = np.unique(
+        boxes.points[used].round(9), axis=0, return_index=True, return_inverse=True
+    )
+    assert len(places) < len(used)
+    points = boxes.points[used][first]
+    mesh = skfem.MeshTet(points.T.copy(), same.ravel()[corners].reshape(-1, 4).T.copy())
+    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTetP2()), intorder=4)
+    lame = lame_parameters(STEEL.youngs_modulus, STEEL.poissons_ratio)
+    forms = linear_elasticity(*lame), skfem.BilinearForm(lambda u, v, _: STEEL.density * dot(u, v))
+    free = basis.complement_dofs(basis.get_dofs(lambda x: (x[0] < 1e-9) | (x[0] > 0.4 - 1e-9)))
+    K, M = (form.assemble(basis)[free][:, free].tocsc() for form in forms)
+    square = eigsh(K, 1, M, sigma=0.0, return_eigenvectors=False)[0]
+    return np.sqrt(square) / (2 * np.pi)
+
+
+def test_boxes_that_touch_are_refused_and_merged_are_one_conforming_mesh(boxes):
+    held = [fem.Support("ends", ("x", "y", "z"))]
+    part = {"all": fem.SolidPart(STEEL)}
+    with pytest.raises(fem.ModelError, match=r"2 pieces of the mesh touch but share no node: \d+"):
+        fem.assemble(fem.StructureModel(boxes, part, held))
+    merged = fem.assemble(fem.StructureModel(fem.joined([boxes]), part, held))
+    assert lowest_hz(merged, 1)[0] == pytest.approx(conforming_hz(boxes), rel=1e-9)
