@@ -9,6 +9,7 @@ import pytest
 from structures import lowest_hz
 
 import fem
+from fem.med import KINDS
 
 STEEL = fem.Material(2.1e11, 7800.0, 0.3)
 
@@ -51,33 +52,40 @@ def as_meshio(mesh: fem.StructureMesh) -> meshio.Mesh:
 
 
 def write_med(mesh: fem.StructureMesh, path) -> None:
-    """As Salome writes it: the kind of cell that is in no group has no families."""
-    names = {"hexahedron20": "H20", "quad8": "QU8"}
+    """As Salome writes it: the kinds of cells that are in no group have no families."""
+    names = {kind: name for name, kind in KINDS.items()}
     with h5py.File(path, "w") as file:
         root = file.create_group("ENS_MAA/block")
         root.attrs["ESP"] = 3
         step = root.create_group("-0000000000000000001-0000000000000000001")
         step["NOE/COO"] = mesh.points.T.ravel()
-        numbers = {"ELEME": {"left": -1, "right": -2, "skin": -3}, "NOEUD": {"root": 1, "tip": 2}}
-        families = np.zeros(len(mesh.points), dtype=np.int64)
-        for name, nodes in mesh.point_sets.items():
-            families[nodes] = numbers["NOEUD"][name]
-        step["NOE/FAM"] = families
+        numbers: dict[tuple[str, ...], int] = {}
+
+        def families(what: str, sets, count: int) -> np.ndarray:
+            """Number of the family of each member, which holds all of its groups."""
+            found = np.zeros(count, dtype=np.int64)
+            for i in range(count):
+                key = (what, *(name for name, at in sets.items() if i in at))
+                if len(key) > 1:
+                    sign = -1 if what == "ELEME" else 1
+                    found[i] = numbers.setdefault(key, sign * (len(numbers) + 1))
+            return found
+
+        step["NOE/FAM"] = families("NOEUD", mesh.point_sets, len(mesh.points))
         for kind, nodes in mesh.cells.items():
             cells = step.create_dataset(f"MAI/{names[kind]}/NOD", data=nodes.T.ravel() + 1)
             cells.attrs["NBR"] = len(nodes)
-            families = np.zeros(len(nodes), dtype=np.int64)
-            for name, group in mesh.groups.items():
-                families[group.get(kind, [])] = numbers["ELEME"][name]
-            if families.any():
-                step[f"MAI/{names[kind]}/FAM"] = families
-        for what, of_names in numbers.items():
-            for name, number in of_names.items():
-                family = file.create_group(f"FAS/block/{what}/FAM_{number}_{name}")
-                family.attrs["NUM"] = number
-                letters = np.zeros((1, 80), dtype=np.int8)
-                letters[0, : len(name)] = list(name.encode())
-                family["GRO/NOM"] = letters
+            groups = {name: group.get(kind, []) for name, group in mesh.groups.items()}
+            of_cells = families("ELEME", groups, len(nodes))
+            if of_cells.any():
+                step[f"MAI/{names[kind]}/FAM"] = of_cells
+        for (what, *of_family), number in numbers.items():
+            family = file.create_group(f"FAS/block/{what}/FAM_{number}_{'_'.join(of_family)}")
+            family.attrs["NUM"] = number
+            letters = np.zeros((len(of_family), 80), dtype=np.int8)
+            for row, name in zip(letters, of_family, strict=True):
+                row[: len(name)] = list(name.encode())
+            family["GRO/NOM"] = letters
 
 
 def write(mesh: fem.StructureMesh, path) -> None:
@@ -129,7 +137,7 @@ def lose_families(file):
 
 
 def undefine_the_skin(file):
-    del file["FAS/block/ELEME/FAM_-3_skin"]
+    del file["FAS/block/ELEME/FAM_-5_skin"]
 
 
 @pytest.mark.parametrize(
@@ -146,7 +154,7 @@ def undefine_the_skin(file):
             "has cells under names that are not read: 'FAC'",
         ),
         (lose_families, "H20 has 8 members, but families for 7"),
-        (undefine_the_skin, "QU8 is in family -3, which FAS does not define"),
+        (undefine_the_skin, "QU8 is in family -5, which FAS does not define"),
     ],
 )
 def test_what_a_med_file_holds_otherwise_is_refused(tmp_path, change, said):
