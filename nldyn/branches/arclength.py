@@ -23,14 +23,13 @@ from nldyn.bifurcations.branch_crossing import (
 from nldyn.bifurcations.events import crosses
 from nldyn.bifurcations.period_doubling import flip_between, half_difference, passed_flip
 from nldyn.bifurcations.point import BranchPoint
-from nldyn.branches.branch import CLOSED, JOINS, NOT_FINISHED, POINTS, RANGE_END, SHORT_STEP
+from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.conditions import TOUCH, depth_row
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import ShootingProblem, asymmetry, metric_length, shifts
 
 KINK = TOUCH  # step below which a branch may bend by any angle where the number of contacts changes
-MEETS_OPEN_END = "meets another branch where that was broken off"
 BROKEN = 1e-8  # asymmetry of an orbit that is more than rounding,
 BY_TOLERANCE = 1.0  # or, over the tolerance of the flow map, more than its error (0.3 at most seen)
 EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
@@ -40,8 +39,6 @@ FARTHEST_CROSSING = 1e-4  # distance of one from which a step may begin
 LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
 RECENT = 10  # points behind a walk that it does not come back to
 SAME_PLACE = 1e-8  # distance of points that are one, relative to the orbit
-COMES_BACK = "comes back to where it had been"
-TOO_NEAR = "on the way it left the branch for another one that lies too near"
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +90,7 @@ class Stepper:
     range_hz: tuple[float, float]
     options: ContinuationOptions
     open_ends: Real | None = None
-    stop_reason: str = NOT_FINISHED
+    stop_reason: StopReason = field(default_factory=Ending.NOT_FINISHED.told)
     stride: StepperState | None = None
     visited: list[BranchPoint] = field(default_factory=list, repr=False)
     _places: Rows | None = field(default=None, init=False, repr=False)  # unknowns of these
@@ -115,38 +112,41 @@ class Stepper:
             here, step, behind = self.stride.here, self.stride.step, self.stride.behind
             attempt = self._shortened(problem, behind, here, step)
             if attempt is None:
-                self.stop_reason = f"{SHORT_STEP}{self.options.min_step:g}: {self._obstacle}"
+                self.stop_reason = Ending.SHORT_STEP.told(
+                    step=f"{self.options.min_step:g}", obstacle=self._obstacle
+                )
                 return
             step, point, angle, miss = attempt
             low, high = self.range_hz
             if not low <= point.orbit.frequency_hz <= high:
                 end = self._range_end(here, point, low if point.orbit.frequency_hz < low else high)
-                self.stop_reason = RANGE_END
+                self.stop_reason = Ending.RANGE_END.told()
                 if end is not None:
                     yield end
                 return
             if passed_flip(here.orbit, point.orbit):
-                half = f"the branch of period {problem.period // 2}"
+                half = problem.period // 2
                 try:
                     end = flip_between(here, point)
                 except ConvergenceError:
-                    self.stop_reason = (
-                        f"meets {half} beyond {here.orbit.frequency_hz:.6g} Hz, where no orbit of "
-                        "that period was found"
+                    self.stop_reason = Ending.MEETS_HALF_PERIOD.told(
+                        period=half, hz=f"{here.orbit.frequency_hz:.6g}"
                     )
                     return
-                self.stop_reason = f"{JOINS} {half} at the flip at {end.orbit.frequency_hz:.6g} Hz"
+                self.stop_reason = Ending.JOINS.told(
+                    period=half, hz=f"{end.orbit.frequency_hz:.6g}"
+                )
                 yield end
                 return
             if self.closes(here, point):
-                self.stop_reason = CLOSED
+                self.stop_reason = Ending.CLOSED_BRANCH.told()
                 yield point
                 return
             if self.stride.count % LOOKS_BACK == 0 and self._comes_back(here, point):
-                self.stop_reason = f"{COMES_BACK} at {here.orbit.frequency_hz:.6g} Hz: {TOO_NEAR}"
+                self.stop_reason = Ending.COMES_BACK.told(hz=f"{here.orbit.frequency_hz:.6g}")
                 return
             if self.open_ends is not None and _passed(here, point, self.open_ends).any():
-                self.stop_reason = MEETS_OPEN_END
+                self.stop_reason = Ending.MEETS_OPEN_END.told()
                 yield point
                 return
             bent = step <= KINK and point.orbit.impacts != here.orbit.impacts
@@ -158,7 +158,7 @@ class Stepper:
             self.stride = StepperState(point, step, behind, self.stride.count + 1)
             self.visited.append(point)
             yield point
-        self.stop_reason = f"{self.options.max_points}{POINTS}"
+        self.stop_reason = Ending.MOST_POINTS.told(points=self.options.max_points)
 
     def _shortened(
         self, problem: ShootingProblem, behind: Real, here: BranchPoint, step: float

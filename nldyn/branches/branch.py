@@ -14,6 +14,7 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_choice, check_types, shown
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.branches.at_frequency import Places, crossings, passes
+from nldyn.branches.endings import Ending, StopReasons, has_ending
 from nldyn.branches.tables import Part, point_columns, special_columns, to_pandas, to_xarray
 from nldyn.orbits.orbit import Orbit, same_orbit
 
@@ -22,15 +23,6 @@ if TYPE_CHECKING:
     import xarray
 
     from nldyn.branches.options import ContinuationOptions
-
-
-# why a continuation stopped
-CLOSED = "closed branch"
-JOINS = "joins"  # the branch of half the period, at a flip
-RANGE_END = "end of the frequency range"
-NOT_FINISHED = "not finished"
-POINTS = " points"  # after their number
-SHORT_STEP = "step below "  # before its length
 
 
 def check_branches(name: str, branches: object) -> None:
@@ -124,7 +116,7 @@ class Branch:
         Computed points in order along the branch.
     special_points : tuple of SpecialPoint
         In the same order.
-    stop_reasons : tuple of str
+    stop_reasons : tuple of StopReason
         Why the continuation stopped at the first and at the last point.
     notes : tuple of str
         What may be missing.
@@ -138,7 +130,7 @@ class Branch:
     period: int
     nodes: tuple[BranchPoint, ...]
     special_points: tuple[SpecialPoint, ...]
-    stop_reasons: tuple[str, str]
+    stop_reasons: StopReasons
     notes: tuple[str, ...] = ()
     requested: tuple[BranchPoint, ...] = ()
     course: Course | None = None
@@ -159,7 +151,7 @@ class Branch:
     @property
     def closed(self) -> bool:
         """Whether the branch ends where it began: its last point lies just beyond its first."""
-        return CLOSED in self.stop_reasons
+        return has_ending(self.stop_reasons, Ending.CLOSED_BRANCH)
 
     @property
     def stop_reason(self) -> str:

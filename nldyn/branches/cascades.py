@@ -14,8 +14,9 @@ from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special, is_at
 from nldyn.bifurcations.within_step import special_points_between
 from nldyn.branches.arclength import Stepper
-from nldyn.branches.branch import JOINS, Branch, check_branches
+from nldyn.branches.branch import Branch, check_branches
 from nldyn.branches.continuation import make_branch
+from nldyn.branches.endings import Ending
 from nldyn.branches.options import ContinuationOptions
 
 FEIGENBAUM = 4.669201609102991  # limit of the ratios, Feigenbaum (1978)
@@ -169,7 +170,9 @@ def cascades_in(branches: Sequence[Branch]) -> list[Cascade]:
         Each from the flip of an orbit that is not itself born at a flip.
     """
     check_branches("branches", branches)
-    ends = [(b, end) for b in branches for end in (0, -1) if b.stop_reasons[end].startswith(JOINS)]
+    ends = [
+        (b, end) for b in branches for end in (0, -1) if b.stop_reasons[end].ending is Ending.JOINS
+    ]
     flips = [(b, special) for b in branches for special in b.special_points if special.kind == "PD"]
     born = {
         id(flip): (branch, end)
@@ -225,8 +228,8 @@ def _up_to_flip(
         nodes.append(point)
         if following is not None:
             break
-    reason = walk.stop_reason if following is None else "a flip"
-    first = f"begins at the flip at {flips[-1].frequency_hz:.6g} Hz"
+    reason = walk.stop_reason if following is None else Ending.FLIP.told()
+    first = Ending.BEGINS_AT_FLIP.told(hz=f"{flips[-1].frequency_hz:.6g}")
     return make_branch("", nodes, specials, (first, reason), []), following
 
 

@@ -19,15 +19,11 @@ from nldyn.bifurcations.branch_crossing import (
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.branches.at_frequency import check_requested, requested
 from nldyn.branches.branch import (
-    CLOSED,
-    NOT_FINISHED,
-    POINTS,
-    RANGE_END,
-    SHORT_STEP,
     Branch,
     Course,
 )
 from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_at
+from nldyn.branches.endings import Ending, StopReason, StopReasons
 from nldyn.branches.leg import Leg, LegBuilder
 from nldyn.branches.options import ContinuationOptions
 from nldyn.flow.ahead import Ahead
@@ -241,7 +237,7 @@ def complete(
             waiting = partial(progress, here) if progress else None
             return ahead.value(key, walked_leg, first, course, meanwhile=waiting)
         ahead.forget(key)
-        leg = leg or Leg([first], [], [], NOT_FINISHED, None)
+        leg = leg or Leg([first], [], [], Ending.NOT_FINISHED.told(), None)
         trail = LegBuilder.going_on(leg, course.range_hz, course.options, course.open_ends)
 
         checkpoint.work = lambda: whole(trail.so_far())
@@ -254,7 +250,7 @@ def complete(
     if forward is None:
         offer_leg(ahead, _reversed(start), course, first=True)
     forward = walked(forward, start, lambda leg: join(name, leg, backward, course) if leg else None)
-    if forward.reason == CLOSED:
+    if forward.reason.ending is Ending.CLOSED_BRANCH:
         ahead.forget(leg_key(_reversed(start), course))
         backward = None
     else:
@@ -273,7 +269,7 @@ def walked_leg(
     flow: FlowMap, first: BranchPoint, course: Course, look: Callable[[], None] | None = None
 ) -> Leg:
     """The leg of a branch from a point on, whole; ``look`` is called on the way."""
-    leg = Leg([first], [], [], NOT_FINISHED, None)
+    leg = Leg([first], [], [], Ending.NOT_FINISHED.told(), None)
     trail = LegBuilder.going_on(leg, course.range_hz, course.options, course.open_ends)
     return trail.follow(keep=look)
 
@@ -372,23 +368,26 @@ def _beside_fold(here: BranchPoint, direction: float) -> BranchPoint | None:
 def goes_on(leg: Leg, course: Course) -> bool:
     """Whether a walk would go on with the range and the options of a course."""
     end, options = leg.end, course.options
-    if leg.reason == NOT_FINISHED:
+    ending = leg.reason.ending
+    if ending is Ending.NOT_FINISHED:
         return True
     if end is None:
         return False
-    if leg.reason == RANGE_END:
+    if ending is Ending.RANGE_END:
         low, high = course.range_hz
         return low * (1.0 + 1e-9) < leg.nodes[-1].orbit.frequency_hz < high * (1.0 - 1e-9)
-    if leg.reason.endswith(POINTS):
+    if ending is Ending.MOST_POINTS:
         return options.max_points > end.count
-    shortest = leg.reason.partition(":")[0]
-    return shortest != f"{SHORT_STEP}{options.min_step:g}" and leg.reason.startswith(SHORT_STEP)
+    if ending is Ending.SHORT_STEP:
+        return leg.reason.values["step"] != f"{options.min_step:g}"
+    return False
 
 
 def join(name: str, forward: Leg, backward: Leg | None, course: Course) -> Branch:
     """Branch of two legs from one start."""
     if backward is None:
-        first = CLOSED if forward.reason == CLOSED else NOT_FINISHED
+        closed = forward.reason.ending is Ending.CLOSED_BRANCH
+        first = forward.reason if closed else Ending.NOT_FINISHED.told()
         backward = Leg([forward.nodes[0]], [], [], first, None)
     forward, backward = _without_repeat(forward, backward)
     branch = make_branch(
@@ -455,7 +454,7 @@ def make_branch(
     name: str,
     nodes: list[BranchPoint],
     special: list[SpecialPoint],
-    reasons: tuple[str, str],
+    reasons: StopReasons,
     notes: list[str],
 ) -> Branch:
     """Branch from its parts; the period is that of its orbits."""
@@ -471,10 +470,10 @@ def _reversed_special(special: SpecialPoint) -> SpecialPoint:
     return SpecialPoint(special.kind, _reversed(special.point), special.frequency_error)
 
 
-def broken_off(branch: Branch) -> list[tuple[BranchPoint, str]]:
+def broken_off(branch: Branch) -> list[tuple[BranchPoint, StopReason]]:
     """The ends at which a branch was broken off, and why."""
     ends = zip((branch.nodes[0], branch.nodes[-1]), branch.stop_reasons, strict=True)
-    return [(end, why) for end, why in ends if why.endswith(POINTS) or why.startswith(SHORT_STEP)]
+    return [(end, why) for end, why in ends if why.broken_off]
 
 
 def open_ends(branch: Branch) -> list[Real]:

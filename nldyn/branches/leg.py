@@ -15,8 +15,9 @@ from nldyn.bifurcations.branch_crossing import NEIGHBOUR, distance, same_crossin
 from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.bifurcations.within_step import insert_dip, special_points_between
-from nldyn.branches.arclength import COMES_BACK, MEETS_OPEN_END, Stepper, StepperState
-from nldyn.branches.branch import CLOSED, JOINS, NOT_FINISHED, WalkEnd
+from nldyn.branches.arclength import Stepper, StepperState
+from nldyn.branches.branch import WalkEnd
+from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.shooting import metric_length
 
@@ -37,7 +38,7 @@ class Leg:
     ----------
     nodes, special_points, notes : list
         As in `Branch`.
-    reason : str
+    reason : StopReason
         Why the walk stopped.
     end : WalkEnd, optional
         How it would go on.
@@ -46,7 +47,7 @@ class Leg:
     nodes: list[BranchPoint]
     special_points: list[SpecialPoint]
     notes: list[str]
-    reason: str
+    reason: StopReason
     end: WalkEnd | None
 
 
@@ -125,12 +126,13 @@ class LegBuilder:
                 if keep is not None:
                     keep()
         self._search(len(self.nodes) - 1, closely=False)
-        if self.walk.stop_reason.startswith(COMES_BACK):
+        ending = self.walk.stop_reason.ending
+        if ending is Ending.COMES_BACK:
             self.notes.append(self.walk.stop_reason)
         special = self.special_points
-        if self.walk.stop_reason.startswith(JOINS):
+        if ending is Ending.JOINS:
             special = [s for s in special if not self._is_flip_at_end(s)]
-        elif self.walk.stop_reason == CLOSED:  # the last step leads beyond the start
+        elif ending is Ending.CLOSED_BRANCH:  # the last step leads beyond the start
             special = self._once_around()
             last = self.nodes.pop()  # a dip may have put others there
             self.nodes = [*(p for p in self.nodes if not self._is_repeated(p)), last]
@@ -164,7 +166,7 @@ class LegBuilder:
             [*self.nodes[:kept], stride.here],
             self.special_points[:special],
             self.notes[:notes],
-            NOT_FINISHED,
+            Ending.NOT_FINISHED.told(),
             self._end(kept),
         )
 
@@ -323,7 +325,7 @@ def _detour(
     )
     inner = Stepper(a, range_hz, options, b.orbit.point[None])
     between = list(inner)[1:-1]
-    if inner.stop_reason != MEETS_OPEN_END or not between:
+    if inner.stop_reason.ending is not Ending.MEETS_OPEN_END or not between:
         return None
     last = between[-1]
     weights = last.orbit.problem.metric(last.orbit.point)

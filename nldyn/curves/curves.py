@@ -23,11 +23,11 @@ from nldyn.base.errors import (
 )
 from nldyn.bifurcations.point import check_special
 from nldyn.bifurcations.roots import root
-from nldyn.branches.branch import NOT_FINISHED
+from nldyn.branches.endings import Ending, StopReasons, has_ending
 from nldyn.branches.options import ContinuationOptions
 from nldyn.branches.tables import orbit_columns
 from nldyn.curves.marks import CurveChord, Located, LocatedPoint, marks_between
-from nldyn.curves.walk import CLOSED_CURVE, DISSOLVED, CurvePoint, CurveWalk, curve_point, passages
+from nldyn.curves.walk import CurvePoint, CurveWalk, curve_point, passages
 from nldyn.flow.flow_map import FlowMap, same_flow
 from nldyn.orbits.bordered import Condition, Free, OrbitFamily, correct, gradient, tangent_surface
 from nldyn.orbits.conditions import Held, Monitor, defined_by
@@ -79,7 +79,7 @@ class Curve:
         In order along the curve.
     marks : tuple of LocatedPoint
         Points at which a further condition is met, in the same order.
-    stop_reasons : tuple of str
+    stop_reasons : tuple of StopReason
         Why the continuation stopped at the first and at the last point.
     notes : tuple of str
         What may be missing.
@@ -89,7 +89,7 @@ class Curve:
     parameters: tuple[Parameter, ...]
     points: tuple[CurvePoint, ...]
     marks: tuple[LocatedPoint, ...]
-    stop_reasons: tuple[str, str]
+    stop_reasons: StopReasons
     notes: tuple[str, ...] = ()
 
     @property
@@ -339,7 +339,7 @@ def continue_special(
     charts = _charts(special.orbit, parameters, ranges, options, progress, 2)
     keeper = _keeper(checkpoint)
     curve = _curve(special.kind, special_start(special, charts), options, progress, keeper)
-    if len(curve.points) == 1 and DISSOLVED in curve.stop_reasons:
+    if len(curve.points) == 1 and has_ending(curve.stop_reasons, Ending.DISSOLVED):
         if checkpoint is not None:
             checkpoint.remove()
         names = " or ".join(chart.parameter.name for chart in charts)
@@ -499,7 +499,8 @@ def _curve(
 ) -> Curve:
     """Walk both ways from the start and mark what is met."""
     parameters = tuple(chart.parameter for chart in start.found.at.family.charts)
-    begun = Curve(kind, parameters, (start,), (), (NOT_FINISHED, NOT_FINISHED))
+    open_ = Ending.NOT_FINISHED.told()
+    begun = Curve(kind, parameters, (start,), (), (open_, open_))
     return _followed(begun, options, progress, keeper)
 
 
@@ -552,18 +553,21 @@ def _followed(
     backward: list[CurvePoint] = []
     first, last = curve.stop_reasons
 
+    def is_closed() -> bool:
+        return has_ending((first, last), Ending.CLOSED_CURVE)
+
     def whole() -> Curve:
         """What there is, not finished before it is searched."""
         points = [point.reversed() for point in backward[:0:-1]]
         points += [*curve.points, *forward[1:]]
-        closed = CLOSED_CURVE in (first, last)
-        reasons = NOT_FINISHED, CLOSED_CURVE if closed else NOT_FINISHED
+        open_, closed = Ending.NOT_FINISHED.told(), Ending.CLOSED_CURVE.told()
+        reasons = open_, closed if is_closed() else open_
         return replace(curve, points=tuple(points), stop_reasons=reasons)
 
     with keeper:
         keeper.work = whole
         for leg in (forward, backward):
-            if CLOSED_CURVE in (first, last):
+            if is_closed():
                 break
             points = whole().points
             end, origin = points[-1], points[0]
@@ -579,10 +583,10 @@ def _followed(
                 last = walk.stop_reason
             else:
                 first = walk.stop_reason
-        if CLOSED_CURVE in (first, last):
-            first = last = CLOSED_CURVE
+        if is_closed():
+            first = last = Ending.CLOSED_CURVE.told()
         points = whole().points
-        if NOT_FINISHED in curve.stop_reasons:
+        if has_ending(curve.stop_reasons, Ending.NOT_FINISHED):
             marks, notes = _marked(points)
         else:
             (ahead, notes), (before, lost) = _marked(forward), _marked(backward)

@@ -13,7 +13,7 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError
 from nldyn.bifurcations.period_doubling import passed_flip
-from nldyn.branches.branch import NOT_FINISHED, SHORT_STEP
+from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.options import ContinuationOptions
 from nldyn.curves.events import codimension_tests, cosine_near, is_torus, torus_cosine
 from nldyn.orbits.bordered import (
@@ -33,13 +33,6 @@ from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import metric_length
 from nldyn.system.chart import Chart
 
-RANGE_END = "end of the range of "
-RESONANCE_END = "becomes a curve of neutral saddles at a resonance"
-CLOSED_CURVE = "closed curve"
-VANISHES = "the extreme that grazes meets another one, and both vanish"
-DISSOLVED = "the branch point dissolves, as the symmetry does that brings it about"
-CORNER_OF_BRANCH_POINTS = "a stop is grazed, where the curve has a corner that is not followed"
-OTHER_EXTREME = "another extreme gets as large as the one held, where that has a corner"
 UNFOLDED = 1e-6  # unfolding number from which a branch point has dissolved
 MEETING = 1e-9  # arclength within which a curve and a grazing meet
 MOST_SECANTS = 20
@@ -362,7 +355,7 @@ class CurveWalk:
     start: CurvePoint
     options: ContinuationOptions
     origin: CurvePoint | None = None
-    stop_reason: str = NOT_FINISHED
+    stop_reason: StopReason = field(default_factory=Ending.NOT_FINISHED.told)
     _cosine: float = field(default=math.nan, init=False, repr=False)  # of a pair on the circle
     _obstacle: str = field(default="", init=False, repr=False)
 
@@ -374,7 +367,7 @@ class CurveWalk:
             self._cosine = torus_cosine(here.orbit.multipliers)
         yield here
         if left := self._left_at_once():
-            self.stop_reason = f"{RANGE_END}{left}"
+            self.stop_reason = Ending.PARAMETER_RANGE_END.told(parameter=left)
             return
         ahead: list[CurvePoint] = []  # a corner, and what is behind it
         for _ in range(self.options.max_points):
@@ -414,7 +407,7 @@ class CurveWalk:
             growth = 0.7 * self.options.max_angle / max(angle, 1e-3)
             growth = min(growth, math.sqrt(0.5 * self.options.max_miss / max(miss, 1e-6)))
             step = min(step * min(max(growth, 0.5), 1.6), self.options.max_step)
-        self.stop_reason = f"{self.options.max_points} points"
+        self.stop_reason = Ending.MOST_POINTS.told(points=self.options.max_points)
 
     def _advance(
         self, here: CurvePoint, curvature: Real, step: float, seen: bool
@@ -465,15 +458,15 @@ class CurveWalk:
                 return None
         return there, angle, miss
 
-    def _why_short(self, here: CurvePoint) -> str:
+    def _why_short(self, here: CurvePoint) -> StopReason:
         """Why no step is short enough."""
         if extremes_meet(here):
-            return VANISHES
+            return Ending.EXTREME_VANISHES.told()
         if isinstance(here.condition, BranchPoint) and nearest_depth(here.orbit) < MEETS:
-            return CORNER_OF_BRANCH_POINTS
+            return Ending.CORNER.told()
         if isinstance(here.condition, Held) and here.condition.changes_extreme(here.orbit):
-            return OTHER_EXTREME
-        return f"{SHORT_STEP}{self.options.min_step:g}: {self._obstacle}"
+            return Ending.OTHER_EXTREME.told()
+        return Ending.SHORT_STEP.told(step=f"{self.options.min_step:g}", obstacle=self._obstacle)
 
     def _left_at_once(self) -> str:
         """Name of a parameter at the end of its range, beyond which the curve would begin."""
@@ -503,7 +496,9 @@ class CurveWalk:
                 weights = here.found.at.family.metric(here.point)
                 off = metric_length(weights, end.point - here.point - ahead * here.tangent)
                 if off <= self.options.max_angle * ahead:
-                    self.stop_reason = f"{RANGE_END}{chart.parameter.name}"
+                    self.stop_reason = Ending.PARAMETER_RANGE_END.told(
+                        parameter=chart.parameter.name
+                    )
                     return end
         return None
 
@@ -519,25 +514,26 @@ class CurveWalk:
                 ends.append((share, which, limit))
         if ends:
             share, which, limit = min(ends)
-            self.stop_reason = f"{RANGE_END}{charts[which].parameter.name}"
+            name = charts[which].parameter.name
+            self.stop_reason = Ending.PARAMETER_RANGE_END.told(parameter=name)
             if share <= 1e-9:
                 return []
             end = on_chart_plane(here, there, which, limit)
             if end is None:
-                self.stop_reason += ", where no orbit was found"
+                self.stop_reason = Ending.NO_ORBIT_AT_RANGE_END.told(parameter=name)
                 return []
             return [end]
         if isinstance(here.condition, BranchPoint) and abs(there.point[-1]) > UNFOLDED:
-            self.stop_reason = DISSOLVED
+            self.stop_reason = Ending.DISSOLVED.told()
             return []
         if passed_flip(here.orbit, there.orbit):
-            self.stop_reason = f"meets orbits of period {here.orbit.period // 2}"
+            self.stop_reason = Ending.MEETS_HALF_PERIODS.told(period=here.orbit.period // 2)
             return []
         if is_torus_curve(here.condition) and not is_torus(there.orbit.multipliers):
-            self.stop_reason = RESONANCE_END
+            self.stop_reason = Ending.RESONANCE.told()
             return [there]
         if self._closed(here, there):
-            self.stop_reason = CLOSED_CURVE
+            self.stop_reason = Ending.CLOSED_CURVE.told()
             return [there]
         return None
 

@@ -25,6 +25,7 @@ from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.branches.branch import Branch, Course, WalkEnd
 from nldyn.branches.checkpoint import Tally
 from nldyn.branches.continuation import alike
+from nldyn.branches.endings import StopReason
 from nldyn.branches.options import ContinuationOptions
 from nldyn.branches.tables import UNITS, orbit_columns
 from nldyn.flow.flow_map import FlowMap, Trajectory, same_flow
@@ -382,7 +383,7 @@ def _read_branch(group: Group, flows: Sequence[FlowMap]) -> Branch:
         problem.period,
         tuple(nodes),
         tuple(map(SpecialPoint, kinds, points, errors.tolist())),
-        (reasons[0], reasons[1]),
+        (StopReason(reasons[0]), StopReason(reasons[1])),
         tuple(group.texts("notes")),
         tuple(_read_points(group.group("requested"), problem, observe)),
         _read_course(group.group("course"), nodes) if "course" in group else None,

@@ -16,6 +16,7 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, shown
+from nldyn.branches.endings import StopReason
 from nldyn.branches.tables import UNITS
 from nldyn.curves.curves import Curve
 from nldyn.curves.marks import LocatedPoint
@@ -218,7 +219,7 @@ def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve:
                 kinds, places, residuals.tolist(), errors.tolist(), strict=True
             )
         ),
-        (reasons[0], reasons[1]),
+        (StopReason(reasons[0]), StopReason(reasons[1])),
         tuple(group.texts("notes")),
     )
 

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Literal
 
 from nldyn.base.version import software_version
 from nldyn.bifurcations.normal_forms import normal_form
-from nldyn.branches.branch import NOT_FINISHED, POINTS, SHORT_STEP
 from nldyn.branches.cascades import cascades_in
+from nldyn.branches.endings import Ending
 from nldyn.branches.tables import at_known, orbit_columns
 from nldyn.io.store import save
 from nldyn.plot.diagram import save_diagram
@@ -146,7 +146,7 @@ def end_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
         ends = zip(("first", "last"), branch.stop_reasons, (0, -1), strict=True)
         for name, reason, index in ends:
             orbit = branch.points[index]
-            broken = reason.startswith((SHORT_STEP, NOT_FINISHED)) or reason.endswith(POINTS)
+            broken = reason.broken_off or reason.ending is Ending.NOT_FINISHED
             hz = at_known(orbit.frequency_hz, diagram.range_hz)
             size = float(orbit.max_abs_displacement)
             yield (branch.name, name, hz, size, int(broken), reason)

@@ -25,7 +25,7 @@ from nldyn.base.rows import Rows
 from nldyn.bifurcations.normal_forms import switch_at_branch_point
 from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint, is_at
-from nldyn.branches.branch import JOINS, Branch, Course, check_branches
+from nldyn.branches.branch import Branch, Course, check_branches
 from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_of_several
 from nldyn.branches.continuation import (
     broken_off,
@@ -37,6 +37,7 @@ from nldyn.branches.continuation import (
     start_point,
     walked_leg,
 )
+from nldyn.branches.endings import Ending
 from nldyn.branches.options import ContinuationOptions
 from nldyn.flow.ahead import Ahead, Task, computing_ahead
 from nldyn.flow.flow_map import FlowMap, flow_of, same_flow
@@ -210,7 +211,7 @@ class Collector:
         for end in open_ends(branch):
             self._open_ends_like(branch.nodes[0].orbit).add(end)
         ends = zip(branch.stop_reasons, (branch.nodes[0], branch.nodes[-1]), strict=True)
-        self.flip_ends += [node.orbit for reason, node in ends if reason.startswith(JOINS)]
+        self.flip_ends += [node.orbit for reason, node in ends if reason.ending is Ending.JOINS]
 
     def _open_ends_like(self, orbit: Orbit) -> Rows:
         """Where branches were broken off at orbits of as many periods and unknowns as this one.

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_frequency, check_range, check_whole
-from nldyn.branches.branch import CLOSED, Branch, check_branches
+from nldyn.branches.branch import Branch, check_branches
+from nldyn.branches.endings import Ending
 from nldyn.flow.flow_map import same_flow
 from nldyn.orbits.orbit import Orbit
 from nldyn.system.system import System
@@ -193,7 +194,7 @@ def _along(branch: Branch, times: int) -> tuple[Real, NDArray[np.int_]]:
     says that it does not: a branch that leaves there to one side only comes back with the same.
     """
     places = list(branch.places.points)
-    if branch.stop_reasons[1] == CLOSED:
+    if branch.stop_reasons[1].ending is Ending.CLOSED_BRANCH:
         places[-1] = places[0]  # beyond which it lies
     changing = {"LP", "BP", "PD"} if times % 2 == 0 else {"LP", "BP"}
     special = {id(s.point): s.kind for s in branch.special_points if s.kind in changing}

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 from nldyn.base.errors import SystemModelError
 from nldyn.bifurcations.point import SpecialPoint
+from nldyn.branches.endings import AT_RANGE_END, Ending
 from nldyn.branches.options import ContinuationOptions
 from nldyn.curves.curves import special_start
-from nldyn.curves.walk import CLOSED_CURVE, RANGE_END, CurveWalk, passages
+from nldyn.curves.walk import CurveWalk, passages
 from nldyn.orbits.orbit import Orbit
 from nldyn.system.chart import EVERY_MODE, FREQUENCY, Chart, checked_parameter, value_of
 from nldyn.system.parameters import Parameter
@@ -66,8 +67,8 @@ def connected_folds(
         walk = CurveWalk(end, options)
         met = passages(walk, 1, value)
         found += [replace(point.orbit, problem=orbit.problem) for point in met]
-        if walk.stop_reason == CLOSED_CURVE:
+        if walk.stop_reason.ending is Ending.CLOSED_CURVE:
             break
-        if not walk.stop_reason.startswith(RANGE_END):
+        if walk.stop_reason.ending not in AT_RANGE_END:
             broken.append(walk.stop_reason)
     return found, broken

@@ -33,10 +33,10 @@ from nldyn import (
 )
 from nldyn.base.resources import example
 from nldyn.bifurcations.period_doubling import switch_at_flip
+from nldyn.branches.endings import Ending
 from nldyn.branches.leg import trace
 from nldyn.curves import events as codimension
 from nldyn.curves.events import along_tori, flip_coefficient, is_torus
-from nldyn.curves.walk import OTHER_EXTREME
 from nldyn.orbits.bordered import OrbitFamily
 from nldyn.orbits.conditions import Singular, bialternate, max_abs_displacement, peak_force
 from nldyn.orbits.orbit import Orbit
@@ -694,7 +694,8 @@ def test_a_curve_that_ends_where_another_force_gets_as_large_says_so():
     start = min(branch.at(14.4), key=lambda orbit: abs(peak_force(orbit) - 50.0))
     parameters, window = ("frequency_hz", Parameter("gap", 0)), ((14.3, 14.6), (5.8e-4, 7.2e-4))
     curve = continue_constant(start, "peak_force", parameters, window, value=50.0)
-    assert sorted(curve.stop_reasons) == sorted([OTHER_EXTREME, "end of the range of gap"])
+    told = [Ending.OTHER_EXTREME.value, "end of the range of gap"]
+    assert sorted(curve.stop_reasons) == sorted(told)
     by_end = [forces_by_stop(orbit) for orbit in (curve.orbits[0], curve.orbits[-1])]
     assert sorted(abs(a / b - 1.0) < 1e-4 for a, b in by_end) == [False, True]
 

@@ -23,7 +23,7 @@ from nldyn import (
     save,
     solve_orbit,
 )
-from nldyn.branches.branch import NOT_FINISHED
+from nldyn.branches.endings import Ending
 from nldyn.io.branches import load_branches, load_diagram
 from nldyn.orbits.starts import nearest_orbit
 from nldyn.paper.jobs import scene_system
@@ -234,12 +234,12 @@ def test_a_branch_that_was_begun_is_finished(three, tmp_path):
             load_diagram(known), tries=50, progress=interrupt, checkpoint=CheckpointFile(place)
         )
     (begun,) = load_branches(place)
-    assert NOT_FINISHED in begun.stop_reasons
+    assert Ending.NOT_FINISHED.value in begun.stop_reasons
     (found,) = by_pseudo_orbits(
         load_diagram(known), tries=50, checkpoint=CheckpointFile(place)
     ).branches[2:]
     assert len(begun.points) < len(found.points)
-    assert NOT_FINISHED not in found.stop_reasons
+    assert Ending.NOT_FINISHED.value not in found.stop_reasons
     ends = [special.frequency_hz for special in found.special_points if special.kind == "LP"]
     wanted = [special.frequency_hz for special in left_out.special_points if special.kind == "LP"]
     assert sorted(ends) == pytest.approx(sorted(wanted), rel=1e-9)

@@ -27,8 +27,8 @@ from nldyn import (
     solve_orbit,
 )
 from nldyn.branches.arclength import Stepper
-from nldyn.branches.branch import CLOSED, NOT_FINISHED
 from nldyn.branches.checkpoint import Checkpoint
+from nldyn.branches.endings import Ending
 from nldyn.io.branches import load_branch, load_branches
 from nldyn.runtime import keeper
 from nldyn.runtime.result_directory import OutputError
@@ -124,7 +124,7 @@ def test_a_branch_that_closes_in_a_wider_range_is_kept_once(picture):
     part = continue_branch(first, narrow)
     assert part.stop_reasons == ("end of the frequency range",) * 2
     longer, once = continue_branch(part, (20.0, 80.0)), continue_branch(first, (20.0, 80.0))
-    assert once.stop_reasons == (CLOSED, CLOSED)
+    assert once.stop_reasons == (Ending.CLOSED_BRANCH.value,) * 2
     assert_same_branches(longer, once)
 
 
@@ -157,7 +157,7 @@ def test_an_interrupted_run_loses_nothing(start, whole, tmp_path, count):
     if count:
         part = load_branch(path)
         assert len(part.nodes) >= count - 1
-        assert NOT_FINISHED in part.stop_reasons
+        assert Ending.NOT_FINISHED.value in part.stop_reasons
         assert_same_branches(continue_branch(part), whole)
     again = continue_branch(start, RANGE_HZ, at=AT, checkpoint=CheckpointFile(path))
     assert_same_branches(again, whole)

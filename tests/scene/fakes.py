@@ -6,6 +6,7 @@ import numpy as np
 
 from nldyn.bifurcations.critical import Estimate
 from nldyn.bifurcations.normal_forms import NormalForm
+from nldyn.branches.endings import StopReason
 from nldyn.orbits.multipliers import Stability
 
 SURE = Stability(0.5 + 0.2j, -0.62, 1e-7)
@@ -66,7 +67,7 @@ class FakeBranch:
     nodes: list
     special_points: list
     stop_reason: str = "end of range"
-    stop_reasons: tuple = ("end of range", "end of range")
+    stop_reasons: tuple = (StopReason("end of range"),) * 2
 
     @property
     def points(self):

@@ -1,0 +1,106 @@
+"""Why a branch or a curve ends."""
+
+from __future__ import annotations
+
+import re
+from enum import Enum
+
+
+class Ending(Enum):
+    """Why a continuation stopped, with the sentence that tells it.
+
+    Examples
+    --------
+    >>> reason = Ending.MOST_POINTS.told(points=100)
+    >>> reason, reason.ending is Ending.MOST_POINTS
+    ('100 points', True)
+    """
+
+    NOT_FINISHED = "not finished"
+    RANGE_END = "end of the frequency range"
+    NO_ORBIT_AT_RANGE_END = "end of the range of {parameter}, where no orbit was found"
+    PARAMETER_RANGE_END = "end of the range of {parameter}"
+    CLOSED_BRANCH = "closed branch"
+    CLOSED_CURVE = "closed curve"
+    JOINS = "joins the branch of period {period} at the flip at {hz} Hz"
+    MEETS_HALF_PERIOD = (
+        "meets the branch of period {period} beyond {hz} Hz, where no orbit of that period was "
+        "found"
+    )
+    MEETS_HALF_PERIODS = "meets orbits of period {period}"
+    MEETS_OPEN_END = "meets another branch where that was broken off"
+    COMES_BACK = (
+        "comes back to where it had been at {hz} Hz: on the way it left the branch for another one "
+        "that lies too near"
+    )
+    BEGINS_AT_FLIP = "begins at the flip at {hz} Hz"
+    FLIP = "a flip"
+    RESONANCE = "becomes a curve of neutral saddles at a resonance"
+    EXTREME_VANISHES = "the extreme that grazes meets another one, and both vanish"
+    DISSOLVED = "the branch point dissolves, as the symmetry does that brings it about"
+    CORNER = "a stop is grazed, where the curve has a corner that is not followed"
+    OTHER_EXTREME = "another extreme gets as large as the one held, where that has a corner"
+    MOST_POINTS = "{points} points"
+    SHORT_STEP = "step below {step}: {obstacle}"
+    OTHER = "{sentence}"  # of an earlier version
+
+    def told(self, **values: object) -> StopReason:
+        """The sentence, with what fills its gaps."""
+        reason = str.__new__(StopReason, self.value.format(**values))
+        reason.ending, reason.values = self, {name: str(value) for name, value in values.items()}
+        return reason
+
+
+def _pattern(ending: Ending) -> re.Pattern[str]:
+    parts = re.split(r"\{(\w+)\}", ending.value)
+    parts[::2] = map(re.escape, parts[::2])
+    parts[1::2] = [f"(?P<{name}>.*?)" for name in parts[1::2]]
+    return re.compile("".join(parts), re.DOTALL)
+
+
+_PATTERNS = {  # the first one that fits is it
+    ending: _pattern(ending) for ending in Ending
+}
+
+
+class StopReason(str):
+    """The sentence that tells why a branch or a curve ends.
+
+    Attributes
+    ----------
+    ending : Ending
+        Which one it is.
+    values : dict of str to str
+        What fills its gaps.
+
+    Examples
+    --------
+    >>> StopReason("step below 1e-05: Newton's method did not converge").values["step"]
+    '1e-05'
+    """
+
+    ending: Ending
+    values: dict[str, str]
+
+    def __new__(cls, sentence: str) -> StopReason:
+        """Read a sentence, as files hold it."""
+        self = super().__new__(cls, sentence)
+        for ending, pattern in _PATTERNS.items():
+            if match := pattern.fullmatch(sentence):
+                self.ending, self.values = ending, match.groupdict()
+                break
+        return self
+
+    @property
+    def broken_off(self) -> bool:
+        """Whether the branch goes on behind its end."""
+        return self.ending in (Ending.SHORT_STEP, Ending.MOST_POINTS)
+
+
+StopReasons = tuple[StopReason, StopReason]
+AT_RANGE_END = (Ending.PARAMETER_RANGE_END, Ending.NO_ORBIT_AT_RANGE_END)
+
+
+def has_ending(reasons: StopReasons, ending: Ending) -> bool:
+    """Whether one of the reasons is of this kind."""
+    return any(reason.ending is ending for reason in reasons)
