@@ -9,18 +9,19 @@ HERE = Path(__file__).parent
 
 # The first worker compiles the kernels with the first file, while the second one has those that
 # need none; then the longest files, so that no worker is left alone with one.
-COMPILES = ("nldyn/test_nldyn_multipliers.py",)
-NEEDS_NO_KERNELS = ("cms", "fem", "scene/test_scene_errors.py", "scene/test_scene_documented.py")
+COMPILES = ("nldyn/orbits/test_multipliers.py",)
+SCENES = "nldyn/scene/test_scene_errors.py", "nldyn/scene/test_scene_documented.py"
+NEEDS_NO_KERNELS = ("cms", "fem", *SCENES)
 LONGEST = (
-    "nldyn/test_nldyn_close_branches.py",
-    "nldyn/test_nldyn_exploration.py",
-    "nldyn/test_nldyn_executors.py",
-    "paper/test_paper_starts.py",
-    "nldyn/test_nldyn_detour_search.py",
-    "nldyn/test_nldyn_curves.py",
+    "nldyn/branches/test_close_branches.py",
+    "nldyn/search/test_exploration.py",
+    "nldyn/runtime/test_executors.py",
+    "nldyn/paper/test_paper_starts.py",
+    "nldyn/search/test_homotopy.py",
+    "nldyn/curves/test_curves.py",
     "faults/test_faults_machine.py",
-    "nldyn/test_nldyn_resume.py",
-    "nldyn/test_nldyn_contacts.py",
+    "nldyn/io/test_resume.py",
+    "nldyn/flow/test_contacts.py",
 )
 
 

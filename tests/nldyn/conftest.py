@@ -1,7 +1,7 @@
 """The 1-DOF system of equation 3.1, and branches of it."""
 
 import pytest
-from one_dof import RANGE_HZ, THREE_HZ, make_one_dof
+from problems import RANGE_HZ, THREE_HZ, make_one_dof
 
 from nldyn import Diagram, System, continue_branch, solve_orbit
 

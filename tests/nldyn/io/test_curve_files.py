@@ -1,0 +1,248 @@
+"""Curves are saved, loaded, tabulated and extended."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pytest
+from problems import between_stops, make_one_dof
+
+from nldyn import (
+    CheckpointFile,
+    ContinuationOptions,
+    Damper,
+    HarmonicForce,
+    Parameter,
+    Stop,
+    System,
+    SystemModelError,
+    continue_branch,
+    continue_constant,
+    continue_in,
+    continue_special,
+    save,
+    solve_orbit,
+)
+from nldyn.curves import curves
+from nldyn.io.branches import load_branch
+from nldyn.io.curves import load_curve, load_curves, save_curves
+from nldyn.orbits.conditions import peak_force
+
+
+def symmetric() -> System:
+    stops = [Stop.linear("m", 3000.0, gap=0.01, direction=side) for side in (1, -1)]
+    return System.from_matrices(
+        [[1.0]], [[100.0]], {"m": [1.0]}, modal_damping=0.02, stops=stops,
+        dampers=[Damper("m", 0.01)], excitation=[HarmonicForce("m", 1.0)],
+    )  # fmt: skip
+
+
+def special(system, kind, window, start=None):
+    branch = continue_branch(solve_orbit(system, start or window[0]), window)
+    return next(s for s in branch.special_points if s.kind == kind)
+
+
+def force(orbit):
+    return peak_force(orbit)
+
+
+def make(kind):
+    one_dof = make_one_dof()
+    few = ContinuationOptions(max_points=4)
+    if kind == "BP":
+        found = special(symmetric(), "BP", (0.5, 1.0), 1.0)
+        return continue_special(
+            found, ("frequency_hz", "coefficient"), ((0.3, 2.0), (0.005, 0.02)), options=few
+        )
+    if kind in ("LP", "PD", "GR"):
+        window, start = {
+            "LP": ((12.0, 26.0), 26.0), "PD": ((33.0, 34.0), 33.0), "GR": ((5.7, 6.5), 6.5)
+        }[kind]  # fmt: skip
+        found = special(one_dof, kind, window, start)
+        pair = ("frequency_hz", "modal_damping" if kind == "PD" else "gap")
+        ranges = ((5.0, 60.0), (0.01, 0.02) if kind == "PD" else (-1e-7, 1e-7))
+        return continue_special(found, pair, ranges, options=few)
+    start = solve_orbit(one_dof, 26.0)
+    if kind == "orbit":
+        return continue_in(start, "frequency_hz", (15.0, 30.0))
+    monitor = {"own": force, "max_abs_displacement": "max_abs_displacement"}[kind]
+    window = ((25.0, 27.0), (-1e-7, 1e-7))
+    return continue_constant(start, monitor, ("frequency_hz", "gap"), window, options=few)
+
+
+@pytest.fixture(
+    scope="module", params=["LP", "PD", "GR", "BP", "orbit", "own", "max_abs_displacement"]
+)
+def curve(request):
+    return make(request.param)
+
+
+@pytest.fixture(scope="module")
+def loaded(curve, tmp_path_factory):
+    path = tmp_path_factory.mktemp("curves") / "curve.h5"
+    save(curve, path)
+    return load_curve(path, monitor=force if curve.kind == "force" else None)
+
+
+def test_loaded_curve_has_the_unknowns_of_the_saved_one(curve, loaded):
+    assert (loaded.kind, loaded.parameters) == (curve.kind, curve.parameters)
+    assert (loaded.stop_reasons, loaded.notes) == (curve.stop_reasons, curve.notes)
+    assert np.array_equal(loaded.values, curve.values)
+    for a, b in zip(curve.points, loaded.points, strict=True):
+        for name in ("point", "tangent", "arclength", "corner"):
+            assert np.array_equal(getattr(a, name), getattr(b, name))
+    assert [m.kind for m in loaded.marks] == [m.kind for m in curve.marks]
+    for one, other in zip(curve.marks, loaded.marks, strict=True):
+        assert other.values == pytest.approx(one.values, rel=1e-14)
+        assert other.orbit.frequency_hz == pytest.approx(one.orbit.frequency_hz, rel=1e-14)
+        assert other.orbit.multipliers == pytest.approx(one.orbit.multipliers, rel=1e-9, abs=1e-12)
+
+
+def test_loaded_curve_has_its_orbits_and_conditions(curve, loaded):
+    assert loaded.residuals == pytest.approx(curve.residuals, abs=1e-12)
+    for a, b in zip(curve.orbits, loaded.orbits, strict=True):
+        assert b.multipliers == pytest.approx(a.multipliers, rel=1e-12)
+        assert b.max_abs_displacement == pytest.approx(a.max_abs_displacement, rel=1e-12)
+        assert (b.period, b.observe, b.impacts) == (a.period, a.observe, a.impacts)
+
+
+def test_table_has_the_parameters_and_the_orbits(curve, loaded):
+    for part, rows in (("points", curve.points), ("marks", curve.marks)):
+        table = curve.table(part)
+        for number, parameter in enumerate(curve.parameters):
+            assert table[parameter.name].tolist() == [row.values[number] for row in rows]
+        assert table["impacts"].tolist() == [row.orbit.impacts for row in rows]
+        assert {len(column) for column in table.values()} == {len(rows)}
+        again = loaded.table(part)
+        assert list(again) == list(table)
+    with pytest.raises(SystemModelError, match="part must be one of points, marks, got 'nodes'"):
+        curve.table("nodes")
+
+
+def test_an_extended_curve_is_the_curve_through_the_longer_range():
+    found = special(make_one_dof(), "LP", (12.0, 26.0), 26.0)
+    pair = ("frequency_hz", "gap")
+    short = continue_special(found, pair, ((5.0, 60.0), (-1e-7, 1e-7)))
+    longer = short.extend(((5.0, 60.0), (-2e-7, 2e-7)))
+    whole = continue_special(found, pair, ((5.0, 60.0), (-2e-7, 2e-7)))
+    assert longer.values[[0, -1]] == pytest.approx(whole.values[[0, -1]], rel=1e-9)
+    assert longer.residuals.max() < 1e-7
+    assert [m.kind for m in longer.marks] == [m.kind for m in whole.marks]
+    for value in (-1.2e-7, 0.5e-7, 1.5e-7):
+        one, other = (c.at("gap", value)[0].frequency_hz for c in (longer, whole))
+        assert one == pytest.approx(other, rel=1e-9)
+    with pytest.raises(SystemModelError, match="outside its range"):
+        short.extend(((5.0, 60.0), (-1e-8, 1e-8)))
+
+
+def test_a_loaded_curve_goes_on(tmp_path):
+    few = ContinuationOptions(max_points=3)
+    start = solve_orbit(make_one_dof(), 26.0)
+    short = continue_in(start, Parameter("stiffness"), (1e9, 2e10), options=few)
+    assert "3 points" in short.stop_reasons
+    save(short, tmp_path / "short.h5")
+    longer = load_curve(tmp_path / "short.h5").extend([(1e9, 2e10)])
+    assert longer.values[[0, -1], 0] == pytest.approx([1e9, 2e10], rel=1e-14)
+    assert longer.stop_reasons == ("end of the range of stiffness",) * 2
+
+
+@pytest.mark.parametrize("share", [0.2, 0.7])
+def test_an_interrupted_curve_is_kept_and_finished(tmp_path, share):
+    """In the leg forward, and in the one backward."""
+    path = tmp_path / "curve.h5"
+    found = special(make_one_dof(), "PD", (33.0, 34.0), 33.0)
+    pair, ranges = ("frequency_hz", "gap"), ((5.0, 60.0), (-1e-7, 2e-7))
+    whole = continue_special(found, pair, ranges)
+    seen = []
+
+    def stop(values):
+        seen.append(values)
+        if len(seen) > share * len(whole.points):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        continue_special(found, pair, ranges, progress=stop, checkpoint=CheckpointFile(path))
+    kept = load_curve(path)
+    assert kept.stop_reasons == ("not finished", "not finished") and not kept.marks
+    assert len(kept.points) >= len(seen) - 1
+    assert (kept.points[0].arclength < 0.0) is (share > 0.5)
+    with pytest.raises(SystemModelError, match="exists already; load and"):
+        continue_special(found, pair, ranges, checkpoint=CheckpointFile(path))
+    done = kept.extend(ranges, checkpoint=CheckpointFile(path))
+    assert done.stop_reasons == whole.stop_reasons
+    assert done.values[[0, -1]] == pytest.approx(whole.values[[0, -1]], rel=1e-9)
+    assert [mark.kind for mark in done.marks] == [mark.kind for mark in whole.marks]
+    for mark, other in zip(done.marks, whole.marks, strict=True):
+        assert mark.values == pytest.approx(other.values, rel=1e-8)
+    again = load_curve(path)
+    assert np.array_equal(again.values, done.values) and again.stop_reasons == done.stop_reasons
+    few = ContinuationOptions(max_points=2)
+    next_flip = special(make_one_dof(), "PD", (12.0, 20.0), 20.0)
+    for other in (
+        continue_special(next_flip, pair, ranges, options=few),
+        continue_in(solve_orbit(make_one_dof(), 26.0), "gap", (0.0, 1e-7), options=few),
+    ):
+        with pytest.raises(SystemModelError, match="holds another curve, or more of this one"):
+            other.extend(
+                [(5.0, 60.0), (-1e-7, 2e-7)][-len(other.parameters) :],
+                checkpoint=CheckpointFile(path),
+            )
+
+
+@pytest.mark.parametrize("searched", [False, True])
+def test_an_interrupted_closed_curve_closes_where_it_began(tmp_path, monkeypatch, searched):
+    """A closed 1/3 branch between two equal stops."""
+    orbit = solve_orbit(between_stops(), 11.26, 3, guess=[7.9058e-06, 9.9213e-05])
+    whole = continue_in(orbit, "frequency_hz", (11.0, 12.0))
+    assert whole.stop_reasons == ("closed curve", "closed curve")
+    seen = []
+
+    def stop(values):
+        seen.append(values)
+        if not searched and len(seen) == len(whole.points) // 2:
+            raise KeyboardInterrupt
+
+    def stop_search(points):
+        raise KeyboardInterrupt
+
+    path = tmp_path / "curve.h5"
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        if searched:
+            patched.setattr(curves, "_marked", stop_search)
+        continue_in(
+            orbit, "frequency_hz", (11.0, 12.0), progress=stop, checkpoint=CheckpointFile(path)
+        )
+    done = load_curve(path).extend([(11.0, 12.0)])
+    assert done.stop_reasons == whole.stop_reasons
+    length = [curve.points[-1].arclength for curve in (done, whole)]
+    assert length[0] == pytest.approx(length[1], rel=0.2)
+    found, expected = (
+        sorted((m.kind, m.frequency_hz) for m in curve.marks) for curve in (done, whole)
+    )
+    assert [kind for kind, _ in found] == [kind for kind, _ in expected]
+    assert [hz for _, hz in found] == pytest.approx([hz for _, hz in expected], rel=1e-9)
+
+
+def test_several_curves_in_one_file_and_what_is_refused(tmp_path):
+    path, curve = tmp_path / "curves.h5", make("own")
+    few = continue_in(solve_orbit(make_one_dof(), 26.0), "frequency_hz", (25.9, 26.1))
+    save_curves(path, [few, few])
+    assert [c.kind for c in load_curves(path)] == ["orbit", "orbit"]
+    with pytest.raises(SystemModelError, match="holds 2 curves; use load_curves"):
+        load_curve(path)
+    with pytest.raises(SystemModelError, match="is not a file of branches"):
+        load_branch(path)
+    with pytest.raises(SystemModelError, match="curves must be a list of curves, got 3"):
+        save_curves(path, 3)
+    save(curve, path)
+    with pytest.raises(SystemModelError, match="a file cannot hold: pass monitor="):
+        load_curve(path)
+    with pytest.raises(SystemModelError, match="the monitor passed is not 'force'"):
+        load_curve(path, monitor=lambda orbit: 2.0 * force(orbit))
+    with h5py.File(path, "a") as file:
+        file.attrs["format_version"] = 99
+    with pytest.raises(SystemModelError, match="has format version 99, written by nldyn"):
+        load_curve(path, monitor=force)
+    path.write_bytes(path.read_bytes()[:3000])
+    with pytest.raises(SystemModelError, match="cut off or damaged"):
+        load_curve(path)

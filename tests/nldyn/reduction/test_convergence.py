@@ -1,0 +1,364 @@
+"""Convergence studies: against models solved on their own, and what they write."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from problems import MASSES, SETTING, string
+
+import cms
+import fem
+from nldyn import (
+    ConvergenceError,
+    Damper,
+    LoadCase,
+    SceneError,
+    Stop,
+    System,
+    SystemModelError,
+    Unbalance,
+    convergence_study,
+    solve_orbit,
+)
+from nldyn.app.cli import main
+from nldyn.base.resources import example
+from nldyn.reduction import convergence
+from nldyn.reduction.convergence import (
+    contact_time,
+    distance,
+    harmonic_branch,
+    largest_force,
+    massless_receptance,
+    matched,
+    measured_linear,
+    receptance,
+    receptance_bound,
+)
+from nldyn.report.convergence import write_study
+from nldyn.scene.component import build_component
+from nldyn.scene.convergence import convergence_study_of, with_mesh
+from nldyn.scene.read import load_scene
+
+
+@pytest.fixture(scope="module")
+def study():
+    return convergence_study(
+        string(),
+        SETTING,
+        modes=(1, 3, 7, 15),
+        methods=("rubin", "truncation"),
+        at_hz=36.0,
+        full=True,
+    )
+
+
+def test_the_full_model_is_the_reference(study):
+    full = SETTING.system(cms.reduce(string(), modes=MASSES))
+    orbit = solve_orbit(full, 36.0)
+    assert study.reference.size == 21  # the modes that the middle sees
+    assert largest_force(study.reference.orbit) == pytest.approx(largest_force(orbit), rel=1e-6)
+    found = study.reference.orbit.max_abs_displacement
+    assert found == pytest.approx(orbit.max_abs_displacement, rel=1e-6)
+
+
+def test_the_reference_of_a_large_component_has_a_bound_of_its_own_error(monkeypatch):
+    monkeypatch.setattr(convergence, "ALL_MODES_UP_TO", 40)
+    monkeypatch.setattr(convergence, "FEWEST_REFERENCE_MODES", 6)
+    study = convergence_study(string(), SETTING, modes=(1, 2))
+    assert (study.reference.label, study.reference.modes) == ("reference", 6)
+    assert "reference: rubin with 6 modes (its undamped receptance is within" in study.report()
+    with pytest.raises(SystemModelError, match="up to 40 degrees of freedom, this one has 41"):
+        convergence_study(string(), SETTING, modes=(1,), full=True)
+
+
+def test_the_bound_of_the_reference_holds():
+    setting, grid = replace(SETTING, modal_damping=0.0), np.linspace(*SETTING.range_hz, 400)
+    reduced = cms.reduce(string(), modes=2)
+    bound = receptance_bound(string(), reduced, measured_linear("", "", reduced, setting), setting)
+    full = receptance(cms.reduce(string(), modes=MASSES), setting, grid)
+    error = distance(receptance(reduced, setting, grid), full)
+    assert 0.5 * bound < error < bound
+
+
+def test_contacts_are_compared_only_where_there_are_any():
+    far = replace(SETTING, stops=(Stop("middle", stiffness=2e7, gap=1.0),))
+    study = convergence_study(string(), far, modes=(1, 3))
+    assert all(np.isnan((error.force, error.contact)).all() for error in study.errors)
+    assert "no stop is touched at 36.7423 Hz" in study.report()
+    assert "contact force" not in study.report()
+
+
+def test_a_structure_that_nothing_holds_is_told():
+    K = 1e5 * (np.diag([1.0, 2.0, 1.0]) - np.eye(3, k=1) - np.eye(3, k=-1))
+    loads = {"middle": np.eye(3)[1], "end": np.eye(3)[2]}
+    free = cms.reduce(cms.Matrices(K, np.eye(3), loads), modes=3)
+    setting = replace(SETTING, stops=(), excitation=(Unbalance("middle", 1e-4),))
+    with pytest.raises(ConvergenceError, match="nothing holds the structure: it has 1 mode at 0"):
+        harmonic_branch(setting.system(free), setting, print)
+
+
+def test_errors_fall_with_the_number_of_modes(study):
+    for label, factor in (("rubin", 0.05), ("truncation", 0.3)):
+        for quantity in ("receptance", "force", "contact"):
+            errors = [getattr(study.errors[i], quantity) for i in study.series()[label]]
+            assert errors[-1] < factor * errors[0], (label, quantity)
+
+
+def test_residual_flexibility_beats_truncation(study):
+    """At equal counts, in the receptance and in the contact force."""
+    rubin, plain = (study.series()[label] for label in ("rubin", "truncation"))
+    for a, b in zip(rubin, plain, strict=True):
+        assert study.errors[a].receptance < study.errors[b].receptance
+    assert study.errors[rubin[1]].force < 0.5 * study.errors[plain[1]].force
+
+
+def test_kept_frequencies_are_exact(study):
+    index = study.series()["rubin"][2]
+    assert study.errors[index].eigenfrequency < 1e-9
+
+
+def test_contact_time_is_the_time_of_positive_penetration():
+    orbit = solve_orbit(SETTING.system(cms.reduce(string(), modes=5)), 36.0)
+    history = orbit.history(200000)
+    closed = np.count_nonzero(history.penetration[:-1, 0] > 0.0) / 200000
+    assert contact_time(orbit) == pytest.approx(closed * orbit.duration, rel=2e-3)
+
+
+def test_special_points_are_paired_nearest_first():
+    exact = {"LP": (10.0, 20.0), "PD": (30.0, 30.1)}
+    own = {"LP": (10.01,), "PD": (30.11, 30.02, 50.0)}
+    worst, missing, extra = matched(own, exact)
+    assert worst == pytest.approx(1e-3)
+    assert (missing, extra) == (1, 1)
+    assert matched(exact, exact) == (0.0, 0, 0)
+
+
+def test_the_report_says_from_where_on(study):
+    said = study.report()
+    assert "rubin, receptance: 1 % from" in said
+    assert "truncation, contact force:" in said
+
+
+def test_files(study, tmp_path):
+    folder = write_study(study, tmp_path / "out", "A string")
+    with (folder / "convergence.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["label"] for row in rows] == ["rubin"] * 4 + ["truncation"] * 4 + ["full"]
+    assert float(rows[1]["force_error"]) == study.errors[1].force
+    assert not any(value in ("nan", "inf") for row in rows for value in row.values())
+    for name in ("convergence.png", "speed_against_error.svg", "special_points_by_model.csv"):
+        assert (folder / name).stat().st_size > 0
+
+
+@pytest.fixture(scope="module")
+def meshes():
+    """A cantilever of 2 to 16 elements, by Rubin's and MacNeal's methods."""
+    components = {}
+    for count in (2, 4, 8, 16):
+        mesh = fem.frame_mesh({"root": (0, 0), "tip": (0.5, 0)}, [("arm", "root", "tip", count)])
+        part = fem.BeamPart(fem.Material(2.1e11, 7800.0), fem.RectangularSection(0.02, 0.01))
+        model = fem.FrameModel(
+            mesh,
+            {"arm": part},
+            supports=[fem.Support("root", ("x", "y", "rotation"))],
+            interfaces={"tip": fem.Interface("tip", "y")},
+        )
+        components[f"{count} elements"] = fem.assemble(model)
+    setting = LoadCase(
+        (30.0, 40.0),
+        stops=(Stop("tip", stiffness=1e8),),
+        excitation=(Unbalance("tip", 1e-4),),
+        dampers=(Damper("tip", 1.0),),
+        modal_damping=0.02,
+    )
+    return convergence_study(components, setting, modes=(3,), methods=("rubin", "macneal"))
+
+
+def test_errors_of_a_beam_fall_with_the_fourth_power_of_its_elements(meshes):
+    """As those of its frequencies; against 16 elements the order seen is a little above."""
+    indices = meshes.mesh_series()["rubin, 3 modes"]
+    assert [meshes.models[i].dofs for i in indices] == [6, 12, 24, 48]
+    for quantity in ("eigenfrequency", "receptance", "force"):
+        errors = [getattr(meshes.errors[i], quantity) for i in indices]
+        assert 10 < errors[1] / errors[2] < 25, quantity
+    assert meshes.best.label == "16 elements rubin"
+    assert meshes.best.dofs == 48
+
+
+def test_macneals_method_is_compared_by_its_linear_numbers(meshes):
+    """One power of the squared frequency worse than Rubin's, and no branch."""
+    rubin, macneal = (meshes.mesh_series()[f"{name}, 3 modes"][-1] for name in ("rubin", "macneal"))
+    errors = meshes.errors[macneal]
+    assert meshes.errors[rubin].receptance < 0.1 * errors.receptance < 1e-5
+    assert np.isnan(errors.force) and errors.counts is None
+    said = meshes.report()
+    assert said.count("so that a stop has no equation of motion") == 1
+    assert "rubin, 3 modes, receptance: 1 % from 12 degrees of freedom" in said
+
+
+def test_a_study_of_meshes_is_drawn_over_their_size(meshes, tmp_path):
+    folder = write_study(meshes, tmp_path / "out", "A cantilever")
+    assert (folder / "meshes.png").is_file()
+    assert not (folder / "convergence.png").exists()
+    with (folder / "convergence.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["dofs"] for row in rows[:4]] == ["6", "6", "12", "12"]
+    assert rows[1]["missing"] == rows[1]["force_error"] == ""
+    assert "no equation of motion" in rows[1]["note"]
+
+
+def test_dampers_close_a_receptance_of_modes_and_flexibility():
+    """Against the modal equations with all dampers, where everything has mass."""
+    setting = replace(SETTING, dampers=(Damper("middle", 3.0), Damper("quarter", 5.0)))
+    whole = cms.reduce(string({"quarter": np.eye(MASSES)[10]}), modes=MASSES, method="truncation")
+    hz = np.linspace(20.0, 60.0, 9)
+    np.testing.assert_allclose(
+        massless_receptance(whole, setting, hz), receptance(whole, setting, hz), rtol=1e-10
+    )
+
+
+def test_the_reference_of_models_of_one_size_is_the_one_with_the_best_receptance():
+    for methods in (("craig-bampton", "rubin"), ("rubin", "craig-bampton")):
+        study = convergence_study(string(), SETTING, modes=(4,), methods=methods, at_hz=36.0)
+        assert study.best.label == "rubin"
+
+
+def test_refined_meshes_converge_to_the_frequencies_of_the_beam():
+    """Twice the elements: the names stay, and the frequencies move by h^4."""
+    scene = load_scene(example("four_dof_xi_0.01.toml"))
+    components = [build_component(scene, times) for times in (1, 2)]
+    hz = [cms.reduce(c, modes=3).frequencies_hz[:3] for c in components]
+    assert components[1].stiffness.shape[0] > 1.9 * components[0].stiffness.shape[0]
+    np.testing.assert_allclose(hz[1], hz[0], rtol=1e-6)
+
+
+SPACE_FRAME = """
+mesh = {file = "frame.inp", model = "structure"}
+parts.mast = {youngs_modulus = 2.1e11, density = 7800, poissons_ratio = 0.3, diameter = 0.02}
+parts.arm = {youngs_modulus = 2.1e11, density = 7800, poissons_ratio = 0.3, diameter = 0.02}
+interfaces.tip = {at = "tip", direction = "z"}
+reduction.modes = 3
+[[supports]]
+at = "foot"
+fixed = ["x", "y", "z", "rotation_x", "rotation_y", "rotation_z"]
+"""
+
+
+@pytest.fixture
+def space_frame(tmp_path):
+    """A scene with a mast and an arm on it, of four and eight elements in two files."""
+    points = {"foot": (0, 0, 0), "top": (0, 0, 1), "tip": (1, 0, 1)}
+    for file, count in (("frame.inp", 2), ("finer.inp", 4)):
+        members = [("mast", "foot", "top", count), ("arm", "top", "tip", count)]
+        fem.write_mesh(fem.frame_mesh(points, members), tmp_path / file)
+    (tmp_path / "scene.toml").write_text(SPACE_FRAME, encoding="utf-8")
+    return load_scene(tmp_path / "scene.toml")
+
+
+def test_lines_of_a_structure_are_cut_as_a_mesher_does(space_frame):
+    cut = cms.reduce(build_component(space_frame, 2), modes=4).frequencies_hz
+    finer = cms.reduce(build_component(with_mesh(space_frame, "finer.inp")), modes=4)
+    coarse = cms.reduce(build_component(space_frame), modes=4).frequencies_hz
+    np.testing.assert_allclose(cut, finer.frequencies_hz, rtol=1e-9)
+    assert np.all(coarse[:4] > cut[:4])
+
+
+def test_solids_are_refined_in_the_mesher():
+    with pytest.raises(SceneError, match="has cells other than two-node lines; refine it"):
+        build_component(load_scene(example("plate.toml")), 2)
+
+
+@pytest.mark.parametrize(
+    "changed, words",
+    [
+        ({"modes": ()}, "at least one component, count and method"),
+        ({"at_hz": 100.0}, "at_hz must lie in the range"),
+    ],
+)
+def test_faults_are_told(changed, words):
+    with pytest.raises(SystemModelError, match=words):
+        convergence_study(string(), SETTING, **{"modes": (1,), **changed})
+
+
+def test_a_setting_without_excitation_is_refused():
+    with pytest.raises(SystemModelError, match="no excitation"):
+        LoadCase((10.0, 20.0))
+    with pytest.raises(SystemModelError, match="from low to high"):
+        LoadCase((20.0, 10.0), excitation=(Unbalance("middle", 1.0),))
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        (["--modes", "one"], "is not a list of whole numbers"),
+        (["--methods", "mcneal", "--modes", "1"], "each method must be one of rubin, cr"),
+        (["--methods", "macneal", "--modes", "1"], "has a harmonic branch: its interfaces have no"),
+        (["--modes", "999"], "999"),
+        (["--meshes", "a.msh,b.msh"], "mesh.file names"),
+        (["--meshes", "a.msh", "--refinements", "2"], "give either refinements or meshes"),
+        (["--at-hz", "500", "--modes", "1"], "at_hz must lie in the range"),
+    ],
+)
+def test_faults_on_the_command_line(tmp_path, options, words):
+    scene = str(example("four_dof_xi_0.01.toml"))
+    result = CliRunner().invoke(main, ["converge", scene, "--out", str(tmp_path / "o"), *options])
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_command(tmp_path):
+    text = example("four_dof_xi_0.01.toml").read_text(encoding="utf-8")
+    mesh = (example("four_dof_xi_0.01.toml").parent / "../../meshes/half_beam.msh").resolve()
+    text = text.replace("../../meshes/half_beam.msh", mesh.as_posix())
+    text = text.replace("range_hz = [15.0, 90.0]", "range_hz = [87.0, 90.0]")
+    scene = tmp_path / "scene.toml"
+    scene.write_text(text, encoding="utf-8")
+    arguments = ["converge", str(scene), "--out", str(tmp_path / "out"), "--quiet"]
+    result = CliRunner().invoke(main, [*arguments, "--modes", "1-2", "--methods", "rubin"])
+    assert result.exit_code == 0, result.output
+    assert "reference: the full model" in result.stdout
+    assert (tmp_path / "out" / "report.txt").is_file()
+
+
+def test_damping_of_a_reduced_model_is_carried_over():
+    """Rayleigh damping by the reduced model or mode by mode: one system."""
+    reduced = cms.reduce(string(), modes=3)
+    omega = 2 * np.pi * reduced.frequencies_hz
+    damped = System.from_reduced(reduced.with_damping(rayleigh=(2.0, 1e-5)), modal_damping=0.01)
+    ratios = 0.01 + (2.0 / omega + 1e-5 * omega) / 2
+    by_hand = System.from_reduced(reduced, modal_damping=ratios)
+    np.testing.assert_allclose(damped.damping, by_hand.damping, rtol=1e-12)
+
+
+def test_a_craig_bampton_model_runs_as_one_by_rubin():
+    """The same orbit of the string with all modes by either method."""
+    orbits = [
+        solve_orbit(SETTING.system(cms.reduce(string(), modes=k, method=method)), 36.0)
+        for method, k in (("craig-bampton", 40), ("rubin", 41))
+    ]
+    sizes = [orbit.max_abs_displacement for orbit in orbits]
+    assert sizes[0] == pytest.approx(sizes[1], rel=1e-8)
+
+
+def test_massless_interfaces_are_refused():
+    macneal = cms.reduce(string(), modes=3, method="macneal")
+    with pytest.raises(SystemModelError, match="no equation of motion; reduce by 'rubin'"):
+        System.from_reduced(macneal)
+    wrong = replace(cms.reduce(string(), modes=3), damping=np.full((4, 4), 1.0) + np.eye(4))
+    assert System.from_reduced(wrong).size == 4
+
+
+def test_two_processes_give_the_same_study():
+    scene = load_scene(example("portal.toml"))
+    studies = [convergence_study_of(scene, modes=(1, 2, 3), jobs=jobs) for jobs in (1, 2)]
+    for one, other in zip(*(study.models for study in studies), strict=True):
+        assert (one.label, one.modes, one.note) == (other.label, other.modes, other.note)
+        assert one.special_hz == other.special_hz
+        assert (one.peak is None) == (other.peak is None)
+        if one.peak is not None and other.peak is not None:
+            assert np.array_equal(one.peak.point, other.peak.point)

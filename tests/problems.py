@@ -1,0 +1,69 @@
+"""Systems that many tests compute."""
+
+import numpy as np
+from scipy import sparse
+
+import cms
+from nldyn import HarmonicForce, LoadCase, Stop, System, Unbalance
+
+RANGE_HZ = (5.7, 90.0)
+THREE_HZ = (36.0, 38.5)  # where there are branches of three periods up to 3
+
+
+def make_one_dof(**changes) -> System:
+    """m = 2.48 kg, k = 16877 N/m, ζ = 0.0142, k_s = 5.17e9 N/m^1.5, m_e r_e = 4.92e-6 kg m."""
+    elements = {
+        "stops": [Stop("middle", stiffness=5.17e9)],
+        "excitation": [Unbalance("middle", 4.92e-6)],
+        **changes,
+    }
+    return System.from_matrices(
+        [[2.48]], [[16877.0]], {"middle": [1.0]}, modal_damping=0.0142, **elements
+    )
+
+
+def between_stops(mismatch: float = 0.0) -> System:
+    """A mode between two linear stops, one of them farther off by a share of the gap."""
+    stops = [
+        Stop("m", 1e6, 1.0, gap=5e-6),
+        Stop("m", 1e6, 1.0, gap=5e-6 * (1.0 + mismatch), direction=-1),
+    ]
+    unbalance = [Unbalance("m", 4.92e-6)]
+    return System.from_modal(
+        [13.13], {"m": [0.635]}, modal_damping=0.02, stops=stops, excitation=unbalance
+    )
+
+
+MASSES, MASS, SPRING = 41, 0.05, 141000.0
+SETTING = LoadCase(
+    (30.0, 45.0),
+    stops=(Stop("middle", stiffness=2e7),),
+    excitation=(Unbalance("middle", 2e-4),),
+    modal_damping=0.03,
+)
+
+
+def string(extra=None) -> cms.Matrices:
+    """Masses on a string that hits a stop in its middle, held at both ends.
+
+    Frequencies from 20 to 534 Hz; every second mode has a node in the middle.
+    """
+    off = -np.ones(MASSES - 1)
+    K = SPRING * sparse.diags_array([off, np.full(MASSES, 2.0), off], offsets=[-1, 0, 1])
+    loads = {"middle": np.eye(MASSES)[MASSES // 2], **(extra or {})}
+    return cms.Matrices(K.tocsc(), MASS * sparse.eye_array(MASSES, format="csc"), loads)
+
+
+def torus_system() -> System:
+    """Two modes and a soft stop: a pair of multipliers leaves the unit circle near 11.5 Hz."""
+    return System.from_modal(
+        [10.0, 34.0], {"m": [0.635, 0.3]}, modal_damping=0.02,
+        stops=[Stop("m", stiffness=1.2e7, gap=1e-5)], excitation=[Unbalance("m", 4.92e-6)],
+    )  # fmt: skip
+
+
+def driven(power: float) -> System:
+    """x'' + x |x|^(p - 1) = sin ωt, as one stop on either side of a mass without a spring."""
+    stops = [Stop("x", 1.0, power), Stop("x", 1.0, power, direction=-1)]
+    force = HarmonicForce("x", 1.0, phase_deg=-90.0)
+    return System.from_matrices([[1.0]], [[0.0]], {"x": [1.0]}, stops=stops, excitation=[force])
