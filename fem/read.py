@@ -25,6 +25,7 @@ from fem.gmsh import read_gmsh
 from fem.ignored import SET_PREFIX, TYPE_PREFIX, without_cells
 from fem.med import read_med
 from fem.mesh import FloatArray, FrameMesh, IntArray
+from fem.nastran import read_nastran
 from fem.structure_mesh import StructureMesh
 from fem.unpacking import bounded_unpacking
 
@@ -102,7 +103,8 @@ READERS: dict[str, tuple[str, Callable[[Path], meshio.Mesh]]] = {
 }
 DECK = ".inp"
 """The extension of files that hold more than a mesh."""
-EXTENSIONS = (*READERS, DECK)
+NASTRAN = (".bdf", ".nas")
+EXTENSIONS = (*READERS, DECK, *NASTRAN)
 
 
 def read_mesh(
@@ -121,6 +123,8 @@ def read_mesh(
           a cell array ``set:NAME`` that is 1 on the elements of a part, else 0, names the part,
           and a point array ``set:NAME`` that is 1 at one node names a point.
         - ``.med``: MED of version 3 or later. Groups of edges and of nodes are parts and points.
+        - ``.bdf``, ``.nas``: Nastran bulk data, of which solids are read, so for `read_structure`
+          only. Properties are the parts, "PSOLID 3"; there are no names of points.
         - ``.inp``: Abaqus input. ELSET and NSET, also those given on ``*ELEMENT`` and ``*NODE``.
 
     include_folders
@@ -208,6 +212,10 @@ def _read(
     try:
         if extension == DECK:
             return _deck_mesh(path, build, include_folders, ignore)
+        if extension in NASTRAN:
+            solids, left_out = read_nastran(path)
+            content, said = without_cells(solids, ignore, str(path))
+            return replace(_noted(build(content, str(path)), said), left_out=left_out)
         content, said = without_cells(READERS[extension][1](path), ignore, str(path))
         return _noted(build(content, str(path)), said)
     except ModelError:
@@ -216,7 +224,7 @@ def _read(
         reason = _reason(error)
         if "zero-size array" in reason:
             raise ModelError(f"{path}: the mesh is empty, it has no elements") from error
-        kind = "Abaqus" if extension == DECK else READERS[extension][0]
+        kind = "Abaqus" if extension == DECK else READERS.get(extension, ("Nastran",))[0]
         raise ModelError(f"{path}: cannot be read as {kind} mesh ({reason})") from error
 
 

@@ -57,6 +57,7 @@ def test_examples_of_structures_run_in_order(monkeypatch, tmp_path):
         "membranes",
         "mesh",
         "model",
+        "nastran",
         "page",
         "read",
         "scatter",

@@ -173,7 +173,7 @@ def test_what_is_no_med_file_is_refused(tmp_path):
         fem.read_structure(path)
 
 
-@pytest.mark.parametrize("extension", [".bdf", ".unv"])
+@pytest.mark.parametrize("extension", [".unv", ".cdb"])
 def test_other_formats_are_refused_with_what_to_do(tmp_path, extension):
     path = tmp_path / f"block{extension}"
     path.write_text("")
