@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 from urllib.parse import unquote
+from xml.sax.saxutils import unescape
 
 import meshio
 import numpy as np
@@ -54,7 +55,7 @@ def read_vtu(path: Path) -> meshio.Mesh:
         rb"<(PointData|CellData)\b(.*?)</\1>", path.read_bytes(), re.DOTALL
     ):
         found = re.findall(rb"<DataArray\b[^>]*?\bName=[\"']([^\"']*)[\"']", arrays)
-        _check_each_once(found, path)
+        _check_each_once([unescape(name.decode("utf-8", "replace")) for name in found], path)
     with bounded_unpacking(path):
         return _without_warning(meshio.vtu.read, path)
 
@@ -65,7 +66,7 @@ def read_vtk(path: Path) -> meshio.Mesh:
     VTK writes a blank in a name as %20, a percent sign as %25, and so on; meshio leaves it so.
     """
     for arrays in re.split(rb"^(?:POINT|CELL)_DATA\b", path.read_bytes(), flags=re.MULTILINE)[1:]:
-        _check_each_once(LEGACY_ARRAY.findall(arrays), path)
+        _check_each_once([unquote(name) for name in LEGACY_ARRAY.findall(arrays)], path)
     try:
         content = _without_warning(meshio.vtk.read, path)
     except (meshio.ReadError, KeyError) as error:
@@ -78,9 +79,8 @@ def read_vtk(path: Path) -> meshio.Mesh:
     return content
 
 
-def _check_each_once(arrays: Sequence[bytes], path: Path) -> None:
+def _check_each_once(names: Sequence[str], path: Path) -> None:
     """Refuse two arrays of one name, of which meshio would take the last one."""
-    names = [unquote(name) for name in arrays]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise ModelError(f"{path}: has two arrays {twice!r}")
