@@ -41,7 +41,7 @@ bench: $(VENV)/.installed
 hard: $(VENV)/.installed
 	PYTHONPATH=tests $(BIN)/python -m hard --out results/hard
 
-# what no input and no machine may do to a run: docs/faults.md
+# what no input and no machine may do to a run: docs/explanation/faults.md
 faults: $(VENV)/.installed
 	$(BIN)/python -m pytest tests/faults -m "slow or not slow" -o addopts=-q
 

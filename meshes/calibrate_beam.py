@@ -1,8 +1,8 @@
 """Calibrate the dimensions of the beam that the paper's text does not give.
 
 Run as ``python meshes/calibrate_beam.py`` to see the fit, with ``--write`` to write
-half_beam.toml, the meshes and the tables in docs/calibration.md. It takes half a minute; many
-threads in the linear algebra slow it down (set OPENBLAS_NUM_THREADS=1).
+half_beam.toml, the meshes and the tables in docs/how-to/calibration.md. It takes half a minute;
+many threads in the linear algebra slow it down (set OPENBLAS_NUM_THREADS=1).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from make_meshes import BEAM, DIMENSIONS, Dimensions
 import cms
 import fem
 
-DOCUMENT = Path(__file__).resolve().parent.parent / "docs" / "calibration.md"
+DOCUMENT = Path(__file__).resolve().parent.parent / "docs" / "how-to" / "calibration.md"
 
 PUBLISHED = {
     "f1 (Hz)": 13.1,
@@ -135,7 +135,7 @@ def write_dimensions(dimensions: Dimensions, path: Path = DIMENSIONS) -> None:
         "middle_mass": "kg, whole beam",
     }
     rows = ["# Dimensions of the paper's beam that its text does not give: calibrated, see"]
-    rows += ["# docs/calibration.md; written by calibrate_beam.py."]
+    rows += ["# docs/how-to/calibration.md; written by calibrate_beam.py."]
     rows += [f"{name} = {value!r}  # {units[name]}" for name, value in asdict(dimensions).items()]
     path.write_text("\n".join(rows) + "\n", encoding="utf-8")
 

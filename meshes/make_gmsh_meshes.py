@@ -1,7 +1,8 @@
 """Make plate.msh and hook.msh with Gmsh, as a user would who has a mesher of his own.
 
 Run as ``python meshes/make_gmsh_meshes.py``; it needs ``pip install gmsh``, and perhaps a system
-library that Gmsh names. The files are written beside this script; docs/own_mesh.md goes on.
+library that Gmsh names. The files are written beside this script; docs/tutorials/own_mesh.md goes
+on.
 """
 
 from pathlib import Path

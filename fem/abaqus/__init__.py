@@ -78,7 +78,7 @@ def read_abaqus(
     ----------
     path
         Input file. Upper and lower case are the same, and a set keeps the spelling of its first
-        occurrence. ``docs/decks.md`` lists the keywords and elements.
+        occurrence. ``docs/reference/decks.md`` lists the keywords and elements.
     include_folders
         Folders below which included files may be, beside that of the file.
     ignore

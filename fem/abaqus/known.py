@@ -114,4 +114,4 @@ ELEMENT_ADVICE: tuple[tuple[str, str], ...] = (
     (r"SFM3D.*", "a surface without stiffness; leave it out"),
 )
 """What is said of types of elements that are refused, by a pattern of their names."""
-OTHER_ELEMENT = "not known; convert it to elements of docs/decks.md"
+OTHER_ELEMENT = "not known; convert it to elements of docs/reference/decks.md"

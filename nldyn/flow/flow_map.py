@@ -1,7 +1,7 @@
 """The flow map: where a state goes, how it depends on its start and on the frequency.
 
 Between contacts the modes are propagated in closed form; contact phases by Gauss collocation on
-the contact forces. See ``docs/theory.md``.
+the contact forces. See ``docs/explanation/theory.md``.
 """
 
 from __future__ import annotations

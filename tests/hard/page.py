@@ -46,7 +46,7 @@ def write_page(results: Sequence[Result], seconds: float, folder: Path) -> Path:
         "# Hard cases",
         machine(),
         f"{len(results)} cases, {passed} passed, {len(results) - passed} failed; "
-        f"computed in {seconds:.0f} s. How to read the tables: docs/hard_cases.md.",
+        f"computed in {seconds:.0f} s. How to read the tables: docs/results/hard_cases.md.",
     ]
     for subject, group in groupby(results, lambda result: result.case.subject):
         parts += [f"## {subject.capitalize()}", markdown([row(result) for result in group])]

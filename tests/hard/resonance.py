@@ -35,7 +35,7 @@ from nldyn.system.system import System
 
 SUBJECT = "resonances, folds and cusps"
 LOCATED = 1e-8
-LOCATED_FROM = "relative, location of special points (docs/theory.md)"
+LOCATED_FROM = "relative, location of special points (docs/explanation/theory.md)"
 MANY = ContinuationOptions(max_points=20000)
 
 
@@ -247,7 +247,7 @@ def differs_little(a: Orbit, b: Orbit) -> bool:
 
 
 def resonance_with_gap(gap: float) -> System:
-    """One mode and a stop at a small distance, as in docs/curves.md."""
+    """One mode and a stop at a small distance, as in docs/how-to/curves.md."""
     return System.from_modal(
         [13.1],
         {"middle": [0.635]},

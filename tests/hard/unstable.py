@@ -118,7 +118,7 @@ CASES = (
             "an error of the start grows by the multiplier",
             ORIGIN + ", Newton step",
             1e-9,
-            "the promise of the state over one segment (docs/theory.md)",
+            "the promise of the state over one segment (docs/explanation/theory.md)",
             partial(orbit_error, period, multiplier),
             quick,
         )

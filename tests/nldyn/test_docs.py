@@ -10,8 +10,8 @@ import pytest
 from nldyn.branches.tables import UNITS
 
 ROOT = Path(__file__).parents[2]
-BRANCHES = (ROOT / "docs" / "branches.md").read_text(encoding="utf-8")
-THEORY = ROOT / "docs" / "theory.md"
+BRANCHES = (ROOT / "docs" / "how-to" / "branches.md").read_text(encoding="utf-8")
+THEORY = ROOT / "docs" / "explanation" / "theory.md"
 
 
 def test_example_runs(capsys):
@@ -27,7 +27,7 @@ def test_example_runs(capsys):
 
 def test_example_of_the_curves_runs(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    text = (ROOT / "docs" / "curves.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "how-to" / "curves.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.S)
     exec(code, {})
     said = re.findall(r"^print.*?# (.*)$", code, flags=re.M)
@@ -71,7 +71,7 @@ def test_every_column_of_a_table_is_documented():
 @pytest.mark.slow
 def test_example_of_exploring_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    text = (ROOT / "docs" / "exploring.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "how-to" / "exploring.md").read_text(encoding="utf-8")
     exec("".join(re.findall(r"```python\n(.*?)```", text, flags=re.S)), {})
     said = capsys.readouterr().out
     assert "1/3" in said and said.endswith("[1, 1, 1]\n[]\n")
@@ -79,7 +79,7 @@ def test_example_of_exploring_runs(tmp_path, monkeypatch, capsys):
 
 
 def test_tests_named_in_the_table_of_special_points_exist():
-    text = (ROOT / "docs" / "special_points.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "reference" / "special_points.md").read_text(encoding="utf-8")
     tests = "\n".join(p.read_text(encoding="utf-8") for p in (ROOT / "tests").rglob("test_*.py"))
     defined = set(re.findall(r"^def (test_\w+)\(", tests, flags=re.M))
     named = set(re.findall(r"`(test_\w+)`", text))
@@ -88,7 +88,7 @@ def test_tests_named_in_the_table_of_special_points_exist():
 
 
 def test_every_cell_of_the_table_of_special_points_says_no_or_names_a_test():
-    text = (ROOT / "docs" / "special_points.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "reference" / "special_points.md").read_text(encoding="utf-8")
     rows = [line for line in text.splitlines() if line.startswith("|")]
     rows = [row for row in rows if not row.startswith(("| kind", "|---"))]
     kinds = ",".join(row.split("|")[1] for row in rows)

@@ -30,7 +30,7 @@ def test_every_claim_has_a_check_and_every_check_a_claim():
 
 
 def test_claims_that_the_documentation_names_exist():
-    text = (Path(__file__).parents[3] / "docs" / "paper.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[3] / "docs" / "results" / "paper.md").read_text(encoding="utf-8")
     differences = text.split("## Where we differ, and why")[1]
     named = set(re.findall(r"`((?:fig|hertz|undamped|damping)[\w./]*)`", differences))
     assert len(named) > 10

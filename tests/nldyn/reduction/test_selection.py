@@ -183,7 +183,7 @@ def test_true_error_of_the_beam_lies_within_the_stated_band():
 @pytest.mark.slow
 def test_the_example_of_the_docs(capsys):
     """The mode at 430 Hz is left out, the one at 639 Hz is not; 20 modes confirm the band."""
-    page = Path(__file__).parents[3] / "docs" / "reduction_studies.md"
+    page = Path(__file__).parents[3] / "docs" / "how-to" / "reduction_studies.md"
     names: dict = {}
     exec(re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.S)[0], names)
     assert "modes kept: 1 (13.12 Hz), 2 (117.4 Hz), 3 (326.1 Hz), 5 (639.4 Hz)" in (

@@ -209,7 +209,8 @@ def test_dissipation_of_a_stop_is_given_or_follows_from_restitution():
     assert build_system(given).stops[0].dissipation == 2.5
     asked = parse_scene(MODAL + stop + "restitution=0.9\nimpact_speed=0.05\n")
     x = 0.05 * build_system(asked).stops[0].dissipation
-    assert 1.9 * x == pytest.approx(math.log((1 + x) / (1 - 0.9 * x)), rel=1e-12)  # docs/theory.md
+    # docs/explanation/theory.md
+    assert 1.9 * x == pytest.approx(math.log((1 + x) / (1 - 0.9 * x)), rel=1e-12)
     for wrong, words in (
         ("restitution=0.9\n", "impact_speed"),
         ("restitution=0.9\nimpact_speed=0.1\ndissipation=1.0\n", "dissipation"),

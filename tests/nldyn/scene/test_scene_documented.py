@@ -1,4 +1,4 @@
-"""docs/scene.md lists exactly the keys of the schema, with their defaults."""
+"""docs/reference/scene.md lists exactly the keys of the schema, with their defaults."""
 
 import re
 import tomllib
@@ -11,7 +11,7 @@ from nldyn.scene.messages import all_keys, table_at
 from nldyn.scene.read import load_scene, parse_scene
 from nldyn.scene.schema import Scene
 
-DOC = (Path(__file__).parents[3] / "docs" / "scene.md").read_text(encoding="utf-8")
+DOC = (Path(__file__).parents[3] / "docs" / "reference" / "scene.md").read_text(encoding="utf-8")
 
 
 def documented():

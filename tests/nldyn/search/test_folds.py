@@ -92,7 +92,7 @@ def test_curve_that_breaks_off_says_why():
 
 
 def one_mode(**changes) -> System:
-    """A mode before a stop, as in docs/curves.md."""
+    """A mode before a stop, as in docs/how-to/curves.md."""
     return System.from_modal(
         [13.1],
         {"middle": [0.635]},
