@@ -26,7 +26,7 @@ class Touch:
 
     def depth(self, point: BranchPoint) -> float:
         """Value of the extremum of this kind nearest in phase."""
-        found = point.orbit.extremes(self.output)
+        found = point.orbit.touches(self.output)
         full = 2.0 * math.pi * point.orbit.period
         index = nearest(found.phases, found.is_maximum, self.is_maximum, self.phase, full)
         if index < 0:
@@ -42,7 +42,7 @@ def touching_extremes(a: Orbit, b: Orbit) -> list[Touch]:
     touches = []
     full = 2.0 * math.pi * a.period
     for output in range(len(a.system.stops)):
-        first, last = a.extremes(output), b.extremes(output)
+        first, last = a.touches(output), b.touches(output)
         kinds, phases = sign_changes(
             *(first.phases, first.values, first.is_maximum),
             *(last.phases, last.values, last.is_maximum),
@@ -61,7 +61,7 @@ def changes_hidden_by_birth(a: Orbit, b: Orbit) -> bool:
     """
     full = 2.0 * math.pi * a.period
     for output in range(len(a.system.stops)):
-        first, last = a.extremes(output), b.extremes(output)
+        first, last = a.touches(output), b.touches(output)
         if first.phases.size == last.phases.size:
             continue
         fewer = a

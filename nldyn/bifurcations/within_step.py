@@ -229,7 +229,7 @@ def hidden_dips(z: BranchPoint, a: BranchPoint, b: BranchPoint) -> Iterator[floa
         yield a.arclength + dip(left, right, tests(z)[kind], value, tests(b)[kind])
     full = 2.0 * math.pi * a.orbit.period
     for output in range(len(a.orbit.system.stops)):
-        beside = (point.orbit.extremes(output) for point in (z, a, b))
+        beside = (point.orbit.touches(output) for point in (z, a, b))
         columns = [x for e in beside for x in (e.phases, e.values, e.is_maximum)]
         yield a.arclength + extreme_dip(left, right, *columns, full)
 

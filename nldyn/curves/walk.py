@@ -307,7 +307,7 @@ def extremes_meet(here: CurvePoint) -> bool:
     grazing = here.condition
     if not isinstance(grazing, Grazing):
         return False
-    found, full = here.orbit.extremes(grazing.stop), 2.0 * math.pi * here.orbit.period
+    found, full = here.orbit.touches(grazing.stop), 2.0 * math.pi * here.orbit.period
     other = nearest(found.phases, found.is_maximum, not grazing.is_maximum, grazing.phase, full)
     return bool(other >= 0 and abs(found.values[other]) < MEETS * grazing.unit)
 

@@ -675,14 +675,23 @@ class Trajectory:
         SystemModelError
             If there is no such output.
         """
+        found = self.recorded_extremes(output)
+        return self.with_exact_values(found, output, np.ones(len(found), dtype=bool))
+
+    def recorded_extremes(self, output: int) -> Real:
+        """The same with the values of the recorded polynomials, in contacts good to 1e-6."""
         flow = self.flow
         check_whole("output", output, 0, len(flow.rows) - 1)
-        row, rate_row = flow.rows[output], flow.rate_rows[output]
-        found = self._evaluate(local_extremes, row, rate_row)
+        return self._evaluate(local_extremes, flow.rows[output], flow.rate_rows[output])
+
+    def with_exact_values(self, found: Real, output: int, wanted: NDArray[np.bool_]) -> Real:
+        """Extremes (k, 3) of an output, those wanted (k,) with the values of the flow map."""
         order = np.argsort(found[:, 0], kind="stable")
+        order = order[wanted[order]]
         inside, solved = self._solved_in_contact(found[order, 0])
-        found[order[inside], 1] = solved @ row
-        return found
+        exact = found.copy()
+        exact[order[inside], 1] = solved @ self.flow.rows[output]
+        return exact
 
     def contact_quadrature(self) -> tuple[Real, Real]:
         """Forcing phases (k,) of all nodes of contact panels, and their weights in s (k,)."""

@@ -318,7 +318,7 @@ def reach_of_grazing(at: Evaluation) -> float:
 def nearest_depth(orbit: Orbit) -> float:
     """Smallest absolute value of an extreme of a penetration, relative to the orbit's size."""
     stops = len(orbit.system.stops)
-    values = [np.abs(orbit.extremes(stop).values).min(initial=math.inf) for stop in range(stops)]
+    values = [np.abs(orbit.touches(stop).values).min(initial=math.inf) for stop in range(stops)]
     return float(min(values, default=math.inf)) / length_unit(orbit)
 
 

@@ -209,7 +209,7 @@ class Grazing:
         unit = length_unit(orbit)
         best, shortest = None, 1e-2 * unit
         for stop in range(len(orbit.system.stops)):
-            found = orbit.extremes(stop)
+            found = orbit.touches(stop)
             for phase, depth, kind in zip(
                 found.phases, found.values, found.is_maximum, strict=True
             ):
@@ -241,7 +241,7 @@ class Grazing:
 
     def extreme(self, orbit: Orbit) -> tuple[float, float]:
         """Phase and depth of the extreme."""
-        found = orbit.extremes(self.stop)
+        found = orbit.touches(self.stop)
         full = 2.0 * math.pi * orbit.period
         index = nearest(found.phases, found.is_maximum, self.is_maximum, self.phase, full)
         if index < 0:

@@ -220,5 +220,6 @@ def keep_numbers(branches: Sequence[Branch]) -> None:
             _ = orbit.liouville_error
             known = vars(orbit)
             known.update(motion=None, jacobians=none, _spectrum=(orbit._spectrum[0], none))
-            for name in ("trajectory", "_extremes", "observed_extremes", "penetration_peaks"):
+            names = "trajectory", "_extremes", "_touches", "observed_extremes", "penetration_peaks"
+            for name in names:
                 known.pop(name, None)
