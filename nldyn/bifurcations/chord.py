@@ -81,7 +81,7 @@ class Chord:
         row = self.row
         offset = float(row @ (a.orbit.point + sigma * self._secant))
         guess = self.between(sigma)
-        found = problem.correct(guess, row, offset=offset)
+        found = problem.correct(guess, row, offset=offset, like=self._nearest(sigma).orbit.motion)
         beside = found.converged and self._is_beside(found.point - guess)
         crossing = None if beside else self._where_branches_cross(guess, offset)
         if crossing is not None:
@@ -134,6 +134,11 @@ class Chord:
             + x * x * (3.0 - 2.0 * x) * b.orbit.point
             + x * x * (x - 1.0) * end
         )
+
+    def _nearest(self, sigma: float) -> BranchPoint:
+        """The known point nearest to a position."""
+        known = self.known | {0.0: self.first, 1.0: self.last}
+        return known[min(known, key=lambda x: abs(x - sigma))]
 
     def direction(self, sigma: float) -> Real:
         """Unit tangent by interpolation between points beside σ, or along a short chord.

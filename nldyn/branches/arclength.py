@@ -25,6 +25,7 @@ from nldyn.bifurcations.period_doubling import flip_between, half_difference, pa
 from nldyn.bifurcations.point import BranchPoint
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.predictor import predicted
 from nldyn.orbits.conditions import TOUCH, depth_row
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import ShootingProblem, asymmetry, metric_length, shifts
@@ -36,6 +37,7 @@ EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit b
 MEETING_STEP = 1e-4  # longest step over which a doubled branch may meet the one it comes from
 LONGER_CROSSINGS = (1.0, 10.0, 100.0)  # steps from a crossing, over `SHORTEST_CROSSING`
 FARTHEST_CROSSING = 1e-4  # distance of one from which a step may begin
+MOST_BEHIND = 4  # points behind the last one that tell where a branch goes on
 LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
 RECENT = 10  # points behind a walk that it does not come back to
 SAME_PLACE = 1e-8  # distance of points that are one, relative to the orbit
@@ -51,8 +53,9 @@ class StepperState:
         The last point.
     step : float
         Arclength of the next step.
-    behind : (2, N + 1)
-        Shooting unknowns and tangent of the point before; no rows at the start.
+    behind : (2m, N + 1)
+        Shooting unknowns and tangent of the points before, the last one first; no rows at the
+        start.
     count : int
         Steps made.
     """
@@ -153,8 +156,8 @@ class Stepper:
             growth = 0.7 * self.options.max_angle / max(angle, 1e-3)
             growth = min(growth, math.sqrt(0.5 * self.options.max_miss / max(miss, 1e-6)))
             step = min(step * min(max(growth, 0.5), 1.6), self.options.max_step)
-            behind = np.array([] if bent else [here.orbit.point, here.tangent])
-            behind = behind.reshape(-1, here.tangent.size)
+            earlier = behind[: 2 * MOST_BEHIND - 2]
+            behind = np.vstack([here.orbit.point, here.tangent, earlier]) if not bent else earlier[:0]
             self.stride = StepperState(point, step, behind, self.stride.count + 1)
             self.visited.append(point)
             yield point
@@ -199,13 +202,19 @@ class Stepper:
         straight = here.orbit.point + step * direction
         row = weights * direction
         row /= math.sqrt(float(row @ row))
-        predicted = _extrapolate(weights, behind, here, step) if behind.size else straight
+        cubic, guess = predicted(
+            np.vstack([here.orbit.point, behind[::2]]),
+            np.vstack([here.tangent, behind[1::2]]),
+            weights,
+            step,
+        )
         found = problem.correct(
-            predicted,
+            guess,
             row,
             offset=float(row @ straight),
             longest=2.0 * (self.options.max_miss if step > KINK else 1.0) * step,
             max_iterations=8,
+            like=here.orbit.motion,
         )
         if not found.converged:
             self._obstacle = found.failure
@@ -215,7 +224,7 @@ class Stepper:
         self._obstacle = "what Newton's method finds is not the next point of the branch"
         if _jumped(problem, here.orbit.point, straight, found.point):
             return None
-        miss = metric_length(weights, found.point - predicted) / step
+        miss = metric_length(weights, found.point - cubic) / step
         if step <= KINK and miss < 1.0:  # a linear stop that is touched bends the branch
             orbit = Orbit.of(problem, found, here.orbit.observe)
             if orbit.impacts != here.orbit.impacts:
@@ -312,7 +321,7 @@ class Stepper:
         row = np.zeros(guess.size)
         row[-1] = 1.0
         guess[-1] = p
-        found = problem.correct(guess, row)
+        found = problem.correct(guess, row, like=a.orbit.motion)
         if not found.converged:
             return None
         orbit = Orbit.of(problem, found, a.orbit.observe)
@@ -399,22 +408,6 @@ def _passed(a: BranchPoint, b: BranchPoint, places: Real) -> NDArray[np.bool_]:
         inside = (along >= 0.0) & (along <= length2)
         passed[near] = inside & ((off * off) @ weights < 0.01 * length2)
     return passed
-
-
-def _extrapolate(weights: Real, behind: Real, here: BranchPoint, step: float) -> Real:
-    """Point at a distance along the tangent on the cubic through two points and their tangents."""
-    (a, tangent), b = behind, here.orbit.point
-    direction = here.tangent / metric_length(weights, here.tangent)
-    row = weights * direction
-    back = float(row @ (a - b))
-    slope_a, slope_b = tangent / float(row @ tangent), direction
-    x = step / back  # 0 here, 1 behind
-    return np.asarray(
-        (1.0 + 2.0 * x) * (1.0 - x) ** 2 * b
-        + x * (1.0 - x) ** 2 * back * slope_b
-        + x * x * (3.0 - 2.0 * x) * a
-        + x * x * (x - 1.0) * back * slope_a
-    )
 
 
 def _jumped(problem: ShootingProblem, here: Real, guess: Real, there: Real) -> bool:

@@ -49,8 +49,9 @@ class WalkEnd:
     ----------
     step : float
         Arclength of the next step.
-    behind : (2, N + 1)
-        Shooting unknowns and tangent of the point before the one to go on from; no rows at a start.
+    behind : (2m, N + 1)
+        Shooting unknowns and tangent of the points before the one to go on from, the last one
+        first; no rows at a start.
     count : int
         Steps made.
     node : int

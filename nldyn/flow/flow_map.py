@@ -420,6 +420,7 @@ class FlowMap:
         rtol: float,
         longest: float,
         max_iterations: int,
+        like: Trajectory | None = None,
     ) -> Solution:
         """Solve the shooting equations with ``row @ point = level``; see `newton.Corrector`.
 
@@ -435,6 +436,8 @@ class FlowMap:
             Weight of the states in the squared length of a step.
         rtol, longest, max_iterations : float, float, int
             When to stop.
+        like : Trajectory, optional
+            A motion nearby over the same phases, whose contact panels are the first guesses.
 
         Returns
         -------
@@ -456,6 +459,8 @@ class FlowMap:
         capacity = 64 * phases.size
         while True:
             point, record = guess.copy(), self._record(capacity)
+            if like is not None:
+                _remember(like.record, record)
             status, iterations, first, last, along, _, jacobians, *_, closings = self._call(
                 record, True, 0.0, point, phases, False, True, (), corrector
             )
@@ -560,8 +565,17 @@ class FlowMap:
             np.empty((capacity, 2 * self.system.size)),
             np.empty((capacity, len(self.system.stops), self.tables.nodes.size)),
             np.empty((capacity, len(self.system.stops), self.tables.nodes.size)),
-            np.zeros(2, dtype=np.int64),
+            np.zeros(3, dtype=np.int64),
         )
+
+
+def _remember(pieces: Record, record: Record) -> None:
+    """Put the pieces of a motion, as far as they serve as guesses, into an empty record."""
+    n = pieces.phase.size
+    if n <= record.phase.size:
+        for name in ("phase", "duration", "kind", "event", "depth"):
+            getattr(record, name)[:n] = getattr(pieces, name)
+        record.used[0], record.used[2] = n, 1
 
 
 def relative_error(value: Real, reference: Real) -> float:

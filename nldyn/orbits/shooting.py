@@ -14,7 +14,7 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_whole
-from nldyn.flow.flow_map import FlowMap, Solution
+from nldyn.flow.flow_map import FlowMap, Solution, Trajectory
 
 SEGMENTS_PER_PERIOD = 2
 LONGEST_PERIOD = 10**4  # excitation periods of an orbit
@@ -91,18 +91,21 @@ class ShootingProblem:
         rtol: float = 1e-11,
         longest: float = 1e3,
         max_iterations: int = 12,
+        like: Trajectory | None = None,
     ) -> Solution:
         """Newton's method on the plane ``row @ point = offset`` (through the guess by default).
 
         A row (N + 1,) that is zero but for its last entry holds the frequency. A first step longer
-        than `longest` (relative, as in `metric`) means failure.
+        than `longest` (relative, as in `metric`) means failure. The contacts of a motion `like` the
+        one sought, if one is known, are where those are looked for first.
         """
         level = float(row @ guess) if offset is None else offset
 
         def solved(start: Real) -> Solution:
             return self.flow.newton(
-                start, row, level, self.phases, self._weight(start), rtol, longest, max_iterations
-            )
+                start, row, level, self.phases, self._weight(start), rtol, longest, max_iterations,
+                like,
+            )  # fmt: skip
 
         found = solved(guess)
         # steps count relative to the start, and may still be large beside a much smaller orbit;

@@ -215,23 +215,51 @@ def guess_panel(fl, tab, phase, w, h, h_mapped, start_switch, panel):
 
 
 @inner
-def remembered_panel(rec, start_switch, h_max, panel):
-    """Kind, length and event of the same panel of the motion before, or (-1, 0, -1).
+def first_panel(fl, tab, rec, before, phase, w, h_max, h_mapped, start_switch, panel):
+    """Kind, length and event of a panel to try first; fills the penetrations.
 
-    Fills the penetrations.
+    The panel of a motion before serves, if it has one there. Of another orbit (`used[2]`) only one
+    of the kind that the state asks for does, and its length only if it ends with an event: lengths
+    that are handed on from orbit to orbit would become shorter and shorter.
     """
-    n = rec.used[0]
-    if n >= rec.used[1] or rec.kind[n] == FLIGHT or rec.kind[n] // 2 != start_switch:
-        return -1, 0.0, -1
+    n = rec.used[1]
+    while n < rec.phase.size and rec.phase[n] + 0.5 * fl.omega * rec.duration[n] < before + phase:
+        n += 1
+    rec.used[1] = n
+    other = rec.used[2] == 1
+    known = n < rec.phase.size and rec.kind[n] != FLIGHT and rec.kind[n] // 2 == start_switch
+    for a in range(panel.active.size):
+        known = known and largest(rec.depth[n], panel.active[a]) > 0.0
+    kind, h = -1, 0.0
+    if other or not known:
+        kind, h = guess_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, panel)
+        known = known and kind == rec.kind[n]
+    if not known:
+        return kind, h, -1
     for a in range(panel.active.size):
         for i in range(panel.F.shape[1]):
             panel.output[a, i] = rec.depth[n, panel.active[a], i]
-        if largest(panel.output, a) == 0.0:
-            return -1, 0.0, -1
-    kind, h, event = rec.kind[n], rec.duration[n], rec.event[n]
-    if h > h_max or (event < 0 and h > 0.98 * h_max):
+    kind, length, event = rec.kind[n], rec.duration[n], rec.event[n]
+    if other and event < 0:
+        return kind, h, -1
+    if length > h_max or (event < 0 and length > 0.98 * h_max):
         return kind, h_max, -1
-    return kind, h, event
+    return kind, length, event
+
+
+@inner
+def remember(rec):
+    """Keep what a motion before needs to serve as a guess at the end of its own record."""
+    used, size = rec.used[0], rec.phase.size
+    rec.used[0], rec.used[1] = 0, size
+    if 2 * used > size:
+        return
+    for i in range(used - 1, -1, -1):
+        n = size - used + i
+        rec.phase[n], rec.duration[n] = rec.phase[i], rec.duration[i]
+        rec.kind[n], rec.event[n] = rec.kind[i], rec.event[i]
+        rec.depth[n] = rec.depth[i]
+    rec.used[1] = size - used
 
 
 @inner
@@ -356,8 +384,12 @@ def far_off(fl, phase, w, h, tried, panel, event, where):
 
 
 @inner
-def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec):
+def contact_panel(
+    fl, tab, before, phase, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec
+):  # fmt: skip
     """Solve one panel and choose its length, at most h_max, and h_mapped to aim at an event.
+
+    `before` is the phase of the whole turns before `phase`.
 
     Returns (status, kind, h, event): a panel that ends where stop `event` opens or closes, or
     (event = -1) one short enough to be resolved.
@@ -373,9 +405,9 @@ def contact_panel(fl, tab, phase, w, h_max, h_mapped, start_switch, closed, pane
     noise = rounding.copy()
     smooth, switch = 2 * start_switch, 2 * start_switch + 1
     limit = h_max
-    kind, h, aim = remembered_panel(rec, start_switch, h_max, panel)
-    if kind < 0:
-        kind, h = guess_panel(fl, tab, phase, w, limit, h_mapped, start_switch, panel)
+    kind, h, aim = first_panel(
+        fl, tab, rec, before, phase, w, limit, h_mapped, start_switch, panel
+    )
     graded = graded_length(fl, active, w, phase, h, 1.0, start_switch == 1, -1)
     if h > 1.5 * graded:
         aim = -1

@@ -103,9 +103,9 @@ class Record(NamedTuple):
         State z at the start.
     force, depth : (n_pieces, n_stops, m)
         Forces and penetrations at the nodes of a panel (zero where a stop is open).
-    used : (2,)
-        Number of pieces in use; number of pieces of the motion before, which are overwritten one
-        by one and serve as guesses.
+    used : (3,)
+        Number of pieces in use; the first of those of a motion before that are still ahead. They
+        stand at the end of the record and serve as guesses. Whether these are of another orbit.
     """
 
     phase: NDArray[np.float64]

@@ -175,6 +175,7 @@ def newton(
             break
         if iteration == max_iterations:
             break
+        rec.used[2] = 0
         if last > 0.5 * before:  # panels that change with what is remembered may keep it going
             rec.used[0] = 0
     return (

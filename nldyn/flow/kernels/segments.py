@@ -7,7 +7,13 @@ import math
 import numpy as np
 
 from nldyn.flow.kernels.compiling import inlined, inner
-from nldyn.flow.kernels.contact import contact_panel, expected_contact, lost_to_rounding, with_event
+from nldyn.flow.kernels.contact import (
+    contact_panel,
+    expected_contact,
+    lost_to_rounding,
+    remember,
+    with_event,
+)
 from nldyn.flow.kernels.flights import (
     add_growth,
     add_rates,
@@ -46,6 +52,7 @@ def record_piece(fl, rec, before, phase, h, kind, event, w):
     n = rec.used[0]
     if n >= rec.phase.size:
         return -1
+    rec.used[1] = max(rec.used[1], n + 1)  # what is remembered there is overwritten
     rec.phase[n] = before + phase
     rec.duration[n] = h
     rec.kind[n] = kind
@@ -251,7 +258,7 @@ def run_pieces(
                 doubt[active[a]] = 0.0 if begins else noise
             panel.depth[0, a], panel.depth[1, a] = depth[active[a]], doubt[active[a]]
         status, kind, h, event = contact_panel(
-            fl, tab, here, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec
+            fl, tab, before, here, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec
         )
         if status != OK:
             return status
@@ -310,8 +317,7 @@ def shoot(
     d_omegas = np.zeros((kept, size))
     d_parameters = np.zeros((kept, size, parameters.shape[0]))
     closings = np.zeros(system.stops.shape[0], dtype=np.int64)
-    rec.used[1] = rec.used[0] if recording else 0
-    rec.used[0] = 0
+    remember(rec)
     status = OK
     for i in range(k):
         start = ends[i - 1] if chained and i > 0 else nodes[i]

@@ -1,0 +1,105 @@
+"""Compiled: where a branch goes on, by polynomials through its last points and their tangents."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from nldyn.flow.kernels.compiling import inner, njit
+
+APART = 0.1  # of the step: a polynomial farther from the cubic is not believed
+
+@njit(cache=True, error_model="numpy")
+def predicted(points, tangents, weights, step):
+    """Points at a distance along the tangent: on the cubic, and on the polynomial that fits best.
+
+    Parameters
+    ----------
+    points, tangents : (m, N + 1)
+        The last points of the branch, the newest first.
+    weights : (N + 1,)
+        Metric at the newest.
+    step : float
+        The distance.
+
+    Returns
+    -------
+    cubic : (N + 1,)
+        On the cubic through two points; on the tangent if there is one only.
+    best : (N + 1,)
+        On the polynomial through so many points as foretell the newest best from those before it.
+    """
+    m = points.shape[0]
+    cubic = hermite(points, tangents, weights, 0, min(m, 2), step)
+    if m < 3:
+        return cubic, cubic
+    count, least = 2, np.inf
+    for q in range(2, m):
+        error = foretold_error(points, tangents, weights, q)
+        if error < least:
+            count, least = q, error
+    if count == m - 1:
+        count = m
+    best = hermite(points, tangents, weights, 0, count, step)
+    return cubic, best if distance(weights, best, cubic) < APART * step else cubic
+
+
+@inner
+def distance(weights, a, b):
+    """Distance of two points."""
+    total = 0.0
+    for i in range(weights.size):
+        total += weights[i] * (a[i] - b[i]) ** 2
+    return math.sqrt(total)
+
+
+@inner
+def foretold_error(points, tangents, weights, count):
+    """Distance of the newest point from the polynomial through some points before it."""
+    row = unit_row(tangents[1], weights)
+    step = 0.0
+    for i in range(row.size):
+        step += row[i] * (points[0, i] - points[1, i])
+    found = hermite(points, tangents, weights, 1, 1 + count, step)
+    return distance(weights, found, points[0])
+
+
+@inner
+def unit_row(tangent, weights):
+    """The covector of the direction of a tangent."""
+    length = 0.0
+    for i in range(weights.size):
+        length += weights[i] * tangent[i] ** 2
+    return weights * tangent / math.sqrt(length)
+
+
+@inner
+def hermite(points, tangents, weights, first, last, step):
+    """Polynomial through points and tangents from `first` up to `last`, a step ahead of the first.
+
+    The distance along the first tangent is its variable; divided differences of double nodes.
+    """
+    size, n = points.shape[1], 2 * (last - first)
+    row = unit_row(tangents[first], weights)
+    nodes, table = np.empty(n), np.empty((n, size))
+    for k in range(last - first):
+        at, pace = 0.0, 0.0
+        for i in range(size):
+            at += row[i] * (points[first + k, i] - points[first, i])
+            pace += row[i] * tangents[first + k, i]
+        for j in (2 * k, 2 * k + 1):
+            nodes[j] = at
+            table[j] = points[first + k]
+        table[2 * k + 1] = tangents[first + k] / pace
+    for j in range(n - 2, 1, -2):
+        table[j] = (points[first + j // 2] - points[first + j // 2 - 1]) / (
+            nodes[j] - nodes[j - 2]
+        )
+    for order in range(2, n):
+        for j in range(n - 1, order - 1, -1):
+            table[j] = (table[j] - table[j - 1]) / (nodes[j] - nodes[j - order])
+    value = table[n - 1].copy()
+    for j in range(n - 2, -1, -1):
+        value = value * (step - nodes[j]) + table[j]
+    return value
