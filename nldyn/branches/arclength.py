@@ -212,9 +212,13 @@ class Stepper:
             guess,
             row,
             offset=float(row @ straight),
-            longest=2.0 * (self.options.max_miss if step > KINK else 1.0) * step,
+            longest=1.1 * self.options.max_miss * step if step > KINK else 2.0 * step,
             max_iterations=8,
             like=here.orbit.motion,
+            aim=cubic,
+            # behind a grazing point the branch may turn on a very short length
+            closings=here.orbit.impacts if step > self.options.grazing_step else -1,
+            contraction=problem.flow.options.rtol,
         )
         if not found.converged:
             self._obstacle = found.failure
@@ -243,7 +247,6 @@ class Stepper:
         if angle > self.options.max_angle:
             return None
         orbit = Orbit.of(problem, found, here.orbit.observe)
-        # behind a grazing point the branch may turn on a very short length
         if step > self.options.grazing_step and orbit.impacts != here.orbit.impacts:
             return None
         meets = passed_flip(here.orbit, orbit)

@@ -31,6 +31,7 @@ from nldyn.flow.kernels.layout import (
     DIVERGED,
     NOT_CONVERGED,
     OK,
+    OTHER_CONTACTS,
     RECORD_FULL,
     ROUNDED,
     SINGULAR,
@@ -64,6 +65,7 @@ _REASONS = {
     DIVERGED: "Newton's method diverged",
     SINGULAR: "singular Jacobian",
     NOT_CONVERGED: "Newton's method did not converge",
+    OTHER_CONTACTS: "the number of contacts changes within the step",
 }
 
 
@@ -138,7 +140,8 @@ class Solution:
         From the point before the last step.
     iterations : int
     first_step, last_step : float
-        Lengths of the first and the last Newton step: the error left is far below the last.
+        Lengths of the first and the last Newton step, or of the next one where the last two foretell
+        it: the error left is far below the last.
     failure : str
         Empty, or why it did not converge.
     """
@@ -411,31 +414,18 @@ class FlowMap:
             capacity *= 4
 
     def newton(
-        self,
-        guess: Real,
-        row: Real,
-        level: float,
-        phases: Real,
-        state_weight: float,
-        rtol: float,
-        longest: float,
-        max_iterations: int,
-        like: Trajectory | None = None,
+        self, guess: Real, corrector: Corrector, phases: Real, like: Trajectory | None = None
     ) -> Solution:
-        """Solve the shooting equations with ``row @ point = level``; see `newton.Corrector`.
+        """Solve the shooting equations on a plane.
 
         Parameters
         ----------
-        guess, row : (N + 1,) arrays
-            States at the k phases, one after the other, and ln ω; normal of the plane.
-        level : float
-            Offset of the plane.
+        guess : (N + 1,) array
+            States at the k phases, one after the other, and ln ω.
+        corrector : Corrector
+            The plane and when to stop.
         phases : (k + 1,) array
             Forcing phases of the segment ends.
-        state_weight : float
-            Weight of the states in the squared length of a step.
-        rtol, longest, max_iterations : float, float, int
-            When to stop.
         like : Trajectory, optional
             A motion nearby over the same phases, whose contact panels are the first guesses.
 
@@ -448,14 +438,14 @@ class FlowMap:
         SystemModelError
             If the arrays do not fit the segments.
         """
-        guess, row = (np.ascontiguousarray(x, dtype=float) for x in (guess, row))
+        guess = np.ascontiguousarray(guess, dtype=float)
         unknowns = 2 * self.system.size * (phases.size - 1) + 1
-        if not guess.shape == row.shape == (unknowns,):  # the kernel would leave their memory
+        row, aim = corrector.row, corrector.aim
+        if not guess.shape == row.shape == aim.shape == (unknowns,):  # or the kernel leaves memory
             raise SystemModelError(
                 f"guess and row must have shape ({unknowns},) for {phases.size - 1} segments of "
                 f"{self.system.size} modes, got {guess.shape} and {row.shape}"
             )
-        corrector = Corrector(row, float(level), float(state_weight), rtol, longest, max_iterations)
         capacity = 64 * phases.size
         while True:
             point, record = guess.copy(), self._record(capacity)
@@ -504,7 +494,7 @@ class FlowMap:
         corrector: Corrector | None = None,
     ) -> tuple[Any, ...]:
         """The kernel, which corrects the point (N + 1,) or, without corrector, only flies."""
-        corrector = corrector or Corrector(point, 0.0, 0.0, 0.0, 0.0, 0)
+        corrector = corrector or Corrector(point, 0.0, 0.0, 0.0, 0.0, 0, point, -1, 0.0)
         table, drive_by = (
             parameter_tables(self.system, parameters) if parameters else self._no_parameters
         )

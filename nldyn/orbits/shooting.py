@@ -15,6 +15,7 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_whole
 from nldyn.flow.flow_map import FlowMap, Solution, Trajectory
+from nldyn.flow.kernels.newton import Corrector
 
 SEGMENTS_PER_PERIOD = 2
 LONGEST_PERIOD = 10**4  # excitation periods of an orbit
@@ -92,26 +93,33 @@ class ShootingProblem:
         longest: float = 1e3,
         max_iterations: int = 12,
         like: Trajectory | None = None,
+        aim: Real | None = None,
+        closings: int = -1,
+        contraction: float = 0.0,
     ) -> Solution:
         """Newton's method on the plane ``row @ point = offset`` (through the guess by default).
 
-        A row (N + 1,) that is zero but for its last entry holds the frequency. A first step longer
-        than `longest` (relative, as in `metric`) means failure. The contacts of a motion `like` the
-        one sought, if one is known, are where those are looked for first.
+        A row (N + 1,) that is zero but for its last entry holds the frequency. A first step farther
+        than `longest` (relative, as in `metric`) from `aim`, the guess by default, means failure.
+        The contacts of a motion `like` the one sought, if one is known, are where those are looked
+        for first. See `kernels.newton.Corrector` for the other arguments.
         """
         level = float(row @ guess) if offset is None else offset
+        row = np.ascontiguousarray(row, dtype=float)
 
-        def solved(start: Real) -> Solution:
-            return self.flow.newton(
-                start, row, level, self.phases, self._weight(start), rtol, longest, max_iterations,
-                like,
+        def solved(start: Real, near: Trajectory | None, expected: Real) -> Solution:
+            corrector = Corrector(
+                row, level, self._weight(start), rtol, longest, max_iterations, expected, closings,
+                contraction,
             )  # fmt: skip
+            return self.flow.newton(start, corrector, self.phases, near)
 
-        found = solved(guess)
+        guess = np.ascontiguousarray(guess, dtype=float)
+        found = solved(guess, like, guess if aim is None else aim)
         # steps count relative to the start, and may still be large beside a much smaller orbit;
         # motions at rest are not found any better
         while found.converged and self.scale(found.point) < 0.1 * self.scale(guess):
-            finer = solved(found.point)
+            finer = solved(found.point, None, found.point)
             if not finer.converged and self.scale(found.point) < AT_REST * self.scale(guess):
                 break
             guess, found = found.point, finer

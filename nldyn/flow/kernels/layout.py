@@ -11,8 +11,8 @@ from nldyn.base.arrays import Complex, Real
 
 (
     OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_FULL, ROUNDED,
-    TOO_MANY_STEPS,
-) = range(9)  # fmt: skip
+    TOO_MANY_STEPS, OTHER_CONTACTS,
+) = range(10)  # fmt: skip
 FLIGHT = -1
 # share of the speed at a stop that rounding of the penetration may cost in one contact, and share
 # of the modes' speeds there that their rounding may cost where a stop's damping decides them

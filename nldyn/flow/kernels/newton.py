@@ -29,7 +29,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.flow.kernels.compiling import entry
-from nldyn.flow.kernels.layout import DIVERGED, NOISE, NOT_CONVERGED, OK, OPEN, SINGULAR, STEADY
+from nldyn.flow.kernels.layout import (
+    DIVERGED,
+    NOISE,
+    NOT_CONVERGED,
+    OK,
+    OPEN,
+    OTHER_CONTACTS,
+    SINGULAR,
+    STEADY,
+)
 from nldyn.flow.kernels.panel import lu_apply, lu_factor
 from nldyn.flow.kernels.segments import shoot
 
@@ -46,9 +55,16 @@ class Corrector(NamedTuple):
     rtol : float
         Longest last step.
     longest : float
-        Longest first step: a longer one means failure.
+        Farthest distance of the first corrected point from `aim`: more means failure.
     max_iterations : int
         Most steps; none means the flow map alone.
+    aim : (N + 1,)
+        Where the point is expected.
+    closings : int
+        How often stops close in the motion from the guess, or it fails; -1 for any number.
+    contraction : float
+        The square of the ratio of the last two steps, at or below which it foretells the next one,
+        which is then not made: the share by which the Jacobians change in the last step.
     """
 
     row: NDArray[np.float64]
@@ -57,6 +73,9 @@ class Corrector(NamedTuple):
     rtol: float
     longest: float
     max_iterations: int
+    aim: NDArray[np.float64]
+    closings: int
+    contraction: float
 
 
 @entry
@@ -89,7 +108,7 @@ def newton(
         `OK`, `DIVERGED`, `SINGULAR`, `NOT_CONVERGED` or why the flow map failed.
     iterations : int
     first, last : float
-        Lengths of the first and the last step.
+        Lengths of the first and the last step, or of the next one where that is foretold.
     along : (N + 1,)
         Vector along the branch, of no particular length.
     ends, jacobians, d_omegas, d_parameters, closings
@@ -121,6 +140,9 @@ def newton(
         )  # fmt: skip
         if status != OK or max_iterations == 0:
             outcome = status
+            break
+        if iteration == 1 and 0 <= corrector.closings != closings.sum():
+            outcome = OTHER_CONTACTS
             break
         for i in range(unknowns):
             sides[i, 0], sides[i, 1] = 0.0, 0.0
@@ -157,8 +179,15 @@ def newton(
         if not np.isfinite(last):
             outcome = SINGULAR
             break
+        far = last
+        if iteration == 1:
+            far = (point[unknowns - 1] + sides[unknowns - 1, 0] - corrector.aim[unknowns - 1]) ** 2
+            for i in range(unknowns - 1):
+                off = point[i] + sides[i, 0] - corrector.aim[i]
+                far += corrector.state_weight * off**2
+            far = math.sqrt(far)
         longest = corrector.longest if iteration == 1 else 1e3
-        if last >= longest or abs(sides[unknowns - 1, 0]) >= 0.5:
+        if far >= longest or abs(sides[unknowns - 1, 0]) >= 0.5:
             outcome = DIVERGED
             break
         for i in range(unknowns):
@@ -170,6 +199,11 @@ def newton(
         if stagnant and opening > max(NOISE, noise):
             stagnant = np.abs(jacobians - known).max() <= STEADY * np.abs(jacobians).max()
         known = jacobians
+        if iteration > 1 and opening <= max(OPEN, noise):
+            ratio = (last / before) ** 2
+            if ratio <= corrector.contraction and ratio * last <= corrector.rtol:
+                converged = True
+                last *= ratio
         if converged or stagnant:
             outcome = OK
             break
