@@ -6,7 +6,13 @@ import numpy as np
 
 from nldyn.base.arrays import Complex
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint
-from nldyn.orbits.multiplier_tests import branch_point_test, flip_test, number_outside, torus_test
+from nldyn.orbits.multiplier_tests import (
+    branch_point_test,
+    flip_test,
+    nearest_pair,
+    number_outside,
+    torus_test,
+)
 from nldyn.orbits.orbit import Orbit
 
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
@@ -82,10 +88,8 @@ def leaves_circle(before: Complex, after: Complex) -> bool:
 
 def _pair_off_circle(multipliers: Complex) -> tuple[complex, float]:
     """One of the two multipliers whose product is nearest to 1, and how far that is from 1."""
-    i, j = np.triu_indices(multipliers.size, 1)
-    off = np.abs(multipliers[i] * multipliers[j] - 1.0)
-    nearest_one = int(np.argmin(off))
-    return complex(multipliers[i[nearest_one]]), float(off[nearest_one])
+    index, off = nearest_pair(multipliers)
+    return complex(multipliers[index]), off
 
 
 def _on_unit_circle(multipliers: Complex) -> bool:

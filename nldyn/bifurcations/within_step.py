@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from itertools import islice, pairwise
+from functools import lru_cache
+from itertools import pairwise
 from operator import itemgetter
 
 from nldyn.base.errors import LocateError
@@ -212,26 +212,30 @@ def turned_over(
             return None if lies_on_crossing(extra.orbit, ON_CROSSING) else extra
         triples = ((a, extra, b), (z, a, extra)) if ahead else ((z, extra, a), (extra, a, b))
         for triple in triples:
-            where = next(islice(hidden_dips(*triple), number, None), math.nan)
+            where = hidden_dips(*triple)[number]
             if not math.isnan(where):
                 z, a, b = triple
                 break
     return None
 
 
-def hidden_dips(z: BranchPoint, a: BranchPoint, b: BranchPoint) -> Iterator[float]:
+@lru_cache(
+    maxsize=8
+)  # three neighbours are asked about as they come and when both steps are searched
+def hidden_dips(z: BranchPoint, a: BranchPoint, b: BranchPoint) -> tuple[float, ...]:
     """Arclengths between z and b at which a test or an extreme may touch zero unseen.
 
     See `orbits.extremes.dip`; the extremes are those of the stops' penetrations.
     """
     left, right = z.arclength - a.arclength, b.arclength - a.arclength
-    for kind, value in tests(a).items():
-        yield a.arclength + dip(left, right, tests(z)[kind], value, tests(b)[kind])
+    before, here, after = tests(z), tests(a), tests(b)
+    found = [dip(left, right, before[kind], here[kind], after[kind]) for kind in here]
     full = 2.0 * math.pi * a.orbit.period
     for output in range(len(a.orbit.system.stops)):
         beside = (point.orbit.touches(output) for point in (z, a, b))
         columns = [x for e in beside for x in (e.phases, e.values, e.is_maximum)]
-        yield a.arclength + extreme_dip(left, right, *columns, full)
+        found.append(extreme_dip(left, right, *columns, full))
+    return tuple(a.arclength + way for way in found)
 
 
 def differs(a: BranchPoint, b: BranchPoint) -> bool:

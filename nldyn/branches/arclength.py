@@ -157,7 +157,9 @@ class Stepper:
             growth = min(growth, math.sqrt(0.5 * self.options.max_miss / max(miss, 1e-6)))
             step = min(step * min(max(growth, 0.5), 1.6), self.options.max_step)
             earlier = behind[: 2 * MOST_BEHIND - 2]
-            behind = np.vstack([here.orbit.point, here.tangent, earlier]) if not bent else earlier[:0]
+            behind = (
+                np.vstack([here.orbit.point, here.tangent, earlier]) if not bent else earlier[:0]
+            )
             self.stride = StepperState(point, step, behind, self.stride.count + 1)
             self.visited.append(point)
             yield point
@@ -219,6 +221,7 @@ class Stepper:
             # behind a grazing point the branch may turn on a very short length
             closings=here.orbit.impacts if step > self.options.grazing_step else -1,
             contraction=problem.flow.options.rtol,
+            turn=math.cos(1.1 * self.options.max_angle) if step > KINK else 0.0,
         )
         if not found.converged:
             self._obstacle = found.failure
@@ -341,8 +344,11 @@ class Stepper:
         if b.arclength - start.arclength < 3.0 * (b.arclength - a.arclength):
             return False
         places, tangents = self._shifts
+        passed = _passed(a, b, places)
+        if not passed.any():
+            return False
         step = start.orbit.problem.metric(start.orbit.point) * (b.orbit.point - a.orbit.point)
-        return bool((_passed(a, b, places) & (tangents @ step > 0.0)).any())
+        return bool((tangents[passed] @ step > 0.0).any())
 
     def _comes_back(self, a: BranchPoint, b: BranchPoint) -> bool:
         """Whether the walk from a to b passes a point that it has passed before, not the start.
@@ -425,6 +431,8 @@ def _jumped(problem: ShootingProblem, here: Real, guess: Real, there: Real) -> b
     least = max(BROKEN, BY_TOLERANCE * problem.flow.options.rtol)
     if broken > least and asymmetry(problem, there) < EQUAL_HALVES * broken:
         return True
+    if problem.period == 1:
+        return False
     apart, *others = (float(np.linalg.norm((p - here)[:-1])) for p in shifts(problem, there))
     if problem.period % 2 == 0:  # half its period: a flip, below
         del others[problem.period // 2 - 1]

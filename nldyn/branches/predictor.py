@@ -10,6 +10,7 @@ from nldyn.flow.kernels.compiling import inner, njit
 
 APART = 0.1  # of the step: a polynomial farther from the cubic is not believed
 
+
 @njit(cache=True, error_model="numpy")
 def predicted(points, tangents, weights, step):
     """Points at a distance along the tangent: on the cubic, and on the polynomial that fits best.
@@ -93,9 +94,7 @@ def hermite(points, tangents, weights, first, last, step):
             table[j] = points[first + k]
         table[2 * k + 1] = tangents[first + k] / pace
     for j in range(n - 2, 1, -2):
-        table[j] = (points[first + j // 2] - points[first + j // 2 - 1]) / (
-            nodes[j] - nodes[j - 2]
-        )
+        table[j] = (points[first + j // 2] - points[first + j // 2 - 1]) / (nodes[j] - nodes[j - 2])
     for order in range(2, n):
         for j in range(n - 1, order - 1, -1):
             table[j] = (table[j] - table[j - 1]) / (nodes[j] - nodes[j - order])

@@ -140,8 +140,8 @@ class Solution:
         From the point before the last step.
     iterations : int
     first_step, last_step : float
-        Lengths of the first and the last Newton step, or of the next one where the last two foretell
-        it: the error left is far below the last.
+        Lengths of the first and the last Newton step, or of the next where two foretell it: the
+        error left is far below the last.
     failure : str
         Empty, or why it did not converge.
     """
@@ -494,7 +494,7 @@ class FlowMap:
         corrector: Corrector | None = None,
     ) -> tuple[Any, ...]:
         """The kernel, which corrects the point (N + 1,) or, without corrector, only flies."""
-        corrector = corrector or Corrector(point, 0.0, 0.0, 0.0, 0.0, 0, point, -1, 0.0)
+        corrector = corrector or Corrector(point, 0.0, 0.0, 0.0, 0.0, 0, point, -1, 0.0, 0.0)
         table, drive_by = (
             parameter_tables(self.system, parameters) if parameters else self._no_parameters
         )

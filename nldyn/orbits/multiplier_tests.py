@@ -46,6 +46,18 @@ def torus_test(multipliers):
 
 
 @njit(cache=True, error_model="numpy")
+def nearest_pair(multipliers):
+    """Index of the first of the two whose product is nearest to 1, and how far that is from 1."""
+    index, least = 0, np.inf
+    for i in range(multipliers.size):
+        for j in range(i + 1, multipliers.size):
+            off = abs(multipliers[i] * multipliers[j] - 1.0)
+            if off < least:
+                index, least = i, off
+    return index, least
+
+
+@njit(cache=True, error_model="numpy")
 def travel(before, after):
     """Longest way of a multiplier near the unit circle to the nearest one of the next orbit."""
     longest = 0.0

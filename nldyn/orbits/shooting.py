@@ -96,6 +96,7 @@ class ShootingProblem:
         aim: Real | None = None,
         closings: int = -1,
         contraction: float = 0.0,
+        turn: float = 0.0,
     ) -> Solution:
         """Newton's method on the plane ``row @ point = offset`` (through the guess by default).
 
@@ -110,7 +111,7 @@ class ShootingProblem:
         def solved(start: Real, near: Trajectory | None, expected: Real) -> Solution:
             corrector = Corrector(
                 row, level, self._weight(start), rtol, longest, max_iterations, expected, closings,
-                contraction,
+                contraction, turn,
             )  # fmt: skip
             return self.flow.newton(start, corrector, self.phases, near)
 
@@ -149,16 +150,17 @@ def asymmetry(problem: ShootingProblem, point: Real) -> float:
     """
     if problem.period % 2 == 0 or problem.segments % 2:
         return math.inf
-    nodes = problem.nodes(point)
-    sum_ = nodes + np.roll(nodes, problem.segments // 2, axis=0)
-    return float(np.abs(sum_).max()) / problem.scale(point)
+    nodes, half = problem.nodes(point), problem.segments // 2
+    return float(np.abs(nodes[:half] + nodes[half:]).max()) / problem.scale(point)
 
 
 def shifts(problem: ShootingProblem, point: Real) -> list[Real]:
     """Shooting unknowns (N + 1,) of an orbit shifted by each of its excitation periods."""
     nodes = problem.nodes(point)
-    moves = range(0, problem.segments, problem.segments // problem.period)
-    return [np.append(np.roll(nodes, move, axis=0).ravel(), point[-1]) for move in moves]
+    every = problem.segments // problem.period
+    moves = range(every, problem.segments, every)
+    moved = [np.append(np.roll(nodes, move, axis=0).ravel(), point[-1]) for move in moves]
+    return [point, *moved]
 
 
 def shooting_problem(flow: FlowMap, period: int, segments: int | None = None) -> ShootingProblem:

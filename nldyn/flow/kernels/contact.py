@@ -405,9 +405,7 @@ def contact_panel(
     noise = rounding.copy()
     smooth, switch = 2 * start_switch, 2 * start_switch + 1
     limit = h_max
-    kind, h, aim = first_panel(
-        fl, tab, rec, before, phase, w, limit, h_mapped, start_switch, panel
-    )
+    kind, h, aim = first_panel(fl, tab, rec, before, phase, w, limit, h_mapped, start_switch, panel)
     graded = graded_length(fl, active, w, phase, h, 1.0, start_switch == 1, -1)
     if h > 1.5 * graded:
         aim = -1

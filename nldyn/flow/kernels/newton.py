@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.flow.kernels.compiling import entry
+from nldyn.flow.kernels.compiling import entry, inner
 from nldyn.flow.kernels.layout import (
     DIVERGED,
     NOISE,
@@ -65,6 +65,8 @@ class Corrector(NamedTuple):
     contraction : float
         The square of the ratio of the last two steps, at or below which it foretells the next one,
         which is then not made: the share by which the Jacobians change in the last step.
+    turn : float
+        Least cosine of the first tangent and the normal of the plane, in the metric, or it fails.
     """
 
     row: NDArray[np.float64]
@@ -76,6 +78,19 @@ class Corrector(NamedTuple):
     aim: NDArray[np.float64]
     closings: int
     contraction: float
+    turn: float
+
+
+@inner
+def cosine(row, along, state_weight):
+    """Cosine, in the metric of the steps, of the normal of a plane and a direction, either way."""
+    last = row.size - 1
+    product, length, pace = row[last] * along[last], row[last] ** 2, along[last] ** 2
+    for i in range(last):
+        product += row[i] * along[i]
+        length += row[i] ** 2 / state_weight
+        pace += state_weight * along[i] ** 2
+    return abs(product) / math.sqrt(length * pace)
 
 
 @entry
@@ -186,6 +201,9 @@ def newton(
                 off = point[i] + sides[i, 0] - corrector.aim[i]
                 far += corrector.state_weight * off**2
             far = math.sqrt(far)
+            if cosine(corrector.row, sides[:, 1], corrector.state_weight) < corrector.turn:
+                outcome = DIVERGED
+                break
         longest = corrector.longest if iteration == 1 else 1e3
         if far >= longest or abs(sides[unknowns - 1, 0]) >= 0.5:
             outcome = DIVERGED
