@@ -219,9 +219,7 @@ def turned_over(
     return None
 
 
-@lru_cache(
-    maxsize=8
-)  # three neighbours are asked about as they come and when both steps are searched
+@lru_cache(maxsize=8)  # three neighbours are asked about when they are met, and in both steps
 def hidden_dips(z: BranchPoint, a: BranchPoint, b: BranchPoint) -> tuple[float, ...]:
     """Arclengths between z and b at which a test or an extreme may touch zero unseen.
 

@@ -156,10 +156,8 @@ class Stepper:
             growth = 0.7 * self.options.max_angle / max(angle, 1e-3)
             growth = min(growth, math.sqrt(0.5 * self.options.max_miss / max(miss, 1e-6)))
             step = min(step * min(max(growth, 0.5), 1.6), self.options.max_step)
-            earlier = behind[: 2 * MOST_BEHIND - 2]
-            behind = (
-                np.vstack([here.orbit.point, here.tangent, earlier]) if not bent else earlier[:0]
-            )
+            trail = np.vstack([here.orbit.point, here.tangent, behind])
+            behind = trail[: 0 if bent else 2 * MOST_BEHIND]
             self.stride = StepperState(point, step, behind, self.stride.count + 1)
             self.visited.append(point)
             yield point
@@ -204,12 +202,7 @@ class Stepper:
         straight = here.orbit.point + step * direction
         row = weights * direction
         row /= math.sqrt(float(row @ row))
-        cubic, guess = predicted(
-            np.vstack([here.orbit.point, behind[::2]]),
-            np.vstack([here.tangent, behind[1::2]]),
-            weights,
-            step,
-        )
+        cubic, guess = predicted(here.orbit.point, here.tangent, behind, weights, step)
         found = problem.correct(
             guess,
             row,

@@ -12,15 +12,17 @@ APART = 0.1  # of the step: a polynomial farther from the cubic is not believed
 
 
 @njit(cache=True, error_model="numpy")
-def predicted(points, tangents, weights, step):
+def predicted(point, tangent, behind, weights, step):
     """Points at a distance along the tangent: on the cubic, and on the polynomial that fits best.
 
     Parameters
     ----------
-    points, tangents : (m, N + 1)
-        The last points of the branch, the newest first.
+    point, tangent : (N + 1,)
+        Where the branch is.
+    behind : (2m, N + 1)
+        The points before and their tangents in turn, the last point first.
     weights : (N + 1,)
-        Metric at the newest.
+        Metric at the point.
     step : float
         The distance.
 
@@ -29,9 +31,13 @@ def predicted(points, tangents, weights, step):
     cubic : (N + 1,)
         On the cubic through two points; on the tangent if there is one only.
     best : (N + 1,)
-        On the polynomial through so many points as foretell the newest best from those before it.
+        On the polynomial through so many points as foretell this one best from those before it.
     """
-    m = points.shape[0]
+    m = 1 + behind.shape[0] // 2
+    points, tangents = np.empty((m, point.size)), np.empty((m, point.size))
+    points[0], tangents[0] = point, tangent
+    for k in range(1, m):
+        points[k], tangents[k] = behind[2 * k - 2], behind[2 * k - 1]
     cubic = hermite(points, tangents, weights, 0, min(m, 2), step)
     if m < 3:
         return cubic, cubic
