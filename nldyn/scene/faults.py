@@ -40,4 +40,5 @@ def unreadable(error: OSError | ValueError | RuntimeError) -> str:
 
 
 def lower_first(text: str) -> str:
+    """A text that goes on a sentence."""
     return text[:1].lower() + text[1:]
