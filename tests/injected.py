@@ -62,8 +62,8 @@ FAULTS = [
     Fault(
         "all physical groups of a Gmsh file but the first are lost",
         "fem/gmsh.py",
-        "np.unique(block.groups[block.groups != 0])",
-        "np.unique(block.groups[block.groups != 0])[:1]",
+        "        for group in np.unique(block.groups[block.groups != 0]):\n            name",
+        "        for group in np.unique(block.groups[block.groups != 0])[:1]:\n            name",
         "fem/test_fem_meshes.py",
     ),
     Fault(
