@@ -71,12 +71,14 @@ class Homotopy:
             system = times(system, what, factor**share)
         return FlowMap(system, self.own.options)
 
-    def carried(self, orbit: Orbit, start: float, end: float) -> Orbit | None:
+    def carried(
+        self, orbit: Orbit, start: float, end: float, look: Callable[[], None] | None = None
+    ) -> Orbit | None:
         """The orbit of the same frequency at another place, or None where its way there ends.
 
-        It ends at a fold, as a rule.
+        It ends at a fold, as a rule. `look` is called before each step.
         """
-        return self._led(orbit, start, end, self._near)
+        return self._led(orbit, start, end, self._near, look)
 
     def carried_fold(self, fold: Orbit, start: float, end: float) -> Orbit | None:
         """The fold at another place, at a frequency of its own, or None where its way there ends.
@@ -92,6 +94,7 @@ class Homotopy:
         start: float,
         end: float,
         near: Callable[[Orbit, float, Real], Orbit | None],
+        look: Callable[[], None] | None = None,
     ) -> Orbit | None:
         """The orbit led from place to place by Newton's method, from the curve through the last.
 
@@ -102,6 +105,8 @@ class Homotopy:
         step = PROBE / self.length
         known = [(start, _unknowns(orbit))]
         while (x := known[-1][0]) != end:
+            if look is not None:
+                look()
             step = min(step, abs(end - x))
             y = end if step == abs(end - x) else x + math.copysign(step, end - start)
             places, values = zip(*known[-3:], strict=True)

@@ -4,23 +4,34 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import ConvergenceError, SystemModelError, check_frequency
+from nldyn.base.errors import (
+    ConvergenceError,
+    SystemModelError,
+    check_frequency,
+    check_positive,
+    check_types,
+)
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.orbits.homotopy import DAMPING, Homotopy
 from nldyn.orbits.newton import check_bounded, first_orbit, guessed_nodes, spread
 from nldyn.orbits.orbit import Orbit, check_observe
 from nldyn.orbits.shooting import ShootingProblem, shooting_problem
 from nldyn.orbits.starts import near_returns
+from nldyn.orbits.time_limit import OutOfTimeError, TimeLimit
+from nldyn.runtime.progress import Progress
 from nldyn.system.rest import at_rest, held_motion, rest
 from nldyn.system.system import System
 
 MORE_DAMPING = 7.0, 20.0, 55.0  # factors that may leave one orbit only
+SECONDS = 5.0
+PERIODS = 200  # of the simulation from rest
+BUNCH = 4  # pieces simulated between two looks at the clock
 
 
 def solve_orbit(
@@ -31,6 +42,8 @@ def solve_orbit(
     guess: Real | None = None,
     observe: str | None = None,
     segments: int | None = None,
+    seconds: float = SECONDS,
+    progress: Progress | None = None,
 ) -> Orbit:
     """Find a periodic orbit at a given frequency by multiple shooting.
 
@@ -52,6 +65,11 @@ def solve_orbit(
         Interface whose displacement is reported; the first unless given.
     segments : int, optional
         Number k of shooting segments; where given, the simulation from rest is cut as finely.
+    seconds : float
+        Processor time in s, about, that the search without a guess may take; compiling does not
+        count.
+    progress : callable, optional
+        Called meanwhile as ``progress(what, frequency_hz, done)``, with the share of that time.
 
     Returns
     -------
@@ -63,7 +81,7 @@ def solve_orbit(
         For input that makes no sense.
     ConvergenceError
         If the simulation fails, or Newton's method does not converge or comes to an orbit of a
-        shorter period; the text says why.
+        shorter period, or the time is spent; the text says why.
 
     Examples
     --------
@@ -76,6 +94,8 @@ def solve_orbit(
     """
     flow = flow_of(system)
     check_frequency("frequency_hz", frequency_hz)
+    check_positive("seconds", seconds)
+    check_types(progress=(progress, Callable, None))
     observe = check_observe(flow.system, observe)
     problem = shooting_problem(flow, period, segments)
     omega = 2.0 * math.pi * frequency_hz
@@ -83,16 +103,33 @@ def solve_orbit(
     if guess is not None:
         return first_orbit(problem, [guessed_nodes(problem, guess, omega)], omega, observe)
     pieces = (segments or period) // period  # of one excitation period
+    limit = TimeLimit(seconds, frequency_hz, progress)
     try:
-        return first_orbit(problem, _simulated(problem, omega, pieces), omega, observe)
+        return _searched(problem, omega, observe, pieces, limit)
+    except OutOfTimeError as error:
+        raise ConvergenceError(
+            f"no orbit of period {period} found at {frequency_hz:g} Hz within {seconds:g} s, spent "
+            f"up to {error}; more `seconds` of solve_orbit, a guess or find_orbits may find one"
+        ) from None
+
+
+def _searched(
+    problem: ShootingProblem, omega: float, observe: str, pieces: int, limit: TimeLimit
+) -> Orbit:
+    """The orbit that a motion from rest leads to, here or at more damping."""
+    try:
+        return first_orbit(problem, _simulated(problem, omega, pieces, limit), omega, observe)
     except ConvergenceError:
-        orbit = _by_more_damping(problem, omega, observe, pieces) if period == 1 else None
+        by_damping = problem.period == 1
+        orbit = _by_more_damping(problem, omega, observe, pieces, limit) if by_damping else None
         if orbit is None:
             raise
         return orbit
 
 
-def _simulated(problem: ShootingProblem, omega: float, pieces: int) -> Iterator[Real]:
+def _simulated(
+    problem: ShootingProblem, omega: float, pieces: int, limit: TimeLimit
+) -> Iterator[Real]:
     """States at the shooting phases that a motion from rest comes near, the likeliest first.
 
     It is simulated in pieces of the excitation period.
@@ -100,29 +137,43 @@ def _simulated(problem: ShootingProblem, omega: float, pieces: int) -> Iterator[
     flow, period = problem.flow, problem.period
     q = rest(flow.system)
     start = flow.to_state(at_rest(q))
-    warm = np.linspace(0.0, 400.0 * np.pi, 200 * pieces + 1)
-    found = flow.shoot(start[None], warm, omega, sensitivities=False, chained=True)
-    if found.failure:
-        raise ConvergenceError(
-            f"the simulation from rest at {omega / (2.0 * math.pi):g} Hz failed: {found.failure}; "
-            "give a guess"
-        )
-    strobe = found.ends[pieces - 1 :: pieces][20:]
+    warm = np.linspace(0.0, 2.0 * PERIODS * np.pi, PERIODS * pieces + 1)
+    ends = start[None]
+    for first in range(0, warm.size - 1, BUNCH):
+        limit.look(f"period {first // pieces} of {PERIODS} of the motion from rest")
+        some = warm[first : first + BUNCH + 1]
+        found = flow.shoot(ends[-1:], some, omega, sensitivities=False, chained=True)
+        if found.failure:
+            raise ConvergenceError(
+                f"the simulation from rest at {limit.frequency_hz:g} Hz failed: {found.failure}; "
+                "give a guess"
+            )
+        ends = np.concatenate([ends, found.ends])
+    strobe = ends[pieces::pieces][20:]
     # beside a subharmonic attractor lies, in its middle, the orbit that it branched from
     counts = (2, 3, 4, len(strobe)) if period == 1 else ()
     middles = [strobe[-count:].mean(axis=0) for count in counts]
     near = strobe[near_returns(strobe, period, 8)]
     # at a sharp resonance the motion from rest takes too long to grow
     linear = [] if flow.system.grows(omega) else [flow.system.steady(omega).real]
-    starts = (spread(problem, z, omega) for z in (strobe[-1], *near, *middles, *linear))
+    starts = _spread(problem, (strobe[-1], *near, *middles, *linear), omega, limit)
     if not np.any(q):
         return starts
     held = held_motion(flow.system, q, omega, problem.phases[:-1])
     return itertools.chain(starts, [flow.to_state(held)])
 
 
+def _spread(
+    problem: ShootingProblem, states: Iterable[Real], omega: float, limit: TimeLimit
+) -> Iterator[Real]:
+    """Each of some states at phase zero as states at all shooting phases, while there is time."""
+    for state in states:
+        limit.look("Newton's method")
+        yield spread(problem, state, omega)
+
+
 def _by_more_damping(
-    problem: ShootingProblem, omega: float, observe: str, pieces: int
+    problem: ShootingProblem, omega: float, observe: str, pieces: int, limit: TimeLimit
 ) -> Orbit | None:
     """Orbit at more damping, which a motion from rest comes near, carried back, or None."""
     if not np.any(problem.flow.system.total_damping):
@@ -131,10 +182,10 @@ def _by_more_damping(
         detour = Homotopy(problem.flow, {DAMPING: factor})
         try:
             more = replace(problem, flow=detour.flow(1.0))
-            orbit = first_orbit(more, _simulated(more, omega, pieces), omega, observe)
+            orbit = first_orbit(more, _simulated(more, omega, pieces, limit), omega, observe)
         except (ConvergenceError, SystemModelError):
             continue
-        found = detour.carried(orbit, 1.0, 0.0)
+        found = detour.carried(orbit, 1.0, 0.0, lambda: limit.look("a way back from more damping"))
         if found is not None:
             return found
     return None

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 COUNTS = (*range(1, 11), 12, 16, 20, 30, 40)
 GRID = 400
+LONGEST_SEARCH = 600.0  # s of processor time for the orbit with which a harmonic branch begins
 EIGENFREQUENCIES = 3
 SPECIAL_KINDS = ("LP", "PD")
 ONE_MODE = 4.0  # part of the cost of a branch that does not grow with its modes, in modes
@@ -410,13 +411,10 @@ def _measured_all(
     return [models[number] for number in range(len(cases))]
 
 
-def _measured_case(
-    setting: LoadCase, at_hz: float, case: tuple[str, cms.ReducedModel]
-) -> Measured:
+def _measured_case(setting: LoadCase, at_hz: float, case: tuple[str, cms.ReducedModel]) -> Measured:
     """As `measured`, in another process."""
     with one_thread():
         return measured(*case, setting, at_hz)
-
 
 
 def best_of(models: Sequence[Measured], full: Measured) -> Measured:
@@ -618,7 +616,9 @@ def harmonic_branch(system: System, setting: LoadCase, tell: Callable[[float], N
     low, high = setting.range_hz
     tell(high)
     try:
-        orbit = solve_orbit(FlowMap(system), high * (1.0 - 1e-9), observe=setting.observe)
+        orbit = solve_orbit(
+            FlowMap(system), high * (1.0 - 1e-9), observe=setting.observe, seconds=LONGEST_SEARCH
+        )
     except ConvergenceError as error:
         rigid = int(np.count_nonzero(system.frequencies_hz == 0.0))
         if not rigid:
@@ -628,9 +628,7 @@ def harmonic_branch(system: System, setting: LoadCase, tell: Callable[[float], N
     return continue_branch(orbit, (low, high), progress=tell)
 
 
-def told(
-    progress: Progress, what: str, range_hz: tuple[float, float]
-) -> Callable[[float], None]:
+def told(progress: Progress, what: str, range_hz: tuple[float, float]) -> Callable[[float], None]:
     """Tell how much of a range a branch covers that comes down from its upper end."""
     low, high = range_hz
     lowest = high

@@ -43,7 +43,7 @@ def chattering_orbit(hz: float) -> Orbit:
         stops=[Stop("m", 1e9)],
         excitation=[HarmonicForce("m", 1.0)],
     )
-    return solve_orbit(system, hz)
+    return solve_orbit(system, hz, seconds=600.0)
 
 
 def chatter_error(hz: float) -> Measured:
@@ -75,7 +75,7 @@ def chattering_halves_error(hz: float) -> Measured:
     """The same in a motion with many impacts, at which both stops close at one instant."""
     single = chattering_orbit(hz)
     two = replace(single.system, stops=(Stop("m", 3e8), Stop("m", 7e8)))
-    return motions_apart(solve_orbit(two, hz), single)
+    return motions_apart(solve_orbit(two, hz, seconds=600.0), single)
 
 
 def chattering_twins_error(hz: float) -> Measured:
@@ -87,7 +87,7 @@ def chattering_twins_error(hz: float) -> Measured:
         stops=[Stop("m", 1e9), Stop("n", 1e9)],
         excitation=[HarmonicForce("m", 1.0), HarmonicForce("n", 1.0)],
     )
-    return motions_apart(solve_orbit(twins, hz), chattering_orbit(hz))
+    return motions_apart(solve_orbit(twins, hz, seconds=600.0), chattering_orbit(hz))
 
 
 def motions_apart(found: Orbit, exact: Orbit) -> Measured:

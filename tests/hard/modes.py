@@ -43,7 +43,7 @@ def spread_error() -> Measured:
         stops=[Stop("m", 1e11)],
         excitation=[FORCE],
     )
-    return orbit_flow_error(solve_orbit(system, 1.7), Precision(24, 30, 16))
+    return orbit_flow_error(solve_orbit(system, 1.7, seconds=600.0), Precision(24, 30, 16))
 
 
 def close_system(detuning: float) -> System:

@@ -1,0 +1,61 @@
+"""How long a search for an orbit may take."""
+
+from __future__ import annotations
+
+import time
+
+from nldyn.runtime.compilation import compilations
+from nldyn.runtime.progress import Progress, silent
+
+
+class OutOfTimeError(RuntimeError):
+    """A search has taken as long as it may; the text says what it was at."""
+
+
+class TimeLimit:
+    """The processor time that a search may take; compiling does not count.
+
+    Parameters
+    ----------
+    seconds : float
+        The time in s.
+    frequency_hz : float
+        Where the search is, for `progress`.
+    progress : callable, optional
+        Called as ``progress(what, frequency_hz, done)``, with the share of the time that is spent.
+
+    Examples
+    --------
+    >>> limit = TimeLimit(60.0, 20.0, print)
+    >>> limit.look("simulation from rest")  # doctest: +ELLIPSIS
+    simulation from rest 20.0 ...
+    """
+
+    def __init__(
+        self, seconds: float, frequency_hz: float, progress: Progress | None = None
+    ) -> None:
+        self.seconds = seconds
+        self.frequency_hz = frequency_hz
+        self.tell = progress or silent
+        self._start = time.thread_time() - compilations.seconds()
+
+    def __repr__(self) -> str:
+        return f"<TimeLimit: {self.spent:.3g} of {self.seconds:g} s spent>"
+
+    @property
+    def spent(self) -> float:
+        """Processor time in s since the search began, without compiling."""
+        return time.thread_time() - compilations.seconds() - self._start
+
+    def look(self, what: str) -> None:
+        """Tell what the search is at.
+
+        Raises
+        ------
+        OutOfTimeError
+            If the time is spent.
+        """
+        spent = self.spent
+        if spent > self.seconds:
+            raise OutOfTimeError(what)
+        self.tell(what, self.frequency_hz, max(spent, 0.0) / self.seconds)

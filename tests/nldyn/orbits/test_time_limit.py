@@ -1,0 +1,36 @@
+"""A search for an orbit ends with a sentence when its time is spent."""
+
+import pytest
+from problems import make_one_dof
+
+from nldyn import ConvergenceError, SystemModelError, solve_orbit
+
+
+def test_a_search_without_time_tells_what_it_was_at():
+    says = (
+        r"no orbit of period 1 found at 30 Hz within 1e-09 s, spent up to period \d+ of 200 of "
+        "the motion from rest; more `seconds`"
+    )
+    with pytest.raises(ConvergenceError, match=says):
+        solve_orbit(make_one_dof(), 30.0, seconds=1e-9)
+
+
+def test_a_search_tells_its_progress_and_finds_what_it_finds_without():
+    told = []
+    orbit = solve_orbit(make_one_dof(), 30.0, seconds=1e4, progress=lambda *news: told.append(news))
+    assert {hz for _, hz, _ in told} == {30.0}
+    shares = [done for *_, done in told]
+    assert shares == sorted(shares) and 0.0 <= shares[0] <= shares[-1] < 1.0
+    assert told[0][0].startswith("period 0 of 200") and told[-1][0] == "Newton's method"
+    assert (orbit.point == solve_orbit(make_one_dof(), 30.0, seconds=1e4).point).all()
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), "5", None])
+def test_a_time_that_is_none_is_refused(seconds):
+    with pytest.raises(SystemModelError, match="seconds must be a positive number"):
+        solve_orbit(make_one_dof(), 30.0, seconds=seconds)
+
+
+def test_a_progress_that_cannot_be_called_is_refused():
+    with pytest.raises(SystemModelError, match="progress"):
+        solve_orbit(make_one_dof(), 30.0, progress=3)
