@@ -6,6 +6,7 @@ from cms.component import ComponentLike
 from cms.coupled_accuracy import CoupledAccuracy, coupled_accuracy
 from cms.coupling import Joint, couple
 from cms.errors import ReductionError
+from cms.matrix_files import ReadMatrices, read_matrices
 from cms.model import ReducedModel
 from cms.reduction import METHODS, Matrices, keep_modes, reduce
 
@@ -17,6 +18,7 @@ __all__ = [
     "CoupledAccuracy",
     "Joint",
     "Matrices",
+    "ReadMatrices",
     "ReducedModel",
     "ReductionError",
     "accuracy",
@@ -25,5 +27,6 @@ __all__ = [
     "coupled_accuracy",
     "keep_modes",
     "mac",
+    "read_matrices",
     "reduce",
 ]
