@@ -11,6 +11,7 @@ from typing import Any
 from nldyn.base.errors import SystemModelError
 
 ContactLaw = Callable[[float, float], tuple[float, float, float]]
+SHALLOW = 1e-6, 1e-8  # of the penetration at which the power law gives 1 N
 
 
 def power_law(
@@ -58,7 +59,7 @@ def duration_factor(p: float) -> float:
 
 
 def check_law(owner: str, law: ContactLaw, stiffness: float, exponent: float) -> None:
-    """Refuse a law that is not finite, not smooth, not zero at its start, or has wrong slopes.
+    """Refuse a law that is not finite, not smooth, not as declared at its start, or wrong in slope.
 
     Penetrations and speeds are tried around those at which the power law gives 1 N.
 
@@ -91,13 +92,29 @@ def check_law(owner: str, law: ContactLaw, stiffness: float, exponent: float) ->
     tiny = abs(_values(owner, law, 1e-9 * unit, 0.1)[0])
     if tiny > 1e-4 * max(abs(_values(owner, law, unit, 0.1)[0]), 1.0):
         raise SystemModelError(f"{owner}: law must vanish with the penetration")
+    _check_declared(owner, law, stiffness, exponent)
     _check_smooth(owner, law, unit)
+
+
+def _check_declared(owner: str, law: ContactLaw, stiffness: float, exponent: float) -> None:
+    """Refuse a law that does not begin as k δ^p with the k and p it is declared with."""
+    unit = stiffness ** (-1.0 / exponent)
+    for share in SHALLOW:
+        delta = share * unit
+        force = _values(owner, law, delta, 0.0)[0]
+        declared = stiffness * delta**exponent
+        if _differ(force, declared, 0.01):
+            raise SystemModelError(
+                f"{owner}: law gives {force:g} N at a penetration of {delta:g} m, but its "
+                f"stiffness {stiffness:g} and exponent {exponent:g} say {declared:g} N: declare "
+                "those with which the law begins"
+            )
 
 
 def _check_smooth(owner: str, law: ContactLaw, unit: float) -> None:
     """Refuse a law whose force or slope jumps: panels resolve analytic laws only.
 
-    Sought on a grid of penetrations with eight points to an octave, from 1e-4 to 1e4 of the unit;
+    Sought on a grid of penetrations with eight points to an octave, from 1e-8 to 1e4 of the unit;
     where neighbours differ by a twentieth, the larger half of the change is followed down to 1e-10
     of the penetration, and one that is left there is a jump.
     """
@@ -106,7 +123,7 @@ def _check_smooth(owner: str, law: ContactLaw, unit: float) -> None:
         force, stiff, _ = _values(owner, law, unit * 2.0**exponent, 0.1)
         return force, stiff
 
-    points = [-13.25 + k / 8.0 for k in range(213)]
+    points = [-26.5 + k / 8.0 for k in range(319)]
     for which, name in enumerate(("force", "derivative by the penetration")):
         known = []
         for point in points:
