@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
-from fem.abaqus.deck import Body, Deck
+from fem.abaqus.deck import Body, Deck, Label
 from fem.abaqus.keywords import Keyword, filled
 from fem.abaqus.sets import Resolver
 from fem.element_types import family
@@ -26,38 +27,81 @@ class NotTakenError(Exception):
     """Why a material or a section cannot be taken over."""
 
 
+@dataclass
+class _Given:
+    """A section, the element set that it is given to with its labels, and what it says."""
+
+    keyword: Keyword
+    names: tuple[str, ...]
+    labels: Sequence[Label]
+    description: dict[str, object]
+
+
 def described_parts(deck: Deck, resolver: Resolver) -> dict[str, dict[str, object]]:
     """Keys of a part of a scene by the name of the set that a section is given to.
 
     A description that holds "refused" says why the file's numbers cannot be taken.
     """
     materials = _materials(deck)
-    found: dict[str, dict[str, object]] = {}
+    given: list[_Given] = []
     for body in deck.bodies.values():
         for keyword in body.later():
-            if keyword.name not in SECTIONS or "ELSET" not in keyword.parameters:
-                continue
-            name = keyword.parameters["ELSET"]
-            try:
-                description = _described(resolver, body, keyword, materials)
-            except NotTakenError as reason:
-                description = {REFUSED: f"{keyword.shown} in {keyword.place()} {reason}"}
-            named = body.set_of("ELSET", name)
-            spelled = named.name if named else name
-            for each in (spelled, f"{body.name}.{spelled}" if body.name else spelled):
-                if found.get(each, description) != description:
-                    description = {REFUSED: f"two sections are given to {each!r}"}
-                found[each] = description
+            if keyword.name in SECTIONS and "ELSET" in keyword.parameters:
+                given.append(_given(resolver, body, keyword, materials))
+    found: dict[str, dict[str, object]] = {}
+    for section in given:
+        for name in section.names:
+            if found.get(name, section.description) != section.description:
+                section.description = {REFUSED: f"two sections are given to {name!r}"}
+            found[name] = section.description
+    return found | _overlapping(given)
+
+
+def _given(
+    resolver: Resolver, body: Body, keyword: Keyword, materials: Mapping[str, list[Keyword]]
+) -> _Given:
+    name = keyword.parameters["ELSET"]
+    labels = resolver.labels("ELSET", body, name, keyword.place())
+    try:
+        description = _described(resolver.deck, body, keyword, labels, materials)
+    except NotTakenError as reason:
+        description = {REFUSED: f"{keyword.shown} in {keyword.place()} {reason}"}
+    named = body.set_of("ELSET", name)
+    spelled = named.name if named else name
+    names = (spelled, f"{body.name}.{spelled}") if body.name else (spelled,)
+    return _Given(keyword, names, labels, description)
+
+
+def _overlapping(given: Iterable[_Given]) -> dict[str, dict[str, object]]:
+    """Refusals for sets that share elements to which different sections are given."""
+    found: dict[str, dict[str, object]] = {}
+    first: dict[Label, _Given] = {}
+    for section in given:
+        met = (first.setdefault(label, section) for label in section.labels)
+        others = [other for other in met if other.description != section.description]
+        if others:
+            one = others[0]
+            count = sum(other is one for other in others)
+            told = (
+                f"{_shown(one)} and {_shown(section)} have {count} element(s) in common, which can"
+                " have one section only"
+            )
+            for name in (*one.names, *section.names):
+                found[name] = {REFUSED: told}
     return found
 
 
+def _shown(section: _Given) -> str:
+    return f"{section.keyword.shown} of {section.names[0]!r} in {section.keyword.place()}"
+
+
 def _materials(deck: Deck) -> dict[str, list[Keyword]]:
+    """The keywords of each material, with all that define it."""
     found: dict[str, list[Keyword]] = {}
     for keyword in deck.materials:
         if keyword.name == "MATERIAL":
             current = found.setdefault(keyword.parameters.get("NAME", "").upper(), [])
-        else:
-            current.append(keyword)
+        current.append(keyword)
     return found
 
 
@@ -65,6 +109,7 @@ def _material(name: str, materials: Mapping[str, list[Keyword]]) -> dict[str, ob
     """Young's modulus, Poisson's ratio and density of an isotropic material."""
     if name.upper() not in materials:
         raise NotTakenError(f"names the material {name!r}, which is not defined")
+    _check_once(name, materials[name.upper()])
     numbers: dict[str, object] = {}
     for keyword in materials[name.upper()]:
         what = f"of material {name!r} with {keyword.shown} in {keyword.place()}"
@@ -76,12 +121,24 @@ def _material(name: str, materials: Mapping[str, list[Keyword]]) -> dict[str, ob
             numbers["poissons_ratio"] = given[1] if len(given) > 1 else 0.0
         elif keyword.name == "DENSITY":
             numbers["density"] = _constant(keyword, what)[0]
-        elif keyword.name not in HARMLESS:
+        elif keyword.name not in ("MATERIAL", *HARMLESS):
             raise NotTakenError(f"is {what}, which is not taken over")
     for key in ("youngs_modulus", "density"):
         if key not in numbers:
             raise NotTakenError(f"is of material {name!r}, which has no {key}")
     return numbers
+
+
+def _check_once(name: str, keywords: Iterable[Keyword]) -> None:
+    """Refuse a material that is defined twice, or has two moduli or densities."""
+    first: dict[str, Keyword] = {}
+    for keyword in keywords:
+        before = first.setdefault(keyword.name, keyword)
+        if before is not keyword and keyword.name in ("MATERIAL", "ELASTIC", "DENSITY"):
+            raise NotTakenError(
+                f"is of material {name!r}, which has {keyword.shown} twice, in {before.place()} and"
+                f" in {keyword.place()}"
+            )
 
 
 def _constant(keyword: Keyword, what: str) -> list[float]:
@@ -91,16 +148,17 @@ def _constant(keyword: Keyword, what: str) -> list[float]:
 
 
 def _described(
-    resolver: Resolver, body: Body, keyword: Keyword, materials: Mapping[str, list[Keyword]]
+    deck: Deck,
+    body: Body,
+    keyword: Keyword,
+    labels: Iterable[Label],
+    materials: Mapping[str, list[Keyword]],
 ) -> dict[str, object]:
     families = {
-        family(resolver.deck.bodies[owner.upper()].element(label).type.name)
-        for owner, label in resolver.labels(
-            "ELSET", body, keyword.parameters["ELSET"], keyword.place()
-        )
+        family(deck.bodies[owner.upper()].element(label).type.name) for owner, label in labels
     }
     if keyword.name.startswith("BEAM"):
-        _check_plain_beams(resolver.deck)
+        _check_plain_beams(deck)
     given = _TAKEN[keyword.name](body, keyword, families)
     if keyword.name == "BEAMGENERALSECTION":
         return given

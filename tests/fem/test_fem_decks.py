@@ -674,6 +674,43 @@ def test_materials_and_sections_of_the_deck_are_described(tmp_path):
         assert re.search(reason, told), told
 
 
+def test_elements_with_two_sections_are_refused(tmp_path):
+    """The section of a set does not describe those of its elements that have another one."""
+    text = cantilever_deck() + (
+        "*ELSET, ELSET=HALF, GENERATE\n6, 10\n*ELSET, ELSET=REST, GENERATE\n1, 5\n"
+        "*MATERIAL, NAME=STEEL\n*ELASTIC\n2.1E11, .3\n*DENSITY\n7800.\n"
+        "*BEAM SECTION, ELSET=BEAM, MATERIAL=STEEL, SECTION=RECT\n0.02, 0.01\n"
+        "*BEAM SECTION, ELSET=HALF, MATERIAL=STEEL, SECTION=RECT\n0.02, 0.03\n"
+    )
+    described = fem.read_mesh(deck(tmp_path, text)).described
+    assert described["BEAM"] == described["HALF"]
+    assert described["BEAM"]["refused"] == (
+        "*BEAM SECTION of 'BEAM' in line 30 and *BEAM SECTION of 'HALF' in line 32 have 5"
+        " element(s) in common, which can have one section only"
+    )
+    apart = fem.read_mesh(deck(tmp_path, text.replace("ELSET=BEAM, MAT", "ELSET=REST, MAT")))
+    assert [apart.described[name]["height"] for name in ("REST", "HALF")] == [0.01, 0.03]
+    same = fem.read_mesh(deck(tmp_path, text.replace("0.02, 0.03", "0.02, 0.01")))
+    assert same.described["BEAM"] == same.described["HALF"]
+    assert same.described["BEAM"]["height"] == 0.01
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [("*MATERIAL, NAME=steel\n*ELASTIC\n1E11, .3\n*DENSITY\n1.\n", "*MATERIAL twice, in line 21"
+      " and in line 26"),
+     ("*DENSITY\n1000.\n", "*DENSITY twice, in line 24 and in line 26"),
+     ("*ELASTIC\n1E11, .3\n", "*ELASTIC twice, in line 22 and in line 26")],
+)  # fmt: skip
+def test_a_material_defined_twice_is_refused(tmp_path, more, told):
+    text = cantilever_deck() + "*MATERIAL, NAME=STEEL\n*ELASTIC\n2.1E11, .3\n*DENSITY\n7800.\n"
+    section = "*BEAM SECTION, ELSET=BEAM, MATERIAL=STEEL, SECTION=RECT\n0.02, 0.01\n"
+    refused = fem.read_mesh(deck(tmp_path, text + more + section)).described["BEAM"]["refused"]
+    assert refused.endswith(f"is of material 'STEEL', which has {told}")
+    once = fem.read_mesh(deck(tmp_path, text + section)).described["BEAM"]
+    assert (once["youngs_modulus"], once["density"]) == (2.1e11, 7800.0)
+
+
 @pytest.mark.parametrize(
     "after",
     ["*BOUNDARY\nROOT, 1, 6\n", "*AMPLITUDE, NAME=A\n0., 0., 1., 1.\n",
