@@ -52,6 +52,9 @@ class Component:
         Indices among all degrees of freedom of (ux, uy, rotation) at the first and the second
         end of every element, shape (e, 6). Node i has 3i, 3i + 1, 3i + 2; the own rotations of
         hinged parts follow after the nodes.
+    inertia
+        M r in kg of the translations r of everything, supports included, along x and y, shape
+        (N, 2): the load by an acceleration of 1 m/s², such as a weight's.
     damping
         Matrix in N s/m of the dampers that the file of the mesh holds; None without any.
     """
@@ -62,6 +65,7 @@ class Component:
     model: FrameModel
     free: IntArray
     element_dofs: IntArray
+    inertia: FloatArray
     damping: SparseArray | None = None
 
     @cached_property
@@ -117,9 +121,12 @@ def assemble_frame(model: FrameModel) -> Component:
     elongations, given, damping = _link_rows(model)
     K = _scatter(stiffness, element_dofs, springs + squares(elongations, given), free)
     lumps = sparse.diags_array(_mass_diagonal(model), format="csr")
-    M = _scatter(mass, element_dofs, lumps, free)
+    every = _scatter(mass, element_dofs, lumps, np.arange(_dof_count(model)))
+    M = sparse.csr_array(every[free][:, free])
+    inertia = (every @ rigid_motions(model)[:, :2])[free]
     C = squares(elongations, damping)[free][:, free] if damping.any() else None
-    return Component(K, M, _interface_vectors(model, free), model, free, element_dofs, C)
+    vectors = _interface_vectors(model, free)
+    return Component(K, M, vectors, model, free, element_dofs, inertia, C)
 
 
 def rigid_body_mass(component: Component) -> FloatArray:
@@ -128,14 +135,20 @@ def rigid_body_mass(component: Component) -> FloatArray:
     every = np.arange(_dof_count(model))
     lumps = sparse.diags_array(_mass_diagonal(model), format="csr")
     mass = _scatter(_element_matrices(model)[1], dofs, lumps, every)
+    motions = rigid_motions(model)
+    return np.asarray(motions.T @ (mass @ motions))
+
+
+def rigid_motions(model: FrameModel) -> FloatArray:
+    """Rigid motions (n, 3) of all degrees of freedom: along x, along y, about z."""
     x, y = model.mesh.points[:, 0], model.mesh.points[:, 1]
-    motions = np.zeros((len(every), 3))
+    motions = np.zeros((_dof_count(model), 3))
     ends = 3 * np.arange(len(x))
     motions[ends, 0] = motions[ends + 1, 1] = 1.0
     motions[ends, 2], motions[ends + 1, 2] = -y, x
     motions[ends + 2, 2] = 1.0
     motions[3 * len(x) :, 2] = 1.0  # own rotations at hinges
-    return np.asarray(motions.T @ (mass @ motions))
+    return motions
 
 
 def mechanism_warnings(model: FrameModel) -> Iterator[str]:

@@ -84,6 +84,9 @@ class StructureComponent:
         Which degrees of freedom there are, and how they follow from the free ones.
     rigid_mass
         Mass matrix (6, 6) of the rigid motions, supports apart: along and about x, y and z.
+    inertia
+        M r in kg of the translations r of everything, supports included, along x, y and z, shape
+        (N, 3): the load by an acceleration of 1 m/s², such as a weight's.
     damping
         Matrix in N s/m of the dampers that the file of the mesh holds; None without any.
     """
@@ -95,6 +98,7 @@ class StructureComponent:
     numbering: Numbering
     constraints: Constraints
     rigid_mass: FloatArray
+    inertia: FloatArray
     damping: SparseArray | None = None
 
     @property
@@ -185,8 +189,12 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     _check_nothing_empty(K, M, model, numbering, constraints)
     interfaces = _interface_vectors(model, numbering, constraints)
     damping = _damping(model, numbering, constraints)
-    rigid = rigid_body_mass(model, numbering, mass)
-    return StructureComponent(K, M, interfaces, model, numbering, constraints, rigid, damping)
+    motions = rigid_motions_of(model, numbering)
+    pushed = np.asarray(mass @ motions)
+    inertia = np.asarray(constraints.transformation.T @ pushed[:, :3])
+    return StructureComponent(
+        K, M, interfaces, model, numbering, constraints, motions.T @ pushed, inertia, damping
+    )
 
 
 def unconstrained_matrices(
@@ -200,8 +208,8 @@ def unconstrained_matrices(
     return stiffness, mass
 
 
-def rigid_body_mass(model: StructureModel, numbering: Numbering, mass: SparseArray) -> FloatArray:
-    """Mass matrix (6, 6) of the rigid motions, given that of all degrees of freedom."""
+def rigid_motions_of(model: StructureModel, numbering: Numbering) -> FloatArray:
+    """Rigid motions (n, 6) of all degrees of freedom: along and about x, y and z."""
     axes = np.arange(3)
     motions = np.zeros((3 * numbering.count, 6))
     moving, turning = numbering.translation >= 0, numbering.rotation >= 0
@@ -209,7 +217,7 @@ def rigid_body_mass(model: StructureModel, numbering: Numbering, mass: SparseArr
     motions[3 * blocks[:, None] + axes] = rigid_motions(model.mesh.points[moving])
     turns = np.concatenate([numbering.rotation[turning], numbering.hinged])
     motions[3 * turns[:, None] + axes, 3 + axes] = 1.0
-    return np.asarray(motions.T @ (mass @ motions))
+    return motions
 
 
 def _check_nothing_empty(

@@ -91,6 +91,8 @@ from nldyn.search.fixed_point_index import index_sum as index_sum
 from nldyn.search.homotopy import by_detour as by_detour
 from nldyn.search.mixtures import by_crossover as by_crossover
 from nldyn.search.random_walks import by_closed_walks as by_closed_walks
+from nldyn.system.elements import BaseMotion as BaseMotion
+from nldyn.system.elements import ConstantForce as ConstantForce
 
 # system
 from nldyn.system.elements import Damper as Damper

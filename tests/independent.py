@@ -37,14 +37,14 @@ class Motion:
         self.A[n:, :n] = -np.diag(system.natural_frequencies**2)
         self.A[n:, n:] = -system.total_damping
         self.stops = [(system.stop_vector(s), s) for s in system.stops]
-        self.sources = [(system.participation[e.at], e) for e in system.excitation]
+        self.sources = [(system.load_vector(e.at), e) for e in system.excitation]
 
     def rate(self, phase: float, x: np.ndarray, omega: float) -> np.ndarray:
         """Time derivative of the state."""
         dx = self.A @ x
         for shape, source in self.sources:
-            amplitude = source.phasor * omega**source.order
-            dx[self.n :] += shape * (amplitude * np.exp(1j * phase)).real
+            amplitude = source.phasor * (source.harmonic * omega) ** source.power
+            dx[self.n :] += shape * (amplitude * np.exp(1j * source.harmonic * phase)).real
         for c, stop in self.stops:
             dx[self.n :] -= c * contact(stop, c @ x[: self.n] - stop.gap, c @ x[self.n :])[0]
         return dx
@@ -135,18 +135,23 @@ class Motion:
 def exact_flight(
     system: System, x0: np.ndarray, phases: tuple[float, float], omega: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """End state and Jacobian from one matrix exponential of the system and its oscillator."""
-    n = system.size
-    A = np.zeros((2 * n + 2, 2 * n + 2))
+    """End state and Jacobian from one matrix exponential of the system and its oscillators."""
+    n, orders = system.size, sorted({source.harmonic for source in system.excitation})
+    size = 2 * n + 2 * len(orders)
+    A = np.zeros((size, size))
     A[:n, n : 2 * n] = np.eye(n)
     A[n : 2 * n, :n] = -np.diag(system.natural_frequencies**2)
     A[n : 2 * n, n : 2 * n] = -system.total_damping
-    A[-2:, -2:] = [[0.0, -omega], [omega, 0.0]]  # (cos ωt, sin ωt)
-    for source in system.excitation:
-        f = source.phasor * omega**source.order
-        A[n : 2 * n, -2:] += np.outer(system.participation[source.at], [f.real, -f.imag])
+    start = list(x0)
+    for h, order in enumerate(orders):  # (cos mωt, sin mωt)
+        pair = slice(2 * n + 2 * h, 2 * n + 2 * h + 2)
+        A[pair, pair] = order * np.array([[0.0, -omega], [omega, 0.0]])
+        start += [np.cos(order * phases[0]), np.sin(order * phases[0])]
+        for source in system.excitation:
+            if source.harmonic == order:
+                f = source.phasor * (order * omega) ** source.power
+                A[n : 2 * n, pair] += np.outer(system.load_vector(source.at), [f.real, -f.imag])
     E = sla.expm(A * (phases[1] - phases[0]) / omega)
-    start = np.concatenate([x0, [np.cos(phases[0]), np.sin(phases[0])]])
     return (E @ start)[: 2 * n], E[: 2 * n, : 2 * n]
 
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from nldyn.system.elements import Stop
     from nldyn.system.system import System
 
+
 def usable_cores() -> int:
     """How many cores this process may use."""
     if hasattr(os, "sched_getaffinity"):
@@ -373,9 +374,7 @@ def converge(
 @main.command()
 @out_option
 @click.option("--atlas", is_flag=True, help="All known branches instead, which takes hours.")
-@click.option(
-    "--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Processes."
-)
+@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
 @quiet_option
 def paper(out: Path, atlas: bool, jobs: int, quiet: bool) -> None:
     """Reproduce the figures and numbers of the paper."""

@@ -48,6 +48,7 @@ from nldyn.flow.packing import parameter_tables
 from nldyn.runtime.interruption import behind
 from nldyn.runtime.kernel_cache import first_call
 from nldyn.system.contact_law import duration_factor, law_address
+from nldyn.system.linear import ForcedResponse
 from nldyn.system.parameters import Parameter
 from nldyn.system.system import System, same_system
 
@@ -189,7 +190,7 @@ class FlowMap:
     ...     excitation=[Unbalance("middle", 4.92e-6)])
     >>> flow = FlowMap(system)
     >>> omega = 2 * np.pi * 20.0
-    >>> steady = system.steady(omega).real[None]
+    >>> steady = system.steady(omega)[None]
     >>> segments = flow.shoot(steady, np.array([0.0, 2 * np.pi]), omega)
     >>> bool(np.allclose(segments.ends, steady, rtol=1e-12))
     True
@@ -258,6 +259,7 @@ class FlowMap:
             np.array([self.rows, self.rate_rows, accelerations]),
             bounds,
             np.ascontiguousarray(force.T),
+            s.orders,
             s.drive,
             np.array(stops, dtype=float).reshape(-1, len(StopRow._fields)),
             np.array([law_address(stop.law) for stop in s.stops], dtype=np.int64),
@@ -706,8 +708,8 @@ class Trajectory:
         return phases.ravel(), (duration * tables.weights[kind]).ravel()
 
     @cached_property
-    def _response(self) -> tuple[Complex, Complex]:
-        """Near eigenvalues (k,), amplitudes (1 + k, 2n) of steady response and growths."""
+    def _response(self) -> ForcedResponse:
+        """Response to the excitation."""
         return self.flow.system.response(self.omega)
 
     def _evaluate(self, kernel: Any, *arguments: object) -> Real:
@@ -724,7 +726,8 @@ class Trajectory:
             rec.start,
             rec.force,
             int(rec.used[0]),
-            *self._response,
+            self._response.terms,
+            self._response.amplitudes,
             *arguments,
         )
         return np.asarray(found)

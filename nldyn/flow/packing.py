@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +12,6 @@ from numpy.typing import NDArray
 from nldyn.base.arrays import Complex
 from nldyn.base.errors import check_types
 from nldyn.flow.kernels.layout import StopRow
-from nldyn.system.elements import turn
 from nldyn.system.parameters import OF_STOPS, Parameter, check_exact
 from nldyn.system.system import System
 
@@ -32,15 +33,15 @@ def parameter_tables(
     for parameter in parameters:
         check_types(**{"parameters: entry": (parameter, Parameter)})
     table = np.zeros((len(parameters), 2), dtype=np.int64)
-    drive_by = np.zeros((len(parameters), 2, 2 * system.size), dtype=complex)
+    drive_by = np.zeros((len(parameters), *system.drive.shape), dtype=complex)
     for row, parameter in enumerate(parameters):
         check_exact(system, parameter)
         name, index = parameter.name, parameter.index
         if name in _COLUMNS:
             table[row] = _COLUMNS[name], index
         else:
-            source = system.excitation[index]
             table[row] = _EXCITATION, index
-            column = system.force_column(system.participation[source.at])
-            drive_by[row, source.order // 2] = turn(source.phase_deg) * column
+            size: dict[str, Any] = {name: 1.0}
+            unit = replace(system.excitation[index], **size)
+            drive_by[row] = system.drive_of([unit])
     return table, drive_by

@@ -8,12 +8,21 @@ from typing import Any
 
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types
 from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.options import FlowOptions
 from nldyn.io.hdf5 import Group, put, set_attribute
 from nldyn.system.contact_law import ContactLaw
-from nldyn.system.elements import Damper, Excitation, HarmonicForce, Stop, Unbalance
+from nldyn.system.elements import (
+    BaseMotion,
+    ConstantForce,
+    Damper,
+    Excitation,
+    HarmonicForce,
+    Stop,
+    Unbalance,
+)
 from nldyn.system.linear import LinearPart
 from nldyn.system.parameters import strength
 from nldyn.system.system import System
@@ -46,6 +55,9 @@ def write_flow(group: Any, flow: FlowMap) -> None:
     set_attribute(group, "interfaces", system.interfaces)
     vectors = np.array([system.participation[name] for name in system.interfaces], dtype=float)
     put(group, "participation", vectors.reshape(-1, system.size), "kg^-0.5")
+    if system.loads:
+        set_attribute(group, "load_vectors", tuple(system.loads))
+        put(group, "loads", np.array(list(system.loads.values()), dtype=float), "kg^0.5")
     basis = group.create_group("basis")  # of the states: another computer may choose another one
     put(basis, "blocks", linear.blocks, "1/s")
     put(basis, "right", linear.right, "kg^-0.5 for displacements")
@@ -77,13 +89,24 @@ def write_flow(group: Any, flow: FlowMap) -> None:
         group.create_group("excitation"),
         {
             "at": [s.at for s in sources],
-            "kind": ["unbalance" if isinstance(s, Unbalance) else "harmonic" for s in sources],
+            "kind": [_kind(s) for s in sources],
         },
         {
-            "size": ("kg m of an unbalance, else N", [strength(s) for s in sources]),
-            "phase_deg": ("degree", [s.phase_deg for s in sources]),
+            "size": ("kg m, N, m, m/s or m/s^2", [strength(s) for s in sources]),
+            "phase_deg": ("degree", [getattr(s, "phase_deg", 0.0) for s in sources]),
         },
     )
+
+
+def _kind(source: Excitation) -> str:
+    """Kind of excitation in files, with its harmonic unless that is the usual one."""
+    if isinstance(source, ConstantForce):
+        return "constant"
+    if isinstance(source, BaseMotion):
+        name = f"base-{source.quantity}"
+    else:
+        name = "unbalance" if isinstance(source, Unbalance) else "harmonic"
+    return name if source.harmonic == 1 else f"{name} {source.harmonic}"
 
 
 def _write_columns(
@@ -124,6 +147,7 @@ def read_flow(group: Group, laws: Laws) -> FlowMap:
             _read_stops(group.group("stops"), laws),
             _read_dampers(group.group("dampers")),
             _read_excitation(group.group("excitation")),
+            _read_loads(group, n),
         )
     except SystemModelError as error:
         if str(error).startswith(str(group.path)):
@@ -185,13 +209,34 @@ def _read_dampers(group: Group) -> tuple[Damper, ...]:
     return tuple(map(Damper, at, group.array("coefficient", len(at)).tolist()))
 
 
+def _read_loads(group: Group, modes: int) -> dict[str, Real]:
+    """Load vectors; files of versions before 0.2 have none."""
+    if not group.has_attribute("load_vectors"):
+        return {}
+    names = group.texts("load_vectors")
+    return dict(zip(names, group.array("loads", len(names), modes), strict=True))
+
+
 def _read_excitation(group: Group) -> tuple[Excitation, ...]:
     at, kinds = group.texts("at"), group.texts("kind")
     size, phase = group.array("size", len(at)), group.array("phase_deg", len(at))
-    sources: list[Excitation] = []
-    for place, kind, amount, angle in zip(at, kinds, size.tolist(), phase.tolist(), strict=True):
-        if kind not in ("unbalance", "harmonic"):
-            raise group.fault("attribute", "kind", f"has an unknown entry '{kind}'")
-        maker = Unbalance if kind == "unbalance" else HarmonicForce
-        sources.append(maker(place, amount, angle))
-    return tuple(sources)
+    rows = zip(at, kinds, size.tolist(), phase.tolist(), strict=True)
+    return tuple(_source(group, *row) for row in rows)
+
+
+def _source(group: Group, at: str, kind: str, size: float, phase_deg: float) -> Excitation:
+    name, _, harmonic = kind.partition(" ")
+    order = int(harmonic) if harmonic.isdecimal() else 1
+    if kind == "constant":
+        return ConstantForce(at, size)
+    if kind == _numbered("unbalance", harmonic):
+        return Unbalance(at, size, phase_deg, order)
+    if kind == _numbered("harmonic", harmonic):
+        return HarmonicForce(at, size, phase_deg, order)
+    if kind == _numbered(name, harmonic) and name.startswith("base-"):
+        return BaseMotion(at, size, name.removeprefix("base-"), phase_deg, order)
+    raise group.fault("attribute", "kind", f"has an unknown entry '{kind}'")
+
+
+def _numbered(name: str, harmonic: str) -> str:
+    return f"{name} {harmonic}" if harmonic.isdecimal() else name

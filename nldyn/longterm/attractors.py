@@ -394,7 +394,7 @@ def _settled(flow: FlowMap, state: Real, omega: float, periods: int) -> tuple[Re
     Forcing sets the size of a motion. Without it a motion has only that which it had on the way,
     and is at rest once it has lost all but `ON_ORBIT` of that.
     """
-    if np.any(flow.system.response(omega)[1]):
+    if flow.system.driven:
         moved, failure = transient_end(flow, state, omega, periods)
         if moved is None:
             raise ConvergenceError(failure)

@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
+import scipy.linalg as sla
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
@@ -81,8 +82,8 @@ def floquet_spectrum(jacobians: Real) -> FloquetSpectrum:
     """Eigenvalues of the product ``jacobians[k-1] @ ... @ jacobians[0]``.
 
     The periodic QR algorithm [Bojanczyk, Golub and Van Dooren 1992] never forms the product: the
-    results are exact for matrices that differ from the given ones by rounding relative to the norm
-    of each. Small eigenvalues beside large ones keep their digits as long as no single matrix
+    results are exact for matrices that differ from the given ones, balanced, by rounding relative
+    to the norm of each. Small eigenvalues beside large ones keep their digits as long as no single matrix
     squeezes them below its own rounding error.
 
     Parameters
@@ -106,11 +107,29 @@ def floquet_spectrum(jacobians: Real) -> FloquetSpectrum:
     >>> [float(f"{x:.6g}") for x in floquet_spectrum(np.array(quarters)).multipliers.real]
     [1000000000000.0, 1e-12]
     """
-    jacobians = np.ascontiguousarray(jacobians, dtype=float)
+    jacobians = np.ascontiguousarray(balanced(jacobians), dtype=float)
     values, logarithms, squeeze, converged = product_eigenvalues(jacobians)
     if not converged:
         raise MultiplierError("the multipliers of an orbit could not be computed")
     return FloquetSpectrum(values, logarithms, squeeze)
+
+
+def balanced(jacobians: Real) -> Real:
+    """The same maps (k, n, n) in coordinates scaled by powers of two, so that entries are alike.
+
+    Rounding is relative to the norm of a matrix: that of a free body, whose coordinates have no
+    natural scale, is otherwise taken for much more than it is [Osborne 1960].
+
+    Examples
+    --------
+    >>> balanced(np.array([[[1.0, 1024.0], [1.0 / 1024.0, 1.0]]])).tolist()
+    [[[1.0, 1.0], [1.0, 1.0]]]
+    """
+    total = np.abs(jacobians).sum(axis=0)
+    if not np.all(np.isfinite(total)):
+        return jacobians
+    _, (scale, _) = sla.matrix_balance(total, permute=False, separate=True)
+    return np.asarray(jacobians * scale / scale[:, None])
 
 
 def uncertainties(jacobians: Real, found: FloquetSpectrum, error: float) -> Real:
@@ -143,6 +162,7 @@ def uncertainties(jacobians: Real, found: FloquetSpectrum, error: float) -> Real
     (True, True)
     """
     k, n = jacobians.shape[:2]
+    jacobians = balanced(jacobians)
     sizes = np.linalg.norm(jacobians, axis=(1, 2))[:, None, None]
     total = np.zeros(n)
     for direction in _directions(k, n):

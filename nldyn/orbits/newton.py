@@ -77,7 +77,10 @@ def _touches_only(system: System, motion: Trajectory, omega: float) -> bool:
     """Whether contacts push, but by no more than rounding of the drive and of the motion."""
     force = float(motion.record.force.max(initial=0.0))
     depth = float(motion.record.depth.max(initial=0.0))
-    drive = sum(abs(source.phasor) * omega**source.order for source in system.excitation)
+    drive = sum(
+        abs(source.phasor) * (source.harmonic * omega) ** source.power
+        for source in system.excitation
+    )
     reach = np.abs(motion.record.start @ motion.flow.rows[: len(system.stops)].T).max(initial=0.0)
     return 0.0 < force <= TOUCH * drive and depth <= TOUCH * reach
 
@@ -100,10 +103,10 @@ def refine(
         raise ConvergenceError(f"{where}: {NO_PLACE}")
     if not found.converged:
         contact = np.any(found.motion.record.kind >= 0)
-        if not contact and problem.flow.system.grows(omega):
+        unbounded = problem.flow.system.response(omega).unbounded(omega)
+        if not contact and unbounded:
             raise ConvergenceError(
-                f"{where}: an undamped mode is excited at its own frequency, and its motion grows "
-                "without bound where it touches no stop"
+                f"{where}: {unbounded}, and its motion grows without bound where it touches no stop"
             )
         if drifts and _is_left_free(problem.flow.system):
             raise ConvergenceError(f"{where}: {NOT_HELD}")

@@ -155,7 +155,7 @@ def _simulated(
     middles = [strobe[-count:].mean(axis=0) for count in counts]
     near = strobe[near_returns(strobe, period, 8)]
     # at a sharp resonance the motion from rest takes too long to grow
-    linear = [] if flow.system.grows(omega) else [flow.system.steady(omega).real]
+    linear = [] if flow.system.grows(omega) else [flow.system.steady(omega)]
     starts = _spread(problem, (strobe[-1], *near, *middles, *linear), omega, limit)
     if not np.any(q):
         return starts

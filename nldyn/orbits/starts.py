@@ -134,9 +134,7 @@ def response_size(system: System, omega: float) -> float:
     >>> bool(np.isfinite(response_size(system, 20.0 * np.pi)))
     True
     """
-    _, response = system.response(omega)
-    growth = 2.0 * np.pi / omega * np.abs(response[1:]).sum(axis=0)
-    return float((np.abs(response[0]) + growth).max())
+    return system.response(omega).size(omega)
 
 
 def reach(system: System) -> float:

@@ -275,9 +275,7 @@ class Collector:
                 group = "period", orbit.period
                 offer_branch(self.ahead, start, self._course(start, None), group)
 
-    def offer_flips(
-        self, branch: Branch, options: ContinuationOptions | None = None
-    ) -> None:
+    def offer_flips(self, branch: Branch, options: ContinuationOptions | None = None) -> None:
         """Let the branches be followed ahead that are born at the flips of a branch.
 
         A branch mostly leads from one flip to the next; so only every other one is tried.

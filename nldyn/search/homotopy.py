@@ -156,9 +156,7 @@ def _met_from_others(known: Diagram, there: Sequence[Via], max_period: int) -> s
 
 def _followed(known: Collector, detour: Homotopy, max_period: int) -> list[Via]:
     """Branches of the changed system to which those known lead."""
-    box = Collector(
-        detour.flow(1.0), known.range_hz, known.observe, known.options, known.progress
-    )
+    box = Collector(detour.flow(1.0), known.range_hz, known.observe, known.options, known.progress)
     there: list[Via] = []
     for index, branch in enumerate(known.branches):
         if branch.period > max_period:

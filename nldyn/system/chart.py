@@ -34,6 +34,7 @@ UNITS = {
     "dissipation": "s/m",
     "amplitude": "N",
     "mass_times_radius": "kg m",
+    "force": "N",
     "coefficient": "N s/m",
     "modal_damping": "1",
     "natural_frequency_hz": "Hz",
@@ -41,6 +42,7 @@ UNITS = {
 BOUNDS = {
     name: (0.0, math.inf)
     for name in ("stiffness", "dissipation", *SOURCES, *_OF_DAMPERS, *_OF_MODES)
+    if name != "force"  # has either sign
 } | {"exponent": (1.0, LARGEST_EXPONENT)}  # between which there are systems
 POSITIVE = ("stiffness", "natural_frequency_hz")  # there is no system where they are zero
 NAMES = (FREQUENCY, *_OF_STOPS, *SOURCES, *_OF_DAMPERS, *_OF_MODES)
@@ -59,9 +61,9 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
     system : System
         The system that must have it.
     parameter : str or Parameter
-        frequency_hz; gap, stiffness, exponent or dissipation of a stop; amplitude or
-        mass_times_radius of an excitation; coefficient of a damper; modal_damping (ratio) or
-        natural_frequency_hz of a mode. The index -1 of modal_damping means all modes, which then
+        frequency_hz; gap, stiffness, exponent or dissipation of a stop; amplitude,
+        mass_times_radius or force of an excitation; coefficient of a damper; modal_damping (ratio)
+        or natural_frequency_hz of a mode. The index -1 of modal_damping means all modes, which then
         have one ratio.
 
     Raises

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg as sla
@@ -18,6 +19,29 @@ from nldyn.base.errors import SystemModelError
 # times as large as what the excitation brings about in 1/ω, and so are its rounding errors; in the
 # derivative by ω they are up to 1/NEAR² times as large
 NEAR = 3e-3
+
+
+# kinds of terms of a response: e^{imωt}; the growth from rest e' = λe + e^{imωt}; and for a slow
+# block A of a trace and determinant the functions of ∫exp(As) ds = e + e_on A from 0 to t
+STEADY, GROWTH, DRIFT, DRIFT_ON = range(4)
+
+
+class Terms(NamedTuple):
+    """Functions of time that a response is made of, beside the steady one at order 1.
+
+    Parameters
+    ----------
+    kinds : (k,)
+        `STEADY`, `GROWTH`, `DRIFT` or `DRIFT_ON`.
+    orders : (k,)
+        Multiples m of the excitation frequency.
+    rates : (k,)
+        Eigenvalues λ of growths, trace + i determinant of drifts, in 1/s and 1/s².
+    """
+
+    kinds: NDArray[np.int64]
+    orders: Real
+    rates: Complex
 
 
 # Beyond this condition number of the basis a Jacobian has fewer than eight digits left: its error
@@ -68,42 +92,87 @@ class LinearPart:
         product = np.einsum("...bi,bij->...bj", pairs, self.blocks)
         return np.ascontiguousarray(product.reshape(rows.shape))
 
-    def response(self, drive: Complex, omega: float) -> tuple[Complex, Complex]:
-        """Response to Re(drive e^{iωt}), also where a mode has no steady response.
-
-        An eigenvalue λ with |λ - iω| < `NEAR` ω is near: the excitation along its eigenvector is
-        not divided by iω - λ.
+    def response(self, orders: Real, drives: Complex, omega: float) -> ForcedResponse:
+        """Response to Σ Re(drives[h] e^{i orders[h] ωt}), also where a mode has no steady response.
 
         Parameters
         ----------
-        drive : (2n,) array
-            Amplitude of the excitation of z.
+        orders : (h,) array
+            Multiples of the excitation frequency, from 0 for a constant force on; the first is 1.
+        drives : (h, 2n) array
+            Amplitudes of the excitation of z.
         omega : float
             Excitation frequency in rad/s.
-
-        Returns
-        -------
-        near : (k,)
-            The near eigenvalues λ.
-        response : (1 + k, 2n)
-            Amplitudes f, then s_k: Re(f e^{iωt} + Σ s_k e_k(t)) is a solution for every solution
-            of e_k' = λ_k e_k + e^{iωt}.
         """
+        terms: list[tuple[int, float, complex]] = []
+        amplitudes: list[Complex] = []
+        growths: list[tuple[tuple[int, float, complex], Complex]] = []
+        for order, drive in zip(orders.tolist(), drives, strict=True):
+            steady, growing = (
+                self._drift(drive, omega) if order == 0.0 else self._swing(drive, order, omega)
+            )
+            terms.append((STEADY, order, 0j))
+            amplitudes.append(steady)
+            growths.extend(growing)
+        terms.extend(term for term, _ in growths)
+        amplitudes.extend(amplitude for _, amplitude in growths)
+        kinds, numbers, rates = zip(*terms[1:], strict=True) if terms[1:] else ((), (), ())
+        return ForcedResponse(
+            Terms(
+                np.array(kinds, dtype=np.int64),
+                np.array(numbers, dtype=float),
+                np.array(rates, dtype=complex),
+            ),
+            np.array(amplitudes),
+        )
+
+    def _swing(
+        self, drive: Complex, order: float, omega: float
+    ) -> tuple[Complex, list[tuple[tuple[int, float, complex], Complex]]]:
+        """Steady response to Re(drive e^{i order ωt}), and growths of the near eigenvalues."""
+        pace = order * omega
         a, b, c, d, rates = self._entries
-        near = np.flatnonzero(np.abs(rates - 1j * omega) < NEAR * omega)
+        near = np.flatnonzero(np.abs(rates - 1j * pace) < NEAR * pace)
         x, y = drive[0::2], drive[1::2]
-        first, last = 1j * omega - a, 1j * omega - d
+        first, last = 1j * pace - a, 1j * pace - d
         determinant = first * last - b * c
         determinant[near] = 1.0
-        response = np.zeros((1 + near.size, drive.size), dtype=complex)
-        response[0, 0::2] = (last * x + b * y) / determinant
-        response[0, 1::2] = (first * y + c * x) / determinant
-        for k, block in enumerate(near):
+        steady = np.empty(drive.size, dtype=complex)
+        steady[0::2] = (last * x + b * y) / determinant
+        steady[1::2] = (first * y + c * x) / determinant
+        growths = []
+        for block in near:
             pair, rate = slice(2 * block, 2 * block + 2), rates[block]
             turned = (self.blocks[block] - rate.real * np.eye(2)) @ drive[pair] / (1j * rate.imag)
-            response[1 + k, pair] = 0.5 * (drive[pair] + turned)
-            response[0, pair] = 0.5 * (drive[pair] - turned) / (1j * omega - rate.conjugate())
-        return rates[near], response
+            growing = np.zeros(drive.size, dtype=complex)
+            growing[pair] = 0.5 * (drive[pair] + turned)
+            steady[pair] = 0.5 * (drive[pair] - turned) / (1j * pace - rate.conjugate())
+            growths.append(((GROWTH, order, complex(rate)), growing))
+        return steady, growths
+
+    def _drift(
+        self, drive: Complex, omega: float
+    ) -> tuple[Complex, list[tuple[tuple[int, float, complex], Complex]]]:
+        """Displacement by a constant drive, and the drifts of the blocks that are slow beside ω."""
+        a, b, c, d, _ = self._entries
+        determinant, trace = a * d - b * c, a + d
+        slow = np.flatnonzero(slowest_rate(trace, determinant) < NEAR * omega)
+        x, y = drive[0::2], drive[1::2]
+        divisor = np.array(determinant)
+        divisor[slow] = 1.0
+        steady = np.empty(drive.size, dtype=complex)
+        steady[0::2] = (b * y - d * x) / divisor
+        steady[1::2] = (c * x - a * y) / divisor
+        drifts = []
+        for block in slow:
+            pair = slice(2 * block, 2 * block + 2)
+            steady[pair] = 0.0
+            rate = complex(trace[block], determinant[block])
+            along, onward = np.zeros((2, drive.size), dtype=complex)
+            along[pair] = drive[pair]
+            onward[pair] = self.blocks[block] @ drive[pair]
+            drifts += [((DRIFT, 0.0, rate), along), ((DRIFT_ON, 0.0, rate), onward)]
+        return steady, drifts
 
     @cached_property
     def _entries(self) -> tuple[Real, Real, Real, Real, Complex]:
@@ -114,32 +183,105 @@ class LinearPart:
         with np.errstate(invalid="ignore"):
             return a, b, c, d, 0.5 * (a + d) + 1j * np.sqrt(-square)
 
-    def steady(self, drive: Complex, omega: float) -> Complex:
-        """Amplitude f (2n,) of the steady response Re(f e^{iωt}) to Re(drive e^{iωt}).
+
+def slowest_rate(trace: Real, determinant: Real) -> Real:
+    """Smallest |eigenvalue| of 2×2 matrices of some traces and determinants."""
+    square = 0.25 * trace * trace - determinant
+    fastest = np.where(
+        square < 0.0,
+        np.sqrt(np.abs(determinant)),
+        0.5 * np.abs(trace) + np.sqrt(np.maximum(square, 0.0)),
+    )
+    return np.asarray(np.abs(determinant) / np.where(fastest > 0.0, fastest, 1.0))
+
+
+@dataclass(frozen=True)
+class ForcedResponse:
+    """What excitation brings about in the linear part, as a sum of terms.
+
+    Re(amplitudes[0] e^{iωt} + Σ amplitudes[1 + k] e_k(t)) is a motion of the linear part, see
+    `Terms`.
+
+    Parameters
+    ----------
+    terms : Terms
+        The k other terms.
+    amplitudes : (1 + k, 2n)
+        Of the steady response at order 1, then of the terms.
+    """
+
+    terms: Terms
+    amplitudes: Complex
+
+    def unbounded(self, omega: float) -> str:
+        """Why no motion without contact is bounded at ω (rad/s), in words; empty if one is."""
+        terms = self.terms
+        driven = np.any(self.amplitudes[1:], axis=1)
+        swings = (terms.kinds == GROWTH) & at_resonance(terms.rates, terms.orders * omega)
+        if np.any(driven & swings):
+            hz = terms.orders[driven & swings][0] * omega / (2.0 * np.pi)
+            return f"the excitation at {hz:g} Hz meets an undamped mode exactly"
+        drifts = np.isin(terms.kinds, (DRIFT, DRIFT_ON))
+        still = slowest_rate(terms.rates.real, terms.rates.imag) < 1e-12 * omega
+        if np.any(driven & drifts & still):
+            return "a constant force acts on a body that nothing but a stop holds"
+        return ""
+
+    def harmonics(self, omega: float) -> tuple[Real, Complex]:
+        """Orders m (k,) and amplitudes a (k, 2n) of the steady response z = Σ Re(a e^{imωt}).
+
+        An order may occur several times.
 
         Raises
         ------
         SystemModelError
-            If an undamped mode is excited exactly at its frequency.
+            If there is none, see `unbounded`.
         """
-        near, response = self.response(drive, omega)
-        exact = at_resonance(near, omega)
-        if np.any(response[1:][exact]):
-            raise SystemModelError(
-                f"the excitation at {omega / (2 * np.pi):g} Hz meets an undamped mode exactly; "
-                "give the mode some damping or move the frequency"
-            )
-        away = np.where(exact, 1.0, 1j * omega - near)
-        return np.asarray(response[0] + (1.0 / away) @ response[1:])
+        reason = self.unbounded(omega)
+        if reason:
+            raise SystemModelError(f"{reason}; {_WAYS_OUT[reason.startswith('a constant')]}")
+        kinds, orders, rates = self.terms
+        factors = np.ones(1 + kinds.size, dtype=complex)
+        for k, kind in enumerate(kinds.tolist()):
+            if not np.any(self.amplitudes[1 + k]):
+                continue
+            if kind == GROWTH:
+                factors[1 + k] = 1.0 / (1j * orders[k] * omega - rates[k])
+            elif kind == DRIFT_ON:  # -A⁻¹ = (A - trace)/determinant
+                factors[1 + k] = 1.0 / rates[k].imag
+            elif kind == DRIFT:
+                factors[1 + k] = -rates[k].real / rates[k].imag
+        return np.append(1.0, orders), factors[:, None] * self.amplitudes
+
+    def steady(self, omega: float, phase: float = 0.0) -> Real:
+        """State z (2n,) of the steady response at a forcing phase; raises as `harmonics`."""
+        orders, amplitudes = self.harmonics(omega)
+        return np.asarray((np.exp(1j * orders * phase) @ amplitudes).real)
+
+    def size(self, omega: float) -> float:
+        """Largest coordinate that it may have, as far as terms grow within one period."""
+        period = 2.0 * np.pi / omega
+        spans = {STEADY: 1.0, GROWTH: period, DRIFT: period, DRIFT_ON: 0.5 * period * period}
+        weights = np.array([1.0, *(spans[kind] for kind in self.terms.kinds.tolist())])
+        return float((weights @ np.abs(self.amplitudes)).max())
 
 
-def at_resonance(eigenvalues: Complex, omega: float) -> NDArray[np.bool_]:
+_WAYS_OUT = (
+    "give the mode some damping or move the frequency",
+    "hold the body by a spring or a stop",
+)
+
+
+def at_resonance(eigenvalues: Complex, omega: float | Real) -> NDArray[np.bool_]:
     """Which eigenvalues are iω but for rounding: of an undamped mode at its own frequency."""
     return np.asarray(np.abs(eigenvalues - 1j * omega) < 1e-12 * omega)
 
 
-def linear_part(omega: Real, damping: Real) -> LinearPart:
+def linear_part(omega: Real, damping: Real, held: Real | float = 0.0) -> LinearPart:
     """Linear part of modes with circular frequencies (n,) and a damping matrix (n, n).
+
+    `held` (n,) is the circular frequency that stops give to a mode which is free without them: it
+    sets the scale of its coordinates.
 
     Raises
     ------
@@ -153,7 +295,8 @@ def linear_part(omega: Real, damping: Real) -> LinearPart:
         )
     if np.linalg.eigvalsh(0.5 * (damping + damping.T))[0] < -1e-12 * (1.0 + abs(damping).max()):
         raise SystemModelError("damping must not feed energy in (the matrix has a negative part)")
-    unit = np.maximum(omega, 1e-3 * (omega.max() or 1.0))
+    slow = 1e-3 * (omega.max() or 1.0)
+    unit = np.where(omega > slow, omega, np.maximum(slow, held))
     blocks, columns, scales = [], [], []
     groups, group_of = connected_components(damping != 0.0, directed=False)
     for group in range(groups):

@@ -9,7 +9,7 @@ from nldyn.system.elements import Excitation
 from nldyn.system.system import System
 
 OF_STOPS = ("gap", "stiffness", "exponent", "dissipation")
-SOURCES = ("amplitude", "mass_times_radius")
+SOURCES = ("amplitude", "mass_times_radius", "force")
 
 
 def size_of(source: Excitation) -> str:
@@ -18,7 +18,7 @@ def size_of(source: Excitation) -> str:
 
 
 def strength(source: Excitation) -> float:
-    """The number itself: in kg m of an unbalance, else in N."""
+    """The number itself, in the unit of its kind."""
     return float(getattr(source, size_of(source)))
 
 
@@ -33,7 +33,7 @@ class Parameter:
     ----------
     name : str
         gap, stiffness, exponent or dissipation of a stop (not of one with a law of its own, but
-        for the gap), amplitude or mass_times_radius of an excitation.
+        for the gap), amplitude, mass_times_radius or force of an excitation.
     index : int
         Which of the stops, excitations, dampers or modes of the system.
 

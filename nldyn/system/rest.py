@@ -7,41 +7,58 @@ from collections.abc import Iterator
 import numpy as np
 
 from nldyn.base.arrays import Complex, Real
+from nldyn.base.errors import SystemModelError
 from nldyn.system.contact_law import power_law
 from nldyn.system.elements import Stop
 from nldyn.system.system import System
 
 MOST_STEPS = 200
 SHORTEST = 1e-14  # last step, relative
+FLAT = 1e-9  # of the largest stiffness, below which a direction counts as without any
+NOT_HELD = 1e-9  # share of a force, or of a direction, that counts as none
 SHARE = 0.1  # of the decrease that the slope foretells, with which a step is taken
 
 
 def rest(system: System) -> Real:
-    """Modal displacements (n,) at which the structure rests when nothing excites it.
+    """Modal displacements (n,) at which the structure rests when nothing but constant forces act.
 
-    They are zero unless a stop is closed there (a negative gap). The forces of the structure and of
-    the stops have the potential ``q Ω² q / 2 + Σ k δ^(m + 1) / (m + 1)``, which is convex: Newton's
-    method with shortened steps [Nocedal and Wright 2006, section 3.1] comes to its only minimum. A
-    stop with a law of its own counts with its stiffness and exponent.
+    They are zero unless a constant force acts or a stop is closed there (a negative gap). The
+    forces have the potential ``q Ω² q / 2 - f q + Σ k δ^(m + 1) / (m + 1)``, which is convex:
+    Newton's method with shortened steps [Nocedal and Wright 2006, section 3.1] comes to its only
+    minimum; a body that nothing holds yet moves along the force to the next stop. A stop with a law
+    of its own counts with its stiffness and exponent.
+
+    Raises
+    ------
+    SystemModelError
+        If a constant force acts on a body that neither a spring nor a stop holds against it.
 
     Examples
     --------
-    >>> from nldyn import Stop
+    >>> from nldyn import ConstantForce, Stop
     >>> stop = Stop.linear("tip", (20.0 * np.pi) ** 2, gap=-1e-3)
     >>> system = System.from_modal([10.0], {"tip": [1.0]}, stops=[stop])
     >>> float(rest(system)[0].round(9))
     -0.0005
+    >>> free = System.from_modal([0.0], {"ship": [1.0]}, stops=[Stop.linear("ship", 50.0, gap=0.1)],
+    ...     excitation=[ConstantForce("ship", 2.0)])
+    >>> float(rest(free)[0].round(9))
+    0.14
     """
+    push = constant_force(system)
     q = np.zeros(system.size)
     for _ in range(MOST_STEPS):
-        slope, stiffness = _slope(system, q), tangent_stiffness(system, q)
-        step = -np.linalg.lstsq(stiffness, slope, rcond=None)[0]
-        size, potential, steepness = 1.0, _potential(system, q), float(np.linalg.norm(slope))
+        slope = _slope(system, push, q)
+        step = _downhill(system, q, slope)
+        size, potential, steepness = 1.0, _potential(system, push, q), float(np.linalg.norm(slope))
         while size > SHORTEST:
             there = q + size * step
             foretold = potential + SHARE * size * float(slope @ step)
             # near the minimum the potential is rounding, the forces are not
-            if _potential(system, there) <= foretold or _steepness(system, there) < steepness:
+            if (
+                _potential(system, push, there) <= foretold
+                or np.linalg.norm(_slope(system, push, there)) < steepness
+            ):
                 break
             size *= 0.5
         else:
@@ -52,11 +69,61 @@ def rest(system: System) -> Real:
     return q
 
 
+def constant_force(system: System) -> Real:
+    """Modal force (n,) of all that acts constantly."""
+    push = np.zeros(system.size)
+    for source in system.excitation:
+        if source.harmonic == 0:
+            push += source.phasor.real * system.load_vector(source.at)
+    return push
+
+
+def _downhill(system: System, q: Real, slope: Real) -> Real:
+    """Newton's step, or the way to the next stop along a force that nothing resists.
+
+    Raises
+    ------
+    SystemModelError
+        If no stop is there.
+    """
+    values, vectors = np.linalg.eigh(tangent_stiffness(system, q))
+    flat = values <= FLAT * values[-1]
+    along = vectors.T @ slope
+    free = -vectors[:, flat] @ along[flat]
+    # what rounding shows of a force along a flat direction is none
+    if np.linalg.norm(free) <= NOT_HELD * np.linalg.norm(slope):
+        return np.asarray(-vectors[:, ~flat] @ (along[~flat] / values[~flat]))
+    force = float(np.linalg.norm(free))
+    ways = []
+    for stop in system.stops:
+        c = system.stop_vector(stop)
+        pace, left = float(c @ free) / force, stop.gap - float(c @ q)
+        if pace > NOT_HELD * np.linalg.norm(c) and left >= 0.0:
+            depth = (force / (stop.stiffness * pace)) ** (1.0 / stop.exponent)
+            ways.append((left + depth) / pace)
+    if not ways:
+        raise SystemModelError(
+            "a constant force acts on a body that neither a spring nor a stop holds against it; "
+            "hold it, or turn the force or the stop round"
+        )
+    return np.asarray(min(ways) / force * free)
+
+
+def closed_at_rest(system: System, q: Real) -> list[tuple[int, float, float]]:
+    """Number, penetration in m and force in N of each stop that is closed at rest."""
+    return [
+        (i, depth, float(stop.force(depth)))
+        for i, stop in enumerate(system.stops)
+        if (depth := float(system.stop_vector(stop) @ q) - stop.gap) > 0.0
+    ]
+
+
 def held_response(system: System, q: Real, omega: float) -> Complex:
     """Amplitude (n,) of the small steady motion q + Re(a e^{iωt}) about a rest position q."""
     force = np.zeros(system.size, dtype=complex)
     for source in system.excitation:
-        force += source.phasor * omega**source.order * system.participation[source.at]
+        if source.harmonic == 1:
+            force += source.phasor * omega**source.power * system.load_vector(source.at)
     matrix = tangent_stiffness(system, q) - omega**2 * np.eye(system.size)
     found = np.linalg.lstsq(matrix + 1j * omega * system.total_damping, force, rcond=None)[0]
     return np.asarray(found)
@@ -96,19 +163,15 @@ def _elastic(stop: Stop, depth: float) -> tuple[float, float]:
     return force, stiffness
 
 
-def _slope(system: System, q: Real) -> Real:
-    slope = system.natural_frequencies**2 * q
+def _slope(system: System, push: Real, q: Real) -> Real:
+    slope = system.natural_frequencies**2 * q - push
     for stop, c, depth in _closed(system, q):
         slope = slope + _elastic(stop, depth)[0] * c
     return np.asarray(slope)
 
 
-def _steepness(system: System, q: Real) -> float:
-    return float(np.linalg.norm(_slope(system, q)))
-
-
-def _potential(system: System, q: Real) -> float:
-    energy = 0.5 * float(system.natural_frequencies**2 @ q**2)
+def _potential(system: System, push: Real, q: Real) -> float:
+    energy = 0.5 * float(system.natural_frequencies**2 @ q**2) - float(push @ q)
     for stop, _, depth in _closed(system, q):
         energy += _elastic(stop, depth)[0] * depth / (stop.exponent + 1.0)
     return energy

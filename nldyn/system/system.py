@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike
 from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import SystemModelError, numbers, shown
 from nldyn.system.elements import Damper, Excitation, Stop
-from nldyn.system.linear import LinearPart, at_resonance, linear_part
+from nldyn.system.linear import ForcedResponse, LinearPart, linear_part
 
 Element = TypeVar("Element")
 LARGEST_PARTICIPATION = 1e50  # its square is the mobility of a stop, and its fourth power occurs
@@ -48,7 +49,9 @@ class System:
     participation : mapping of str to (n,) array
         Displacement of each mass-normalised mode at each interface, 1/sqrt(kg).
     stops, dampers, excitation : tuples
-        What acts at the interfaces.
+        What acts at the interfaces; excitation on load vectors, too.
+    loads : mapping of str to (n,) array
+        Modal force of each load vector: of what acts on the whole structure, as weight does.
 
     Raises
     ------
@@ -71,6 +74,7 @@ class System:
     stops: tuple[Stop, ...] = ()
     dampers: tuple[Damper, ...] = ()
     excitation: tuple[Excitation, ...] = ()
+    loads: Mapping[str, Real] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """One line: modes, interfaces, and what acts."""
@@ -98,6 +102,7 @@ class System:
         stops: Sequence[Stop] = (),
         dampers: Sequence[Damper] = (),
         excitation: Sequence[Excitation] = (),
+        loads: Mapping[str, ArrayLike] = MappingProxyType({}),
     ) -> System:
         """System from modal data typed in by hand.
 
@@ -111,6 +116,8 @@ class System:
             Damping ratio of every mode.
         stops, dampers, excitation : sequences
             What acts at the interfaces.
+        loads : mapping of str to (n,) array_like
+            Modal force of each load vector, see `System`.
 
         Raises
         ------
@@ -126,13 +133,11 @@ class System:
         return cls(
             omega,
             _modal_damping(omega, modal_damping),
-            {
-                name: np.atleast_1d(numbers(name, phi))
-                for name, phi in _by_interface("participation", participation).items()
-            },
+            _vectors("participation", participation),
             _listed("stops", stops),
             _listed("dampers", dampers),
             _listed("excitation", excitation),
+            _vectors("loads", loads),
         )
 
     @classmethod
@@ -147,6 +152,7 @@ class System:
         stops: Sequence[Stop] = (),
         dampers: Sequence[Damper] = (),
         excitation: Sequence[Excitation] = (),
+        loads: Mapping[str, ArrayLike] = MappingProxyType({}),
     ) -> System:
         """System from mass, stiffness and damping matrices.
 
@@ -162,6 +168,9 @@ class System:
             Damping ratio of every mode.
         stops, dampers, excitation : sequences
             What acts at the interfaces.
+        loads : mapping of str to (n,) array_like
+            Load vectors of what acts on the whole structure: M r for a weight or a motion of the
+            base along r.
 
         Raises
         ------
@@ -194,15 +203,13 @@ class System:
             if C.shape != M.shape:
                 raise SystemModelError(f"damping is {C.shape} but mass is {M.shape}")
             D = D + modes.T @ C @ modes
-        participation = {}
-        for name, vector in _by_interface("interfaces", interfaces).items():
-            b = np.atleast_1d(numbers(f"interface '{name}'", vector))
-            if b.shape != omega.shape:
-                raise SystemModelError(
-                    f"interface '{name}' has {b.size} entries "
-                    f"but the matrices have {omega.size} rows"
-                )
-            participation[name] = modes.T @ b
+        participation, modal_loads = (
+            {
+                name: modes.T @ _load_vector(f"{what} '{name}'", vector, omega.size)
+                for name, vector in _checked_names(f"{what}s", vectors).items()
+            }
+            for what, vectors in (("interface", interfaces), ("load", loads))
+        )
         return cls(
             omega,
             D,
@@ -210,6 +217,7 @@ class System:
             _listed("stops", stops),
             _listed("dampers", dampers),
             _listed("excitation", excitation),
+            modal_loads,
         )
 
     @classmethod
@@ -221,6 +229,7 @@ class System:
         stops: Sequence[Stop] = (),
         dampers: Sequence[Damper] = (),
         excitation: Sequence[Excitation] = (),
+        loads: Mapping[str, ArrayLike] = MappingProxyType({}),
     ) -> System:
         """System from a reduced model (anything with frequencies and participations).
 
@@ -229,8 +238,8 @@ class System:
         reduced : object
             With `frequencies_hz` (n,) and `participation` {name: (n,)}; its `damping` (n, n) in 1/s
             is added to the modal damping, if it has one.
-        modal_damping, stops, dampers, excitation
-            As for `from_modal`.
+        modal_damping, stops, dampers, excitation, loads
+            As for `from_modal`; the reduced model's own `loads` are taken, if it has some.
 
         Raises
         ------
@@ -266,6 +275,7 @@ class System:
             _listed("stops", stops),
             _listed("dampers", dampers),
             _listed("excitation", excitation),
+            {**getattr(reduced, "loads", {}), **_vectors("loads", loads)},
         )
 
     @property
@@ -301,13 +311,14 @@ class System:
     def symmetric(self) -> bool:
         """Whether -x(t + T/2) is a motion if x(t) is one: each stop has one opposite to it.
 
-        All excitation is harmonic, of the period T, and so changes its sign after half of that.
+        All excitation must change its sign after half its period T: it has odd harmonics only.
         """
         stops = [
             (self.stop_vector(s), (s.stiffness, s.exponent, s.gap, s.dissipation, s.law))
             for s in self.stops
         ]
-        return all(
+        odd = not np.any(self.drive[self.orders % 2 == 0.0])
+        return odd and all(
             sum(same == law and np.array_equal(c, vector) for c, same in stops)
             == sum(same == law and np.array_equal(-c, vector) for c, same in stops)
             for vector, law in stops
@@ -316,7 +327,13 @@ class System:
     @cached_property
     def linear(self) -> LinearPart:
         """Independent pairs of coordinates of the linear part."""
-        return linear_part(self.natural_frequencies, self.total_damping)
+        squares = np.zeros(self.size)
+        for stop in self.stops:
+            if stop.exponent == 1.0 or stop.gap < 0.0:
+                preload = max(-stop.gap, 0.0) ** (stop.exponent - 1.0)
+                slope = stop.exponent * stop.stiffness * preload
+                squares += slope * self.stop_vector(stop) ** 2
+        return linear_part(self.natural_frequencies, self.total_damping, np.sqrt(squares))
 
     def stop_vector(self, stop: Stop) -> Real:
         """Modal vector c with penetration ``c @ q - gap``, shape (n,)."""
@@ -324,6 +341,10 @@ class System:
         if stop.against is not None:
             c = c - self.participation[stop.against]
         return stop.direction * c
+
+    def load_vector(self, name: str) -> Real:
+        """Modal force (n,) of a unit load at an interface, or on a load vector."""
+        return self.participation[name] if name in self.participation else self.loads[name]
 
     def displacement_row(self, phi: Real) -> Real:
         """Row that gives the displacement ``phi @ q = row @ z``, shape (2n,)."""
@@ -334,35 +355,50 @@ class System:
         return np.asarray(self.linear.left[:, self.size :] @ phi)
 
     @cached_property
+    def orders(self) -> Real:
+        """Multiples of the excitation frequency at which something acts: 1, then the others."""
+        others = {source.harmonic for source in self.excitation} - {1}
+        return np.array([1.0, *sorted(others)])
+
+    @cached_property
     def drive(self) -> Complex:
-        """Excitation of z: Re((drive[0] + ω² drive[1]) e^{iωt}), shape (2, 2n)."""
-        drive = np.zeros((2, 2 * self.size), dtype=complex)
-        for source in self.excitation:
-            column = self.force_column(self.participation[source.at])
-            drive[source.order // 2] += source.phasor * column
+        """Excitation Σ Re(Σ_p ω^p drive[h, p] e^{i orders[h] ωt}) of z, shape (h, 3, 2n)."""
+        return self.drive_of(self.excitation)
+
+    def drive_of(self, excitation: Sequence[Excitation]) -> Complex:
+        """The drive by some sources whose harmonics the system has, as `drive`."""
+        drive = np.zeros((self.orders.size, 3, 2 * self.size), dtype=complex)
+        for source in excitation:
+            row = int(np.flatnonzero(self.orders == source.harmonic)[0])
+            column = self.force_column(self.load_vector(source.at))
+            drive[row, source.power] += source.harmonic**source.power * source.phasor * column
         return drive
 
-    def steady(self, omega: float) -> Complex:
-        """Amplitude (2n,) of the steady linear response z = Re(steady e^{iωt}) at ω (rad/s).
+    @property
+    def driven(self) -> bool:
+        """Whether something swings: any excitation but constant forces."""
+        return bool(np.any(self.drive[self.orders > 0.0]))
+
+    def response(self, omega: float) -> ForcedResponse:
+        """Linear response at ω (rad/s), near or at a resonance, too."""
+        return self.linear.response(
+            self.orders, np.array([1.0, omega, omega * omega]) @ self.drive, omega
+        )
+
+    def steady(self, omega: float, phase: float = 0.0) -> Real:
+        """State z (2n,) of the steady linear response at ω (rad/s) and a forcing phase.
 
         Raises
         ------
         SystemModelError
-            If an undamped mode is excited exactly at its frequency: then there is none.
+            If there is none: an undamped mode is excited exactly at its frequency, or a constant
+            force acts on a body that only stops hold.
         """
-        return self.linear.steady(self._drive_at(omega), omega)
-
-    def response(self, omega: float) -> tuple[Complex, Complex]:
-        """Linear response at ω (rad/s), near or at a resonance, too: see `LinearPart.response`."""
-        return self.linear.response(self._drive_at(omega), omega)
+        return self.response(omega).steady(omega, phase)
 
     def grows(self, omega: float) -> bool:
-        """Whether an undamped mode is excited at its own frequency ω (rad/s), but for rounding."""
-        near, response = self.response(omega)
-        return bool(np.any(response[1:][at_resonance(near, omega)]))
-
-    def _drive_at(self, omega: float) -> Complex:
-        return np.asarray(self.drive[0] + omega**2 * self.drive[1])
+        """Whether no motion without contact is bounded at ω (rad/s), see `ForcedResponse`."""
+        return bool(self.response(omega).unbounded(omega))
 
     def with_elements(
         self,
@@ -375,7 +411,8 @@ class System:
         The linear part is shared, which saves most of the work of making a system.
         """
         other = copy.copy(self)
-        vars(other).pop("drive", None)
+        for kept in ("drive", "orders", "symmetric"):
+            vars(other).pop(kept, None)
         if stops is not None:
             object.__setattr__(other, "stops", _listed("stops", stops))
         if excitation is not None:
@@ -395,18 +432,12 @@ class System:
             raise SystemModelError("frequencies_hz must not be negative")
         if self.damping.shape != (n, n):
             raise SystemModelError(f"damping must be ({n}, {n}), got {self.damping.shape}")
-        for name, phi in self.participation.items():
-            if phi.shape != (n,):
-                raise SystemModelError(
-                    f"participation of '{name}' has {phi.size} entries but there are {n} modes"
-                    if phi.ndim == 1
-                    else f"participation of '{name}' must be a list, got shape {phi.shape}"
-                )
-            if np.abs(phi).max() > LARGEST_PARTICIPATION:
-                raise SystemModelError(
-                    f"participation of '{name}' must be at most {LARGEST_PARTICIPATION:g} "
-                    f"1/kg^0.5, got {np.abs(phi).max():g}"
-                )
+        for what, vectors in (("participation of", self.participation), ("load", self.loads)):
+            for name, phi in vectors.items():
+                _check_modal_vector(f"{what} '{name}'", phi, n)
+        both = set(self.participation) & set(self.loads)
+        if both:
+            raise SystemModelError(f"'{min(both)}' names both an interface and a load vector")
 
     def _check_interfaces(self) -> None:
         known = ", ".join(self.participation) or "none"
@@ -422,10 +453,30 @@ class System:
                 if isinstance(element, Stop) and element.against is not None:
                     names.append(element.against)
                 for name in names:
+                    if kind == "excitation" and name in self.loads:
+                        continue
                     if name not in self.participation:
                         raise SystemModelError(
                             f"{kind} at unknown interface '{name}'; there are: {known}"
+                            + _told_of_loads(kind, self.loads)
                         )
+
+
+def _check_modal_vector(name: str, phi: Real, modes: int) -> None:
+    if phi.shape != (modes,):
+        raise SystemModelError(
+            f"{name} has {phi.size} entries but there are {modes} modes"
+            if phi.ndim == 1
+            else f"{name} must be a list, got shape {phi.shape}"
+        )
+    if np.abs(phi).max() > LARGEST_PARTICIPATION:
+        raise SystemModelError(
+            f"{name} must be at most {LARGEST_PARTICIPATION:g} 1/kg^0.5, got {np.abs(phi).max():g}"
+        )
+
+
+def _told_of_loads(kind: str, loads: Mapping[str, Real]) -> str:
+    return f"; load vectors: {', '.join(loads)}" if loads and kind == "excitation" else ""
 
 
 def _listed(name: str, elements: Sequence[Element]) -> tuple[Element, ...]:
@@ -435,12 +486,26 @@ def _listed(name: str, elements: Sequence[Element]) -> tuple[Element, ...]:
         raise SystemModelError(f"{name} must be a list, got {shown(elements)}") from None
 
 
-def _by_interface(name: str, vectors: Mapping[str, ArrayLike]) -> Mapping[str, ArrayLike]:
+def _vectors(name: str, vectors: Mapping[str, ArrayLike]) -> dict[str, Real]:
+    named = _checked_names(name, vectors)
+    return {key: np.atleast_1d(numbers(key, vector)) for key, vector in named.items()}
+
+
+def _checked_names(name: str, vectors: Mapping[str, ArrayLike]) -> Mapping[str, ArrayLike]:
     if not isinstance(vectors, Mapping):
         raise SystemModelError(
-            f"{name} must be a dictionary from interfaces to numbers, got {shown(vectors)}"
+            f"{name} must be a dictionary from names to numbers, got {shown(vectors)}"
         )
     return vectors
+
+
+def _load_vector(name: str, values: ArrayLike, rows: int) -> Real:
+    vector = np.atleast_1d(numbers(name, values))
+    if vector.shape != (rows,):
+        raise SystemModelError(
+            f"{name} has {vector.size} entries but the matrices have {rows} rows"
+        )
+    return vector
 
 
 def same_system(a: System, b: System) -> bool:
@@ -455,9 +520,9 @@ def same_system(a: System, b: System) -> bool:
     return a is b or (
         np.array_equal(a.natural_frequencies, b.natural_frequencies)
         and np.array_equal(a.damping, b.damping)
-        and a.interfaces == b.interfaces
         and all(
-            np.array_equal(a.participation[name], b.participation[name]) for name in a.interfaces
+            list(one) == list(other) and all(np.array_equal(one[name], other[name]) for name in one)
+            for one, other in ((a.participation, b.participation), (a.loads, b.loads))
         )
         and (a.stops, a.dampers, a.excitation) == (b.stops, b.dampers, b.excitation)
     )

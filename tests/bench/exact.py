@@ -84,8 +84,8 @@ class ExactFlow:
         self.k = mp.mpf(stop.stiffness)
         amplitude = mp.mpf(source.phasor.real)
         load = [mp.mpf(p) * amplitude for p in system.participation[source.at]]
-        self.load = [p * self.omega**source.order for p in load]
-        self.d_load = [source.order * p / self.omega for p in self.load]
+        self.load = [p * self.omega**source.power for p in load]
+        self.d_load = [source.power * p / self.omega for p in self.load]
 
     # Flights
 

@@ -83,7 +83,7 @@ def grazing_start(depth: str) -> dict[str, Any]:
     free = model_system("one_dof")
     omega = 2.0 * math.pi * 20.0
     flow = FlowMap(free)
-    steady = free.steady(omega)
+    steady = free.response(omega).amplitudes[0]
     amplitude = abs(complex(flow.rows[0] @ steady))
     gap = amplitude * (1.0 - float(depth))
     stop = Stop("middle", free.stops[0].stiffness, gap=gap)

@@ -38,9 +38,7 @@ def test_free_beam_of_few_digits(elements, digits, method):
 def test_the_bound_of_rigid_modes_is_told_and_kept():
     K, M = (rounded(A, 7) for A in free_beam(100))
     said = []
-    found = cms.reduce(
-        cms.Matrices(K, M, {"tip": np.eye(202)[0]}), modes=4, progress=said.append
-    )
+    found = cms.reduce(cms.Matrices(K, M, {"tip": np.eye(202)[0]}), modes=4, progress=said.append)
     lowest = linalg.eigh(K, M, eigvals_only=True, subset_by_index=[0, 1])
     assert np.sqrt(np.abs(lowest).max()) / (2 * np.pi) < found.rigid_bound_hz < 300.0
     assert any("2 rigid-body modes: zero within the 7 digits" in text for text in said)

@@ -342,9 +342,7 @@ SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0]]
             "has an offset, but two of its cells that meet at the nodes 1 and 2",
         ),
         (
-            lambda: fem.StructureModel(
-                fem.box_mesh("b", (1.0, 1.0, 1.0), (1, 1, 1)), {"b": PLATE}
-            ),
+            lambda: fem.StructureModel(fem.box_mesh("b", (1.0, 1.0, 1.0), (1, 1, 1)), {"b": PLATE}),
             "part 'b' is a ShellPart and needs cells out of 'quad', 'quad8', 'quad9', 'triangle'",
         ),
         (

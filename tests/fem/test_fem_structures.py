@@ -117,9 +117,7 @@ def test_a_free_body_has_its_mass_and_its_rigid_motions(kind):
         u = motion[:, :dimension].ravel()
         assert np.abs(component.stiffness @ u).max() < 1e-12 * abs(component.stiffness).max()
     one = motions[0][:, :dimension].ravel()
-    volume = (
-        0.7 * (1.158 if _is_tapered(kind) else 1.0) * (0.5, 0.1)[dimension == 2]
-    )
+    volume = 0.7 * (1.158 if _is_tapered(kind) else 1.0) * (0.5, 0.1)[dimension == 2]
     assert one @ component.mass @ one == pytest.approx(8000.0 * volume, rel=1e-12)
 
 

@@ -113,10 +113,7 @@ def test_the_closed_form_of_the_wedge_has_the_published_limit():
 
 def test_a_truncated_wedge_has_the_frequencies_of_bessel_functions():
     wanted = wedge_hz(3)
-    errors = [
-        lowest_hz(fem.assemble(bending_only(n)), 3) / wanted - 1
-        for n in (8, 16)
-    ]
+    errors = [lowest_hz(fem.assemble(bending_only(n)), 3) / wanted - 1 for n in (8, 16)]
     assert (errors[1] > 0).all() and (errors[0] < [5e-6, 1e-4, 7e-4]).all()
     np.testing.assert_allclose(np.log2(errors[0] / errors[1]), 4.0, atol=0.3)
 
@@ -148,9 +145,7 @@ def test_statics_are_those_of_the_integrals(section, theory):
 
 def test_the_mass_and_its_centre_are_exact():
     component = in_space(BOTH, 2)
-    free = fem.assemble(
-        fem.StructureModel(mesh(2), {"arm": fem.BeamPart(STEEL, BOTH)})
-    )
+    free = fem.assemble(fem.StructureModel(mesh(2), {"arm": fem.BeamPart(STEEL, BOTH)}))
     assert component.mass.shape[0] == free.mass.shape[0] - 6
     dofs = free.numbering.dofs(np.arange(3))
     along, across = np.zeros((2, len(free.free)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from nldyn.flow.kernels.compiling import always_inline, inner, never_inline
 from nldyn.flow.kernels.layout import GAP, MOST_STEPS, FlowData
-from nldyn.system.linear import NEAR
+from nldyn.system.linear import DRIFT, DRIFT_ON, GROWTH, NEAR, STEADY, Terms
 
 
 @inner
@@ -121,73 +121,183 @@ def growth_by_omega(rate, omega, phase):
 
 
 @inner
-def swelling(near, forced, omega, out, phase):
-    """Value, two time derivatives, and bound of the third over a period, of an output's growth.
+def drift(trace, determinant, t):
+    """Scalars f and f_on with exp(At) = f + f_on A, and e and e_on of their integrals from 0 to t.
 
-    e grows by at most the time that passes, since no eigenvalue grows.
+    A is any 2×2 matrix of that trace and determinant: by the series of its divided differences at
+    a t so small that it converges, and then by doubling, ∫₀²ᵗ = (1 + exp(At)) ∫₀ᵗ.
+    """
+    size, halvings = (abs(trace) + math.sqrt(abs(determinant))) * abs(t), 0
+    while size > 0.5:
+        size *= 0.5
+        halvings += 1
+    s = t * 0.5**halvings
+    h_old, h, power, f_on, e_on = 0.0, 1.0, s, 0.0, 0.0
+    for j in range(16):
+        f_on += h * power
+        power *= s / (j + 2)
+        e_on += h * power
+        h, h_old = trace * h - determinant * h_old, h
+    f, e = 1.0 - determinant * e_on, f_on - trace * e_on
+    for _ in range(halvings):
+        e, e_on = (
+            e + f * e - determinant * f_on * e_on,
+            e_on + f * e_on + f_on * e + trace * f_on * e_on,
+        )
+        f, f_on = f * f - determinant * f_on * f_on, 2.0 * f * f_on + trace * f_on * f_on
+    return f, f_on, e, e_on
+
+
+@inner
+def term(terms, k, omega, phase):
+    """Value and first two time derivatives of a term at a phase."""
+    never_inline()
+    kind, pace, rate = terms.kinds[k], terms.orders[k] * omega, terms.rates[k]
+    if kind == STEADY:
+        e = turned(terms.orders[k] * phase)
+        return e, 1j * pace * e, -pace * pace * e
+    if kind == GROWTH:
+        e, turn = growth(rate, pace, terms.orders[k] * phase)
+        first = rate * e + turn
+        return e, first, rate * first + 1j * pace * turn
+    f, f_on, e, e_on = drift(rate.real, rate.imag, phase / omega)
+    if kind == DRIFT:
+        return complex(e, 0.0), complex(f, 0.0), complex(-rate.imag * f_on, 0.0)
+    return complex(e_on, 0.0), complex(f_on, 0.0), complex(f + rate.real * f_on, 0.0)
+
+
+@inner
+def term_by_omega(terms, k, omega, phase, t):
+    """Derivatives with respect to ω of a term and its rate at a time t after a fixed phase.
+
+    `phase` is that at the time.
     """
     never_inline()
-    value, first, second, bound = 0.0, 0.0, 0.0, 0.0
-    for k in range(near.size):
-        share, rate = forced[1 + k, 0, out], near[k]
-        e, turn = growth(rate, omega, phase)
+    kind, order, rate = terms.kinds[k], terms.orders[k], terms.rates[k]
+    e, first, second = term(terms, k, omega, phase)
+    if kind == STEADY:
+        by = 1j * order * t * e
+        return by, 1j * order * (e + omega * by)
+    if kind == GROWTH:
+        by = order * growth_by_omega(rate, order * omega, order * phase) + first * (t / omega)
+        return by, rate * by + 1j * order * t * turned(order * phase)
+    since = (t - phase / omega) / omega
+    return first * since, second * since
+
+
+@inner
+def term_change(terms, k, omega, phase, t):
+    """Change of a term in a time t from a phase on, to its own precision."""
+    never_inline()
+    kind, order, rate = terms.kinds[k], terms.orders[k], terms.rates[k]
+    if kind == STEADY:
+        return swung(turned(order * phase), order * omega * t)
+    if kind == GROWTH:
+        pace = order * omega
+        e, turn = growth(rate, pace, order * phase)
+        fresh = turn * turned(pace * t) * from_rest(rate - 1j * pace, t)
+        return e * rate * from_rest(rate, t) + fresh
+    # (exp(At) - 1) ∫ + ∫ over t, with exp(At) - 1 = f_on A - determinant e_on
+    _, _, e, e_on = drift(rate.real, rate.imag, phase / omega)
+    _, f_on, fresh, fresh_on = drift(rate.real, rate.imag, t)
+    if kind == DRIFT:
+        return complex(fresh - rate.imag * (fresh_on * e + f_on * e_on), 0.0)
+    return complex(fresh_on - rate.imag * fresh_on * e_on + f_on * (e + rate.real * e_on), 0.0)
+
+
+@inner
+def term_sizes(terms, k, omega):
+    """Sizes that a term and its rate may have within a period from rest."""
+    kind, period = terms.kinds[k], 2.0 * math.pi / omega
+    if kind == STEADY:
+        return 1.0, terms.orders[k] * omega
+    if kind == GROWTH:
+        return period, period * terms.orders[k] * omega
+    return (period, 1.0) if kind == DRIFT else (0.5 * period * period, period)
+
+
+@inner
+def third_bound(terms, k, omega, phase):
+    """Bound on the third time derivative of a term within a period from a phase on.
+
+    No eigenvalue grows: a growth gains by at most the time that passes, and |f_on| <= t.
+    """
+    kind, pace, rate = terms.kinds[k], terms.orders[k] * omega, terms.rates[k]
+    if kind == STEADY:
+        return pace**3
+    if kind == GROWTH:
+        e, _ = growth(rate, pace, terms.orders[k] * phase)
         size, later = abs(rate), abs(e) + 2.0 * math.pi / omega
+        return size * size * (size * later + 1.0) + pace * (size + pace)
+    t = (abs(phase) + 2.0 * math.pi) / omega
+    trace, determinant = abs(rate.real), abs(rate.imag)
+    second = 1.0 + 0.5 * determinant * t * t + trace * t  # of |f_on'|
+    if kind == DRIFT:
+        return determinant * second
+    return determinant * t + trace * second
+
+
+@inner
+def swelling(fl, out, phase):
+    """Value, two time derivatives, and bound of the third over a period, of an output's terms."""
+    never_inline()
+    value, first, second, bound = 0.0, 0.0, 0.0, 0.0
+    for k in range(fl.terms.kinds.size):
+        share = fl.forced[1 + k, 0, out]
+        e, e1, e2 = term(fl.terms, k, fl.omega, phase)
         value += (share * e).real
-        e = rate * e + turn
-        first += (share * e).real
-        second += (share * (rate * e + 1j * omega * turn)).real
-        bound += abs(share) * (size * size * (size * later + 1.0) + omega * (size + omega))
+        first += (share * e1).real
+        second += (share * e2).real
+        bound += abs(share) * third_bound(fl.terms, k, fl.omega, phase)
     return value, first, second, bound
 
 
 @inner
-def swollen(near, forced, omega, out, phase, t):
-    """Change of an output's growth in a time t from a phase on, to its own precision."""
+def swollen(fl, out, phase, t):
+    """Change of an output's terms in a time t from a phase on, to its own precision."""
     never_inline()
     change = 0.0
-    for k in range(near.size):
-        rate = near[k]
-        e, turn = growth(rate, omega, phase)
-        fresh = turn * turned(omega * t) * from_rest(rate - 1j * omega, t)
-        change += (forced[1 + k, 0, out] * (e * rate * from_rest(rate, t) + fresh)).real
+    for k in range(fl.terms.kinds.size):
+        share = fl.forced[1 + k, 0, out]
+        change += (share * term_change(fl.terms, k, fl.omega, phase, t)).real
     return change
 
 
 @inner
-def add_swelling_by(near, forced, omega, out, phase, t, rate, factor, sums):
-    """Add the derivatives of an output's growth, or its rate's, at time t after a fixed phase.
+def add_swelling_by(fl, out, phase, t, rate, factor, sums):
+    """Add the derivatives of an output's terms, or their rates', at time t after a fixed phase.
 
-    sums (n_columns,) ends with the columns of the parameters and of ω, as in `panel_columns`.
+    `phase` is that at the time. sums (n_columns,) ends with the columns of the parameters and of
+    ω, as in `panel_columns`.
     """
     never_inline()
     last = sums.size - 1
-    first = sums.size + 1 - forced.shape[1]
-    for k in range(near.size):
-        e, turn = growth(near[k], omega, phase)
-        e1 = near[k] * e + turn
-        d = growth_by_omega(near[k], omega, phase) + e1 * (t / omega)
+    first = sums.size + 1 - fl.forced.shape[1]
+    for k in range(fl.terms.kinds.size):
+        e, e1, _ = term(fl.terms, k, fl.omega, phase)
+        d, d1 = term_by_omega(fl.terms, k, fl.omega, phase, t)
         if rate:
-            e, d = e1, near[k] * d + 1j * t * turn
-        sums[last] += factor * (forced[1 + k, 1, out] * e + forced[1 + k, 0, out] * d).real
+            e, d = e1, d1
+        sums[last] += factor * (fl.forced[1 + k, 1, out] * e + fl.forced[1 + k, 0, out] * d).real
         for c in range(first, last):
-            sums[c] += factor * (forced[1 + k, 2 + c - first, out] * e).real
+            sums[c] += factor * (fl.forced[1 + k, 2 + c - first, out] * e).real
 
 
 @inner
-def add_growth(near, response, omega, phase, sign, w, columns):
-    """Add sign times the growth to the state w (2n,) and its derivatives to its last columns."""
+def add_growth(fl, phase, sign, w, columns):
+    """Add sign times the terms to the state w (2n,) and their derivatives to its last columns."""
     never_inline()
     last = columns.shape[1] - 1
-    first = columns.shape[1] + 1 - response.shape[1]
-    for k in range(near.size):
-        e, _ = growth(near[k], omega, phase)
-        d = sign * growth_by_omega(near[k], omega, phase)
-        e *= sign
+    first = columns.shape[1] + 1 - fl.response.shape[1]
+    for k in range(fl.terms.kinds.size):
+        e, _, _ = term(fl.terms, k, fl.omega, phase)
+        d, _ = term_by_omega(fl.terms, k, fl.omega, phase, 0.0)
+        e, d = sign * e, sign * d
         for i in range(w.size):
-            w[i] += (response[1 + k, 0, i] * e).real
-            columns[i, last] += (response[1 + k, 1, i] * e + response[1 + k, 0, i] * d).real
+            w[i] += (fl.response[1 + k, 0, i] * e).real
+            columns[i, last] += (fl.response[1 + k, 1, i] * e + fl.response[1 + k, 0, i] * d).real
             for c in range(first, last):
-                columns[i, c] += (response[1 + k, 2 + c - first, i] * e).real
+                columns[i, c] += (fl.response[1 + k, 2 + c - first, i] * e).real
 
 
 @inner
@@ -216,8 +326,8 @@ def output_derivatives(fl, out, w, phase, t):
         else:
             size = math.hypot(fl.bound3[out, j], fl.bound3[out, j + 1])
             bound += size * math.hypot(x, y)
-    if fl.near.size > 0:
-        s, s1, s2, s3 = swelling(fl.near, fl.forced, fl.omega, out, phase + fl.omega * t)
+    if fl.terms.kinds.size > 0:
+        s, s1, s2, s3 = swelling(fl, out, phase + fl.omega * t)
         value += s
         first += s1
         second += s2
@@ -238,8 +348,9 @@ def output_size(fl, out, w, order):
     """Sum of the sizes of an output's terms (order 0), or of those of its rate (order 1)."""
     pace = fl.omega if order == 1 else 1.0
     total = abs(fl.forced[0, 0, out]) * pace
-    for k in range(fl.near.size):
-        total += abs(fl.forced[1 + k, 0, out]) * (2.0 * math.pi / fl.omega) * pace
+    for k in range(fl.terms.kinds.size):
+        size, rate = term_sizes(fl.terms, k, fl.omega)
+        total += abs(fl.forced[1 + k, 0, out]) * (rate if order == 1 else size)
     for j in range(w.size):
         total += abs(fl.rows[order, out, j] * w[j])
     return total
@@ -261,9 +372,9 @@ def rate_noise(fl, out, w):
 def carried_noise(fl, stop, w, phase, depth, h):
     """The same in a penetration that is carried on from a depth over a time h."""
     change = abs(fl.forced[0, 0, stop]) * fl.omega * h
-    for k in range(fl.near.size):
-        e, _ = growth(fl.near[k], fl.omega, phase)
-        change += h * abs(fl.forced[1 + k, 0, stop]) * (abs(fl.near[k] * e) + 1.0)
+    for k in range(fl.terms.kinds.size):
+        _, rate = term_sizes(fl.terms, k, fl.omega)
+        change += h * abs(fl.forced[1 + k, 0, stop]) * rate
     for j in range(w.size):
         change += h * (abs(fl.rows[1, stop, j]) + h * abs(fl.rows[2, stop, j])) * abs(w[j])
     return 1e-15 * (abs(depth) + change)
@@ -374,7 +485,7 @@ def swung(turn, angle):
 def flown(fl, stop, phase, w, t):
     """Change of a penetration in a flight of duration t from the state w, to its own precision."""
     value = (fl.forced[0, 0, stop] * swung(turned(phase), fl.omega * t)).real
-    value += swollen(fl.near, fl.forced, fl.omega, stop, phase, t)
+    value += swollen(fl, stop, phase, t)
     for b in range(fl.blocks.shape[0]):
         j = 2 * b
         _, e01, e10, _, _, _, _, _, d00, d11 = there_and_back(fl.blocks[b], t)
@@ -397,7 +508,7 @@ def fly(fl, columns, t):
 @inner
 def forced_output(fl, out, phase):
     """Response of an output to the excitation at a forcing phase."""
-    value, _, _, _ = swelling(fl.near, fl.forced, fl.omega, out, phase)
+    value, _, _, _ = swelling(fl, out, phase)
     return value + (fl.forced[0, 0, out] * turned(phase)).real
 
 
@@ -423,71 +534,123 @@ def free_output(fl, out, w, t):
 
 
 @inner
-def near_rate(block, omega):
-    """Eigenvalue λ of a block with |λ - iω| < NEAR ω, or zero."""
+def near_rate(block, pace):
+    """Eigenvalue λ of a block with |λ - i pace| < NEAR pace, or zero."""
     mean = 0.5 * (block[0, 0] + block[1, 1])
     half = 0.5 * (block[0, 0] - block[1, 1])
     square = half * half + block[0, 1] * block[1, 0]
     rate = math.sqrt(abs(square))
-    near = square < 0.0 and math.hypot(mean, rate - omega) < NEAR * omega
+    near = square < 0.0 and math.hypot(mean, rate - pace) < NEAR * pace
     return complex(mean, rate) if near else complex(0.0, 0.0)
 
 
 @inner
-def respond(blocks, omega, x, row, response):
-    """Fill a row of `FlowData.response` with what an excitation x (2n,) brings about.
+def slow_rate(block, omega):
+    """Trace + i determinant of a block of which an eigenvalue is slow beside ω, and whether."""
+    trace = block[0, 0] + block[1, 1]
+    determinant = block[0, 0] * block[1, 1] - block[0, 1] * block[1, 0]
+    square = 0.25 * trace * trace - determinant
+    fastest = math.sqrt(abs(determinant))
+    if square >= 0.0:
+        fastest = 0.5 * abs(trace) + math.sqrt(square)
+    slow = fastest == 0.0 or abs(determinant) < NEAR * omega * fastest
+    return complex(trace, determinant), slow
 
-    That is (iω - A)⁻¹ x, but for a block with a near eigenvalue λ. There x falls into its parts
-    along the two eigenvectors: that of λ is the drive of the growth, that of its conjugate has a
-    steady response.
+
+@inner
+def further_terms(blocks, orders, omega):
+    """The terms of a system's response beside the steady one at order 1."""
+    most = orders.size * (1 + 2 * blocks.shape[0])
+    kinds = np.zeros(most, dtype=np.int64)
+    numbers, rates = np.zeros(most), np.zeros(most, dtype=np.complex128)
+    n = orders.size - 1
+    for h in range(1, orders.size):
+        kinds[h - 1], numbers[h - 1] = STEADY, orders[h]
+    for h in range(orders.size):
+        for b in range(blocks.shape[0]):
+            if orders[h] == 0.0:
+                rate, slow = slow_rate(blocks[b], omega)
+                if slow:
+                    kinds[n], kinds[n + 1] = DRIFT, DRIFT_ON
+                    rates[n], rates[n + 1] = rate, rate
+                    n += 2
+            else:
+                rate = near_rate(blocks[b], orders[h] * omega)
+                if rate.imag > 0.0:
+                    kinds[n], numbers[n], rates[n] = GROWTH, orders[h], rate
+                    n += 1
+    return Terms(kinds[:n], numbers[:n], rates[:n])
+
+
+@inner
+def respond(blocks, order, omega, x, row, steady, first, response):
+    """Fill a row of `FlowData.response` with what an excitation x (2n,) at an order brings about.
+
+    That is (i order ω - A)⁻¹ x in the term `steady`, but for a block with a near eigenvalue λ.
+    There x falls into its parts along the two eigenvectors: that of λ is the drive of the growth,
+    that of its conjugate has a steady response. `first` is the first growth or drift of this order.
+    Returns the first of the next order.
     """
-    k = 0
+    pace, k = order * omega, first
     for b in range(blocks.shape[0]):
         block = blocks[b]
         i, j = 2 * b, 2 * b + 1
         u, v = x[i], x[j]
-        rate = near_rate(block, omega)
+        if order == 0.0:
+            rate, slow = slow_rate(block, omega)
+            if slow:
+                response[k, row, i], response[k, row, j] = u, v
+                response[k + 1, row, i] = block[0, 0] * u + block[0, 1] * v
+                response[k + 1, row, j] = block[1, 0] * u + block[1, 1] * v
+                k += 2
+            else:
+                response[steady, row, i] = (block[0, 1] * v - block[1, 1] * u) / rate.imag
+                response[steady, row, j] = (block[1, 0] * u - block[0, 0] * v) / rate.imag
+            continue
+        rate = near_rate(block, pace)
         if rate.imag > 0.0:
-            k += 1
             half = 0.5 * (block[0, 0] - block[1, 1])
             p = 0.5 * u - 0.5j * (half * u + block[0, 1] * v) / rate.imag
             q = 0.5 * v - 0.5j * (block[1, 0] * u - half * v) / rate.imag
-            for c in range(x.size):
-                response[k, row, c] = 0.0
             response[k, row, i], response[k, row, j] = p, q
-            away = complex(-rate.real, omega + rate.imag)
-            response[0, row, i], response[0, row, j] = (u - p) / away, (v - q) / away
+            k += 1
+            away = complex(-rate.real, pace + rate.imag)
+            response[steady, row, i] = (u - p) / away
+            response[steady, row, j] = (v - q) / away
         else:
-            m00, m01 = 1j * omega - block[0, 0], -block[0, 1]
-            m10, m11 = -block[1, 0], 1j * omega - block[1, 1]
+            m00, m01 = 1j * pace - block[0, 0], -block[0, 1]
+            m10, m11 = -block[1, 0], 1j * pace - block[1, 1]
             det = m00 * m11 - m01 * m10
-            response[0, row, i] = (m11 * u - m01 * v) / det
-            response[0, row, j] = (m00 * v - m10 * u) / det
+            response[steady, row, i] = (m11 * u - m01 * v) / det
+            response[steady, row, j] = (m00 * v - m10 * u) / det
+    return k
 
 
 @inner
 def at_frequency(system, omega, parameters, drive_by):
     """Numbers of the system at an excitation frequency (rad/s), see `shoot`."""
-    blocks, rows, drive = system.blocks, system.rows, system.drive
-    near = np.empty(blocks.shape[0], dtype=np.complex128)
-    k = 0
-    for b in range(blocks.shape[0]):
-        near[k] = near_rate(blocks[b], omega)
-        if near[k].imag > 0.0:
-            k += 1
-    x = np.empty(drive.shape[1], dtype=np.complex128)
-    response = np.empty((1 + k, 2 + parameters.shape[0], x.size), dtype=np.complex128)
-    for row in range(response.shape[1]):
-        for i in range(x.size):
-            if row == 0:
-                x[i] = drive[0, i] + omega * omega * drive[1, i]
-            elif row == 1:
-                x[i] = 2.0 * omega * drive[1, i] - 1j * response[0, 0, i]
-            else:
-                x[i] = drive_by[row - 2, 0, i] + omega * omega * drive_by[row - 2, 1, i]
-        respond(blocks, omega, x, row, response)
-    forced = np.zeros((1 + k, response.shape[1], rows.shape[1]), dtype=np.complex128)
-    for p in range(1 + k):
+    blocks, rows, drive, orders = system.blocks, system.rows, system.drive, system.orders
+    terms = further_terms(blocks, orders, omega)
+    count = 1 + terms.kinds.size
+    x = np.empty(drive.shape[2], dtype=np.complex128)
+    response = np.zeros((count, 2 + parameters.shape[0], x.size), dtype=np.complex128)
+    first = orders.size
+    for h in range(orders.size):
+        after = first
+        for row in range(response.shape[1]):
+            for i in range(x.size):
+                if row == 0:
+                    x[i] = drive[h, 0, i] + omega * (drive[h, 1, i] + omega * drive[h, 2, i])
+                elif row == 1:
+                    x[i] = drive[h, 1, i] + 2.0 * omega * drive[h, 2, i]
+                    x[i] -= 1j * orders[h] * response[h, 0, i]
+                else:
+                    by = drive_by[row - 2, h]
+                    x[i] = by[0, i] + omega * (by[1, i] + omega * by[2, i])
+            after = respond(blocks, orders[h], omega, x, row, h, first, response)
+        first = after
+    forced = np.zeros((count, response.shape[1], rows.shape[1]), dtype=np.complex128)
+    for p in range(count):
         for row in range(response.shape[1]):
             for out in range(rows.shape[1]):
                 for i in range(x.size):
@@ -499,7 +662,7 @@ def at_frequency(system, omega, parameters, drive_by):
         system.force,
         system.stops,
         system.laws,
-        near[:k],
+        terms,
         response,
         forced,
         parameters,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Complex, Real
+from nldyn.system.linear import Terms
 
 (
     OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_FULL, ROUNDED,
@@ -27,6 +28,7 @@ CREEP = 100.0  # such an exponent over an elastic contact: the damping alone dec
 # an orbit closes to this share of its size, or to this one times the largest entry of its segments'
 # Jacobians, which is what rounding costs; a short step of Newton's method does not tell
 OPEN, NOISE = 1e-7, 1e-12
+PRELOADED = 1e-14  # the same of the preloads' size: forces that hold each other up are rounded, too
 STEADY = 1e-3  # share by which the Jacobians may change in a step that only shows rounding
 HALF_CONTACT = 2.5  # phase of the stiffness of a stop in half a contact, at most, in rad
 # the share of a slope in a Jacobian's error, kick (4 tail)², is less than rtol, (tail / 0.3)², as
@@ -59,7 +61,8 @@ class SystemData(NamedTuple):
     rows: Real  # (3, n_out, 2n) outputs, their velocities and accelerations in flight
     bound3: Real  # (n_out, 2n) |third derivative| <= Σ_b |bound3_b| |w_b| at any later time
     force: Real  # (2n, n_stops): w' = A w - force @ F
-    drive: Complex  # (2, 2n) excitation Re((drive[0] + ω² drive[1]) e^{iωt}) of z
+    orders: Real  # (h,) multiples of the excitation frequency at which something acts; 1 first
+    drive: Complex  # (h, 3, 2n) excitation Σ Re(Σ_p ω^p drive[h, p] e^{i orders[h] ωt}) of z
     stops: Real  # (n_stops, 7), rows as `StopRow`
     laws: NDArray[np.int64]  # (n_stops,) address of a compiled law, or 0 for the power law
     tail: float  # largest relative Legendre tail accepted on a contact panel
@@ -75,9 +78,9 @@ class FlowData(NamedTuple):
     force: Real
     stops: Real
     laws: NDArray[np.int64]
-    near: Complex  # (k,) eigenvalues near iω; k = 0 for most systems
-    # (1 + k, 2 + n_parameters, 2n): amplitude of the steady response, z = w + Re(response[0, 0]
-    # e^{iωt}), and of the `growth` of each near eigenvalue; then their derivatives with respect to
+    terms: Terms  # k of them; none for most systems
+    # (1 + k, 2 + n_parameters, 2n): amplitude of the steady response at order 1, z = w +
+    # Re(response[0, 0] e^{iωt}), and of each further term; then their derivatives with respect to
     # ω and to each parameter
     response: Complex
     forced: Complex  # (1 + k, 2 + n_parameters, n_out) the same of the outputs

@@ -31,11 +31,13 @@ from numpy.typing import NDArray
 from nldyn.flow.kernels.compiling import entry, inner
 from nldyn.flow.kernels.layout import (
     DIVERGED,
+    GAP,
     NOISE,
     NOT_CONVERGED,
     OK,
     OPEN,
     OTHER_CONTACTS,
+    PRELOADED,
     SINGULAR,
     STEADY,
 )
@@ -93,6 +95,17 @@ def cosine(row, along, state_weight):
     return abs(product) / math.sqrt(length * pace)
 
 
+@inner
+def preloaded(system):
+    """Size of the state that would relieve the most preloaded stop."""
+    largest = 0.0
+    for s in range(system.stops.shape[0]):
+        square = (system.rows[0, s] ** 2).sum()
+        if square > 0.0:
+            largest = max(largest, -system.stops[s, GAP] / math.sqrt(square))
+    return largest
+
+
 @entry
 def newton(
     system, tab, rec, recording, omega, point, phases, chained, with_columns, parameters, drive_by,
@@ -143,6 +156,7 @@ def newton(
     outcome = NOT_CONVERGED
     iteration = 0
     known = np.full((k, size, size), np.inf)
+    preload = preloaded(system) * math.sqrt(corrector.state_weight)
     while True:
         iteration += 1
         if max_iterations > 0:
@@ -176,7 +190,7 @@ def newton(
         for i in range(unknowns - 1):
             opening += corrector.state_weight * sides[i, 0] ** 2
         opening = math.sqrt(opening)
-        noise = NOISE * np.abs(jacobians).max()
+        noise = (NOISE + PRELOADED * preload) * np.abs(jacobians).max()
         sides[unknowns - 1, 0] = corrector.level
         for j in range(unknowns):
             matrix[unknowns - 1, j] = row[j]
@@ -213,7 +227,7 @@ def newton(
             along[i] = sides[i, 1]
         converged = last <= corrector.rtol and opening <= max(OPEN, noise)
         # the rounding level, or steps to and fro where there is no orbit, across a sharp touch
-        stagnant = last < 1e-8 and last > 0.5 * before and opening <= max(OPEN, noise)
+        stagnant = last < max(1e-8, noise) and last > 0.5 * before and opening <= max(OPEN, noise)
         if stagnant and opening > max(NOISE, noise):
             stagnant = np.abs(jacobians - known).max() <= STEADY * np.abs(jacobians).max()
         known = jacobians

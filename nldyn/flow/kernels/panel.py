@@ -180,16 +180,16 @@ def free_outputs(fl, tab, kind, phase, w, h, panel, free):
                 for k in range(w.size):
                     value += panel.to[o, i, k] * w[k]
             free[o * m + i] = value
-    if fl.near.size > 0:
+    if fl.terms.kinds.size > 0:
         for o in range(panel.to.shape[0]):
             stop = panel.active[o % na]
             for i in range(m):
                 t = h * tab.chi[kind, i]
                 if o < na:
-                    more = swollen(fl.near, fl.forced, fl.omega, stop, phase, t)
+                    more = swollen(fl, stop, phase, t)
                 else:
                     here = phase + fl.omega * t
-                    _, more, _, _ = swelling(fl.near, fl.forced, fl.omega, stop, here)
+                    _, more, _, _ = swelling(fl, stop, here)
                 free[o * m + i] += more
 
 
@@ -457,11 +457,9 @@ def panel_columns(fl, tab, kind, phase, t0, h, panel, columns):
             else:
                 d_omega = fl.omega * d_omega + fl.forced[0, 0, stop]
                 forces[p, n_columns - 1] -= slope * (d_omega * turn).imag
-            if fl.near.size > 0:
-                add_swelling_by(
-                    fl.near, fl.forced, fl.omega, stop, phase + fl.omega * t, t0 + t, o >= na,
-                    slope, forces[p],
-                )  # fmt: skip
+            if fl.terms.kinds.size > 0:
+                here = phase + fl.omega * t
+                add_swelling_by(fl, stop, here, t0 + t, o >= na, slope, forces[p])
             for c in range(fl.parameters.shape[0]):
                 q = columns.shape[0] + c
                 by = fl.forced[0, 2 + c, stop] * turn

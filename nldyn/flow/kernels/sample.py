@@ -7,6 +7,7 @@ import numpy as np
 from nldyn.flow.kernels.compiling import FILES, inner, njit
 from nldyn.flow.kernels.flights import (
     block_exponential,
+    drift,
     fastest_moved,
     fly_state,
     from_rest,
@@ -15,6 +16,7 @@ from nldyn.flow.kernels.flights import (
 from nldyn.flow.kernels.layout import FLIGHT
 from nldyn.flow.kernels.resolution import map_fraction
 from nldyn.runtime.kernel_cache import resting_on
+from nldyn.system.linear import DRIFT, GROWTH, STEADY
 
 compiled = resting_on(njit(cache=True, error_model="numpy"), *FILES)
 
@@ -106,32 +108,45 @@ def state_in_contact(blocks, start, shares, weights, t, w):
 
 
 @inner
-def without_steady(response, phase, state, w):
-    """Fill w with a state less the steady response, (2n,)."""
-    turn = turned(phase)
+def without_steady(terms, response, phase, state, w):
+    """Fill w with a state less the steady responses, (2n,)."""
     for k in range(w.size):
-        w[k] = state[k] - (response[0, k] * turn).real
+        w[k] = state[k]
+    for p in range(response.shape[0]):
+        if p == 0 or terms.kinds[p - 1] == STEADY:
+            turn = turned(phase if p == 0 else terms.orders[p - 1] * phase)
+            for k in range(w.size):
+                w[k] -= (response[p, k] * turn).real
 
 
 @inner
-def grown(rate, omega, phase, t):
-    """Growth of a near eigenvalue a time t after rest, and its rate; the phase is that at its end.
+def since_rest(terms, k, omega, phase, t):
+    """A term, and its rate, that was at rest a time t ago if it is no steady one.
 
-    See `flights.growth`.
+    The phase is that at its end. See `flights.term`.
     """
-    turn = turned(phase)
-    e = turn * from_rest(rate - 1j * omega, t)
-    return e, rate * e + turn
+    kind, pace, rate = terms.kinds[k], terms.orders[k] * omega, terms.rates[k]
+    if kind == STEADY:
+        turn = turned(terms.orders[k] * phase)
+        return turn, 1j * pace * turn
+    if kind == GROWTH:
+        turn = turned(terms.orders[k] * phase)
+        e = turn * from_rest(rate - 1j * pace, t)
+        return e, rate * e + turn
+    f, f_on, e, e_on = drift(rate.real, rate.imag, t)
+    if kind == DRIFT:
+        return complex(e, 0.0), complex(f, 0.0)
+    return complex(e_on, 0.0), complex(f_on, 0.0)
 
 
 @compiled
 def sample_states(
     blocks, force, omega, tab,
-    rec_phase, rec_duration, rec_kind, rec_start, rec_force, count, near, response, phases,
+    rec_phase, rec_duration, rec_kind, rec_start, rec_force, count, terms, response, phases,
 ):  # fmt: skip
     """States (n_phases, 2n) at ascending forcing phases.
 
-    near (k,) and response (1 + k, 2n) are those of `LinearPart.response`.
+    terms (k of them) and response (1 + k, 2n) are those of `LinearPart.response`.
     """
     states = np.empty((phases.size, force.shape[0]))
     shares = np.empty((tab.nodes.size, force.shape[0]))
@@ -142,7 +157,7 @@ def sample_states(
             piece += 1
         kind, h = rec_kind[piece], rec_duration[piece]
         if ready != piece:
-            without_steady(response, rec_phase[piece], rec_start[piece], start)
+            without_steady(terms, response, rec_phase[piece], rec_start[piece], start)
             if kind != FLIGHT:
                 impulses(blocks, force, tab, kind, h, rec_force[piece], shares)
             ready = piece
@@ -151,20 +166,20 @@ def sample_states(
         for p in range(response.shape[0]):
             e = turned(phases[i])
             if p > 0:
-                e, _ = grown(near[p - 1], omega, phases[i], t)
+                e, _ = since_rest(terms, p - 1, omega, phases[i], t)
             for j in range(states.shape[1]):
                 states[i, j] += (response[p, j] * e).real
     return states
 
 
 @inner
-def output_rate(row, row1, near, forced, omega, phase, t, w):
-    """Value and rate of the output ``row @ w + Re(forced[0] e^{i phase})`` and its growth."""
+def output_rate(row, row1, terms, forced, omega, phase, t, w):
+    """Value and rate of the output ``row @ w + Re(forced[0] e^{i phase})`` and its terms."""
     turn = forced[0] * turned(phase)
     value = turn.real
     rate = -omega * turn.imag
-    for k in range(near.size):
-        e, e1 = grown(near[k], omega, phase, t)
+    for k in range(terms.kinds.size):
+        e, e1 = since_rest(terms, k, omega, phase, t)
         value += (forced[1 + k] * e).real
         rate += (forced[1 + k] * e1).real
     for k in range(w.size):
@@ -198,7 +213,7 @@ def leave_unseen(blocks, row, forced, w):
 @compiled
 def local_extremes(
     blocks, force, omega, tab,
-    rec_phase, rec_duration, rec_kind, rec_start, rec_force, count, near, response,
+    rec_phase, rec_duration, rec_kind, rec_start, rec_force, count, terms, response,
     row, row1,
 ):  # fmt: skip
     """Phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output.
@@ -224,7 +239,7 @@ def local_extremes(
     for piece in range(count):
         h = rec_duration[piece]
         kind = rec_kind[piece]
-        without_steady(response, rec_phase[piece], rec_start[piece], start)
+        without_steady(terms, response, rec_phase[piece], rec_start[piece], start)
         seen = max(omega, leave_unseen(blocks, row, forced, start))
         if kind != FLIGHT:
             seen = max(seen, moved)
@@ -253,7 +268,7 @@ def local_extremes(
                     w[2 * b] = steps[b, 0] * x + steps[b, 1] * y
                     w[2 * b + 1] = steps[b, 2] * x + steps[b, 3] * y
             value, rate = output_rate(
-                row, row1, near, forced, omega, rec_phase[piece] + omega * t, t, w
+                row, row1, terms, forced, omega, rec_phase[piece] + omega * t, t, w
             )
             new_sign = 1 if rate > 0.0 else -1 if rate < 0.0 else sign
             if piece == 0 and i == 0:
@@ -264,7 +279,7 @@ def local_extremes(
                 middle = t
                 if i > 0:
                     middle, value = turning_point(
-                        blocks, tab, kind, h, start, shares, row, row1, near, forced, omega,
+                        blocks, tab, kind, h, start, shares, row, row1, terms, forced, omega,
                         rec_phase[piece], h / pieces, sign, t_old, t, rate_old, rate, v,
                     )  # fmt: skip
                 found, n = append_extreme(found, n, rec_phase[piece] + omega * middle, value, sign)
@@ -279,7 +294,7 @@ def local_extremes(
                         break
                     state_at(blocks, tab, kind, h, start, shares, where, v)
                     value, rate_where = output_rate(
-                        row, row1, near, forced, omega, rec_phase[piece] + omega * where, where, v
+                        row, row1, terms, forced, omega, rec_phase[piece] + omega * where, where, v
                     )
                     if where < middle:
                         hi, rate_hi = middle, rate_middle
@@ -288,12 +303,12 @@ def local_extremes(
                     if rate_where * sign < 0.0:
                         phase = rec_phase[piece]
                         first, value = turning_point(
-                            blocks, tab, kind, h, start, shares, row, row1, near, forced, omega,
+                            blocks, tab, kind, h, start, shares, row, row1, terms, forced, omega,
                             phase, h / pieces, sign, lo, where, rate_lo, rate_where, v,
                         )  # fmt: skip
                         found, n = append_extreme(found, n, phase + omega * first, value, sign)
                         last, value = turning_point(
-                            blocks, tab, kind, h, start, shares, row, row1, near, forced, omega,
+                            blocks, tab, kind, h, start, shares, row, row1, terms, forced, omega,
                             phase, h / pieces, -sign, where, hi, rate_where, rate_hi, v,
                         )  # fmt: skip
                         found, n = append_extreme(found, n, phase + omega * last, value, -sign)
@@ -309,7 +324,7 @@ def local_extremes(
 
 @inner
 def turning_point(
-    blocks, tab, kind, h, start, shares, row, row1, near, forced, omega,
+    blocks, tab, kind, h, start, shares, row, row1, terms, forced, omega,
     phase, spacing, sign, lo, hi, rate_lo, rate_hi, v,
 ):  # fmt: skip
     """Time and value at which the rate of an output changes its sign between two times of a piece.
@@ -324,7 +339,7 @@ def turning_point(
             middle = 0.5 * (lo + hi)
         state_at(blocks, tab, kind, h, start, shares, middle, v)
         value, rate_middle = output_rate(
-            row, row1, near, forced, omega, phase + omega * middle, middle, v
+            row, row1, terms, forced, omega, phase + omega * middle, middle, v
         )
         if rate_middle * sign > 0.0:
             if step > 0 and last < middle:

@@ -23,9 +23,9 @@ from nldyn.flow.kernels.flights import (
     fastest_moved,
     fly,
     fly_state,
-    growth,
     output_derivatives,
     output_noise,
+    term,
     turned,
 )
 from nldyn.flow.kernels.law import law
@@ -60,8 +60,8 @@ def record_piece(fl, rec, before, phase, h, kind, event, w):
     turn = turned(phase)
     for i in range(w.size):
         rec.start[n, i] = w[i] + (fl.response[0, 0, i] * turn).real
-    for k in range(fl.near.size):
-        e, _ = growth(fl.near[k], fl.omega, phase)
+    for k in range(fl.terms.kinds.size):
+        e, _, _ = term(fl.terms, k, fl.omega, phase)
         for i in range(w.size):
             rec.start[n, i] += (fl.response[1 + k, 0, i] * e).real
     for a in range(rec.force.shape[1]):
@@ -125,7 +125,7 @@ def propagate(
         columns[i, last] = -(fl.response[0, 1, i] * turn).real
         for c in range(n_parameters):
             columns[i, size + c] = -(fl.response[0, 2 + c, i] * turn).real
-    add_growth(fl.near, fl.response, fl.omega, phase, -1.0, w, columns)
+    add_growth(fl, phase, -1.0, w, columns)
     closed = np.zeros(n_stops, dtype=np.bool_)
     for s in range(n_stops):
         value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
@@ -147,7 +147,7 @@ def propagate(
             force = pushes[s]
         for i in range(size):
             rate[i] -= fl.force[i, s] * force
-    add_growth(fl.near, fl.response, fl.omega, end_phase, 1.0, w, columns)
+    add_growth(fl, end_phase, 1.0, w, columns)
     for i in range(size):
         end[i] = w[i] + (fl.response[0, 0, i] * turn).real
         d_omega[i] = columns[i, last] + (fl.response[0, 1, i] * turn).real
@@ -306,7 +306,7 @@ def shoot(
 
     When `chained`, only the first node is used and each segment starts where the last one ended.
     Derivatives are also taken with respect to parameters (n, 2), see `FlowData`; drive_by
-    (n, 2, 2n) is the derivative of `SystemData.drive` with respect to each.
+    (n, h, 3, 2n) is the derivative of `SystemData.drive` with respect to each.
     """
     fl = at_frequency(system, omega, parameters, drive_by)
     k = phases.size - 1

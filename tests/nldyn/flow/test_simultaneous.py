@@ -112,9 +112,7 @@ def test_a_motion_may_begin_on_a_stop_that_it_leaves():
         )  # fmt: skip
         starts = np.array([[-1e-12, 0.0, 0.0, *speed], [0.0, 0.0, 0.0, *speed]])
         flow = FlowMap(system)
-        before, here = (
-            flow.shoot(flow.to_state(start)[None], PERIOD, 26.3) for start in starts
-        )
+        before, here = (flow.shoot(flow.to_state(start)[None], PERIOD, 26.3) for start in starts)
         assert not here.failure
         assert np.abs(here.ends - before.ends).max() < 1e-9
 

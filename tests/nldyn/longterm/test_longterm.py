@@ -567,7 +567,7 @@ def test_spectrum_at_any_point_is_that_of_its_modes():
     )  # fmt: skip
     orbit = solve_orbit(system, 20.0)
     row = np.array([0.1, -0.7])
-    steady = system.steady(orbit.omega)
+    steady = system.response(orbit.omega).amplitudes[0]
     displacement = (system.linear.right @ steady)[:2]
     assert harmonics(orbit, row).phasor[1] == pytest.approx(row @ displacement, rel=1e-9)
     with pytest.raises(SystemModelError, match="displacements of 2 modes"):

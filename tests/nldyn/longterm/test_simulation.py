@@ -142,7 +142,7 @@ def chirp_end(system: System, first: float, last: float, rate: float) -> np.ndar
     def rate_of(t: float, x: np.ndarray) -> list[float]:
         omega = 2.0 * np.pi * (first + slope * t)
         phase = 2.0 * np.pi * (first * t + 0.5 * slope * t * t)
-        push = phi[0] * source.phasor.real * omega**source.order * np.cos(phase)
+        push = phi[0] * source.phasor.real * omega**source.power * np.cos(phase)
         for c, stop in stops:
             push -= c[0] * contact(stop, c[0] * x[0] - stop.gap, c[0] * x[1])[0]
         return [x[1], push - spring * x[0] - damping * x[1]]

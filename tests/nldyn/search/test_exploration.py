@@ -682,8 +682,7 @@ def test_where_a_doubled_branch_comes_to_its_flip_the_other_one_has_half_the_per
     """Followed on as a branch of the doubled period it would be the same orbits twice."""
     flow = FlowMap(system_of("one_dof"))
     box, other = (
-        Collector(flow, (28.0, 60.0), "middle", ContinuationOptions(), silent)
-        for _ in range(2)
+        Collector(flow, (28.0, 60.0), "middle", ContinuationOptions(), silent) for _ in range(2)
     )
     box.from_orbits([solve_orbit(flow, 50.0)])
     harmonic = box.branches[0]

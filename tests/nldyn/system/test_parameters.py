@@ -77,7 +77,7 @@ def test_a_motion_scales_with_force_and_stiffness():
     """δ → sδ where force → s force and k → s^(1-p) k: the derivatives obey Euler's relation."""
     system = make_one_dof()
     flow = FlowMap(system, EXACT)
-    start = 2.0 * flow.system.steady(OMEGA).real[None]
+    start = 2.0 * flow.system.steady(OMEGA)[None]
     found = flow.shoot(
         start,
         2 * np.pi * np.array([0.0, 1.0]),
