@@ -41,8 +41,9 @@ class ComponentLike(Protocol):
     A ``natural_form`` is optional: an object whose ``deformations`` A, an (m, N) matrix or linear
     operator, and ``stiffness`` d, (m,), give ``K = A^T d A``. Where A keeps the digits of
     deformations beside those of rigid motion, all results do, whatever the condition of K.
-    ``digits`` are optional, too: how many decimal digits the entries have. Where they are not
-    given they are read off the entries.
+    ``load_vectors`` are optional, too: names of interfaces that are no places but loads on the
+    whole, as a weight is. So are ``digits``: how many decimal digits the entries have.
+    Where they are not given they are read off the entries.
     """
 
     @property

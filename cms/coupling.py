@@ -69,6 +69,8 @@ class Assembly:
         Shapes of the coordinates, and of unit forces through the massless flexibility.
     components : dict of str to (int, int)
         Rows of each component.
+    load_vectors : tuple of str
+        Names of those interfaces of the coupled model that are load vectors.
     """
 
     places: list[Place]
@@ -79,6 +81,7 @@ class Assembly:
     basis: FloatArray
     shapes: FloatArray
     components: Mapping[str, tuple[int, int]]
+    load_vectors: tuple[str, ...] = ()
 
     def joint_rows(self, joints: Sequence[Joint]) -> FloatArray:
         """Signed interface displacements that open each joint, (j, m)."""
@@ -343,6 +346,9 @@ def side_by_side(components: Mapping[str, ReducedModel]) -> Assembly:
         damping=linalg.block_diag(*[damping_of(model) for model in models]),
         basis=linalg.block_diag(*[model.basis for model in models]),
         shapes=linalg.block_diag(*[shapes_of(model) for model in models]),
+        load_vectors=tuple(
+            f"{name}.{at}" for name, model in components.items() for at in model.load_vectors
+        ),
         components={
             name: (int(end - size), int(end))
             for name, size, end in zip(components, sizes, ends, strict=True)
@@ -437,6 +443,7 @@ def model_of(
         residual_flexibility=flexibility if massless else None,
         residual_shapes=shapes if massless else None,
         components=assembly.components,
+        load_vectors=assembly.load_vectors,
     )
 
 

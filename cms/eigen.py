@@ -217,9 +217,7 @@ def lowest_modes(pencil: Pencil, shifted: Shifted, count: int) -> Modes:
     return modes
 
 
-def check_stable(
-    pencil: Pencil, squares: FloatArray, vectors: FloatArray, fastest: float
-) -> None:
+def check_stable(pencil: Pencil, squares: FloatArray, vectors: FloatArray, fastest: float) -> None:
     """Raise ReductionError where the lowest w^2, ascending, is negative."""
     if squares.size == 0 or squares[0] >= 0.0:
         return

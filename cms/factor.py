@@ -116,9 +116,7 @@ def backward_error(
     return float(error) if np.isfinite(error) else np.inf
 
 
-def factorise(
-    matrix: SparseMatrix, dense_suspect: float = DENSE_SUSPECT
-) -> Factor | None:
+def factorise(matrix: SparseMatrix, dense_suspect: float = DENSE_SUSPECT) -> Factor | None:
     """Factorise A, or None where A is not numerically positive definite.
 
     A is first scaled to a unit diagonal, so that metres and radians weigh the same. Up to 1500

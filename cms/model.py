@@ -60,6 +60,8 @@ class ReducedModel:
         ``basis @ q + residual_shapes @ f``.
     components : dict of str to (int, int)
         Rows of the basis that belong to each component of a coupled model.
+    load_vectors : tuple of str
+        Names of those interfaces that are load vectors: of weight, or of a motion of the base.
     rigid_bound_hz : float
         Up to where the few digits of given matrices leave the frequency of rigid-body modes
         undetermined; those below are zero. 0 for matrices in double precision.
@@ -86,6 +88,7 @@ class ReducedModel:
     residual_shapes: FloatArray | None = None
     components: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     rigid_bound_hz: float = 0.0
+    load_vectors: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the shapes and make the arrays read-only."""
@@ -358,6 +361,7 @@ class ReducedModel:
             "participation": np.array(list(self.participation.values())).reshape(-1, self.size),
             "method": np.array(self.method),
             "rigid_bound_hz": np.array(self.rigid_bound_hz),
+            "load_vectors": np.array(self.load_vectors, dtype=np.str_),
             "components": np.array(list(self.components), dtype=np.str_),
             "component_rows": np.array(list(self.components.values()), dtype=np.int64),
         }
@@ -449,6 +453,7 @@ def later_fields(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
         "method": str(arrays["method"]),
         "components": dict(zip(names, rows, strict=True)),
         "rigid_bound_hz": float(arrays.get("rigid_bound_hz", 0.0)),
+        "load_vectors": tuple(str(name) for name in arrays.get("load_vectors", ())),
         **{name: arrays[name] for name in OPTIONAL if name in arrays},
     }
 

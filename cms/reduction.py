@@ -189,7 +189,8 @@ def reduce(
             ) from error
     check_masses(pencil, reduced)
     with announced(progress):
-        return with_component_damping(told(reduced, pencil), component)
+        reduced = with_component_damping(told(reduced, pencil), component)
+    return replace(reduced, load_vectors=tuple(getattr(component, "load_vectors", ())))
 
 
 def told(reduced: ReducedModel, pencil: Pencil) -> ReducedModel:

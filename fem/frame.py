@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,7 @@ from fem.beams import plane_matrices, plane_rows
 from fem.elements import rotations, turn
 from fem.errors import JointWarning, ModelError
 from fem.links import link_rows, link_terms
+from fem.load_vectors import inertia_load
 from fem.mesh import FloatArray, IntArray
 from fem.model import FrameModel, TrussPart
 from fem.natural import (
@@ -57,6 +58,8 @@ class Component:
         (N, 2): the load by an acceleration of 1 m/s², such as a weight's.
     damping
         Matrix in N s/m of the dampers that the file of the mesh holds; None without any.
+    load_vectors
+        Names of those interfaces that are load vectors, see `with_load`.
     """
 
     stiffness: SparseArray
@@ -67,6 +70,32 @@ class Component:
     element_dofs: IntArray
     inertia: FloatArray
     damping: SparseArray | None = None
+    load_vectors: tuple[str, ...] = ()
+
+    def with_load(self, name: str, acceleration: Sequence[float]) -> Component:
+        """The component with a load vector: its weight under an acceleration.
+
+        It is an interface of this name that nothing can be joined to, so that a reduction keeps
+        its static deflection exact.
+
+        Parameters
+        ----------
+        name
+            Of the load vector.
+        acceleration
+            Components (x, y, and z, which must be 0) in m/s²; a load is a factor of it.
+
+        Raises
+        ------
+        ModelError
+            If there is an interface of this name, or no mass is moved that way.
+        """
+        vector = inertia_load(self.inertia, self.interfaces, name, acceleration)
+        return replace(
+            self,
+            interfaces={**self.interfaces, name: vector},
+            load_vectors=(*self.load_vectors, name),
+        )
 
     @cached_property
     def natural_form(self) -> NaturalForm:

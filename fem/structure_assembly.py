@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -28,6 +28,7 @@ from fem.distorted import distortion_warnings
 from fem.errors import JointWarning, ModelError
 from fem.joints import hinge_warnings, mechanism_warnings
 from fem.links import link_rows
+from fem.load_vectors import inertia_load
 from fem.locking import locking_warnings
 from fem.mesh import FloatArray, IntArray
 from fem.natural import (
@@ -89,6 +90,8 @@ class StructureComponent:
         (N, 3): the load by an acceleration of 1 m/s², such as a weight's.
     damping
         Matrix in N s/m of the dampers that the file of the mesh holds; None without any.
+    load_vectors
+        Names of those interfaces that are load vectors, see `with_load`.
     """
 
     stiffness: SparseArray
@@ -100,6 +103,32 @@ class StructureComponent:
     rigid_mass: FloatArray
     inertia: FloatArray
     damping: SparseArray | None = None
+    load_vectors: tuple[str, ...] = ()
+
+    def with_load(self, name: str, acceleration: Sequence[float]) -> StructureComponent:
+        """The component with a load vector: its weight under an acceleration.
+
+        It is an interface of this name that nothing can be joined to, so that a reduction keeps
+        its static deflection exact.
+
+        Parameters
+        ----------
+        name
+            Of the load vector.
+        acceleration
+            Components (x, y, z) in m/s²; a load is a factor of it.
+
+        Raises
+        ------
+        ModelError
+            If there is an interface of this name, or no mass is moved that way.
+        """
+        vector = inertia_load(self.inertia, self.interfaces, name, acceleration)
+        return replace(
+            self,
+            interfaces={**self.interfaces, name: vector},
+            load_vectors=(*self.load_vectors, name),
+        )
 
     @property
     def free(self) -> IntArray:

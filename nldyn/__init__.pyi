@@ -101,5 +101,7 @@ from nldyn.system.elements import Stop as Stop
 from nldyn.system.elements import Unbalance as Unbalance
 from nldyn.system.elements import dissipation_for as dissipation_for
 from nldyn.system.elements import hertz_stiffness as hertz_stiffness
+from nldyn.system.measured import MeasuredForce as MeasuredForce
+from nldyn.system.measured import measured_force as measured_force
 from nldyn.system.parameters import Parameter as Parameter
 from nldyn.system.system import System as System

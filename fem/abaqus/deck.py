@@ -81,9 +81,7 @@ class Scope:
             return
         self.nodes[label] = (float(place[0]), float(place[1]), float(place[2]))
 
-    def add_element(
-        self, keyword: Keyword, row: int | None, label: int, element: Element
-    ) -> None:
+    def add_element(self, keyword: Keyword, row: int | None, label: int, element: Element) -> None:
         """A new element; a number that is taken already is an error."""
         if label in self.elements:
             raise keyword.fail(f"element {label} is defined twice", row)

@@ -423,7 +423,26 @@ def describe_system(system: System, residual: int = 0) -> str:
     flexibility = "".join(f"{static_flexibility(system, name):>{width}.6g}" for name in names)
     lines.append(f"{'static flexibility m/N':<23}{flexibility}")
     lines += [describe_stop(stop) for stop in system.stops]
-    return "\n".join(lines)
+    return "\n".join([*lines, *describe_rest(system)])
+
+
+def describe_rest(system: System) -> list[str]:
+    """Say where the structure rests, and what holds it, if that is not at zero."""
+    from nldyn.system.rest import closed_at_rest, rest
+
+    q = rest(system)
+    if not q.any():
+        return []
+    places = ", ".join(
+        f"{float(phi @ q):.6g} m at '{name}'" for name, phi in system.participation.items()
+    )
+    return [
+        f"at rest: {places}",
+        *(
+            f"at rest the stop at '{system.stops[i].at}' is closed by {depth:.6g} m: {force:.6g} N"
+            for i, depth, force in closed_at_rest(system, q)
+        ),
+    ]
 
 
 def describe_stop(stop: Stop) -> str:

@@ -83,8 +83,8 @@ def floquet_spectrum(jacobians: Real) -> FloquetSpectrum:
 
     The periodic QR algorithm [Bojanczyk, Golub and Van Dooren 1992] never forms the product: the
     results are exact for matrices that differ from the given ones, balanced, by rounding relative
-    to the norm of each. Small eigenvalues beside large ones keep their digits as long as no single matrix
-    squeezes them below its own rounding error.
+    to the norm of each. Small eigenvalues beside large ones keep their digits as long as no single
+    matrix squeezes them below its own rounding error.
 
     Parameters
     ----------

@@ -191,7 +191,13 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
             hz = scene.modal.frequencies_hz
             check_ratio_count(scene, len(hz), scene.file)
             first = _observed_first(scene, scene.modal.participation)
-            return System.from_modal(hz, first, modal_damping=ratio, **acting._asdict())
+            return System.from_modal(
+                hz,
+                first,
+                modal_damping=ratio,
+                loads=scene.modal.loads,
+                **acting._asdict(),
+            )
         if scene.matrices is not None:
             table = scene.matrices
             check_ratio_count(scene, len(table.mass), scene.file)
@@ -203,6 +209,7 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
                     first,
                     damping=table.damping,
                     modal_damping=ratio,
+                    loads=table.loads,
                     **acting._asdict(),
                 )
         reduced = reduced or build_reduced(scene)

@@ -108,8 +108,9 @@ def check_structure_names(scene: Scene, mesh: TaggedStructure, file: Path) -> No
 
 def check_computable(scene: Scene, file: Path) -> None:
     """Check that the scene says what excites the structure and which range to follow."""
-    if not scene.excitation:
-        raise scene_error(file, ("excitation",), "is missing: nothing moves the structure")
+    if not any(table.kind not in ("constant", "weight") for table in scene.excitation):
+        fault = "is missing" if not scene.excitation else "is constant"
+        raise scene_error(file, ("excitation",), f"{fault}: nothing moves the structure")
     if scene.continuation is None:
         fault = "is missing: give the frequency range, range_hz = [lowest, highest]"
         raise scene_error(file, ("continuation",), fault)
@@ -271,8 +272,21 @@ def _check_length(values: list[float], count: int, unit: str, key: KeyPath, repo
 
 def _check_interface_names(scene: Scene, report: Report) -> None:
     for key, name in _interfaces_used(scene):
-        if name not in scene.interface_names:
+        if name in scene.interface_names:
+            continue
+        if key[0] != "excitation":
             raise report(key, unknown_name(name, scene.interface_names, "an interface"))
+        if name not in scene.load_names:
+            known = [*scene.interface_names, *scene.load_names]
+            raise report(key, unknown_name(name, known, "an interface or load vector"))
+    for number, table in enumerate(scene.excitation):
+        if table.load is None:
+            continue
+        if scene.mesh is None:
+            wanted = "a [mesh]; give 'loads' of the matrices and name one of them in 'at'"
+            raise report(("excitation", number, "kind"), f"'{table.kind}' needs {wanted}")
+        if table.load in scene.interfaces:
+            raise report(("interfaces", table.load), "is the name of a load vector; rename it")
 
 
 def _check_seeds(scene: Scene, report: Report) -> None:
@@ -300,7 +314,8 @@ def _check_explore(scene: Scene, report: Report) -> None:
 def _interfaces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
     for table in ("dampers", "stops", "excitation"):
         for number, entry in enumerate(getattr(scene, table)):
-            yield (table, number, "at"), entry.at
+            if entry.at is not None:
+                yield (table, number, "at"), entry.at
     for number, stop in enumerate(scene.stops):
         if stop.against is not None:
             yield ("stops", number, "against"), stop.against

@@ -15,6 +15,8 @@ from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import PartTable, Scene
 
 Mesh = TypeVar("Mesh", fem.FrameMesh, fem.StructureMesh)
+Loaded = TypeVar("Loaded", fem.Component, fem.StructureComponent)
+AXES = ("x", "y", "z")
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
 
 
@@ -64,7 +66,7 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
             with told_as(scene, ("mesh", "file"), fem.ModelError, hint=": --meshes"):
                 structure = fem.refined(structure, refinement)
         with told_as(scene, (), fem.ModelError):
-            return fem.assemble(_structure_model(scene, structure))
+            return _loaded(scene, fem.assemble(_structure_model(scene, structure)))
     with told_as(scene, ("mesh", "file"), fem.ModelError):
         mesh = _in_metres(scene, fem.read_mesh(path, _mesh_places(scene), ignore))
     mesh = _with_places(scene, mesh)
@@ -73,7 +75,20 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
     with told_as(scene, (), fem.ModelError):
         if refinement > 1:
             mesh = fem.refined(mesh, refinement)
-        return fem.assemble(_frame_model(scene, mesh))
+        return _loaded(scene, fem.assemble(_frame_model(scene, mesh)))
+
+
+def _loaded(scene: Scene, component: Loaded) -> Loaded:
+    """The component with the load vectors that the excitation acts on."""
+    for number, table in enumerate(scene.excitation):
+        if table.load is None or table.load in component.interfaces:
+            continue
+        acceleration = table.acceleration
+        if acceleration is None:
+            acceleration = [float(table.direction == axis) for axis in AXES]
+        with told_as(scene, ("excitation", number), fem.ModelError):
+            component = component.with_load(table.load, acceleration)
+    return component
 
 
 def _in_metres(scene: Scene, mesh: Mesh) -> Mesh:

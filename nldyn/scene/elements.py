@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 from typing import NamedTuple
 
+import numpy as np
+
 from nldyn.base.errors import SystemModelError
-from nldyn.scene.faults import told_as
+from nldyn.scene.faults import check_regular, told_as, unreadable
+from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import ExcitationTable, Scene, StopTable
 from nldyn.system.elements import (
+    BaseMotion,
+    ConstantForce,
     Damper,
     Excitation,
     HarmonicForce,
@@ -16,6 +22,9 @@ from nldyn.system.elements import (
     dissipation_for,
     hertz_stiffness,
 )
+from nldyn.system.measured import MeasuredForce, measured_force
+
+logger = logging.getLogger("nldyn")
 
 
 class Acting(NamedTuple):
@@ -32,7 +41,11 @@ def acting_elements(scene: Scene) -> Acting:
         return Acting(
             tuple(_stop(stop) for stop in scene.stops),
             tuple(Damper(damper.at, damper.coefficient) for damper in scene.dampers),
-            tuple(_excitation(table) for table in scene.excitation),
+            tuple(
+                source
+                for number, table in enumerate(scene.excitation)
+                for source in _excitation(scene, number, table)
+            ),
         )
 
 
@@ -49,8 +62,43 @@ def _stop(table: StopTable) -> Stop:
     return Stop(table.at, stiffness, exponent, table.gap, table.direction, table.against, loss)
 
 
-def _excitation(table: ExcitationTable) -> Excitation:
+def _excitation(scene: Scene, number: int, table: ExcitationTable) -> tuple[Excitation, ...]:
+    at, phase, harmonic = table.load or table.at, table.phase_deg or 0.0, table.harmonic or 1
+    assert at is not None
+    if table.kind == "measured":
+        force = _measured(scene, number, at, table)
+        logger.info(f"excitation at '{at}': {force!r}")
+        return force.sources
+    if table.kind == "weight":
+        return (ConstantForce(at, 1.0),)  # the load vector holds the acceleration
+    if table.force is not None:
+        return (ConstantForce(at, table.force),)
     if table.mass_times_radius is not None:
-        return Unbalance(table.at, table.mass_times_radius, table.phase_deg)
+        return (Unbalance(at, table.mass_times_radius, phase, harmonic),)
     assert table.amplitude is not None
-    return HarmonicForce(table.at, table.amplitude, table.phase_deg)
+    if table.kind == "base":
+        return (BaseMotion(at, table.amplitude, table.quantity or "displacement", phase, harmonic),)
+    return (HarmonicForce(at, table.amplitude, phase, harmonic),)
+
+
+def _measured(scene: Scene, number: int, at: str, table: ExcitationTable) -> MeasuredForce:
+    """The force whose samples a file holds, one number in a line."""
+    assert table.file is not None
+    path, key = scene.file.parent / table.file, ("excitation", number, "file")
+    try:
+        check_regular(path)
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, ValueError) as error:
+        raise scene_error(scene.file, key, f"names {path}, which {unreadable(error)}") from None
+    samples = []
+    for place, line in enumerate(lines, 1):
+        text = line.split("#")[0].strip().rstrip(",;")
+        if not text:
+            continue
+        try:
+            samples.append(float(text))
+        except ValueError:
+            fault = f"{path}, line {place}: must be one number, the force in N, not '{line[:40]}'"
+            raise scene_error(scene.file, key, fault, sep=": ") from None
+    with told_as(scene, key, SystemModelError):
+        return measured_force(at, np.array(samples), table.harmonics or 20)

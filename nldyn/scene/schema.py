@@ -22,7 +22,7 @@ from pydantic import (
 
 from nldyn.base.errors import LARGEST_FREQUENCY
 from nldyn.scene.messages import quoted, show
-from nldyn.system.elements import LARGEST_EXPONENT, LARGEST_PHASE
+from nldyn.system.elements import LARGEST_EXPONENT, LARGEST_PHASE, MOST_HARMONIC
 
 SMALLEST, LARGEST = 1e-50, 1e50
 
@@ -286,6 +286,7 @@ class ModalTable(Table):
 
     frequencies_hz: Annotated[list[ModeFrequency], Field(min_length=1)]
     participation: Annotated[dict[str, list[Number]], Field(min_length=1)]
+    loads: dict[str, list[Number]] = {}
 
 
 class MatricesTable(Table):
@@ -295,6 +296,7 @@ class MatricesTable(Table):
     stiffness: Annotated[Matrix, Field(min_length=1)]
     damping: Matrix | None = None
     interfaces: Annotated[dict[str, list[Number]], Field(min_length=1)]
+    loads: dict[str, list[Number]] = {}
 
 
 class DampingTable(Table):
@@ -377,24 +379,58 @@ class StopTable(Table):
         return self
 
 
-class ExcitationTable(Table):
-    """``[[excitation]]``: a rotating unbalance or a harmonic force at an interface."""
+# what each kind of excitation needs, and what it may have
+_EXCITATION_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "unbalance": (("at", "mass_times_radius"), ("phase_deg", "harmonic")),
+    "harmonic": (("at", "amplitude"), ("phase_deg", "harmonic")),
+    "constant": (("at", "force"), ()),
+    "measured": (("at", "file"), ("harmonics",)),
+    "weight": (("acceleration",), ()),
+    "base": (("amplitude",), ("at", "direction", "quantity", "phase_deg", "harmonic")),
+}
 
-    at: str
-    kind: Literal["unbalance", "harmonic"]
+
+class ExcitationTable(Table):
+    """``[[excitation]]``: what moves the structure, by its kind."""
+
+    kind: Literal["unbalance", "harmonic", "constant", "measured", "weight", "base"]
+    at: str | None = None
     mass_times_radius: Positive | None = None
     amplitude: Positive | None = None
-    phase_deg: Annotated[Number, Field(ge=-LARGEST_PHASE, le=LARGEST_PHASE)] = 0.0
+    force: Number | None = None
+    phase_deg: Annotated[Number, Field(ge=-LARGEST_PHASE, le=LARGEST_PHASE)] | None = None
+    harmonic: Annotated[int, Field(ge=1, le=MOST_HARMONIC)] | None = None
+    file: str | None = None
+    harmonics: Annotated[int, Field(ge=1, le=MOST_HARMONIC)] | None = None
+    acceleration: Annotated[list[Number], Field(min_length=2, max_length=3)] | None = None
+    direction: Literal["x", "y", "z"] | None = None
+    quantity: Literal["displacement", "velocity", "acceleration"] | None = None
 
     @model_validator(mode="after")
     def _complete(self) -> ExcitationTable:
-        wanted, other = ("mass_times_radius", "amplitude")
-        if self.kind == "harmonic":
-            wanted, other = other, wanted
-        _refuse(self, (other,), f"kind '{self.kind}'; use '{wanted}'")
-        if getattr(self, wanted) is None:
-            raise ValueError(f"needs '{wanted}' for kind '{self.kind}'")
+        needed, allowed = _EXCITATION_KEYS[self.kind]
+        others = {key for keys in _EXCITATION_KEYS.values() for part in keys for key in part}
+        uses = ", ".join(f"'{key}'" for key in needed if key != "at")
+        _refuse(
+            self,
+            tuple(sorted(others.difference(needed, allowed))),
+            f"kind '{self.kind}'; use {uses}",
+        )
+        for key in needed:
+            if getattr(self, key) is None:
+                raise ValueError(f"needs '{key}' for kind '{self.kind}'")
+        if self.kind == "base" and (self.at is None) == (self.direction is None):
+            raise ValueError(
+                "needs 'direction' for kind 'base' of a mesh, or 'at' naming a load vector"
+            )
         return self
+
+    @property
+    def load(self) -> str | None:
+        """Name of the load vector that a mesh must have for it; None if it needs none."""
+        if self.kind == "weight":
+            return "weight"
+        return f"base {self.direction}" if self.direction is not None else None
 
 
 class ObserveTable(Table):
@@ -523,6 +559,12 @@ class Scene(Table):
         if self.matrices is not None:
             return list(self.matrices.interfaces)
         return list(self.interfaces)
+
+    @property
+    def load_names(self) -> list[str]:
+        """Names of the load vectors that are given with modes or matrices."""
+        given = self.modal or self.matrices
+        return list(given.loads) if given else []
 
     @property
     def observed(self) -> str:

@@ -23,7 +23,7 @@ PLAIN = (bool, int, float, complex, str, bytes, np.generic, PurePath, range, sli
 def case_keys(
     cases: list[dict[str, Any]], folder: Path, measure: Callable[..., Any], name: str | None
 ) -> list[str]:
-    """A key for each case, of its tables, the bytes of its mesh and the measure.
+    """A key for each case, of its tables, the bytes of the files it names and the measure.
 
     Raises
     ------
@@ -31,15 +31,16 @@ def case_keys(
         If the measure depends on an object that has no key and no name is given.
     """
     identity = ["named", name] if name is not None else ["measure", MeasureKey(measure).of_measure]
-    meshes: dict[str, str] = {}
+    read: dict[str, str] = {}
     keys = []
     for tables in cases:
-        file = str(tables.get("mesh", {}).get("file", ""))
-        if file not in meshes:
-            meshes[file] = _bytes_hash(folder / file) if file else ""
-        keys.append(
-            _hash(json.dumps([tables, meshes[file], identity], sort_keys=True, default=str))
-        )
+        sources = [tables.get("mesh", {}), *tables.get("excitation", [])]
+        files = [str(source.get("file", "")) for source in sources]
+        for file in files:
+            if file not in read:
+                read[file] = _bytes_hash(folder / file) if file else ""
+        contents = [read[file] for file in files]
+        keys.append(_hash(json.dumps([tables, contents, identity], sort_keys=True, default=str)))
     return keys
 
 

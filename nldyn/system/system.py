@@ -239,7 +239,8 @@ class System:
             With `frequencies_hz` (n,) and `participation` {name: (n,)}; its `damping` (n, n) in 1/s
             is added to the modal damping, if it has one.
         modal_damping, stops, dampers, excitation, loads
-            As for `from_modal`; the reduced model's own `loads` are taken, if it has some.
+            As for `from_modal`; interfaces that are `load_vectors` of the reduced model are loads,
+            too.
 
         Raises
         ------
@@ -260,8 +261,13 @@ class System:
                 f"(method '{getattr(reduced, 'method', 'unknown')}'), so that its interfaces have "
                 "no equation of motion; reduce by 'rubin' or 'craig-bampton' instead"
             )
+        whole = set(getattr(reduced, "load_vectors", ()))
+        rows = reduced.participation
         system = cls.from_modal(
-            reduced.frequencies_hz, reduced.participation, modal_damping=modal_damping
+            reduced.frequencies_hz,
+            {name: row for name, row in rows.items() if name not in whole},
+            modal_damping=modal_damping,
+            loads={name: row for name, row in rows.items() if name in whole},
         )
         damping = getattr(reduced, "damping", None)
         if damping is not None:
@@ -275,7 +281,7 @@ class System:
             _listed("stops", stops),
             _listed("dampers", dampers),
             _listed("excitation", excitation),
-            {**getattr(reduced, "loads", {}), **_vectors("loads", loads)},
+            {**system.loads, **_vectors("loads", loads)},
         )
 
     @property
