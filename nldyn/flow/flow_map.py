@@ -217,7 +217,7 @@ class FlowMap:
         power = 2 if smooth else 4
         nodes, tail = self.options.panel_nodes, self.options.panel_tail
         for stop in self.system.stops:
-            viscous = stop.dissipation != 0.0
+            viscous = stop.dissipation != 0.0 or stop.dashpot != 0.0
             nodes = _nodes_for_switch(stop.exponent, power, viscous, nodes, tail)
         return gauss_tables(nodes, power)
 
@@ -248,9 +248,10 @@ class FlowMap:
                 stiffness=stop.stiffness,
                 exponent=stop.exponent,
                 dissipation=stop.dissipation,
+                dashpot=stop.dashpot,
                 mobility=float(v @ v),
                 duration=duration_factor(stop.exponent),
-                instant=self.options.instant(stop.exponent),
+                instant=self.options.instant(0.0 if stop.dashpot else stop.exponent),
             )
             for stop, v in zip(s.stops, vectors, strict=True)
         ]

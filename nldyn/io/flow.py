@@ -74,6 +74,11 @@ def write_flow(group: Any, flow: FlowMap) -> None:
             "gap": ("m", [s.gap for s in stops]),
             "direction": ("1", [s.direction for s in stops]),
             "dissipation": ("s/m", [s.dissipation for s in stops]),
+            **(
+                {"dashpot": ("N s/m", [s.dashpot for s in stops])}
+                if any(s.dashpot for s in stops)
+                else {}
+            ),
             "is_against": ("1", [s.against is not None for s in stops]),
             "has_own_law": ("1", [s.law is not None for s in stops]),
             "law_trials": ("N, N/m, N s/m", [_trials(s) for s in stops]),
@@ -171,6 +176,7 @@ def _read_stops(group: Group, laws: Laws) -> tuple[Stop, ...]:
     count = len(at)
     numbers = ("stiffness", "exponent", "gap", "direction", "dissipation")
     values = {name: group.array(name, count) for name in (*numbers, "is_against", "has_own_law")}
+    values["dashpot"] = group.array("dashpot", count) if "dashpot" in group else np.zeros(count)
     trials = group.array("law_trials", *((count, len(TRIALS), 3) if count else (0,)))
     for i in laws:
         if i not in range(count) or not values["has_own_law"][i]:
@@ -194,6 +200,7 @@ def _read_stops(group: Group, laws: Laws) -> tuple[Stop, ...]:
             against[i] if values["is_against"][i] else None,
             float(values["dissipation"][i]),
             law,
+            float(values["dashpot"][i]),
         )
         if not np.array_equal(_trials(stop), trials[i]):
             raise SystemModelError(

@@ -59,7 +59,16 @@ def _stop(table: StopTable) -> Stop:
     loss = table.dissipation or 0.0
     if table.restitution is not None and table.impact_speed is not None:
         loss = dissipation_for(table.restitution, table.impact_speed)
-    return Stop(table.at, stiffness, exponent, table.gap, table.direction, table.against, loss)
+    return Stop(
+        table.at,
+        stiffness,
+        exponent,
+        table.gap,
+        table.direction,
+        table.against,
+        loss,
+        dashpot=table.dashpot,
+    )
 
 
 def _excitation(scene: Scene, number: int, table: ExcitationTable) -> tuple[Excitation, ...]:

@@ -343,6 +343,7 @@ class StopTable(Table):
     poissons_ratio: Annotated[float, Field(gt=-1, le=0.5)] | None = None
     gap: Number = 0.0
     dissipation: NotNegative | None = None
+    dashpot: NotNegative = 0.0
     restitution: Annotated[float, Field(gt=0, le=1)] | None = None
     impact_speed: Positive | None = None
     direction: Literal[1, -1] = 1

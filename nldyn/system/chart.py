@@ -17,13 +17,13 @@ from nldyn.base.errors import (
     shown,
 )
 from nldyn.system.elements import LARGEST_EXPONENT
-from nldyn.system.parameters import SOURCES, Parameter, check_exact, check_index
+from nldyn.system.parameters import OF_STOPS, SOURCES, Parameter, check_exact, check_index
 from nldyn.system.system import System
 
 FREQUENCY = "frequency_hz"
 EVERY_MODE = -1
 
-_OF_STOPS = ("gap", "stiffness", "exponent", "dissipation")
+_OF_STOPS = OF_STOPS
 _OF_DAMPERS = ("coefficient",)
 _OF_MODES = ("modal_damping", "natural_frequency_hz")
 UNITS = {
@@ -32,6 +32,7 @@ UNITS = {
     "stiffness": "N/m^exponent",
     "exponent": "1",
     "dissipation": "s/m",
+    "dashpot": "N s/m",
     "amplitude": "N",
     "mass_times_radius": "kg m",
     "force": "N",
@@ -41,7 +42,7 @@ UNITS = {
 }
 BOUNDS = {
     name: (0.0, math.inf)
-    for name in ("stiffness", "dissipation", *SOURCES, *_OF_DAMPERS, *_OF_MODES)
+    for name in ("stiffness", "dissipation", "dashpot", *SOURCES, *_OF_DAMPERS, *_OF_MODES)
     if name != "force"  # has either sign
 } | {"exponent": (1.0, LARGEST_EXPONENT)}  # between which there are systems
 POSITIVE = ("stiffness", "natural_frequency_hz")  # there is no system where they are zero
@@ -61,7 +62,7 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
     system : System
         The system that must have it.
     parameter : str or Parameter
-        frequency_hz; gap, stiffness, exponent or dissipation of a stop; amplitude,
+        frequency_hz; gap, stiffness, exponent, dissipation or dashpot of a stop; amplitude,
         mass_times_radius or force of an excitation; coefficient of a damper; modal_damping (ratio)
         or natural_frequency_hz of a mode. The index -1 of modal_damping means all modes, which then
         have one ratio.

@@ -15,7 +15,12 @@ SHALLOW = 1e-6, 1e-8  # of the penetration at which the power law gives 1 N
 
 
 def power_law(
-    stiffness: float, exponent: float, dissipation: float, delta: float, speed: float
+    stiffness: float,
+    exponent: float,
+    dissipation: float,
+    dashpot: float,
+    delta: float,
+    speed: float,
 ) -> tuple[float, float, float]:
     """The law of a stop without one of its own: its force, and the force's two derivatives.
 
@@ -23,8 +28,9 @@ def power_law(
 
     Parameters
     ----------
-    stiffness, exponent, dissipation : float
-        k in N/m^p, p and a in s/m of the force k δ^p (1 + a v) [Hunt and Crossley 1975, eq. 9].
+    stiffness, exponent, dissipation, dashpot : float
+        k in N/m^p, p, a in s/m and c in N s/m of the force k δ^p (1 + a v) + c v [Hunt and
+        Crossley 1975, eq. 9; Kelvin and Voigt's for a = 0].
     delta, speed : float
         Penetration δ in m and its rate v in m/s.
 
@@ -35,7 +41,7 @@ def power_law(
 
     Examples
     --------
-    >>> power_law(2.0, 1.0, 0.5, 3.0, 1.0)
+    >>> power_law(2.0, 1.0, 0.5, 0.0, 3.0, 1.0)
     (9.0, 3.0, 3.0)
     """
     if delta <= 0.0:
@@ -46,7 +52,11 @@ def power_law(
     elif exponent != 1.0:
         slope *= delta ** (exponent - 1.0)
     factor = 1.0 + dissipation * speed
-    return slope * delta * factor, exponent * slope * factor, dissipation * slope * delta
+    return (
+        slope * delta * factor + dashpot * speed,
+        exponent * slope * factor,
+        dissipation * slope * delta + dashpot,
+    )
 
 
 def duration_factor(p: float) -> float:

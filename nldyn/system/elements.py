@@ -162,7 +162,7 @@ def _exact_loss(restitution: float) -> float:
 
 @dataclass(frozen=True)
 class Stop:
-    r"""One-sided contact with the force :math:`F = k\,\delta^p (1 + a\dot\delta)` for δ > 0.
+    r"""One-sided contact: :math:`F = k\,\delta^p (1 + a\dot\delta) + c\,\dot\delta` for δ > 0.
 
     The penetration δ is ``direction * (displacement at `at` - displacement at `against`) - gap``.
 
@@ -189,6 +189,9 @@ class Stop:
         to both, for a positive penetration. numba must be able to compile it. It vanishes with
         the penetration, where `stiffness` and `exponent` say how: as k δ^p. Beyond that it must be
         smooth: one with a kink is several stops with gaps of their own.
+    dashpot : float
+        c in N s/m, parallel to the spring (Kelvin and Voigt's model for a linear one): the force
+        jumps at the contact, and pulls at the end of it.
 
     Raises
     ------
@@ -209,6 +212,7 @@ class Stop:
     against: str | None = None
     dissipation: float = 0.0
     law: ContactLaw | None = None
+    dashpot: float = 0.0
 
     def __post_init__(self) -> None:
         check_types(**{"stop: at": (self.at, str), "stop: against": (self.against, str, None)})
@@ -225,9 +229,14 @@ class Stop:
             raise SystemModelError(
                 f"{owner}: dissipation must not be negative, got {self.dissipation:g}"
             )
+        _finite(owner, "dashpot", self.dashpot)
+        if self.dashpot < 0.0:
+            raise SystemModelError(f"{owner}: dashpot must not be negative, got {self.dashpot:g}")
         if self.law is not None:
-            if self.dissipation:
-                raise SystemModelError(f"{owner}: give either dissipation or a law of your own")
+            if self.dissipation or self.dashpot:
+                raise SystemModelError(
+                    f"{owner}: give either dissipation and a dashpot or a law of your own"
+                )
             check_law(owner, self.law, self.stiffness, self.exponent)
         _finite(owner, "gap", self.gap)
         if self.against == self.at:
@@ -238,7 +247,7 @@ class Stop:
     @property
     def depends_on_speed(self) -> bool:
         """Whether the force may depend on the speed of penetration."""
-        return self.law is not None or self.dissipation != 0.0
+        return self.law is not None or self.dissipation != 0.0 or self.dashpot != 0.0
 
     def force(self, penetration: ArrayLike, speed: ArrayLike = 0.0) -> Real:
         """Force in N at penetrations (m) and speeds (m/s).
@@ -314,6 +323,7 @@ class Stop:
         direction: int = 1,
         against: str | None = None,
         dissipation: float = 0.0,
+        dashpot: float = 0.0,
     ) -> Stop:
         """Linear one-sided spring (the bilinear oscillator's), stiffness in N/m.
 
@@ -324,7 +334,7 @@ class Stop:
         >>> Stop.linear("middle", 1.33e7).exponent
         1.0
         """
-        return cls(at, stiffness, 1.0, gap, direction, against, dissipation)
+        return cls(at, stiffness, 1.0, gap, direction, against, dissipation, None, dashpot)
 
 
 @dataclass(frozen=True)

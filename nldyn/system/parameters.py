@@ -8,7 +8,7 @@ from nldyn.base.errors import SystemModelError, check_types, check_whole
 from nldyn.system.elements import Excitation
 from nldyn.system.system import System
 
-OF_STOPS = ("gap", "stiffness", "exponent", "dissipation")
+OF_STOPS = ("gap", "stiffness", "exponent", "dissipation", "dashpot")
 SOURCES = ("amplitude", "mass_times_radius", "force")
 
 
@@ -32,8 +32,8 @@ class Parameter:
     Parameters
     ----------
     name : str
-        gap, stiffness, exponent or dissipation of a stop (not of one with a law of its own, but
-        for the gap), amplitude, mass_times_radius or force of an excitation.
+        gap, stiffness, exponent, dissipation or dashpot of a stop (not of one with a law of its
+        own, but for the gap), amplitude, mass_times_radius or force of an excitation.
     index : int
         Which of the stops, excitations, dampers or modes of the system.
 

@@ -159,7 +159,7 @@ def _closed(system: System, q: Real) -> Iterator[tuple[Stop, Real, float]]:
 
 def _elastic(stop: Stop, depth: float) -> tuple[float, float]:
     """Force and stiffness of a closed stop at rest."""
-    force, stiffness, _ = power_law(stop.stiffness, stop.exponent, 0.0, depth, 0.0)
+    force, stiffness, _ = power_law(stop.stiffness, stop.exponent, 0.0, 0.0, depth, 0.0)
     return force, stiffness
 
 

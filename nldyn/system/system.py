@@ -320,7 +320,7 @@ class System:
         All excitation must change its sign after half its period T: it has odd harmonics only.
         """
         stops = [
-            (self.stop_vector(s), (s.stiffness, s.exponent, s.gap, s.dissipation, s.law))
+            (self.stop_vector(s), (s.stiffness, s.exponent, s.gap, s.dissipation, s.dashpot, s.law))
             for s in self.stops
         ]
         odd = not np.any(self.drive[self.orders % 2 == 0.0])

@@ -15,12 +15,11 @@ from nldyn.flow.kernels.flights import (
     output_size,
     rate_noise,
 )
-from nldyn.flow.kernels.law import law, singular_slope
+from nldyn.flow.kernels.law import depends_on_speed, law, singular_slope
 from nldyn.flow.kernels.layout import (
     CONTACT_FAILED,
     CREEP,
     DECAY,
-    DISSIPATION,
     DURATION,
     EXPONENT,
     FLIGHT,
@@ -161,7 +160,7 @@ def creep(fl, stop, w, phase, duration):
 
     So it does where an elastic contact would take much longer than the damping to act.
     """
-    if fl.laws[stop] != 0 or fl.stops[stop, DISSIPATION] == 0.0:
+    if fl.laws[stop] != 0 or not depends_on_speed(fl, stop):
         return 0.0, 0.0
     value, speed, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
     depth = value - fl.stops[stop, GAP]

@@ -10,7 +10,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from nldyn.flow.kernels.compiling import inlined, inner
-from nldyn.flow.kernels.layout import DISSIPATION, EXPONENT, GAP, ROUND, STIFFNESS
+from nldyn.flow.kernels.layout import DASHPOT, DISSIPATION, EXPONENT, GAP, ROUND, STIFFNESS
 from nldyn.system import contact_law
 
 power_law = inlined(contact_law.power_law)
@@ -41,7 +41,14 @@ def law(fl, stop, delta, speed):
     if fl.laws[stop] != 0:
         return call_law(fl.laws[stop], delta, speed)
     numbers = fl.stops[stop]
-    return power_law(numbers[STIFFNESS], numbers[EXPONENT], numbers[DISSIPATION], delta, speed)
+    return power_law(
+        numbers[STIFFNESS],
+        numbers[EXPONENT],
+        numbers[DISSIPATION],
+        numbers[DASHPOT],
+        delta,
+        speed,
+    )
 
 
 @inner
@@ -49,18 +56,23 @@ def closed_law(fl, stop, delta, speed):
     """The same within a panel on which the stop is closed.
 
     There a law whose slope sets in almost at once goes on beyond the switch, as an odd function:
-    the outermost node may come to lie on its other side, and would drop the whole stiffness.
+    the outermost node may come to lie on its other side, and would drop the whole stiffness. So
+    does a dashpot.
     """
-    if delta < 0.0 and fl.stops[stop, EXPONENT] < ROUND:
+    if delta > 0.0:
+        return law(fl, stop, delta, speed)
+    dashpot = fl.stops[stop, DASHPOT]
+    if fl.stops[stop, EXPONENT] < ROUND:
         force, stiffness, viscosity = law(fl, stop, -delta, speed)
-        return -force, stiffness, -viscosity
-    return law(fl, stop, delta, speed)
+        return 2.0 * dashpot * speed - force, stiffness, 2.0 * dashpot - viscosity
+    return dashpot * speed, 0.0, dashpot
 
 
 @inner
 def depends_on_speed(fl, stop):
     """Whether a force depends on the speed of penetration, as far as one knows."""
-    return fl.laws[stop] != 0 or fl.stops[stop, DISSIPATION] != 0.0
+    lossy = fl.stops[stop, DISSIPATION] != 0.0 or fl.stops[stop, DASHPOT] != 0.0
+    return fl.laws[stop] != 0 or lossy
 
 
 @inner
@@ -68,7 +80,7 @@ def needs_speed(fl, stop):
     """Whether a force depends on the speed, or is to be differentiated by what makes it do so."""
     needed = depends_on_speed(fl, stop)
     for c in range(fl.parameters.shape[0]):
-        wanted = fl.parameters[c, 0] == DISSIPATION and fl.parameters[c, 1] == stop
+        wanted = fl.parameters[c, 0] in (DISSIPATION, DASHPOT) and fl.parameters[c, 1] == stop
         needed = needed or wanted
     return needed
 
@@ -79,6 +91,9 @@ def law_by(fl, stop, column, delta, speed):
     force, slope, _ = closed_law(fl, stop, delta, speed)
     if column == GAP:
         return -slope
+    if column == DASHPOT:
+        return speed
+    force -= fl.stops[stop, DASHPOT] * speed
     if column == STIFFNESS:
         return force / fl.stops[stop, STIFFNESS]
     if column == EXPONENT:

@@ -43,12 +43,15 @@ class StopRow(NamedTuple):
     stiffness: float
     exponent: float
     dissipation: float
+    dashpot: float
     mobility: float  # velocity jump per unit impulse in 1/kg
     duration: float  # of a free contact, over (peak penetration / speed)
     instant: float  # error allowed in the instant of an event, as a share of the panel
 
 
-GAP, STIFFNESS, EXPONENT, DISSIPATION, MOBILITY, DURATION, INSTANT = range(len(StopRow._fields))
+GAP, STIFFNESS, EXPONENT, DISSIPATION, DASHPOT, MOBILITY, DURATION, INSTANT = range(
+    len(StopRow._fields)
+)
 
 
 class SystemData(NamedTuple):
@@ -63,7 +66,7 @@ class SystemData(NamedTuple):
     force: Real  # (2n, n_stops): w' = A w - force @ F
     orders: Real  # (h,) multiples of the excitation frequency at which something acts; 1 first
     drive: Complex  # (h, 3, 2n) excitation Σ Re(Σ_p ω^p drive[h, p] e^{i orders[h] ωt}) of z
-    stops: Real  # (n_stops, 7), rows as `StopRow`
+    stops: Real  # (n_stops, 8), rows as `StopRow`
     laws: NDArray[np.int64]  # (n_stops,) address of a compiled law, or 0 for the power law
     tail: float  # largest relative Legendre tail accepted on a contact panel
     node_angle: float  # phase of the fastest mode from node to node, in rad

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from nldyn.flow.kernels.compiling import inlined, inner
+from nldyn.flow.kernels.compiling import inlined, inner, never_inline
 from nldyn.flow.kernels.contact import (
     contact_panel,
     expected_contact,
@@ -17,6 +17,7 @@ from nldyn.flow.kernels.contact import (
 from nldyn.flow.kernels.flights import (
     add_growth,
     add_rates,
+    add_swelling_by,
     at_frequency,
     closing_time,
     distance,
@@ -31,6 +32,7 @@ from nldyn.flow.kernels.flights import (
 from nldyn.flow.kernels.law import law
 from nldyn.flow.kernels.layout import (
     CONTACT_FAILED,
+    DASHPOT,
     DECAY,
     FLIGHT,
     GAP,
@@ -161,7 +163,34 @@ def propagate(
 
 
 @inner
-def switch_with(fl, w, phase, h, closed, closings):
+def jump_columns(fl, stop, phase, t, closes, columns):
+    """Change of the sensitivities as a dashpot begins or ceases to act, a time t after the start.
+
+    The force jumps by c δ', and the switch moves by -dδ/δ' with the penetration there: together
+    they change the velocities by c dδ [Aizerman and Gantmacher 1958].
+    """
+    never_inline()
+    n = columns.shape[1]
+    depth = np.zeros(n)
+    for c in range(n):
+        for k in range(columns.shape[0]):
+            depth[c] += fl.rows[0, stop, k] * columns[k, c]
+    turn = turned(phase)
+    depth[n - 1] += ((fl.forced[0, 1, stop] + 1j * t * fl.forced[0, 0, stop]) * turn).real
+    for c in range(fl.parameters.shape[0]):
+        q = columns.shape[0] + c
+        depth[q] += (fl.forced[0, 2 + c, stop] * turn).real
+        if fl.parameters[c, 0] == GAP and fl.parameters[c, 1] == stop:
+            depth[q] -= 1.0
+    add_swelling_by(fl, stop, phase, t, False, 1.0, depth)
+    impulse = -fl.stops[stop, DASHPOT] if closes else fl.stops[stop, DASHPOT]
+    for k in range(columns.shape[0]):
+        for c in range(n):
+            columns[k, c] += impulse * fl.force[k, stop] * depth[c]
+
+
+@inner
+def switch_with(fl, w, phase, t, h, closed, closings, with_columns, columns):
     """Open and close the stops that do so at the very instant of another one's event.
 
     Each to the small share of the length h of the panel before it to which it must be known.
@@ -171,6 +200,8 @@ def switch_with(fl, w, phase, h, closed, closings):
             closed[s] = not closed[s]
             if closed[s]:
                 closings[s] += 1
+            if with_columns and fl.stops[s, DASHPOT] > 0.0:
+                jump_columns(fl, s, phase, t, closed[s], columns)
 
 
 @inlined
@@ -232,7 +263,10 @@ def run_pieces(
             if stop >= 0:
                 closed[stop] = True
                 closings[stop] += 1
-                switch_with(fl, w, phase + fl.omega * t, 0.0, closed, closings)
+                here = phase + fl.omega * t
+                if with_columns and fl.stops[stop, DASHPOT] > 0.0:
+                    jump_columns(fl, stop, here, t, True, columns)
+                switch_with(fl, w, here, t, 0.0, closed, closings, with_columns, columns)
                 start_switch = 1
             continue
         active = active[:n_active]
@@ -246,6 +280,8 @@ def run_pieces(
             if peak <= 100.0 * noise:  # a touch without force
                 closed[active[0]] = False
                 closings[active[0]] -= 1
+                if with_columns and fl.stops[active[0], DASHPOT] > 0.0:
+                    jump_columns(fl, active[0], here, t, False, columns)
                 start_switch, skip = 0, max(left, shortest)
                 continue
         h_max = min(remain, h_mapped if start_switch == 1 else h_even)
@@ -293,7 +329,10 @@ def run_pieces(
             start_switch = 1
             if closed[event]:
                 closings[event] += 1
-            switch_with(fl, w, phase + fl.omega * t, h, closed, closings)
+            here = phase + fl.omega * t
+            if with_columns and fl.stops[event, DASHPOT] > 0.0:
+                jump_columns(fl, event, here, t, closed[event], columns)
+            switch_with(fl, w, here, t, h, closed, closings, with_columns, columns)
             skip = shortest if h < shortest else 0.0
     return TOO_MANY_PIECES
 
