@@ -195,6 +195,13 @@ def full_beam_model(mesh: fem.FrameMesh, middle_mass: float) -> fem.FrameModel:
     )
 
 
+def tube_mesh() -> fem.FrameMesh:
+    """A tube of a heat exchanger, 1.8 m between tube sheets, with a baffle in the middle."""
+    places = {"left": (0.0, 0.0), "baffle": (0.9, 0.0), "quarter": (1.35, 0.0), "right": (1.8, 0.0)}
+    ends = ("left", "baffle", 16), ("baffle", "quarter", 8), ("quarter", "right", 8)
+    return fem.frame_mesh(places, [("tube", *pair) for pair in ends])
+
+
 def main() -> None:
     """Write all files."""
     dimensions = read_dimensions()
@@ -204,6 +211,7 @@ def main() -> None:
     fem.write_mesh(half_beam_mesh(dimensions, 2, 1), HERE / "half_beam_coarse.msh")
     fem.write_mesh(full_beam_mesh(dimensions), HERE / "full_beam.msh")
     fem.write_mesh(solid_half_beam_mesh(dimensions), HERE / "half_beam_solid.vtu")
+    fem.write_mesh(tube_mesh(), HERE / "tube.msh")
 
 
 if __name__ == "__main__":

@@ -13,14 +13,15 @@ from nldyn import Stop, System
 
 
 def contact(stop: Stop, depth: float, speed: float) -> tuple[float, float, float]:
-    """Force k δ^p (1 + a δ') and its derivatives by δ and δ', or what the stop's own law gives."""
+    """Force k δ^p (1 + a δ') + c δ' and its derivatives, or what the stop's own law gives."""
     if depth <= 0.0:
         return 0.0, 0.0, 0.0
     if stop.law is not None:
         return stop.law(depth, speed)
-    k, p, a = stop.stiffness, stop.exponent, stop.dissipation
+    k, p, a, c = stop.stiffness, stop.exponent, stop.dissipation, stop.dashpot
     lossy = 1.0 + a * speed
-    return k * depth**p * lossy, p * k * depth ** (p - 1.0) * lossy, a * k * depth**p
+    force = k * depth**p * lossy + c * speed
+    return force, p * k * depth ** (p - 1.0) * lossy, a * k * depth**p + c
 
 
 class Motion:

@@ -123,7 +123,7 @@ def balanced(jacobians: Real) -> Real:
     Examples
     --------
     >>> balanced(np.array([[[1.0, 1024.0], [1.0 / 1024.0, 1.0]]])).tolist()
-    [[[1.0, 1.0], [1.0, 1.0]]]
+    [[[1.0, 2.0], [0.5, 1.0]]]
     """
     total = np.abs(jacobians).sum(axis=0)
     if not np.all(np.isfinite(total)):

@@ -274,7 +274,7 @@ def _check_interface_names(scene: Scene, report: Report) -> None:
     for key, name in _interfaces_used(scene):
         if name in scene.interface_names:
             continue
-        if key[0] != "excitation":
+        if key[0] != "excitation" or not scene.load_names:
             raise report(key, unknown_name(name, scene.interface_names, "an interface"))
         if name not in scene.load_names:
             known = [*scene.interface_names, *scene.load_names]

@@ -271,7 +271,9 @@ class Stop:
 
     def _evaluate(self, penetration: ArrayLike, speed: ArrayLike) -> tuple[Real, Real]:
         delta, rate = np.broadcast_arrays(np.asarray(penetration, float), np.asarray(speed, float))
-        law = self.law or partial(power_law, self.stiffness, self.exponent, self.dissipation)
+        law = self.law or partial(
+            power_law, self.stiffness, self.exponent, self.dissipation, self.dashpot
+        )
         values = [
             (0.0, 0.0, 0.0) if x <= 0.0 else law(x, v)
             for x, v in zip(delta.ravel().tolist(), rate.ravel().tolist(), strict=True)

@@ -14,7 +14,7 @@ from nldyn.system.system import System
 
 MOST_STEPS = 200
 SHORTEST = 1e-14  # last step, relative
-FLAT = 1e-9  # of the largest stiffness, below which a direction counts as without any
+FLAT = 1e-12  # of the stops' largest stiffness, below which a rigid motion counts as not held
 NOT_HELD = 1e-9  # share of a force, or of a direction, that counts as none
 SHARE = 0.1  # of the decrease that the slope foretells, with which a step is taken
 
@@ -86,13 +86,16 @@ def _downhill(system: System, q: Real, slope: Real) -> Real:
     SystemModelError
         If no stop is there.
     """
-    values, vectors = np.linalg.eigh(tangent_stiffness(system, q))
-    flat = values <= FLAT * values[-1]
-    along = vectors.T @ slope
-    free = -vectors[:, flat] @ along[flat]
+    stiffness = tangent_stiffness(system, q)
+    free = np.zeros(system.size)
+    rigid = np.flatnonzero(system.natural_frequencies == 0.0)
+    if rigid.size:
+        values, vectors = np.linalg.eigh(stiffness[np.ix_(rigid, rigid)])
+        flat = vectors[:, values <= FLAT * values[-1]]
+        free[rigid] = -flat @ (flat.T @ slope[rigid])
     # what rounding shows of a force along a flat direction is none
     if np.linalg.norm(free) <= NOT_HELD * np.linalg.norm(slope):
-        return np.asarray(-vectors[:, ~flat] @ (along[~flat] / values[~flat]))
+        return np.asarray(-np.linalg.lstsq(stiffness, slope, rcond=None)[0])
     force = float(np.linalg.norm(free))
     ways = []
     for stop in system.stops:

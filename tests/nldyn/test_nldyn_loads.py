@@ -27,6 +27,9 @@ from nldyn import (
     save,
     solve_orbit,
 )
+from nldyn.base.resources import example
+from nldyn.scene.build import build_system
+from nldyn.scene.read import load_scene
 from nldyn.system.rest import closed_at_rest, rest
 
 HZ = 3.0
@@ -282,3 +285,36 @@ def test_even_harmonics_break_the_symmetry_of_opposed_stops():
     assert make("held", stops=stops, excitation=odd).symmetric
     for source in (HarmonicForce("a", 1.0, 0.0, 2), ConstantForce("a", 1.0)):
         assert not make("held", stops=stops, excitation=[*odd, source]).symmetric
+
+
+@pytest.mark.parametrize(
+    ("name", "hz"),
+    [
+        ("gear_pair.toml", 0.12),
+        ("ship_between_fenders.toml", 0.5),
+        ("bumper.toml", 6.0),
+        ("tube_between_baffles.toml", 30.0),
+    ],
+)
+def test_an_example_under_loads_is_periodic_by_a_runge_kutta_method(name, hz):
+    """From the orbit's state one period by small steps leads back to it."""
+    system = build_system(load_scene(example(name)))
+    orbit = solve_orbit(system, hz)
+    assert orbit.max_penetration > 0.0
+    start = orbit.states(np.zeros(1))[0]
+    end, _ = Motion(system).run(
+        start, (0.0, 2 * np.pi), 2 * np.pi * hz, tangent=False, max_step=2e-3
+    )
+    sizes = np.abs(orbit.states(np.linspace(0.0, 2 * np.pi, 50))).max(axis=0)
+    assert (np.abs(end - start)[: system.size] < 3e-6 * sizes[: system.size].max()).all()
+
+
+def test_a_tube_lies_in_its_baffle_with_the_force_of_beam_theory():
+    """Three supports, the middle one a spring of 1e6 N/m that is 0.3 mm lower."""
+    system = build_system(load_scene(example("tube_between_baffles.toml")))
+    area = np.pi / 4 * (0.025**2 - 0.021**2)
+    bending = 2.1e11 * np.pi / 64 * (0.025**4 - 0.021**4)
+    sag = 5 * 7850.0 * area * 9.81 * 1.8**4 / (384 * bending)
+    reaction = (sag - 3e-4) / (1.8**3 / (48 * bending) + 1e-6)
+    ((number, _, force),) = closed_at_rest(system, rest(system))
+    assert (number, force) == (1, pytest.approx(reaction, rel=1e-9))
