@@ -106,6 +106,7 @@ class _Block:
     kind: str
     nodes: IntArray
     groups: IntArray
+    labels: IntArray  # (e,), their own numbers
     entities: IntArray | None = None  # (e,), of version 2.2
 
 
@@ -163,6 +164,7 @@ def _mesh(content: bytes) -> meshio.Mesh:
     if version == "2.2":
         labels, points = _nodes_22(nodes)
         blocks = _binary_22(elements) if binary else _lines_22(sections["Elements"])
+        _check_labels(blocks)
         blocks = _once(blocks)
     else:
         labels, points = _nodes_41(nodes)
@@ -171,6 +173,7 @@ def _mesh(content: bytes) -> meshio.Mesh:
             parts = _Numbers(sections["PartitionedEntities"], binary, size_type)
             groups |= _partitioned(parts, groups)
         blocks = _elements_41(elements, groups)
+        _check_labels(blocks)
     order = np.argsort(labels, kind="stable")
     if (np.diff(labels[order]) == 0).any():
         raise ValueError("two nodes have the same number")
@@ -218,6 +221,20 @@ def _apart(blocks: list[_Block], names: dict[tuple[int, int], str]) -> dict[tupl
     }
 
 
+def _check_labels(blocks: list[_Block]) -> None:
+    """Refuse a number that two elements have which are not one, of several groups."""
+    labels = np.concatenate([np.zeros(0, dtype=np.int64), *(block.labels for block in blocks)])
+    numbers, counts = np.unique(labels, return_counts=True)
+    if len(numbers) == len(labels):
+        return
+    first: dict[int, tuple[str, list[int]]] = {}
+    for block in blocks:
+        for row in np.flatnonzero(np.isin(block.labels, numbers[counts > 1])):
+            label, element = int(block.labels[row]), (block.kind, block.nodes[row].tolist())
+            if first.setdefault(label, element) != element:
+                raise ValueError(f"two elements have the number {label}")
+
+
 def _once(blocks: list[_Block]) -> list[_Block]:
     """Elements of version 2.2 that stand once for each of their groups, as one in all of these.
 
@@ -236,6 +253,7 @@ def _once(blocks: list[_Block]) -> list[_Block]:
 def _in_all_groups(kind: str, blocks: list[_Block]) -> _Block:
     nodes = np.concatenate([block.nodes for block in blocks])
     groups = np.concatenate([block.groups[:, 0] for block in blocks])
+    labels = np.concatenate([block.labels for block in blocks])
     entities = np.concatenate(
         [np.zeros(len(b.nodes), np.int64) if b.entities is None else b.entities for b in blocks]
     )
@@ -256,7 +274,8 @@ def _in_all_groups(kind: str, blocks: list[_Block]) -> _Block:
     table = np.zeros((len(kept), widest), dtype=np.int64)
     for row, (_, numbers) in enumerate(kept):
         table[row, : len(numbers)] = numbers
-    return _Block(kind, nodes[[row for row, _ in kept]], table)
+    first = [row for row, _ in kept]
+    return _Block(kind, nodes[first], table, labels[first])
 
 
 def _sections(content: bytes) -> dict[str, bytes]:
@@ -358,25 +377,27 @@ def _lines_22(body: bytes) -> list[_Block]:
     count, *lines = body.strip().splitlines()
     if len(lines) != _whole(count):
         raise ValueError(f"{_whole(count)} elements are declared, but {len(lines)} are there")
-    runs: list[tuple[str, list[list[int]], list[int], list[int]]] = []
+    runs: list[tuple[str, list[list[int]], list[int], list[int], list[int]]] = []
     for line in lines:
         label, code, tags, *rest = (_whole(word) for word in line.split())
         kind = _kind(code)
         if tags < 0 or len(rest) != tags + num_nodes_per_cell[kind]:
             raise ValueError(f"element {label} does not have the numbers of its type")
         if not runs or runs[-1][0] != kind:
-            runs.append((kind, [], [], []))
+            runs.append((kind, [], [], [], []))
         runs[-1][1].append(rest[tags:])
         runs[-1][2].append(abs(rest[0]) if tags else 0)
-        runs[-1][3].append(rest[1] if tags > 1 else 0)
+        runs[-1][3].append(label)
+        runs[-1][4].append(rest[1] if tags > 1 else 0)
     return [
         _Block(
             kind,
             np.array(nodes, dtype=np.int64),
             np.array(groups, dtype=np.int64)[:, None],
+            np.array(labels, dtype=np.int64),
             np.array(entities, dtype=np.int64),
         )
-        for kind, nodes, groups, entities in runs
+        for kind, nodes, groups, labels, entities in runs
     ]
 
 
@@ -391,7 +412,7 @@ def _binary_22(numbers: _Numbers) -> list[_Block]:
         rows = numbers.integers(here * width).reshape(here, width)
         groups = np.abs(rows[:, 1:2]) if tags else np.zeros((here, 1), dtype=np.int64)
         entities = rows[:, 2] if tags > 1 else np.zeros(here, dtype=np.int64)
-        blocks.append(_Block(kind, rows[:, 1 + tags :], groups, entities))
+        blocks.append(_Block(kind, rows[:, 1 + tags :], groups, rows[:, 0], entities))
         count -= here
     numbers.end()
     return blocks
@@ -458,7 +479,7 @@ def _elements_41(numbers: _Numbers, groups: Groups) -> list[_Block]:
         width = 1 + num_nodes_per_cell[kind]
         rows = numbers.sizes(here * width).reshape(here, width)
         of_entity = groups.get((dimension, tag), np.zeros(0, dtype=np.int64))
-        found.append(_Block(kind, rows[:, 1:], np.tile(of_entity, (here, 1))))
+        found.append(_Block(kind, rows[:, 1:], np.tile(of_entity, (here, 1)), rows[:, 0]))
     numbers.end()
     if sum(len(block.nodes) for block in found) != count:
         raise ValueError(f"{count} elements are declared, but others are there")

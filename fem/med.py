@@ -24,6 +24,9 @@ KINDS = {
 }  # fmt: skip
 """Kinds of cells by MED's name; its nodes are in VTK's order, but for the handedness of solids."""
 
+SYSTEMS = {1: "cylindrical", 2: "spherical"}
+"""MED's other systems of coordinates, by their numbers."""
+
 
 def read_med(path: Path) -> meshio.Mesh:
     """Read the nodes, cells and groups of a MED file with one mesh.
@@ -37,12 +40,13 @@ def read_med(path: Path) -> meshio.Mesh:
     -------
     meshio.Mesh
         One block for each kind of cell; groups of cells as cell sets, groups of nodes as point
-        sets.
+        sets. Its ``info`` is a list of sentences: which unit the file states if it is not the m.
 
     Raises
     ------
     ModelError
-        If it is not a MED file, holds several meshes or steps, or cells of a kind that is not read.
+        If it is not a MED file, is not in Cartesian coordinates, holds several meshes or steps, or
+        cells of a kind that is not read.
 
     References
     ----------
@@ -61,9 +65,34 @@ def read_med(path: Path) -> meshio.Mesh:
         if len(names) != 1:
             raise ModelError(f"{path}: holds {len(names)} meshes, not one: {quoted(names)}")
         mesh = file["ENS_MAA"][names[0]]
+        _check_cartesian(path, mesh)
         step = mesh if "NOE" in mesh else _only_step(path, mesh)
         families = file["FAS"][names[0]] if "FAS" in file and names[0] in file["FAS"] else {}
-        return _content(path, step, families, int(mesh.attrs["ESP"]))
+        content = _content(path, step, families, int(mesh.attrs["ESP"]))
+        content.info = _told_unit(path, mesh)
+        return content
+
+
+def _check_cartesian(path: Path, mesh: Any) -> None:
+    system = int(mesh.attrs.get("REP", 0))
+    if system:
+        name = SYSTEMS.get(system, "of an unknown kind")
+        raise ModelError(
+            f"{path}: its coordinates are {name} (REP = {system}); save them as Cartesian ones"
+        )
+
+
+def _told_unit(path: Path, mesh: Any) -> list[str]:
+    """What to say of the unit of the axes, which have 16 letters each."""
+    letters = bytes(mesh.attrs.get("UNI", b"")).decode("latin-1").replace("\0", " ")
+    units = dict.fromkeys(letters[i : i + 16].strip() for i in range(0, len(letters), 16))
+    others = [unit for unit in units if unit not in ("", "m")]
+    if not others:
+        return []
+    return [
+        f"{path}: states the unit {quoted(others)} for its coordinates, but they are taken as they"
+        " are, in m unless 'unit' in [mesh] says otherwise"
+    ]
 
 
 def _only_step(path: Path, mesh: Any) -> Any:

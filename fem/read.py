@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import redirect_stderr
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TypeVar
 from urllib.parse import unquote
 from xml.sax.saxutils import unescape
@@ -34,6 +35,12 @@ Mesh = TypeVar("Mesh", FrameMesh, StructureMesh)
 
 FARTHEST = 1e50
 
+GHOSTS = {"vtkGhostType": 1 | 8 | 32, "vtkGhostLevels": 255}
+"""Bits of VTK's arrays for cells of another piece, cells that others refine, and hidden ones."""
+
+FIELD_DATA = re.compile(rb"<FieldData\b(?:[^>]*/>|.*?</FieldData>)", re.DOTALL)
+"""What a VTK file says of the whole, such as ParaView's time; meshio stops at it in a piece."""
+
 LEGACY_ARRAY = re.compile(
     rb"^(?:SCALARS +)?(set\S+) +(?:\d+ +\d+ +)?[a-z]\w*(?: +\d+)?[ \r]*$", re.MULTILINE
 )
@@ -51,13 +58,17 @@ FAULTS = (
 
 def read_vtu(path: Path) -> meshio.Mesh:
     """Read a VTK file, without unpacking endlessly; what meshio would leave out is an error."""
-    for _, arrays in re.findall(
-        rb"<(PointData|CellData)\b(.*?)</\1>", path.read_bytes(), re.DOTALL
-    ):
+    before, appended, data = path.read_bytes().partition(b"<AppendedData")
+    told = FIELD_DATA.sub(b"", before)
+    for _, arrays in re.findall(rb"<(PointData|CellData)\b(.*?)</\1>", told, re.DOTALL):
         found = re.findall(rb"<DataArray\b[^>]*?\bName=[\"']([^\"']*)[\"']", arrays)
         _check_each_once([unescape(name.decode("utf-8", "replace")) for name in found], path)
-    with bounded_unpacking(path):
-        return _without_warning(meshio.vtu.read, path)
+    with bounded_unpacking(path), TemporaryDirectory() as folder:
+        without = Path(folder) / "mesh.vtu"
+        without.write_bytes(told + appended + data)
+        content = _without_warning(meshio.vtu.read, without)
+    _check_no_ghosts(content, path)
+    return content
 
 
 def read_vtk(path: Path) -> meshio.Mesh:
@@ -76,7 +87,20 @@ def read_vtk(path: Path) -> meshio.Mesh:
     for data in (content.point_data, content.cell_data):
         for name in list(data):
             data[unquote(name)] = data.pop(name)
+    _check_no_ghosts(content, path)
     return content
+
+
+def _check_no_ghosts(content: meshio.Mesh, path: Path) -> None:
+    """Refuse cells that a VTK file marks as ones that do not count."""
+    for name in GHOSTS.keys() & content.cell_data:
+        marks = np.concatenate([np.ravel(marks) for marks in content.cell_data[name]])
+        found = np.flatnonzero(marks.astype(np.int64) & GHOSTS[name])
+        if len(found):
+            raise ModelError(
+                f"{path}: its array {name!r} says that {len(found)} cells (the first is cell"
+                f" {found[0]}) are hidden, refined or of another piece; save it without them"
+            )
 
 
 def _check_each_once(names: Sequence[str], path: Path) -> None:
@@ -216,8 +240,9 @@ def _read(
             solids, left_out = read_nastran(path)
             content, said = without_cells(solids, ignore, str(path))
             return replace(_noted(build(content, str(path)), said), left_out=left_out)
-        content, said = without_cells(READERS[extension][1](path), ignore, str(path))
-        return _noted(build(content, str(path)), said)
+        whole = READERS[extension][1](path)
+        content, said = without_cells(whole, ignore, str(path))
+        return _noted(_noted(build(content, str(path)), whole.info or ()), said)
     except ModelError:
         raise
     except (Exception, SystemExit) as error:

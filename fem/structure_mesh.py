@@ -285,6 +285,16 @@ def joined(meshes: Sequence[StructureMesh], tolerance: float | None = None) -> S
     tolerance
         Distance in m below which nodes are one; by default 1e-9 of the size of the whole.
 
+    Returns
+    -------
+    StructureMesh
+        Its notes tell how many nodes are gone, and how far away those are that stand for them.
+
+    Raises
+    ------
+    ModelError
+        If a spring or damper is between nodes that become one.
+
     Examples
     --------
     >>> left = box_mesh("left", (1.0, 1.0, 1.0), (1, 1, 1))
@@ -313,14 +323,17 @@ def joined(meshes: Sequence[StructureMesh], tolerance: float | None = None) -> S
                     blocks.append(found + before.get(kind, 0))
         for name, nodes in mesh.point_sets.items():
             sets.setdefault(name, []).append(number[nodes + first])
+        _check_links(mesh, number[first : first + len(mesh.points)])
         first += len(mesh.points)
+    moved = np.linalg.norm(points - points[kept][number], axis=1).max()
+    said = f"{len(points) - len(kept)} nodes are merged into others, at most {moved:.3g} m away"
     return StructureMesh(
         points[kept],
         {kind: np.concatenate(blocks) for kind, blocks in cells.items()},
         _in_one(groups),
         {name: np.concatenate(nodes) for name, nodes in sets.items()},
         " + ".join(dict.fromkeys(mesh.source for mesh in meshes)),
-        notes=[note for mesh in meshes for note in mesh.notes],
+        notes=[*(note for mesh in meshes for note in mesh.notes), said],
         attachments=sum((mesh.attachments for mesh in meshes), Attachments()),
         element_types=_in_one(types),
         described={name: keys for mesh in meshes for name, keys in mesh.described.items()},
@@ -348,6 +361,22 @@ def _check_attached_names(meshes: Sequence[StructureMesh]) -> None:
                     f"{mesh.source}: something is attached to {both[0]!r}, and {other.source} has"
                     " this name, too; rename one of them before they are joined"
                 )
+
+
+def _check_links(mesh: StructureMesh, number: IntArray) -> None:
+    """Refuse springs and dampers whose two nodes get one number."""
+    lost = []
+    for link in mesh.attachments.links:
+        ends = [mesh.node(point) for point in link.points]
+        if len(set(ends)) > len(set(number[ends].tolist())):
+            lost.append(f"{link.first!r} and {link.second!r}")
+    if lost:
+        pairs = list(dict.fromkeys(lost))
+        told = "; ".join(pairs[:5]) + ("; ..." if len(pairs) > 5 else "")
+        raise ModelError(
+            f"{mesh.source}: {len(lost)} springs or dampers are between nodes that are merged into"
+            f" one, where they would do nothing: {told}; do without 'merge' or without these"
+        )
 
 
 def _merged(points: FloatArray, tolerance: float | None) -> tuple[IntArray, IntArray]:

@@ -229,3 +229,21 @@ def test_a_vtk_legacy_file_that_is_not_understood_is_refused_with_advice(tmp_pat
     path.write_text(LEGACY.replace("POINTS 8 double", "POINTS 8 quaternion"))
     with pytest.raises(fem.ModelError, match=r"not read of VTK legacy .* as '\.vtu'"):
         fem.read_structure(path)
+
+
+def test_med_in_other_coordinates_is_refused_and_another_unit_told(tmp_path):
+    path, box = tmp_path / "box.med", fem.box_mesh("block", (1.0, 1.0, 1.0), (1, 1, 1))
+    write_med(box, path)
+    assert not fem.read_structure(path).notes
+    for system, name in ((1, "cylindrical"), (2, "spherical")):
+        with h5py.File(path, "r+") as file:
+            file["ENS_MAA/block"].attrs["REP"] = system
+        with pytest.raises(fem.ModelError, match=rf"are {name} \(REP = {system}\)"):
+            fem.read_structure(path)
+    for unit, told in (("m", False), ("", False), ("mm", True)):
+        with h5py.File(path, "r+") as file:
+            file["ENS_MAA/block"].attrs["REP"] = 0
+            file["ENS_MAA/block"].attrs["UNI"] = np.bytes_(3 * f"{unit:16}")
+        mesh = fem.read_structure(path)
+        assert (mesh.points == box.points).all()
+        assert len(mesh.notes) == told and all("the unit 'mm'" in note for note in mesh.notes)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import meshio
 import numpy as np
 import pytest
@@ -66,6 +68,31 @@ def test_merged_they_are_one_bar_and_separate_two():
 def test_pieces_at_a_distance_are_told():
     model = fem.StructureModel(two_boxes(0.1), BAR, supports=ENDS)
     assert "the model is in 2 pieces that are not joined" in fem.summary(fem.assemble(model))
+
+
+def test_merging_tells_how_many_nodes_and_how_far():
+    assert fem.joined([two_boxes()]).notes == ("8 nodes are merged into others, at most 0 m away",)
+    assert fem.joined([two_boxes(0.001)], 0.002).notes == (
+        "8 nodes are merged into others, at most 0.001 m away",
+    )
+
+
+def test_springs_between_nodes_that_are_merged_are_refused():
+    boxes = two_boxes()
+    touching = fem.pieces_of(fem.StructureModel(boxes, BAR)).touching[0]
+    places = {"a": [touching[0]], "b": [touching[1]], "far": [0]}
+    mesh = replace(
+        boxes.with_point_sets(places),
+        attachments=fem.Attachments(links=[fem.Link("a", "b", ("x", "x"), stiffness=1e6)]),
+    )
+    with pytest.raises(
+        fem.ModelError,
+        match=r"boxes: 1 springs or dampers are between nodes that are merged .*: 'a' and 'b'; do",
+    ):
+        fem.joined([mesh])
+    kept = [fem.Link("far", "b", ("x", "x"), stiffness=1e6), fem.Link("a", None, ("x",), 1e6)]
+    merged = fem.joined([replace(mesh, attachments=fem.Attachments(links=kept))])
+    assert list(merged.attachments.links) == kept
 
 
 @pytest.mark.parametrize("order", [[0, 1, 2, 3, 4, 5, 6, 7], [1, 2, 3, 0, 5, 6, 7, 4]])
@@ -309,3 +336,34 @@ def test_a_slit_within_one_piece_is_told():
     model = fem.StructureModel(mesh, BAR, couplings=[fem.Coupling("frame", "ends")])
     with pytest.warns(fem.JointWarning, match="16 nodes are at the place of another one that they"):
         fem.assemble(model)
+
+
+@pytest.mark.parametrize("mark", [1, 8, 32])
+def test_ghosts_of_vtk_are_refused(tmp_path, mark):
+    name = "vtkGhostType"
+    for extension in (".vtu", ".vtk"):
+        path = tmp_path / f"square{extension}"
+        marked = content()
+        marked.cell_data[name] = [
+            np.full(len(block.data), mark * (block.type == "triangle")) for block in marked.cells
+        ]
+        meshio.write(path, marked)
+        with pytest.raises(fem.ModelError, match=rf"'{name}' says that 2 cells .* are hidden"):
+            fem.read_structure(path)
+        marked.cell_data[name] = [np.zeros(len(block.data), int) for block in marked.cells]
+        meshio.write(path, marked)
+        assert len(fem.read_structure(path).cells["triangle"]) == 2
+
+
+@pytest.mark.parametrize("place", ["<Piece", "<Points>"])
+def test_what_a_vtk_file_says_of_the_whole_is_passed_over(tmp_path, place):
+    """ParaView writes the time of a step there, and texts."""
+    path = tmp_path / "square.vtu"
+    meshio.write(path, content(), binary=False)
+    time = (
+        '<FieldData><DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">'
+        "0.5</DataArray></FieldData>"
+    )
+    plain = fem.read_structure(path)
+    path.write_text(path.read_text().replace(place, time + place))
+    assert (fem.read_structure(path).points == plain.points).all()

@@ -363,6 +363,20 @@ def test_what_is_wrong_with_a_file_is_told(tmp_path, name, content, sentence):
         fem.read_mesh(tmp_path / name)
 
 
+@pytest.mark.parametrize("again", ["1 1 2 1 1 2 3", "1 15 2 1 1 2"])
+def test_a_number_of_two_gmsh_elements_is_refused(tmp_path, again):
+    path = tmp_path / "rod.msh"
+    text = (
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n3\n1 0 0 0\n2 1 0 0\n3 2 0 0\n$EndNodes\n"
+        f"$Elements\n2\n1 1 2 1 1 1 2\n{again}\n$EndElements\n"
+    )
+    path.write_text(text)
+    with pytest.raises(fem.ModelError, match="two elements have the number 1"):
+        fem.read_mesh(path)
+    path.write_text(text.replace(again, f"2{again[1:]}"))
+    assert fem.read_mesh(path).lengths.tolist() == [1.0] * (2 if again.endswith("3") else 1)
+
+
 @pytest.mark.parametrize("name", ["gmsh22.msh", "gmsh41.msh", "gmsh_export.inp"])
 def test_a_file_with_a_hole_never_ends_in_a_traceback(tmp_path, name):
     whole = (DATA / name).read_bytes()
