@@ -61,6 +61,8 @@ class Matrices:
         How many decimal digits the entries of stiffness and mass have, 3 to 17; read off the
         entries unless given. State it where they were rounded and then converted to other units,
         or where exact entries look rounded (17).
+    load_vectors : tuple of str
+        Names of those interfaces that are loads on the whole, as a weight is.
 
     Examples
     --------
@@ -75,6 +77,7 @@ class Matrices:
     interfaces: Mapping[str, Any]
     damping: Any = None
     digits: int | None = None
+    load_vectors: tuple[str, ...] = ()
 
 
 def reduce(

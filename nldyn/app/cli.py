@@ -180,24 +180,26 @@ def run(
 def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
     """Check a scene, and print the modes of its structure."""
     with plain_errors():
+        import cms
         import fem
         from nldyn.runtime.progress import messages_shown
-        from nldyn.scene.build import build_candidates, build_reduced, build_system
+        from nldyn.scene.build import build_any, build_candidates, build_reduced, build_system
         from nldyn.scene.checks import check_computable, range_remark
-        from nldyn.scene.component import build_component
         from nldyn.scene.read import load_scene
 
         loaded = load_scene(scene, mesh_folders)
         with messages_shown():
             reduced = candidates = None
-            component = None if loaded.mesh is None else build_component(loaded)
+            component = None if loaded.reduction is None else build_any(loaded)
             if loaded.reduction is not None and loaded.reduction.tolerance is not None:
                 candidates = build_candidates(loaded, component)
                 reduced = candidates.reduced()
             elif component is not None:
                 reduced = build_reduced(loaded, component)
             system = build_system(loaded, reduced)
-        if component is not None:
+        if isinstance(component, cms.Matrices):
+            click.echo(f"matrices of {component.mass.shape[0]} degrees of freedom")
+        elif component is not None:
             click.echo(fem.summary(component))
         click.echo(describe_system(system, 0 if reduced is None else reduced.residual_modes))
         check_computable(loaded, scene)

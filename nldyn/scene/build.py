@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, TypeVar
 
 import cms
 import fem
-from nldyn.base.errors import ConvergenceError, SystemModelError
+from nldyn.base.errors import LARGEST_DENSE, ConvergenceError, SystemModelError
 from nldyn.reduction.candidates import Candidates, candidate_modes
 from nldyn.reduction.load_case import system_of_reduced
 from nldyn.runtime.progress import Progress
 from nldyn.scene.checks import check_ratio_count
 from nldyn.scene.component import build_component
-from nldyn.scene.elements import acting_elements
+from nldyn.scene.elements import Acting, acting_elements
 from nldyn.scene.faults import told_as
 from nldyn.scene.load_case import load_case_of
+from nldyn.scene.matrices import build_matrices
 from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import Scene
 from nldyn.system.system import System
@@ -25,23 +26,35 @@ if TYPE_CHECKING:
     from nldyn.reduction.selection import ModeSelection
 
 Given = TypeVar("Given")
+AnyComponent = fem.Component | fem.StructureComponent | cms.Matrices
 logger = logging.getLogger("nldyn")
 LARGE = 20000  # degrees of freedom from which on the factorisation takes seconds
 
 
+def build_any(scene: Scene) -> AnyComponent:
+    """The component of a scene that is to be reduced: of its mesh or its matrices.
+
+    Raises
+    ------
+    SceneError
+        As `build_component` and `build_matrices`.
+    """
+    return build_component(scene) if scene.matrices is None else build_matrices(scene)
+
+
 def build_reduced(
     scene: Scene,
-    component: fem.Component | fem.StructureComponent | None = None,
+    component: AnyComponent | None = None,
     progress: Progress | None = None,
 ) -> cms.ReducedModel:
-    """Reduce the mesh of a scene to the modes that it asks for.
+    """Reduce the mesh or the matrices of a scene to the modes that it asks for.
 
     Parameters
     ----------
     scene : Scene
-        A scene with a ``[mesh]`` and a ``[reduction]``.
-    component : fem.Component or fem.StructureComponent, optional
-        What `build_component` gave for this scene, if it is at hand.
+        A scene with a ``[mesh]`` or ``[matrices]``, and a ``[reduction]``.
+    component : optional
+        What `build_any` gave for this scene, if it is at hand.
     progress : callable, optional
         As for `nldyn.select_modes`, which chooses the modes of a scene with a tolerance.
 
@@ -63,14 +76,14 @@ def build_reduced(
     >>> len(reduced.frequencies_hz)
     2
     """
-    component = component or build_component(scene)
+    component = component or build_any(scene)
     table = scene.reduction
     assert table is not None
     if table.tolerance is not None:
         selection = build_selection(scene, component, progress)
         logger.info(selection.report())
         return selection.reduced
-    pieces = fem.pieces_of(component.model).count
+    pieces = 1 if isinstance(component, cms.Matrices) else fem.pieces_of(component.model).count
     hint = f"; the mesh is in {pieces} pieces that share no node" if pieces > 1 else ""
     with told_as(scene, ("reduction",), cms.ReductionError, hint=hint):
         reduced = cms.reduce(
@@ -91,9 +104,7 @@ def build_reduced(
         return reduced
 
 
-def build_candidates(
-    scene: Scene, component: fem.Component | fem.StructureComponent | None = None
-) -> Candidates:
+def build_candidates(scene: Scene, component: AnyComponent | None = None) -> Candidates:
     """The modes among which a scene with a tolerance chooses, by its linear response alone.
 
     Parameters
@@ -111,14 +122,14 @@ def build_candidates(
         As for `build_selection`, as far as the linear response tells.
     """
     setting = load_case_of(scene)
-    component = component or build_component(scene)
+    component = component or build_any(scene)
     with told_as(scene, ("reduction",), cms.ReductionError, SystemModelError):
         return candidate_modes(component, setting)
 
 
 def build_selection(
     scene: Scene,
-    component: fem.Component | fem.StructureComponent | None = None,
+    component: AnyComponent | None = None,
     progress: Progress | None = None,
 ) -> ModeSelection:
     """Choose the modes of a scene by the tolerance of its ``[reduction]``.
@@ -126,9 +137,9 @@ def build_selection(
     Parameters
     ----------
     scene : Scene
-        A scene with a ``[mesh]`` and ``tolerance`` in ``[reduction]``.
-    component : fem.Component or fem.StructureComponent, optional
-        What `build_component` gave for this scene, if it is at hand.
+        A scene with ``tolerance`` in ``[reduction]``.
+    component : optional
+        What `build_any` gave for this scene, if it is at hand.
     progress : callable, optional
         As for `nldyn.select_modes`.
 
@@ -147,7 +158,7 @@ def build_selection(
     table = scene.reduction
     assert table is not None and table.tolerance is not None
     setting = load_case_of(scene)
-    component = component or build_component(scene)
+    component = component or build_any(scene)
     faults = (cms.ReductionError, ConvergenceError, SystemModelError)
     with told_as(scene, ("reduction",), *faults):
         return select_modes(component, setting, tolerance=table.tolerance, progress=progress)
@@ -184,8 +195,8 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
         acting = acting_elements(scene)
         ratio = scene.damping.modal_ratio
         rayleigh = scene.damping.rayleigh
-        if any(rayleigh) and scene.mesh is None:
-            fault = "has Rayleigh's damping, which needs a [mesh]"
+        if any(rayleigh) and scene.reduction is None:
+            fault = "has Rayleigh's damping, which needs a [reduction]"
             raise scene_error(scene.file, ("damping",), fault)
         if scene.modal is not None:
             hz = scene.modal.frequencies_hz
@@ -198,24 +209,33 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
                 loads=scene.modal.loads,
                 **acting._asdict(),
             )
-        if scene.matrices is not None:
-            table = scene.matrices
-            check_ratio_count(scene, len(table.mass), scene.file)
-            first = _observed_first(scene, table.interfaces)
-            with told_as(scene, ("matrices",), SystemModelError):
-                return System.from_matrices(
-                    table.mass,
-                    table.stiffness,
-                    first,
-                    damping=table.damping,
-                    modal_damping=ratio,
-                    loads=table.loads,
-                    **acting._asdict(),
-                )
+        if scene.matrices is not None and scene.reduction is None:
+            return _unreduced(scene, build_matrices(scene), acting)
         reduced = reduced or build_reduced(scene)
         check_ratio_count(scene, len(reduced.frequencies_hz), scene.file)
         return system_of_reduced(
             reduced, scene.observed, rayleigh, modal_damping=ratio, **acting._asdict()
+        )
+
+
+def _unreduced(scene: Scene, component: cms.Matrices, acting: Acting) -> System:
+    """The system of matrices that are small enough as they are."""
+    rows = component.mass.shape[0]
+    if rows > LARGEST_DENSE:
+        fault = f"is missing: matrices of {rows} rows, more than {LARGEST_DENSE}, must be reduced"
+        raise scene_error(scene.file, ("reduction",), f"{fault}, as by modes = 10")
+    check_ratio_count(scene, rows, scene.file)
+    loads = {name: component.interfaces[name] for name in component.load_vectors}
+    interfaces = {name: v for name, v in component.interfaces.items() if name not in loads}
+    with told_as(scene, ("matrices",), SystemModelError):
+        return System.from_matrices(
+            component.mass,
+            component.stiffness,
+            _observed_first(scene, interfaces),
+            damping=component.damping,
+            modal_damping=scene.damping.modal_ratio,
+            loads=loads,
+            **acting._asdict(),
         )
 
 

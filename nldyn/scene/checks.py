@@ -117,8 +117,8 @@ def check_computable(scene: Scene, file: Path) -> None:
 
 
 def range_remark(scene: Scene, highest_hz: float) -> str:
-    """Say that the range goes beyond the modes that are kept of a mesh; empty if it does not."""
-    if scene.mesh is None or scene.continuation is None:
+    """Say that the range goes beyond the modes that are kept; empty if it does not."""
+    if scene.reduction is None or scene.continuation is None:
         return ""
     top = max(scene.continuation.range_hz)
     if top <= highest_hz:
@@ -196,7 +196,7 @@ def _check_structure(scene: Scene, report: Report) -> None:
         raise report((kinds[1],), f"cannot stand beside [{kinds[0]}]; keep one of them")
     if scene.mesh is None:
         for key in MESH_ONLY:
-            if getattr(scene, key):
+            if getattr(scene, key) and (key, kinds[0]) != ("reduction", "matrices"):
                 raise report(
                     (key,), f"describes a mesh, but the structure is given by [{kinds[0]}]"
                 )
@@ -230,23 +230,30 @@ def _check_modal(scene: Scene, report: Report) -> None:
 
 
 def _check_matrices(scene: Scene, report: Report) -> None:
+    """Check the matrices and vectors that are typed in; those in files are checked when read."""
     table = scene.matrices
     if table is None:
         return
-    count = len(table.mass)
-    for row in table.mass:
-        if len(row) != count:
-            fault = f"must be square, but has {_counted(count, 'row')} and one of "
-            raise report(("matrices", "mass"), fault + _counted(len(row), "number"))
-    for key, matrix in (
-        ("mass", table.mass), ("stiffness", table.stiffness), ("damping", table.damping)
-    ):  # fmt: skip
-        if matrix is not None:
+    mass, typed = table.mass, {}
+    for key in ("mass", "stiffness", "damping"):
+        matrix = getattr(table, key)
+        if isinstance(matrix, list):
+            typed[key] = matrix
+    if isinstance(mass, list):
+        count = len(mass)
+        for row in mass:
+            if len(row) != count:
+                fault = f"must be square, but has {_counted(count, 'row')} and one of "
+                raise report(("matrices", "mass"), fault + _counted(len(row), "number"))
+        for key, matrix in typed.items():
             _check_symmetric(matrix, count, ("matrices", key), report)
-    if np.linalg.eigvalsh(np.array(table.mass))[0] <= 0:
-        raise report(("matrices", "mass"), "must be positive definite")
-    for name, values in table.interfaces.items():
-        _check_length(values, count, "degree of freedom", ("matrices", "interfaces", name), report)
+        if np.linalg.eigvalsh(np.array(mass))[0] <= 0:
+            raise report(("matrices", "mass"), "must be positive definite")
+    for kind in ("interfaces", "loads"):
+        for name, values in getattr(table, kind).items():
+            if isinstance(values, list) and isinstance(mass, list):
+                key_path = ("matrices", kind, name)
+                _check_length(values, len(mass), "degree of freedom", key_path, report)
 
 
 def _counted(count: int, what: str) -> str:

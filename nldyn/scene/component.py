@@ -11,7 +11,7 @@ from nldyn.base.resources import data_directory
 from nldyn.scene.checks import check_mesh_names, check_structure_names
 from nldyn.scene.described_parts import with_described_parts
 from nldyn.scene.faults import check_regular, told_as, unreadable
-from nldyn.scene.messages import scene_error
+from nldyn.scene.messages import KeyPath, scene_error
 from nldyn.scene.schema import PartTable, Scene
 
 Mesh = TypeVar("Mesh", fem.FrameMesh, fem.StructureMesh)
@@ -50,7 +50,7 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
     """
     if scene.mesh is None:
         raise scene_error(scene.file, ("mesh",), "is missing: the structure is not given by a mesh")
-    path, ignore = _mesh_path(scene, scene.mesh.file), scene.mesh.ignore
+    path, ignore = readable_path(scene, scene.mesh.file, ("mesh", "file")), scene.mesh.ignore
     if scene.mesh.model == "structure":
         with told_as(scene, ("mesh", "file"), fem.ModelError):
             structure = fem.read_structure(path, _mesh_places(scene), ignore)
@@ -210,24 +210,30 @@ def _section(table: PartTable) -> fem.CrossSection | fem.TaperedSection:
     )
 
 
-def _mesh_path(scene: Scene, name: str) -> Path:
-    """Where the mesh is: a file that can be read, in one of the places it may come from."""
+def readable_path(scene: Scene, name: str, key: KeyPath) -> Path:
+    """Where a file that a key names is: one that can be read, where files may come from.
+
+    Raises
+    ------
+    SceneError
+        If it is elsewhere, or cannot be read.
+    """
     path = scene.file.parent / name
     try:
         real = path.resolve()
         if not any(real.is_relative_to(place) for place in _mesh_places(scene)):
             advice = f"if that is meant, allow it with --mesh-folder {real.parent}"
             if not real.is_file():
-                advice = "there is no such file: copy the mesh beside the scene"
+                advice = "there is no such file: copy it beside the scene"
             fault = f"leads to {real}, outside the folder of the scene and the current one"
-            raise scene_error(scene.file, ("mesh", "file"), f"{fault}; {advice}")
+            raise scene_error(scene.file, key, f"{fault}; {advice}")
         check_regular(path)
         path.open("rb").close()
     except SceneError:
         raise
     except (OSError, ValueError, RuntimeError) as error:  # the last one of links in a circle
         fault = f"names {path}, which {unreadable(error)}"
-        raise scene_error(scene.file, ("mesh", "file"), fault) from None
+        raise scene_error(scene.file, key, fault) from None
     return path
 
 

@@ -15,12 +15,12 @@ def load_case_of(scene: Scene) -> LoadCase:
     Raises
     ------
     SceneError
-        If the scene has no mesh, nothing to compute, or damping ratios for a certain number of
+        If the scene has no reduction, nothing to compute, or damping ratios for a certain number of
         modes.
     """
     check_computable(scene, scene.file)
-    if scene.mesh is None:
-        raise scene_error(scene.file, ("mesh",), "is missing: nothing is reduced")
+    if scene.reduction is None:
+        raise scene_error(scene.file, ("reduction",), "is missing: nothing is reduced")
     if isinstance(scene.damping.modal_ratio, list):
         fault = "must be one number where the number of modes is open"
         raise scene_error(scene.file, ("damping", "modal_ratio"), fault)

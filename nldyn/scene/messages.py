@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Tag, ValidationError
 from pydantic_core import ErrorDetails
 
 from nldyn.base.errors import SceneError
@@ -104,17 +104,31 @@ def from_validation(file: Path, model: type[BaseModel], error: ValidationError) 
 def _own_steps(model: type[BaseModel], key: KeyPath) -> KeyPath:
     """The steps of a key that are a user's, without those of pydantic into one of several types."""
     here: Any = model
-    for number, step in enumerate(key):
+    steps: list[str | int] = []
+    for step in key:
         while get_origin(here) is Annotated:
             here = get_args(here)[0]
+        tagged = _tagged(here, step)
+        if tagged is not None:  # a step into one of several types
+            here = tagged
+            continue
         if isinstance(here, type) and issubclass(here, BaseModel):
             field = here.model_fields.get(str(step))
             here = _without_none(field.annotation) if field else None
         elif get_origin(here) in (list, dict):
             here = get_args(here)[-1]
         else:
-            return key[:number]
-    return key
+            break
+        steps.append(step)
+    return tuple(steps)
+
+
+def _tagged(annotation: Any, tag: str | int) -> Any:
+    """The one of several types that has a tag, if there is one."""
+    for option in get_args(annotation):
+        if Tag(str(tag)) in get_args(option)[1:]:
+            return option
+    return None
 
 
 def _fault(model: type[BaseModel], detail: ErrorDetails) -> str:

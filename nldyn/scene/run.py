@@ -164,7 +164,7 @@ def _to_follow(scene: Scene, shares: Shares) -> tuple[FlowMap, ContinuationTable
     """Flow map of a scene that says what to compute."""
     check_computable(scene, scene.file)
     model = None
-    if scene.mesh is not None:
+    if scene.reduction is not None:
         model = build_reduced(scene, progress=shares.part("model"))
     system = build_system(scene, model)
     shares.end("model")

@@ -7,6 +7,7 @@ checks what can be judged inside one table; what joins two tables is checked in
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -14,8 +15,10 @@ from pydantic import (
     AfterValidator,
     BaseModel,
     ConfigDict,
+    Discriminator,
     Field,
     PrivateAttr,
+    Tag,
     field_validator,
     model_validator,
 )
@@ -289,14 +292,56 @@ class ModalTable(Table):
     loads: dict[str, list[Number]] = {}
 
 
+class PlaceOfMatrices(Table):
+    """``interfaces.NAME`` of matrices: a row, rows with weights, or a node and its direction."""
+
+    row: Annotated[int, Field(ge=1)] | None = None
+    rows: dict[str, Number] | None = None
+    node: Annotated[int, Field(ge=1)] | None = None
+    direction: Literal["x", "y", "z", "rotation_x", "rotation_y", "rotation_z"] | None = None
+
+    @field_validator("rows")
+    @classmethod
+    def _row_numbers(cls, value: dict[str, float] | None) -> dict[str, float] | None:
+        for name in value or ():
+            if not re.fullmatch(r"[1-9][0-9]{0,8}", name):
+                raise ValueError(f"must name rows by numbers from 1, not '{name}'")
+        if value is not None and not any(value.values()):
+            raise ValueError("must not be zero throughout: nothing could move there")
+        return value
+
+    @model_validator(mode="after")
+    def _one_way(self) -> PlaceOfMatrices:
+        _exactly_one(self, "row", "rows", "node")
+        if (self.node is None) != (self.direction is None):
+            raise ValueError("needs both 'node' and 'direction', or neither")
+        return self
+
+
+def _written_as(value: object) -> str:
+    return "file" if isinstance(value, str) else "table" if isinstance(value, dict) else "numbers"
+
+
+RowsOrFile = Annotated[
+    Annotated[Annotated[Matrix, Field(min_length=1)], Tag("numbers")] | Annotated[str, Tag("file")],
+    Discriminator(lambda value: "file" if isinstance(value, str) else "numbers"),
+]
+VectorOrPlace = Annotated[
+    Annotated[list[Number], Tag("numbers")]
+    | Annotated[PlaceOfMatrices, Tag("table")]
+    | Annotated[str, Tag("file")],
+    Discriminator(_written_as),
+]
+
+
 class MatricesTable(Table):
     """``[matrices]``: a structure given by its matrices instead of a mesh."""
 
-    mass: Annotated[Matrix, Field(min_length=1)]
-    stiffness: Annotated[Matrix, Field(min_length=1)]
-    damping: Matrix | None = None
-    interfaces: Annotated[dict[str, list[Number]], Field(min_length=1)]
-    loads: dict[str, list[Number]] = {}
+    mass: RowsOrFile
+    stiffness: RowsOrFile
+    damping: RowsOrFile | None = None
+    interfaces: Annotated[dict[str, VectorOrPlace], Field(min_length=1)]
+    loads: dict[str, VectorOrPlace] = {}
 
 
 class DampingTable(Table):

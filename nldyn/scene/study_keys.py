@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from cms.matrix_files import split_source
 from nldyn.base.errors import SystemModelError, shown
 
 PLAIN = (bool, int, float, complex, str, bytes, np.generic, PurePath, range, slice)
@@ -36,12 +37,22 @@ def case_keys(
     for tables in cases:
         sources = [tables.get("mesh", {}), *tables.get("excitation", [])]
         files = [str(source.get("file", "")) for source in sources]
+        files += _matrix_files(tables.get("matrices", {}))
         for file in files:
             if file not in read:
                 read[file] = _bytes_hash(folder / file) if file else ""
         contents = [read[file] for file in files]
         keys.append(_hash(json.dumps([tables, contents, identity], sort_keys=True, default=str)))
     return keys
+
+
+def _matrix_files(table: Mapping[str, Any]) -> list[str]:
+    """Files that matrices and their vectors are read from, and those read beside them."""
+    values = [table.get(key) for key in ("mass", "stiffness", "damping")]
+    for kind in ("interfaces", "loads"):
+        values += table.get(kind, {}).values()
+    files = [split_source(value)[0] for value in values if isinstance(value, str)]
+    return [str(path) for file in files for path in (file, file.with_suffix(".dof"))]
 
 
 def _hash(text: str) -> str:

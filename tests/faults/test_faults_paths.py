@@ -57,7 +57,7 @@ def test_a_mesh_that_is_not_there_is_not_asked_for_in_another_folder(project):
     file = scene_with(project, "../meshes/frime.vtu")
     assert refusal(command("check", file)) == (
         f"{file}: mesh.file leads to {project / 'meshes' / 'frime.vtu'}, {IN_FOLDER}; there is no "
-        "such file: copy the mesh beside the scene"
+        "such file: copy it beside the scene"
     )
 
 

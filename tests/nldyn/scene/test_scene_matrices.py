@@ -1,0 +1,177 @@
+"""Matrices from files in scenes, against the closed form of a chain between two walls."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy import io, sparse
+
+from nldyn import SceneError, solve_orbit
+from nldyn.app.cli import main
+from nldyn.scene.build import build_system
+from nldyn.scene.read import load_scene, parse_scene
+from nldyn.scene.study_keys import case_keys
+
+COUNT = 60
+REST = """
+[[excitation]]
+at = "load"
+kind = "harmonic"
+amplitude = 1.0
+
+[continuation]
+range_hz = [0.01, 0.02]
+"""
+
+
+def chain(count: int):
+    return sparse.diags_array([-1.0, 2.0, -1.0], offsets=[-1, 0, 1], shape=(count, count)).tocsc()
+
+
+def frequencies(count: int):
+    """Of masses 1 and springs 1 between walls: 2 sin(k pi / 2 / (count + 1)) in rad/s."""
+    return np.sin(np.arange(1, count + 1) * np.pi / 2 / (count + 1)) / np.pi
+
+
+def written(folder, head: str, count: int = COUNT):
+    io.mmwrite(folder / "M.mtx", sparse.eye_array(count))
+    sparse.save_npz(folder / "K.npz", chain(count))
+    io.savemat(folder / "all.mat", {"K": chain(count), "M": sparse.eye_array(count).tocsc()})
+    np.save(folder / "load.npy", np.eye(count)[count // 2 - 1])
+    (folder / "scene.toml").write_text(head + REST)
+    return folder / "scene.toml"
+
+
+FILES = '[matrices]\nmass = "M.mtx"\nstiffness = "K.npz"\n'
+MAT = '[matrices]\nmass = "all.mat:M"\nstiffness = "all.mat:K"\n'
+
+
+@pytest.mark.parametrize("files", [FILES, MAT])
+@pytest.mark.parametrize(
+    "place", ["{row = 30}", "{rows = {30 = 1.0}}", '"load.npy"'], ids=["row", "rows", "file"]
+)
+def test_a_chain_from_files_moves_as_its_closed_form(tmp_path, files, place):
+    system = build_system(load_scene(written(tmp_path, f"{files}interfaces.load = {place}\n")))
+    assert system.frequencies_hz == pytest.approx(frequencies(COUNT), rel=1e-9)
+    k = np.arange(1, COUNT + 1)
+    shapes = np.sqrt(2.0 / (COUNT + 1)) * np.sin(k * 30 * np.pi / (COUNT + 1))
+    assert np.abs(system.participation["load"]) == pytest.approx(np.abs(shapes), abs=1e-9)
+
+
+def test_reduced_matrices_keep_modes_and_statics(tmp_path):
+    head = (
+        f"{FILES}interfaces.load = {{row = 30}}\ninterfaces.apart = {{rows = {{1 = 1, 60 = -1}}}}\n"
+    )
+    scene = load_scene(written(tmp_path, f"{head}[reduction]\nmodes = 5\n"))
+    system = build_system(scene)
+    assert system.frequencies_hz[:5] == pytest.approx(frequencies(COUNT)[:5], rel=1e-9)
+    flexibility = np.linalg.inv(chain(COUNT).toarray())
+    apart = np.zeros(COUNT)
+    apart[[0, -1]] = 1.0, -1.0
+    squares = system.natural_frequencies**2
+    for name, vector in (("load", np.eye(COUNT)[29]), ("apart", apart)):
+        static = np.sum(system.participation[name] ** 2 / squares)
+        assert static == pytest.approx(vector @ flexibility @ vector, rel=1e-8)
+
+
+def test_reduced_matrices_take_dampings_and_loads(tmp_path):
+    head = (
+        f'{FILES}damping = "K.npz"\ninterfaces.load = {{row = 30}}\nloads.weight = {{row = 7}}\n'
+        "[reduction]\nmodes = 5\n"
+    )
+    system = build_system(load_scene(written(tmp_path, head)))
+    assert system.loads["weight"].shape == (system.size,) and system.interfaces == ("load",)
+    omega = system.natural_frequencies
+    assert np.diag(system.damping)[:5] == pytest.approx(omega[:5] ** 2, rel=1e-8)
+    rayleigh = head.replace('damping = "K.npz"\n', "") + "[damping]\nrayleigh_stiffness = 1.0\n"
+    again = build_system(load_scene(written(tmp_path, rayleigh)))
+    assert again.damping == pytest.approx(system.damping, abs=1e-9)
+
+
+def test_a_scene_of_files_is_checked_and_solved(tmp_path):
+    damping = "[damping]\nmodal_ratio = 0.02\n"
+    head = f"{FILES}interfaces.load = {{row = 30}}\n[reduction]\nmodes = 5\n{damping}"
+    path = written(tmp_path, head)
+    told = CliRunner().invoke(main, ["check", str(path)])
+    assert told.exit_code == 0, told.output
+    assert "matrices of 60 degrees of freedom" in told.output
+    assert f"{frequencies(COUNT)[0]:.6f}" in told.output
+    system = build_system(load_scene(path))
+    omega = 2.0 * np.pi * 0.015
+    phi = system.participation["load"]
+    linear = phi**2 / (
+        system.natural_frequencies**2 - omega**2 + 2j * 0.02 * system.natural_frequencies * omega
+    )
+    found = solve_orbit(system, 0.015).max_abs_displacement
+    assert found == pytest.approx(abs(np.sum(linear)), rel=1e-6)
+
+
+def test_large_matrices_must_be_reduced(tmp_path):
+    path = written(tmp_path, f"{FILES}interfaces.load = {{row = 30}}\n", count=600)
+    with pytest.raises(SceneError, match="reduction is missing: matrices of 600 rows"):
+        build_system(load_scene(path))
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('mass = "none.mtx"', "matrices.mass names .*none.mtx, which does not exist"),
+        ('mass = "load.npy"', "matrices.mass: .*load.npy: the mass matrix has shape .60, 1."),
+        ('mass = "all.mat"', 'matrices.mass: .*all.mat: must be told as "all.mat:K"'),
+        ("mass = [[1.0]]", "matrices: the mass typed in has 1 rows, but .*K.npz has 60"),
+        ("mass = 3", "matrices.mass must be a list in square brackets, not 3"),
+        ('mass = [["a"]]', r"matrices.mass\[0\]\[0\] must be a number, not 'a'"),
+    ],
+)
+def test_files_that_do_not_fit_are_told(tmp_path, line, words):
+    head = f'[matrices]\n{line}\nstiffness = "K.npz"\ninterfaces.load = {{row = 30}}\n'
+    with pytest.raises(SceneError, match=words):
+        build_system(load_scene(written(tmp_path, head)))
+
+
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [
+        ("{row = 0}", "load.row must be at least 1"),
+        ("{row = 61}", "load: there is no row 61: rows are counted from 1 to 60"),
+        ("{rows = {0 = 1.0}}", "must name rows by numbers from 1, not '0'"),
+        ("{row = 3, node = 4}", "has both 'row' and 'node'; keep one"),
+        ("{node = 4}", "needs both 'node' and 'direction'"),
+        ('{node = 4, direction = "x"}', "the files do not tell nodes: give the row instead"),
+        ("[1.0, 2.0]", "there must be 60 numbers, one per row of the matrices, not 2"),
+        ('"all.mat:K"', "must hold a vector of real numbers, but is of shape"),
+    ],
+)
+def test_interfaces_that_matrices_do_not_have(tmp_path, place, words):
+    path = written(tmp_path, f"{FILES}interfaces.load = {place}\n")
+    with pytest.raises(SceneError, match=words) as told:
+        build_system(load_scene(path))
+    assert "matrices.interfaces.load" in str(told.value)
+
+
+def test_files_outside_the_folder_are_refused(tmp_path):
+    (tmp_path / "inner").mkdir()
+    path = written(tmp_path / "inner", f"{FILES}interfaces.load = {{row = 3}}\n")
+    np.save(tmp_path / "secret.npy", np.eye(60))
+    text = path.read_text().replace("M.mtx", "../secret.npy")
+    with pytest.raises(SceneError, match="outside the folder of the scene"):
+        build_system(parse_scene(text, path))
+
+
+def test_studies_tell_files_of_matrices_apart(tmp_path):
+    path = written(tmp_path, f'{FILES}interfaces.load = "load.npy"\n')
+    tables = json.loads(json.dumps(tomllib.loads(path.read_text())))
+
+    def key() -> str:
+        return case_keys([tables], tmp_path, max, "name")[0]
+
+    keys = [key(), key()]
+    for name, matrix in (("K.npz", 2.0 * chain(COUNT)), ("load.npy", np.ones(COUNT))):
+        save = sparse.save_npz if name.endswith("npz") else np.save
+        save(tmp_path / name, matrix)
+        keys.append(key())
+    assert keys[0] == keys[1] and len(set(keys)) == 3
