@@ -16,6 +16,38 @@ from nldyn.base.errors import SceneError
 
 KeyPath = tuple[str | int, ...]
 MOST_SHOWN, LONGEST_SHOWN = 20, 60  # names in a list, letters of a name
+BETWEEN = (
+    "springs between two interfaces are not modelled: put them into the stiffness of [matrices], "
+    "or use [[stops]] with law = 'linear' and 'against', which push on contact"
+)
+WORDS = {  # that users try for a table, and what there is
+    "friction": "friction is not modelled; there are [[stops]], which push along their normal and "
+    "lose energy by 'dissipation' or 'restitution', and linear [[dampers]]",
+    "force": "forces are [[excitation]] of kind 'harmonic', 'constant' or 'measured'",
+    "load": "loads are [[excitation]] of kind 'harmonic', 'constant', 'measured' or 'weight'",
+    "gravity": "gravity is [[excitation]] of kind 'weight', with 'acceleration'",
+    "weight": "weight is [[excitation]] of kind 'weight', with 'acceleration'",
+    "base": "a motion of the supports is [[excitation]] of kind 'base'",
+    "unbalance": "an unbalance is [[excitation]] of kind 'unbalance'",
+    "contact": "contacts are [[stops]]",
+    "gap": "a gap is a key of [[stops]]",
+    "impact": "impacts are computed at [[stops]]",
+    "dashpot": "dashpots are [[dampers]]; that of a stop is a key of [[stops]]",
+    "nonlinear_spring": f"nonlinear springs are [[stops]]; {BETWEEN}",
+    "connection": BETWEEN,
+    "connector": BETWEEN,
+    "constraint": "what is held is in [[supports]], what is joined in [[couplings]]",
+    "boundary_condition": "what is held is in [[supports]]",
+    "material": "materials are in [parts.NAME]",
+    "section": "sections are in [parts.NAME]",
+    "mass": "masses on a mesh are [[point_masses]]; a mass matrix is in [matrices]",
+    "stiffness": "a stiffness matrix is in [matrices]; springs to the ground are [[springs]]",
+    "mode": "modes are given in [modal], or chosen in [reduction]",
+    "frequency": "the range of frequencies is range_hz in [continuation]",
+    "sweep": "the range of frequencies is range_hz in [continuation]",
+    "simulation": "a simulation is not part of a scene; there is nldyn.simulate in Python",
+    "gyroscopic": "gyroscopic matrices are not modelled",
+}
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -186,6 +218,10 @@ def _unknown_key(model: type[BaseModel], key: KeyPath) -> str:
     """Guess the key that was meant: here first, then the same word in another table."""
     name = str(key[-1])
     here = table_at(model, key[:-1])
+    if len(key) == 1 and (hint := _word(name)):
+        return f"is not a table of a scene: {hint}"
+    if key[0] == "springs" and name in ("against", "between", "to", "from"):
+        return f"is not a known key: {BETWEEN}"
     known = list(here.model_fields) if here else []
     guess = nearest(name, known)
     if guess:
@@ -194,6 +230,14 @@ def _unknown_key(model: type[BaseModel], key: KeyPath) -> str:
     if elsewhere:
         return f"is not a known key here; did you mean {elsewhere[0]}?"
     return f"is not a known key; known here: {quoted(known)}"
+
+
+def _word(name: str) -> str | None:
+    """What there is instead of a word, in the singular or the plural, that users try."""
+    word = name.lower()
+    return next(
+        (WORDS[w] for w in (word, word[:-1], word[:-2], word[:-3] + "y") if w in WORDS), None
+    )
 
 
 def table_at(model: type[BaseModel], key: KeyPath) -> type[BaseModel] | None:

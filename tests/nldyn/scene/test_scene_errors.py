@@ -8,7 +8,9 @@ from click.testing import CliRunner
 
 import fem
 from nldyn.app.cli import main
+from nldyn.base.errors import SceneError
 from nldyn.base.resources import example, mesh
+from nldyn.scene.read import parse_scene
 
 MODAL = """
 [modal]
@@ -464,3 +466,23 @@ def test_negative_gap_is_a_preload(tmp_path):
     result = CliRunner().invoke(main, ["check", str(file)])
     assert result.exit_code == 0
     assert "gap -1e-06 m" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("[[friction]]", "friction is not modelled; there are [[stops]]"),
+        ("[[forces]]", "forces are [[excitation]] of kind 'harmonic', 'constant' or 'measured'"),
+        ("[gravity]", "gravity is [[excitation]] of kind 'weight'"),
+        ("[[masses]]", "masses on a mesh are [[point_masses]]"),
+        ("[[boundary_conditions]]", "what is held is in [[supports]]"),
+        ("[[springs]]\nagainst = 'x'", "springs between two interfaces are not modelled"),
+    ],
+)
+def test_words_that_users_try_lead_to_what_there_is(table, words):
+    text = (
+        f"[matrices]\nmass = [[1.0]]\nstiffness = [[1.0]]\ninterfaces.x = [1.0]\n{table}\nat = 'x'"
+    )
+    with pytest.raises(SceneError) as told:
+        parse_scene(text)
+    assert words in str(told.value)
