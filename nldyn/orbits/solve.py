@@ -100,6 +100,11 @@ def solve_orbit(
     problem = shooting_problem(flow, period, segments)
     omega = 2.0 * math.pi * frequency_hz
     check_bounded(flow.system, omega)
+    if flow.system.conservative and not flow.system.driven:
+        raise SystemModelError(
+            "nothing excites the system and nothing damps it, so that its free motions are a "
+            "family over the energy and none of them stands alone: give excitation or damping"
+        )
     if guess is not None:
         return first_orbit(problem, [guessed_nodes(problem, guess, omega)], omega, observe)
     pieces = (segments or period) // period  # of one excitation period
