@@ -155,6 +155,8 @@ class Orbit:
             stability: str = self.stability.verdict
         except ConvergenceError as error:
             size, stability = str(error), "stability unknown"
+        if not self.resolved:
+            stability += f", not resolved (error of the monodromy {self.flow_error.monodromy:.1e})"
         return f"<Orbit of period {self.period} at {self.frequency_hz:.6g} Hz: {size}, {stability}>"
 
     @classmethod
@@ -233,11 +235,32 @@ class Orbit:
         """Estimate of how far each of the `log_moduli` may be off, (2n,).
 
         Of each segment's Jacobian a relative error of ten times the flow map's `rtol` is assumed
-        (or of ten times `error`, where that is more); see `nldyn.orbits.multipliers.uncertainties`.
+        (or of ten times `error`, where that is more, and with a law of one's own the `flow_error`);
+        see `nldyn.orbits.multipliers.uncertainties`.
         """
         found, jacobians = self._spectrum
-        error = 10.0 * max(self.problem.flow.options.rtol, self.error)
-        return uncertainties(jacobians, found, error)
+        error = max(self.problem.flow.options.rtol, self.error)
+        if self._own_laws:
+            error = max(error, self.flow_error.monodromy)
+        if not error < 1.0:
+            return np.full(found.log_moduli.shape, np.inf)
+        return uncertainties(jacobians, found, 10.0 * error)
+
+    @property
+    def _own_laws(self) -> bool:
+        return any(stop.law is not None for stop in self.system.stops)
+
+    @property
+    def resolved(self) -> bool:
+        """Whether the contacts are resolved: always with the stops' own kinds of force.
+
+        A law of one's own may have a steep part or a kink; then `flow_error` is computed, and an
+        orbit whose monodromy matrix is wrong by more than 1000 times the flow map's `rtol` is not
+        resolved.
+        """
+        if not self._own_laws:
+            return True
+        return self.flow_error.monodromy <= 1000.0 * self.problem.flow.options.rtol
 
     @property
     def stability(self) -> Stability:
