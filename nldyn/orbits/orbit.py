@@ -156,7 +156,7 @@ class Orbit:
         except ConvergenceError as error:
             size, stability = str(error), "stability unknown"
         if not self.resolved:
-            stability += f", not resolved (error of the monodromy {self.flow_error.monodromy:.1e})"
+            stability += f", contacts resolved to {self.flow_error.monodromy:.1e} only"
         return f"<Orbit of period {self.period} at {self.frequency_hz:.6g} Hz: {size}, {stability}>"
 
     @classmethod

@@ -80,8 +80,9 @@ def solve_orbit(
     SystemModelError
         For input that makes no sense.
     ConvergenceError
-        If the simulation fails, or Newton's method does not converge or comes to an orbit of a
-        shorter period, or the time is spent; the text says why.
+        If nothing excites and nothing damps the system, if the simulation fails, if Newton's
+        method does not converge or comes to an orbit of a shorter period, or if the time is
+        spent; the text says why.
 
     Examples
     --------
@@ -101,7 +102,7 @@ def solve_orbit(
     omega = 2.0 * math.pi * frequency_hz
     check_bounded(flow.system, omega)
     if flow.system.conservative and not flow.system.driven:
-        raise SystemModelError(
+        raise ConvergenceError(
             "nothing excites the system and nothing damps it, so that its free motions are a "
             "family over the energy and none of them stands alone: give excitation or damping"
         )
