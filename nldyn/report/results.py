@@ -203,7 +203,6 @@ def summary(diagram: Diagram) -> Mapping[str, object]:
         "largest_relative_error": worst(orbit.error for orbit in orbits),
         "largest_liouville_error": worst(orbit.liouville_error for orbit in orbits),
         "stability_undecided": sum(orbit.stability.verdict == "undecided" for orbit in orbits),
-        "not_resolved": sum(not orbit.resolved for orbit in orbits),
         "notes": list(diagram.notes),
         "branches": [_branch_summary(branch, diagram.range_hz) for branch in diagram.branches],
         "cascades": [_cascade_summary(cascade) for cascade in cascades_in(diagram.branches)],
