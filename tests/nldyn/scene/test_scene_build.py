@@ -33,7 +33,7 @@ def test_rayleighs_damping_of_a_mesh_is_that_of_its_matrices():
     np.testing.assert_allclose(added, np.diag(2.0 + 1e-5 * squares), rtol=1e-10, atol=1e-9)
     asked = load_case_of(damped).system(build_reduced(scene)).total_damping
     np.testing.assert_allclose(asked, build_system(damped).total_damping, rtol=1e-12)
-    with pytest.raises(SceneError, match=r"Rayleigh's damping, which needs a \[mesh\]"):
+    with pytest.raises(SceneError, match=r"Rayleigh's damping, which needs a \[reduction\]"):
         build_system(parse_scene(MODAL + "[damping]\nrayleigh_mass = 1.0"))
 
 
