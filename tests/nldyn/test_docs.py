@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
 
@@ -34,6 +35,15 @@ def test_example_of_the_curves_runs(capsys, tmp_path, monkeypatch):
     assert capsys.readouterr().out.splitlines() == said
     assert len(said) == 5
     assert (tmp_path / "curves.png").is_file()
+
+
+def test_example_of_the_loads_prints_the_folds(capsys):
+    text = (ROOT / "docs" / "how-to" / "loads.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.S)
+    exec(code, {})
+    at_rest, folds = (ast.literal_eval(line) for line in capsys.readouterr().out.splitlines())
+    assert at_rest[0] == pytest.approx((0, 0.1, 0.1))
+    assert sorted(folds) == pytest.approx([0.112687, 0.131854], abs=5e-7)
 
 
 def test_every_kind_of_special_point_is_in_the_table():
