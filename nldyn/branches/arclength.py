@@ -225,9 +225,12 @@ class Stepper:
         if _jumped(problem, here.orbit.point, straight, found.point):
             return None
         miss = metric_length(weights, found.point - cubic) / step
-        if step <= KINK and miss < 1.0:  # a linear stop that is touched bends the branch
+        # a linear stop that is touched bends the branch; a force that jumps does where the phase of
+        # a switch passes one of shooting, as the state there has a corner
+        if step <= KINK and miss < 1.0:
             orbit = Orbit.of(problem, found, here.orbit.observe)
-            if orbit.impacts != here.orbit.impacts:
+            jumps = any(stop.dashpot for stop in problem.flow.system.stops)
+            if jumps or orbit.impacts != here.orbit.impacts:
                 tangent = problem.tangent(found, direction)
                 return BranchPoint(orbit, tangent, here.arclength + step), 0.0, 0.0
         if miss > self.options.max_miss:

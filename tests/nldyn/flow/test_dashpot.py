@@ -22,6 +22,10 @@ from nldyn import (
     solve_orbit,
 )
 from nldyn.base.arrays import Real
+from nldyn.base.resources import example
+from nldyn.branches.endings import Ending
+from nldyn.scene.build import build_system
+from nldyn.scene.read import load_scene
 
 M, K, C, SPRING, DASHPOT, GAP, FORCE = 1.3, 4000.0, 3.0, 1e5, 60.0, 1e-3, 5.0
 HZ = 10.0
@@ -129,6 +133,14 @@ def test_a_body_that_stays_closed_is_a_linear_oscillator():
     assert np.ptp(moved) == pytest.approx(2 * amplitude, rel=1e-7)
     decay = np.exp(-c / M / HZ)
     assert np.prod(orbit.multipliers).real == pytest.approx(decay, rel=1e-6)
+
+
+def test_a_branch_goes_on_where_a_switch_passes_a_phase_of_shooting():
+    """The state there has a corner, as the force jumps; twice on this branch."""
+    system = build_system(load_scene(example("ship_between_fenders.toml")))
+    branch = continue_branch(solve_orbit(system, 0.9), (0.15, 1.2))
+    assert [reason.ending for reason in branch.stop_reasons] == [Ending.RANGE_END] * 2
+    assert sum(point.kind == "LP" for point in branch.special_points) == 4
 
 
 def test_a_dashpot_comes_back_from_its_file(tmp_path):
