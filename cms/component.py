@@ -14,7 +14,7 @@ from scipy.sparse.linalg import LinearOperator, aslinearoperator
 
 from cms.digits import checked_digits, entry_digits, relative_rounding, rounded_energies
 from cms.errors import ReductionError
-from cms.massless import massless_directions
+from cms.massless import massless_directions, without_noise
 
 FloatArray = NDArray[np.float64]
 SparseMatrix = sparse.csc_array[np.float64]
@@ -250,6 +250,7 @@ def checked_pencil(component: ComponentLike) -> Pencil:
             f"the stiffness matrix has shape {stiffness.shape}, but the mass matrix {mass.shape}"
         )
     check_diagonal(stiffness, "stiffness")
+    mass = without_noise(mass, stiffness)
     check_diagonal(mass, "mass")
     if not abs(mass).max() > 0.0:
         raise ReductionError("the mass matrix is zero: the component has no mass")

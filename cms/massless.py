@@ -16,6 +16,28 @@ MASSLESS = 1e-10  # least eigenvalue of a mass matrix scaled to a unit diagonal 
 CERTAIN = 1e-6  # above it an estimate of the least eigenvalue is enough
 SAFETY = 2.0
 ESTIMATES = 8
+NOISE = 10.0  # rows with up to so many times the mass of a negative one are as massless as it
+
+
+def without_noise(mass: Any, stiffness: Any) -> Any:
+    """M (N, N) without the rows of degrees of freedom whose mass is noise about zero.
+
+    Mass is measured by stiffness, ``m_ij / sqrt(k_ii k_jj)``, which no unit changes. A negative
+    entry on the diagonal shows the noise, at least that of double precision, where it is within
+    1e-10 of the largest one.
+    """
+    diagonal = stiffness.diagonal()
+    scale = sparse.diags_array(1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, np.inf)))
+    scaled = abs(sparse.csr_array(scale @ mass @ scale))
+    masses = np.copysign(scaled.diagonal(), mass.diagonal())
+    noise, largest = -float(np.min(masses)), float(np.max(masses))
+    if not 0.0 < noise <= MASSLESS * largest:
+        return mass
+    noise = max(noise, float(np.finfo(np.float64).eps) * largest)
+    rows = scaled.max(axis=1).toarray().ravel()
+    kept = (rows > NOISE * noise) | (diagonal <= 0.0)
+    keep = sparse.diags_array(kept.astype(np.float64))
+    return sparse.csc_array(keep @ mass @ keep)
 
 
 def massless_directions(mass: Any, rounding: float) -> FloatArray:

@@ -120,6 +120,73 @@ def test_superelements_of_46_degrees_of_freedom(seed, units):
         np.testing.assert_allclose(np.sort(model.frequencies_hz)[2:8], exact[2:], rtol=1e-8)
 
 
+def spring_network(nodes, massless, seed):
+    """K and M of a floating body of springs between random points, the last of which have no mass.
+
+    With them are the w^2 and modes of the points that have it, by static condensation.
+    """
+    chance = np.random.default_rng(seed)
+    points = chance.uniform(0.0, 1.0, (nodes, 3))
+    K = np.zeros((3 * nodes, 3 * nodes))
+    for i in range(nodes):
+        for j in range(i):
+            along = (points[i] - points[j]) / np.linalg.norm(points[i] - points[j])
+            pull = np.zeros((nodes, 3))
+            pull[i], pull[j] = along, -along
+            K += chance.uniform(1e4, 1e5) * np.outer(pull, pull)
+    masses = chance.uniform(0.5, 2.0, nodes)
+    masses[nodes - massless :] = 0.0
+    heavy = 3 * (nodes - massless)
+    follow = -linalg.solve(K[heavy:, heavy:], K[heavy:, :heavy])
+    expand = np.vstack([np.eye(heavy), follow])
+    M = np.diag(np.repeat(masses, 3))
+    squares, modes = linalg.eigh(expand.T @ K @ expand, M[:heavy, :heavy])
+    return K, M, squares, expand @ modes
+
+
+@pytest.mark.parametrize("first", [0, 21])
+@pytest.mark.parametrize("noise", [1e-17, 1e-14, 1e-11])
+def test_noise_on_the_diagonal_of_massless_rows_is_no_mass(noise, first):
+    K, M, squares, _ = spring_network(8, 3, seed=1)
+    error = np.random.default_rng(3).standard_normal(M.shape)
+    noisy = M + noise * (error + error.T)
+    assert np.diag(noisy).min() < 0.0
+    named = {axis: np.eye(24)[first + i] for i, axis in enumerate("xyz")}
+    found = cms.reduce(cms.Matrices(K, noisy, named), modes=10)
+    assert found.rigid_body_modes == 6
+    exact = np.sqrt(squares[6:10]) / (2 * np.pi)
+    np.testing.assert_allclose(found.frequencies_hz[6:10], exact, rtol=max(1e-12, 10 * noise))
+
+
+def test_a_negative_mass_beyond_noise_is_refused():
+    K, M, _, _ = spring_network(8, 3, seed=1)
+    M[16, 16] = -1e-8
+    with pytest.raises(cms.ReductionError, match="its diagonal has -1e-08 in row 16"):
+        cms.reduce(cms.Matrices(K, M, {"x": np.eye(24)[0]}), modes=4)
+
+
+@pytest.mark.parametrize("first", [0, 27])
+@pytest.mark.parametrize("digits", [7, 8, 12])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_skew_massless_directions_of_few_digits(seed, digits, first):
+    """The w^2 lie within the change that rounding of all entries may cause, in the first order."""
+    K, M, squares, modes = spring_network(10, 4, seed)
+    chance = np.random.default_rng(seed + 100)
+    mixed = np.triu(chance.standard_normal(K.shape), 1) * (chance.uniform(size=K.shape) < 0.15)
+    T = np.eye(30) + 0.3 * mixed
+    K, M = ((A + A.T) / 2 for A in (T.T @ K @ T, T.T @ M @ T))
+    named = {axis: T[first + i] for i, axis in enumerate("xyz")}
+    few = cms.Matrices(rounded(K, digits), rounded(M, digits), named)
+    found = cms.reduce(few, modes=10)
+    assert found.rigid_body_modes == 6
+    shapes = np.abs(linalg.solve(T, modes[:, 6:10]))
+    sizes = [np.sum(shapes * (np.abs(A) @ shapes), axis=0) for A in (K, M)]
+    change = 0.5 * 10.0 ** (1 - digits) * (sizes[0] + squares[6:10] * sizes[1])
+    assert np.all(change < 10.0 ** (3 - digits) * squares[6:10])
+    moved = (2 * np.pi * found.frequencies_hz[6:10]) ** 2 - squares[6:10]
+    assert np.all(np.abs(moved) < change)
+
+
 def test_more_modes_than_have_mass_are_refused_with_their_number():
     K, M, _ = superelement(kept=9, heavy=14)
     with pytest.raises(cms.ReductionError, match="only 10 degrees of freedom that have mass"):
