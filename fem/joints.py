@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from fem.links import link_terms
-from fem.structure import StructureModel, axis_index
+from fem.mesh import IntArray
+from fem.pieces import place_of
+from fem.structure import AXES, StructureModel, axis_index
 from fem.trusses import loose_nodes, loose_sentences
 
 
@@ -51,6 +54,80 @@ def hinge_warnings(model: StructureModel) -> Iterator[str]:
                 " their place only, so that the shell turns there as on a hinge; let it go on by a"
                 " cell along the face or into the solid, or couple these nodes rigidly to a point"
             )
+
+
+def pin_warnings(model: StructureModel) -> Iterator[str]:
+    """One sentence for every beam part with nodes on solids that only hold their place.
+
+    Nothing is said of a node whose rotations a support holds, that a shell or a coupling joins, or
+    from which a line goes to another node of one cell, along the solid or into it.
+
+    Examples
+    --------
+    >>> import fem
+    >>> steel = fem.Material(2.1e11, 7800.0, 0.3)
+    >>> block = fem.box_mesh("block", (1.0, 1.0), (1, 1), kind="quad")
+    >>> rod = fem.structure_mesh(fem.frame_mesh({"a": (1, 0), "b": (2, 0)}, [("rod", "a", "b", 1)]))
+    >>> model = fem.StructureModel(
+    ...     fem.joined([block, rod]),
+    ...     {
+    ...         "block": fem.SolidPart(steel, plane="stress", thickness=0.01),
+    ...         "rod": fem.BeamPart(steel, fem.CircularSection(0.02)),
+    ...     },
+    ... )
+    >>> [text.split(": ")[1] for text in pin_warnings(model)]
+    ["part 'rod' shares 1 nodes with solids, the first 'a' at (1, 0, 0)"]
+    """
+    if not model.solids or not model.beams:
+        return
+    pinned = np.zeros(len(model.mesh.points), dtype=np.bool_)
+    for cells in _solid_cells(model):
+        pinned[cells] = True
+    lines = np.concatenate([ends for _, ends in model.beams.values()])
+    pinned[_in_one_cell(model, lines[pinned[lines].all(axis=1)])] = False
+    for _, kinds in model.shells.values():
+        for facets in kinds.values():
+            pinned[facets] = False
+    for coupling in model.attached.couplings:
+        pinned[model.mesh.node(coupling.point)] = False
+        if coupling.kind == "rigid" and len(coupling.directions) == 3:
+            pinned[model.mesh.nodes(coupling.face)] = False
+    turns = {"rotation_z"} if model.is_plane else {f"rotation_{axis}" for axis in "xyz"}
+    for support in model.supports:
+        if turns <= {AXES[axis_index(direction)] for direction in support.directions}:
+            pinned[model.mesh.nodes(support.point)] = False
+    for name, (_, ends) in model.beams.items():
+        at = np.unique(ends[pinned[ends]])
+        if len(at):
+            yield (
+                f"{model.mesh.source}: part {name!r} shares {len(at)} nodes with solids, the first"
+                f" {_point(model, int(at[0]))}: solids hold the place of a node only, so that the"
+                " beam turns there as on a ball joint; to clamp it, couple a face of the solid to"
+                " the end of the beam ('couplings' in a scene, fem.Coupling)"
+            )
+
+
+def _solid_cells(model: StructureModel) -> list[IntArray]:
+    return [cells for _, kinds in model.solids.values() for cells in kinds.values()]
+
+
+def _in_one_cell(model: StructureModel, lines: IntArray) -> IntArray:
+    """Those of some lines (e, 2) both of whose ends are nodes of one solid cell."""
+    blocks = _solid_cells(model)
+    widths = np.concatenate([np.full(len(cells), cells.shape[1]) for cells in blocks])
+    owners = np.repeat(np.arange(len(widths)), widths)
+    used = np.concatenate([cells.ravel() for cells in blocks])
+    shape = (len(model.mesh.points), len(widths))
+    cells_of = csr_array((np.ones(len(used)), (used, owners)), shape=shape)
+    common = cells_of[lines[:, 0]].multiply(cells_of[lines[:, 1]])
+    return np.asarray(lines[common.sum(axis=1) > 0.0])
+
+
+def _point(model: StructureModel, node: int) -> str:
+    """A node by the name of its point, if it has one, and its place."""
+    name = next((n for n, at in model.mesh.point_sets.items() if list(at) == [node]), None)
+    what = f"node {node}" if name is None else repr(name)
+    return f"{what} at {place_of(model.mesh.points[node])}"
 
 
 def mechanism_warnings(model: StructureModel) -> Iterator[str]:

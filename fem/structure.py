@@ -150,8 +150,9 @@ class StructureModel:
     interfaces
         The named directions that a reduction keeps and a load may act on.
     separate
-        Whether nodes at one place may belong to pieces that nothing joins. Else `fem.assemble`
-        refuses such pieces: as a rule their nodes were to be one.
+        Whether nodes at one place may belong to pieces that nothing joins, and cells lie against
+        each other without having the same nodes. Else `fem.assemble` refuses both: as a rule they
+        were to be joined.
 
     Raises
     ------
@@ -442,9 +443,21 @@ def once(facets: IntArray, kind: str) -> IntArray:
     >>> once(np.array([[0, 1], [2, 1], [1, 0]]), "line")
     array([[2, 1]])
     """
-    lowest = np.sort(facets[:, : len(KINDS[kind].corners)], axis=1)[:, :3]
-    _, index, count = np.unique(facet_keys(lowest), return_index=True, return_counts=True)
-    return np.asarray(facets[np.sort(index[count == 1])], dtype=np.int64)
+    first, count = occurrences(facets[:, : len(KINDS[kind].corners)])
+    return np.asarray(facets[np.sort(first[count == 1])], dtype=np.int64)
+
+
+def occurrences(corners: IntArray) -> tuple[IntArray, IntArray]:
+    """Where each facet (f, k) first is, and how often, told apart by their three lowest corners.
+
+    Examples
+    --------
+    >>> occurrences(np.array([[0, 1], [2, 1], [1, 0]]))
+    (array([0, 1]), array([2, 1]))
+    """
+    keys = facet_keys(np.sort(corners, axis=1)[:, :3])
+    _, first, count = np.unique(keys, return_index=True, return_counts=True)
+    return first, count
 
 
 def symmetry(point: str, normal: str) -> Support:

@@ -26,7 +26,8 @@ from fem.constraints import (
 )
 from fem.distorted import distortion_warnings
 from fem.errors import JointWarning, ModelError
-from fem.joints import hinge_warnings, mechanism_warnings
+from fem.hanging import check_nothing_hangs
+from fem.joints import hinge_warnings, mechanism_warnings, pin_warnings
 from fem.links import link_rows
 from fem.load_vectors import inertia_load
 from fem.locking import locking_warnings
@@ -198,12 +199,13 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     DistortionWarning
         If cells are out of shape.
     JointWarning
-        If a shell meets solids at an edge only, about which it can turn, or a truss has a node
-        that is not held in all directions.
+        If a shell meets solids at an edge only, about which it can turn, a beam at a node, about
+        which it can turn, or a truss has a node that is not held in all directions.
     """
     slits = check_joined(model)
     check_conforming(model)
-    for text in (*hinge_warnings(model), *mechanism_warnings(model), *slits):
+    told = (*hinge_warnings(model), *pin_warnings(model), *mechanism_warnings(model), *slits)
+    for text in told:
         warnings.warn(text, JointWarning, stacklevel=3)
     for text in locking_warnings(model):
         warnings.warn(text, LockingWarning, stacklevel=3)
@@ -212,6 +214,7 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     numbering = number_blocks(model)
     constraints = constrain(model, numbering)
     stiffness, mass = unconstrained_matrices(model, numbering)
+    check_nothing_hangs(model)
     K = constraints.reduced(stiffness)
     del stiffness
     M = constraints.reduced(mass)
