@@ -124,7 +124,7 @@ def _refuse(model: StructureModel, facets: Facets) -> None:
     pairs = np.concatenate(found)
     if not len(pairs):
         return
-    met = pairs[pairs[:, 0].argmin()]
+    met = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))[0]]
     first, second = met[np.lexsort((facets.numbers[met], facets.kinds[met]))]
     smaller = met[facets[met].radii.argmin()]
     raise ModelError(

@@ -199,8 +199,8 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     DistortionWarning
         If cells are out of shape.
     JointWarning
-        If a shell meets solids at an edge only, about which it can turn, a beam at a node, about
-        which it can turn, or a truss has a node that is not held in all directions.
+        If a shell meets solids at an edge only, or a beam at a node, about which it can turn, or a
+        truss has a node that is not held in all directions.
     """
     slits = check_joined(model)
     check_conforming(model)
