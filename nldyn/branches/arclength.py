@@ -213,7 +213,6 @@ class Stepper:
             aim=cubic,
             # behind a grazing point the branch may turn on a very short length
             closings=here.orbit.impacts if step > self.options.grazing_step else -1,
-            contraction=problem.flow.options.rtol,
             turn=math.cos(1.1 * self.options.max_angle) if step > KINK else 0.0,
         )
         if not found.converged:

@@ -497,7 +497,7 @@ class FlowMap:
         corrector: Corrector | None = None,
     ) -> tuple[Any, ...]:
         """The kernel, which corrects the point (N + 1,) or, without corrector, only flies."""
-        corrector = corrector or Corrector(point, 0.0, 0.0, 0.0, 0.0, 0, point, -1, 0.0, 0.0)
+        corrector = corrector or Corrector(point, 0.0, 0.0, 0.0, 0.0, 0, point, -1, 0.0)
         table, drive_by = (
             parameter_tables(self.system, parameters) if parameters else self._no_parameters
         )

@@ -95,7 +95,6 @@ class ShootingProblem:
         like: Trajectory | None = None,
         aim: Real | None = None,
         closings: int = -1,
-        contraction: float = 0.0,
         turn: float = 0.0,
     ) -> Solution:
         """Newton's method on the plane ``row @ point = offset`` (through the guess by default).
@@ -111,7 +110,7 @@ class ShootingProblem:
         def solved(start: Real, near: Trajectory | None, expected: Real) -> Solution:
             corrector = Corrector(
                 row, level, self._weight(start), rtol, longest, max_iterations, expected, closings,
-                contraction, turn,
+                turn,
             )  # fmt: skip
             return self.flow.newton(start, corrector, self.phases, near)
 

@@ -233,10 +233,9 @@ class Stop:
         if self.dashpot < 0.0:
             raise SystemModelError(f"{owner}: dashpot must not be negative, got {self.dashpot:g}")
         if self.law is not None:
-            if self.dissipation or self.dashpot:
-                raise SystemModelError(
-                    f"{owner}: give either dissipation and a dashpot or a law of your own"
-                )
+            for name in ("dissipation", "dashpot"):
+                if getattr(self, name):
+                    raise SystemModelError(f"{owner}: give either {name} or a law of your own")
             check_law(owner, self.law, self.stiffness, self.exponent)
         _finite(owner, "gap", self.gap)
         if self.against == self.at:

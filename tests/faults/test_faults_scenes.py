@@ -26,7 +26,8 @@ def folder(tmp_path_factory):
     """A folder of scenes with the meshes, and what else paths may lead to."""
     place = tmp_path_factory.mktemp("scenes")
     write_meshes(place)
-    (place / "half_beam.msh").write_bytes(mesh("half_beam.msh").read_bytes())
+    for name in ("half_beam.msh", "tube.msh"):
+        (place / name).write_bytes(mesh(name).read_bytes())
     return place
 
 

@@ -64,9 +64,6 @@ class Corrector(NamedTuple):
         Where the point is expected.
     closings : int
         How often stops close in the motion from the guess, or it fails; -1 for any number.
-    contraction : float
-        The square of the ratio of the last two steps, at or below which it foretells the next one,
-        which is then not made: the share by which the Jacobians change in the last step.
     turn : float
         Least cosine of the first tangent and the normal of the plane, in the metric, or it fails.
     """
@@ -79,7 +76,6 @@ class Corrector(NamedTuple):
     max_iterations: int
     aim: NDArray[np.float64]
     closings: int
-    contraction: float
     turn: float
 
 
@@ -231,11 +227,6 @@ def newton(
         if stagnant and opening > max(NOISE, noise):
             stagnant = np.abs(jacobians - known).max() <= STEADY * np.abs(jacobians).max()
         known = jacobians
-        if iteration > 1 and opening <= max(OPEN, noise):
-            ratio = (last / before) ** 2
-            if ratio <= corrector.contraction and ratio * last <= corrector.rtol:
-                converged = True
-                last *= ratio
         if converged or stagnant:
             outcome = OK
             break

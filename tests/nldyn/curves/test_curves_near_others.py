@@ -77,7 +77,7 @@ def cubic(depth: float, speed: float) -> tuple[float, float, float]:
 
 def test_stops_touched_at_once_by_symmetry_are_one_mark():
     """Two stops with a law of one's own; their contacts are split at one orbit."""
-    stops = [Stop("m", 2e3, 1.0, law=cubic, direction=side) for side in (1, -1)]
+    stops = [Stop("m", 200.0 * np.pi**2, 1.0, law=cubic, direction=side) for side in (1, -1)]
     system = System.from_modal(
         [10.0], {"m": [1.0]}, modal_damping=0.03, stops=stops,
         excitation=[HarmonicForce("m", 45.0)],

@@ -83,7 +83,7 @@ def test_a_law_that_cannot_be_sent_is_computed_here():
 
     system = System.from_modal(
         [13.0], {"middle": [0.6]}, modal_damping=0.02,
-        stops=[Stop("middle", 5e7, law=own)], excitation=[Unbalance("middle", 5e-6)],
+        stops=[Stop("middle", 5e7, 1.0, law=own)], excitation=[Unbalance("middle", 5e-6)],
     )  # fmt: skip
     with computing_ahead(FlowMap(system), 2) as ahead:
         assert ahead.executor is None
