@@ -16,6 +16,7 @@ from scipy import io, sparse
 
 from cms.component import SparseMatrix, symmetric_matrix
 from cms.errors import ReductionError
+from cms.file_entries import chosen_entry
 from cms.harwell_boeing import is_harwell_boeing, read_harwell_boeing
 from cms.punch import read_punch
 from cms.reduction import Matrices
@@ -341,15 +342,8 @@ def _mat_variables(path: Path) -> dict[str, Any]:
 
 
 def _from_variables(path: Path, variables: Mapping[str, Any], name: str | None) -> FileMatrix:
-    known = ", ".join(variables) or "none"
-    if name is None:
-        if len(variables) != 1:
-            example = f"{path.name}:{next(iter(variables), 'K')}"
-            raise ReductionError(f'must be told as "{example}", as it has the variables {known}')
-        name = next(iter(variables))
-    if name not in variables:
-        raise ReductionError(f"has no variable '{name}'; it has: {known}")
-    return _from_array(path, variables[name])
+    chosen = chosen_entry(path, variables, name, ("variable", "variables"), "K")
+    return _from_array(path, variables[chosen])
 
 
 def _from_text(path: Path, name: str | None) -> FileMatrix:

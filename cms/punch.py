@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cms.errors import ReductionError
+from cms.file_entries import chosen_entry
 
 IntArray = NDArray[np.int64]
 SYMMETRIC, REAL = 6, (1, 2)
@@ -31,14 +32,7 @@ def read_punch(path: Path, name: str | None) -> tuple[IntArray, IntArray, NDArra
     with path.open(encoding="latin-1") as file:
         lines = [line.rstrip("\n") for line in file if line[:4] == "DMIG" or line[:1] == "*"]
     headers = {_field(line, 8, 8): line for line in lines if _is_header(line)}
-    known = ", ".join(headers) or "none"
-    if name is None:
-        if len(headers) != 1:
-            example = f"{path.name}:{next(iter(headers), 'KAAX')}"
-            raise ReductionError(f'must be told as "{example}", as it has the matrices {known}')
-        name = next(iter(headers))
-    if name not in headers:
-        raise ReductionError(f"has no matrix '{name}'; it has: {known}")
+    name = chosen_entry(path, headers, name, ("matrix", "matrices"), "KAAX")
     form, kind = (int(_field(headers[name], place, 8)) for place in (24, 32))
     if form != SYMMETRIC or kind not in REAL:
         raise ReductionError(f"matrix {name} must be symmetric (6) and real (1 or 2)")

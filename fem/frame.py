@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,7 @@ from fem.beams import plane_matrices, plane_rows
 from fem.elements import rotations, turn
 from fem.errors import JointWarning, ModelError
 from fem.links import link_rows, link_terms
-from fem.load_vectors import inertia_load
+from fem.load_vectors import InertiaLoads
 from fem.mesh import FloatArray, IntArray
 from fem.model import FrameModel, TrussPart
 from fem.natural import (
@@ -35,7 +35,7 @@ from fem.trusses import loose_nodes, loose_sentences
 
 
 @dataclass(frozen=True, eq=False)
-class Component:
+class Component(InertiaLoads):
     """An assembled frame: N free degrees of freedom, two matrices and named interfaces.
 
     Parameters
@@ -53,6 +53,8 @@ class Component:
         Indices among all degrees of freedom of (ux, uy, rotation) at the first and the second
         end of every element, shape (e, 6). Node i has 3i, 3i + 1, 3i + 2; the own rotations of
         hinged parts follow after the nodes.
+    rigid_mass
+        Mass matrix (3, 3) of the rigid motions, supports apart: along x, along y, about z.
     inertia
         M r in kg of the translations r of everything, supports included, along x and y, shape
         (N, 2): the load by an acceleration of 1 m/s², such as a weight's.
@@ -68,34 +70,10 @@ class Component:
     model: FrameModel
     free: IntArray
     element_dofs: IntArray
+    rigid_mass: FloatArray
     inertia: FloatArray
     damping: SparseArray | None = None
     load_vectors: tuple[str, ...] = ()
-
-    def with_load(self, name: str, acceleration: Sequence[float]) -> Component:
-        """The component with a load vector: its weight under an acceleration.
-
-        It is an interface of this name that nothing can be joined to, so that a reduction keeps
-        its static deflection exact.
-
-        Parameters
-        ----------
-        name
-            Of the load vector.
-        acceleration
-            Components (x, y, and z, which must be 0) in m/s²; a load is a factor of it.
-
-        Raises
-        ------
-        ModelError
-            If there is an interface of this name, or no mass is moved that way.
-        """
-        vector = inertia_load(self.inertia, self.interfaces, name, acceleration)
-        return replace(
-            self,
-            interfaces={**self.interfaces, name: vector},
-            load_vectors=(*self.load_vectors, name),
-        )
 
     @cached_property
     def natural_form(self) -> NaturalForm:
@@ -152,20 +130,13 @@ def assemble_frame(model: FrameModel) -> Component:
     lumps = sparse.diags_array(_mass_diagonal(model), format="csr")
     every = _scatter(mass, element_dofs, lumps, np.arange(_dof_count(model)))
     M = sparse.csr_array(every[free][:, free])
-    inertia = (every @ rigid_motions(model)[:, :2])[free]
+    motions = rigid_motions(model)
+    pushed = np.asarray(every @ motions)
     C = squares(elongations, damping)[free][:, free] if damping.any() else None
     vectors = _interface_vectors(model, free)
-    return Component(K, M, vectors, model, free, element_dofs, inertia, C)
-
-
-def rigid_body_mass(component: Component) -> FloatArray:
-    """Mass matrix (3, 3) of the rigid motions, supports apart: along x, along y, about z."""
-    model, dofs = component.model, component.element_dofs
-    every = np.arange(_dof_count(model))
-    lumps = sparse.diags_array(_mass_diagonal(model), format="csr")
-    mass = _scatter(_element_matrices(model)[1], dofs, lumps, every)
-    motions = rigid_motions(model)
-    return np.asarray(motions.T @ (mass @ motions))
+    return Component(
+        K, M, vectors, model, free, element_dofs, motions.T @ pushed, pushed[free, :2], C
+    )
 
 
 def rigid_motions(model: FrameModel) -> FloatArray:

@@ -2,12 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import replace
+from typing import Self
 
 import numpy as np
 
 from fem.errors import ModelError
 from fem.mesh import FloatArray
+
+
+class InertiaLoads:
+    """What the dataclass of a component needs to be loaded by its own mass."""
+
+    interfaces: Mapping[str, FloatArray]
+    inertia: FloatArray
+    load_vectors: tuple[str, ...]
+
+    def with_load(self, name: str, acceleration: Sequence[float]) -> Self:
+        """The component with a load vector: its weight under an acceleration.
+
+        It is an interface of this name that nothing can be joined to, so that a reduction keeps
+        its static deflection exact.
+
+        Parameters
+        ----------
+        name
+            Of the load vector.
+        acceleration
+            Components (x, y, z) in m/s², z being 0 in a plane frame; a load is a factor of it.
+
+        Raises
+        ------
+        ModelError
+            If there is an interface of this name, or no mass is moved that way.
+        """
+        vector = inertia_load(self.inertia, self.interfaces, name, acceleration)
+        return replace(  # type: ignore[type-var]  # of a dataclass
+            self,
+            interfaces={**self.interfaces, name: vector},
+            load_vectors=(*self.load_vectors, name),
+        )
 
 
 def inertia_load(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
@@ -29,7 +29,7 @@ from fem.errors import JointWarning, ModelError
 from fem.hanging import check_nothing_hangs
 from fem.joints import hinge_warnings, mechanism_warnings, pin_warnings
 from fem.links import link_rows
-from fem.load_vectors import inertia_load
+from fem.load_vectors import InertiaLoads
 from fem.locking import locking_warnings
 from fem.mesh import FloatArray, IntArray
 from fem.natural import (
@@ -70,7 +70,7 @@ class DistortionWarning(UserWarning):
 
 
 @dataclass(frozen=True, eq=False)
-class StructureComponent:
+class StructureComponent(InertiaLoads):
     """An assembled structure: N free degrees of freedom, two matrices and named interfaces.
 
     Parameters
@@ -105,31 +105,6 @@ class StructureComponent:
     inertia: FloatArray
     damping: SparseArray | None = None
     load_vectors: tuple[str, ...] = ()
-
-    def with_load(self, name: str, acceleration: Sequence[float]) -> StructureComponent:
-        """The component with a load vector: its weight under an acceleration.
-
-        It is an interface of this name that nothing can be joined to, so that a reduction keeps
-        its static deflection exact.
-
-        Parameters
-        ----------
-        name
-            Of the load vector.
-        acceleration
-            Components (x, y, z) in m/s²; a load is a factor of it.
-
-        Raises
-        ------
-        ModelError
-            If there is an interface of this name, or no mass is moved that way.
-        """
-        vector = inertia_load(self.inertia, self.interfaces, name, acceleration)
-        return replace(
-            self,
-            interfaces={**self.interfaces, name: vector},
-            load_vectors=(*self.load_vectors, name),
-        )
 
     @property
     def free(self) -> IntArray:

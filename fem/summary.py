@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.frame import Component, rigid_body_mass
+from fem.frame import Component
 from fem.pieces import described, place_of
 from fem.structure_assembly import StructureComponent
 
@@ -46,13 +46,11 @@ def mass_properties(component: Component | StructureComponent) -> MassProperties
     With the mass matrix M of all degrees of freedom, t the translation and r the rotation about an
     axis, m = tᵀMt, and tᵀMr is m times a coordinate of the centre.
     """
+    rigid = component.rigid_mass
+    mass = rigid[0, 0]
     if isinstance(component, Component):
-        rigid = rigid_body_mass(component)
-        mass = rigid[0, 0]
         moments = np.array([rigid[1, 2], -rigid[0, 2], mass * component.model.mesh.points[0, 2]])
     else:
-        rigid = component.rigid_mass
-        mass = rigid[0, 0]
         moments = np.array([rigid[1, 5], -rigid[0, 5], rigid[0, 4]])
     x, y, z = (float(f"{value:.12g}") + 0.0 for value in (moments / mass if mass else np.zeros(3)))
     return MassProperties(float(f"{mass:.12g}"), (x, y, z))

@@ -141,8 +141,7 @@ class Solution:
         From the point before the last step.
     iterations : int
     first_step, last_step : float
-        Lengths of the first and the last Newton step, or of the next where two foretell it: the
-        error left is far below the last.
+        Lengths of the first and the last Newton step: the error left is far below the last.
     failure : str
         Empty, or why it did not converge.
     """

@@ -217,7 +217,7 @@ def _read_dampers(group: Group) -> tuple[Damper, ...]:
 
 
 def _read_loads(group: Group, modes: int) -> dict[str, Real]:
-    """Load vectors; files of versions before 0.2 have none."""
+    """Load vectors, if the file has some."""
     if not group.has_attribute("load_vectors"):
         return {}
     names = group.texts("load_vectors")

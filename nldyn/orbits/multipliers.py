@@ -107,7 +107,11 @@ def floquet_spectrum(jacobians: Real) -> FloquetSpectrum:
     >>> [float(f"{x:.6g}") for x in floquet_spectrum(np.array(quarters)).multipliers.real]
     [1000000000000.0, 1e-12]
     """
-    jacobians = np.ascontiguousarray(balanced(jacobians), dtype=float)
+    return _spectrum_of_balanced(balanced(jacobians))
+
+
+def _spectrum_of_balanced(jacobians: Real) -> FloquetSpectrum:
+    jacobians = np.ascontiguousarray(jacobians, dtype=float)
     values, logarithms, squeeze, converged = product_eigenvalues(jacobians)
     if not converged:
         raise MultiplierError("the multipliers of an orbit could not be computed")
@@ -167,7 +171,7 @@ def uncertainties(jacobians: Real, found: FloquetSpectrum, error: float) -> Real
     total = np.zeros(n)
     for direction in _directions(k, n):
         try:
-            moved = floquet_spectrum(jacobians + error * sizes * direction).log_moduli
+            moved = _spectrum_of_balanced(jacobians + error * sizes * direction).log_moduli
         except MultiplierError:
             return np.full(n, math.inf)
         with np.errstate(invalid="ignore"):

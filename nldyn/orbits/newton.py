@@ -103,10 +103,10 @@ def refine(
         raise ConvergenceError(f"{where}: {NO_PLACE}")
     if not found.converged:
         contact = np.any(found.motion.record.kind >= 0)
-        unbounded = problem.flow.system.response(omega).unbounded(omega)
-        if not contact and unbounded:
+        fault = None if contact else problem.flow.system.response(omega).unbounded(omega)
+        if fault is not None:
             raise ConvergenceError(
-                f"{where}: {unbounded}, and its motion grows without bound where it touches no stop"
+                f"{where}: {fault[0]}, and its motion grows without bound where it touches no stop"
             )
         if drifts and _is_left_free(problem.flow.system):
             raise ConvergenceError(f"{where}: {NOT_HELD}")

@@ -44,6 +44,9 @@ class Terms(NamedTuple):
     rates: Complex
 
 
+_Term = tuple[int, float, complex, Complex]  # kind, order, rate and amplitude
+
+
 # Beyond this condition number of the basis a Jacobian has fewer than eight digits left: its error
 # is about 200 roundings times the condition (the cases of `hard.modes`).
 _MAX_CONDITION = 2e5
@@ -104,31 +107,23 @@ class LinearPart:
         omega : float
             Excitation frequency in rad/s.
         """
-        terms: list[tuple[int, float, complex]] = []
-        amplitudes: list[Complex] = []
-        growths: list[tuple[tuple[int, float, complex], Complex]] = []
+        found: list[_Term] = []
         for order, drive in zip(orders.tolist(), drives, strict=True):
             steady, growing = (
                 self._drift(drive, omega) if order == 0.0 else self._swing(drive, order, omega)
             )
-            terms.append((STEADY, order, 0j))
-            amplitudes.append(steady)
-            growths.extend(growing)
-        terms.extend(term for term, _ in growths)
-        amplitudes.extend(amplitude for _, amplitude in growths)
-        kinds, numbers, rates = zip(*terms[1:], strict=True) if terms[1:] else ((), (), ())
-        return ForcedResponse(
-            Terms(
-                np.array(kinds, dtype=np.int64),
-                np.array(numbers, dtype=float),
-                np.array(rates, dtype=complex),
-            ),
-            np.array(amplitudes),
+            found += [(STEADY, order, 0j, steady), *growing]
+        first, *others = found
+        terms = Terms(
+            np.array([term[0] for term in others], dtype=np.int64),
+            np.array([term[1] for term in others], dtype=float),
+            np.array([term[2] for term in others], dtype=complex),
         )
+        return ForcedResponse(terms, np.array([first[3], *(term[3] for term in others)]))
 
     def _swing(
         self, drive: Complex, order: float, omega: float
-    ) -> tuple[Complex, list[tuple[tuple[int, float, complex], Complex]]]:
+    ) -> tuple[Complex, list[_Term]]:
         """Steady response to Re(drive e^{i order ωt}), and growths of the near eigenvalues."""
         pace = order * omega
         a, b, c, d, rates = self._entries
@@ -147,12 +142,10 @@ class LinearPart:
             growing = np.zeros(drive.size, dtype=complex)
             growing[pair] = 0.5 * (drive[pair] + turned)
             steady[pair] = 0.5 * (drive[pair] - turned) / (1j * pace - rate.conjugate())
-            growths.append(((GROWTH, order, complex(rate)), growing))
+            growths.append((GROWTH, order, complex(rate), growing))
         return steady, growths
 
-    def _drift(
-        self, drive: Complex, omega: float
-    ) -> tuple[Complex, list[tuple[tuple[int, float, complex], Complex]]]:
+    def _drift(self, drive: Complex, omega: float) -> tuple[Complex, list[_Term]]:
         """Displacement by a constant drive, and the drifts of the blocks that are slow beside ω."""
         a, b, c, d, _ = self._entries
         determinant, trace = a * d - b * c, a + d
@@ -171,7 +164,7 @@ class LinearPart:
             along, onward = np.zeros((2, drive.size), dtype=complex)
             along[pair] = drive[pair]
             onward[pair] = self.blocks[block] @ drive[pair]
-            drifts += [((DRIFT, 0.0, rate), along), ((DRIFT_ON, 0.0, rate), onward)]
+            drifts += [(DRIFT, 0.0, rate, along), (DRIFT_ON, 0.0, rate, onward)]
         return steady, drifts
 
     @cached_property
@@ -213,19 +206,25 @@ class ForcedResponse:
     terms: Terms
     amplitudes: Complex
 
-    def unbounded(self, omega: float) -> str:
-        """Why no motion without contact is bounded at ω (rad/s), in words; empty if one is."""
+    def unbounded(self, omega: float) -> tuple[str, str] | None:
+        """Why no motion without contact is bounded at ω (rad/s), and what helps, if none is."""
         terms = self.terms
         driven = np.any(self.amplitudes[1:], axis=1)
         swings = (terms.kinds == GROWTH) & at_resonance(terms.rates, terms.orders * omega)
         if np.any(driven & swings):
             hz = terms.orders[driven & swings][0] * omega / (2.0 * np.pi)
-            return f"the excitation at {hz:g} Hz meets an undamped mode exactly"
+            return (
+                f"the excitation at {hz:g} Hz meets an undamped mode exactly",
+                "give the mode some damping or move the frequency",
+            )
         drifts = np.isin(terms.kinds, (DRIFT, DRIFT_ON))
         still = slowest_rate(terms.rates.real, terms.rates.imag) < 1e-12 * omega
         if np.any(driven & drifts & still):
-            return "a constant force acts on a body that nothing but a stop holds"
-        return ""
+            return (
+                "a constant force acts on a body that nothing but a stop holds",
+                "hold the body by a spring or a stop",
+            )
+        return None
 
     def harmonics(self, omega: float) -> tuple[Real, Complex]:
         """Orders m (k,) and amplitudes a (k, 2n) of the steady response z = Σ Re(a e^{imωt}).
@@ -237,9 +236,9 @@ class ForcedResponse:
         SystemModelError
             If there is none, see `unbounded`.
         """
-        reason = self.unbounded(omega)
-        if reason:
-            raise SystemModelError(f"{reason}; {_WAYS_OUT[reason.startswith('a constant')]}")
+        fault = self.unbounded(omega)
+        if fault is not None:
+            raise SystemModelError("; ".join(fault))
         kinds, orders, rates = self.terms
         factors = np.ones(1 + kinds.size, dtype=complex)
         for k, kind in enumerate(kinds.tolist()):
@@ -264,12 +263,6 @@ class ForcedResponse:
         spans = {STEADY: 1.0, GROWTH: period, DRIFT: period, DRIFT_ON: 0.5 * period * period}
         weights = np.array([1.0, *(spans[kind] for kind in self.terms.kinds.tolist())])
         return float((weights @ np.abs(self.amplitudes)).max())
-
-
-_WAYS_OUT = (
-    "give the mode some damping or move the frequency",
-    "hold the body by a spring or a stop",
-)
 
 
 def at_resonance(eigenvalues: Complex, omega: float | Real) -> NDArray[np.bool_]:

@@ -114,11 +114,7 @@ def _downhill(system: System, q: Real, slope: Real) -> Real:
 
 def closed_at_rest(system: System, q: Real) -> list[tuple[int, float, float]]:
     """Number, penetration in m and force in N of each stop that is closed at rest."""
-    return [
-        (i, depth, float(stop.force(depth)))
-        for i, stop in enumerate(system.stops)
-        if (depth := float(system.stop_vector(stop) @ q) - stop.gap) > 0.0
-    ]
+    return [(i, depth, float(system.stops[i].force(depth))) for i, _, depth in _closed(system, q)]
 
 
 def held_response(system: System, q: Real, omega: float) -> Complex:
@@ -146,18 +142,18 @@ def held_motion(system: System, q: Real, omega: float, phases: Real) -> Real:
 def tangent_stiffness(system: System, q: Real) -> Real:
     """Stiffness (n, n) of the structure with its closed stops at modal displacements q."""
     matrix = np.diag(system.natural_frequencies**2)
-    for stop, c, depth in _closed(system, q):
-        matrix += _elastic(stop, depth)[1] * np.outer(c, c)
+    for i, c, depth in _closed(system, q):
+        matrix += _elastic(system.stops[i], depth)[1] * np.outer(c, c)
     return matrix
 
 
-def _closed(system: System, q: Real) -> Iterator[tuple[Stop, Real, float]]:
-    """The stops that are closed at modal displacements q, with their vectors and penetrations."""
-    for stop in system.stops:
+def _closed(system: System, q: Real) -> Iterator[tuple[int, Real, float]]:
+    """Numbers of the stops that are closed at modal displacements q, vectors and penetrations."""
+    for i, stop in enumerate(system.stops):
         c = system.stop_vector(stop)
         depth = float(c @ q) - stop.gap
         if depth > 0.0:
-            yield stop, c, depth
+            yield i, c, depth
 
 
 def _elastic(stop: Stop, depth: float) -> tuple[float, float]:
@@ -168,13 +164,14 @@ def _elastic(stop: Stop, depth: float) -> tuple[float, float]:
 
 def _slope(system: System, push: Real, q: Real) -> Real:
     slope = system.natural_frequencies**2 * q - push
-    for stop, c, depth in _closed(system, q):
-        slope = slope + _elastic(stop, depth)[0] * c
+    for i, c, depth in _closed(system, q):
+        slope = slope + _elastic(system.stops[i], depth)[0] * c
     return np.asarray(slope)
 
 
 def _potential(system: System, push: Real, q: Real) -> float:
     energy = 0.5 * float(system.natural_frequencies**2 @ q**2) - float(push @ q)
-    for stop, _, depth in _closed(system, q):
+    for i, _, depth in _closed(system, q):
+        stop = system.stops[i]
         energy += _elastic(stop, depth)[0] * depth / (stop.exponent + 1.0)
     return energy

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from types import MappingProxyType
 from typing import Protocol, TypeVar
@@ -404,7 +404,7 @@ class System:
 
     def grows(self, omega: float) -> bool:
         """Whether no motion without contact is bounded at ω (rad/s), see `ForcedResponse`."""
-        return bool(self.response(omega).unbounded(omega))
+        return self.response(omega).unbounded(omega) is not None
 
     def with_elements(
         self,
@@ -417,8 +417,9 @@ class System:
         The linear part is shared, which saves most of the work of making a system.
         """
         other = copy.copy(self)
-        for kept in ("drive", "orders", "symmetric"):
-            vars(other).pop(kept, None)
+        own = {field.name for field in fields(self)} | {"linear", "total_damping"}
+        for derived in vars(self).keys() - own:
+            del vars(other)[derived]
         if stops is not None:
             object.__setattr__(other, "stops", _listed("stops", stops))
         if excitation is not None:

@@ -151,16 +151,25 @@ def drift(trace, determinant, t):
 @inner
 def term(terms, k, omega, phase):
     """Value and first two time derivatives of a term at a phase."""
+    return term_since(terms, k, omega, phase, phase / omega)
+
+
+@inner
+def term_since(terms, k, omega, phase, t):
+    """The same of one that was at rest a time t ago, if it is no steady one.
+
+    The phase is that at its end.
+    """
     never_inline()
     kind, pace, rate = terms.kinds[k], terms.orders[k] * omega, terms.rates[k]
+    turn = turned(terms.orders[k] * phase)
     if kind == STEADY:
-        e = turned(terms.orders[k] * phase)
-        return e, 1j * pace * e, -pace * pace * e
+        return turn, 1j * pace * turn, -pace * pace * turn
     if kind == GROWTH:
-        e, turn = growth(rate, pace, terms.orders[k] * phase)
+        e = turn * from_rest(rate - 1j * pace, t)
         first = rate * e + turn
         return e, first, rate * first + 1j * pace * turn
-    f, f_on, e, e_on = drift(rate.real, rate.imag, phase / omega)
+    f, f_on, e, e_on = drift(rate.real, rate.imag, t)
     if kind == DRIFT:
         return complex(e, 0.0), complex(f, 0.0), complex(-rate.imag * f_on, 0.0)
     return complex(e_on, 0.0), complex(f_on, 0.0), complex(f + rate.real * f_on, 0.0)

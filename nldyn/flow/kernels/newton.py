@@ -132,7 +132,7 @@ def newton(
         `OK`, `DIVERGED`, `SINGULAR`, `NOT_CONVERGED` or why the flow map failed.
     iterations : int
     first, last : float
-        Lengths of the first and the last step, or of the next one where that is foretold.
+        Lengths of the first and the last step.
     along : (N + 1,)
         Vector along the branch, of no particular length.
     ends, jacobians, d_omegas, d_parameters, closings

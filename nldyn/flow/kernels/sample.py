@@ -7,16 +7,15 @@ import numpy as np
 from nldyn.flow.kernels.compiling import FILES, inner, njit
 from nldyn.flow.kernels.flights import (
     block_exponential,
-    drift,
     fastest_moved,
     fly_state,
-    from_rest,
+    term_since,
     turned,
 )
 from nldyn.flow.kernels.layout import FLIGHT
 from nldyn.flow.kernels.resolution import map_fraction
 from nldyn.runtime.kernel_cache import resting_on
-from nldyn.system.linear import DRIFT, GROWTH, STEADY
+from nldyn.system.linear import STEADY
 
 compiled = resting_on(njit(cache=True, error_model="numpy"), *FILES)
 
@@ -119,26 +118,6 @@ def without_steady(terms, response, phase, state, w):
                 w[k] -= (response[p, k] * turn).real
 
 
-@inner
-def since_rest(terms, k, omega, phase, t):
-    """A term, and its rate, that was at rest a time t ago if it is no steady one.
-
-    The phase is that at its end. See `flights.term`.
-    """
-    kind, pace, rate = terms.kinds[k], terms.orders[k] * omega, terms.rates[k]
-    if kind == STEADY:
-        turn = turned(terms.orders[k] * phase)
-        return turn, 1j * pace * turn
-    if kind == GROWTH:
-        turn = turned(terms.orders[k] * phase)
-        e = turn * from_rest(rate - 1j * pace, t)
-        return e, rate * e + turn
-    f, f_on, e, e_on = drift(rate.real, rate.imag, t)
-    if kind == DRIFT:
-        return complex(e, 0.0), complex(f, 0.0)
-    return complex(e_on, 0.0), complex(f_on, 0.0)
-
-
 @compiled
 def sample_states(
     blocks, force, omega, tab,
@@ -146,7 +125,7 @@ def sample_states(
 ):  # fmt: skip
     """States (n_phases, 2n) at ascending forcing phases.
 
-    terms (k of them) and response (1 + k, 2n) are those of `LinearPart.response`.
+    terms (k of them) and response (1 + k, 2n) are those of a `ForcedResponse`.
     """
     states = np.empty((phases.size, force.shape[0]))
     shares = np.empty((tab.nodes.size, force.shape[0]))
@@ -166,7 +145,7 @@ def sample_states(
         for p in range(response.shape[0]):
             e = turned(phases[i])
             if p > 0:
-                e, _ = since_rest(terms, p - 1, omega, phases[i], t)
+                e, _, _ = term_since(terms, p - 1, omega, phases[i], t)
             for j in range(states.shape[1]):
                 states[i, j] += (response[p, j] * e).real
     return states
@@ -179,7 +158,7 @@ def output_rate(row, row1, terms, forced, omega, phase, t, w):
     value = turn.real
     rate = -omega * turn.imag
     for k in range(terms.kinds.size):
-        e, e1 = since_rest(terms, k, omega, phase, t)
+        e, e1, _ = term_since(terms, k, omega, phase, t)
         value += (forced[1 + k] * e).real
         rate += (forced[1 + k] * e1).real
     for k in range(w.size):

@@ -190,6 +190,14 @@ def jump_columns(fl, stop, phase, t, closes, columns):
 
 
 @inner
+def switch(fl, stop, phase, t, closed, with_columns, columns):
+    """Close a stop that is open, or open one that is closed, a time t after the start."""
+    closed[stop] = not closed[stop]
+    if with_columns and fl.stops[stop, DASHPOT] > 0.0:
+        jump_columns(fl, stop, phase, t, closed[stop], columns)
+
+
+@inner
 def switch_with(fl, w, phase, t, h, closed, closings, with_columns, columns):
     """Open and close the stops that do so at the very instant of another one's event.
 
@@ -197,11 +205,9 @@ def switch_with(fl, w, phase, t, h, closed, closings, with_columns, columns):
     """
     for s in range(closed.size):
         if with_event(fl, s, w, phase, 10.0 * fl.stops[s, INSTANT] * h, closed):
-            closed[s] = not closed[s]
+            switch(fl, s, phase, t, closed, with_columns, columns)
             if closed[s]:
                 closings[s] += 1
-            if with_columns and fl.stops[s, DASHPOT] > 0.0:
-                jump_columns(fl, s, phase, t, closed[s], columns)
 
 
 @inlined
@@ -261,11 +267,9 @@ def run_pieces(
             t = duration if stop < 0 else t + first
             skip = 0.0
             if stop >= 0:
-                closed[stop] = True
-                closings[stop] += 1
                 here = phase + fl.omega * t
-                if with_columns and fl.stops[stop, DASHPOT] > 0.0:
-                    jump_columns(fl, stop, here, t, True, columns)
+                switch(fl, stop, here, t, closed, with_columns, columns)
+                closings[stop] += 1
                 switch_with(fl, w, here, t, 0.0, closed, closings, with_columns, columns)
                 start_switch = 1
             continue
@@ -278,10 +282,8 @@ def run_pieces(
             if lost_to_rounding(fl, active[0], w, peak, noise) > WORST_ROUNDING:
                 return ROUNDED
             if peak <= 100.0 * noise:  # a touch without force
-                closed[active[0]] = False
+                switch(fl, active[0], here, t, closed, with_columns, columns)
                 closings[active[0]] -= 1
-                if with_columns and fl.stops[active[0], DASHPOT] > 0.0:
-                    jump_columns(fl, active[0], here, t, False, columns)
                 start_switch, skip = 0, max(left, shortest)
                 continue
         h_max = min(remain, h_mapped if start_switch == 1 else h_even)
@@ -325,13 +327,11 @@ def run_pieces(
         start_switch = 0
         if event >= 0:
             panel.decay[:] = 0.0
-            closed[event] = not closed[event]
+            here = phase + fl.omega * t
+            switch(fl, event, here, t, closed, with_columns, columns)
             start_switch = 1
             if closed[event]:
                 closings[event] += 1
-            here = phase + fl.omega * t
-            if with_columns and fl.stops[event, DASHPOT] > 0.0:
-                jump_columns(fl, event, here, t, closed[event], columns)
             switch_with(fl, w, here, t, h, closed, closings, with_columns, columns)
             skip = shortest if h < shortest else 0.0
     return TOO_MANY_PIECES
