@@ -64,9 +64,11 @@ def read_vtu(path: Path) -> meshio.Mesh:
         found = re.findall(rb"<DataArray\b[^>]*?\bName=[\"']([^\"']*)[\"']", arrays)
         _check_each_once([unescape(name.decode("utf-8", "replace")) for name in found], path)
     with bounded_unpacking(path), TemporaryDirectory() as folder:
-        without = Path(folder) / "mesh.vtu"
-        without.write_bytes(told + appended + data)
-        content = _without_warning(meshio.vtu.read, without)
+        readable = path
+        if told != before:
+            readable = Path(folder) / "mesh.vtu"
+            readable.write_bytes(told + appended + data)
+        content = _without_warning(meshio.vtu.read, readable)
     _check_no_ghosts(content, path)
     return content
 

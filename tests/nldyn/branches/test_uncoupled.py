@@ -44,7 +44,7 @@ def test_a_fast_mode_that_no_stop_moves_costs_no_contact_panels():
             np.eye(2), np.diag([fast, 1.0]), {"m": [0.0, 1.0]}, modal_damping=0.05,
             stops=[Stop.linear("m", 1.5, gap=-1e-2)], excitation=[HarmonicForce("m", 1e-3)],
         )  # fmt: skip
-        found.append(solve_orbit(system, 0.1, seconds=600.0).max_abs_displacement)
+        found.append(solve_orbit(system, 0.1).max_abs_displacement)
     assert found[1] == pytest.approx(found[0], rel=1e-12)
 
 
