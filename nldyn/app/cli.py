@@ -25,6 +25,7 @@ from nldyn.runtime.interruption import STOPPED, interrupted
 if TYPE_CHECKING:
     from nldyn.search.diagram import Diagram
     from nldyn.system.elements import Stop
+    from nldyn.system.springs import Spring
     from nldyn.system.system import System
 
 
@@ -425,6 +426,10 @@ def describe_system(system: System, residual: int = 0) -> str:
     flexibility = "".join(f"{static_flexibility(system, name):>{width}.6g}" for name in names)
     lines.append(f"{'static flexibility m/N':<23}{flexibility}")
     lines += [describe_stop(stop) for stop in system.stops]
+    lines += [describe_spring(spring) for spring in system.springs]
+    if system.springs:
+        hz = ", ".join(f"{value:.6f}" for value in system.linear.frequencies_hz)
+        lines.append(f"frequencies with the springs: {hz} Hz")
     return "\n".join([*lines, *describe_rest(system)])
 
 
@@ -459,10 +464,22 @@ def describe_stop(stop: Stop) -> str:
     )
 
 
+def describe_spring(spring: Spring) -> str:
+    """Say in a line where a spring is and what it does."""
+    where = f"at '{spring.at}'" + (f" against '{spring.against}'" if spring.against else "")
+    return f"spring {where}: {spring.stiffness:.6g} N/m"
+
+
 def static_flexibility(system: System, interface: str) -> float:
     """Displacement in m at an interface for a steady force of 1 N there; inf if nothing holds."""
-    shares = system.participation[interface] ** 2
-    squares = system.natural_frequencies**2
+    import numpy as np
+
+    phi = system.participation[interface]
+    if system.springs:
+        displaced = np.linalg.lstsq(system.stiffness, phi, rcond=None)[0]
+        left = np.linalg.norm(system.stiffness @ displaced - phi)
+        return float(phi @ displaced) if left <= 1e-9 * np.linalg.norm(phi) else float("inf")
+    shares, squares = phi**2, system.natural_frequencies**2
     if any(shares[squares == 0.0]):
         return float("inf")
     return float(sum(shares[squares > 0.0] / squares[squares > 0.0]))

@@ -25,6 +25,7 @@ from nldyn.system.elements import (
 )
 from nldyn.system.linear import LinearPart
 from nldyn.system.parameters import strength
+from nldyn.system.springs import Spring
 from nldyn.system.system import System
 
 TRIALS = ((0.1, 0.0), (1.0, 0.1), (1.0, -0.1))  # penetration over its unit, speed in m/s
@@ -86,9 +87,15 @@ def write_flow(group: Any, flow: FlowMap) -> None:
     )
     _write_columns(
         group.create_group("dampers"),
-        {"at": [d.at for d in system.dampers]},
+        {"at": [d.at for d in system.dampers], **_ends(system.dampers)},
         {"coefficient": ("N s/m", [d.coefficient for d in system.dampers])},
     )
+    if system.springs:
+        _write_columns(
+            group.create_group("springs"),
+            {"at": [s.at for s in system.springs], **_ends(system.springs)},
+            {"stiffness": ("N/m", [s.stiffness for s in system.springs])},
+        )
     sources = system.excitation
     _write_columns(
         group.create_group("excitation"),
@@ -101,6 +108,13 @@ def write_flow(group: Any, flow: FlowMap) -> None:
             "phase_deg": ("degree", [getattr(s, "phase_deg", 0.0) for s in sources]),
         },
     )
+
+
+def _ends(elements: Sequence[Damper] | Sequence[Spring]) -> dict[str, list[str]]:
+    """Interfaces at the other ends, with a mark before, or nothing if all are on the ground."""
+    if all(element.against is None for element in elements):
+        return {}
+    return {"against": ["" if e.against is None else f"'{e.against}" for e in elements]}
 
 
 def _kind(source: Excitation) -> str:
@@ -153,6 +167,7 @@ def read_flow(group: Group, laws: Laws) -> FlowMap:
             _read_dampers(group.group("dampers")),
             _read_excitation(group.group("excitation")),
             _read_loads(group, n),
+            _read_springs(group.group("springs")) if "springs" in group else (),
         )
     except SystemModelError as error:
         if str(error).startswith(str(group.path)):
@@ -213,7 +228,19 @@ def _read_stops(group: Group, laws: Laws) -> tuple[Stop, ...]:
 
 def _read_dampers(group: Group) -> tuple[Damper, ...]:
     at = group.texts("at")
-    return tuple(map(Damper, at, group.array("coefficient", len(at)).tolist()))
+    return tuple(map(Damper, at, group.array("coefficient", len(at)).tolist(), _other_ends(group)))
+
+
+def _read_springs(group: Group) -> tuple[Spring, ...]:
+    at = group.texts("at")
+    return tuple(map(Spring, at, group.array("stiffness", len(at)).tolist(), _other_ends(group)))
+
+
+def _other_ends(group: Group) -> list[str | None]:
+    """What `_ends` wrote."""
+    if not group.has_attribute("against"):
+        return [None] * len(group.texts("at"))
+    return [name[1:] if name else None for name in group.texts("against")]
 
 
 def _read_loads(group: Group, modes: int) -> dict[str, Real]:

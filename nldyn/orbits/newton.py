@@ -65,14 +65,6 @@ def check_bounded(system: System, omega: float) -> None:
         system.steady(omega)
 
 
-def _is_left_free(system: System) -> bool:
-    """Whether the stops leave a mode of zero frequency, or a combination of such modes, free."""
-    free = system.natural_frequencies == 0.0
-    held = np.array([system.stop_vector(stop)[free] for stop in system.stops])
-    held = held.reshape(-1, int(free.sum()))  # without stops, too
-    return int(np.linalg.matrix_rank(held)) < held.shape[1]
-
-
 def _touches_only(system: System, motion: Trajectory, omega: float) -> bool:
     """Whether contacts push, but by no more than rounding of the drive and of the motion."""
     force = float(motion.record.force.max(initial=0.0))
@@ -98,7 +90,7 @@ def refine(
     row[-1] = 1.0
     found = problem.correct(guess, row, max_iterations=max_iterations)
     where = f"no orbit of period {problem.period} found at {omega / (2 * math.pi):g} Hz"
-    drifts = bool(np.any(problem.flow.system.natural_frequencies == 0.0))
+    drifts = problem.flow.system.free_modes > 0
     if drifts and _touches_only(problem.flow.system, found.motion, omega):
         raise ConvergenceError(f"{where}: {NO_PLACE}")
     if not found.converged:
@@ -108,7 +100,7 @@ def refine(
             raise ConvergenceError(
                 f"{where}: {fault[0]}, and its motion grows without bound where it touches no stop"
             )
-        if drifts and _is_left_free(problem.flow.system):
+        if drifts and problem.flow.system.left_free:
             raise ConvergenceError(f"{where}: {NOT_HELD}")
         if not contact and drifts:
             raise ConvergenceError(f"{where}: {NO_PLACE}")

@@ -579,11 +579,11 @@ def receptance(reduced: cms.ReducedModel, setting: LoadCase, frequency_hz: Real)
     system = setting.system(reduced)
     row = next(iter(system.participation.values()))
     squares, D = system.natural_frequencies**2, system.total_damping
-    if not np.any(D - np.diag(np.diag(D))):
+    if not np.any(D - np.diag(np.diag(D))) and not system.springs:
         omega = 2 * np.pi * frequency_hz[:, None]
         return np.asarray(np.sum(row**2 / (squares - omega**2 + 1j * omega * np.diag(D)), axis=1))
     found = [
-        row @ np.linalg.solve(np.diag(squares - w**2) + 1j * w * D, row)
+        row @ np.linalg.solve(system.stiffness - w**2 * np.eye(row.size) + 1j * w * D, row)
         for w in 2 * np.pi * frequency_hz
     ]
     return np.array(found)
@@ -592,7 +592,10 @@ def receptance(reduced: cms.ReducedModel, setting: LoadCase, frequency_hz: Real)
 def massless_receptance(
     reduced: cms.ReducedModel, setting: LoadCase, frequency_hz: Real
 ) -> Complex:
-    """The same where part of the flexibility has no mass: dampers close R = P Z^-1 P^T + G."""
+    """The same where part of the flexibility has no mass.
+
+    Dampers and springs close R = P Z^-1 P^T + G.
+    """
     if any(setting.rayleigh):  # not known where flexibility has no mass
         return np.full(len(frequency_hz), np.nan, dtype=complex)
     names = reduced.interfaces
@@ -603,9 +606,16 @@ def massless_receptance(
             for a in names
         ]
     )
-    C = np.diag([sum(d.coefficient for d in setting.dampers if d.at == name) for name in names])
+    C, K = np.zeros((2, len(names), len(names)))
+    sizes = [(C, d.coefficient, d.at, d.against) for d in setting.dampers]
+    sizes += [(K, s.stiffness, s.at, s.against) for s in setting.springs]
+    for matrix, size, at, against in sizes:
+        ends = [1.0 * (name == at) - (name == against) for name in names]
+        matrix += size * np.outer(ends, ends)
     found = [
-        np.linalg.solve(np.eye(len(names)) + 1j * w * R[:, :, k] @ C, R[:, observed, k])[observed]
+        np.linalg.solve(np.eye(len(names)) + R[:, :, k] @ (K + 1j * w * C), R[:, observed, k])[
+            observed
+        ]
         for k, w in enumerate(2 * np.pi * frequency_hz)
     ]
     return np.array(found)
@@ -620,7 +630,7 @@ def harmonic_branch(system: System, setting: LoadCase, tell: Callable[[float], N
             FlowMap(system), high * (1.0 - 1e-9), observe=setting.observe, seconds=LONGEST_SEARCH
         )
     except ConvergenceError as error:
-        rigid = int(np.count_nonzero(system.frequencies_hz == 0.0))
+        rigid = system.free_modes
         if not rigid:
             raise
         modes = f"{rigid} mode{'' if rigid == 1 else 's'} at 0 Hz"

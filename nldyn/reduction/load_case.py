@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from nldyn.base.errors import SystemModelError, check_frequency
 from nldyn.system.elements import Damper, Excitation, Stop
+from nldyn.system.springs import Spring
 from nldyn.system.system import System
 
 if TYPE_CHECKING:
@@ -33,6 +34,8 @@ class LoadCase:
         Interface whose displacement is asked for; the first unless given.
     rayleigh : (float, float)
         alpha in 1/s and beta in s of the damping alpha M + beta K of the component.
+    springs : tuple
+        Springs at the interfaces.
 
     Raises
     ------
@@ -53,6 +56,7 @@ class LoadCase:
     modal_damping: float = 0.0
     observe: str | None = None
     rayleigh: tuple[float, float] = (0.0, 0.0)
+    springs: tuple[Spring, ...] = ()
 
     def __post_init__(self) -> None:
         low, high = self.range_hz
@@ -84,6 +88,7 @@ class LoadCase:
             stops=self.stops,
             dampers=self.dampers,
             excitation=self.excitation,
+            springs=self.springs,
         )
 
 
@@ -96,6 +101,7 @@ def system_of_reduced(
     stops: Sequence[Stop],
     dampers: Sequence[Damper],
     excitation: Sequence[Excitation],
+    springs: Sequence[Spring] = (),
 ) -> System:
     """The system of a reduced model, for parameters as those of `LoadCase`.
 
@@ -112,6 +118,7 @@ def system_of_reduced(
         stops=stops,
         dampers=dampers,
         excitation=excitation,
+        springs=springs,
     )
 
 

@@ -196,7 +196,8 @@ def _check_structure(scene: Scene, report: Report) -> None:
         raise report((kinds[1],), f"cannot stand beside [{kinds[0]}]; keep one of them")
     if scene.mesh is None:
         for key in MESH_ONLY:
-            if getattr(scene, key) and (key, kinds[0]) != ("reduction", "matrices"):
+            given = scene.mesh_springs if key == "springs" else getattr(scene, key)
+            if given and (key, kinds[0]) != ("reduction", "matrices"):
                 raise report(
                     (key,), f"describes a mesh, but the structure is given by [{kinds[0]}]"
                 )
@@ -282,7 +283,10 @@ def _check_interface_names(scene: Scene, report: Report) -> None:
         if name in scene.interface_names:
             continue
         if key[0] != "excitation" or not scene.load_names:
-            raise report(key, unknown_name(name, scene.interface_names, "an interface"))
+            fault = unknown_name(name, scene.interface_names, "an interface")
+            at_mesh = key[0] == "springs" and scene.mesh is not None
+            hint = "; a spring at a point of the mesh needs a 'direction'" if at_mesh else ""
+            raise report(key, fault + hint)
         if name not in scene.load_names:
             known = [*scene.interface_names, *scene.load_names]
             raise report(key, unknown_name(name, known, "an interface or load vector"))
@@ -323,15 +327,20 @@ def _interfaces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
         for number, entry in enumerate(getattr(scene, table)):
             if entry.at is not None:
                 yield (table, number, "at"), entry.at
-    for number, stop in enumerate(scene.stops):
-        if stop.against is not None:
-            yield ("stops", number, "against"), stop.against
+    for number, spring in scene.interface_springs.items():
+        yield ("springs", number, "at"), spring.at
+    for kind in ("stops", "dampers", "springs"):
+        for number, entry in enumerate(getattr(scene, kind)):
+            if entry.against is not None:
+                yield (kind, number, "against"), entry.against
     if scene.observe is not None:
         yield ("observe", "at"), scene.observe.at
 
 
 def _points_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
-    for table in ("supports", "point_masses", "springs", "hinges"):
+    for number, spring in scene.mesh_springs.items():
+        yield ("springs", number, "at"), spring.at
+    for table in ("supports", "point_masses", "hinges"):
         for number, entry in enumerate(getattr(scene, table)):
             yield (table, number, "at"), entry.at
     for name, interface in scene.interfaces.items():

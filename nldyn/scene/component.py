@@ -149,7 +149,11 @@ def _attached(scene: Scene) -> dict[str, Any]:
             fem.PointMass(m.at, m.mass, m.rotary_inertia, m.offset or (0.0, 0.0, 0.0))
             for m in scene.point_masses
         ],
-        "springs": [fem.PointSpring(s.at, s.direction, s.stiffness) for s in scene.springs],
+        "springs": [
+            fem.PointSpring(s.at, s.direction, s.stiffness)
+            for s in scene.mesh_springs.values()
+            if s.direction is not None
+        ],
         "hinges": [fem.Hinge(h.at, h.part) for h in scene.hinges],
         "interfaces": {
             name: fem.Interface(i.at, i.direction) for name, i in scene.interfaces.items()

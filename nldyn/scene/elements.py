@@ -23,6 +23,7 @@ from nldyn.system.elements import (
     hertz_stiffness,
 )
 from nldyn.system.measured import MeasuredForce, measured_force
+from nldyn.system.springs import Spring
 
 logger = logging.getLogger("nldyn")
 
@@ -33,6 +34,7 @@ class Acting(NamedTuple):
     stops: tuple[Stop, ...]
     dampers: tuple[Damper, ...]
     excitation: tuple[Excitation, ...]
+    springs: tuple[Spring, ...]
 
 
 def acting_elements(scene: Scene) -> Acting:
@@ -40,12 +42,15 @@ def acting_elements(scene: Scene) -> Acting:
     with told_as(scene, (), SystemModelError):
         return Acting(
             tuple(_stop(stop) for stop in scene.stops),
-            tuple(Damper(damper.at, damper.coefficient) for damper in scene.dampers),
+            tuple(
+                Damper(damper.at, damper.coefficient, damper.against) for damper in scene.dampers
+            ),
             tuple(
                 source
                 for number, table in enumerate(scene.excitation)
                 for source in _excitation(scene, number, table)
             ),
+            tuple(Spring(s.at, s.stiffness, s.against) for s in scene.interface_springs.values()),
         )
 
 

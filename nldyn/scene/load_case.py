@@ -28,7 +28,7 @@ def load_case_of(scene: Scene) -> LoadCase:
     low, high = scene.continuation.range_hz
     return LoadCase(
         (low, high),
-        *acting_elements(scene),
+        **acting_elements(scene)._asdict(),
         modal_damping=scene.damping.modal_ratio,
         observe=scene.observed,
         rayleigh=scene.damping.rayleigh,

@@ -16,10 +16,7 @@ from nldyn.base.errors import SceneError
 
 KeyPath = tuple[str | int, ...]
 MOST_SHOWN, LONGEST_SHOWN = 20, 60  # names in a list, letters of a name
-BETWEEN = (
-    "springs between two interfaces are not modelled: put them into the stiffness of [matrices], "
-    "or use [[stops]] with law = 'linear' and 'against', which push on contact"
-)
+BETWEEN = "what joins two interfaces is [[springs]] and [[dampers]] with 'at' and 'against'"
 WORDS = {  # that users try for a table, and what there is
     "friction": "friction is not modelled; there are [[stops]], which push along their normal and "
     "lose energy by 'dissipation' or 'restitution', and linear [[dampers]]",
@@ -33,7 +30,7 @@ WORDS = {  # that users try for a table, and what there is
     "gap": "a gap is a key of [[stops]]",
     "impact": "impacts are computed at [[stops]]",
     "dashpot": "dashpots are [[dampers]]; that of a stop is a key of [[stops]]",
-    "nonlinear_spring": f"nonlinear springs are [[stops]]; {BETWEEN}",
+    "nonlinear_spring": f"nonlinear springs that push on contact are [[stops]]; {BETWEEN}",
     "connection": BETWEEN,
     "connector": BETWEEN,
     "constraint": "what is held is in [[supports]], what is joined in [[couplings]]",
@@ -41,7 +38,7 @@ WORDS = {  # that users try for a table, and what there is
     "material": "materials are in [parts.NAME]",
     "section": "sections are in [parts.NAME]",
     "mass": "masses on a mesh are [[point_masses]]; a mass matrix is in [matrices]",
-    "stiffness": "a stiffness matrix is in [matrices]; springs to the ground are [[springs]]",
+    "stiffness": "a stiffness matrix is in [matrices]; springs are [[springs]]",
     "mode": "modes are given in [modal], or chosen in [reduction]",
     "frequency": "the range of frequencies is range_hz in [continuation]",
     "sweep": "the range of frequencies is range_hz in [continuation]",
@@ -220,7 +217,7 @@ def _unknown_key(model: type[BaseModel], key: KeyPath) -> str:
     here = table_at(model, key[:-1])
     if len(key) == 1 and (hint := _word(name)):
         return f"is not a table of a scene: {hint}"
-    if key[0] == "springs" and name in ("against", "between", "to", "from"):
+    if key[0] == "springs" and name in ("between", "to", "from"):
         return f"is not a known key: {BETWEEN}"
     known = list(here.model_fields) if here else []
     guess = nearest(name, known)

@@ -223,11 +223,22 @@ class PointMassTable(Table):
 
 
 class SpringTable(Table):
-    """``[[springs]]``: a linear spring between a point set and the ground."""
+    """``[[springs]]``: a spring at an interface or, with a direction, at a point of the mesh."""
 
     at: str
-    direction: Direction
-    stiffness: Positive
+    direction: Direction | None = None
+    stiffness: Number
+    against: str | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> SpringTable:
+        if self.direction is None:
+            _refuse_own(self)
+            return self
+        _refuse(self, ("against",), "a spring of the mesh, which has a 'direction'")
+        if self.stiffness <= 0.0:
+            raise ValueError("must have a 'stiffness' above 0 where it has a 'direction'")
+        return self
 
 
 class HingeTable(Table):
@@ -370,10 +381,16 @@ class DampingTable(Table):
 
 
 class DamperTable(Table):
-    """``[[dampers]]``: a linear damper between an interface and the ground."""
+    """``[[dampers]]``: a linear damper between an interface and the ground or another one."""
 
     at: str
     coefficient: NotNegative
+    against: str | None = None
+
+    @model_validator(mode="after")
+    def _two_ends(self) -> DamperTable:
+        _refuse_own(self)
+        return self
 
 
 class StopTable(Table):
@@ -403,8 +420,7 @@ class StopTable(Table):
 
     @model_validator(mode="after")
     def _complete(self) -> StopTable:
-        if self.against == self.at:
-            raise ValueError("needs another interface than its own in 'against'")
+        _refuse_own(self)
         if (self.restitution is None) != (self.impact_speed is None):
             raise ValueError("needs both 'restitution' and 'impact_speed', or neither")
         if self.restitution is not None:
@@ -598,6 +614,16 @@ class Scene(Table):
         return self._mesh_folders
 
     @property
+    def mesh_springs(self) -> dict[int, SpringTable]:
+        """The springs that belong to the mesh, by their numbers in the file."""
+        return {n: spring for n, spring in enumerate(self.springs) if spring.direction is not None}
+
+    @property
+    def interface_springs(self) -> dict[int, SpringTable]:
+        """The others, which act at interfaces."""
+        return {n: spring for n, spring in enumerate(self.springs) if spring.direction is None}
+
+    @property
     def interface_names(self) -> list[str]:
         """Names of the interfaces, in the order of the file."""
         if self.modal is not None:
@@ -625,6 +651,11 @@ def _exactly_one(table: BaseModel, *names: str) -> None:
         fault = ("has both" if len(given) == 2 else "has") if given else "needs one of"
         listed = ", ".join(f"'{name}'" for name in chosen[:-1]) + f" and '{chosen[-1]}'"
         raise ValueError(f"{fault} {listed}" + ("; keep one" if given else ""))
+
+
+def _refuse_own(table: StopTable | SpringTable | DamperTable) -> None:
+    if table.against == table.at:
+        raise ValueError("needs another interface than its own in 'against'")
 
 
 def _refuse(table: BaseModel, names: tuple[str, ...], of: str) -> None:

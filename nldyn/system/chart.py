@@ -25,6 +25,7 @@ EVERY_MODE = -1
 
 _OF_STOPS = OF_STOPS
 _OF_DAMPERS = ("coefficient",)
+_OF_SPRINGS = {"spring_stiffness": "stiffness"}  # and what it is called there
 _OF_MODES = ("modal_damping", "natural_frequency_hz")
 UNITS = {
     "frequency_hz": "Hz",
@@ -37,6 +38,7 @@ UNITS = {
     "mass_times_radius": "kg m",
     "force": "N",
     "coefficient": "N s/m",
+    "spring_stiffness": "N/m",
     "modal_damping": "1",
     "natural_frequency_hz": "Hz",
 }
@@ -46,7 +48,7 @@ BOUNDS = {
     if name != "force"  # has either sign
 } | {"exponent": (1.0, LARGEST_EXPONENT)}  # between which there are systems
 POSITIVE = ("stiffness", "natural_frequency_hz")  # there is no system where they are zero
-NAMES = (FREQUENCY, *_OF_STOPS, *SOURCES, *_OF_DAMPERS, *_OF_MODES)
+NAMES = (FREQUENCY, *_OF_STOPS, *SOURCES, *_OF_DAMPERS, *_OF_SPRINGS, *_OF_MODES)
 
 
 def has_exact_derivatives(parameter: Parameter) -> bool:
@@ -63,9 +65,9 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
         The system that must have it.
     parameter : str or Parameter
         frequency_hz; gap, stiffness, exponent, dissipation or dashpot of a stop; amplitude,
-        mass_times_radius or force of an excitation; coefficient of a damper; modal_damping (ratio)
-        or natural_frequency_hz of a mode. The index -1 of modal_damping means all modes, which then
-        have one ratio.
+        mass_times_radius or force of an excitation; coefficient of a damper; spring_stiffness of a
+        spring; modal_damping (ratio) or natural_frequency_hz of a mode. The index -1 of
+        modal_damping means all modes, which then have one ratio.
 
     Raises
     ------
@@ -81,6 +83,8 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
         check_exact(system, parameter)
     elif parameter.name in _OF_DAMPERS:
         check_index(parameter, "damper", len(system.dampers))
+    elif parameter.name in _OF_SPRINGS:
+        check_index(parameter, "spring", len(system.springs))
     elif parameter.name in _OF_MODES and parameter != Parameter("modal_damping", EVERY_MODE):
         check_index(parameter, "mode", system.size)
     if parameter.name == "modal_damping":
@@ -110,7 +114,9 @@ def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float
         elements = system.excitation
     elif name in _OF_DAMPERS:
         elements = system.dampers
-    return float(getattr(elements[index], name))
+    elif name in _OF_SPRINGS:
+        elements = system.springs
+    return float(getattr(elements[index], _OF_SPRINGS.get(name, name)))
 
 
 def with_value(system: System, parameter: Parameter, value: float) -> System:
@@ -130,6 +136,9 @@ def with_value(system: System, parameter: Parameter, value: float) -> System:
         return system.with_elements(excitation=_replaced(system.excitation, index, name, value))
     if name in _OF_DAMPERS:
         return replace(system, dampers=_replaced(system.dampers, index, name, value))
+    if name in _OF_SPRINGS:
+        springs = _replaced(system.springs, index, _OF_SPRINGS[name], value)
+        return replace(system, springs=springs)
     modes = np.arange(system.size) if index == EVERY_MODE else np.array([index])
     damping, natural = np.array(system.damping), np.array(system.natural_frequencies)
     if name == "modal_damping":

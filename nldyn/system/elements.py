@@ -30,6 +30,13 @@ def _positive(owner: str, name: str, value: float) -> None:
         raise SystemModelError(f"{owner}: {name} must be positive, got {value:g}")
 
 
+def check_ends(kind: str, at: object, against: object) -> None:
+    """Refuse what names no interface, and one interface at both ends of an element."""
+    check_types(**{f"{kind}: at": (at, str), f"{kind}: against": (against, str, None)})
+    if against == at:
+        raise SystemModelError(f"{kind} at '{at}': against must be another interface")
+
+
 def hertz_stiffness(
     radius: float,
     youngs_modulus: float,
@@ -340,7 +347,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class Damper:
-    """Linear viscous damper from an interface to the ground.
+    """Linear viscous damper from an interface to the ground, or to another interface.
 
     Parameters
     ----------
@@ -348,6 +355,8 @@ class Damper:
         Interface.
     coefficient : float
         Damping in N s/m, zero or positive.
+    against : str, optional
+        Interface at the other end; the ground unless given.
 
     Examples
     --------
@@ -357,9 +366,10 @@ class Damper:
 
     at: str
     coefficient: float
+    against: str | None = None
 
     def __post_init__(self) -> None:
-        check_types(**{"damper: at": (self.at, str)})
+        check_ends("damper", self.at, self.against)
         owner = f"damper at '{self.at}'"
         _finite(owner, "coefficient", self.coefficient)
         if self.coefficient < 0.0:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -55,6 +55,8 @@ _MAX_CONDITION = 2e5
 # within the promise of a flow map.
 _SPLITS = (1e-11, 3e-11, 1e-10)
 _LARGEST_RATE = 1e100  # its square is far from the largest floating-point number
+_EPS = float(np.finfo(float).eps)
+_MOST_SWEEPS = 30  # of rotations; they converge quadratically
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,20 @@ class LinearPart:
     left: Real
     growth: Real
     condition: float
+
+    @property
+    def frequencies_hz(self) -> Real:
+        """Frequencies of the pairs without their damping, sqrt(det A_b)/2π, ascending, (n,)."""
+        return np.sort(np.sqrt(np.abs(np.linalg.det(self.blocks)))) / (2.0 * np.pi)
+
+    def of_modes(self, modes: Real) -> LinearPart:
+        """The same for states of displacements ``modes @ q``, with orthogonal modes (n, n)."""
+        n = modes.shape[0]
+        turned, back = np.array(self.right), np.array(self.left)
+        for half in (slice(0, n), slice(n, 2 * n)):
+            turned[half] = modes @ self.right[half]
+            back[:, half] = self.left[:, half] @ modes.T
+        return replace(self, right=turned, left=back)
 
     @property
     def slowest_decay(self) -> float:
@@ -121,9 +137,7 @@ class LinearPart:
         )
         return ForcedResponse(terms, np.array([first[3], *(term[3] for term in others)]))
 
-    def _swing(
-        self, drive: Complex, order: float, omega: float
-    ) -> tuple[Complex, list[_Term]]:
+    def _swing(self, drive: Complex, order: float, omega: float) -> tuple[Complex, list[_Term]]:
         """Steady response to Re(drive e^{i order ωt}), and growths of the near eigenvalues."""
         pace = order * omega
         a, b, c, d, rates = self._entries
@@ -270,16 +284,64 @@ def at_resonance(eigenvalues: Complex, omega: float | Real) -> NDArray[np.bool_]
     return np.asarray(np.abs(eigenvalues - 1j * omega) < 1e-12 * omega)
 
 
-def linear_part(omega: Real, damping: Real, held: Real | float = 0.0) -> LinearPart:
-    """Linear part of modes with circular frequencies (n,) and a damping matrix (n, n).
+def diagonalised(omega: Real, added: Real) -> tuple[Real, Real]:
+    """Circular frequencies (n,) and modes (n, n) of modes with a symmetric stiffness (n, n) added.
 
-    `held` (n,) is the circular frequency that stops give to a mode which is free without them: it
-    sets the scale of its coordinates.
+    By Jacobi's rotations, which keep the digits of a soft mode beside stiff ones [Demmel and
+    Veselic 1992], and leave modes alone that nothing couples.
 
     Raises
     ------
     SystemModelError
-        If the damping feeds energy in, or makes coupled modes inseparable.
+        If the whole stiffness is negative in a direction.
+    """
+    n = omega.size
+    K, modes = np.diag(omega**2) + added, np.eye(n)
+    sizes = omega**2 + np.abs(np.diag(added))
+    for _ in range(_MOST_SWEEPS):
+        size = np.sqrt(np.abs(np.diag(K)))
+        pairs = np.argwhere(np.triu(np.abs(K) > _EPS * np.outer(size, size), 1))
+        if not pairs.size:
+            break
+        for i, j in pairs:
+            pair = [i, j]
+            half = 0.5 * (K[j, j] - K[i, i])
+            t = K[i, j] / ((half + np.copysign(np.hypot(half, K[i, j]), half)) or 1.0)
+            turn = np.array([[1.0, t], [-t, 1.0]]) / np.hypot(1.0, t)
+            K[:, pair] = K[:, pair] @ turn
+            K[pair, :] = turn.T @ K[pair, :]
+            K[i, j] = K[j, i] = 0.0
+            modes[:, pair] = modes[:, pair] @ turn
+    squares = np.diag(K).copy()
+    rounding = 8.0 * n * _EPS * (modes**2).T @ sizes
+    if np.any(squares < -rounding):
+        raise SystemModelError(
+            "the springs make the linear stiffness negative in a direction, so that the structure "
+            "runs away; what bounds it belongs into the same PolynomialSpring"
+        )
+    return np.sqrt(np.where(squares > rounding, squares, 0.0)), modes
+
+
+def without_rounding(matrix: Real) -> Real:
+    """The matrix without entries of rounding's size, which would seem to couple modes."""
+    size = np.sqrt(np.abs(np.diag(matrix)))
+    scale = np.maximum(np.outer(size, size), _EPS * size.max(initial=0.0) ** 2)
+    return np.where(np.abs(matrix) > 4.0 * matrix.shape[0] * _EPS * scale, matrix, 0.0)
+
+
+def linear_part(
+    omega: Real, damping: Real, held: Real | float = 0.0, cross: Real | None = None
+) -> LinearPart:
+    """Linear part of modes with circular frequencies (n,) and a damping matrix (n, n).
+
+    `held` (n,) is the circular frequency that stops give to a mode which is free without them: it
+    sets the scale of its coordinates. `cross` (n, n) is a skew stiffness, of bearings.
+
+    Raises
+    ------
+    SystemModelError
+        If the damping feeds energy in, or makes coupled modes inseparable, or if a skew stiffness
+        lets motions grow.
     """
     n = omega.size
     if not (omega.max() < _LARGEST_RATE and abs(damping).max() < _LARGEST_RATE):
@@ -288,13 +350,15 @@ def linear_part(omega: Real, damping: Real, held: Real | float = 0.0) -> LinearP
         )
     if np.linalg.eigvalsh(0.5 * (damping + damping.T))[0] < -1e-12 * (1.0 + abs(damping).max()):
         raise SystemModelError("damping must not feed energy in (the matrix has a negative part)")
+    cross = np.zeros((n, n)) if cross is None else cross
     slow = 1e-3 * (omega.max() or 1.0)
     unit = np.where(omega > slow, omega, np.maximum(slow, held))
     blocks, columns, scales = [], [], []
-    groups, group_of = connected_components(damping != 0.0, directed=False)
+    groups, group_of = connected_components((damping != 0.0) | (cross != 0.0), directed=False)
     for group in range(groups):
         modes = np.flatnonzero(group_of == group)
-        A, planes = _planes(omega[modes], unit[modes], damping[np.ix_(modes, modes)])
+        square = np.ix_(modes, modes)
+        A, planes = _planes(omega[modes], unit[modes], damping[square], cross[square])
         places = np.concatenate([modes, n + modes])
         for plane in planes:
             plane, block = _separated(plane, plane.T @ A @ plane)
@@ -303,6 +367,8 @@ def linear_part(omega: Real, damping: Real, held: Real | float = 0.0) -> LinearP
             blocks.append(block)
             columns.append(column)
             scales.append(max(np.sqrt(abs(np.linalg.det(block))), unit[modes].min()))
+    if np.any(cross):
+        _check_bounded(np.array(blocks))
     energy_basis = np.hstack(columns)
     condition = float(np.linalg.cond(energy_basis))
     if not condition < _MAX_CONDITION:
@@ -322,13 +388,24 @@ def linear_part(omega: Real, damping: Real, held: Real | float = 0.0) -> LinearP
     )
 
 
-def _planes(omega: Real, unit: Real, damping: Real) -> tuple[Real, list[Real]]:
+def _check_bounded(blocks: Real) -> None:
+    """Refuse a skew stiffness that feeds in more energy than the damping takes out."""
+    values = np.linalg.eigvals(blocks)
+    if values.real.max() > 1e-12 * np.abs(values).max():
+        worst = values.ravel()[values.real.argmax()]
+        raise SystemModelError(
+            f"the nonsymmetric stiffness lets the motion at {abs(worst.imag) / (2 * np.pi):.6g} Hz "
+            f"grow at {worst.real:.3g} 1/s without bound: give more damping, or less of it"
+        )
+
+
+def _planes(omega: Real, unit: Real, damping: Real, cross: Real) -> tuple[Real, list[Real]]:
     """Matrix of a group of modes in energy coordinates, and its invariant planes.
 
     Where the planes (nearly) coincide a frequency is moved, the slowest that helps, which feeds no
     energy in; a warning tells of it.
     """
-    A = _energy_matrix(omega, unit, damping)
+    A = _energy_matrix(omega, unit, damping, cross)
     if omega.size == 1:
         return A, [np.eye(2)]
     planes = _invariant_planes(A)
@@ -338,7 +415,7 @@ def _planes(omega: Real, unit: Real, damping: Real) -> tuple[Real, list[Real]]:
         for mode in np.argsort(omega):
             other = omega.copy()
             other[mode] *= 1.0 + share
-            moved = _energy_matrix(other, unit, damping)
+            moved = _energy_matrix(other, unit, damping, cross)
             split = _invariant_planes(moved)
             if np.linalg.cond(np.hstack(split)) < _MAX_CONDITION:
                 hz = omega[mode] / (2.0 * np.pi)
@@ -351,10 +428,11 @@ def _planes(omega: Real, unit: Real, damping: Real) -> tuple[Real, list[Real]]:
     return A, planes
 
 
-def _energy_matrix(omega: Real, unit: Real, damping: Real) -> Real:
+def _energy_matrix(omega: Real, unit: Real, damping: Real, cross: Real) -> Real:
     """Matrix of the state (unit·q, q'), in which energy is half the squared length."""
     n = omega.size
-    return np.block([[np.zeros((n, n)), np.diag(unit)], [-np.diag(omega**2 / unit), -damping]])
+    pull = np.diag(omega**2 / unit) + cross / unit
+    return np.block([[np.zeros((n, n)), np.diag(unit)], [-pull, -damping]])
 
 
 def _invariant_planes(A: Real) -> list[Real]:

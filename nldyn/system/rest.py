@@ -141,7 +141,7 @@ def held_motion(system: System, q: Real, omega: float, phases: Real) -> Real:
 
 def tangent_stiffness(system: System, q: Real) -> Real:
     """Stiffness (n, n) of the structure with its closed stops at modal displacements q."""
-    matrix = np.diag(system.natural_frequencies**2)
+    matrix = np.array(system.stiffness)
     for i, c, depth in _closed(system, q):
         matrix += _elastic(system.stops[i], depth)[1] * np.outer(c, c)
     return matrix
@@ -163,14 +163,14 @@ def _elastic(stop: Stop, depth: float) -> tuple[float, float]:
 
 
 def _slope(system: System, push: Real, q: Real) -> Real:
-    slope = system.natural_frequencies**2 * q - push
+    slope = system.stiffness @ q - push
     for i, c, depth in _closed(system, q):
         slope = slope + _elastic(system.stops[i], depth)[0] * c
     return np.asarray(slope)
 
 
 def _potential(system: System, push: Real, q: Real) -> float:
-    energy = 0.5 * float(system.natural_frequencies**2 @ q**2) - float(push @ q)
+    energy = 0.5 * float(q @ system.stiffness @ q) - float(push @ q)
     for i, _, depth in _closed(system, q):
         stop = system.stops[i]
         energy += _elastic(stop, depth)[0] * depth / (stop.exponent + 1.0)

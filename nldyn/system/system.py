@@ -16,7 +16,14 @@ from numpy.typing import ArrayLike
 from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import SystemModelError, numbers, shown
 from nldyn.system.elements import Damper, Excitation, Stop
-from nldyn.system.linear import ForcedResponse, LinearPart, linear_part
+from nldyn.system.linear import (
+    ForcedResponse,
+    LinearPart,
+    diagonalised,
+    linear_part,
+    without_rounding,
+)
+from nldyn.system.springs import Spring
 
 Element = TypeVar("Element")
 LARGEST_PARTICIPATION = 1e50  # its square is the mobility of a stop, and its fourth power occurs
@@ -52,6 +59,8 @@ class System:
         What acts at the interfaces; excitation on load vectors, too.
     loads : mapping of str to (n,) array
         Modal force of each load vector: of what acts on the whole structure, as weight does.
+    springs : tuple
+        What acts at the interfaces all the time. The modes are those of the structure without.
 
     Raises
     ------
@@ -75,6 +84,7 @@ class System:
     dampers: tuple[Damper, ...] = ()
     excitation: tuple[Excitation, ...] = ()
     loads: Mapping[str, Real] = field(default_factory=dict)
+    springs: tuple[Spring, ...] = ()
 
     def __repr__(self) -> str:
         """One line: modes, interfaces, and what acts."""
@@ -84,7 +94,8 @@ class System:
         return (
             f"<System of {self.size} modes at {hz}{more} Hz; interfaces {names}; "
             f"{len(self.stops)} stops, {len(self.dampers)} dampers, "
-            f"{len(self.excitation)} excitations>"
+            + (f"{len(self.springs)} springs, " if self.springs else "")
+            + f"{len(self.excitation)} excitations>"
         )
 
     def __post_init__(self) -> None:
@@ -103,6 +114,7 @@ class System:
         dampers: Sequence[Damper] = (),
         excitation: Sequence[Excitation] = (),
         loads: Mapping[str, ArrayLike] = MappingProxyType({}),
+        springs: Sequence[Spring] = (),
     ) -> System:
         """System from modal data typed in by hand.
 
@@ -114,7 +126,7 @@ class System:
             Displacement of each mass-normalised mode at each interface, 1/sqrt(kg).
         modal_damping : float or (n,) array_like
             Damping ratio of every mode.
-        stops, dampers, excitation : sequences
+        stops, dampers, excitation, springs : sequences
             What acts at the interfaces.
         loads : mapping of str to (n,) array_like
             Modal force of each load vector, see `System`.
@@ -138,6 +150,7 @@ class System:
             _listed("dampers", dampers),
             _listed("excitation", excitation),
             _vectors("loads", loads),
+            _listed("springs", springs),
         )
 
     @classmethod
@@ -153,6 +166,7 @@ class System:
         dampers: Sequence[Damper] = (),
         excitation: Sequence[Excitation] = (),
         loads: Mapping[str, ArrayLike] = MappingProxyType({}),
+        springs: Sequence[Spring] = (),
     ) -> System:
         """System from mass, stiffness and damping matrices.
 
@@ -166,7 +180,7 @@ class System:
             Symmetric damping matrix in N s/m, added to the modal damping.
         modal_damping : float or (n,) array_like
             Damping ratio of every mode.
-        stops, dampers, excitation : sequences
+        stops, dampers, excitation, springs : sequences
             What acts at the interfaces.
         loads : mapping of str to (n,) array_like
             Load vectors of what acts on the whole structure: M r for a weight or a motion of the
@@ -218,6 +232,7 @@ class System:
             _listed("dampers", dampers),
             _listed("excitation", excitation),
             modal_loads,
+            _listed("springs", springs),
         )
 
     @classmethod
@@ -230,6 +245,7 @@ class System:
         dampers: Sequence[Damper] = (),
         excitation: Sequence[Excitation] = (),
         loads: Mapping[str, ArrayLike] = MappingProxyType({}),
+        springs: Sequence[Spring] = (),
     ) -> System:
         """System from a reduced model (anything with frequencies and participations).
 
@@ -238,7 +254,7 @@ class System:
         reduced : object
             With `frequencies_hz` (n,) and `participation` {name: (n,)}; its `damping` (n, n) in 1/s
             is added to the modal damping, if it has one.
-        modal_damping, stops, dampers, excitation, loads
+        modal_damping, stops, dampers, excitation, loads, springs
             As for `from_modal`; interfaces that are `load_vectors` of the reduced model are loads,
             too.
 
@@ -282,6 +298,7 @@ class System:
             _listed("dampers", dampers),
             _listed("excitation", excitation),
             {**system.loads, **_vectors("loads", loads)},
+            _listed("springs", springs),
         )
 
     @property
@@ -304,9 +321,41 @@ class System:
         """Modal damping matrix with the point dampers, (n, n), 1/s."""
         D = np.array(self.damping)
         for damper in self.dampers:
-            phi = self.participation[damper.at]
+            phi = self.vector_between(damper.at, damper.against)
             D += damper.coefficient * np.outer(phi, phi)
         return D
+
+    @cached_property
+    def spring_stiffness(self) -> Real:
+        """Modal stiffness of the linear springs, (n, n), 1/s²."""
+        K = np.zeros((self.size, self.size))
+        for spring in self.springs:
+            phi = self.vector_between(spring.at, spring.against)
+            K += spring.stiffness * np.outer(phi, phi)
+        return K
+
+    @cached_property
+    def stiffness(self) -> Real:
+        """Modal stiffness of the linear part, (n, n), 1/s²."""
+        return np.diag(self.natural_frequencies**2) + self.spring_stiffness
+
+    @property
+    def free_modes(self) -> int:
+        """Number of rigid-body motions that neither the structure nor a spring holds."""
+        free = self.natural_frequencies == 0.0
+        held = [self.vector_between(spring.at, spring.against)[free] for spring in self.springs]
+        return int(free.sum()) - _rank(held, int(free.sum()))
+
+    @property
+    def left_free(self) -> bool:
+        """Whether the stops, too, leave a rigid-body motion free."""
+        free = self.natural_frequencies == 0.0
+        held = [self.vector_between(each.at, each.against)[free] for each in self._holders]
+        return _rank(held, int(free.sum())) < int(free.sum())
+
+    @property
+    def _holders(self) -> tuple[Stop | Spring, ...]:
+        return (*self.stops, *self.springs)
 
     @cached_property
     def conservative(self) -> bool:
@@ -333,20 +382,28 @@ class System:
     @cached_property
     def linear(self) -> LinearPart:
         """Independent pairs of coordinates of the linear part."""
+        omega, modes, D = self.natural_frequencies, None, self.total_damping
+        if np.any(self.spring_stiffness):
+            omega, modes = diagonalised(omega, self.spring_stiffness)
+            D = without_rounding(modes.T @ D @ modes)
         squares = np.zeros(self.size)
         for stop in self.stops:
             if stop.exponent == 1.0 or stop.gap < 0.0:
                 preload = max(-stop.gap, 0.0) ** (stop.exponent - 1.0)
                 slope = stop.exponent * stop.stiffness * preload
-                squares += slope * self.stop_vector(stop) ** 2
-        return linear_part(self.natural_frequencies, self.total_damping, np.sqrt(squares))
+                c = self.stop_vector(stop)
+                squares += slope * (c if modes is None else modes.T @ c) ** 2
+        part = linear_part(omega, D, np.sqrt(squares))
+        return part if modes is None else part.of_modes(modes)
+
+    def vector_between(self, at: str, against: str | None) -> Real:
+        """Modal vector of the displacement at an interface, less that at another one, (n,)."""
+        c = self.participation[at]
+        return c if against is None else c - self.participation[against]
 
     def stop_vector(self, stop: Stop) -> Real:
         """Modal vector c with penetration ``c @ q - gap``, shape (n,)."""
-        c = self.participation[stop.at]
-        if stop.against is not None:
-            c = c - self.participation[stop.against]
-        return stop.direction * c
+        return stop.direction * self.vector_between(stop.at, stop.against)
 
     def load_vector(self, name: str) -> Real:
         """Modal force (n,) of a unit load at an interface, or on a load vector."""
@@ -417,7 +474,12 @@ class System:
         The linear part is shared, which saves most of the work of making a system.
         """
         other = copy.copy(self)
-        own = {field.name for field in fields(self)} | {"linear", "total_damping"}
+        own = {field.name for field in fields(self)} | {
+            "linear",
+            "total_damping",
+            "spring_stiffness",
+            "stiffness",
+        }
         for derived in vars(self).keys() - own:
             del vars(other)[derived]
         if stops is not None:
@@ -451,15 +513,15 @@ class System:
         for kind, elements, classes in (
             ("stop", self.stops, Stop),
             ("damper", self.dampers, Damper),
+            ("spring", self.springs, Spring),
             ("excitation", self.excitation, Excitation),
         ):
             for element in elements:
                 if not isinstance(element, classes):
                     raise SystemModelError(f"{kind} cannot be {shown(element)}")
-                names = [element.at]
-                if isinstance(element, Stop) and element.against is not None:
-                    names.append(element.against)
-                for name in names:
+                for name in (element.at, getattr(element, "against", None)):
+                    if name is None:
+                        continue
                     if kind == "excitation" and name in self.loads:
                         continue
                     if name not in self.participation:
@@ -531,8 +593,13 @@ def same_system(a: System, b: System) -> bool:
             list(one) == list(other) and all(np.array_equal(one[name], other[name]) for name in one)
             for one, other in ((a.participation, b.participation), (a.loads, b.loads))
         )
-        and (a.stops, a.dampers, a.excitation) == (b.stops, b.dampers, b.excitation)
+        and (a.stops, a.dampers, a.excitation, a.springs)
+        == (b.stops, b.dampers, b.excitation, b.springs)
     )
+
+
+def _rank(rows: Sequence[Real], columns: int) -> int:
+    return int(np.linalg.matrix_rank(np.array(rows).reshape(-1, columns))) if columns else 0
 
 
 def _negative(K: Real) -> bool:

@@ -476,7 +476,7 @@ def test_negative_gap_is_a_preload(tmp_path):
         ("[gravity]", "gravity is [[excitation]] of kind 'weight'"),
         ("[[masses]]", "masses on a mesh are [[point_masses]]"),
         ("[[boundary_conditions]]", "what is held is in [[supports]]"),
-        ("[[springs]]\nagainst = 'x'", "springs between two interfaces are not modelled"),
+        ("[[springs]]\nbetween = 'x'", "what joins two interfaces is [[springs]] and [[dampers]]"),
     ],
 )
 def test_words_that_users_try_lead_to_what_there_is(table, words):

@@ -1,0 +1,166 @@
+"""Springs and dampers between interfaces: closed forms, and the same structure by its matrices."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import nldyn
+from nldyn import Damper, HarmonicForce, Parameter, Spring, Stop, System
+from nldyn.base.errors import SceneError, SystemModelError
+from nldyn.scene.build import build_system
+from nldyn.scene.read import parse_scene
+from nldyn.system.rest import rest
+
+UNITS = {f"m{i}": np.eye(6)[i].tolist() for i in range(6)}
+
+
+def chain(ends=(), count=6, mass=2.0, k=18.0, **more):
+    """Free masses in a row that springs join, and further springs."""
+    names = list(UNITS)[:count]
+    springs = [Spring(a, k, b) for a, b in pairwise(names)]
+    return System.from_matrices(
+        mass * np.eye(count),
+        np.zeros((count, count)),
+        {name: UNITS[name][:count] for name in names},
+        springs=[*springs, *ends],
+        **more,
+    )
+
+
+def test_a_chain_has_the_frequencies_of_the_closed_form():
+    """2 sqrt(k/m) sin(j pi/(2n + 2)) between walls, 2 sqrt(k/m) sin(j pi/(2n)) free."""
+    held = chain([Spring("m0", 18.0), Spring("m5", 18.0)])
+    j = np.arange(1, 7)
+    exact = 6.0 * np.sin(j * np.pi / 14.0) / (2.0 * np.pi)
+    assert held.linear.frequencies_hz == pytest.approx(exact, rel=1e-14)
+    assert held.free_modes == 0
+    free = chain()
+    exact = 6.0 * np.sin((j - 1) * np.pi / 12.0) / (2.0 * np.pi)
+    assert free.linear.frequencies_hz == pytest.approx(exact, rel=1e-14, abs=0.0)
+    assert free.free_modes == 1
+    assert free.left_free
+
+
+def test_a_soft_mode_keeps_its_digits_beside_a_stiff_one():
+    """Modes at 1 rad/s and 1e7 rad/s with a spring k = 1: a quadratic equation."""
+    soft, stiff = 1.0, 1e14
+    system = System.from_modal(
+        np.sqrt([soft, stiff]) / (2.0 * np.pi), {"a": [1.0, 1.0]}, springs=[Spring("a", 1.0)]
+    )
+    trace, determinant = soft + stiff + 2.0, (soft + 1.0) * (stiff + 1.0) - 1.0
+    lower = 2.0 * determinant / (trace + np.sqrt(trace * trace - 4.0 * determinant))
+    assert (2.0 * np.pi * system.linear.frequencies_hz[0]) ** 2 == pytest.approx(lower, rel=1e-14)
+
+
+def pair(matrices):
+    """Two masses with a spring and a damper between them, as elements or as matrices."""
+    between = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    grounded = np.diag([1.0, 0.0])
+    damping = np.array([[0.06, -0.01], [-0.01, 0.08]])
+    common = {
+        "stops": [Stop("b", 5e3, gap=0.2, direction=-1), Stop("a", 40.0, 1.0, 0.3, 1, "b")],
+        "excitation": [HarmonicForce("a", 1.0)],
+    }
+    interfaces = {"a": [1.0, 0.0], "b": [0.0, 1.0]}
+    K = np.diag([3.0, 4.0])
+    if matrices:
+        K = K + 5.0 * between - 1.5 * grounded
+        C = damping + 0.3 * between
+        return System.from_matrices(np.diag([1.0, 2.0]), K, interfaces, damping=C, **common)
+    return System.from_matrices(
+        np.diag([1.0, 2.0]), K, interfaces, damping=damping,
+        springs=[Spring("a", 5.0, "b"), Spring("a", -1.5)], dampers=[Damper("b", 0.3, "a")],
+        **common,
+    )  # fmt: skip
+
+
+def test_orbits_with_springs_are_those_of_the_matrices():
+    found, same = (nldyn.solve_orbit(pair(matrices), 0.2) for matrices in (False, True))
+    assert found.impacts == same.impacts > 0
+    assert found.max_abs_displacement == pytest.approx(same.max_abs_displacement, rel=1e-9)
+    order = np.lexsort((found.multipliers.imag, found.multipliers.real))
+    other = np.lexsort((same.multipliers.imag, same.multipliers.real))
+    assert found.multipliers[order] == pytest.approx(same.multipliers[other], rel=1e-7)
+    assert found.liouville_error < 1e-8
+
+
+def test_springs_and_dampers_go_through_files(tmp_path):
+    orbit = nldyn.solve_orbit(pair(False), 0.2)
+    branch = nldyn.continue_branch(orbit, (0.1998, 0.2002))
+    nldyn.save(branch, tmp_path / "b.h5")
+    (back,) = nldyn.load(tmp_path / "b.h5")
+    assert back.points[0].system.springs == orbit.system.springs
+    assert back.points[0].system.dampers == orbit.system.dampers
+    assert np.array_equal(back.max_abs_displacement, branch.max_abs_displacement)
+
+
+def test_a_spring_is_a_parameter():
+    """|u| of one mass on k is 1/sqrt((k - ω²)² + (cω)²)."""
+    system = System.from_matrices(
+        [[1.0]], [[0.0]], {"a": [1.0]}, damping=[[0.2]], springs=[Spring("a", 2.0)],
+        excitation=[HarmonicForce("a", 1.0)],
+    )  # fmt: skip
+    orbit = nldyn.solve_orbit(system, 1.0 / (2.0 * np.pi))
+    family = nldyn.continue_in(orbit, Parameter("spring_stiffness"), (1.5, 2.5))
+    k = np.array([point.system.springs[0].stiffness for point in family.orbits])
+    size = np.array([point.max_abs_displacement for point in family.orbits])
+    assert k.min() == pytest.approx(1.5) and k.max() == pytest.approx(2.5)
+    assert size == pytest.approx(1.0 / np.hypot(k - 1.0, 0.2), rel=1e-8)
+
+
+def test_rest_on_springs():
+    """A load of 1 N on the first of two free masses, of which the second is held."""
+    system = chain([Spring("m1", 4.0)], count=2, excitation=[nldyn.ConstantForce("m0", 1.0)])
+    q = rest(system)
+    places = [float(phi @ q) for phi in system.participation.values()]
+    assert places == pytest.approx([1.0 / 4.0 + 1.0 / 18.0, 1.0 / 4.0], rel=1e-12)
+
+
+def test_what_makes_no_sense_is_refused():
+    with pytest.raises(SystemModelError, match="spring at 'a': against must be another interface"):
+        Spring("a", 1.0, "a")
+    with pytest.raises(SystemModelError, match="spring at 'a': stiffness must be a finite number"):
+        Spring("a", np.nan)
+    with pytest.raises(SystemModelError, match="damper at 'a': against must be another interface"):
+        Damper("a", 1.0, "a")
+    with pytest.raises(SystemModelError, match="spring at unknown interface 'z'"):
+        replace(pair(True), springs=(Spring("z", 1.0),))
+    with pytest.raises(SystemModelError, match="negative in a direction"):
+        replace(pair(True), springs=(Spring("a", -20.0),))
+
+
+SCENE = """
+[matrices]
+mass = [[1.0, 0.0], [0.0, 2.0]]
+stiffness = [[3.0, 0.0], [0.0, 4.0]]
+damping = [[0.06, -0.01], [-0.01, 0.08]]
+interfaces.a = [1.0, 0.0]
+interfaces.b = [0.0, 1.0]
+
+[[springs]]
+at = "a"
+against = "b"
+stiffness = 5.0
+
+[[springs]]
+at = "a"
+stiffness = -1.5
+
+[[dampers]]
+at = "b"
+against = "a"
+coefficient = 0.3
+"""
+
+
+def test_springs_in_a_scene():
+    system = build_system(parse_scene(SCENE))
+    same = pair(True)
+    assert system.linear.frequencies_hz == pytest.approx(same.linear.frequencies_hz, rel=1e-12)
+    assert np.trace(system.total_damping) == pytest.approx(np.trace(same.total_damping), rel=1e-12)
+    with pytest.raises(SceneError, match=r"springs\[0\].against 'c' is not an interface"):
+        parse_scene(SCENE.replace('against = "b"', 'against = "c"'))
+    with pytest.raises(SceneError, match="needs another interface than its own in 'against'"):
+        parse_scene(SCENE.replace('against = "b"', 'against = "a"'))
