@@ -9,7 +9,7 @@ import numpy as np
 import scipy.linalg as sla
 from scipy.integrate import solve_ivp
 
-from nldyn import Stop, System
+from nldyn import CubicDamper, PolynomialSpring, Spring, Stop, System
 
 
 def contact(stop: Stop, depth: float, speed: float) -> tuple[float, float, float]:
@@ -36,7 +36,20 @@ class Motion:
         self.A = np.zeros((2 * n, 2 * n))
         self.A[:n, n:] = np.eye(n)
         self.A[n:, :n] = -np.diag(system.natural_frequencies**2)
-        self.A[n:, n:] = -system.total_damping
+        self.A[n:, n:] = -system.damping
+        self.springs, self.dampers = [], []
+        for element in (*system.springs, *system.dampers):
+            c = system.participation[element.at].copy()
+            if element.against is not None:
+                c -= system.participation[element.against]
+            if isinstance(element, PolynomialSpring):
+                self.springs.append((c, element.coefficients))
+            elif isinstance(element, CubicDamper):
+                self.dampers.append((c, element))
+            elif isinstance(element, Spring):
+                self.A[n:, :n] -= element.stiffness * np.outer(c, c)
+            else:
+                self.A[n:, n:] -= element.coefficient * np.outer(c, c)
         self.stops = [(system.stop_vector(s), s) for s in system.stops]
         self.sources = [(system.load_vector(e.at), e) for e in system.excitation]
 
@@ -48,6 +61,12 @@ class Motion:
             dx[self.n :] += shape * (amplitude * np.exp(1j * source.harmonic * phase)).real
         for c, stop in self.stops:
             dx[self.n :] -= c * contact(stop, c @ x[: self.n] - stop.gap, c @ x[self.n :])[0]
+        for c, coefficients in self.springs:
+            u = c @ x[: self.n]
+            dx[self.n :] -= c * sum(k * u**j for j, k in enumerate(coefficients, 1))
+        for c, damper in self.dampers:
+            u, v = c @ x[: self.n], c @ x[self.n :]
+            dx[self.n :] -= c * damper.coefficient * v * (v if damper.by == "speed" else u) ** 2
         return dx
 
     def tangent_matrix(self, x: np.ndarray) -> np.ndarray:
@@ -57,6 +76,15 @@ class Motion:
             _, stiff, viscous = contact(stop, c @ x[: self.n] - stop.gap, c @ x[self.n :])
             J[self.n :, : self.n] -= stiff * np.outer(c, c)
             J[self.n :, self.n :] -= viscous * np.outer(c, c)
+        for c, coefficients in self.springs:
+            u = c @ x[: self.n]
+            slope = sum(j * k * u ** (j - 1) for j, k in enumerate(coefficients, 1))
+            J[self.n :, : self.n] -= slope * np.outer(c, c)
+        for c, damper in self.dampers:
+            u, v = c @ x[: self.n], c @ x[self.n :]
+            by_u, by_v = (0.0, 3.0 * v * v) if damper.by == "speed" else (2.0 * u * v, u * u)
+            J[self.n :, : self.n] -= damper.coefficient * by_u * np.outer(c, c)
+            J[self.n :, self.n :] -= damper.coefficient * by_v * np.outer(c, c)
         return J
 
     def run(

@@ -23,10 +23,10 @@ from nldyn.report.console import kept_at_interrupt, plain_errors, told_what_is_k
 from nldyn.runtime.interruption import STOPPED, interrupted
 
 if TYPE_CHECKING:
+    from nldyn.base.arrays import Real
     from nldyn.search.diagram import Diagram
     from nldyn.system.elements import Stop
-    from nldyn.system.springs import Spring
-    from nldyn.system.system import System
+    from nldyn.system.system import AnySpring, System
 
 
 def usable_cores() -> int:
@@ -415,6 +415,8 @@ def describe_system(system: System, residual: int = 0) -> str:
 
     The last ``residual`` modes are marked as such.
     """
+    import numpy as np
+
     names = list(system.interfaces)
     width = max(14, *(len(name) + 2 for name in names))
     lines = ["mode   frequency (Hz)   participation (1/sqrt(kg)) at"]
@@ -427,7 +429,7 @@ def describe_system(system: System, residual: int = 0) -> str:
     lines.append(f"{'static flexibility m/N':<23}{flexibility}")
     lines += [describe_stop(stop) for stop in system.stops]
     lines += [describe_spring(spring) for spring in system.springs]
-    if system.springs:
+    if np.any(system.spring_stiffness):
         hz = ", ".join(f"{value:.6f}" for value in system.linear.frequencies_hz)
         lines.append(f"frequencies with the springs: {hz} Hz")
     return "\n".join([*lines, *describe_rest(system)])
@@ -435,21 +437,27 @@ def describe_system(system: System, residual: int = 0) -> str:
 
 def describe_rest(system: System) -> list[str]:
     """Say where the structure rests, and what holds it, if that is not at zero."""
-    from nldyn.system.rest import closed_at_rest, rest
+    from nldyn.system.rest import closed_at_rest, rest_positions
 
-    q = rest(system)
-    if not q.any():
+    found = rest_positions(system)
+    q, others = found[0], found[1:]
+    if not q.any() and not others:
         return []
-    places = ", ".join(
-        f"{float(phi @ q):.6g} m at '{name}'" for name, phi in system.participation.items()
-    )
+    places = _places(system, q)
     return [
         f"at rest: {places}",
+        *(f"or at rest: {_places(system, other)}" for other in others),
         *(
             f"at rest the stop at '{system.stops[i].at}' is closed by {depth:.6g} m: {force:.6g} N"
             for i, depth, force in closed_at_rest(system, q)
         ),
     ]
+
+
+def _places(system: System, q: Real) -> str:
+    return ", ".join(
+        f"{float(phi @ q):.6g} m at '{name}'" for name, phi in system.participation.items()
+    )
 
 
 def describe_stop(stop: Stop) -> str:
@@ -464,10 +472,12 @@ def describe_stop(stop: Stop) -> str:
     )
 
 
-def describe_spring(spring: Spring) -> str:
+def describe_spring(spring: AnySpring) -> str:
     """Say in a line where a spring is and what it does."""
     where = f"at '{spring.at}'" + (f" against '{spring.against}'" if spring.against else "")
-    return f"spring {where}: {spring.stiffness:.6g} N/m"
+    values = getattr(spring, "coefficients", None) or (getattr(spring, "stiffness", 0.0),)
+    terms = [f"{k:.6g} N/m" + (f"^{j}" if j > 1 else "") for j, k in enumerate(values, 1) if k]
+    return f"spring {where}: {', '.join(terms) or '0 N/m'}"
 
 
 def static_flexibility(system: System, interface: str) -> float:

@@ -162,7 +162,7 @@ def displacement_along(orbit: Orbit, q: Real) -> float:
     """Derivative of the largest observed displacement along a change q (k, 2n) of the nodes."""
     extremes = orbit.observed_extremes
     index = int(np.argmax(np.abs(extremes.values)))
-    output = len(orbit.system.stops) + orbit.system.interfaces.index(orbit.observe)
+    output = orbit.system.output(orbit.observe)
     change, _ = output_change(orbit, output, float(extremes.phases[index]), q)
     return math.copysign(1.0, float(extremes.values[index])) * change
 

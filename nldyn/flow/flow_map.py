@@ -222,10 +222,18 @@ class FlowMap:
 
     @cached_property
     def rows(self) -> Real:
-        """Output rows (n_stops + n_interfaces, 2n): penetrations first, then displacements."""
+        """Output rows (n_out, 2n): penetrations, displacements at bonds, then of interfaces."""
         s = self.system
-        vectors = [s.stop_vector(stop) for stop in s.stops] + list(s.participation.values())
+        vectors = [*self._pushed, *s.participation.values()]
         return np.array([s.displacement_row(v) for v in vectors]).reshape(len(vectors), 2 * s.size)
+
+    @cached_property
+    def _pushed(self) -> list[Real]:
+        """Modal vectors (n,) of what the forces of the stops, then of the bonds, push."""
+        s = self.system
+        return [s.stop_vector(stop) for stop in s.stops] + [
+            s.vector_between(bond.at, bond.against) for bond in s.bonds
+        ]
 
     @cached_property
     def rate_rows(self) -> Real:
@@ -235,7 +243,7 @@ class FlowMap:
     @cached_property
     def _data(self) -> SystemData:
         s, linear = self.system, self.system.linear
-        vectors = [s.stop_vector(stop) for stop in s.stops]
+        vectors = self._pushed
         accelerations = linear.times_block(self.rate_rows)
         thirds = np.abs(linear.times_block(accelerations))
         growth = np.repeat(linear.growth, 2)
@@ -252,8 +260,15 @@ class FlowMap:
                 duration=duration_factor(stop.exponent),
                 instant=self.options.instant(0.0 if stop.dashpot else stop.exponent),
             )
-            for stop, v in zip(s.stops, vectors, strict=True)
+            for stop, v in zip(s.stops, vectors, strict=False)
         ]
+        stops += [
+            StopRow(0.0, 1.0, 1.0, 0.0, 0.0, float(v @ v), 1.0, 0.0, 1.0, bond.drag, bond.cubic)
+            for bond, v in zip(s.bonds, vectors[len(s.stops) :], strict=True)
+        ]
+        powers = np.zeros((len(stops), max((len(b.coefficients) for b in s.bonds), default=0)))
+        for row, bond in enumerate(s.bonds, len(s.stops)):
+            powers[row, : len(bond.coefficients)] = bond.coefficients
         return SystemData(
             linear.blocks,
             np.array([self.rows, self.rate_rows, accelerations]),
@@ -261,8 +276,8 @@ class FlowMap:
             np.ascontiguousarray(force.T),
             s.orders,
             s.drive,
-            np.array(stops, dtype=float).reshape(-1, len(StopRow._fields)),
-            np.array([law_address(stop.law) for stop in s.stops], dtype=np.int64),
+            np.hstack([np.array(stops, dtype=float).reshape(-1, len(StopRow._fields)), powers]),
+            np.array([law_address(e.law) for e in s.stops] + [0] * len(s.bonds), dtype=np.int64),
             self.options.panel_tail,
             self.options.node_angle,
         )
@@ -307,7 +322,7 @@ class FlowMap:
         status, *_, ends, jacobians, d_omegas, d_parameters, closings = self._fly(
             self._no_record, False, nodes, phases, omega, chained, sensitivities, parameters
         )
-        return Segments(ends, jacobians, d_omegas, d_parameters, closings, _REASONS[status])
+        return Segments(ends, jacobians, d_omegas, d_parameters, closings, self._reason(status))
 
     def error(
         self,
@@ -412,7 +427,7 @@ class FlowMap:
             record = self._record(capacity)
             status, *_, closings = self._fly(record, True, nodes, phases, omega, chained, False)
             if status != RECORD_FULL:
-                return self._motion(omega, record, closings, _REASONS[status])
+                return self._motion(omega, record, closings, self._reason(status))
             capacity *= 4
 
     def newton(
@@ -458,9 +473,9 @@ class FlowMap:
             )
             if status != RECORD_FULL:
                 omega = math.exp(point[-1])
-                motion = self._motion(omega, record, closings, _REASONS[status])
+                motion = self._motion(omega, record, closings, self._reason(status))
                 return Solution(
-                    point, along, jacobians, motion, iterations, first, last, _REASONS[status]
+                    point, along, jacobians, motion, iterations, first, last, self._reason(status)
                 )
             capacity *= 4
 
@@ -506,10 +521,17 @@ class FlowMap:
         )  # fmt: skip
         try:
             found = newton(*arguments) if newton.overloads else first_call(newton, *arguments)
-            return found  # type: ignore[no-any-return]
+            return (*found[:-1], found[-1][: len(self.system.stops)])
         except SystemError as error:
             told = error
         raise behind(told)  # out here, so that it does not become its own cause
+
+    def _reason(self, status: int) -> str:
+        """Why the kernels gave up; empty if they did not."""
+        softens = any(bond.coefficients and not bond.bounded for bond in self.system.bonds)
+        if status == CONTACT_FAILED and softens:
+            return "the motion runs away along a spring that softens"
+        return _REASONS[status]
 
     @cached_property
     def _no_record(self) -> Record:
@@ -555,8 +577,8 @@ class FlowMap:
             np.empty(capacity, dtype=np.int64),
             np.empty(capacity, dtype=np.int64),
             np.empty((capacity, 2 * self.system.size)),
-            np.empty((capacity, len(self.system.stops), self.tables.nodes.size)),
-            np.empty((capacity, len(self.system.stops), self.tables.nodes.size)),
+            np.empty((capacity, len(self._pushed), self.tables.nodes.size)),
+            np.empty((capacity, len(self._pushed), self.tables.nodes.size)),
             np.zeros(3, dtype=np.int64),
         )
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Complex
 from nldyn.base.errors import check_types
-from nldyn.flow.kernels.layout import StopRow
-from nldyn.system.parameters import OF_STOPS, Parameter, check_exact
+from nldyn.flow.kernels.layout import FIRST_POWER, StopRow
+from nldyn.system.parameters import OF_SPRINGS, OF_STOPS, Parameter, check_exact
 from nldyn.system.system import System
 
 _COLUMNS = {name: StopRow._fields.index(name) for name in OF_STOPS}
@@ -39,6 +39,11 @@ def parameter_tables(
         name, index = parameter.name, parameter.index
         if name in _COLUMNS:
             table[row] = _COLUMNS[name], index
+        elif name in OF_SPRINGS:
+            spring = system.springs[index]
+            place = [(bond.at, bond.against) for bond in system.bonds]
+            bond = len(system.stops) + place.index((spring.at, spring.against))
+            table[row] = FIRST_POWER + OF_SPRINGS.index(name), bond
         else:
             table[row] = _EXCITATION, index
             size: dict[str, Any] = {name: 1.0}

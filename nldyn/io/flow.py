@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -25,8 +26,8 @@ from nldyn.system.elements import (
 )
 from nldyn.system.linear import LinearPart
 from nldyn.system.parameters import strength
-from nldyn.system.springs import Spring
-from nldyn.system.system import System
+from nldyn.system.springs import LARGEST_DEGREE, CubicDamper, PolynomialSpring, Spring
+from nldyn.system.system import AnyDamper, AnySpring, System
 
 TRIALS = ((0.1, 0.0), (1.0, 0.1), (1.0, -0.1))  # penetration over its unit, speed in m/s
 STATE_UNIT = "m kg^0.5"
@@ -87,14 +88,18 @@ def write_flow(group: Any, flow: FlowMap) -> None:
     )
     _write_columns(
         group.create_group("dampers"),
-        {"at": [d.at for d in system.dampers], **_ends(system.dampers)},
+        {"at": [d.at for d in system.dampers], **_ends(system.dampers), **_drags(system.dampers)},
         {"coefficient": ("N s/m", [d.coefficient for d in system.dampers])},
     )
     if system.springs:
         _write_columns(
             group.create_group("springs"),
-            {"at": [s.at for s in system.springs], **_ends(system.springs)},
-            {"stiffness": ("N/m", [s.stiffness for s in system.springs])},
+            {
+                "at": [s.at for s in system.springs],
+                "kind": ["linear" if isinstance(s, Spring) else "" for s in system.springs],
+                **_ends(system.springs),
+            },
+            {"coefficients": ("N/m, N/m^2, ...", [_coefficients(s) for s in system.springs])},
         )
     sources = system.excitation
     _write_columns(
@@ -110,11 +115,24 @@ def write_flow(group: Any, flow: FlowMap) -> None:
     )
 
 
-def _ends(elements: Sequence[Damper] | Sequence[Spring]) -> dict[str, list[str]]:
+def _ends(elements: Sequence[AnyDamper] | Sequence[AnySpring]) -> dict[str, list[str]]:
     """Interfaces at the other ends, with a mark before, or nothing if all are on the ground."""
     if all(element.against is None for element in elements):
         return {}
     return {"against": ["" if e.against is None else f"'{e.against}" for e in elements]}
+
+
+def _drags(dampers: Sequence[AnyDamper]) -> dict[str, list[str]]:
+    """With what the damping grows, or nothing if all dampers are linear."""
+    if all(isinstance(damper, Damper) for damper in dampers):
+        return {}
+    return {"by": [getattr(damper, "by", "") for damper in dampers]}
+
+
+def _coefficients(spring: AnySpring) -> list[float]:
+    """Coefficients of all powers that there may be; nan stands for one that is not given."""
+    known = [spring.stiffness] if isinstance(spring, Spring) else list(spring.coefficients)
+    return known + [math.nan] * (LARGEST_DEGREE - len(known))
 
 
 def _kind(source: Excitation) -> str:
@@ -226,14 +244,25 @@ def _read_stops(group: Group, laws: Laws) -> tuple[Stop, ...]:
     return tuple(stops)
 
 
-def _read_dampers(group: Group) -> tuple[Damper, ...]:
+def _read_dampers(group: Group) -> tuple[AnyDamper, ...]:
     at = group.texts("at")
-    return tuple(map(Damper, at, group.array("coefficient", len(at)).tolist(), _other_ends(group)))
+    by = group.texts("by") if group.has_attribute("by") else [""] * len(at)
+    rows = zip(at, group.array("coefficient", len(at)).tolist(), _other_ends(group), strict=True)
+    return tuple(
+        CubicDamper(*row, drag) if drag else Damper(*row)
+        for row, drag in zip(rows, by, strict=True)
+    )
 
 
-def _read_springs(group: Group) -> tuple[Spring, ...]:
-    at = group.texts("at")
-    return tuple(map(Spring, at, group.array("stiffness", len(at)).tolist(), _other_ends(group)))
+def _read_springs(group: Group) -> tuple[AnySpring, ...]:
+    at, kinds = group.texts("at"), group.texts("kind")
+    rows = group.array("coefficients", len(at), LARGEST_DEGREE)
+    return tuple(
+        Spring(place, float(row[0]), other)
+        if kind
+        else PolynomialSpring(place, row[~np.isnan(row)].tolist(), other)
+        for place, kind, row, other in zip(at, kinds, rows, _other_ends(group), strict=True)
+    )
 
 
 def _other_ends(group: Group) -> list[str | None]:

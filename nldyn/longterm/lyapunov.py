@@ -284,7 +284,7 @@ def _grown(
     flow: FlowMap, state: Real, omega: float, periods: int, parts: int, basis: Real
 ) -> tuple[Real, Real, float]:
     """Last state, stretches per period (periods, 2n) and ∫ of the stops' damping, in blocks."""
-    lossy = any(stop.depends_on_speed for stop in flow.system.stops)
+    lossy = flow.system.loses_by_speed
     stretches = np.empty((periods, state.size))
     viscous = 0.0
     for first in range(0, periods, BLOCK):

@@ -184,7 +184,7 @@ class Motion:
         """
         system = self.system
         name = check_observe(system, interface)
-        output = len(system.stops) + system.interfaces.index(name)
+        output = system.output(name)
         times, values = [np.empty(0)], [np.empty(0)]
         for begin, stretch in zip(self.begins, self.stretches, strict=False):
             found = stretch.extremes(output)

@@ -320,7 +320,7 @@ def max_abs_displacement(orbit: Orbit) -> float:
     if not extremes.values.size:
         return 0.0
     phase = float(extremes.phases[int(np.argmax(np.abs(extremes.values)))])
-    output = len(orbit.system.stops) + orbit.system.interfaces.index(orbit.observe)
+    output = orbit.system.output(orbit.observe)
     return abs(exact_output(orbit, output, phase))
 
 

@@ -61,14 +61,15 @@ def first_orbit(
 
 def check_bounded(system: System, omega: float) -> None:
     """Refuse the resonance of an undamped mode where no stop can limit the motion."""
-    if not system.stops:
+    if not system.stops and not system.bonds:
         system.steady(omega)
 
 
 def _touches_only(system: System, motion: Trajectory, omega: float) -> bool:
     """Whether contacts push, but by no more than rounding of the drive and of the motion."""
-    force = float(motion.record.force.max(initial=0.0))
-    depth = float(motion.record.depth.max(initial=0.0))
+    stops = len(system.stops)
+    force = float(motion.record.force[:, :stops].max(initial=0.0))
+    depth = float(motion.record.depth[:, :stops].max(initial=0.0))
     drive = sum(
         abs(source.phasor) * (source.harmonic * omega) ** source.power
         for source in system.excitation

@@ -352,7 +352,7 @@ class Orbit:
     @cached_property
     def observed_extremes(self) -> Extremes:
         """Local extremes of the observed displacement."""
-        return self.extremes(len(self.system.stops) + self.system.interfaces.index(self.observe))
+        return self.extremes(self.system.output(self.observe))
 
     @cached_property
     def penetration_peaks(self) -> tuple[Extremes, ...]:
@@ -486,7 +486,7 @@ def history_of(system: System, time: Real, states: Real) -> History:
 def contact_damping(flow: FlowMap, motion: Trajectory) -> float:
     """∫ Σ v² ∂F/∂δ' dt over the contacts of a motion, by the quadrature of their panels."""
     system = flow.system
-    if not any(stop.depends_on_speed for stop in system.stops):
+    if not system.loses_by_speed:
         return 0.0
     phases, weights = motion.contact_quadrature()
     states = flow.to_modal(motion.states(phases))
@@ -494,6 +494,10 @@ def contact_damping(flow: FlowMap, motion: Trajectory) -> float:
     for stop in system.stops:
         v = system.stop_vector(stop)
         total += float(v @ v * weights @ stop.viscosity(*_depth_and_speed(system, stop, states)))
+    for bond in system.bonds:
+        v = system.vector_between(bond.at, bond.against)
+        q, rates = states[:, : system.size], states[:, system.size :]
+        total += float(v @ v * weights @ bond.viscosity(q @ v, rates @ v))
     return total
 
 

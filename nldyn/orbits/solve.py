@@ -163,7 +163,7 @@ def _simulated(
     # at a sharp resonance the motion from rest takes too long to grow
     linear = [] if flow.system.grows(omega) else [flow.system.steady(omega)]
     starts = _spread(problem, (strobe[-1], *near, *middles, *linear), omega, limit)
-    if not np.any(q):
+    if not np.any(q) and not flow.system.bonds:
         return starts
     held = held_motion(flow.system, q, omega, problem.phases[:-1])
     return itertools.chain(starts, [flow.to_state(held)])

@@ -12,9 +12,8 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError
 from nldyn.reduction.load_case import LoadCase
 from nldyn.system.contact_law import duration_factor
-from nldyn.system.elements import Damper, Stop
-from nldyn.system.springs import Spring
-from nldyn.system.system import System
+from nldyn.system.elements import Stop
+from nldyn.system.system import AnyDamper, AnySpring, System
 
 INVISIBLE = 1e-6
 MOST_MODES = 60
@@ -118,7 +117,11 @@ def contact_duration(stop: Stop, mass: float, speed: float) -> float:
 
 def in_use(model: cms.ReducedModel, setting: LoadCase) -> Real:
     """Participations (m, r) of the interfaces where something acts or is observed."""
-    pairs: tuple[Stop | Damper | Spring, ...] = (*setting.stops, *setting.dampers, *setting.springs)
+    pairs: tuple[Stop | AnyDamper | AnySpring, ...] = (
+        *setting.stops,
+        *setting.dampers,
+        *setting.springs,
+    )
     names = {element.at for element in (*pairs, *setting.excitation)}
     names |= {element.against for element in pairs if element.against is not None}
     names.add(setting.observe or model.interfaces[0])

@@ -24,6 +24,8 @@ from nldyn.reduction.load_case import LoadCase
 from nldyn.runtime.executors import as_finished, own_processes
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.runtime.threads import one_thread
+from nldyn.system.elements import Damper
+from nldyn.system.springs import Spring
 from nldyn.system.system import System
 
 if TYPE_CHECKING:
@@ -607,8 +609,10 @@ def massless_receptance(
         ]
     )
     C, K = np.zeros((2, len(names), len(names)))
-    sizes = [(C, d.coefficient, d.at, d.against) for d in setting.dampers]
-    sizes += [(K, s.stiffness, s.at, s.against) for s in setting.springs]
+    linear = [d for d in setting.dampers if isinstance(d, Damper)]
+    sizes = [(C, d.coefficient, d.at, d.against) for d in linear]
+    springs = [s for s in setting.springs if isinstance(s, Spring)]
+    sizes += [(K, s.stiffness, s.at, s.against) for s in springs]
     for matrix, size, at, against in sizes:
         ends = [1.0 * (name == at) - (name == against) for name in names]
         matrix += size * np.outer(ends, ends)

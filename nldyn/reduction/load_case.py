@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 from numpy.typing import ArrayLike
 
 from nldyn.base.errors import SystemModelError, check_frequency
-from nldyn.system.elements import Damper, Excitation, Stop
-from nldyn.system.springs import Spring
-from nldyn.system.system import System
+from nldyn.system.elements import Excitation, Stop
+from nldyn.system.system import AnyDamper, AnySpring, System
 
 if TYPE_CHECKING:
     import cms
@@ -51,12 +50,12 @@ class LoadCase:
 
     range_hz: tuple[float, float]
     stops: tuple[Stop, ...] = ()
-    dampers: tuple[Damper, ...] = ()
+    dampers: tuple[AnyDamper, ...] = ()
     excitation: tuple[Excitation, ...] = ()
     modal_damping: float = 0.0
     observe: str | None = None
     rayleigh: tuple[float, float] = (0.0, 0.0)
-    springs: tuple[Spring, ...] = ()
+    springs: tuple[AnySpring, ...] = ()
 
     def __post_init__(self) -> None:
         low, high = self.range_hz
@@ -99,9 +98,9 @@ def system_of_reduced(
     *,
     modal_damping: float | ArrayLike,
     stops: Sequence[Stop],
-    dampers: Sequence[Damper],
+    dampers: Sequence[AnyDamper],
     excitation: Sequence[Excitation],
-    springs: Sequence[Spring] = (),
+    springs: Sequence[AnySpring] = (),
 ) -> System:
     """The system of a reduced model, for parameters as those of `LoadCase`.
 

@@ -152,7 +152,7 @@ def _attached(scene: Scene) -> dict[str, Any]:
         "springs": [
             fem.PointSpring(s.at, s.direction, s.stiffness)
             for s in scene.mesh_springs.values()
-            if s.direction is not None
+            if s.direction is not None and s.stiffness is not None
         ],
         "hinges": [fem.Hinge(h.at, h.part) for h in scene.hinges],
         "interfaces": {

@@ -10,7 +10,7 @@ import numpy as np
 from nldyn.base.errors import SystemModelError
 from nldyn.scene.faults import check_regular, told_as, unreadable
 from nldyn.scene.messages import scene_error
-from nldyn.scene.schema import ExcitationTable, Scene, StopTable
+from nldyn.scene.schema import DamperTable, ExcitationTable, Scene, SpringTable, StopTable
 from nldyn.system.elements import (
     BaseMotion,
     ConstantForce,
@@ -23,7 +23,8 @@ from nldyn.system.elements import (
     hertz_stiffness,
 )
 from nldyn.system.measured import MeasuredForce, measured_force
-from nldyn.system.springs import Spring
+from nldyn.system.springs import CubicDamper, PolynomialSpring, Spring
+from nldyn.system.system import AnyDamper, AnySpring
 
 logger = logging.getLogger("nldyn")
 
@@ -32,9 +33,9 @@ class Acting(NamedTuple):
     """What acts at the interfaces of a structure."""
 
     stops: tuple[Stop, ...]
-    dampers: tuple[Damper, ...]
+    dampers: tuple[AnyDamper, ...]
     excitation: tuple[Excitation, ...]
-    springs: tuple[Spring, ...]
+    springs: tuple[AnySpring, ...]
 
 
 def acting_elements(scene: Scene) -> Acting:
@@ -42,16 +43,28 @@ def acting_elements(scene: Scene) -> Acting:
     with told_as(scene, (), SystemModelError):
         return Acting(
             tuple(_stop(stop) for stop in scene.stops),
-            tuple(
-                Damper(damper.at, damper.coefficient, damper.against) for damper in scene.dampers
-            ),
+            tuple(_damper(damper) for damper in scene.dampers),
             tuple(
                 source
                 for number, table in enumerate(scene.excitation)
                 for source in _excitation(scene, number, table)
             ),
-            tuple(Spring(s.at, s.stiffness, s.against) for s in scene.interface_springs.values()),
+            tuple(_spring(spring) for spring in scene.interface_springs.values()),
         )
+
+
+def _damper(table: DamperTable) -> AnyDamper:
+    if table.law == "linear":
+        return Damper(table.at, table.coefficient, table.against)
+    by = "speed" if table.law == "cubic" else table.law
+    return CubicDamper(table.at, table.coefficient, table.against, by)
+
+
+def _spring(table: SpringTable) -> AnySpring:
+    if table.coefficients is not None:
+        return PolynomialSpring(table.at, table.coefficients, table.against)
+    assert table.stiffness is not None
+    return Spring(table.at, table.stiffness, table.against)
 
 
 def _stop(table: StopTable) -> Stop:

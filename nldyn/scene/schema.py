@@ -26,6 +26,7 @@ from pydantic import (
 from nldyn.base.errors import LARGEST_FREQUENCY
 from nldyn.scene.messages import quoted, show
 from nldyn.system.elements import LARGEST_EXPONENT, LARGEST_PHASE, MOST_HARMONIC
+from nldyn.system.springs import LARGEST_DEGREE
 
 SMALLEST, LARGEST = 1e-50, 1e50
 
@@ -227,15 +228,24 @@ class SpringTable(Table):
 
     at: str
     direction: Direction | None = None
-    stiffness: Number
+    stiffness: Number | None = None
+    coefficients: Annotated[list[Number], Field(min_length=1, max_length=LARGEST_DEGREE)] | None = (
+        None
+    )
     against: str | None = None
 
     @model_validator(mode="after")
     def _one_kind(self) -> SpringTable:
         if self.direction is None:
+            _exactly_one(self, "stiffness", "coefficients")
             _refuse_own(self)
+            if self.coefficients is not None and not any(self.coefficients):
+                raise ValueError("must have 'coefficients' that are not all zero")
             return self
-        _refuse(self, ("against",), "a spring of the mesh, which has a 'direction'")
+        of_mesh = "a spring of the mesh, which has a 'direction'"
+        _refuse(self, ("against", "coefficients"), of_mesh)
+        if self.stiffness is None:
+            raise ValueError("needs 'stiffness'")
         if self.stiffness <= 0.0:
             raise ValueError("must have a 'stiffness' above 0 where it has a 'direction'")
         return self
@@ -381,15 +391,18 @@ class DampingTable(Table):
 
 
 class DamperTable(Table):
-    """``[[dampers]]``: a linear damper between an interface and the ground or another one."""
+    """``[[dampers]]``: a damper between an interface and the ground or another one."""
 
     at: str
     coefficient: NotNegative
+    law: Literal["linear", "cubic", "displacement"] = "linear"
     against: str | None = None
 
     @model_validator(mode="after")
     def _two_ends(self) -> DamperTable:
         _refuse_own(self)
+        if self.law != "linear" and self.coefficient == 0.0:
+            raise ValueError(f"needs a 'coefficient' above 0 for law '{self.law}'")
         return self
 
 

@@ -17,7 +17,15 @@ from nldyn.base.errors import (
     shown,
 )
 from nldyn.system.elements import LARGEST_EXPONENT
-from nldyn.system.parameters import OF_STOPS, SOURCES, Parameter, check_exact, check_index
+from nldyn.system.parameters import (
+    OF_SPRINGS,
+    OF_STOPS,
+    SOURCES,
+    Parameter,
+    check_exact,
+    check_index,
+)
+from nldyn.system.springs import PolynomialSpring
 from nldyn.system.system import System
 
 FREQUENCY = "frequency_hz"
@@ -41,19 +49,22 @@ UNITS = {
     "spring_stiffness": "N/m",
     "modal_damping": "1",
     "natural_frequency_hz": "Hz",
-}
+} | {name: f"N/m^{name[1:]}" for name in OF_SPRINGS}
 BOUNDS = {
     name: (0.0, math.inf)
     for name in ("stiffness", "dissipation", "dashpot", *SOURCES, *_OF_DAMPERS, *_OF_MODES)
     if name != "force"  # has either sign
 } | {"exponent": (1.0, LARGEST_EXPONENT)}  # between which there are systems
 POSITIVE = ("stiffness", "natural_frequency_hz")  # there is no system where they are zero
-NAMES = (FREQUENCY, *_OF_STOPS, *SOURCES, *_OF_DAMPERS, *_OF_SPRINGS, *_OF_MODES)
+NAMES = (
+    *(FREQUENCY, *_OF_STOPS, *SOURCES, *_OF_DAMPERS, *_OF_SPRINGS),
+    *(*OF_SPRINGS, *_OF_MODES),
+)
 
 
 def has_exact_derivatives(parameter: Parameter) -> bool:
     """Whether the flow map differentiates by the parameter itself."""
-    return parameter.name in (*_OF_STOPS, *SOURCES)
+    return parameter.name in (*_OF_STOPS, *SOURCES, *OF_SPRINGS)
 
 
 def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
@@ -66,8 +77,9 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
     parameter : str or Parameter
         frequency_hz; gap, stiffness, exponent, dissipation or dashpot of a stop; amplitude,
         mass_times_radius or force of an excitation; coefficient of a damper; spring_stiffness of a
-        spring; modal_damping (ratio) or natural_frequency_hz of a mode. The index -1 of
-        modal_damping means all modes, which then have one ratio.
+        linear spring; k1, k2, ... of a polynomial one; modal_damping (ratio) or
+        natural_frequency_hz of a mode. The index -1 of modal_damping means all modes, which then
+        have one ratio.
 
     Raises
     ------
@@ -85,6 +97,10 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
         check_index(parameter, "damper", len(system.dampers))
     elif parameter.name in _OF_SPRINGS:
         check_index(parameter, "spring", len(system.springs))
+        if isinstance(system.springs[parameter.index], PolynomialSpring):
+            raise SystemModelError(
+                f"parameter 'spring_stiffness': spring {parameter.index} has k1, k2, ... instead"
+            )
     elif parameter.name in _OF_MODES and parameter != Parameter("modal_damping", EVERY_MODE):
         check_index(parameter, "mode", system.size)
     if parameter.name == "modal_damping":
@@ -109,6 +125,8 @@ def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float
         return _damping_ratio(system, index)
     if name == "natural_frequency_hz":
         return float(system.frequencies_hz[index])
+    if name in OF_SPRINGS:
+        return float(_polynomial(system, index).coefficients[int(name[1:]) - 1])
     elements: Sequence[Any] = system.stops
     if name in SOURCES:
         elements = system.excitation
@@ -132,6 +150,12 @@ def with_value(system: System, parameter: Parameter, value: float) -> System:
         return system
     if name in _OF_STOPS:
         return system.with_elements(stops=_replaced(system.stops, index, name, value))
+    if name in OF_SPRINGS:
+        values = list(_polynomial(system, index).coefficients)
+        values[int(name[1:]) - 1] = value
+        return system.with_elements(
+            springs=_replaced(system.springs, index, "coefficients", tuple(values))
+        )
     if name in SOURCES:
         return system.with_elements(excitation=_replaced(system.excitation, index, name, value))
     if name in _OF_DAMPERS:
@@ -151,7 +175,13 @@ def with_value(system: System, parameter: Parameter, value: float) -> System:
     return replace(system, natural_frequencies=natural, damping=damping)
 
 
-def _replaced(elements: tuple[Any, ...], index: int, name: str, value: float) -> tuple[Any, ...]:
+def _polynomial(system: System, index: int) -> PolynomialSpring:
+    spring = system.springs[index]
+    assert isinstance(spring, PolynomialSpring)
+    return spring
+
+
+def _replaced(elements: tuple[Any, ...], index: int, name: str, value: object) -> tuple[Any, ...]:
     changed = replace(elements[index], **{name: value})
     return (*elements[:index], changed, *elements[index + 1 :])
 

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 from nldyn.base.errors import SystemModelError, check_types, check_whole
 from nldyn.system.elements import Excitation
+from nldyn.system.springs import LARGEST_DEGREE, PolynomialSpring
 from nldyn.system.system import System
 
 OF_STOPS = ("gap", "stiffness", "exponent", "dissipation", "dashpot")
+OF_SPRINGS = tuple(f"k{power}" for power in range(1, LARGEST_DEGREE + 1))
 SOURCES = ("amplitude", "mass_times_radius", "force")
 
 
@@ -33,9 +35,10 @@ class Parameter:
     ----------
     name : str
         gap, stiffness, exponent, dissipation or dashpot of a stop (not of one with a law of its
-        own, but for the gap), amplitude, mass_times_radius or force of an excitation.
+        own, but for the gap), amplitude, mass_times_radius or force of an excitation; k1, k2, ...,
+        the coefficients of a polynomial spring.
     index : int
-        Which of the stops, excitations, dampers or modes of the system.
+        Which of the stops, excitations, springs, dampers or modes of the system.
 
     Raises
     ------
@@ -83,8 +86,17 @@ def check_exact(system: System, parameter: Parameter) -> None:
         check_index(parameter, "excitation", len(system.excitation))
         if not hasattr(system.excitation[index], name):
             raise SystemModelError(f"parameter '{name}': excitation {index} has no {name}")
+    elif name in OF_SPRINGS:
+        check_index(parameter, "spring", len(system.springs))
+        spring = system.springs[index]
+        degree = len(spring.coefficients) if isinstance(spring, PolynomialSpring) else 0
+        if int(name[1:]) > degree:
+            raise SystemModelError(
+                f"parameter '{name}': spring {index} has no such coefficient"
+                + ("; that of a linear one is spring_stiffness" if degree == 0 else "")
+            )
     else:
-        known = ", ".join([*OF_STOPS, *SOURCES])
+        known = ", ".join([*OF_STOPS, *SOURCES, *OF_SPRINGS])
         raise SystemModelError(f"unknown parameter '{name}'; there are: {known}")
 
 

@@ -10,12 +10,16 @@ from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import SystemModelError
 from nldyn.system.contact_law import power_law
 from nldyn.system.elements import Stop
+from nldyn.system.springs import Bond
 from nldyn.system.system import System
 
 MOST_STEPS = 200
 SHORTEST = 1e-14  # last step, relative
 FLAT = 1e-12  # of the stops' largest stiffness, below which a rigid motion counts as not held
 NOT_HELD = 1e-9  # share of a force, or of a direction, that counts as none
+MOST_STARTS = 100  # in the search for all rest positions
+SAME = 1e-6  # share of their size by which two of them may differ
+FARTHEST = 1e9  # m kg^0.5, where a motion counts as running away
 SHARE = 0.1  # of the decrease that the slope foretells, with which a step is taken
 
 
@@ -26,7 +30,8 @@ def rest(system: System) -> Real:
     forces have the potential ``q Ω² q / 2 - f q + Σ k δ^(m + 1) / (m + 1)``, which is convex:
     Newton's method with shortened steps [Nocedal and Wright 2006, section 3.1] comes to its only
     minimum; a body that nothing holds yet moves along the force to the next stop. A stop with a law
-    of its own counts with its stiffness and exponent.
+    of its own counts with its stiffness and exponent. Where polynomial springs make several minima,
+    it is the first of `rest_positions`.
 
     Raises
     ------
@@ -45,11 +50,92 @@ def rest(system: System) -> Real:
     >>> float(rest(free)[0].round(9))
     0.14
     """
+    if system.bonds:
+        return rest_positions(system)[0]
+    return _settled(system, np.zeros(system.size))
+
+
+def rest_positions(system: System) -> list[Real]:
+    """All rest positions (n,) that are found, the one of least energy first.
+
+    There is one without polynomial springs. With them, Newton's method goes downhill from zero,
+    from where each spring alone with the structure behind it would rest, and to both sides of a
+    saddle.
+
+    Raises
+    ------
+    SystemModelError
+        If nothing holds the structure, or it runs away along a spring that softens.
+
+    Examples
+    --------
+    >>> from nldyn import PolynomialSpring
+    >>> wells = System.from_matrices([[1.0]], [[0.0]], {"tip": [1.0]},
+    ...     springs=[PolynomialSpring("tip", [-4.0, 0.0, 1.0])])
+    >>> [abs(float(q[0].round(9))) for q in rest_positions(wells)]
+    [2.0, 2.0]
+    """
+    if not system.bonds:
+        return [rest(system)]
     push = constant_force(system)
-    q = np.zeros(system.size)
+    starts = [np.zeros(system.size), *_rests_of_bonds(system, push)]
+    found: list[Real] = []
+    for start in starts:
+        if not np.all(np.isfinite(q := _settled(system, start))):
+            continue
+        values, vectors = np.linalg.eigh(tangent_stiffness(system, q))
+        if values[0] < -FLAT * abs(values[-1]):
+            if len(starts) < MOST_STARTS:
+                away = _beside(system, push, q, vectors[:, 0])
+                starts += [q + away, q - away]
+        elif not any(np.linalg.norm(q - p) <= SAME * _length(system, q, p) for p in found):
+            found.append(q)
+    if not found:
+        raise SystemModelError(
+            "the structure has no rest position: the springs that soften let it run away"
+        )
+    return sorted(found, key=lambda q: _potential(system, push, q))
+
+
+def _rests_of_bonds(system: System, push: Real) -> Iterator[Real]:
+    """Where the forces along each bond alone vanish."""
+    for bond in system.bonds:
+        c = _vector(system, bond)
+        way = c / float(c @ c) if np.any(c) else c
+        forces = np.zeros(max(len(bond.coefficients), 1) + 1)
+        forces[1 : len(bond.coefficients) + 1] = bond.coefficients
+        forces[:2] += -float(push @ way), float(way @ system.stiffness @ way)
+        roots = np.polynomial.polynomial.polyroots(np.trim_zeros(forces, "b"))
+        for root in roots:
+            if abs(root.imag) <= 1e-9 * abs(root):
+                yield root.real * way
+
+
+def _beside(system: System, push: Real, q: Real, way: Real) -> Real:
+    """Step from a saddle along a direction, a thousandth of that to where the energy is lowest."""
+    steps = 2.0 ** np.arange(-60.0, 60.0)
+    size = max(float(np.abs(_vector(system, bond) @ way)) for bond in system.bonds) or 1.0
+    energies = [
+        min(_potential(system, push, q + s * way), _potential(system, push, q - s * way))
+        for s in steps / size
+    ]
+    rises = np.flatnonzero(np.diff(energies) > 0.0)
+    rises = rises[np.array(energies)[rises] < energies[0]]
+    return np.asarray(1e-3 * steps[rises[0] if rises.size else 0] / size * way)
+
+
+def _length(system: System, *states: Real) -> float:
+    return max(float(np.linalg.norm(q)) for q in states) or 1.0
+
+
+def _settled(system: System, q: Real) -> Real:
+    """Where Newton's method goes downhill from q; not finite if it runs away."""
+    push = constant_force(system)
     for _ in range(MOST_STEPS):
         slope = _slope(system, push, q)
         step = _downhill(system, q, slope)
+        if not np.linalg.norm(q) < FARTHEST:
+            return np.full(system.size, np.nan)
         size, potential, steepness = 1.0, _potential(system, push, q), float(np.linalg.norm(slope))
         while size > SHORTEST:
             there = q + size * step
@@ -91,10 +177,16 @@ def _downhill(system: System, q: Real, slope: Real) -> Real:
     rigid = np.flatnonzero(system.natural_frequencies == 0.0)
     if rigid.size:
         values, vectors = np.linalg.eigh(stiffness[np.ix_(rigid, rigid)])
-        flat = vectors[:, values <= FLAT * values[-1]]
+        flat = vectors[:, np.abs(values) <= FLAT * np.abs(values).max()]
         free[rigid] = -flat @ (flat.T @ slope[rigid])
     # what rounding shows of a force along a flat direction is none
     if np.linalg.norm(free) <= NOT_HELD * np.linalg.norm(slope):
+        if system.bonds:  # away from maxima, too
+            values, vectors = np.linalg.eigh(stiffness)
+            sizes = np.abs(values)
+            along = vectors[:, sizes > FLAT * sizes.max()]
+            sizes = sizes[sizes > FLAT * sizes.max()]
+            return np.asarray(-along @ ((along.T @ slope) / sizes))
         return np.asarray(-np.linalg.lstsq(stiffness, slope, rcond=None)[0])
     force = float(np.linalg.norm(free))
     ways = []
@@ -144,7 +236,15 @@ def tangent_stiffness(system: System, q: Real) -> Real:
     matrix = np.array(system.stiffness)
     for i, c, depth in _closed(system, q):
         matrix += _elastic(system.stops[i], depth)[1] * np.outer(c, c)
+    for bond in system.bonds:
+        c = _vector(system, bond)
+        matrix += float(bond.stiffness(c @ q)) * np.outer(c, c)
     return matrix
+
+
+def _vector(system: System, bond: Bond) -> Real:
+    """Modal vector of the displacement at a bond."""
+    return system.vector_between(bond.at, bond.against)
 
 
 def _closed(system: System, q: Real) -> Iterator[tuple[int, Real, float]]:
@@ -166,6 +266,9 @@ def _slope(system: System, push: Real, q: Real) -> Real:
     slope = system.stiffness @ q - push
     for i, c, depth in _closed(system, q):
         slope = slope + _elastic(system.stops[i], depth)[0] * c
+    for bond in system.bonds:
+        c = _vector(system, bond)
+        slope = slope + float(bond.force(c @ q)) * c
     return np.asarray(slope)
 
 
@@ -174,4 +277,6 @@ def _potential(system: System, push: Real, q: Real) -> float:
     for i, _, depth in _closed(system, q):
         stop = system.stops[i]
         energy += _elastic(stop, depth)[0] * depth / (stop.exponent + 1.0)
+    for bond in system.bonds:
+        energy += float(bond.energy(_vector(system, bond) @ q))
     return energy

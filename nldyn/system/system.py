@@ -23,9 +23,11 @@ from nldyn.system.linear import (
     linear_part,
     without_rounding,
 )
-from nldyn.system.springs import Spring
+from nldyn.system.springs import Bond, CubicDamper, PolynomialSpring, Spring, bonds_of
 
 Element = TypeVar("Element")
+AnySpring = Spring | PolynomialSpring
+AnyDamper = Damper | CubicDamper
 LARGEST_PARTICIPATION = 1e50  # its square is the mobility of a stop, and its fourth power occurs
 
 
@@ -81,10 +83,10 @@ class System:
     damping: Real
     participation: Mapping[str, Real]
     stops: tuple[Stop, ...] = ()
-    dampers: tuple[Damper, ...] = ()
+    dampers: tuple[AnyDamper, ...] = ()
     excitation: tuple[Excitation, ...] = ()
     loads: Mapping[str, Real] = field(default_factory=dict)
-    springs: tuple[Spring, ...] = ()
+    springs: tuple[AnySpring, ...] = ()
 
     def __repr__(self) -> str:
         """One line: modes, interfaces, and what acts."""
@@ -111,10 +113,10 @@ class System:
         *,
         modal_damping: float | ArrayLike = 0.0,
         stops: Sequence[Stop] = (),
-        dampers: Sequence[Damper] = (),
+        dampers: Sequence[AnyDamper] = (),
         excitation: Sequence[Excitation] = (),
         loads: Mapping[str, ArrayLike] = MappingProxyType({}),
-        springs: Sequence[Spring] = (),
+        springs: Sequence[AnySpring] = (),
     ) -> System:
         """System from modal data typed in by hand.
 
@@ -163,10 +165,10 @@ class System:
         damping: ArrayLike | None = None,
         modal_damping: float | ArrayLike = 0.0,
         stops: Sequence[Stop] = (),
-        dampers: Sequence[Damper] = (),
+        dampers: Sequence[AnyDamper] = (),
         excitation: Sequence[Excitation] = (),
         loads: Mapping[str, ArrayLike] = MappingProxyType({}),
-        springs: Sequence[Spring] = (),
+        springs: Sequence[AnySpring] = (),
     ) -> System:
         """System from mass, stiffness and damping matrices.
 
@@ -242,10 +244,10 @@ class System:
         *,
         modal_damping: float | ArrayLike = 0.0,
         stops: Sequence[Stop] = (),
-        dampers: Sequence[Damper] = (),
+        dampers: Sequence[AnyDamper] = (),
         excitation: Sequence[Excitation] = (),
         loads: Mapping[str, ArrayLike] = MappingProxyType({}),
-        springs: Sequence[Spring] = (),
+        springs: Sequence[AnySpring] = (),
     ) -> System:
         """System from a reduced model (anything with frequencies and participations).
 
@@ -321,6 +323,8 @@ class System:
         """Modal damping matrix with the point dampers, (n, n), 1/s."""
         D = np.array(self.damping)
         for damper in self.dampers:
+            if isinstance(damper, CubicDamper):
+                continue
             phi = self.vector_between(damper.at, damper.against)
             D += damper.coefficient * np.outer(phi, phi)
         return D
@@ -330,6 +334,8 @@ class System:
         """Modal stiffness of the linear springs, (n, n), 1/s²."""
         K = np.zeros((self.size, self.size))
         for spring in self.springs:
+            if isinstance(spring, PolynomialSpring):
+                continue
             phi = self.vector_between(spring.at, spring.against)
             K += spring.stiffness * np.outer(phi, phi)
         return K
@@ -338,6 +344,24 @@ class System:
     def stiffness(self) -> Real:
         """Modal stiffness of the linear part, (n, n), 1/s²."""
         return np.diag(self.natural_frequencies**2) + self.spring_stiffness
+
+    @cached_property
+    def bonds(self) -> tuple[Bond, ...]:
+        """What acts nonlinearly all the time."""
+        return bonds_of(self.springs, self.dampers)
+
+    @property
+    def loses_by_speed(self) -> bool:
+        """Whether a force of a stop or bond depends on the speed."""
+        lossy = [stop.depends_on_speed for stop in self.stops]
+        return any(lossy + [bond.depends_on_speed for bond in self.bonds])
+
+    def output(self, interface: str) -> int:
+        """Number of the displacement of an interface among the outputs of a flow map.
+
+        Before it come the penetrations of the stops and the displacements at the bonds.
+        """
+        return len(self.stops) + len(self.bonds) + self.interfaces.index(interface)
 
     @property
     def free_modes(self) -> int:
@@ -354,13 +378,13 @@ class System:
         return _rank(held, int(free.sum())) < int(free.sum())
 
     @property
-    def _holders(self) -> tuple[Stop | Spring, ...]:
+    def _holders(self) -> tuple[Stop | AnySpring, ...]:
         return (*self.stops, *self.springs)
 
     @cached_property
     def conservative(self) -> bool:
         """Whether nothing takes energy out: no damping, and no stop whose force knows the speed."""
-        return not np.any(self.total_damping) and not any(s.depends_on_speed for s in self.stops)
+        return not np.any(self.total_damping) and not self.loses_by_speed
 
     @cached_property
     def symmetric(self) -> bool:
@@ -373,10 +397,14 @@ class System:
             for s in self.stops
         ]
         odd = not np.any(self.drive[self.orders % 2 == 0.0])
-        return odd and all(
-            sum(same == law and np.array_equal(c, vector) for c, same in stops)
-            == sum(same == law and np.array_equal(-c, vector) for c, same in stops)
-            for vector, law in stops
+        return (
+            odd
+            and all(bond.odd for bond in self.bonds)
+            and all(
+                sum(same == law and np.array_equal(c, vector) for c, same in stops)
+                == sum(same == law and np.array_equal(-c, vector) for c, same in stops)
+                for vector, law in stops
+            )
         )
 
     @cached_property
@@ -393,6 +421,10 @@ class System:
                 slope = stop.exponent * stop.stiffness * preload
                 c = self.stop_vector(stop)
                 squares += slope * (c if modes is None else modes.T @ c) ** 2
+        for bond in self.bonds:
+            c = self.vector_between(bond.at, bond.against)
+            slope = abs(bond.coefficients[0]) if bond.coefficients else 0.0
+            squares += slope * (c if modes is None else modes.T @ c) ** 2
         part = linear_part(omega, D, np.sqrt(squares))
         return part if modes is None else part.of_modes(modes)
 
@@ -468,10 +500,12 @@ class System:
         *,
         stops: tuple[Stop, ...] | None = None,
         excitation: tuple[Excitation, ...] | None = None,
+        springs: tuple[AnySpring, ...] | None = None,
     ) -> System:
-        """The same structure with stops or excitation whose numbers differ, at the same interfaces.
+        """The same structure with elements whose numbers differ, at the same interfaces.
 
-        The linear part is shared, which saves most of the work of making a system.
+        Of the springs, polynomial ones may. The linear part is shared, which saves most of the
+        work of making a system.
         """
         other = copy.copy(self)
         own = {field.name for field in fields(self)} | {
@@ -486,6 +520,8 @@ class System:
             object.__setattr__(other, "stops", _listed("stops", stops))
         if excitation is not None:
             object.__setattr__(other, "excitation", _listed("excitation", excitation))
+        if springs is not None:
+            object.__setattr__(other, "springs", _listed("springs", springs))
         other._check_interfaces()
         return other
 
@@ -512,8 +548,8 @@ class System:
         known = ", ".join(self.participation) or "none"
         for kind, elements, classes in (
             ("stop", self.stops, Stop),
-            ("damper", self.dampers, Damper),
-            ("spring", self.springs, Spring),
+            ("damper", self.dampers, AnyDamper),
+            ("spring", self.springs, AnySpring),
             ("excitation", self.excitation, Excitation),
         ):
             for element in elements:

@@ -46,6 +46,16 @@ def test_example_of_the_loads_prints_the_folds(capsys):
     assert sorted(folds) == pytest.approx([0.112687, 0.131854], abs=5e-7)
 
 
+def test_example_of_the_elements_prints_folds_and_wells(capsys):
+    """The folds are those of harmonic balance, see `test_bonds`."""
+    text = (ROOT / "docs" / "how-to" / "elements.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.S)
+    exec(code, {})
+    folds, wells = (ast.literal_eval(line) for line in capsys.readouterr().out.splitlines())
+    assert sorted(folds) == pytest.approx([0.210759, 0.283251], abs=5e-7)
+    assert wells == [2.0, 2.0]
+
+
 def test_every_kind_of_special_point_is_in_the_table():
     text = THEORY.read_text(encoding="utf-8")
     for kind in ("LP", "PD", "BP", "NS", "GR"):

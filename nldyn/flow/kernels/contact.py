@@ -15,13 +15,14 @@ from nldyn.flow.kernels.flights import (
     output_size,
     rate_noise,
 )
-from nldyn.flow.kernels.law import depends_on_speed, law, singular_slope
+from nldyn.flow.kernels.law import depends_on_speed, is_bond, law, singular_slope
 from nldyn.flow.kernels.layout import (
     CONTACT_FAILED,
     CREEP,
     DECAY,
     DURATION,
     EXPONENT,
+    FIRST_POWER,
     FLIGHT,
     GAP,
     INSTANT,
@@ -118,6 +119,9 @@ def first_event(fl, tab, kind, phase, w, h, closed, panel, w_end):
     inner = np.empty((1, m))
     values = np.empty(m + 2)
     for s in range(closed.size):
+        if is_bond(fl, s):
+            position += 1
+            continue
         noise = output_noise(fl, s, w)
         start, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
         end, _, _, _ = output_derivatives(fl, s, w_end, phase + fl.omega * h, 0.0)
@@ -173,6 +177,53 @@ def creep(fl, stop, w, phase, duration):
 
 
 @inner
+def bond_length(fl, stop, w, phase):
+    """Length of a panel to try first on a bond: a radian of the free swing through the present.
+
+    By a bound of the slope as far as the displacement and the speed carry.
+    """
+    value, speed, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
+    numbers = fl.stops[stop]
+    rate = fl.omega
+    for _ in range(6):
+        reach, power, slope = abs(value) + abs(speed) / rate, 1.0, 0.0
+        for c in range(FIRST_POWER, numbers.size):
+            slope += (c - FIRST_POWER + 1) * abs(numbers[c]) * power
+            power *= reach
+        rate = math.sqrt(rate * max(math.sqrt(numbers[MOBILITY] * slope), fl.omega))
+    return 1.0 / rate
+
+
+@inner
+def growth_of_panel(fl, tab, panel):
+    """Factor by which the next panel may be longer than this one, as far as its bonds tell.
+
+    A Legendre tail of degree m - 1 goes about with that power of the length.
+    """
+    na, m = panel.F.shape
+    strain = 1e-30
+    for a in range(na):
+        if is_bond(fl, panel.active[a]):
+            for o in range(a, panel.slope.shape[0], na):
+                top = largest(panel.slope, o)
+                if top > 0.0:
+                    strain = max(strain, legendre_tail(tab, panel.slope, o) / (4.0 * top))
+            top = largest(panel.F, a)
+            if top > 0.0:
+                strain = max(strain, legendre_tail(tab, panel.F, a) / top)
+    growth = 0.9 * (fl.tail / strain) ** (1.0 / (m - 1))
+    return min(max(growth, 0.5), 1.6)
+
+
+@inner
+def hold_still(fl, phase, w, a, panel):
+    """Guess a bond's displacements to be the present one: then one step is its linearisation."""
+    value, _, _, _ = output_derivatives(fl, panel.active[a], w, phase, 0.0)
+    for i in range(panel.output.shape[1]):
+        panel.output[a, i] = value
+
+
+@inner
 def guess_panel(fl, tab, phase, w, h, h_mapped, start_switch, panel):
     """Choose the kind and length of a panel and guess its penetrations.
 
@@ -184,6 +235,8 @@ def guess_panel(fl, tab, phase, w, h, h_mapped, start_switch, panel):
     ends = False
     length = h
     for a in range(active.size):
+        if is_bond(fl, active[a]):
+            continue
         _, duration, left = expected_contact(fl, active[a], w, phase)
         depth, speed = creep(fl, active[a], w, phase, duration)
         if depth > 0.0:
@@ -199,6 +252,9 @@ def guess_panel(fl, tab, phase, w, h, h_mapped, start_switch, panel):
             length = left
     kind = 2 * start_switch + (1 if ends else 0)
     for a in range(active.size):
+        if is_bond(fl, active[a]):
+            hold_still(fl, phase, w, a, panel)
+            continue
         peak, duration, left = expected_contact(fl, active[a], w, phase)
         depth, speed = creep(fl, active[a], w, phase, duration)
         if depth > 0.0:
@@ -240,6 +296,9 @@ def first_panel(fl, tab, rec, before, phase, w, h_max, h_mapped, start_switch, p
             panel.output[a, i] = rec.depth[n, panel.active[a], i]
     kind, length, event = rec.kind[n], rec.duration[n], rec.event[n]
     if other and event < 0:
+        for a in range(panel.active.size):
+            if is_bond(fl, panel.active[a]):
+                hold_still(fl, phase, w, a, panel)
         return kind, h, -1
     if length > h_max or (event < 0 and length > 0.98 * h_max):
         return kind, h_max, -1
@@ -262,7 +321,7 @@ def remember(rec):
 
 
 @inner
-def keep_profile(tab, kind, new_kind, ratio, panel, guess):
+def keep_profile(fl, tab, kind, new_kind, ratio, panel, guess):
     """Carry all penetrations over to a panel `ratio` times as long."""
     for a in range(panel.active.size):
         stretch_profile(tab, kind, new_kind, ratio, panel.output[a], guess)
@@ -270,7 +329,8 @@ def keep_profile(tab, kind, new_kind, ratio, panel, guess):
         for i in range(guess.size):
             top = max(top, guess[i])
         for i in range(guess.size):
-            panel.output[a, i] = max(guess[i], 1e-3 * top)
+            bond = is_bond(fl, panel.active[a])
+            panel.output[a, i] = guess[i] if bond else max(guess[i], 1e-3 * top)
 
 
 @inner
@@ -309,7 +369,7 @@ def at_switch(fl, stop, w, phase, allowed):
 @inner
 def with_event(fl, stop, w, phase, allowed, closed):
     """Whether a stop is to open or close now, to within a time allowed or rounding."""
-    if not at_switch(fl, stop, w, phase, allowed):
+    if is_bond(fl, stop) or not at_switch(fl, stop, w, phase, allowed):
         return False
     _, speed, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
     return closed[stop] != (speed > 0.0)
@@ -332,6 +392,8 @@ def stop_at_switch(fl, w, phase, h, closed):
     stop, nearest = -1, np.inf
     allowed = 10.0 * coarsest_instant(fl) * h
     for s in range(closed.size):
+        if is_bond(fl, s):
+            continue
         late = abs(time_to_event(fl, s, closed[s], w, phase))
         gap = abs(distance(fl, s, w, phase))
         here = late <= allowed or gap <= 10.0 * output_noise(fl, s, w)
@@ -441,7 +503,7 @@ def contact_panel(
             )
         if 1e-6 < doubtful < 1.0 - 1e-6 and not looked:  # the state at the end of a panel is exact
             looked = True
-            keep_profile(tab, kind, smooth, doubtful, panel, guess)
+            keep_profile(fl, tab, kind, smooth, doubtful, panel, guess)
             kind, aim = smooth, -1
             h *= doubtful
             continue
@@ -455,7 +517,7 @@ def contact_panel(
             aim = event
             if h * where > h_mapped:  # half the way first
                 goal, aim, where = smooth, -1, 0.5 * where
-            keep_profile(tab, kind, goal, where, panel, guess)
+            keep_profile(fl, tab, kind, goal, where, panel, guess)
             kind = goal
             h *= where
             continue
@@ -463,6 +525,7 @@ def contact_panel(
             for a in range(active.size):
                 if (
                     aim < 0
+                    and not is_bond(fl, active[a])
                     and time_to_event(fl, active[a], closed[active[a]], w_end, end_phase) < h
                 ):
                     aim = active[a]
@@ -481,7 +544,7 @@ def contact_panel(
         elif fine and not lost:
             return OK, kind, h, -1
         aim = -1
-        keep_profile(tab, kind, smooth, 0.5, panel, guess)
+        keep_profile(fl, tab, kind, smooth, 0.5, panel, guess)
         kind = smooth
         h *= 0.5
     return CONTACT_FAILED, kind, h, -1

@@ -10,7 +10,18 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from nldyn.flow.kernels.compiling import inlined, inner
-from nldyn.flow.kernels.layout import DASHPOT, DISSIPATION, EXPONENT, GAP, ROUND, STIFFNESS
+from nldyn.flow.kernels.layout import (
+    BOND,
+    CUBIC,
+    DASHPOT,
+    DISSIPATION,
+    DRAG,
+    EXPONENT,
+    FIRST_POWER,
+    GAP,
+    ROUND,
+    STIFFNESS,
+)
 from nldyn.system import contact_law
 
 power_law = inlined(contact_law.power_law)
@@ -34,8 +45,32 @@ def call_law(typing, address, delta, speed):
 
 
 @inner
+def is_bond(fl, stop):
+    """Whether a stop is none, but a bond that acts all the time."""
+    return fl.stops[stop, BOND] != 0.0
+
+
+@inner
+def bond_law(numbers, u, speed):
+    """Force of a bond, Σ k_j u^j + (drag u² + cubic u'²) u', and its two derivatives."""
+    secant, bend = 0.0, 0.0  # Σ k_j u^(j - 1), and its derivative
+    for c in range(numbers.size - 1, FIRST_POWER - 1, -1):
+        bend = bend * u + secant
+        secant = secant * u + numbers[c]
+    drag, cubic = numbers[DRAG], numbers[CUBIC]
+    viscosity = drag * u * u + cubic * speed * speed
+    return (
+        u * secant + viscosity * speed,
+        secant + u * bend + 2.0 * drag * u * speed,
+        viscosity + 2.0 * cubic * speed * speed,
+    )
+
+
+@inner
 def law(fl, stop, delta, speed):
     """Contact force and its derivatives with respect to penetration and speed."""
+    if is_bond(fl, stop):
+        return bond_law(fl.stops[stop], delta, speed)
     if delta <= 0.0:
         return 0.0, 0.0, 0.0
     if fl.laws[stop] != 0:
@@ -59,7 +94,7 @@ def closed_law(fl, stop, delta, speed):
     the outermost node may come to lie on its other side, and would drop the whole stiffness. So
     does a dashpot.
     """
-    if delta > 0.0:
+    if delta > 0.0 or is_bond(fl, stop):
         return law(fl, stop, delta, speed)
     dashpot = fl.stops[stop, DASHPOT]
     if fl.stops[stop, EXPONENT] < ROUND:
@@ -72,6 +107,7 @@ def closed_law(fl, stop, delta, speed):
 def depends_on_speed(fl, stop):
     """Whether a force depends on the speed of penetration, as far as one knows."""
     lossy = fl.stops[stop, DISSIPATION] != 0.0 or fl.stops[stop, DASHPOT] != 0.0
+    lossy = lossy or fl.stops[stop, DRAG] != 0.0 or fl.stops[stop, CUBIC] != 0.0
     return fl.laws[stop] != 0 or lossy
 
 
@@ -88,6 +124,8 @@ def needs_speed(fl, stop):
 @inner
 def law_by(fl, stop, column, delta, speed):
     """Derivative of a stop's force with respect to its own number in a column of `stops`."""
+    if column >= FIRST_POWER:
+        return delta ** (column - FIRST_POWER + 1)
     force, slope, _ = closed_law(fl, stop, delta, speed)
     if column == GAP:
         return -slope

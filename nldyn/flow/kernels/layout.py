@@ -47,11 +47,16 @@ class StopRow(NamedTuple):
     mobility: float  # velocity jump per unit impulse in 1/kg
     duration: float  # of a free contact, over (peak penetration / speed)
     instant: float  # error allowed in the instant of an event, as a share of the panel
+    bond: float = 0.0  # 1 for what is no stop but acts all the time, with the law `bond_law`
+    drag: float = 0.0  # of a bond: coefficients of u² u' and u'^3
+    cubic: float = 0.0
 
 
-GAP, STIFFNESS, EXPONENT, DISSIPATION, DASHPOT, MOBILITY, DURATION, INSTANT = range(
-    len(StopRow._fields)
-)
+GAP, STIFFNESS, EXPONENT, DISSIPATION, DASHPOT, MOBILITY, DURATION, INSTANT = range(8)
+BOND, DRAG, CUBIC = range(len(StopRow._fields) - 3, len(StopRow._fields))
+FIRST_POWER = len(
+    StopRow._fields
+)  # column of the coefficient of u of a bond; those of u²... follow
 
 
 class SystemData(NamedTuple):
@@ -66,7 +71,7 @@ class SystemData(NamedTuple):
     force: Real  # (2n, n_stops): w' = A w - force @ F
     orders: Real  # (h,) multiples of the excitation frequency at which something acts; 1 first
     drive: Complex  # (h, 3, 2n) excitation Σ Re(Σ_p ω^p drive[h, p] e^{i orders[h] ωt}) of z
-    stops: Real  # (n_stops, 8), rows as `StopRow`
+    stops: Real  # (n_stops, ...), rows as `StopRow`, bonds last; then coefficients of bonds
     laws: NDArray[np.int64]  # (n_stops,) address of a compiled law, or 0 for the power law
     tail: float  # largest relative Legendre tail accepted on a contact panel
     node_angle: float  # phase of the fastest mode from node to node, in rad

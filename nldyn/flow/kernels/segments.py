@@ -8,8 +8,10 @@ import numpy as np
 
 from nldyn.flow.kernels.compiling import inlined, inner, never_inline
 from nldyn.flow.kernels.contact import (
+    bond_length,
     contact_panel,
     expected_contact,
+    growth_of_panel,
     lost_to_rounding,
     remember,
     with_event,
@@ -29,7 +31,7 @@ from nldyn.flow.kernels.flights import (
     term,
     turned,
 )
-from nldyn.flow.kernels.law import law
+from nldyn.flow.kernels.law import is_bond, law
 from nldyn.flow.kernels.layout import (
     CONTACT_FAILED,
     DASHPOT,
@@ -132,7 +134,7 @@ def propagate(
     for s in range(n_stops):
         value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
         left = output_noise(fl, s, w) if speed < 0.0 else 0.0  # it opens at this instant
-        closed[s] = value - fl.stops[s, GAP] > left
+        closed[s] = is_bond(fl, s) or value - fl.stops[s, GAP] > left
     pushes = np.full(n_stops, np.nan)
     status = run_pieces(
         fl, tab, w, columns, phase, before, duration, closed, closings, with_columns, rec,
@@ -237,6 +239,11 @@ def run_pieces(
     w_end = np.empty(w.size)
     # penetrations that are carried from panel to panel, and their rounding errors
     depth, doubt = np.zeros(n_stops), np.full(n_stops, np.inf)
+    bonded = n_stops > 0 and is_bond(fl, n_stops - 1)
+    reach = np.inf  # length of a panel that the bonds are likely to allow
+    for s in range(n_stops):
+        if is_bond(fl, s):
+            reach = min(reach, bond_length(fl, s, w, phase))
     for _ in range(20000):
         remain = duration - t
         if remain <= 0.0:
@@ -276,7 +283,7 @@ def run_pieces(
         active = active[:n_active]
         if not same_stops(active, panel.active):
             panel = new_panel(fl, m, w.size, active)
-        if n_active == 1 and start_switch == 1:
+        if n_active == 1 and start_switch == 1 and not bonded:
             peak, _, left = expected_contact(fl, active[0], w, here)
             noise = output_noise(fl, active[0], w)
             if lost_to_rounding(fl, active[0], w, peak, noise) > WORST_ROUNDING:
@@ -286,7 +293,7 @@ def run_pieces(
                 closings[active[0]] -= 1
                 start_switch, skip = 0, max(left, shortest)
                 continue
-        h_max = min(remain, h_mapped if start_switch == 1 else h_even)
+        h_max = min(remain, h_mapped if start_switch == 1 else h_even, reach)
         for a in range(n_active):
             noise = output_noise(fl, active[a], w)
             if doubt[active[a]] >= noise:  # the state knows it as well
@@ -300,6 +307,10 @@ def run_pieces(
         )
         if status != OK:
             return status
+        if bonded and h > 0.0:
+            grown = growth_of_panel(fl, tab, panel) * h
+            cut = event >= 0 or h >= remain or start_switch == 1
+            reach = max(reach, grown) if cut else grown
         if h > 0.0:
             if not np.isfinite(w_end.sum()):
                 return CONTACT_FAILED

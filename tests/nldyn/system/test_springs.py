@@ -5,13 +5,24 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import nldyn
-from nldyn import Damper, HarmonicForce, Parameter, Spring, Stop, System
+from nldyn import (
+    CubicDamper,
+    Damper,
+    HarmonicForce,
+    Parameter,
+    PolynomialSpring,
+    Spring,
+    Stop,
+    System,
+)
+from nldyn.app.cli import main
 from nldyn.base.errors import SceneError, SystemModelError
 from nldyn.scene.build import build_system
 from nldyn.scene.read import parse_scene
-from nldyn.system.rest import rest
+from nldyn.system.rest import rest, rest_positions
 
 UNITS = {f"m{i}": np.eye(6)[i].tolist() for i in range(6)}
 
@@ -164,3 +175,87 @@ def test_springs_in_a_scene():
         parse_scene(SCENE.replace('against = "b"', 'against = "c"'))
     with pytest.raises(SceneError, match="needs another interface than its own in 'against'"):
         parse_scene(SCENE.replace('against = "b"', 'against = "a"'))
+
+
+WELLS = """
+[[springs]]
+at = "b"
+against = "a"
+coefficients = [-8.0, 0.0, 2.0]
+
+[[dampers]]
+at = "a"
+law = "cubic"
+coefficient = 0.2
+
+[[dampers]]
+at = "b"
+law = "displacement"
+coefficient = 0.1
+
+[[excitation]]
+at = "a"
+kind = "harmonic"
+amplitude = 1.0
+
+[continuation]
+range_hz = [0.1, 1.0]
+"""
+
+
+def test_nonlinear_springs_and_dampers_in_a_scene(tmp_path):
+    """Two bodies, held by nothing else than springs, with two rest positions: told by check."""
+    system = build_system(parse_scene(SCENE + WELLS))
+    assert system.springs[2] == PolynomialSpring("b", (-8.0, 0.0, 2.0), "a")
+    assert system.dampers[1:] == (
+        CubicDamper("a", 0.2),
+        CubicDamper("b", 0.1, by="displacement"),
+    )
+    (tmp_path / "wells.toml").write_text(SCENE + WELLS)
+    told = CliRunner().invoke(main, ["check", str(tmp_path / "wells.toml")])
+    assert told.exit_code == 0
+    assert "spring at 'b' against 'a': -8 N/m, 2 N/m^3" in told.stdout
+    # with u = b - a: 1.5 a = 4 b·(-1), so that (1.5 · 4 / 5.5 + 5 - 8) u + 2 u³ = 0
+    u = np.sqrt((3.0 - 6.0 / 5.5) / 2.0)
+    first, second = (line for line in told.stdout.splitlines() if "at rest" in line)
+    assert first.startswith("at rest: ") and second.startswith("or at rest: ")
+    assert f"{4.0 / 5.5 * u:.6g} m at 'a'" in first + second
+    for q in rest_positions(system):
+        a, b = (float(phi @ q) for phi in system.participation.values())
+        assert abs(b - a) == pytest.approx(u, rel=1e-12)
+        assert 1.5 * a == pytest.approx(-4.0 * b, rel=1e-12)
+
+
+def test_a_tilted_double_well_has_two_rest_positions_of_which_the_lower_comes_first():
+    """x³ - x = 0.1."""
+    system = System.from_matrices(
+        [[1.0]], [[0.0]], {"a": [1.0]}, springs=[PolynomialSpring("a", [-1.0, 0.0, 1.0])],
+        excitation=[nldyn.ConstantForce("a", 0.1)],
+    )  # fmt: skip
+    lowest, middle, other = sorted(np.roots([1.0, 0.0, -1.0, -0.1]).real, key=lambda x: -x)
+    found = [float(system.participation["a"] @ q) for q in rest_positions(system)]
+    assert found == pytest.approx([lowest, other], rel=1e-12)
+    assert middle == pytest.approx(-0.1, rel=0.02)  # the saddle, which is none
+
+
+def test_rest_positions_that_there_are_not():
+    softening = System.from_matrices(
+        [[1.0]], [[1.0]], {"a": [1.0]}, springs=[PolynomialSpring("a", [0.0, 0.0, -1.0])],
+        excitation=[nldyn.ConstantForce("a", 5.0)],
+    )  # fmt: skip
+    with pytest.raises(SystemModelError, match="no rest position: the springs that soften"):
+        rest(softening)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("coefficients = [-8.0, 0.0, 2.0]", "coefficients = [0.0]", "not all zero"),
+        ("coefficients = [-8.0, 0.0, 2.0]", "", "needs one of 'stiffness' and 'coefficients'"),
+        ('law = "cubic"\ncoefficient = 0.2', 'law = "cubic"\ncoefficient = 0.0', "above 0"),
+        ('against = "a"\ncoefficients', 'direction = "x"\ncoefficients', "has 'coefficients'"),
+    ],
+)
+def test_springs_that_make_no_sense_in_a_scene(old, new, words):
+    with pytest.raises(SceneError, match=words):
+        parse_scene(SCENE + WELLS.replace(old, new))
