@@ -128,8 +128,14 @@ def fakes_know_their_normal_form(monkeypatch):
 
 @pytest.fixture(autouse=True)
 def fakes_are_saved(monkeypatch):
-    """Made-up diagrams have no orbits that a file could hold."""
-    real = results.save
+    """Made-up diagrams have no orbits that a file could hold or a page could show."""
+    real, page = results.save, results.write_page
+
+    def shown(found, path, *more, **options):
+        made_up = isinstance(found, FakeDiagram)
+        return path.write_text("page") if made_up else page(found, path, *more, **options)
+
+    monkeypatch.setattr(results, "write_page", shown)
 
     def either(found, path):
         made_up = isinstance(found, FakeDiagram)

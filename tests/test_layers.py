@@ -22,6 +22,7 @@ KEPT_TO = {
     "cms": {"reduction", "scene", "report", "paper", "app"},
     "h5py": {"io"},
     "matplotlib": {"plot", "report", "paper"},
+    "plotly": {"report"},
     "click": {"app"},
     "pydantic": {"scene"},
 }

@@ -1,4 +1,4 @@
-"""The command line: ``nldyn run``, ``check``, ``render``, ``converge`` and ``paper``.
+"""The command line: ``nldyn run``, ``report``, ``check``, ``render``, ``converge``, ``paper``.
 
 Exit codes: 0 done, 2 something in the scene or on the command line is wrong, 3 a picture or an
 animation needs something that is not installed, 130 stopped with Ctrl-C.
@@ -146,7 +146,10 @@ def main() -> None:
 def run(
     scene: Path, out: Path, mesh_folders: tuple[Path, ...], log: bool, quiet: bool, jobs: int
 ) -> None:
-    """Compute the branches of a scene, and write tables and a diagram."""
+    """Compute the branches of a scene, and write tables, a diagram and a report.
+
+    The report is one page for a browser, report.html.
+    """
     with plain_errors():
         from nldyn.runtime.progress import progress_line
         from nldyn.runtime.result_directory import check_directory
@@ -156,23 +159,59 @@ def run(
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)
         from nldyn.io.checkpoint import CheckpointFile
-        from nldyn.scene.run import compute, explore_scene
+        from nldyn.report.again import drawn_of
+        from nldyn.report.results import write_results
+        from nldyn.scene.run import compute, explore_scene, parts_of_work, structure_of
 
         with kept_at_interrupt(out) as unfinished:
             kept = CheckpointFile(unfinished)
-            with progress_line(quiet) as report:
-                found = explore_scene(loaded, report, kept, jobs) if loaded.explore else None
-                diagram = found.diagram if found else compute(loaded, report, kept, jobs)
-            from nldyn.report.results import write_results
-
-            yscale: Literal["linear", "log"] = "log" if log else "linear"
-            write_results(found or diagram, out, loaded, yscale=yscale)
+            with progress_line(quiet) as line:
+                parts = parts_of_work(loaded, line)
+                structure = structure_of(loaded, parts.part("model"))
+                parts.end("model")
+                work = (loaded, parts.part("branches"), kept, jobs, structure)
+                found = explore_scene(*work) if loaded.explore else None
+                diagram = found.diagram if found else compute(*work)
+                line("report", 0.0, 1.0)
+                yscale: Literal["linear", "log"] = "log" if log else "linear"
+                drawn = drawn_of(loaded, structure)
+                write_results(found or diagram, out, loaded, drawn=drawn, yscale=yscale)
         if found:
             click.echo("\n".join(found.coverage_lines()))
         click.echo(describe(diagram, time.perf_counter() - start, out))
         if not diagram.branches:
             click.echo("nldyn: no periodic orbit was found; the tables are empty", err=True)
             sys.exit(NOTHING_FOUND)
+
+
+@main.command()
+@click.argument("directory", type=any_path, metavar="DIR")
+@click.option(
+    "--scene",
+    type=any_path,
+    metavar="SCENE.toml",
+    help="What was computed, by default the copy in DIR; its mesh shows the structure.",
+)
+@mesh_option
+@quiet_option
+def report(
+    directory: Path, scene: Path | None, mesh_folders: tuple[Path, ...], quiet: bool
+) -> None:
+    """Write the report of results anew, also of a run that has not ended.
+
+    DIR is what 'nldyn run --out' was given. The report is one page for a browser, report.html.
+    """
+    with plain_errors():
+        from nldyn.report.again import report_again
+        from nldyn.runtime.progress import progress_line
+        from nldyn.scene.read import load_scene
+
+        loaded = None if scene is None else load_scene(scene, mesh_folders)
+        with progress_line(quiet) as line:
+            notes = report_again(directory, loaded, mesh_folders, line)
+        for note in notes:
+            click.echo(f"note: {note}")
+        click.echo(f"written to {directory / 'report.html'}")
 
 
 @main.command()

@@ -20,6 +20,7 @@ from nldyn.plot.diagram import (
     period_name,
     stop_places,
 )
+from nldyn.system.system import System
 
 FORCE_PREFIXES = ((1e6, "MN"), (1e3, "kN"), (1.0, "N"), (1e-3, "mN"), (1e-6, "µN"))
 FLOOR = 1e-7  # amplitudes below this share of the largest are not shown
@@ -61,8 +62,8 @@ def plot_history(
     ('time (s)', 'displacement of middle (µm)')
     """
     name = _checked(orbit, ax, interface, samples)
-    phases = _phases(orbit, samples)
-    y, _ = _motion(orbit, name, phases)
+    phases = drawn_phases(orbit, samples)
+    y, _ = motion_at(orbit, name, phases)
     factor, unit = length_unit(float(np.abs(y).max()))
     ax = _axes(ax, orbit)
     ax.axhline(0.0, color="0.6", linewidth=0.6)
@@ -100,13 +101,13 @@ def plot_phase_portrait(
         For an unknown interface.
     """
     name = _checked(orbit, ax, interface, samples)
-    y, speed = _motion(orbit, name, _phases(orbit, samples))
+    y, speed = motion_at(orbit, name, drawn_phases(orbit, samples))
     factor, unit = length_unit(float(np.abs(y).max()))
     pace, pace_unit = length_unit(float(np.abs(speed).max()))
     ax = _axes(ax, orbit)
     ax.plot(y / factor, speed / pace, **_style(orbit))
     strobe = 2.0 * np.pi * np.arange(orbit.period, dtype=float)
-    y, speed = _motion(orbit, name, strobe)
+    y, speed = motion_at(orbit, name, strobe)
     label = "start of an excitation period"
     ax.plot(y / factor, speed / pace, "o", color="black", markersize=5.0, label=label, zorder=4)
     for number, gap in enumerate(stop_places(orbit.system, name)):
@@ -179,31 +180,22 @@ def plot_contact_force(orbit: Orbit, ax: Axes | None = None, *, samples: int = 4
     matplotlib.axes.Axes
     """
     _checked(orbit, ax, None, samples)
-    phases = _phases(orbit, samples)
-    states = orbit.states(phases)
+    phases = drawn_phases(orbit, samples)
     system = orbit.system
-    forces = np.zeros((len(system.stops), phases.size))
-    for row, stop in enumerate(system.stops):
-        v = system.stop_vector(stop)
-        depth = states[:, : system.size] @ v - stop.gap
-        forces[row] = stop.force(depth, states[:, system.size :] @ v)
-    largest = float(np.abs(forces).max(initial=0.0))
-    factor, unit = next((p for p in FORCE_PREFIXES if largest >= p[0]), (1.0, "N"))
+    forces = contact_forces(system, orbit.states(phases))
+    factor, unit = force_unit(float(np.abs(forces).max(initial=0.0)))
     ax = _axes(ax, orbit)
     ax.axhline(0.0, color="0.6", linewidth=0.6)
-    for row, stop in enumerate(system.stops):
+    for row in range(len(system.stops)):
         colour = PERIOD_COLOURS[(row + 1) % len(PERIOD_COLOURS)]
         style = STABLE if orbit.stable else UNSTABLE
-        number = f" {row + 1}" if len(system.stops) > 1 else ""
-        against = f" against {stop.against}" if stop.against else ""
-        label = f"stop{number} at {stop.at}{against}"
         ax.plot(
             phases / orbit.omega,
             forces[row] / factor,
             color=colour,
             linewidth=1.4,
             linestyle=style,
-            label=label,
+            label=stop_name(system, row),
         )
     if system.stops:
         _draw_legend(ax)
@@ -219,7 +211,7 @@ def _checked(orbit: Orbit, ax: Axes | None, interface: str | None, samples: int 
     return check_observe(orbit.system, orbit.observe if interface is None else interface)
 
 
-def _phases(orbit: Orbit, samples: int) -> Real:
+def drawn_phases(orbit: Orbit, samples: int) -> Real:
     """Equal steps of the phase over the orbit's period, with the nodes of its contacts."""
     end = 2.0 * np.pi * orbit.period
     nodes, _ = orbit.trajectory.contact_quadrature()
@@ -227,10 +219,46 @@ def _phases(orbit: Orbit, samples: int) -> Real:
     return np.unique(np.concatenate([np.linspace(0.0, end, samples + 1), within]))
 
 
-def _motion(orbit: Orbit, interface: str, phases: Real) -> tuple[Real, Real]:
+def motion_at(orbit: Orbit, interface: str, phases: Real) -> tuple[Real, Real]:
     """Displacement and velocity of an interface at forcing phases."""
     phi, states = orbit.system.participation[interface], orbit.states(phases)
     return states[:, : phi.size] @ phi, states[:, phi.size :] @ phi
+
+
+def contact_forces(system: System, states: Real) -> Real:
+    """Forces in N of the stops (n_stops, k) at modal states (k, 2n)."""
+    forces = np.zeros((len(system.stops), len(states)))
+    for row, stop in enumerate(system.stops):
+        v = system.stop_vector(stop)
+        depth = states[:, : system.size] @ v - stop.gap
+        forces[row] = stop.force(depth, states[:, system.size :] @ v)
+    return forces
+
+
+def force_unit(largest: float) -> tuple[float, str]:
+    """Choose the unit for an axis that reaches up to ``largest`` newtons.
+
+    Examples
+    --------
+    >>> force_unit(2300.0)
+    (1000.0, 'kN')
+    """
+    return next((p for p in FORCE_PREFIXES if largest >= p[0]), (1.0, "N"))
+
+
+def stop_name(system: System, index: int) -> str:
+    """Name a stop by its place, and by its number where there are several.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System
+    >>> stop_name(System.from_modal([13.1], {"tip": [0.6]}, stops=[Stop("tip", 1e9)]), 0)
+    'stop at tip'
+    """
+    stop = system.stops[index]
+    number = f" {index + 1}" if len(system.stops) > 1 else ""
+    against = f" against {stop.against}" if stop.against else ""
+    return f"stop{number} at {stop.at}{against}"
 
 
 def _axes(ax: Axes | None, orbit: Orbit) -> Axes:

@@ -1,7 +1,7 @@
 """Write branches, special points and diagrams to a directory.
 
 ``branches.csv`` and ``special_points.csv`` hold every number to the last digit, in SI units;
-``branches.h5`` has the branches themselves, see `nldyn.io.branches`.
+``branches.h5`` has the branches themselves, see `nldyn.io.branches`; ``report.html`` shows them.
 """
 
 from __future__ import annotations
@@ -20,12 +20,14 @@ from nldyn.branches.endings import Ending
 from nldyn.branches.tables import at_known, orbit_columns
 from nldyn.io.store import save
 from nldyn.plot.diagram import save_diagram
+from nldyn.report.page import Table, write_page
 from nldyn.runtime.result_directory import result_directory
 from nldyn.search.exploration import Exploration
 
 if TYPE_CHECKING:
     from nldyn.branches.branch import Branch
     from nldyn.branches.cascades import Cascade
+    from nldyn.report.page import Drawn
     from nldyn.scene.schema import Scene
     from nldyn.search.diagram import Diagram
     from nldyn.search.exploration import Exploration
@@ -66,6 +68,11 @@ END_COLUMNS = (
     "broken_off",
     "reason",
 )
+FILES = {
+    "points": "branches.csv",
+    "special_points": "special_points.csv",
+    "ends": "ends.csv",
+}
 COVERAGE_COLUMNS = ("frequency_hz", "periods", "settled", "unsettled", "failed")
 
 
@@ -74,9 +81,10 @@ def write_results(
     directory: str | Path,
     scene: Scene | None = None,
     *,
+    drawn: Drawn | None = None,
     yscale: Literal["linear", "log"] = "linear",
 ) -> Path:
-    """Write a diagram as tables and pictures, all of them or nothing.
+    """Write a diagram as tables, pictures and a page for a browser, all of them or nothing.
 
     Parameters
     ----------
@@ -85,10 +93,12 @@ def write_results(
     directory : str or Path
         New, empty, or written by an earlier run, whose files are replaced; other files in it
         are kept. Gets ``branches.csv``, ``special_points.csv``, ``ends.csv``, ``branches.h5``,
-        ``diagram.png``, ``diagram.svg``, ``summary.json``, with an exploration ``coverage.csv``
-        and, with a scene, ``scene.toml``.
+        ``diagram.png``, ``diagram.svg``, ``summary.json``, ``report.html``, with an exploration
+        ``coverage.csv`` and, with a scene, ``scene.toml``.
     scene : Scene, optional
         The scene it was computed from; its text is copied.
+    drawn : Drawn, optional
+        The structure, for the page to show it deflected.
     yscale : {"linear", "log"}
         Scale of the displacement axis of the diagram.
 
@@ -116,18 +126,30 @@ def write_results(
     exploration = found if isinstance(found, Exploration) else None
     diagram = found.diagram if isinstance(found, Exploration) else found
     with result_directory(directory, "run") as folder:
-        write_table(folder / "branches.csv", BRANCH_COLUMNS, branch_rows(diagram))
-        write_table(folder / "special_points.csv", SPECIAL_COLUMNS, special_rows(diagram))
-        write_table(folder / "ends.csv", END_COLUMNS, end_rows(diagram))
+        tables = tables_of(diagram)
+        for part, (columns, rows) in tables.items():
+            write_table(folder / FILES[part], columns, rows)
         save(found, folder / "branches.h5")
         if exploration is not None:
             write_table(folder / "coverage.csv", COVERAGE_COLUMNS, coverage_rows(exploration))
         save_diagram(diagram, folder, title=scene.title if scene else "", yscale=yscale)
-        text = json.dumps(summary(diagram), indent=1, allow_nan=False)
+        told = summary(diagram)
+        text = json.dumps(told, indent=1, allow_nan=False)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
         if scene is not None:
             (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
+        page = folder / "report.html"
+        write_page(diagram, page, tables, told, scene=scene, drawn=drawn, yscale=yscale)
     return Path(directory)
+
+
+def tables_of(diagram: Diagram) -> dict[str, Table]:
+    """The tables of points, special points and ends; normal forms of special points take time."""
+    return {
+        "points": (BRANCH_COLUMNS, list(branch_rows(diagram))),
+        "special_points": (SPECIAL_COLUMNS, list(special_rows(diagram))),
+        "ends": (END_COLUMNS, list(end_rows(diagram))),
+    }
 
 
 def branch_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 import cms
@@ -40,6 +41,38 @@ def build_any(scene: Scene) -> AnyComponent:
         As `build_component` and `build_matrices`.
     """
     return build_component(scene) if scene.matrices is None else build_matrices(scene)
+
+
+@dataclass(frozen=True)
+class Structure:
+    """The structure of a scene: its component, and what this is reduced to.
+
+    Parameters
+    ----------
+    component : fem.Component, fem.StructureComponent or cms.Matrices, optional
+        None where the scene gives modes, or matrices that are not reduced.
+    reduced : cms.ReducedModel, optional
+        None with it.
+    """
+
+    component: AnyComponent | None = None
+    reduced: cms.ReducedModel | None = None
+
+
+def build_structure(scene: Scene, progress: Progress | None = None) -> Structure:
+    """Build the component of a scene and reduce it, as `build_any` and `build_reduced` do.
+
+    Examples
+    --------
+    >>> from nldyn.base.resources import example
+    >>> from nldyn.scene.read import load_scene
+    >>> build_structure(load_scene(example("one_dof.toml")))
+    Structure(component=None, reduced=None)
+    """
+    if scene.reduction is None:
+        return Structure()
+    component = build_any(scene)
+    return Structure(component, build_reduced(scene, component, progress))
 
 
 def build_reduced(

@@ -10,7 +10,7 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.options import FlowOptions
 from nldyn.io.checkpoint import CheckpointFile
 from nldyn.runtime.progress import Progress, Shares, silent
-from nldyn.scene.build import build_reduced, build_system
+from nldyn.scene.build import Structure, build_structure, build_system
 from nldyn.scene.checks import check_computable, range_remark
 from nldyn.scene.faults import told_as
 from nldyn.scene.messages import scene_error
@@ -27,6 +27,7 @@ def compute(
     progress: Progress | None = None,
     checkpoint: CheckpointFile | None = None,
     jobs: int = 1,
+    structure: Structure | None = None,
 ) -> Diagram:
     """Compute all branches that a scene asks for.
 
@@ -42,6 +43,8 @@ def compute(
         File that keeps what is computed, see `nldyn.diagram`.
     jobs : int
         Processes that share the work, see `nldyn.diagram`.
+    structure : Structure, optional
+        What `structure_of` gave for this scene, if it is at hand.
 
     Returns
     -------
@@ -74,9 +77,11 @@ def compute(
     1
     """
     if scene.explore is not None:
-        return explore_scene(scene, progress, checkpoint, jobs).diagram
-    shares = _shares(scene, progress)
-    flow, table = _to_follow(scene, shares)
+        return explore_scene(scene, progress, checkpoint, jobs, structure).diagram
+    shares = parts_of_work(scene, progress, built=structure is not None)
+    structure = structure or structure_of(scene, shares.part("model"))
+    shares.end("model")
+    flow, table = _to_follow(scene, structure)
 
     with told_as(scene, ("continuation",), SystemModelError):
         found = diagram(
@@ -99,6 +104,7 @@ def explore_scene(
     progress: Progress | None = None,
     checkpoint: CheckpointFile | None = None,
     jobs: int = 1,
+    structure: Structure | None = None,
 ) -> Exploration:
     """Find the branches of a scene with an ``[explore]`` table, and tell how well it was searched.
 
@@ -106,7 +112,7 @@ def explore_scene(
     ----------
     scene : Scene
         A scene with an ``[[excitation]]``, a ``[continuation]`` and an ``[explore]``.
-    progress, checkpoint, jobs
+    progress, checkpoint, jobs, structure
         As for `nldyn.explore`.
 
     Returns
@@ -140,8 +146,10 @@ def explore_scene(
     >>> explore_scene(scene).settled_share
     1.0
     """
-    shares = _shares(scene, progress)
-    flow, table = _to_follow(scene, shares)
+    shares = parts_of_work(scene, progress, built=structure is not None)
+    structure = structure or structure_of(scene, shares.part("model"))
+    shares.end("model")
+    flow, table = _to_follow(scene, structure)
 
     if scene.explore is None:
         raise scene_error(scene.file, ("explore",), "is missing")
@@ -160,25 +168,32 @@ def explore_scene(
     return replace(found, diagram=_remarked(scene, flow, found.diagram))
 
 
-def _to_follow(scene: Scene, shares: Shares) -> tuple[FlowMap, ContinuationTable]:
-    """Flow map of a scene that says what to compute."""
-    check_computable(scene, scene.file)
-    model = None
-    if scene.reduction is not None:
-        model = build_reduced(scene, progress=shares.part("model"))
-    system = build_system(scene, model)
-    shares.end("model")
+def structure_of(scene: Scene, progress: Progress | None = None) -> Structure:
+    """Build the structure of a scene that says what to compute, after a check of the whole scene.
 
+    Raises
+    ------
+    SceneError
+        As for `compute`.
+    """
+    check_computable(scene, scene.file)
+    return build_structure(scene, progress)
+
+
+def parts_of_work(scene: Scene, progress: Progress | None, *, built: bool = False) -> Shares:
+    """The parts ``model`` and ``branches``: to choose modes by a tolerance takes a while."""
+    chosen = scene.reduction is not None and scene.reduction.tolerance is not None
+    weight = CHOICE if chosen and not built else 0.0
+    return Shares(progress or silent, {"model": weight, "branches": 1.0})
+
+
+def _to_follow(scene: Scene, structure: Structure) -> tuple[FlowMap, ContinuationTable]:
+    """Flow map of a scene that says what to compute."""
+    system = build_system(scene, structure.reduced)
     table = scene.continuation
     assert table is not None
     with told_as(scene, ("continuation",), SystemModelError):
         return FlowMap(system, FlowOptions(table.rtol)), table
-
-
-def _shares(scene: Scene, progress: Progress | None) -> Shares:
-    """The parts of a computation: to choose modes takes a while if a tolerance is given."""
-    chosen = scene.reduction is not None and scene.reduction.tolerance is not None
-    return Shares(progress or silent, {"model": CHOICE if chosen else 0.0, "branches": 1.0})
 
 
 def _remarked(scene: Scene, flow: FlowMap, found: Diagram) -> Diagram:

@@ -137,7 +137,7 @@ def test_results_go_nowhere_but_into_the_folder_asked_for(tmp_path, monkeypatch)
     assert refusal(result) is None
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out", "scene.toml"]
     known = {"branches.csv", "special_points.csv", "ends.csv", "branches.h5", "diagram.png",
-             "diagram.svg", "summary.json", "scene.toml", ".nldyn.json"}  # fmt: skip
+             "diagram.svg", "report.html", "summary.json", "scene.toml", ".nldyn.json"}  # fmt: skip
     assert {entry.name for entry in (tmp_path / "out").iterdir()} == known
 
 

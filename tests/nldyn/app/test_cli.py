@@ -30,7 +30,7 @@ def invoke(*arguments):
 def computed(monkeypatch):
     """Let every scene give the same ready diagram."""
 
-    def compute(scene, progress, checkpoint, jobs):
+    def compute(scene, progress, checkpoint, jobs, structure):
         progress("harmonic branch", 25.3, 0.5)
         return replace(diagram(), notes=("no 1/5 orbit found near 62.2 Hz",))
 

@@ -21,6 +21,7 @@ FILES = {
     "diagram.png",
     "diagram.svg",
     "summary.json",
+    "report.html",
 }
 
 

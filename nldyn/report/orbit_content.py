@@ -1,0 +1,232 @@
+"""Which orbits a page shows, and what of each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fem.page import packed
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError
+from nldyn.branches.branch import Branch
+from nldyn.orbits.harmonics import harmonics
+from nldyn.orbits.orbit import Orbit
+from nldyn.plot.diagram import MARKER_NAMES, period_name, stop_places
+from nldyn.plot.orbit import FLOOR, contact_forces, drawn_phases, motion_at, stop_name
+
+MOST_ORBITS = 120
+SPECIAL_SHARE = 2 / 3  # of them, at most, are those at special points
+STEPS = 300  # equal steps of a time history in each period of the excitation
+MOST_SAMPLES = 1500
+SHOWN_INSTANTS = 36  # of a period, at which the structure is shown deflected
+
+
+@dataclass(frozen=True, eq=False)
+class ChosenOrbit:
+    """An orbit of a diagram to be shown.
+
+    Parameters
+    ----------
+    branch : int
+        Number of its branch.
+    place : float
+        Number of the point of the branch; between two points for a special point.
+    name : str
+        What it is: ``point 12``, or the kind of special point.
+    orbit : Orbit
+        The orbit.
+    special : int
+        Number of the special point among those of the branch; -1 for a point.
+    """
+
+    branch: int
+    place: float
+    name: str
+    orbit: Orbit
+    special: int = -1
+
+
+def chosen_orbits(
+    branches: Sequence[Branch], heights: Sequence[Sequence[float]], most: int = MOST_ORBITS
+) -> list[ChosenOrbit]:
+    """Choose orbits to show: at special points, at the highest points, and evenly spaced ones.
+
+    Parameters
+    ----------
+    branches : sequence of Branch
+        With their special points.
+    heights : sequence of sequence of float
+        The largest displacements of the points of each branch.
+    most : int
+        About how many; every branch has at least its highest point, whatever this is.
+
+    Returns
+    -------
+    list of ChosenOrbit
+        In order along the branches. Where there are more special points than two thirds of `most`,
+        evenly spaced ones are taken.
+
+    Examples
+    --------
+    >>> from nldyn import System, Unbalance, continue_branch, solve_orbit
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> branch = continue_branch(solve_orbit(system, frequency_hz=10.0), (9.0, 12.0))
+    >>> found = chosen_orbits([branch], [branch.max_abs_displacement], most=5)
+    >>> found[0].name, found[-1].place == len(branch.points) - 1
+    ('point 0', True)
+    """
+    special = [
+        _at_special(branch, number, index)
+        for number, branch in enumerate(branches)
+        for index in range(len(branch.special_points))
+    ]
+    special = [special[i] for i in even(len(special), int(SPECIAL_SHARE * most))]
+    share = (most - len(special)) / max(sum(len(branch.points) for branch in branches), 1)
+    points = [
+        ChosenOrbit(number, float(i), f"point {i}", branch.points[i])
+        for number, (branch, y) in enumerate(zip(branches, heights, strict=True))
+        for i in sorted({int(np.argmax(y)), *even(len(y), int(share * len(y)))})
+    ]
+    return sorted([*special, *points], key=lambda chosen: (chosen.branch, chosen.place))
+
+
+def even(count: int, most: int) -> list[int]:
+    """At most so many of ``range(count)``, evenly spaced, the first and the last among them.
+
+    Examples
+    --------
+    >>> even(9, 3), even(2, 5), even(9, 0)
+    ([0, 4, 8], [0, 1], [])
+    """
+    number = max(0, min(count, most))
+    return sorted(set(np.linspace(0, count - 1, number).round().astype(int).tolist()))
+
+
+def _at_special(branch: Branch, number: int, index: int) -> ChosenOrbit:
+    special = branch.special_points[index]
+    lengths = [node.arclength for node in branch.nodes]
+    after = int(np.searchsorted(lengths, special.point.arclength))
+    name = f"{MARKER_NAMES[special.kind]} ({special.kind})"
+    return ChosenOrbit(number, after - 0.5, name, special.orbit, index)
+
+
+def orbit_content(chosen: ChosenOrbit) -> dict[str, Any]:
+    """What a page shows of an orbit, ready for JSON; arrays are packed as 32-bit numbers.
+
+    In SI units. What cannot be computed is told under ``fault``, and then the rest is missing.
+    """
+    orbit = chosen.orbit
+    told = {
+        "branch": chosen.branch,
+        "place": chosen.place,
+        "special": chosen.special,
+        "name": chosen.name,
+        "period": orbit.period,
+        "hz": float(orbit.frequency_hz),
+        "y": float(orbit.max_abs_displacement),
+        "title": f"{orbit.stability.verdict} {period_name(orbit.period)} orbit "
+        f"at {orbit.frequency_hz:.7g} Hz",
+    }
+    try:
+        return {**told, **_motion(orbit), **_spectrum(orbit), **_figures(orbit)}
+    except ConvergenceError as error:
+        return {**told, "fault": str(error)}
+
+
+def _motion(orbit: Orbit) -> dict[str, Any]:
+    """Displacement, velocity and contact forces over a period, and all impacts."""
+    phases = drawn_phases(orbit, min(STEPS * orbit.period, MOST_SAMPLES // 2))
+    phases = phases[even(phases.size, MOST_SAMPLES)]
+    states = drawn_states(orbit, phases)
+    y, speed = (part @ orbit.system.participation[orbit.observe] for part in halves(states))
+    start = motion_at(orbit, orbit.observe, 2.0 * math.pi * np.arange(orbit.period, dtype=float))
+    return {
+        "time": floats(phases / orbit.omega),
+        "displacement": floats(y),
+        "velocity": floats(speed),
+        "forces": [floats(force) for force in contact_forces(orbit.system, states)],
+        "strobe": [value.tolist() for value in start],
+        "impacts": [[hit.time, hit.stop, hit.penetration, hit.force] for hit in orbit.impact_list],
+    }
+
+
+def drawn_states(orbit: Orbit, phases: Real) -> Real:
+    """Modal states (k, 2n) at ascending phases (k,) of one period, exact enough to be drawn."""
+    return orbit.problem.flow.to_modal(orbit.trajectory.recorded_states(phases))
+
+
+def halves(states: Real) -> tuple[Real, Real]:
+    """Modal displacements and velocities, (k, n) each."""
+    n = states.shape[1] // 2
+    return states[:, :n], states[:, n:]
+
+
+def _spectrum(orbit: Orbit) -> dict[str, Any]:
+    """Amplitudes at multiples of the orbit's frequency, those above the floor."""
+    lines = harmonics(orbit)
+    shown = np.flatnonzero(lines.amplitude > FLOOR * lines.amplitude.max())
+    return {
+        "lines": shown.tolist(),
+        "amplitudes": [float(f"{value:.6g}") for value in lines.amplitude[shown]],
+    }
+
+
+def _figures(orbit: Orbit) -> dict[str, Any]:
+    """Multipliers and the errors that are claimed."""
+    moduli = orbit.log_moduli
+    return {
+        "multipliers": [[value.real, value.imag] for value in orbit.multipliers.tolist()],
+        "log_moduli": [known(value) for value in moduli],
+        "uncertainties": [known(value) for value in orbit.log_modulus_uncertainties],
+        "error": known(orbit.error),
+        "liouville_error": known(orbit.liouville_error),
+        "flow_error": [known(orbit.flow_error.state), known(orbit.flow_error.monodromy)],
+    }
+
+
+def modal_motion(orbit: Orbit) -> tuple[Real, Real]:
+    """Instants (k,) in s and modal displacements (k, n): the deepest contact, then a period.
+
+    Without a contact the largest observed displacement comes first.
+    """
+    deepest = max(orbit.impact_list, key=lambda hit: hit.penetration, default=None)
+    if deepest is not None:
+        phase = orbit.omega * deepest.time
+    else:
+        extremes = orbit.observed_extremes
+        largest = np.argmax(np.abs(extremes.values)) if extremes.values.size else None
+        phase = 0.0 if largest is None else float(extremes.phases[largest])
+    steps = np.linspace(0.0, 2.0 * math.pi * orbit.period, SHOWN_INSTANTS, endpoint=False)
+    states = np.vstack([orbit.states(np.array([phase])), drawn_states(orbit, steps)])
+    return np.concatenate([[phase], steps]) / orbit.omega, halves(states)[0]
+
+
+def stops_of(orbit: Orbit) -> dict[str, Any]:
+    """The stops' names, and the displacements at which the observed interface meets some."""
+    system = orbit.system
+    return {
+        "names": [stop_name(system, index) for index in range(len(system.stops))],
+        "places": stop_places(system, orbit.observe),
+    }
+
+
+def known(value: float) -> float | None:
+    """A number for JSON, to six digits; None where it is nan or infinite.
+
+    Examples
+    --------
+    >>> known(1 / 3), known(math.inf)
+    (0.333333, None)
+    """
+    return float(f"{value:.6g}") if math.isfinite(value) else None
+
+
+def floats(values: npt.ArrayLike) -> str:
+    """Numbers as 32-bit ones in base64."""
+    return packed(np.asarray(values), np.float32)

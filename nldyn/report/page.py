@@ -1,0 +1,497 @@
+"""The report: one page for a browser with the diagram, its orbits, tables, scene and errors."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import html
+import json
+import platform
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, cast
+
+import numpy as np
+import numpy.typing as npt
+from plotly.offline import get_plotlyjs
+
+from nldyn.base.version import software_version
+from nldyn.branches.branch import Branch
+from nldyn.plot.diagram import (
+    MARKER_NAMES,
+    branch_curve,
+    length_unit,
+    orbit_text,
+    period_colours,
+    period_name,
+    stability_runs,
+)
+from nldyn.report.deflection import surface_content
+from nldyn.report.orbit_content import (
+    ChosenOrbit,
+    chosen_orbits,
+    even,
+    floats,
+    known,
+    modal_motion,
+    orbit_content,
+    stops_of,
+)
+from nldyn.search.diagram import Diagram
+
+if TYPE_CHECKING:
+    import cms
+    from fem.render import AnyComponent
+    from nldyn.orbits.orbit import Orbit
+    from nldyn.scene.schema import Scene
+
+TEMPLATE = Path(__file__).with_name("page.html")
+MOST_POINTS = 10_000  # of all branches together that are drawn and listed
+LINE = 62  # letters in a line of what is shown at the pointer
+PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "plotly")
+
+Table = tuple[Sequence[str], Sequence[Sequence[object]]]
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A structure that can be shown deflected.
+
+    Parameters
+    ----------
+    component : fem.Component or fem.StructureComponent
+        Of a mesh.
+    reduced : cms.ReducedModel
+        What it was reduced to: the modal coordinates are those of the orbits.
+    mirror : str, optional
+        A point on a plane of symmetry, to draw half a frame whole.
+    """
+
+    component: AnyComponent
+    reduced: cms.ReducedModel
+    mirror: str | None = None
+
+
+def write_page(
+    diagram: Diagram,
+    path: Path,
+    tables: Mapping[str, Table],
+    summary: Mapping[str, Any],
+    *,
+    scene: Scene | None = None,
+    drawn: Drawn | None = None,
+    notes: Iterable[str] = (),
+    yscale: Literal["linear", "log"] = "linear",
+) -> None:
+    """Write one HTML file that shows a diagram and its orbits in a browser, without a network.
+
+    Parameters
+    ----------
+    diagram : Diagram
+        What to show.
+    path : Path
+        The file.
+    tables : dict of str to (columns, rows)
+        ``points``, ``special_points`` and ``ends`` of the branches, as `write_results` writes them.
+    summary : dict
+        What `nldyn.report.results.summary` says of the diagram.
+    scene : Scene, optional
+        Its text and its title are shown.
+    drawn : Drawn, optional
+        The structure, if there is one to be shown deflected.
+    notes : iterable of str
+        What is to be said beside the notes of the diagram.
+    yscale : {"linear", "log"}
+        Scale of the displacement axis at first.
+    """
+    content = page_content(diagram, tables, summary, scene, drawn, notes, yscale)
+    template = TEMPLATE.read_text(encoding="utf-8")
+    before, rest = template.replace("__TITLE__", html.escape(content["title"])).split("__PLOTLY__")
+    between, after = rest.split("__DATA__")
+    script = get_plotlyjs().replace("</script", "<\\/script")
+    path.write_text("".join([before, script, between, packed(content), after]), encoding="utf-8")
+
+
+def packed(content: Mapping[str, Any]) -> str:
+    """The content of a page as JSON, compressed by gzip, in base64; the same on every run."""
+    text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return base64.b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode("ascii")
+
+
+def unpacked(page: str) -> dict[str, Any]:
+    """The content of a page that `write_page` wrote, from its text.
+
+    Examples
+    --------
+    >>> unpacked('<script id="data" type="text/plain">' + packed({"unit": "mm"}) + "</script>")
+    {'unit': 'mm'}
+    """
+    data = page.split('<script id="data" type="text/plain">')[1].split("<")[0]
+    found: dict[str, Any] = json.loads(gzip.decompress(base64.b64decode(data)))
+    return found
+
+
+def page_content(
+    diagram: Diagram,
+    tables: Mapping[str, Table],
+    summary: Mapping[str, Any],
+    scene: Scene | None = None,
+    drawn: Drawn | None = None,
+    notes: Iterable[str] = (),
+    yscale: Literal["linear", "log"] = "linear",
+) -> dict[str, Any]:
+    """What the page shows, ready for JSON; the parameters are those of `write_page`."""
+    branches = diagram.branches
+    told = told_branches(diagram, tables)
+    heights = [[node.orbit.max_abs_displacement for node in branch.nodes] for branch in told]
+    factor, unit = length_unit(max((max(y) for y in heights), default=1.0))
+    chosen = chosen_orbits(branches, heights)
+    kept = kept_points(branches)
+    notes = [*notes, *dict.fromkeys(diagram.notes), *limits(diagram, chosen, kept)]
+    orbits = [orbit_content(each) for each in chosen]
+    content: dict[str, Any] = {
+        "title": (scene.title if scene else "") or "Bifurcation diagram",
+        "range_hz": list(diagram.range_hz),
+        "observe": diagram.observe,
+        "factor": factor,
+        "unit": unit,
+        "yscale": yscale,
+        "notes": notes,
+        "branches": drawn_branches(told, kept, factor, unit),
+        "special": special_marks(told, factor, unit),
+        "kinds": MARKER_NAMES,
+        "stops": stops_of(branches[0].points[0]) if branches else {"names": [], "places": []},
+        "orbits": orbits,
+        "tables": {
+            "special points": as_table(tables["special_points"]),
+            "branches": branch_table(branches, tables),
+            "points": as_table(kept_rows(tables["points"], branches, kept)),
+        },
+        "errors": error_table(diagram, tables, summary, orbits),
+        "versions": [["nldyn", software_version()], *versions()],
+        "system": repr(branches[0].points[0].system) if branches else "",
+        "scene": scene.text if scene else "",
+    }
+    if drawn is not None:
+        content["surface"] = surface_content(drawn.component, drawn.reduced, drawn.mirror)
+        for shown, each in zip(orbits, chosen, strict=True):
+            if "fault" not in shown:
+                time, modal = modal_motion(each.orbit)
+                shown |= {"shown_time": floats(time), "modal": floats(modal)}
+    return content
+
+
+@dataclass(frozen=True)
+class ToldOrbit:
+    """What the tables tell of an orbit, as far as it is drawn."""
+
+    frequency_hz: float
+    max_abs_displacement: float
+    impacts: int
+    stable: bool = False
+    largest_multiplier: float = 0.0
+
+
+@dataclass(frozen=True)
+class ToldPoint:
+    """Where an orbit lies along its branch."""
+
+    orbit: ToldOrbit
+    arclength: float
+
+
+@dataclass(frozen=True)
+class ToldSpecial:
+    """A special point, and what it means."""
+
+    kind: str
+    point: ToldPoint
+    meaning: str
+
+    @property
+    def orbit(self) -> ToldOrbit:
+        """The orbit."""
+        return self.point.orbit
+
+
+@dataclass(frozen=True)
+class ToldBranch:
+    """A branch as the tables tell it: its orbits need not be computed again."""
+
+    name: str
+    period: int
+    nodes: list[ToldPoint]
+    special_points: list[ToldSpecial]
+
+
+def told_branches(diagram: Diagram, tables: Mapping[str, Table]) -> list[ToldBranch]:
+    """The branches of a diagram, with the numbers of its tables."""
+    points, special = records(tables["points"]), records(tables["special_points"])
+    found = []
+    for branch in diagram.branches:
+        nodes = [
+            ToldPoint(
+                ToldOrbit(
+                    row["frequency_hz"],
+                    row["max_abs_displacement_m"],
+                    row["impacts"],
+                    bool(row["stable"]),
+                    row["largest_multiplier"],
+                ),
+                node.arclength,
+            )
+            for node, row in zip(branch.nodes, points, strict=False)
+        ]
+        marks = [
+            ToldSpecial(
+                str(row["type"]),
+                ToldPoint(
+                    ToldOrbit(row["frequency_hz"], row["max_abs_displacement_m"], row["impacts"]),
+                    each.point.arclength,
+                ),
+                str(row["meaning"]),
+            )
+            for each, row in zip(branch.special_points, special, strict=False)
+        ]
+        name = branch.name or period_name(branch.period)
+        found.append(ToldBranch(name, branch.period, nodes, marks))
+    return found
+
+
+def records(table: Table) -> Iterator[dict[str, Any]]:
+    """The rows of a table by the names of its columns."""
+    columns, rows = table
+    return (dict(zip(columns, row, strict=True)) for row in rows)
+
+
+def kept_points(branches: Sequence[Branch]) -> list[list[int]]:
+    """Numbers of the points of each branch that are drawn: all, or evenly spaced ones."""
+    counts = [len(branch.points) for branch in branches]
+    share = min(1.0, MOST_POINTS / max(sum(counts), 1))
+    return [even(count, max(2, int(share * count))) for count in counts]
+
+
+def limits(
+    diagram: Diagram, chosen: Sequence[ChosenOrbit], kept: Sequence[Sequence[int]]
+) -> list[str]:
+    """Say what the page does not hold."""
+    special = sum(len(branch.special_points) for branch in diagram.branches)
+    points = sum(len(branch.points) for branch in diagram.branches)
+    shown = sum(each.special >= 0 for each in chosen)
+    said = [
+        f"{len(chosen)} orbits can be looked at: those of {shown} of {special} special points and "
+        f"of {len(chosen) - shown} of {points} points, evenly spaced (the dots)."
+    ]
+    drawn = sum(map(len, kept))
+    if drawn < points:
+        said.append(
+            f"The diagram is thinned: it shows {drawn} of {points} points; branches.csv has all."
+        )
+    return said
+
+
+def drawn_branches(
+    branches: Sequence[ToldBranch], kept: Sequence[Sequence[int]], factor: float, unit: str
+) -> list[dict[str, Any]]:
+    """Lines and points of the branches; displacements in units of ``factor`` metres."""
+    colours = period_colours(branch.period for branch in branches)
+    found = []
+    for branch, numbers in zip(branches, kept, strict=True):
+        hz, y, stable = branch_curve(cast("Branch", branch))
+        step = -(-len(branch.nodes) // max(len(numbers), 1))
+        orbits = [branch.nodes[i].orbit for i in numbers]
+        runs = [
+            {
+                "stable": run.stable,
+                "x": rounded(thinned(hz[run.start : run.stop], step)),
+                "y": rounded(thinned(y[run.start : run.stop], step) / factor),
+            }
+            for run in stability_runs(stable)
+        ]
+        found.append(
+            {
+                "name": branch.name,
+                "period": branch.period,
+                "period_name": period_name(branch.period),
+                "colour": colours[branch.period],
+                "runs": runs,
+                "numbers": list(numbers),
+                "x": rounded(orbit.frequency_hz for orbit in orbits),
+                "y": rounded(orbit.max_abs_displacement / factor for orbit in orbits),
+                "text": [
+                    orbit_text(cast("Orbit", orbit), factor, unit).replace("\n", "<br>")
+                    for orbit in orbits
+                ],
+            }
+        )
+    return found
+
+
+def special_marks(branches: Sequence[ToldBranch], factor: float, unit: str) -> list[dict[str, Any]]:
+    """Special points with what they mean, in the order of their table."""
+    return [
+        {
+            "branch": number,
+            "index": index,
+            "kind": special.kind,
+            "x": float(f"{special.orbit.frequency_hz:.9g}"),
+            "y": float(f"{special.orbit.max_abs_displacement / factor:.9g}"),
+            "sentence": special.meaning,
+            "text": "<br>".join(textwrap.wrap(html.escape(special.meaning), LINE)),
+        }
+        for number, branch in enumerate(branches)
+        for index, special in enumerate(branch.special_points)
+    ]
+
+
+def rounded(values: Iterable[float]) -> list[float]:
+    """Numbers for a drawing, to nine digits."""
+    return [float(f"{value:.9g}") for value in values]
+
+
+def thinned(values: np.ndarray[Any, Any], step: int) -> np.ndarray[Any, Any]:
+    """Every so-many-th number, and the last one.
+
+    Examples
+    --------
+    >>> thinned(np.arange(6.0), 2).tolist()
+    [0.0, 2.0, 4.0, 5.0]
+    """
+    return values if step == 1 else np.append(values[:-1:step], values[-1])
+
+
+def as_table(table: Table) -> dict[str, Any]:
+    """A table for JSON."""
+    columns, rows = table
+    return {"columns": list(columns), "rows": [list(map(plain, row)) for row in rows]}
+
+
+def plain(value: object) -> object:
+    """A cell for JSON: None, a text or a finite number, with all its digits."""
+    return value if value is None or isinstance(value, int | float) else str(value)
+
+
+def kept_rows(table: Table, branches: Sequence[Branch], kept: Sequence[Sequence[int]]) -> Table:
+    """The rows of the points that are drawn, of a table that has all points branch by branch."""
+    columns, rows = table
+    starts = np.cumsum([0, *(len(branch.points) for branch in branches)]).tolist()
+    wanted = [
+        rows[start + number]
+        for start, numbers in zip(starts, kept, strict=False)
+        for number in numbers
+    ]
+    return columns, wanted
+
+
+def branch_table(branches: Sequence[Branch], tables: Mapping[str, Table]) -> dict[str, Any]:
+    """Branches, one a row: where they go, why they end, and the largest errors along them."""
+    columns = (
+        "branch", "period", "points", "special_points", "lowest_hz", "highest_hz",
+        "max_abs_displacement_m", "stable_points", "largest_relative_error",
+        "largest_liouville_error", "largest_uncertainty", "first_end", "last_end",
+    )  # fmt: skip
+    points, ends = records(tables["points"]), records(tables["ends"])
+    rows = []
+    for branch in branches:
+        told = [next(points) for _ in branch.points]
+        hz = [row["frequency_hz"] for row in told]
+        rows.append(
+            [
+                branch.name,
+                branch.period,
+                len(told),
+                len(branch.special_points),
+                min(hz),
+                max(hz),
+                max(row["max_abs_displacement_m"] for row in told),
+                sum(int(row["stable"]) for row in told),
+                largest([orbit.error for orbit in branch.points]),
+                largest([row["liouville_error"] for row in told]),
+                largest([row["relative_uncertainty"] for row in told]),
+                *(str(next(ends)["reason"]) for _ in range(2)),
+            ]
+        )
+    return {"columns": list(columns), "rows": rows}
+
+
+def error_table(
+    diagram: Diagram,
+    tables: Mapping[str, Table],
+    summary: Mapping[str, Any],
+    orbits: Sequence[Mapping[str, Any]],
+) -> list[list[object]]:
+    """The tolerance and the errors that are claimed: what, how large, how it is known."""
+    branches = diagram.branches
+    if not branches:
+        return []
+    special = [each for branch in branches for each in branch.special_points]
+    flow = np.array([each["flow_error"] for each in orbits if "flow_error" in each], dtype=float)
+    flow = flow.reshape(-1, 2)
+    return [
+        [
+            "tolerance of the flow map, relative (rtol)",
+            branches[0].points[0].problem.flow.options.rtol,
+            "asked for",
+        ],
+        [
+            "error of the orbits, relative",
+            summary["largest_relative_error"],
+            "the last step of Newton's method; the largest of all points",
+        ],
+        [
+            "error of the flow map, of states, relative",
+            largest(flow[:, 0]),
+            "compared with a finer flow map; the largest of the orbits shown",
+        ],
+        [
+            "error of the flow map, of monodromy matrices, relative",
+            largest(flow[:, 1]),
+            "compared with a finer flow map; the largest of the orbits shown",
+        ],
+        [
+            "error of Liouville's formula",
+            summary["largest_liouville_error"],
+            "an independent check of the determinant; the largest of all points",
+        ],
+        [
+            "uncertainty of ln |largest multiplier|",
+            largest([row["relative_uncertainty"] for row in records(tables["points"])]),
+            "estimated; the largest of all points",
+        ],
+        [
+            "points whose stability is undecided",
+            summary["stability_undecided"],
+            "the unit circle lies within the uncertainty",
+        ],
+        [
+            "error of the frequencies of special points, relative",
+            largest([each.frequency_error for each in special]),
+            "estimated; the largest of all",
+        ],
+    ]
+
+
+def largest(values: npt.ArrayLike) -> float | None:
+    """The largest of some numbers for JSON; None if there are none, or one is nan or infinite.
+
+    Examples
+    --------
+    >>> largest([1.0, 2.0]), largest([1.0, float("nan")]), largest([])
+    (2.0, None, None)
+    """
+    array = np.asarray(values, dtype=float)
+    return known(float(np.max(array))) if array.size else None
+
+
+def versions() -> list[list[str]]:
+    """The versions of what the numbers rest on."""
+    found = [["Python", platform.python_version()]]
+    for name in PACKAGES:
+        try:
+            found.append([name, version(name)])
+        except PackageNotFoundError:
+            continue
+    return found
