@@ -1,4 +1,4 @@
-"""The command line: ``nldyn run``, ``report``, ``check``, ``render``, ``converge``, ``paper``.
+"""The command line: ``nldyn new``, ``run``, ``report``, ``check`` and others; see ``--help``.
 
 Exit codes: 0 done, 2 something in the scene or on the command line is wrong, 3 a picture or an
 animation needs something that is not installed, 130 stopped with Ctrl-C.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 import time
+import tomllib
 import warnings
 from collections import Counter
 from collections.abc import Iterator
@@ -24,6 +25,7 @@ from nldyn.runtime.interruption import STOPPED, interrupted
 
 if TYPE_CHECKING:
     from nldyn.base.arrays import Real
+    from nldyn.scene.schema import Scene
     from nldyn.search.diagram import Diagram
     from nldyn.system.elements import Stop
     from nldyn.system.system import AnySpring, System
@@ -141,10 +143,17 @@ def main() -> None:
 @out_option
 @mesh_option
 @click.option("--log", is_flag=True, help="Draw the displacement on a logarithmic axis.")
+@click.option("--replace", is_flag=True, help="Replace results of another scene in DIR.")
 @quiet_option
 @jobs_option
 def run(
-    scene: Path, out: Path, mesh_folders: tuple[Path, ...], log: bool, quiet: bool, jobs: int
+    scene: Path,
+    out: Path,
+    mesh_folders: tuple[Path, ...],
+    log: bool,
+    replace: bool,
+    quiet: bool,
+    jobs: int,
 ) -> None:
     """Compute the branches of a scene, and write tables, a diagram and a report.
 
@@ -158,6 +167,8 @@ def run(
         start = time.perf_counter()
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)
+        if not replace:
+            check_same_scene(out, loaded)
         from nldyn.io.checkpoint import CheckpointFile
         from nldyn.report.again import drawn_of
         from nldyn.report.results import write_results
@@ -182,6 +193,43 @@ def run(
         if not diagram.branches:
             click.echo("nldyn: no periodic orbit was found; the tables are empty", err=True)
             sys.exit(NOTHING_FOUND)
+
+
+@main.command()
+@click.argument("name", required=False, metavar="[EXAMPLE]")
+@click.argument("directory", required=False, type=any_path, metavar="[DIR]")
+def new(name: str | None, directory: Path | None) -> None:
+    """Copy an example scene with its mesh to begin from; without a name, list them.
+
+    DIR is made if it does not exist; by default it has the name of the example.
+    """
+    with plain_errors():
+        from nldyn.base.resources import copy_example, example_titles
+
+        if name is None:
+            titles = example_titles()
+            width = max(map(len, titles))
+            click.echo("\n".join(f"{each:<{width}}  {title}" for each, title in titles.items()))
+            return
+        scene = copy_example(name, directory)
+        click.echo(f"written to {scene.parent}; go on with")
+        click.echo(f"nldyn run {scene} --out {scene.parent / 'results'}")
+
+
+@main.command()
+@quiet_option
+def warm(quiet: bool) -> None:
+    """Compile the kernels beforehand, which else the first run does: a minute or two."""
+    with plain_errors():
+        from nldyn.app.warm import warm as compile_all
+        from nldyn.runtime.progress import progress_line
+
+        with progress_line(quiet):
+            done = compile_all()
+    if done.seconds:
+        click.echo(f"compiled in {done.seconds:.0f} s; kept in {done.folder}")
+    else:
+        click.echo(f"the kernels are compiled already; they are kept in {done.folder}")
 
 
 @main.command()
@@ -431,6 +479,24 @@ def paper(out: Path, atlas: bool, jobs: int, quiet: bool) -> None:
         else:
             with told_what_is_kept(unfinished_folder(out), has_values):
                 nldyn.paper.main(out, jobs, quiet=quiet)
+
+
+def check_same_scene(out: Path, scene: Scene) -> None:
+    """Refuse a directory with the results of another scene: titles and comments do not count."""
+    from nldyn.runtime.result_directory import OutputError
+
+    def asked(text: str) -> dict[str, object]:
+        return {key: value for key, value in tomllib.loads(text).items() if key != "title"}
+
+    try:
+        before = asked((out / "scene.toml").read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError):
+        return
+    if before != asked(scene.text):
+        raise OutputError(
+            f"{out}: holds the results of a scene that says something else; choose another "
+            "directory, or replace them with --replace"
+        )
 
 
 def describe(diagram: Diagram, seconds: float, out: Path) -> str:

@@ -10,7 +10,10 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-COMPILING = "nldyn: compiling the kernels of the flow map (about 60 s, once)"
+COMPILING = (
+    "nldyn: compiling the kernels, once: one to two minutes of processor time "
+    "('nldyn warm' does it beforehand)"
+)
 
 
 class Compilations:

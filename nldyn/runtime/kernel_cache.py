@@ -20,7 +20,7 @@ from nldyn.runtime.compilation import compilations
 from nldyn.runtime.interruption import deferred_interruption
 
 ADVICE = (
-    "nldyn: no folder to keep compiled code in, so each start compiles for up to a minute; "
+    "nldyn: no folder to keep compiled code in, so each start compiles for a minute or two; "
     "set NUMBA_CACHE_DIR to a folder to write in"
 )
 
@@ -76,7 +76,7 @@ def _save_if_possible(cache: FunctionCache, signature: Any, data: Any) -> None:
             fault = (error.strerror or str(error)).lower()
             print(
                 f"nldyn: warning: compiled code cannot be kept in {folder}: {fault}; without it "
-                "each start compiles for up to a minute",
+                "each start compiles for a minute or two",
                 file=sys.stderr,
             )
             _told.add(folder)
