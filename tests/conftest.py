@@ -4,6 +4,11 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("gate", deadline=None, derandomize=True, max_examples=20)
+settings.register_profile("long", deadline=None, max_examples=500)
+settings.load_profile("gate")
 
 HERE = Path(__file__).parent
 
@@ -13,15 +18,17 @@ COMPILES = ("nldyn/orbits/test_multipliers.py",)
 SCENES = "nldyn/scene/test_scene_errors.py", "nldyn/scene/test_scene_documented.py"
 NEEDS_NO_KERNELS = ("cms", "fem", *SCENES)
 LONGEST = (
-    "nldyn/branches/test_close_branches.py",
-    "nldyn/search/test_exploration.py",
-    "nldyn/runtime/test_executors.py",
-    "nldyn/paper/test_paper_starts.py",
     "nldyn/search/test_homotopy.py",
+    "nldyn/search/test_exploration.py",
     "nldyn/curves/test_curves.py",
+    "nldyn/branches/test_close_branches.py",
     "faults/test_faults_machine.py",
+    "nldyn/runtime/test_executors.py",
     "nldyn/io/test_resume.py",
     "nldyn/flow/test_contacts.py",
+    "nldyn/longterm/test_longterm.py",
+    "hard/test_hard_cases.py",
+    "nldyn/paper/test_paper_starts.py",
 )
 
 
@@ -52,7 +59,7 @@ def kernels(tmp_path_factory, worker_id):
 
             flock(file, LOCK_EX)  # until the file is closed
         system = System.from_modal(
-            [10.0], {"tip": [1.0]}, modal_damping=0.05, stops=[Stop("tip", 1e9)],
+            [10.0, 40.0], {"tip": [1.0, 0.5]}, modal_damping=0.05, stops=[Stop("tip", 1e9)],
             excitation=[Unbalance("tip", 1e-5)],
         )  # fmt: skip
         assert continue_branch(solve_orbit(system, 12.0), (11.9, 12.1)).points

@@ -1,7 +1,7 @@
 """Do the tests notice? Faults put into a copy of the program by hand, one at a time.
 
-``python tests/injected.py [NUMBER ...]`` tells for each which test notices it first. It takes ten
-minutes of processor time for all; the exit code is 1 if one is not noticed.
+``python tests/injected.py [NUMBER ...]`` tells for each which test notices it first. It takes
+twenty minutes of processor time for all; the exit code is 1 if one is not noticed.
 """
 
 from __future__ import annotations
@@ -41,8 +41,9 @@ FAULTS = [
     Fault(
         "contacts of the last of several stops are missed",
         "nldyn/flow/kernels/contact.py",
-        "    for s in range(closed.size):\n        noise = output_noise(fl, s, w)",
-        "    for s in range(max(1, closed.size - 1)):\n        noise = output_noise(fl, s, w)",
+        "    for s in range(closed.size):\n        if is_bond(fl, s):\n            position += 1",
+        "    for s in range(max(1, closed.size - 1)):\n        if is_bond(fl, s):\n"
+        "            position += 1",
         "nldyn/flow/test_contacts.py",
     ),
     Fault(
@@ -142,6 +143,71 @@ FAULTS = [
         "self._beside(runs, known, BESIDE_PASSING)",
         "pass",
         "nldyn/search/test_exploration.py",
+    ),
+    Fault(
+        "wedges of a file are left out",
+        "fem/read.py",
+        "        blocks = cells.setdefault(block.type, [])",
+        '        if block.type == "wedge":\n            continue\n'
+        "        blocks = cells.setdefault(block.type, [])",
+        "fem/test_fem_cell_orders.py",
+    ),
+    Fault(
+        "a point mass of a frame is half as heavy in y",
+        "fem/frame.py",
+        "(lump.mass, lump.mass, about_z)",
+        "(lump.mass, 0.5 * lump.mass, about_z)",
+        "fem/test_fem_structures.py",
+    ),
+    Fault(
+        "Hertz's law has the exponent 1.4",
+        "nldyn/system/contact_law.py",
+        "    slope = stiffness\n    if exponent == 1.5:",
+        "    slope = stiffness\n    exponent = 1.4 if exponent == 1.5 else exponent\n"
+        "    if exponent == 1.5:",
+        "nldyn/flow/test_contacts.py",
+    ),
+    Fault(
+        "modal damping is half of what is asked for",
+        "nldyn/system/system.py",
+        "np.diag(2.0 * zeta * omega)",
+        "np.diag(zeta * omega)",
+        "nldyn/system",
+    ),
+    Fault(
+        "harmonics have the opposite phase",
+        "nldyn/orbits/harmonics.py",
+        "phasor = np.fft.rfft(displacement)[",
+        "phasor = np.conj(np.fft.rfft(displacement))[",
+        "nldyn/orbits/test_harmonics.py",
+    ),
+    Fault(
+        "sensitivities do not jump where a dashpot begins to act",
+        "nldyn/flow/kernels/segments.py",
+        "        jump_columns(fl, stop, phase, t, closed[stop], columns)",
+        "        pass",
+        "nldyn/flow/test_dashpot.py",
+    ),
+    Fault(
+        "folds are told as flips, and flips as folds",
+        "nldyn/bifurcations/events.py",
+        "LP=float(point.tangent[-1]),\n            PD=flip_test(mu),",
+        "PD=float(point.tangent[-1]),\n            LP=flip_test(mu),",
+        "nldyn/branches/test_harmonic_branch.py",
+    ),
+    Fault(
+        "a checkpoint loses the last branch",
+        "nldyn/branches/checkpoint.py",
+        "[*held, *branches[known:]]",
+        "[*held, *branches[known:-1]]",
+        "nldyn/io/test_resume.py",
+    ),
+    Fault(
+        "the last interface or load vector has no residual mode",
+        "cms/residual.py",
+        "residual = without_modes(static, modes, pencil)\n    basis",
+        "residual = without_modes(static[:, :-1], modes, pencil)\n    basis",
+        "cms/test_cms_methods.py",
     ),
 ]
 

@@ -129,6 +129,7 @@ def test_folder_that_holds_something_else_is_refused_before_measuring(tmp_path, 
         run.run(tmp_path)
 
 
+@pytest.mark.slow
 def test_results_of_a_benchmark_that_stops_are_not_left_half_written(tmp_path, monkeypatch):
     stub_measurements(monkeypatch)
     folder = tmp_path / "bench"

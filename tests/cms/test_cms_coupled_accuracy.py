@@ -77,13 +77,13 @@ def coupled(methods, seed, joints, held=True, modes=4):
 @pytest.mark.parametrize("joints", CASES.values(), ids=CASES)
 @pytest.mark.parametrize("methods", [(m, m) for m in METHODS] + [("rubin", "craig-bampton")])
 def test_every_frequency_and_receptance_lies_in_its_band(methods, joints):
-    for seed in range(4):
+    for seed in range(2):
         bands, (exact, receptance) = coupled(methods, seed, joints)
         count = 5
         found = bands.frequency_bands_hz(count)
         assert np.all(found[:, 0] * (1 - 1e-12) <= exact[:count])
         assert np.all(exact[:count] <= found[:, 1] * (1 + 1e-12))
-        for hz in np.linspace(0.3, 0.95, 7) * min(bands.next_hz, exact[5]):
+        for hz in np.linspace(0.3, 0.95, 4) * min(bands.next_hz, exact[5]):
             for pair in (("a.left", "a.left"), ("a.right", "b.right")):
                 low, high = bands.receptance_band(hz, *pair)[0]
                 true = receptance(hz, *pair)

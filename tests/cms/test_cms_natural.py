@@ -57,7 +57,7 @@ def plain(component):
     return cms.Matrices(component.stiffness, component.mass, component.interfaces)
 
 
-@pytest.mark.parametrize("count", [10, 100, 400, 1000])
+@pytest.mark.parametrize("count", [10, 1000])
 @pytest.mark.parametrize("held", [PINNED, GUIDED], ids=["pinned", "guided"])
 def test_frequencies_are_those_of_the_exact_matrices(count, held):
     reduced = cms.reduce(beam(count, held), modes=4)
@@ -74,7 +74,7 @@ def test_matrices_alone_lose_as_many_digits_as_their_condition_has():
 
 
 @pytest.mark.parametrize("method", ["rubin", "macneal", "craig-bampton", "guyan"])
-@pytest.mark.parametrize("count", [100, 1000])
+@pytest.mark.parametrize("count", [1000])
 def test_static_flexibility_is_that_of_the_beam(method, count):
     """Statics of beam elements are exact: L/(3EI)."""
     modes = {} if method == "guyan" else {"modes": 4}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import linalg
 
@@ -26,7 +26,6 @@ cases = st.tuples(st.integers(0, 10**6), st.integers(2, 25), st.integers(1, 4)).
 )
 
 
-@settings(max_examples=60, deadline=None)
 @given(cases)
 def test_projection_is_diagonal_and_above_the_full_frequencies(case):
     component, modes = case
@@ -42,7 +41,6 @@ def test_projection_is_diagonal_and_above_the_full_frequencies(case):
     np.testing.assert_allclose(squares[:modes], exact[:modes], rtol=1e-9)
 
 
-@settings(max_examples=60, deadline=None)
 @given(cases)
 def test_statics_between_all_interfaces_are_exact(case):
     component, modes = case
@@ -57,7 +55,6 @@ def test_statics_between_all_interfaces_are_exact(case):
             assert abs(error) <= 1e-10 * scale
 
 
-@settings(max_examples=40, deadline=None)
 @given(cases, st.lists(st.floats(-6, 6), min_size=4, max_size=4), st.floats(-6, 6))
 def test_units_of_interfaces_and_of_mass_do_not_matter(case, exponents, mass_exponent):
     component, modes = case
@@ -80,7 +77,6 @@ def test_units_of_interfaces_and_of_mass_do_not_matter(case, exponents, mass_exp
         )
 
 
-@settings(max_examples=30, deadline=None)
 @given(cases)
 def test_the_same_component_gives_the_same_model(case):
     component, modes = case

@@ -23,13 +23,14 @@ START = "from nldyn.app.command import main; main()"
 def test_two_processes_give_the_same_bytes(tmp_path):
     """With another order of sets and dictionaries, and other numbers of threads."""
     text = example("bilinear_modal.toml").read_text()
-    text = text.replace("[8.0, 30.0]", "[12.0, 16.0]\nsearch_points = 1\nrtol = 1e-7")
+    text = text.replace("[8.0, 30.0]", "[12.0, 13.0]\nsearch_points = 1\nrtol = 1e-7")
     scene = tmp_path / "scene.toml"
     scene.write_text(text.replace("max_step = 0.02", "max_step = 0.1"))
     for seed in ("1", "2"):
         threads = {f"{name}_NUM_THREADS": seed for name in ("OPENBLAS", "OMP", "NUMBA")}
         subprocess.run(
-            [sys.executable, "-c", START, "run", str(scene), "--out", str(tmp_path / seed)],
+            [sys.executable, "-c", START, "run", str(scene), "--out", str(tmp_path / seed),
+             "--jobs", "1"],
             check=True, timeout=300, capture_output=True,
             env={**os.environ, "PYTHONHASHSEED": seed, **threads},
         )  # fmt: skip

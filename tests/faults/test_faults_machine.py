@@ -61,7 +61,11 @@ def full(*_, **__):
 
 @pytest.mark.parametrize(
     ("module", "name"),
-    [(output, "write_table"), (output, "save_diagram"), (os, "fsync")],
+    [
+        (output, "write_table"),
+        pytest.param(output, "save_diagram", marks=pytest.mark.slow),
+        (os, "fsync"),
+    ],
 )
 def test_a_disk_that_is_full_at_the_end_keeps_what_was_computed(
     scene, whole, tmp_path, monkeypatch, module, name
@@ -193,7 +197,13 @@ STAGES = {
 }
 
 
-@pytest.mark.parametrize("stage", STAGES)
+@pytest.mark.parametrize(
+    "stage",
+    [
+        pytest.param(stage, marks=[pytest.mark.slow] * (stage in ("search", "picture")))
+        for stage in STAGES
+    ],
+)
 def test_ctrl_c_at_every_stage(scene, whole, tmp_path, monkeypatch, stage):
     place, name, call, kept = STAGES[stage]
     owner = sys.modules.get(place) or Stepper
@@ -232,30 +242,33 @@ def ticks_of_session(session):
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
-def test_ctrl_c_from_the_terminal(tmp_path):
+@pytest.mark.parametrize(
+    "seconds", [0.3, 2.0, *(pytest.param(more, marks=pytest.mark.slow) for more in (1.0, 4.0))]
+)
+def test_ctrl_c_from_the_terminal(tmp_path, seconds):
     """At any time from the first second of the process on, also within compiled code."""
     out = tmp_path / "out"
     scene = example("one_dof.toml")
     arguments = [sys.executable, "-c", START, "run", str(scene), "--out", str(out)]
-    for seconds in (0.3, 1.0, 2.0, 4.0):
-        child = subprocess.Popen(
-            arguments, stderr=subprocess.PIPE, text=True, start_new_session=True
-        )
-        wait_until_it_had(child, seconds)
-        os.killpg(child.pid, signal.SIGINT)
-        _, said = child.communicate(timeout=300.0)
-        if child.returncode == -signal.SIGINT:  # before Python has read the program
-            assert seconds < 1.0
-            continue
-        assert child.returncode == 130, said
-        assert said.splitlines()[-1].startswith("nldyn: stopped by Ctrl-C"), said
-        check_whole(out)
+    child = subprocess.Popen(arguments, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    wait_until_it_had(child, seconds)
+    os.killpg(child.pid, signal.SIGINT)
+    _, said = child.communicate(timeout=300.0)
+    if child.returncode == -signal.SIGINT:  # before Python has read the program
+        assert seconds < 1.0
+        return
+    assert child.returncode == 130, said
+    assert said.splitlines()[-1].startswith("nldyn: stopped by Ctrl-C"), said
+    check_whole(out)
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
 @pytest.mark.parametrize(
     "arguments",
-    [["hard", "--only", "continuation at low damping"], ["bench"]],
+    [
+        pytest.param(["hard", "--only", "continuation at low damping"], marks=pytest.mark.slow),
+        ["bench"],
+    ],
     ids=["hard", "bench"],
 )
 def test_ctrl_c_while_a_suite_is_computed(tmp_path, arguments):

@@ -14,8 +14,8 @@ from small_meshes import fuzz, write_meshes
 
 from nldyn.app.cli import main
 
-QUICK, FULL = 8, 150
-SOON = 4  # s of processor time
+QUICK, FULL = 4, 150
+SOON = 2  # s of processor time
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 

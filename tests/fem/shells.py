@@ -1,5 +1,7 @@
 """What the tests of shells share: curved meshes, loads, and published static benchmarks."""
 
+from functools import cache
+
 import numpy as np
 from scipy.sparse.linalg import spsolve
 from structures import CLAMP
@@ -61,6 +63,7 @@ def hemisphere(kind, n):
     return deflection(component, [(first, 0, 1.0), (last, 1, -1.0)], (first, 0))
 
 
+@cache
 def twisted_beam(kind, counts, thickness):
     """A strip of 12 by 1.1 twisted by 90 degrees: deflections along and across the width."""
 

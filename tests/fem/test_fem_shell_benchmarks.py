@@ -7,6 +7,7 @@ finite elements, Computer Methods in Applied Mechanics and Engineering 51 (1985)
 """
 
 import re
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -78,11 +79,16 @@ CASES = [
 ]
 
 
+@cache
+def computed(build, kind, n):
+    return build(kind, n)
+
+
 @pytest.mark.parametrize("kind", ["quad", "triangle"])
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case[0])
 def test_published_deflections_are_met(case, kind):
     _, build, meshes, published, tolerances = case
-    errors = np.abs([build(kind, n) / published - 1 for n in meshes])
+    errors = np.abs([computed(build, kind, n) / published - 1 for n in meshes])
     assert (errors < tolerances).all()
 
 
@@ -90,7 +96,8 @@ def rows():
     for name, build, meshes, published, _ in CASES:
         for n in meshes:
             cells = "{} x {}".format(*(n if isinstance(n, tuple) else (n, n)))
-            errors = [100 * (build(kind, n) / published - 1) for kind in ("quad", "triangle")]
+            found = [computed(build, kind, n) for kind in ("quad", "triangle")]
+            errors = [100 * (value / published - 1) for value in found]
             yield f"| {name} | {cells} | {published:g} | {errors[0]:+.1f} | {errors[1]:+.1f} |"
 
 

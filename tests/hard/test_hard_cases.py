@@ -23,6 +23,14 @@ LONG = (
     "folds of the harmonic branch, 1-DOF model",
     "three branches within 1e-6 of each other",
     "scene in mm, t and s, modal frequencies",
+    "scene in mm, t and s, special points from 25 to 40 Hz",
+    "gap at which two folds vanish in a cusp",
+    "forced free body between two stops",
+    "two frequencies 1e-09 apart",
+    *(
+        f"damper {distance} from a defective eigenproblem"
+        for distance in ("0.01", "1e-06", "1e-10")
+    ),
 )
 
 

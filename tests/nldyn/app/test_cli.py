@@ -111,9 +111,16 @@ def short_scene(folder):
     return scene
 
 
-def test_a_run_goes_on_after_ctrl_c(tmp_path, monkeypatch):
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The results of the short scene."""
+    folder = tmp_path_factory.mktemp("short")
+    assert invoke("run", short_scene(folder), "--out", folder / "whole", "--quiet").exit_code == 0
+    return folder / "whole"
+
+
+def test_a_run_goes_on_after_ctrl_c(whole, tmp_path, monkeypatch):
     scene, out = short_scene(tmp_path), tmp_path / "new" / "out"
-    assert invoke("run", scene, "--out", tmp_path / "whole", "--quiet").exit_code == 0
     advance = Stepper._advance
     steps = []
 
@@ -140,7 +147,7 @@ def test_a_run_goes_on_after_ctrl_c(tmp_path, monkeypatch):
     assert invoke("run", scene, "--out", out, *own).exit_code == 0
     assert [entry.name for entry in out.parent.iterdir()] == ["out"]
     for name in ("branches.csv", "special_points.csv", "branches.h5", "summary.json"):
-        assert (out / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+        assert (out / name).read_bytes() == (whole / name).read_bytes()
     (branch,) = load_diagram(out / "branches.h5").branches
     assert known > 20 and len(steps) < 1.5 * (len(branch.nodes) - known)
 
@@ -157,10 +164,17 @@ def explored_scene(folder, more=EXPLORE):
     return scene
 
 
-def test_a_scene_is_explored(tmp_path):
-    out = tmp_path / "out"
-    result = invoke("run", explored_scene(tmp_path), "--out", out, "--quiet")
+@pytest.fixture(scope="module")
+def explored(tmp_path_factory):
+    """What the exploration of the scene says, with the folder of its results."""
+    folder = tmp_path_factory.mktemp("explored")
+    result = invoke("run", explored_scene(folder), "--out", folder / "out", "--quiet")
     assert result.exit_code == 0, result.output
+    return result, folder / "out"
+
+
+def test_a_scene_is_explored(explored):
+    result, out = explored
     assert "simulations at 6 frequencies, 100.0 % ended on one of the branches" in result.stdout
     with (out / "coverage.csv").open() as file:
         rows = list(csv.DictReader(file))
@@ -171,9 +185,8 @@ def test_a_scene_is_explored(tmp_path):
     assert found.finished and len(found.coverage) == len(rows)
 
 
-def test_an_exploration_goes_on_after_ctrl_c(tmp_path, monkeypatch):
+def test_an_exploration_goes_on_after_ctrl_c(explored, tmp_path, monkeypatch):
     scene, out = explored_scene(tmp_path), tmp_path / "out"
-    assert invoke("run", scene, "--out", tmp_path / "whole", "--quiet").exit_code == 0
     step = survey._Survey.step
     steps = []
 
@@ -190,7 +203,7 @@ def test_an_exploration_goes_on_after_ctrl_c(tmp_path, monkeypatch):
     assert invoke("run", scene, "--out", out, "--quiet").exit_code == 0
     assert len(steps) == 5 + 12 - 4
     for name in ("branches.csv", "coverage.csv", "branches.h5", "summary.json"):
-        assert (out / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+        assert (out / name).read_bytes() == (explored[1] / name).read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -215,12 +228,11 @@ def test_places_to_look_at_are_refused_beside_explore(tmp_path):
     assert "continuation.search_points is of no use beside [explore]" in result.stderr
 
 
-def test_an_unfinished_run_of_another_scene_is_refused_and_kept(tmp_path):
+def test_an_unfinished_run_of_another_scene_is_refused_and_kept(whole, tmp_path):
     scene, out = short_scene(tmp_path), tmp_path / "out"
-    assert invoke("run", scene, "--out", tmp_path / "whole", "--quiet").exit_code == 0
     scene.write_text(scene.read_text().replace("4.92e-6", "4.93e-6"))
     unfinished = tmp_path / "out.unfinished.h5"
-    save_branches(unfinished, load_branches(tmp_path / "whole" / "branches.h5"))
+    save_branches(unfinished, load_branches(whole / "branches.h5"))
     before = unfinished.read_bytes()
     result = invoke("run", scene, "--out", out, "--quiet")
     assert result.exit_code == 2 and not out.exists()

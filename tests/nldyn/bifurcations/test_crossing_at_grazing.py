@@ -150,7 +150,7 @@ def test_grazing_and_branch_point_are_both_where_the_piecewise_solution_has_them
     oscillator = Bilinear(2.0 * DAMPING * natural, natural**2, STIFFNESS, GAP, force)
     whole = continue_branch(by_force.at("amplitude", force)[0], RANGE_HZ)
     exact = {}
-    for start in whole.points[:: len(whole.points) // 4]:
+    for start in whole.points[:: len(whole.points) // 2]:
         branch = continue_branch(start, RANGE_HZ)
         found = {special.kind: special for special in branch.special_points}
         assert sorted(special.kind for special in branch.special_points) == ["BP", "GR", "LP"]
@@ -168,7 +168,7 @@ def test_grazing_and_branch_point_are_both_where_the_piecewise_solution_has_them
 def test_a_grazing_point_beside_a_branch_point_is_found_once(by_force, force):
     """1e-7 to 6e-6 Hz before the touch, where both lie in steps of their own or in one."""
     whole = continue_branch(by_force.at("amplitude", force)[0], RANGE_HZ)
-    for start in whole.points[:: len(whole.points) // 6]:
+    for start in whole.points[:: len(whole.points) // 3]:
         branch = continue_branch(start, RANGE_HZ)
         assert sorted(special.kind for special in branch.special_points) == ["BP", "GR", "LP"]
 
@@ -182,7 +182,7 @@ def test_both_halves_of_a_broken_symmetry_have_the_same_points_beside_a_grazing(
     )  # fmt: skip
     start = solve_orbit(system, 7.9963, guess=np.array([5.8e-4, -2.9e-4]))
     whole = continue_branch(start, (7.964, 8.012))
-    for begun in whole.points[:: len(whole.points) // 4]:
+    for begun in whole.points[:: len(whole.points) // 2]:
         branch = continue_branch(begun, (7.964, 8.012))
         found = sorted((special.kind, special.frequency_hz) for special in branch.special_points)
         kinds, hz = zip(*found, strict=True)

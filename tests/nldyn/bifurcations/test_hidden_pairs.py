@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from hard.continuation import beam
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
@@ -43,7 +43,6 @@ def bubble(off, coupling, where, speed=0.4, angle=1.0):
     return at
 
 
-@settings(deadline=None, max_examples=40)
 @given(
     off=st.floats(1e-3, 0.015),
     above=st.floats(1.05, 1.5),
@@ -58,7 +57,6 @@ def test_pairs_that_meet_and_leave_the_circle_within_a_step_are_looked_at(off, a
     assert looked(family) is not None
 
 
-@settings(deadline=None, max_examples=40)
 @given(off=st.floats(0.01, 0.03), share=st.floats(0.0, 0.6), where=st.floats(0.1, 0.9))
 def test_pairs_that_meet_well_inside_are_not_looked_at(off, share, where):
     """Orbits are computed only where they may tell something."""

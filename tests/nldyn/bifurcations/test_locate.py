@@ -101,6 +101,7 @@ def test_a_function_without_numbers_has_no_root():
         root(lambda x: math.nan)
 
 
+@pytest.mark.slow
 def test_an_orbit_that_cannot_be_recorded_does_not_cost_the_branch():
     """Two preloaded linear stops just let go: rounding makes countless flights of it."""
     stops = [

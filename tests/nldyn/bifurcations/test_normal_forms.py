@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from problems import make_one_dof, torus_system
 
@@ -113,7 +113,6 @@ def test_torus_of_the_delayed_logistic_map():
     assert form.slope.value == pytest.approx(0.5, rel=1e-11)  # |μ|² = r - 1
 
 
-@settings(deadline=None, max_examples=25)
 @given(
     st.floats(0.3, 2.8), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0),
     st.floats(-1.0, 1.0), st.floats(-1.0, 1.0),

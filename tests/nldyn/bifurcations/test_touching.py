@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from independent import Motion, state_map
 from problems import make_one_dof
@@ -156,7 +156,6 @@ def motions(draw):
     ), draw(st.sampled_from([1e-1, 1e-3, 1e-5, 1e-7, 1e-9]))
 
 
-@settings(deadline=None, max_examples=120, derandomize=True)
 @given(motions())
 def test_no_contact_is_passed_over(drawn):
     """The stop stands just below the highest point of a dense sampling of one period.
@@ -262,6 +261,7 @@ def test_modes_that_cancel_at_a_stop_without_gap_leave_it_alone(apart):
     assert found.ends == pytest.approx(free.shoot(state, phases, OMEGA).ends, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_search_for_a_contact_ends_beside_a_decay_in_a_nanosecond():
     """Its shortest step would be lost in the rounding of the time."""
     modal = [20.0, 90.0], {"b": [0.5, 1.0]}

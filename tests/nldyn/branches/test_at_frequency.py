@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from problems import RANGE_HZ, make_one_dof
 
@@ -20,7 +20,6 @@ def monotone_pieces(branch):
     return [(hz[a], hz[b]) for a, b in pairwise(edges)]
 
 
-@settings(max_examples=40, deadline=None)
 @given(share=st.floats(0.001, 0.999))
 def test_every_piece_between_folds_gives_one_orbit(harmonic_branch, share):
     frequency = RANGE_HZ[0] * (RANGE_HZ[1] / RANGE_HZ[0]) ** share

@@ -109,7 +109,7 @@ def beside(fold, distance):
     return Orbit.of(problem, problem.correct(place, across * fold.point.tangent), "middle")
 
 
-@pytest.mark.parametrize("distance", [-1e-8, -1e-9, -1e-10, -1e-11, 0.0, 1e-11, 1e-10, 1e-9, 1e-8])
+@pytest.mark.parametrize("distance", [-1e-8, -1e-10, 0.0, 1e-11, 1e-9])
 def test_a_branch_started_at_one_of_its_folds_has_the_same_special_points(
     harmonic_branch, doubled_branch, distance
 ):

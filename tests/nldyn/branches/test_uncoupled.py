@@ -36,6 +36,7 @@ def oscillator(scale: float = 1.0, sides: tuple[int, ...] = (1, -1)) -> System:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_fast_mode_that_no_stop_moves_costs_no_contact_panels():
     """1 rad/s beside 1e6 rad/s; too many panels at first."""
     found = []

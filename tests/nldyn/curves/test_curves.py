@@ -164,13 +164,17 @@ def between_two_stops(**changes) -> System:
     )  # fmt: skip
 
 
-def test_branch_point_at_which_a_symmetry_breaks():
+@pytest.fixture(scope="module")
+def symmetric_branch():
+    return continue_branch(solve_orbit(between_two_stops(), 1.0), (0.5, 1.0))
+
+
+def test_branch_point_at_which_a_symmetry_breaks(symmetric_branch):
     """There the orbit is still its own mirror image half a period later; λ is zero.
 
     With unequal stops there is no such point: λ stays, in proportion to what they differ by.
     """
-    branch = continue_branch(solve_orbit(between_two_stops(), 1.0), (0.5, 1.0))
-    specials = of_kind(branch, "BP")
+    specials = of_kind(symmetric_branch, "BP")
     assert specials
     for special in specials:
         found = refine_special(special)
@@ -311,9 +315,9 @@ def first_touch():
 
 
 def test_grazing_in_frequency_and_gap_is_the_linear_resonance_curve(first_touch):
-    curve = continue_special(first_touch, ("frequency_hz", "gap"), ((5.0, 15.0), (1e-5, 1e-2)))
+    curve = continue_special(first_touch, ("frequency_hz", "gap"), ((7.0, 12.0), (1e-5, 1e-2)))
     frequency, gap = curve.values.T
-    assert frequency[[0, -1]] == pytest.approx([5.0, 15.0], rel=1e-14)
+    assert frequency[[0, -1]] == pytest.approx([7.0, 12.0], rel=1e-14)
     assert np.abs(gap / amplitude(frequency) - 1.0).max() < 1e-10
     assert gap.max() > 5.0 * gap[0]  # over the resonance
 
@@ -341,6 +345,7 @@ def test_folds_of_a_linear_stop_scale_with_unbalance_and_gap():
         assert orbit.multipliers == pytest.approx(special.orbit.multipliers, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_flips_of_doubled_orbits_scale_with_force_and_stiffness(harmonic_branch):
     """Without a gap, force times s and stiffness times s^(1-p) give displacements times s."""
     start = switch_at_flip(of_kind(harmonic_branch, "PD", 33.0)[0])
@@ -391,7 +396,7 @@ def test_curve_passes_through_the_special_points_of_other_branches(
 @pytest.fixture(scope="module")
 def torus_curve():
     system = torus_system()
-    branch = continue_branch(solve_orbit(system, 60.0), (5.0, 80.0))
+    branch = continue_branch(solve_orbit(system, 20.0), (10.0, 20.0))
     parameters = ("frequency_hz", Parameter("natural_frequency_hz", 1))
     window = ((10.5, 14.0), (30.0, 38.0))
     special, fold = of_kind(branch, "NS")[0], of_kind(branch, "LP")[0]
@@ -411,7 +416,7 @@ def test_neimark_sacker_curve_passes_through_those_of_another_structure(torus_cu
     parameter = Parameter("natural_frequency_hz", 1)
     crossing = curve.at("natural_frequency_hz", 33.8)
     assert crossing
-    branch = continue_branch(solve_orbit(with_value(system, parameter, 33.8), 60.0), (5.0, 80.0))
+    branch = continue_branch(solve_orbit(with_value(system, parameter, 33.8), 20.0), (10.0, 20.0))
     frequencies = np.array([s.frequency_hz for s in of_kind(branch, "NS")])
     for orbit in crossing:
         assert np.abs(frequencies / orbit.frequency_hz - 1.0).min() < 1e-8
@@ -423,6 +428,7 @@ def four_modes() -> System:
     return build_system(load_scene(example("four_dof_xi_0.01.toml")))
 
 
+@pytest.mark.slow
 def test_neimark_sacker_curve_is_followed_round_a_narrow_tip():
     """A slight contact makes a tip 4e-6 of the frequency wide; branches at three dampings agree."""
     points = {}
@@ -444,11 +450,10 @@ def test_neimark_sacker_curve_is_followed_round_a_narrow_tip():
         assert met == pytest.approx([s.frequency_hz for s in points[ratio]], rel=1e-9)
 
 
-def test_symmetry_breaks_on_a_curve_where_both_parameters_keep_it():
+def test_symmetry_breaks_on_a_curve_where_both_parameters_keep_it(symmetric_branch):
     """Branches at other forces have their branch points on it, and λ stays zero."""
-    branch = continue_branch(solve_orbit(between_two_stops(), 1.0), (0.5, 1.0))
-    special = of_kind(branch, "BP")[0]
-    window = ((0.3, 2.0), (0.9, 1.1))
+    special = of_kind(symmetric_branch, "BP")[0]
+    window = ((0.3, 2.0), (0.94, 1.01))
     curve = continue_special(special, ("frequency_hz", "amplitude"), window)
     assert curve.residuals.max() < 1e-7
     found = curve.at("amplitude", 0.95)
@@ -460,9 +465,8 @@ def test_symmetry_breaks_on_a_curve_where_both_parameters_keep_it():
         assert np.abs(places / orbit.frequency_hz - 1.0).min() < 1e-8
 
 
-def test_a_branch_point_whose_symmetry_goes_is_a_single_point():
-    branch = continue_branch(solve_orbit(between_two_stops(), 1.0), (0.5, 1.0))
-    special = of_kind(branch, "BP")[0]
+def test_a_branch_point_whose_symmetry_goes_is_a_single_point(symmetric_branch):
+    special = of_kind(symmetric_branch, "BP")[0]
     with pytest.raises(SystemModelError, match="dissolves when frequency_hz or gap changes"):
         continue_special(special, ("frequency_hz", "gap"), ((0.3, 2.0), (0.005, 0.02)))
 
@@ -890,6 +894,7 @@ def test_a_curve_has_no_other_parameters_than_its_own(one_dof):
         curve.at("gap", 0.0)
 
 
+@pytest.mark.slow
 def test_a_curve_of_folds_goes_on_behind_a_grazing_of_a_linear_stop():
     """Two folds of a 1/2 branch, with a grazing between them, are ends of one curve.
 
@@ -908,6 +913,7 @@ def test_a_curve_of_folds_goes_on_behind_a_grazing_of_a_linear_stop():
     assert found == pytest.approx(sorted(fold.frequency_hz for fold in folds), rel=1e-11)
 
 
+@pytest.mark.slow
 def test_pole_of_a_flips_coefficient_at_a_fold_flip_is_no_generalised_flip():
     """The coefficient changes its sign through infinity where another multiplier passes 1."""
     gap = 2.55e-4

@@ -39,6 +39,7 @@ def harmonic():
     return continue_branch(solve_orbit(two_modes(), 8.0), (4.0, 45.0))
 
 
+@pytest.mark.slow
 def test_a_flip_is_followed_past_contacts_of_a_few_nanometres(harmonic):
     """A difference by the mode's frequency reaches across them unless it is short."""
     flip = [p for p in harmonic.special_points if p.kind == "PD"][2]
@@ -50,6 +51,7 @@ def test_a_flip_is_followed_past_contacts_of_a_few_nanometres(harmonic):
     assert flips == [pytest.approx(orbit.frequency_hz, rel=1e-9)]
 
 
+@pytest.mark.slow
 def test_a_neimark_sacker_curve_does_not_go_over_to_neutral_saddles(harmonic):
     """Some lie so near to its start that a step of usual length led there."""
     start = next(p for p in harmonic.special_points if p.kind == "NS")

@@ -54,6 +54,7 @@ def test_an_executor_finds_the_same(alone):
         assert_same_diagrams(diagram(make_one_dof(), **WANTED, executor=executor), alone)
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_goes_on_with_another_number_of_processes(alone, tmp_path, monkeypatch):
     monkeypatch.setattr("nldyn.runtime.keeper.PAUSE", 0.0)
     path = tmp_path / "kept.h5"

@@ -71,7 +71,7 @@ def test_three_modes_against_runge_kutta(exponent):
     assert_agrees(system, X0, TURN, OMEGA, closings=[2])
 
 
-@pytest.mark.parametrize("exponent", [1.2, 1.3, 1.7, 2.3])
+@pytest.mark.parametrize("exponent", [1.2, 2.3])
 def test_exponents_that_the_square_of_time_does_not_make_smooth(exponent):
     stiffness = 5e9 * 4e-6 ** (1.5 - exponent)
     system = three_modes(Stop("middle", stiffness=stiffness, exponent=exponent))
@@ -225,7 +225,7 @@ def test_three_accuracies_agree_on_random_systems(stops):
     ("exponents", "seed"),
     [((1.37, 3.0, 1.0), 3), ((1.2, 1.5, 2.0), 3), ((1.2, 1.5, 2.0), 5), ((1.0, 2.5, 1.5), 3)],
 )
-@pytest.mark.parametrize("count", [6, pytest.param(25, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [3, pytest.param(25, marks=pytest.mark.slow)])
 def test_stops_of_mixed_laws_on_one_mass_are_resolved_at_every_tolerance(exponents, seed, count):
     """Preloaded and open stops that are hit up to hundreds of times, some at almost one instant.
 
@@ -574,7 +574,7 @@ def held_between_stops() -> System:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("hz", [4.8, 5.0, 5.03, 5.3])
+@pytest.mark.parametrize("hz", [4.8, 5.03])
 def test_slow_motion_held_between_stops_against_runge_kutta(hz):
     """The forces are smooth over a panel that is far too long for what a change of them does."""
     system = held_between_stops()

@@ -7,7 +7,7 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from independent import Motion
 from problems import make_one_dof
@@ -52,7 +52,6 @@ def moving(flow: FlowMap, speed: float) -> np.ndarray:
     return flow.to_state(np.array([0.0, speed * math.sqrt(MASS)]))
 
 
-@settings(max_examples=30, deadline=None)
 @given(
     st.floats(-3.0, 0.5), st.floats(0.01, 0.9), st.sampled_from([1.0, 1.5, 2.0]),
     st.floats(4.0, 9.0),
@@ -209,7 +208,7 @@ def test_the_largest_force_of_a_lossy_impact_comes_before_the_deepest_point():
     assert impact.force == pytest.approx(sampled.max(), rel=1e-6)
 
 
-@pytest.mark.parametrize("loss", [2000.0, 1e4])
+@pytest.mark.parametrize("loss", [pytest.param(2000.0, marks=pytest.mark.slow), 1e4])
 def test_an_orbit_with_a_stop_that_is_all_but_a_dashpot_is_found(loss):
     """The contact creeps; panels remembered from the step before must not keep Newton going."""
     system = System.from_matrices(
@@ -379,7 +378,7 @@ def test_the_derivative_by_the_frequency_holds_while_a_stop_holds_the_body():
     assert off[1] < 0.01 * omega * abs(exact[0])
 
 
-@pytest.mark.parametrize("depth", [1e-4, 1e-2])
+@pytest.mark.parametrize("depth", [1e-4, pytest.param(1e-2, marks=pytest.mark.slow)])
 def test_creep_of_two_modes_against_a_stiff_integrator(depth):
     """Pressed in, and left alone for a quarter of the time that it takes to creep out."""
     stiffness, loss = 1e12, 100.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.linalg as sla
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from independent import exact_flight, state_map
 
@@ -95,7 +95,6 @@ ENTRY = st.tuples(st.floats(-1.0, 1.0), st.integers(-3, 3)).map(lambda e: e[0] *
 DECAY = st.just(0.0) | st.floats(1e-6, 10.0)
 
 
-@settings(deadline=None, max_examples=150, derandomize=True)
 @given(st.tuples(ENTRY, ENTRY, ENTRY, ENTRY), DECAY)
 @example((0.0, 1.0, -1.0, -2.0), 0.0)  # critically damped
 @example((0.0, 10.0, -0.1, 0.0), 0.0)  # without decay

@@ -6,13 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from problems import make_one_dof
 
 from nldyn import Damper, FlowMap, FlowOptions, HarmonicForce, Stop, System, Unbalance, solve_orbit
 
-LAW = settings(deadline=None, max_examples=60, derandomize=True)
 FREQUENCIES = [13.1, 117.5, 326.5]
 PLACES = {"middle": [0.63, 0.8, -0.5], "end": [-0.4, 0.9, 0.7]}
 
@@ -33,7 +32,6 @@ STATES = st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6).map(
 )
 
 
-@LAW
 @given(
     STATES,
     st.sampled_from([1.0, 1.5, 2.0]),
@@ -85,7 +83,6 @@ def test_liouvilles_formula_is_judged_where_rounding_hides_the_products_determin
     assert orbit.liouville_error < 1e-8
 
 
-@LAW
 @given(STATES, st.sampled_from([1.0, 1.5, 2.0, 1.3]), st.floats(-3.0, 3.0))
 def test_without_a_gap_motion_scales_with_force(state, exponent, decades):
     """y → s y, force → s force, stiffness → s^(1-p) stiffness; for p = 1 nothing else changes."""
@@ -128,7 +125,6 @@ def test_orbit_scales_with_force(one_dof, scale):
     np.testing.assert_allclose(scaled.multipliers, orbit.multipliers, rtol=1e-7)
 
 
-@LAW
 @given(STATES, st.floats(-360.0, 360.0), st.sampled_from(["force", "unbalance"]))
 def test_phase_of_the_excitation_shifts_time(state, degrees, kind):
     def excitation(phase_deg):

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from branches_alike import assert_same_branches
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from problems import make_one_dof
 
@@ -327,7 +327,6 @@ def test_wrong_attribute_is_named(copy, place, value):
     refused(copy, f"attribute '/branches/0000/{place}'")
 
 
-@settings(max_examples=60, deadline=None)
 @given(share=st.floats(0.0, 1.0, exclude_max=True), bit=st.integers(0, 7))
 def test_a_flipped_bit_is_noticed_or_does_no_harm(branch, saved, tmp_path_factory, share, bit):
     content = bytearray(saved.read_bytes())

@@ -119,6 +119,7 @@ def test_table_has_the_parameters_and_the_orbits(curve, loaded):
         curve.table("nodes")
 
 
+@pytest.mark.slow
 def test_an_extended_curve_is_the_curve_through_the_longer_range():
     found = special(make_one_dof(), "LP", (12.0, 26.0), 26.0)
     pair = ("frequency_hz", "gap")
@@ -146,7 +147,7 @@ def test_a_loaded_curve_goes_on(tmp_path):
     assert longer.stop_reasons == ("end of the range of stiffness",) * 2
 
 
-@pytest.mark.parametrize("share", [0.2, 0.7])
+@pytest.mark.parametrize("share", [pytest.param(0.2, marks=pytest.mark.slow), 0.7])
 def test_an_interrupted_curve_is_kept_and_finished(tmp_path, share):
     """In the leg forward, and in the one backward."""
     path = tmp_path / "curve.h5"
@@ -189,7 +190,7 @@ def test_an_interrupted_curve_is_kept_and_finished(tmp_path, share):
             )
 
 
-@pytest.mark.parametrize("searched", [False, True])
+@pytest.mark.parametrize("searched", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_an_interrupted_closed_curve_closes_where_it_began(tmp_path, monkeypatch, searched):
     """A closed 1/3 branch between two equal stops."""
     orbit = solve_orbit(between_stops(), 11.26, 3, guess=[7.9058e-06, 9.9213e-05])

@@ -86,6 +86,16 @@ def test_another_search_begins_anew(three, way, interrupted):
         assert tried.tried == fresh.tried
 
 
+@pytest.mark.parametrize(
+    "way",
+    [
+        "mixtures",
+        *(
+            pytest.param(other, marks=pytest.mark.slow)
+            for other in ("closed walks", "pseudo-orbits")
+        ),
+    ],
+)
 def test_what_it_has_found_is_not_lost_and_changes_nothing_where_it_goes_on(three, way, tmp_path):
     """Interrupted just after a branch was found: its orbits are used from the next frequency on."""
     (left_out,) = three.of_period(2)

@@ -294,6 +294,7 @@ def test_phases_are_those_that_a_simulation_has(one_dof, plane, at_50_hz):
         assert away.min() < 1e-6 * away.max()
 
 
+@pytest.mark.slow
 def test_stable_manifold_separates_the_phases(one_dof, plane):
     saddle = solve_orbit(one_dof, 50.0)
     assert not saddle.stable

@@ -10,7 +10,9 @@ import pytest
 DOCS = Path(__file__).parents[3] / "docs" / "how-to"
 
 
-@pytest.mark.parametrize("page", ["simulation", "lyapunov", "basins", "cluster"])
+@pytest.mark.parametrize(
+    "page", ["lyapunov", "basins", "cluster", pytest.param("simulation", marks=pytest.mark.slow)]
+)
 def test_examples_print_what_they_say(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     text = (DOCS / f"{page}.md").read_text(encoding="utf-8")

@@ -90,6 +90,7 @@ def ueda() -> System:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_duffing_oscillator_has_the_published_exponents():
     flow = FlowMap(ueda(), FlowOptions(1e-6))
     found = lyapunov_exponents(flow, 0.5 / np.pi, start=[2.5, 0.0], transient=50, periods=1000)

@@ -135,6 +135,7 @@ def test_curve_of_flips_goes_round_the_first_tongue():
     assert (ends.min() - 2.0 * own) * (ends.max() - 2.0 * own) < 0.0
 
 
+@pytest.mark.slow
 def test_curve_of_branch_points_goes_round_the_second_tongue():
     """There y leaves zero to either side; the branch points are multipliers 1 of Mathieu's."""
     damping = 0.02

@@ -9,7 +9,7 @@ from itertools import pairwise
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from problems import make_one_dof
 from repeated import run_through
@@ -37,7 +37,6 @@ from nldyn.orbits.multipliers import (
 )
 
 EPS = 2.0**-52
-LAW = settings(max_examples=60, deadline=None, derandomize=True)
 
 
 def exact_multipliers(factors, digits=120):
@@ -230,7 +229,6 @@ def sequence(case):
     return graded(rng, rng.uniform(-decades / 2.0, decades / 2.0, n), k)
 
 
-@LAW
 @given(SEQUENCES, st.integers(1, 6))
 def test_multipliers_do_not_depend_on_where_the_period_begins(case, shift):
     """Differences are of rounding size, as `uncertainties` estimates it."""
@@ -240,7 +238,6 @@ def test_multipliers_do_not_depend_on_where_the_period_begins(case, shift):
     assert np.all(np.abs(found.log_moduli - shifted.log_moduli) <= bound)
 
 
-@LAW
 @given(SEQUENCES, st.integers(0, 2**31))
 def test_coordinates_between_the_segments_do_not_matter(case, seed):
     factors = sequence(case)
@@ -253,7 +250,6 @@ def test_coordinates_between_the_segments_do_not_matter(case, seed):
     assert np.all(np.abs(found.log_moduli - other.log_moduli) <= bound)
 
 
-@LAW
 @given(SEQUENCES)
 def test_log_moduli_add_up_to_the_log_determinant(case):
     factors = sequence(case)

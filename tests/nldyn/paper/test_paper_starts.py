@@ -159,6 +159,7 @@ def test_families_followed_apart_are_the_diagram_followed_at_once(short_chart, t
     assert whole.notes[0] == f"{ends} ends of branches broken off: 10 points"
 
 
+@pytest.mark.slow
 def test_what_starts_lead_to_is_kept_when_an_atlas_is_interrupted(
     short_chart, monkeypatch, tmp_path
 ):
@@ -223,6 +224,7 @@ def two_known(monkeypatch, tmp_path):
     return job.name, tmp_path
 
 
+@pytest.mark.slow
 def test_a_detour_gives_starts(two_known):
     name, folder = two_known
     known = read_starts(name, folder)
@@ -236,7 +238,7 @@ def test_a_detour_gives_starts(two_known):
     [
         ("pseudo-orbits", "pseudo-orbits"),
         ("crossover", "mixtures"),
-        ("closed-walks", "closed walks"),
+        pytest.param("closed-walks", "closed walks", marks=pytest.mark.slow),
     ],
 )
 def test_guesses_give_starts(way, what, two_known, monkeypatch, capsys):

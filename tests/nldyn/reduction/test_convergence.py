@@ -200,6 +200,7 @@ def test_macneals_method_is_compared_by_its_linear_numbers(meshes):
     assert "rubin, 3 modes, receptance: 1 % from 12 degrees of freedom" in said
 
 
+@pytest.mark.slow
 def test_a_study_of_meshes_is_drawn_over_their_size(meshes, tmp_path):
     folder = write_study(meshes, tmp_path / "out", "A cantilever")
     assert (folder / "meshes.png").is_file()
@@ -353,6 +354,7 @@ def test_massless_interfaces_are_refused():
     assert System.from_reduced(wrong).size == 4
 
 
+@pytest.mark.slow
 def test_two_processes_give_the_same_study():
     scene = load_scene(example("portal.toml"))
     studies = [convergence_study_of(scene, modes=(1, 2, 3), jobs=jobs) for jobs in (1, 2)]

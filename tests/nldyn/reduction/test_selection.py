@@ -101,6 +101,7 @@ def test_true_error_of_folds_and_flips_lies_within_the_stated_band(stiffness, ra
     assert f"folds and flips: error {low:.1e} to {high:.1e}" in found.report()
 
 
+@pytest.mark.slow
 def test_true_error_of_a_solid_lies_within_the_stated_band():
     """A cantilever of second-order hexahedra with a stop below its tip, against 24 modes."""
     mesh = fem.box_mesh("bar", (0.3, 0.02, 0.01), (6, 1, 1))

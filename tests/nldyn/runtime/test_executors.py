@@ -67,15 +67,15 @@ def simulated(executor, progress):
 
 def exponents(executor, progress):
     found = lyapunov_exponents(
-        make_one_dof(), HERTZ, periods=100, executor=executor, progress=progress
+        make_one_dof(), HERTZ, periods=64, executor=executor, progress=progress
     )
     return [(s.frequency_hz, s.exponents, s.errors, s.divergence, s.end) for s in found]
 
 
 def measured(executor, progress):
     attractors = [classify(make_one_dof(), hz) for hz in (36.0, 50.0)]  # chaos and an orbit
-    sources = [*attractors, *simulate(make_one_dof(), HERTZ[:3], 200)]
-    table = measures_table(sources, periods=100, executor=executor, progress=progress)
+    sources = [*attractors, *simulate(make_one_dof(), HERTZ[:3], 50)]
+    table = measures_table(sources, periods=50, executor=executor, progress=progress)
     return [column.astype(str) for column in table.values()]
 
 
@@ -83,7 +83,7 @@ def manifold(executor, progress):
     system = make_one_dof()
     saddle = solve_orbit(system, 50.0)
     plane = Plane.at_interface(system, (-2e-4, 0.0), (-0.05, 0.05))
-    return stable_manifold(saddle, plane, max_points=200, executor=executor, progress=progress)
+    return stable_manifold(saddle, plane, max_points=60, executor=executor, progress=progress)
 
 
 LISTS = [swept_both_ways, simulated, exponents, measured, manifold]
@@ -128,7 +128,7 @@ def test_failures_are_kept_beside_results():
                 found[2].value_or_raise()
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_a_case_that_kills_its_process_fails_alone(workers):
     with processes(workers) as pool:
         for items in ([0, 1, 2, 3], [4, 5]):  # the pool stays broken
@@ -243,6 +243,7 @@ def test_threads_give_the_same_basins(plane, here):
     np.testing.assert_array_equal(found.periods, here.periods)
 
 
+@pytest.mark.slow
 def test_processes_give_the_same_diagram():
     alone = brute_force(make_one_dof(), (35.0, 38.0), points=4)
     with processes(2) as pool:
@@ -379,19 +380,15 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_basins(plane, here, cluste
     assert found.wrong == here.wrong == 0
 
 
-@pytest.mark.parametrize(
-    "compute",
-    [
-        simulated,
-        *(pytest.param(f, marks=pytest.mark.slow) for f in (swept_both_ways, exponents, measured)),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("compute", [swept_both_ways, simulated, exponents, measured])
 def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(compute, alone, cluster):
     with one_worker_killed(cluster) as executor:
         found = compute(executor, None)
     assert_same_numbers(alone[compute], found)
 
 
+@pytest.mark.slow
 def test_points_on_the_edge_of_basins_do_not_depend_on_the_executor():
     system = build_system(load_scene(example("two_dof_xi_0.01.toml")))
     plane = Plane.at_interface(system, (-3e-5, 1e-5), (-0.006, 0.006))

@@ -62,7 +62,7 @@ def test_hook_of_gmsh_is_near_a_frame_of_deep_beams():
 @pytest.mark.parametrize(
     "name, interface, force, gap, ratio",
     [
-        ("plate", "corner", 0.3, 1e-3, 0.02),
+        pytest.param("plate", "corner", 0.3, 1e-3, 0.02, marks=pytest.mark.slow),
         ("portal", "push", 20.0, 2e-3, 0.02),
         pytest.param("hook", "tip", 5.0, 5e-5, 0.02, marks=pytest.mark.slow),  # 17 s
     ],

@@ -5,7 +5,7 @@ from itertools import count
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from problems import RANGE_HZ
 
@@ -43,6 +43,7 @@ def test_no_piece_of_a_doubled_branch_is_missing_beside_its_flip(doubled):
                 assert [index_sum(doubled.branches, frequency, n) for n in (1, 2)] == [1, 1]
 
 
+@pytest.mark.slow
 def test_no_piece_of_a_crossing_branch_is_missing_beside_the_branch_point():
     """Two facing linear stops break the symmetry; the halves meet where that is not far away."""
     stops = [Stop.linear("m", 1e6, gap=1e-3, direction=side) for side in (1, -1)]
@@ -95,7 +96,6 @@ def test_the_note_tells_that_all_is_missing_where_there_is_no_branch():
     assert " but for P from 28 to 60 Hz: orbits are missing" in told
 
 
-@settings(max_examples=40, deadline=None)
 @given(share=st.floats(0.001, 0.999))
 def test_the_harmonic_branch_has_the_sum_one_at_every_frequency(harmonic_branch, share):
     frequency = RANGE_HZ[0] * (RANGE_HZ[1] / RANGE_HZ[0]) ** share
@@ -132,7 +132,6 @@ def test_the_note_tells_for_each_power_where_orbits_are_missing(doubled):
     )
 
 
-@settings(max_examples=40, deadline=None)
 @given(share=st.floats(0.001, 0.999), period=st.integers(1, 4), left=st.booleans())
 def test_the_gaps_are_where_the_sum_is_not_one(doubled, share, period, left):
     low, high = doubled.range_hz

@@ -60,6 +60,7 @@ def isola() -> Branch:
     return branch
 
 
+@pytest.mark.slow
 def test_curve_of_folds_of_an_isola_leads_to_another_branch(isola):
     """A third fold of the curve lies on a branch that other orbits lead to."""
     fold = min(isola.special_points, key=lambda special: special.frequency_hz)

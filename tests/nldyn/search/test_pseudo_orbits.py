@@ -9,7 +9,7 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 from branches_alike import without
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from problems import THREE_HZ
 
@@ -155,7 +155,6 @@ def way(pieces: Pieces, sequence: tuple[int, ...]) -> float:
     return sum(pieces.jumps[a, b] for a, b in steps)
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.integers(1, 4), st.integers(1, 6), st.integers(0, 2**32 - 1))
 def test_closed_sequences_come_in_the_order_of_their_jumps(length, count, seed):
     """Against all, of which those that begin elsewhere are one; first one of each choice."""
@@ -197,7 +196,6 @@ def test_closed_sequences_of_small_jumps_come_in_no_order():
     assert abs(rising - len(ways) / 2) < 5.0 * np.sqrt(len(ways) / 12)  # of a random permutation
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 8), st.integers(1, 40))
 def test_of_very_many_pieces_some_of_the_sequences_are_left_out(seed, nearest, most_paths):
     """Those that a search of the nearest, prolonged by one at a time, leaves out."""
