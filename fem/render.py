@@ -55,7 +55,15 @@ AUTO_FRACTION = 0.06
 BAR_ROW = 110
 GHOST_SHRINKAGE = 0.97
 """Makes the frame at rest a little thinner, so that it hides inside the other where they agree."""
-VIEW = np.array([0.20, 0.42, 1.0])
+VIEWS = {
+    "oblique": (0.20, 0.42, 1.0),
+    "front": (0.0, 0.0, 1.0),
+    "top": (0.0, 1.0, 0.0),
+    "side": (1.0, 0.0, 0.0),
+    "isometric": (1.0, 1.0, 1.0),
+}
+"""From where the frame is looked at: y is up, but from the top x is to the right."""
+TRIAD = 110  # pixels
 FIELD = (0.20, 0.85, 0.94)
 SHEET_FIELD = (0.05, 0.84, 0.94)
 """Where the frame goes: from this part of the field's height to that, and of its width."""
@@ -71,6 +79,7 @@ def render_shape(
     stop: StopSphere | None = None,
     mirror: str | None = None,
     colour: str = "displacement",
+    view: str = "oblique",
     size: tuple[int, int] = (1600, 900),
 ) -> float:
     """Picture of a deflected frame or structure, coloured by its displacement or stress.
@@ -98,6 +107,8 @@ def render_shape(
     colour
         "displacement"; "stress": von Mises' in solids, that of the outermost fibre in beams; or
         "moment": the bending moment of beams.
+    view
+        From where: one of `VIEWS`. Axes in a corner show the directions.
     size
         Width and height in pixels.
 
@@ -132,7 +143,7 @@ def render_shape(
     require_gl()
     with plotter_of(size) as plotter:
         moving = add_deflected(plotter, drawing, states[0], factor, colour)
-        compose(plotter, moving, states, stop, title, size)
+        compose(plotter, moving, states, stop, title, size, checked_view(view))
         add_note(plotter, scale_note(factor, stop), size)
         image = plotter.screenshot(None, return_img=True)
     write_image(target, image)
@@ -146,6 +157,7 @@ def render_modes(
     path: str | os.PathLike[str],
     *,
     mirror: str | None = None,
+    view: str = "oblique",
     size: tuple[int, int] | None = None,
 ) -> None:
     """Picture with one mode in each field, all drawn with the same largest displacement.
@@ -162,6 +174,8 @@ def render_modes(
         The .png to write, whole or not at all.
     mirror
         A point on a plane of symmetry, to draw a half model whole.
+    view
+        From where, as for `render_shape`.
     size
         Width and height in pixels; by default what k fields need.
 
@@ -195,7 +209,7 @@ def render_modes(
     with plotter_of(window, (rows, columns), BAR_ROW / field[1]) as plotter:
         for index, (mode, title) in enumerate(zip(modes, titles, strict=True)):
             plotter.subplot(*divmod(index, columns))
-            moving = add_mode(plotter, drawing, mode, title, field)
+            moving = add_mode(plotter, drawing, mode, title, field, checked_view(view))
         plotter.subplot(rows, 0)
         drawn = f"{moving.factor * 1e3:.3g} mm"
         label = f"displacement relative to each mode's largest, which is drawn as {drawn}"
@@ -252,7 +266,7 @@ def render_comparison(
         other, _ = drawing.place(states[1], factor)
         _, lines = polydata(drawing, other)
         plotter.add_mesh(lines, color=STOP, line_width=3.0)
-        compose(plotter, moving, states, None, title, size)
+        compose(plotter, moving, states, None, title, size, checked_view("oblique"))
         unit, per_metre = length_unit(float(apart.max()))
         moving.colour_by(per_metre, float(apart.max()))
         moving.surface.point_data["colour"][:] = apart * per_metre
@@ -275,6 +289,7 @@ def animate(
     mirror: str | None = None,
     colour: str = "displacement",
     title: str = "",
+    view: str = "oblique",
     fps: float = 25.0,
     size: tuple[int, int] = (1120, 540),
 ) -> float:
@@ -291,7 +306,7 @@ def animate(
         A .gif, or an .mp4 where imageio-ffmpeg is installed; written whole or not at all.
     times
         Instants in s, shape (m,), shown in the pictures.
-    scale, stop, mirror, colour, title
+    scale, stop, mirror, colour, title, view
         As for `render_shape`; one scale and one range of colours for all pictures.
     fps
         Pictures per second.
@@ -338,7 +353,7 @@ def animate(
     require_gl()
     with plotter_of(size) as plotter:
         moving = add_deflected(plotter, drawing, states[0], factor, colour)
-        compose(plotter, moving, states, stop, title, size)
+        compose(plotter, moving, states, stop, title, size, checked_view(view))
         images = []
         for state, instant in zip(states, instants, strict=True):
             moving.move(state)
@@ -582,6 +597,7 @@ def compose(
     stop: StopSphere | None,
     title: str,
     size: tuple[int, int],
+    view: FloatArray,
 ) -> None:
     """Put everything around the deflected frame, with one range of colours for all states."""
     drawing = moving.drawing
@@ -593,7 +609,8 @@ def compose(
     moving.move(states[0])
     add_scalar_bar(plotter, moving, label, *size)
     add_text(plotter, title, "title", (0.5, 0.92), 1.4 * text_height(size[1]), size[0])
-    fit_camera(plotter, size)
+    fit_camera(plotter, size, view)
+    add_triad(plotter, size)
 
 
 def add_note(plotter: Plotter, text: str, size: tuple[int, int]) -> None:
@@ -699,15 +716,31 @@ def add_text(
     plotter.add_actor(label, name=name, reset_camera=False, render=False)
 
 
+def add_triad(plotter: Plotter, size: tuple[int, int]) -> None:
+    """Axes x, y and z in a corner of a field of so many pixels, as they lie in the picture."""
+    wide, high = TRIAD / size[0], TRIAD / size[1]
+    plotter.add_axes(line_width=2, color=TEXT, viewport=(0.0, 0.0, wide, high), interactive=False)
+
+
+def checked_view(view: str) -> FloatArray:
+    """The unit vector towards the eye, or ModelError."""
+    if view not in VIEWS:
+        raise ModelError(f"view must be one of {', '.join(VIEWS)}, not {view!r}")
+    towards = np.array(VIEWS[view])
+    return np.asarray(towards / np.linalg.norm(towards))
+
+
 def fit_camera(
-    plotter: Plotter, size: tuple[int, int], field: tuple[float, float, float] = FIELD
+    plotter: Plotter,
+    size: tuple[int, int],
+    back: FloatArray,
+    field: tuple[float, float, float] = FIELD,
 ) -> None:
-    """Look at the frame from the front and above, without perspective, as large as fits."""
+    """Look at the frame from a direction, without perspective, as large as fits."""
     box = np.array(plotter.bounds).reshape(3, 2)
     corners = np.stack(np.meshgrid(*box, indexing="ij"), axis=-1).reshape(-1, 3)
-    back = VIEW / np.linalg.norm(VIEW)
     right = np.cross([0.0, 1.0, 0.0], back)
-    right = right / np.linalg.norm(right)
+    right = right / np.linalg.norm(right) if right.any() else np.array([1.0, 0.0, 0.0])
     up = np.cross(back, right)
     across, above = corners @ right, corners @ up
     half_width, half_height = np.ptp(across) / 2, np.ptp(above) / 2
@@ -729,6 +762,7 @@ def add_mode(
     mode: FloatArray,
     title: str,
     size: tuple[int, int],
+    view: FloatArray,
 ) -> Moving:
     """One field of the sheet of modes."""
     largest = float(drawing.place(mode)[1].max())
@@ -739,7 +773,8 @@ def add_mode(
     moving.colour_by(1.0, 1.0)
     moving.move(unit)
     add_text(plotter, title, "title", (0.5, 0.89), 22.0, size[0])
-    fit_camera(plotter, size, SHEET_FIELD)
+    fit_camera(plotter, size, view, SHEET_FIELD)
+    add_triad(plotter, size)
     return moving
 
 

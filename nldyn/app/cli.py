@@ -6,13 +6,15 @@ animation needs something that is not installed, 130 stopped with Ctrl-C.
 
 from __future__ import annotations
 
+import json
+import math
 import os
 import sys
 import time
 import tomllib
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -63,6 +65,41 @@ jobs_option = click.option(
     show_default="all cores",
     metavar="N",
     help="Processes that share the work; the results do not depend on it.",
+)
+
+
+def number_list(
+    _context: click.Context, _parameter: click.Parameter, value: str | None
+) -> list[int] | None:
+    """Read whole numbers with commas between them, or ranges like 1-10."""
+    if value is None:
+        return None
+    found: set[int] = set()
+    for piece in value.split(","):
+        first, _dash, last = piece.strip().partition("-")
+        if not first.isdecimal() or (last and not last.isdecimal()):
+            raise click.BadParameter(f"'{value}' is not a list of whole numbers such as 1-10,20")
+        if int(last or first) - int(first) > 1000:
+            raise click.BadParameter(f"'{value}' names more than 1000 numbers")
+        found |= set(range(int(first), int(last or first) + 1))
+    return sorted(found)
+
+
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print a summary as JSON instead of text."
+)
+view_option = click.option(
+    "--view",
+    type=click.Choice(["oblique", "front", "top", "side", "isometric"]),
+    default="oblique",
+    show_default=True,
+    help="From where the pictures are taken; y is up.",
+)
+drawn_modes_option = click.option(
+    "--modes",
+    callback=number_list,
+    metavar="LIST",
+    help="Modes to show, such as 1-4,7; all unless given.",
 )
 
 
@@ -144,6 +181,7 @@ def main() -> None:
 @mesh_option
 @click.option("--log", is_flag=True, help="Draw the displacement on a logarithmic axis.")
 @click.option("--replace", is_flag=True, help="Replace results of another scene in DIR.")
+@json_option
 @quiet_option
 @jobs_option
 def run(
@@ -152,6 +190,7 @@ def run(
     mesh_folders: tuple[Path, ...],
     log: bool,
     replace: bool,
+    as_json: bool,
     quiet: bool,
     jobs: int,
 ) -> None:
@@ -187,9 +226,25 @@ def run(
                 yscale: Literal["linear", "log"] = "log" if log else "linear"
                 drawn = drawn_of(loaded, structure)
                 write_results(found or diagram, out, loaded, drawn=drawn, yscale=yscale)
-        if found:
-            click.echo("\n".join(found.coverage_lines()))
-        click.echo(describe(diagram, time.perf_counter() - start, out))
+        seconds = time.perf_counter() - start
+        if as_json:
+            from nldyn.report.results import summary
+
+            print_json(
+                {
+                    "scene": str(scene),
+                    "out": str(out),
+                    "report": str(out / "report.html"),
+                    "seconds": seconds,
+                    "special_points": special_counts(diagram),
+                    "coverage": found.coverage_lines() if found else [],
+                    **summary(diagram),
+                }
+            )
+        else:
+            if found:
+                click.echo("\n".join(found.coverage_lines()))
+            click.echo(describe(diagram, seconds, out))
         if not diagram.branches:
             click.echo("nldyn: no periodic orbit was found; the tables are empty", err=True)
             sys.exit(NOTHING_FOUND)
@@ -265,7 +320,8 @@ def report(
 @main.command()
 @scene_argument
 @mesh_option
-def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
+@json_option
+def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
     """Check a scene, and print the modes of its structure."""
     with plain_errors():
         import cms
@@ -285,6 +341,29 @@ def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
             elif component is not None:
                 reduced = build_reduced(loaded, component)
             system = build_system(loaded, reduced)
+        if as_json:
+            from nldyn.report.modes import mode_table
+            from nldyn.scene.build import Structure
+
+            check_computable(loaded, scene)
+            table = mode_table(loaded, Structure(component, reduced))
+            remark = range_remark(loaded, float(system.frequencies_hz.max()))
+            print_json(
+                {
+                    "scene": str(scene),
+                    "title": loaded.title,
+                    "degrees_of_freedom": None if component is None else component.mass.shape[0],
+                    "mass_kg": table.mass,
+                    "modes": table.as_json(),
+                    "static_flexibility_m_per_n": {
+                        name: static_flexibility(system, name) for name in system.interfaces
+                    },
+                    "stops": [describe_stop(stop) for stop in system.stops],
+                    "at_rest": describe_rest(system),
+                    "notes": [remark] if remark else [],
+                }
+            )
+            return
         if isinstance(component, cms.Matrices):
             click.echo(f"matrices of {component.mass.shape[0]} degrees of freedom")
         elif component is not None:
@@ -303,8 +382,99 @@ def check(scene: Path, mesh_folders: tuple[Path, ...]) -> None:
 
 @main.command()
 @scene_argument
+@click.option(
+    "--out",
+    type=any_path,
+    metavar="DIR",
+    help="Directory for the table, the picture and the page for a browser; else only a table.",
+)
+@mesh_option
+@drawn_modes_option
+@view_option
+@click.option("--open", "opened", is_flag=True, help="Open the page where there is a screen.")
+@json_option
+def modes(
+    scene: Path,
+    out: Path | None,
+    mesh_folders: tuple[Path, ...],
+    modes: list[int] | None,
+    view: str,
+    opened: bool,
+    as_json: bool,
+) -> None:
+    """Tell and draw the modes of a scene: frequencies, effective masses, participation."""
+    if opened and out is None:
+        raise click.UsageError("'--open' needs '--out'")
+    with plain_errors():
+        from nldyn.report.modes import check_modes, mode_table
+        from nldyn.report.render import render_modes_of
+        from nldyn.runtime.progress import messages_shown
+        from nldyn.runtime.result_directory import check_directory
+        from nldyn.scene.build import build_structure
+        from nldyn.scene.read import load_scene
+
+        loaded = load_scene(scene, mesh_folders)
+        if out is not None:
+            check_directory(out)
+        with messages_shown():
+            structure = build_structure(loaded)
+        table = mode_table(loaded, structure)
+        check_modes(loaded, modes or (), len(table.frequencies_hz))
+        missing = ""
+        if out is not None:
+            missing = render_modes_of(loaded, structure, out, modes=modes or (), view=view)
+    if as_json:
+        rows = [row for row in table.as_json() if not modes or row["mode"] in modes]
+        print_json({"scene": str(scene), "mass_kg": table.mass, "modes": rows})
+    else:
+        click.echo(table.report(modes or ()))
+        if out is not None:
+            click.echo(f"written to {out}: {written_by(out, 'modes')}")
+    if missing:
+        click.echo(f"nldyn: {missing}", err=True)
+        sys.exit(NO_GRAPHICS)
+    if opened and out is not None:
+        open_page(out / "mode_shapes.html")
+
+
+def open_page(page: Path) -> None:
+    """Open a page in the browser of the desktop, or say that there is none."""
+    import webbrowser
+
+    if not page.is_file():
+        click.echo("nldyn: only a mesh can be drawn, so there is no page to open", err=True)
+    elif not webbrowser.open(page.resolve().as_uri()):
+        click.echo(
+            f"nldyn: no browser can be opened here; {page} can be opened elsewhere", err=True
+        )
+
+
+def written_by(out: Path, kind: str) -> str:
+    """The files that a command wrote into a directory of results."""
+    from nldyn.runtime.result_directory import written_files
+
+    return ", ".join(written_files(out, kind))
+
+
+def print_json(content: Mapping[str, object]) -> None:
+    """Print JSON on stdout; numbers that are not finite become null."""
+
+    def plain(value: object) -> object:
+        if isinstance(value, float):
+            return value if math.isfinite(value) else None
+        if isinstance(value, Mapping):
+            return {key: plain(each) for key, each in value.items()}
+        return [plain(each) for each in value] if isinstance(value, list | tuple) else value
+
+    click.echo(json.dumps(plain(content), indent=1, allow_nan=False))
+
+
+@main.command()
+@scene_argument
 @out_option
 @mesh_option
+@drawn_modes_option
+@view_option
 @click.option(
     "--frequency-hz",
     type=click.FloatRange(1e-6, 1e12),
@@ -331,6 +501,8 @@ def render(
     scene: Path,
     out: Path,
     mesh_folders: tuple[Path, ...],
+    modes: list[int] | None,
+    view: str,
     frequency_hz: float | None,
     period: int,
     video: str,
@@ -358,33 +530,26 @@ def render(
                     frequency_hz=frequency_hz,
                     period=period,
                     video=video,
+                    modes=modes or (),
+                    view=view,
                     progress=report,
                     jobs=jobs,
                 )
         except RenderError as error:
             click.echo(f"nldyn: {error}", err=True)
             sys.exit(NO_GRAPHICS)
-    click.echo(f"written to {out}")
+    if made.orbit is None:
+        click.echo("no [continuation], so no orbit is drawn")
+    else:
+        orbit = made.orbit
+        click.echo(
+            f"drawn: the {orbit.stability.verdict} orbit of period {orbit.period} at "
+            f"{orbit.frequency_hz:.6g} Hz, with {orbit.impacts} impacts"
+        )
+    click.echo(f"written to {out}: {written_by(out, 'render')}")
     if made.missing:
         click.echo(f"nldyn: {made.missing}", err=True)
         sys.exit(NO_GRAPHICS)
-
-
-def number_list(
-    _context: click.Context, _parameter: click.Parameter, value: str | None
-) -> list[int] | None:
-    """Read whole numbers with commas between them, or ranges like 1-10."""
-    if value is None:
-        return None
-    found: set[int] = set()
-    for piece in value.split(","):
-        first, _dash, last = piece.strip().partition("-")
-        if not first.isdecimal() or (last and not last.isdecimal()):
-            raise click.BadParameter(f"'{value}' is not a list of whole numbers such as 1-10,20")
-        if int(last or first) - int(first) > 1000:
-            raise click.BadParameter(f"'{value}' names more than 1000 numbers")
-        found |= set(range(int(first), int(last or first) + 1))
-    return sorted(found)
 
 
 @main.command()
@@ -502,8 +667,8 @@ def check_same_scene(out: Path, scene: Scene) -> None:
 def describe(diagram: Diagram, seconds: float, out: Path) -> str:
     """Say in a few lines what was computed."""
     branches = diagram.branches
-    kinds = Counter(str(point.kind) for branch in branches for point in branch.special_points)
-    found = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())) or "none"
+    kinds = special_counts(diagram)
+    found = ", ".join(f"{count} {kind}" for kind, count in kinds.items()) or "none"
     points = sum(len(branch.points) for branch in branches)
     lines = [
         f"{len(branches)} {'branch' if len(branches) == 1 else 'branches'} with {points} points "
@@ -513,6 +678,12 @@ def describe(diagram: Diagram, seconds: float, out: Path) -> str:
         f"written to {out}",
     ]
     return "\n".join(lines)
+
+
+def special_counts(diagram: Diagram) -> dict[str, int]:
+    """How many special points there are of each kind."""
+    special = (point for branch in diagram.branches for point in branch.special_points)
+    return dict(sorted(Counter(str(point.kind) for point in special).items()))
 
 
 def describe_system(system: System, residual: int = 0) -> str:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.errors import SceneError
+from nldyn.report.modes import check_modes, mode_table
 from nldyn.report.results import write_table
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.runtime.result_directory import result_directory
-from nldyn.scene.build import build_reduced, build_system
+from nldyn.scene.build import Structure, build_reduced, build_system
 from nldyn.scene.checks import check_computable
 from nldyn.scene.component import build_component
 from nldyn.scene.messages import scene_error
@@ -57,6 +59,8 @@ def render_scene(
     frequency_hz: float | None = None,
     period: int = 1,
     video: str = "gif",
+    modes: Sequence[int] = (),
+    view: str = "oblique",
     progress: Progress | None = None,
     jobs: int = 1,
 ) -> Rendering:
@@ -78,6 +82,10 @@ def render_scene(
         Period of the orbit in periods of the excitation, if a frequency is given.
     video : {"gif", "mp4"}
         Kind of animation.
+    modes : sequence of int
+        Modes to draw, from 1; all unless given.
+    view : str
+        From where the pictures are taken: one of `fem.render.VIEWS`.
     progress : callable, optional
         Called as ``progress(what, frequency_hz, done)``; the frequency is 0 where none applies.
     jobs : int
@@ -119,16 +127,19 @@ def render_scene(
     component = build_component(scene)
     reduced = build_reduced(scene, component)
     shares.end("model")
+    table = mode_table(scene, Structure(component, reduced))
+    check_modes(scene, modes, reduced.size)
     orbit = None
     if scene.continuation is not None:
         tell = shares.part("orbit")
         orbit = orbit_to_draw(scene, build_system(scene, reduced), frequency_hz, period, tell, jobs)
     shares.end("orbit")
     with result_directory(directory, "render") as folder:
-        write_modes(reduced, folder / "modes.csv")
+        write_table(folder / "modes.csv", table.columns(), table.rows())
         if orbit is not None:
             save_orbit(orbit, folder)
-        drawing = _Drawing(scene, component, reduced, folder, shares.part("pictures"))
+        tell = shares.part("pictures")
+        drawing = Drawing(scene, component, reduced, folder, tell, tuple(modes), view)
         drawing.pages(orbit)
         missing = drawing.draw(orbit, video)
     return Rendering(Path(directory), orbit, missing)
@@ -181,11 +192,49 @@ def deepest_state(orbit: Orbit, impact: Impact | None) -> NDArray[np.float64]:
     return orbit.states(np.array([phase]))[0, : orbit.system.size]
 
 
-def write_modes(reduced: cms.ReducedModel, path: Path) -> None:
-    """Write frequency and participation of each mode of the reduced model to a CSV file."""
-    columns = ["mode", "frequency_hz", *(f"participation_{name}" for name in reduced.participation)]
-    values = np.column_stack([reduced.frequencies_hz, *reduced.participation.values()]).tolist()
-    write_table(path, columns, ([number, *row] for number, row in enumerate(values, start=1)))
+def render_modes_of(
+    scene: Scene,
+    structure: Structure,
+    directory: str | Path,
+    *,
+    modes: Sequence[int] = (),
+    view: str = "oblique",
+) -> str:
+    """Write ``modes.csv``, ``mode_shapes.png`` and the page ``mode_shapes.html`` of a scene.
+
+    Parameters
+    ----------
+    scene, structure
+        A scene, and what `build_structure` gave for it; without a mesh only the table is written.
+    directory : str or Path
+        All of the files or none.
+    modes : sequence of int
+        Those to draw, from 1; all unless given.
+    view : str
+        From where the picture is taken: one of `fem.render.VIEWS`.
+
+    Returns
+    -------
+    str
+        Empty, or what to install for the picture.
+
+    Raises
+    ------
+    SceneError
+        If there is no such mode.
+    OutputError
+        If the directory cannot be written.
+    """
+    table = mode_table(scene, structure)
+    check_modes(scene, modes, len(table.frequencies_hz))
+    with result_directory(directory, "modes") as folder:
+        write_table(folder / "modes.csv", table.columns(), table.rows())
+        if scene.mesh is None or structure.reduced is None:
+            return ""
+        component: Any = structure.component
+        drawing = Drawing(scene, component, structure.reduced, folder, silent, tuple(modes), view)
+        drawing.mode_page()
+        return drawing.mode_picture()
 
 
 def save_orbit(orbit: Orbit, folder: Path) -> None:
@@ -219,7 +268,7 @@ def stop_to_draw(scene: Scene, impact: Impact | None) -> StopSphere | None:
 
 
 @dataclass(frozen=True)
-class _Drawing:
+class Drawing:
     """The pages for a browser, and the pictures, which need a graphics library."""
 
     scene: Scene
@@ -227,6 +276,21 @@ class _Drawing:
     reduced: cms.ReducedModel
     folder: Path
     tell: Progress
+    modes: tuple[int, ...] = ()
+    view: str = "oblique"
+
+    def mode_picture(self) -> str:
+        """Draw the modes; say what to install if something is missing for it."""
+        from fem.render import RenderError, gl_available
+
+        available, advice = gl_available()
+        if not available:
+            return advice
+        try:
+            self.draw_modes()
+        except RenderError as error:
+            return str(error)
+        return ""
 
     def draw(self, orbit: Orbit | None, video: str) -> str:
         """Make all of them; say what to install if something is missing for it."""
@@ -236,7 +300,7 @@ class _Drawing:
         if not available:
             return advice
         try:
-            self.modes()
+            self.draw_modes()
             if orbit is not None:
                 self.deepest_contact(orbit)
                 self.motion(orbit, video)
@@ -251,20 +315,27 @@ class _Drawing:
         return [
             f"{'mode' if number < kept else 'residual mode'} {number + 1}: {hz:.1f} Hz"
             for number, hz in enumerate(self.reduced.frequencies_hz)
+            if number in self.chosen
         ]
 
-    def pages(self, orbit: Orbit | None) -> None:
-        """Write the modes, and the stress at the deepest contact, as pages for a browser."""
+    def mode_page(self) -> None:
+        """Write the modes as a page for a browser."""
         from fem.page import write_page
 
         write_page(
             self.component,
-            self.reduced.basis,
+            self.reduced.basis[:, self.chosen],
             self.mode_titles,
             self.folder / "mode_shapes.html",
             heading=self.scene.title or "Mode shapes",
             mirror=_mirror(self.scene),
         )
+
+    def pages(self, orbit: Orbit | None) -> None:
+        """Write the modes, and the stress at the deepest contact, as pages for a browser."""
+        from fem.page import write_page
+
+        self.mode_page()
         if orbit is None:
             return
         impact = deepest_impact(self.scene, orbit)
@@ -280,14 +351,25 @@ class _Drawing:
             relative=False,
         )
 
-    def modes(self) -> None:
-        """Draw a sheet with all modes of the reduced model."""
+    @property
+    def chosen(self) -> list[int]:
+        """Indices of the modes to draw."""
+        return [mode - 1 for mode in self.modes] or list(range(self.reduced.size))
+
+    def draw_modes(self) -> None:
+        """Draw a sheet with the modes of the reduced model."""
         from fem.render import render_modes
 
         self.tell("mode shapes", 0.0, 0.1)
         path = self.folder / "mode_shapes.png"
-        mirror = _mirror(self.scene)
-        render_modes(self.component, self.reduced.basis, self.mode_titles, path, mirror=mirror)
+        render_modes(
+            self.component,
+            self.reduced.basis[:, self.chosen],
+            self.mode_titles,
+            path,
+            mirror=_mirror(self.scene),
+            view=self.view,
+        )
 
     def deepest_contact(self, orbit: Orbit) -> None:
         """Draw the structure at the instant of deepest contact: displacement, then stress."""
@@ -308,6 +390,7 @@ class _Drawing:
                 stop=stop,
                 mirror=_mirror(self.scene),
                 colour=colour,
+                view=self.view,
             )
 
     def visible_scale(
@@ -335,6 +418,7 @@ class _Drawing:
             title=f"one period of the orbit at {orbit.frequency_hz:.4g} Hz",
             stop=stop_to_draw(self.scene, deepest_impact(self.scene, orbit)),
             mirror=_mirror(self.scene),
+            view=self.view,
         )
 
 

@@ -182,6 +182,17 @@ def _complete(new: Path, target: Path, kind: str) -> None:
     (new / MANIFEST).write_text(json.dumps({**kept, kind: written}, indent=1) + "\n")
 
 
+def written_files(directory: str | Path, kind: str) -> list[str]:
+    """Names of the files of a kind in a directory of results, see `result_directory`.
+
+    Examples
+    --------
+    >>> written_files("nowhere", "run")
+    []
+    """
+    return list(_read_manifest(Path(directory)).get(kind, []))
+
+
 def _read_manifest(target: Path) -> dict[str, list[str]]:
     try:
         manifest = json.loads((target / MANIFEST).read_text())
