@@ -202,6 +202,11 @@ def tube_mesh() -> fem.FrameMesh:
     return fem.frame_mesh(places, [("tube", *pair) for pair in ends])
 
 
+def strip_mesh() -> fem.FrameMesh:
+    """A cantilever of 0.3 m."""
+    return fem.frame_mesh({"root": (0.0, 0.0), "tip": (0.3, 0.0)}, [("strip", "root", "tip", 20)])
+
+
 def main() -> None:
     """Write all files."""
     dimensions = read_dimensions()
@@ -212,6 +217,7 @@ def main() -> None:
     fem.write_mesh(full_beam_mesh(dimensions), HERE / "full_beam.msh")
     fem.write_mesh(solid_half_beam_mesh(dimensions), HERE / "half_beam_solid.vtu")
     fem.write_mesh(tube_mesh(), HERE / "tube.msh")
+    fem.write_mesh(strip_mesh(), HERE / "strip.msh")
 
 
 if __name__ == "__main__":

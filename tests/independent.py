@@ -21,6 +21,8 @@ def contact(stop: Stop, depth: float, speed: float) -> tuple[float, float, float
     k, p, a, c = stop.stiffness, stop.exponent, stop.dissipation, stop.dashpot
     lossy = 1.0 + a * speed
     force = k * depth**p * lossy + c * speed
+    if force < 0.0 and not stop.pulls:
+        return 0.0, 0.0, 0.0
     return force, p * k * depth ** (p - 1.0) * lossy, a * k * depth**p + c
 
 
@@ -37,6 +39,8 @@ class Motion:
         self.A[:n, n:] = np.eye(n)
         self.A[n:, :n] = -np.diag(system.natural_frequencies**2)
         self.A[n:, n:] = -system.damping
+        if system.circulatory is not None:
+            self.A[n:, :n] -= system.circulatory
         self.springs, self.dampers = [], []
         for element in (*system.springs, *system.dampers):
             c = system.participation[element.at].copy()

@@ -741,6 +741,7 @@ def describe_stop(stop: Stop) -> str:
     unit = "N/m" if stop.exponent == 1.0 else f"N/m^{stop.exponent:g}"
     loss = f", dissipation {stop.dissipation:g} s/m" if stop.dissipation else ""
     loss += f", dashpot {stop.dashpot:g} N s/m" if stop.dashpot else ""
+    loss += "" if stop.pulls else " (never pulls)"
     where = f"at '{stop.at}'" + (f" against '{stop.against}'" if stop.against else "")
     return (
         f"stop {where}: {stop.stiffness:.6g} {unit}, gap {stop.gap:g} m, "

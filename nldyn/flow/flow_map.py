@@ -6,6 +6,7 @@ the contact forces. See ``docs/explanation/theory.md``.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -222,10 +223,17 @@ class FlowMap:
 
     @cached_property
     def rows(self) -> Real:
-        """Output rows (n_out, 2n): penetrations, displacements at bonds, then of interfaces."""
+        """Output rows (n_out, 2n): penetrations, displacements at bonds, then of interfaces.
+
+        Then, of each stop that never pulls, its force over its stiffness.
+        """
         s = self.system
         vectors = [*self._pushed, *s.participation.values()]
-        return np.array([s.displacement_row(v) for v in vectors]).reshape(len(vectors), 2 * s.size)
+        rows = [s.displacement_row(v) for v in vectors]
+        for stop, row in zip(s.stops, rows[: len(s.stops)], strict=True):
+            if not stop.pulls:
+                rows.append(row + stop.dashpot / stop.stiffness * s.linear.times_block(row))
+        return np.array(rows).reshape(len(rows), 2 * s.size)
 
     @cached_property
     def _pushed(self) -> list[Real]:
@@ -249,6 +257,7 @@ class FlowMap:
         growth = np.repeat(linear.growth, 2)
         bounds = np.multiply(thirds, growth, out=np.zeros_like(thirds), where=thirds > 0.0)
         force = np.array([s.force_column(v) for v in vectors]).reshape(-1, 2 * s.size)
+        releases = itertools.count(float(len(vectors) + len(s.participation)))
         stops = [
             StopRow(
                 gap=stop.gap,
@@ -259,6 +268,7 @@ class FlowMap:
                 mobility=float(v @ v),
                 duration=duration_factor(stop.exponent),
                 instant=self.options.instant(0.0 if stop.dashpot else stop.exponent),
+                release=-1.0 if stop.pulls else next(releases),
             )
             for stop, v in zip(s.stops, vectors, strict=False)
         ]

@@ -54,6 +54,8 @@ def write_flow(group: Any, flow: FlowMap) -> None:
     system, linear = flow.system, flow.system.linear
     put(group, "natural_frequencies", system.natural_frequencies, "rad/s")
     put(group, "damping", system.damping, "1/s")
+    if system.circulatory is not None:
+        put(group, "circulatory", system.circulatory, "1/s^2")
     set_attribute(group, "interfaces", system.interfaces)
     vectors = np.array([system.participation[name] for name in system.interfaces], dtype=float)
     put(group, "participation", vectors.reshape(-1, system.size), "kg^-0.5")
@@ -79,6 +81,11 @@ def write_flow(group: Any, flow: FlowMap) -> None:
             **(
                 {"dashpot": ("N s/m", [s.dashpot for s in stops])}
                 if any(s.dashpot for s in stops)
+                else {}
+            ),
+            **(
+                {"pulls": ("1", [s.pulls for s in stops])}
+                if not all(s.pulls for s in stops)
                 else {}
             ),
             "is_against": ("1", [s.against is not None for s in stops]),
@@ -186,6 +193,7 @@ def read_flow(group: Group, laws: Laws) -> FlowMap:
             _read_excitation(group.group("excitation")),
             _read_loads(group, n),
             _read_springs(group.group("springs")) if "springs" in group else (),
+            group.array("circulatory", n, n) if "circulatory" in group else None,
         )
     except SystemModelError as error:
         if str(error).startswith(str(group.path)):
@@ -210,6 +218,7 @@ def _read_stops(group: Group, laws: Laws) -> tuple[Stop, ...]:
     numbers = ("stiffness", "exponent", "gap", "direction", "dissipation")
     values = {name: group.array(name, count) for name in (*numbers, "is_against", "has_own_law")}
     values["dashpot"] = group.array("dashpot", count) if "dashpot" in group else np.zeros(count)
+    values["pulls"] = group.array("pulls", count) if "pulls" in group else np.ones(count)
     trials = group.array("law_trials", *((count, len(TRIALS), 3) if count else (0,)))
     for i in laws:
         if i not in range(count) or not values["has_own_law"][i]:
@@ -234,6 +243,7 @@ def _read_stops(group: Group, laws: Laws) -> tuple[Stop, ...]:
             float(values["dissipation"][i]),
             law,
             float(values["dashpot"][i]),
+            bool(values["pulls"][i]),
         )
         if not np.array_equal(_trials(stop), trials[i]):
             raise SystemModelError(

@@ -253,6 +253,7 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
 
 def _unreduced(scene: Scene, component: cms.Matrices, acting: Acting) -> System:
     """The system of matrices that are small enough as they are."""
+    assert scene.matrices is not None
     rows = component.mass.shape[0]
     if rows > LARGEST_DENSE:
         fault = f"is missing: matrices of {rows} rows, more than {LARGEST_DENSE}, must be reduced"
@@ -268,6 +269,8 @@ def _unreduced(scene: Scene, component: cms.Matrices, acting: Acting) -> System:
             damping=component.damping,
             modal_damping=scene.damping.modal_ratio,
             loads=loads,
+            gyroscopic=scene.matrices.gyroscopic,
+            circulatory=scene.matrices.circulatory,
             **acting._asdict(),
         )
 

@@ -235,6 +235,12 @@ def _check_matrices(scene: Scene, report: Report) -> None:
     table = scene.matrices
     if table is None:
         return
+    for name in ("gyroscopic", "circulatory"):
+        skew = getattr(table, name)
+        if skew is not None and scene.reduction is not None:
+            raise report(("reduction",), f"cannot stand beside matrices.{name}")
+        if skew is not None:
+            _check_skew(skew, ("matrices", name), report)
     mass, typed = table.mass, {}
     for key in ("mass", "stiffness", "damping"):
         matrix = getattr(table, key)
@@ -268,6 +274,14 @@ def _check_symmetric(matrix: Matrix, count: int, key: KeyPath, report: Report) -
     values = np.array(matrix)
     if not np.allclose(values, values.T, rtol=1e-9, atol=1e-12 * np.abs(values).max()):
         raise report(key, "must be symmetric")
+
+
+def _check_skew(matrix: Matrix, key: KeyPath, report: Report) -> None:
+    if any(len(row) != len(matrix) for row in matrix):
+        raise report(key, "must be square")
+    values = np.array(matrix)
+    if not np.allclose(values, -values.T, rtol=1e-9, atol=1e-12 * np.abs(values).max()):
+        raise report(key, "must be skew: its transpose must be minus itself")
 
 
 def _check_length(values: list[float], count: int, unit: str, key: KeyPath, report: Report) -> None:

@@ -86,6 +86,7 @@ def _stop(table: StopTable) -> Stop:
         table.against,
         loss,
         dashpot=table.dashpot,
+        pulls=table.pulls,
     )
 
 

@@ -43,7 +43,7 @@ WORDS = {  # that users try for a table, and what there is
     "frequency": "the range of frequencies is range_hz in [continuation]",
     "sweep": "the range of frequencies is range_hz in [continuation]",
     "simulation": "a simulation is not part of a scene; there is nldyn.simulate in Python",
-    "gyroscopic": "gyroscopic matrices are not modelled",
+    "gyroscopic": "a gyroscopic matrix is a key of [matrices]",
 }
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 

@@ -361,6 +361,8 @@ class MatricesTable(Table):
     mass: RowsOrFile
     stiffness: RowsOrFile
     damping: RowsOrFile | None = None
+    gyroscopic: Matrix | None = None
+    circulatory: Matrix | None = None
     interfaces: Annotated[dict[str, VectorOrPlace], Field(min_length=1)]
     loads: dict[str, VectorOrPlace] = {}
 
@@ -419,6 +421,7 @@ class StopTable(Table):
     gap: Number = 0.0
     dissipation: NotNegative | None = None
     dashpot: NotNegative = 0.0
+    pulls: bool = True
     restitution: Annotated[float, Field(gt=0, le=1)] | None = None
     impact_speed: Positive | None = None
     direction: Literal[1, -1] = 1
@@ -438,6 +441,12 @@ class StopTable(Table):
             raise ValueError("needs both 'restitution' and 'impact_speed', or neither")
         if self.restitution is not None:
             _refuse(self, ("dissipation",), "a stop whose 'restitution' is given")
+        if not self.pulls and (self.law != "linear" or not self.dashpot):
+            raise ValueError(
+                "has 'pulls = false', which needs law 'linear' and a 'dashpot' above 0"
+            )
+        if not self.pulls and (self.dissipation or self.restitution is not None):
+            raise ValueError("has 'pulls = false' beside 'dissipation' or 'restitution'; keep one")
         sphere = ("radius", "youngs_modulus", "poissons_ratio")
         if self.law == "linear":
             _refuse(self, (*sphere, "exponent"), "a linear stop")

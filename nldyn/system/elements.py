@@ -198,7 +198,10 @@ class Stop:
         smooth: one with a kink is several stops with gaps of their own.
     dashpot : float
         c in N s/m, parallel to the spring (Kelvin and Voigt's model for a linear one): the force
-        jumps at the contact, and pulls at the end of it.
+        jumps at the contact, and pulls at the end of it unless `pulls` forbids that.
+    pulls : bool
+        False: the force of a linear stop with a dashpot is never negative. It lets go where
+        k δ + c δ' falls below zero, and presses again where that rises above it within the stop.
 
     Raises
     ------
@@ -220,6 +223,7 @@ class Stop:
     dissipation: float = 0.0
     law: ContactLaw | None = None
     dashpot: float = 0.0
+    pulls: bool = True
 
     def __post_init__(self) -> None:
         check_types(**{"stop: at": (self.at, str), "stop: against": (self.against, str, None)})
@@ -244,6 +248,14 @@ class Stop:
                 if getattr(self, name):
                     raise SystemModelError(f"{owner}: give either {name} or a law of your own")
             check_law(owner, self.law, self.stiffness, self.exponent)
+        if not isinstance(self.pulls, bool | np.bool_):
+            raise SystemModelError(f"{owner}: pulls must be True or False, got {shown(self.pulls)}")
+        plain = self.exponent == 1.0 and self.law is None and not self.dissipation
+        if not self.pulls and not (plain and self.dashpot):
+            raise SystemModelError(
+                f"{owner}: pulls = False is for a linear stop (exponent 1) with a dashpot; others "
+                "without one never pull, but for a loss by dissipation"
+            )
         _finite(owner, "gap", self.gap)
         if self.against == self.at:
             raise SystemModelError(f"{owner}: against must be another interface")
@@ -284,6 +296,8 @@ class Stop:
             (0.0, 0.0, 0.0) if x <= 0.0 else law(x, v)
             for x, v in zip(delta.ravel().tolist(), rate.ravel().tolist(), strict=True)
         ]
+        if not self.pulls:
+            values = [(0.0, 0.0, 0.0) if value[0] < 0.0 else value for value in values]
         table = np.array(values, dtype=float).reshape((*delta.shape, 3))
         return table[..., 0], table[..., 2]
 
@@ -332,6 +346,7 @@ class Stop:
         against: str | None = None,
         dissipation: float = 0.0,
         dashpot: float = 0.0,
+        pulls: bool = True,
     ) -> Stop:
         """Linear one-sided spring (the bilinear oscillator's), stiffness in N/m.
 
@@ -342,7 +357,7 @@ class Stop:
         >>> Stop.linear("middle", 1.33e7).exponent
         1.0
         """
-        return cls(at, stiffness, 1.0, gap, direction, against, dissipation, None, dashpot)
+        return cls(at, stiffness, 1.0, gap, direction, against, dissipation, None, dashpot, pulls)
 
 
 @dataclass(frozen=True)

@@ -63,6 +63,8 @@ class System:
         Modal force of each load vector: of what acts on the whole structure, as weight does.
     springs : tuple
         What acts at the interfaces all the time. The modes are those of the structure without.
+    circulatory : (n, n) array, optional
+        Skew part of the modal stiffness, 1/s²; the damping may have a skew part, too.
 
     Raises
     ------
@@ -87,6 +89,7 @@ class System:
     excitation: tuple[Excitation, ...] = ()
     loads: Mapping[str, Real] = field(default_factory=dict)
     springs: tuple[AnySpring, ...] = ()
+    circulatory: Real | None = None
 
     def __repr__(self) -> str:
         """One line: modes, interfaces, and what acts."""
@@ -169,6 +172,8 @@ class System:
         excitation: Sequence[Excitation] = (),
         loads: Mapping[str, ArrayLike] = MappingProxyType({}),
         springs: Sequence[AnySpring] = (),
+        gyroscopic: ArrayLike | None = None,
+        circulatory: ArrayLike | None = None,
     ) -> System:
         """System from mass, stiffness and damping matrices.
 
@@ -187,11 +192,17 @@ class System:
         loads : mapping of str to (n,) array_like
             Load vectors of what acts on the whole structure: M r for a weight or a motion of the
             base along r.
+        gyroscopic : (n, n) array_like, optional
+            Skew matrix in N s/m, added to the damping: that of a rotor at its speed.
+        circulatory : (n, n) array_like, optional
+            Skew matrix in N/m, added to the stiffness: the cross-coupling of bearings and seals.
+            A stiffness K that is not symmetric is (K + Kᵀ)/2 and this, (K - Kᵀ)/2.
 
         Raises
         ------
         SystemModelError
-            If a matrix is not square, symmetric, finite or definite; see also `System`.
+            If a matrix is not square, symmetric or skew, finite or definite, or the motion without
+            contact grows; see also `System`.
 
         Examples
         --------
@@ -219,6 +230,12 @@ class System:
             if C.shape != M.shape:
                 raise SystemModelError(f"damping is {C.shape} but mass is {M.shape}")
             D = D + modes.T @ C @ modes
+        G, N = (
+            None if given is None else modes.T @ _skew(name, given, omega.size) @ modes
+            for name, given in (("gyroscopic", gyroscopic), ("circulatory", circulatory))
+        )
+        if G is not None:
+            D = D + 0.5 * (G - G.T)
         participation, modal_loads = (
             {
                 name: modes.T @ _load_vector(f"{what} '{name}'", vector, omega.size)
@@ -235,6 +252,7 @@ class System:
             _listed("excitation", excitation),
             modal_loads,
             _listed("springs", springs),
+            N,
         )
 
     @classmethod
@@ -343,7 +361,8 @@ class System:
     @cached_property
     def stiffness(self) -> Real:
         """Modal stiffness of the linear part, (n, n), 1/s²."""
-        return np.diag(self.natural_frequencies**2) + self.spring_stiffness
+        K = np.diag(self.natural_frequencies**2) + self.spring_stiffness
+        return K if self.circulatory is None else K + self.circulatory
 
     @cached_property
     def bonds(self) -> tuple[Bond, ...]:
@@ -384,7 +403,9 @@ class System:
     @cached_property
     def conservative(self) -> bool:
         """Whether nothing takes energy out: no damping, and no stop whose force knows the speed."""
-        return not np.any(self.total_damping) and not self.loses_by_speed
+        damped = np.any(self.total_damping + self.total_damping.T)
+        damped = damped or np.any(_or_zero(self.circulatory))
+        return not damped and not self.loses_by_speed
 
     @cached_property
     def symmetric(self) -> bool:
@@ -392,10 +413,11 @@ class System:
 
         All excitation must change its sign after half its period T: it has odd harmonics only.
         """
-        stops = [
-            (self.stop_vector(s), (s.stiffness, s.exponent, s.gap, s.dissipation, s.dashpot, s.law))
-            for s in self.stops
-        ]
+
+        def law_of(s: Stop) -> tuple[object, ...]:
+            return s.stiffness, s.exponent, s.gap, s.dissipation, s.dashpot, s.law, s.pulls
+
+        stops = [(self.stop_vector(s), law_of(s)) for s in self.stops]
         odd = not np.any(self.drive[self.orders % 2 == 0.0])
         return (
             odd
@@ -411,9 +433,11 @@ class System:
     def linear(self) -> LinearPart:
         """Independent pairs of coordinates of the linear part."""
         omega, modes, D = self.natural_frequencies, None, self.total_damping
+        cross = self.circulatory
         if np.any(self.spring_stiffness):
             omega, modes = diagonalised(omega, self.spring_stiffness)
             D = without_rounding(modes.T @ D @ modes)
+            cross = None if cross is None else modes.T @ cross @ modes
         squares = np.zeros(self.size)
         for stop in self.stops:
             if stop.exponent == 1.0 or stop.gap < 0.0:
@@ -425,7 +449,7 @@ class System:
             c = self.vector_between(bond.at, bond.against)
             slope = abs(bond.coefficients[0]) if bond.coefficients else 0.0
             squares += slope * (c if modes is None else modes.T @ c) ** 2
-        part = linear_part(omega, D, np.sqrt(squares))
+        part = linear_part(omega, D, np.sqrt(squares), cross)
         return part if modes is None else part.of_modes(modes)
 
     def vector_between(self, at: str, against: str | None) -> Real:
@@ -537,6 +561,8 @@ class System:
             raise SystemModelError("frequencies_hz must not be negative")
         if self.damping.shape != (n, n):
             raise SystemModelError(f"damping must be ({n}, {n}), got {self.damping.shape}")
+        if self.circulatory is not None and self.circulatory.shape != (n, n):
+            raise SystemModelError(f"circulatory must be ({n}, {n}), got {self.circulatory.shape}")
         for what, vectors in (("participation of", self.participation), ("load", self.loads)):
             for name, phi in vectors.items():
                 _check_modal_vector(f"{what} '{name}'", phi, n)
@@ -625,6 +651,7 @@ def same_system(a: System, b: System) -> bool:
     return a is b or (
         np.array_equal(a.natural_frequencies, b.natural_frequencies)
         and np.array_equal(a.damping, b.damping)
+        and np.array_equal(_or_zero(a.circulatory), _or_zero(b.circulatory))
         and all(
             list(one) == list(other) and all(np.array_equal(one[name], other[name]) for name in one)
             for one, other in ((a.participation, b.participation), (a.loads, b.loads))
@@ -636,6 +663,20 @@ def same_system(a: System, b: System) -> bool:
 
 def _rank(rows: Sequence[Real], columns: int) -> int:
     return int(np.linalg.matrix_rank(np.array(rows).reshape(-1, columns))) if columns else 0
+
+
+def _or_zero(matrix: Real | None) -> Real:
+    return np.zeros(0) if matrix is None else matrix
+
+
+def _skew(name: str, values: ArrayLike, size: int) -> Real:
+    matrix = np.atleast_2d(numbers(name, values))
+    if matrix.shape != (size, size):
+        raise SystemModelError(f"{name} is {matrix.shape} but mass is {(size, size)}")
+    largest = float(np.abs(matrix).max())
+    if not np.allclose(matrix, -matrix.T, rtol=1e-10, atol=1e-12 * largest):
+        raise SystemModelError(f"{name} must be skew: its transpose must be minus itself")
+    return 0.5 * (matrix - matrix.T)
 
 
 def _negative(K: Real) -> bool:
@@ -650,7 +691,9 @@ def _symmetric(name: str, values: ArrayLike) -> Real:
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
         raise SystemModelError(f"{name} must be a square matrix, got shape {matrix.shape}")
     if not np.allclose(matrix, matrix.T, rtol=1e-10, atol=1e-12 * float(np.abs(matrix).max())):
-        raise SystemModelError(f"{name} must be symmetric")
+        skew = {"stiffness": "circulatory", "damping": "gyroscopic"}.get(name)
+        hint = f"; a skew part, as of rotors, is given as {skew}" if skew else ""
+        raise SystemModelError(f"{name} must be symmetric{hint}")
     return matrix
 
 

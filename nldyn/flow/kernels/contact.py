@@ -9,16 +9,22 @@ import numpy as np
 from nldyn.flow.kernels.compiling import always_inline, inner
 from nldyn.flow.kernels.flights import (
     carried_noise,
-    distance,
     output_derivatives,
     output_noise,
     output_size,
     rate_noise,
 )
-from nldyn.flow.kernels.law import depends_on_speed, is_bond, law, singular_slope
+from nldyn.flow.kernels.law import (
+    depends_on_speed,
+    is_bond,
+    law,
+    never_pulls,
+    singular_slope,
+)
 from nldyn.flow.kernels.layout import (
     CONTACT_FAILED,
     CREEP,
+    DASHPOT,
     DECAY,
     DURATION,
     EXPONENT,
@@ -28,12 +34,14 @@ from nldyn.flow.kernels.layout import (
     INSTANT,
     MOBILITY,
     OK,
+    RELEASE,
     STIFFNESS,
 )
 from nldyn.flow.kernels.panel import node_outputs, panel_end, solve_panel
 from nldyn.flow.kernels.resolution import (
     first_doubt,
     first_root,
+    interpolate,
     largest,
     legendre_tail,
     map_fraction,
@@ -108,6 +116,40 @@ def stretch_profile(tab, old_kind, new_kind, ratio, old, new):
 
 
 @inner
+def watched(fl, stop, closed, w, phase):
+    """The output that tells when a stop opens or closes, by passing its gap.
+
+    That is the penetration or, of one that never pulls and is penetrated, what its force goes with.
+    """
+    if never_pulls(fl, stop):
+        if closed[stop]:
+            return int(fl.stops[stop, RELEASE])
+        value, _, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
+        if value - fl.stops[stop, GAP] > 10.0 * output_noise(fl, stop, w):
+            return int(fl.stops[stop, RELEASE])
+    return stop
+
+
+@inner
+def watched_pace(fl, stop, closed, w, phase):
+    """What that output exceeds the gap by, and its first two rates, the first with all forces.
+
+    The second leaves the forces out.
+    """
+    out = watched(fl, stop, closed, w, phase)
+    value, speed, accel, _ = output_derivatives(fl, out, w, phase, 0.0)
+    if out != stop:
+        for s in range(closed.size):
+            if closed[s]:
+                depth, rate, _, _ = output_derivatives(fl, s, w, phase, 0.0)
+                force, _, _ = law(fl, s, depth - fl.stops[s, GAP], rate)
+                for k in range(w.size):
+                    speed -= fl.rows[0, out, k] * fl.force[k, s] * force
+        accel = 0.0
+    return value - fl.stops[stop, GAP], speed, accel
+
+
+@inner
 def first_event(fl, tab, kind, phase, w, h, closed, panel, w_end):
     """Stop that first opens or closes within a panel and the fraction of the panel, or (-1, 2).
 
@@ -122,16 +164,21 @@ def first_event(fl, tab, kind, phase, w, h, closed, panel, w_end):
         if is_bond(fl, s):
             position += 1
             continue
-        noise = output_noise(fl, s, w)
-        start, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
-        end, _, _, _ = output_derivatives(fl, s, w_end, phase + fl.omega * h, 0.0)
+        out = watched(fl, s, closed, w, phase)
+        noise = output_noise(fl, out, w)
+        start, speed, _, _ = output_derivatives(fl, out, w, phase, 0.0)
+        end, _, _, _ = output_derivatives(fl, out, w_end, phase + fl.omega * h, 0.0)
         sign = 1.0 if closed[s] else -1.0  # the values are positive as long as nothing happens
         if closed[s]:
             position += 1
             for i in range(m):
                 inner[0, i] = panel.output[position, i]
+            if out != s:
+                creep_time = fl.stops[s, DASHPOT] / fl.stops[s, STIFFNESS]
+                for i in range(m):
+                    inner[0, i] += creep_time * panel.output[panel.active.size + position, i]
         else:
-            node_outputs(fl, tab, kind, phase, w, h, panel, s, inner)
+            node_outputs(fl, tab, kind, phase, w, h, panel, out, inner)
             for i in range(m):
                 inner[0, i] = fl.stops[s, GAP] - inner[0, i]
         values[0], values[m + 1] = (
@@ -149,6 +196,15 @@ def first_event(fl, tab, kind, phase, w, h, closed, panel, w_end):
         root = first_root(tab, values, fine, below, edge)
         if root <= 1.0:
             fraction = map_fraction(tab, kind, root)
+            if not closed[s] and out != s:  # beyond the surface its force would press in vain
+                node_outputs(fl, tab, kind, phase, w, h, panel, s, inner)
+                for i in range(m):
+                    values[i + 1] = inner[0, i]
+                values[0], _, _, _ = output_derivatives(fl, s, w, phase, 0.0)
+                values[m + 1], _, _, _ = output_derivatives(fl, s, w_end, phase + fl.omega * h, 0.0)
+                if interpolate(tab, values, root) < fl.stops[s, GAP]:
+                    doubtful = min(doubtful, fraction)
+                    continue
             if fraction < where:
                 event, where = s, fraction
         elif tail > 10.0 * noise:
@@ -340,9 +396,8 @@ def time_to_event(fl, stop, closed, w, phase):
     The nearer root of the parabola through the present; inf where the gap changes the wrong way.
     """
     always_inline()
-    value, speed, accel, _ = output_derivatives(fl, stop, w, phase, 0.0)
-    value -= fl.stops[stop, GAP]
-    if (speed >= 0.0) if closed else (speed <= 0.0):
+    value, speed, accel = watched_pace(fl, stop, closed, w, phase)
+    if (speed >= 0.0) if closed[stop] else (speed <= 0.0):
         return np.inf
     square = speed * speed - 2.0 * accel * value
     root = math.sqrt(square) if square > 0.0 else abs(speed)
@@ -359,19 +414,19 @@ def coarsest_instant(fl):
 
 
 @inner
-def at_switch(fl, stop, w, phase, allowed):
-    """Whether a stop is just at its surface, to within a time allowed or rounding."""
-    value, speed, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
-    reach = allowed * abs(speed) + 10.0 * output_noise(fl, stop, w)
-    return abs(value - fl.stops[stop, GAP]) <= reach
+def at_switch(fl, stop, w, phase, allowed, closed):
+    """Whether a stop is just about to switch, to within a time allowed or rounding."""
+    value, speed, _ = watched_pace(fl, stop, closed, w, phase)
+    out = watched(fl, stop, closed, w, phase)
+    return abs(value) <= allowed * abs(speed) + 10.0 * output_noise(fl, out, w)
 
 
 @inner
 def with_event(fl, stop, w, phase, allowed, closed):
     """Whether a stop is to open or close now, to within a time allowed or rounding."""
-    if is_bond(fl, stop) or not at_switch(fl, stop, w, phase, allowed):
+    if is_bond(fl, stop) or not at_switch(fl, stop, w, phase, allowed, closed):
         return False
-    _, speed, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
+    _, speed, _ = watched_pace(fl, stop, closed, w, phase)
     return closed[stop] != (speed > 0.0)
 
 
@@ -394,9 +449,10 @@ def stop_at_switch(fl, w, phase, h, closed):
     for s in range(closed.size):
         if is_bond(fl, s):
             continue
-        late = abs(time_to_event(fl, s, closed[s], w, phase))
-        gap = abs(distance(fl, s, w, phase))
-        here = late <= allowed or gap <= 10.0 * output_noise(fl, s, w)
+        late = abs(time_to_event(fl, s, closed, w, phase))
+        gap, _, _ = watched_pace(fl, s, closed, w, phase)
+        out = watched(fl, s, closed, w, phase)
+        here = late <= allowed or abs(gap) <= 10.0 * output_noise(fl, out, w)
         if late < nearest and here:
             stop, nearest = s, late
     return stop
@@ -433,7 +489,7 @@ def graded_length(fl, active, w, phase, h, sign, switched, event):
 
 
 @inner
-def far_off(fl, phase, w, h, tried, panel, event, where):
+def far_off(fl, phase, w, h, tried, panel, event, where, closed):
     """Whether a panel holds another solution of the force laws than the motion.
 
     It opens a stop at once that is not about to, or lets one feed as much as it should damp.
@@ -441,7 +497,7 @@ def far_off(fl, phase, w, h, tried, panel, event, where):
     if event < 0:
         return not panel.decay[1].min() > -DECAY
     allowed = 10.0 * coarsest_instant(fl) * h
-    return not (h * where > 1e-12 * tried or at_switch(fl, event, w, phase, allowed))
+    return not (h * where > 1e-12 * tried or at_switch(fl, event, w, phase, allowed, closed))
 
 
 @inner
@@ -475,7 +531,8 @@ def contact_panel(
     looked = False
     for attempt in range(100):
         if h <= 1e-16 * tried or phase + fl.omega * h == phase:
-            if aim < 0 or not at_switch(fl, aim, w, phase, 10.0 * coarsest_instant(fl) * tried):
+            coarse = 10.0 * coarsest_instant(fl) * tried
+            if aim < 0 or not at_switch(fl, aim, w, phase, coarse, closed):
                 aim = stop_at_switch(fl, w, phase, tried, closed)
             return OK if aim >= 0 else CONTACT_FAILED, kind, 0.0, aim
         for a in range(active.size):
@@ -487,7 +544,7 @@ def contact_panel(
             decays = shows_decay(fl, tab, kind, h, panel)
             panel_end(fl, tab, kind, phase, w, h, panel, w_end)
             event, where, doubtful = first_event(fl, tab, kind, phase, w, h, closed, panel, w_end)
-            found = not far_off(fl, phase, w, h, tried, panel, event, where)
+            found = not far_off(fl, phase, w, h, tried, panel, event, where, closed)
         if not found:
             limit = 0.4 * min(h, tried)
             aim = -1
@@ -526,13 +583,15 @@ def contact_panel(
                 if (
                     aim < 0
                     and not is_bond(fl, active[a])
-                    and time_to_event(fl, active[a], closed[active[a]], w_end, end_phase) < h
+                    and time_to_event(fl, active[a], closed, w_end, end_phase) < h
                 ):
                     aim = active[a]
         if aim >= 0 and not lost:
-            dh = time_to_event(fl, aim, closed[aim], w_end, end_phase)
+            dh = time_to_event(fl, aim, closed, w_end, end_phase)
+            late, _, _ = watched_pace(fl, aim, closed, w_end, end_phase)
+            rounded = output_noise(fl, watched(fl, aim, closed, w_end, end_phase), w)
             if abs(dh) <= instant_with(fl, aim, w_end, end_phase, h, closed) or (
-                dh < np.inf and abs(distance(fl, aim, w_end, end_phase)) <= output_noise(fl, aim, w)
+                dh < np.inf and abs(late) <= rounded
             ):
                 if fine:
                     return OK, kind, h, aim

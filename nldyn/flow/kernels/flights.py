@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from nldyn.flow.kernels.compiling import always_inline, inner, never_inline
-from nldyn.flow.kernels.layout import GAP, MOST_STEPS, FlowData
+from nldyn.flow.kernels.layout import GAP, MOST_STEPS, RELEASE, FlowData
 from nldyn.system.linear import DRIFT, DRIFT_ON, GROWTH, NEAR, STEADY, Terms
 
 
@@ -450,18 +450,39 @@ def safe_step(h, h1, h2, bound):
 def closing_time(fl, stop, w, phase, start, end, shortest):
     """First time in [start, end] at which a stop closes, or inf; no contact is passed over.
 
+    One that never pulls closes within, too, where its force turns positive. Negative if the search
+    takes too many steps.
+    """
+    release = int(fl.stops[stop, RELEASE])
+    if release >= 0:
+        value, _, _, _ = output_derivatives(fl, stop, w, phase, start)
+        if value > fl.stops[stop, GAP]:
+            at = rising_time(fl, stop, release, w, phase, start, end, shortest)
+            if not 0.0 <= at <= end:
+                return at
+            value, _, _, _ = output_derivatives(fl, stop, w, phase, at)
+            if value > fl.stops[stop, GAP]:
+                return at
+            start = at
+    return rising_time(fl, stop, stop, w, phase, start, end, shortest)
+
+
+@inner
+def rising_time(fl, stop, out, w, phase, start, end, shortest):
+    """First time in [start, end] at which an output rises to the gap of a stop, or inf.
+
     Every step is bounded by the third derivative, so that it cannot cross a contact; the steps
     converge to the contact at order three. Only contacts that are shorter than `shortest` or no
     deeper than rounding can be stepped over, and only where the approach is so slow that the
     acceleration stops it in that time. Negative if it takes too many steps.
     """
     longest = 2.0 * math.pi / fl.omega
-    noise = output_noise(fl, stop, w)
+    noise = output_noise(fl, out, w)
     t = start
     for _ in range(MOST_STEPS):
         if t > end:
             return np.inf
-        value, h1, h2, bound = output_derivatives(fl, stop, w, phase, t)
+        value, h1, h2, bound = output_derivatives(fl, out, w, phase, t)
         h = value - fl.stops[stop, GAP]
         if h >= 0.0 and h1 > 0.0:
             return t

@@ -19,6 +19,7 @@ from nldyn.flow.kernels.layout import (
     EXPONENT,
     FIRST_POWER,
     GAP,
+    RELEASE,
     ROUND,
     STIFFNESS,
 )
@@ -51,6 +52,12 @@ def is_bond(fl, stop):
 
 
 @inner
+def never_pulls(fl, stop):
+    """Whether a stop with a dashpot lets go where its force would pull."""
+    return fl.stops[stop, RELEASE] >= 0.0
+
+
+@inner
 def bond_law(numbers, u, speed):
     """Force of a bond, Σ k_j u^j + (drag u² + cubic u'²) u', and its two derivatives."""
     secant, bend = 0.0, 0.0  # Σ k_j u^(j - 1), and its derivative
@@ -73,6 +80,17 @@ def law(fl, stop, delta, speed):
         return bond_law(fl.stops[stop], delta, speed)
     if delta <= 0.0:
         return 0.0, 0.0, 0.0
+    if (
+        never_pulls(fl, stop)
+        and fl.stops[stop, STIFFNESS] * delta < -fl.stops[stop, DASHPOT] * speed
+    ):
+        return 0.0, 0.0, 0.0
+    return pressing_law(fl, stop, delta, speed)
+
+
+@inner
+def pressing_law(fl, stop, delta, speed):
+    """The same of a stop that is closed."""
     if fl.laws[stop] != 0:
         return call_law(fl.laws[stop], delta, speed)
     numbers = fl.stops[stop]
@@ -94,11 +112,13 @@ def closed_law(fl, stop, delta, speed):
     the outermost node may come to lie on its other side, and would drop the whole stiffness. So
     does a dashpot.
     """
-    if delta > 0.0 or is_bond(fl, stop):
+    if is_bond(fl, stop):
         return law(fl, stop, delta, speed)
+    if delta > 0.0:
+        return pressing_law(fl, stop, delta, speed)
     dashpot = fl.stops[stop, DASHPOT]
     if fl.stops[stop, EXPONENT] < ROUND:
-        force, stiffness, viscosity = law(fl, stop, -delta, speed)
+        force, stiffness, viscosity = pressing_law(fl, stop, -delta, speed)
         return 2.0 * dashpot * speed - force, stiffness, 2.0 * dashpot - viscosity
     return dashpot * speed, 0.0, dashpot
 

@@ -50,10 +50,11 @@ class StopRow(NamedTuple):
     bond: float = 0.0  # 1 for what is no stop but acts all the time, with the law `bond_law`
     drag: float = 0.0  # of a bond: coefficients of u² u' and u'^3
     cubic: float = 0.0
+    release: float = -1.0  # output δ + δ' dashpot/stiffness of a stop that never pulls, or -1
 
 
 GAP, STIFFNESS, EXPONENT, DISSIPATION, DASHPOT, MOBILITY, DURATION, INSTANT = range(8)
-BOND, DRAG, CUBIC = range(len(StopRow._fields) - 3, len(StopRow._fields))
+BOND, DRAG, CUBIC, RELEASE = range(len(StopRow._fields) - 4, len(StopRow._fields))
 FIRST_POWER = len(
     StopRow._fields
 )  # column of the coefficient of u of a bond; those of u²... follow

@@ -31,7 +31,7 @@ from nldyn.flow.kernels.flights import (
     term,
     turned,
 )
-from nldyn.flow.kernels.law import is_bond, law
+from nldyn.flow.kernels.law import is_bond, law, never_pulls
 from nldyn.flow.kernels.layout import (
     CONTACT_FAILED,
     DASHPOT,
@@ -41,6 +41,7 @@ from nldyn.flow.kernels.layout import (
     INSTANT,
     OK,
     RECORD_FULL,
+    RELEASE,
     ROUNDED,
     TOO_MANY_PIECES,
     TOO_MANY_STEPS,
@@ -135,6 +136,11 @@ def propagate(
         value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
         left = output_noise(fl, s, w) if speed < 0.0 else 0.0  # it opens at this instant
         closed[s] = is_bond(fl, s) or value - fl.stops[s, GAP] > left
+        if never_pulls(fl, s) and closed[s]:
+            release = int(fl.stops[s, RELEASE])
+            value, speed, _, _ = output_derivatives(fl, release, w, phase, 0.0)
+            left = output_noise(fl, release, w) if speed < 0.0 else 0.0
+            closed[s] = value - fl.stops[s, GAP] > left
     pushes = np.full(n_stops, np.nan)
     status = run_pieces(
         fl, tab, w, columns, phase, before, duration, closed, closings, with_columns, rec,
@@ -192,10 +198,23 @@ def jump_columns(fl, stop, phase, t, closes, columns):
 
 
 @inner
-def switch(fl, stop, phase, t, closed, with_columns, columns):
+def jumps(fl, stop, w, phase):
+    """Whether the force jumps as a stop opens or closes.
+
+    That of one that never pulls does so only where it is hit, not where it lets go, or presses
+    again: there the body moves out.
+    """
+    if never_pulls(fl, stop):
+        _, speed, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
+        return speed > 0.0
+    return fl.stops[stop, DASHPOT] > 0.0
+
+
+@inner
+def switch(fl, stop, w, phase, t, closed, with_columns, columns):
     """Close a stop that is open, or open one that is closed, a time t after the start."""
     closed[stop] = not closed[stop]
-    if with_columns and fl.stops[stop, DASHPOT] > 0.0:
+    if with_columns and jumps(fl, stop, w, phase):
         jump_columns(fl, stop, phase, t, closed[stop], columns)
 
 
@@ -207,7 +226,7 @@ def switch_with(fl, w, phase, t, h, closed, closings, with_columns, columns):
     """
     for s in range(closed.size):
         if with_event(fl, s, w, phase, 10.0 * fl.stops[s, INSTANT] * h, closed):
-            switch(fl, s, phase, t, closed, with_columns, columns)
+            switch(fl, s, w, phase, t, closed, with_columns, columns)
             if closed[s]:
                 closings[s] += 1
 
@@ -275,7 +294,7 @@ def run_pieces(
             skip = 0.0
             if stop >= 0:
                 here = phase + fl.omega * t
-                switch(fl, stop, here, t, closed, with_columns, columns)
+                switch(fl, stop, w, here, t, closed, with_columns, columns)
                 closings[stop] += 1
                 switch_with(fl, w, here, t, 0.0, closed, closings, with_columns, columns)
                 start_switch = 1
@@ -289,7 +308,7 @@ def run_pieces(
             if lost_to_rounding(fl, active[0], w, peak, noise) > WORST_ROUNDING:
                 return ROUNDED
             if peak <= 100.0 * noise:  # a touch without force
-                switch(fl, active[0], here, t, closed, with_columns, columns)
+                switch(fl, active[0], w, here, t, closed, with_columns, columns)
                 closings[active[0]] -= 1
                 start_switch, skip = 0, max(left, shortest)
                 continue
@@ -339,7 +358,7 @@ def run_pieces(
         if event >= 0:
             panel.decay[:] = 0.0
             here = phase + fl.omega * t
-            switch(fl, event, here, t, closed, with_columns, columns)
+            switch(fl, event, w, here, t, closed, with_columns, columns)
             start_switch = 1
             if closed[event]:
                 closings[event] += 1

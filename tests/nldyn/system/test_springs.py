@@ -6,11 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from independent import Motion
 
 import nldyn
 from nldyn import (
     CubicDamper,
     Damper,
+    FlowMap,
     HarmonicForce,
     Parameter,
     PolynomialSpring,
@@ -20,8 +22,9 @@ from nldyn import (
 )
 from nldyn.app.cli import main
 from nldyn.base.errors import SceneError, SystemModelError
+from nldyn.base.resources import example
 from nldyn.scene.build import build_system
-from nldyn.scene.read import parse_scene
+from nldyn.scene.read import load_scene, parse_scene
 from nldyn.system.rest import rest, rest_positions
 
 UNITS = {f"m{i}": np.eye(6)[i].tolist() for i in range(6)}
@@ -259,3 +262,19 @@ def test_rest_positions_that_there_are_not():
 def test_springs_that_make_no_sense_in_a_scene(old, new, words):
     with pytest.raises(SceneError, match=words):
         parse_scene(SCENE + WELLS.replace(old, new))
+
+
+def test_the_beam_with_two_wells_rests_where_beam_theory_says():
+    """u = sqrt((9 - 3EI/L³)/4e4), and a motion between the wells is that of Runge and Kutta."""
+    system = build_system(load_scene(example("two_well_beam.toml")))
+    held = 3.0 * 2.1e11 * 0.02 * 5e-4**3 / 12.0 / 0.3**3
+    tip = np.sqrt((9.0 - held) / 4e4)
+    found = sorted(float(system.participation["tip"] @ q) for q in rest_positions(system))
+    assert found == pytest.approx([-tip, tip], rel=1e-7)
+    assert tip == pytest.approx(0.0101721, abs=5e-8)
+    flow, start = FlowMap(system), np.array([1e-3, 0.0, 0.0, 0.0, 0.02, 0.0, 0.0, 0.0])
+    end, _ = Motion(system).run(start, (0.0, 2.0 * np.pi), 25.0, tangent=False)
+    here = flow.to_state(start)[None]
+    end_found = flow.shoot(here, np.array([0.0, 2.0 * np.pi]), 25.0).ends[0]
+    row = system.participation["tip"]
+    assert row @ flow.to_modal(end_found)[:4] == pytest.approx(row @ end[:4], rel=1e-8)
