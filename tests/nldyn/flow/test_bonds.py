@@ -235,3 +235,29 @@ def test_what_makes_no_sense_is_refused():
         CubicDamper("a", 0.0)
     with pytest.raises(SystemModelError, match="has no such coefficient"):
         nldyn.continue_in(nldyn.solve_orbit(SYSTEMS["hardening"], 0.1), Parameter("k4"), (0.0, 1.0))
+
+
+def test_a_fold_in_two_parameters_obeys_the_scaling_of_duffings_equation():
+    """With u = v/sqrt(k3), F² k3 alone decides where the folds are."""
+    system = SYSTEMS["hardening"]
+    branch = nldyn.continue_branch(nldyn.solve_orbit(system, 0.15), (0.12, 0.4))
+    fold = branch.special_points[0]
+    curve = nldyn.continue_special(
+        fold, ("frequency_hz", Parameter("k3")), ((0.05, 0.6), (0.9, 2.1))
+    )
+    (there,) = curve.at(Parameter("k3"), 2.0)
+    other = one(force=0.3 * math.sqrt(2.0), springs=[PolynomialSpring("a", [0.0, 0.0, 1.0])])
+    folds = nldyn.continue_branch(nldyn.solve_orbit(other, 0.15), (0.12, 0.5)).special_points
+    near = min(folds, key=lambda point: abs(point.frequency_hz - there.frequency_hz))
+    assert there.frequency_hz == pytest.approx(near.frequency_hz, rel=1e-9)
+    assert there.frequency_hz > 1.1 * fold.frequency_hz
+
+
+def test_both_wells_hold_an_orbit_and_a_motion_settles_in_one():
+    system = one(0.0, 0.25, 0.1, springs=[WELLS])
+    orbits = nldyn.find_orbits(system, 1.0 / (2.0 * math.pi), period=1)
+    phases = np.linspace(0.0, 2.0 * math.pi, 64, endpoint=False)
+    means = sorted(float(orbit.states(phases)[:, 0].mean()) for orbit in orbits)
+    assert means[0] < -0.5
+    assert means[0] == pytest.approx(-means[-1], abs=1e-8)
+    assert nldyn.classify(system, 1.0 / (2.0 * math.pi)).kind == "periodic"
