@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from nldyn.base.arrays import Real
     from nldyn.scene.schema import Scene
     from nldyn.search.diagram import Diagram
-    from nldyn.system.elements import Stop
+    from nldyn.system.rigid_stop import AnyStop
     from nldyn.system.system import AnySpring, System
 
 
@@ -736,15 +736,21 @@ def _places(system: System, q: Real) -> str:
     )
 
 
-def describe_stop(stop: Stop) -> str:
+def describe_stop(stop: AnyStop) -> str:
     """Say in a line where a stop is and what it does."""
+    from nldyn.system.rigid_stop import RigidStop
+
+    if isinstance(stop, RigidStop):
+        return (
+            f"rigid stop {_place(stop)}: restitution {stop.restitution_at(1.0):g}, "
+            f"gap {stop.gap:g} m, direction {stop.direction:+d}"
+        )
     unit = "N/m" if stop.exponent == 1.0 else f"N/m^{stop.exponent:g}"
     loss = f", dissipation {stop.dissipation:g} s/m" if stop.dissipation else ""
     loss += f", dashpot {stop.dashpot:g} N s/m" if stop.dashpot else ""
     loss += "" if stop.pulls else " (never pulls)"
-    where = f"at '{stop.at}'" + (f" against '{stop.against}'" if stop.against else "")
     return (
-        f"stop {where}: {stop.stiffness:.6g} {unit}, gap {stop.gap:g} m, "
+        f"stop {_place(stop)}: {stop.stiffness:.6g} {unit}, gap {stop.gap:g} m, "
         f"direction {stop.direction:+d}{loss}"
     )
 
@@ -755,6 +761,10 @@ def describe_spring(spring: AnySpring) -> str:
     values = getattr(spring, "coefficients", None) or (getattr(spring, "stiffness", 0.0),)
     terms = [f"{k:.6g} N/m" + (f"^{j}" if j > 1 else "") for j, k in enumerate(values, 1) if k]
     return f"spring {where}: {', '.join(terms) or '0 N/m'}"
+
+
+def _place(stop: AnyStop) -> str:
+    return f"at '{stop.at}'" + (f" against '{stop.against}'" if stop.against else "")
 
 
 def static_flexibility(system: System, interface: str) -> float:

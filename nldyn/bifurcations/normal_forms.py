@@ -27,8 +27,10 @@ from nldyn.bifurcations.critical import (
     torus,
 )
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special
+from nldyn.bifurcations.touching import rigid_grazing
 from nldyn.orbits.orbit import Orbit, minimal_period
 from nldyn.orbits.shooting import asymmetry, metric_length
+from nldyn.system.rigid_stop import RigidStop
 
 CLOSE = 1e-3  # relative distance in frequency of a special point that counts as close
 NEAR_RESONANCE_DEG = 5.0
@@ -429,6 +431,8 @@ def _grazing(special: SpecialPoint, others: Sequence[SpecialPoint]) -> NormalFor
     if not touches:
         return NormalForm("new contact", f"Grazing at {hz}: the system has no stop.")
     output, phase, is_maximum = touches[0]
+    if isinstance(orbit.system.stops[output], RigidStop):
+        return _rigid_grazing(special, output, phase)
     states = special.point.tangent[:-1].reshape(orbit.problem.segments, -1)
     try:
         along, by_parameter = output_change(orbit, output, phase, states)
@@ -448,6 +452,47 @@ def _grazing(special: SpecialPoint, others: Sequence[SpecialPoint]) -> NormalFor
         f"Grazing at {hz}: {stops} {verb} {what}{where}. {_stability_at_grazing(special, others)}"
     )
     return NormalForm(name, sentence, side=side, stable=orbit.stable)
+
+
+def _rigid_grazing(special: SpecialPoint, stop: int, phase: float) -> NormalForm:
+    """Grazing of a rigid stop, by the root of the distance in the map of the motion behind it.
+
+    References
+    ----------
+    A. B. Nordmark (1991), *J. Sound Vib.* 145, 279-297; W. Chin, E. Ott, H. E. Nusse, C. Grebogi
+    (1994), *Phys. Rev. E* 50, 4427-4444.
+    """
+    orbit = special.orbit
+    grazed = rigid_grazing(orbit)
+    begins = (
+        f"Grazing at {_hz(special)}: rigid {_stop_name(orbit, stop, phase)} is just touched, with "
+        "zero speed."
+    )
+    infinite = "a multiplier goes to infinity with the inverse of the speed of that impact"
+    if grazed is not None and grazed[2] > 0.0:
+        return NormalForm("rigid grazing", f"{begins} The branch comes from impacts: {infinite}.")
+    largest = orbit.largest_multiplier
+    if abs(largest) >= 1.0:
+        follows = "The orbit is unstable before it"
+    elif largest.imag != 0.0 or largest.real <= 0.0:
+        follows = (
+            "Its largest multiplier is not real and positive: no attractor with slight impacts is "
+            "to be expected behind it, the motion jumps"
+        )
+    else:
+        follows = f"Behind it {_behind_grazing(largest.real)}"
+    return NormalForm(
+        "rigid grazing", f"{begins} With impacts {infinite}. {follows}.", stable=orbit.stable
+    )
+
+
+def _behind_grazing(multiplier: float) -> str:
+    """What the map with a root shows behind a grazing, by the largest multiplier before it."""
+    if multiplier > 2.0 / 3.0:
+        return "chaos sets in at once (multiplier above 2/3)"
+    if multiplier > 0.25:
+        return "orbits of periods that grow by one, with chaos between (multiplier above 1/4)"
+    return "orbits of periods that grow by one follow each other (multiplier below 1/4)"
 
 
 def touching(orbit: Orbit) -> list[tuple[int, float, bool]]:

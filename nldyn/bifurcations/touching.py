@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import LocateError
 from nldyn.bifurcations.point import BranchPoint
 from nldyn.orbits.extremes import alone, nearest, sign_changes
-from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.orbit import Extremes, Orbit
+from nldyn.system.rigid_stop import RigidStop
 from nldyn.system.system import System
 
 SMOOTH_TOUCH = 1.5  # exponent of a stop from which on multipliers have a slope at a touch
@@ -73,6 +75,24 @@ def changes_hidden_by_birth(a: Orbit, b: Orbit) -> bool:
     return False
 
 
+def rigid_grazing(orbit: Orbit) -> tuple[int, float, float] | None:
+    """Rigid stop, phase and depth (in m) of the slightest impact or nearest miss; None without one.
+
+    The depth of an impact is its speed over ω.
+    """
+    found = [
+        (stop, float(phase), float(depth))
+        for stop, each in enumerate(orbit.system.stops)
+        if isinstance(each, RigidStop)
+        for phase, depth in zip(*_maxima(orbit.touches(stop)), strict=True)
+    ]
+    return min(found, key=lambda entry: abs(entry[2]), default=None)
+
+
+def _maxima(found: Extremes) -> tuple[Real, Real]:
+    return found.phases[found.is_maximum], found.values[found.is_maximum]
+
+
 def touches_sharply(system: System) -> bool:
     """Whether a stop is so stiff from the first touch that multipliers have no slope there."""
-    return any(stop.exponent < SMOOTH_TOUCH for stop in system.stops)
+    return any(isinstance(s, RigidStop) or s.exponent < SMOOTH_TOUCH for s in system.stops)

@@ -23,12 +23,16 @@ from nldyn.bifurcations.branch_crossing import (
 from nldyn.bifurcations.events import crosses
 from nldyn.bifurcations.period_doubling import flip_between, half_difference, passed_flip
 from nldyn.bifurcations.point import BranchPoint
+from nldyn.bifurcations.touching import rigid_grazing
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.options import ContinuationOptions
 from nldyn.branches.predictor import predicted
+from nldyn.flow.rigid import rigid_impacts
+from nldyn.orbits.bordered import length_unit
 from nldyn.orbits.conditions import TOUCH, depth_row
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import ShootingProblem, asymmetry, metric_length, shifts
+from nldyn.system.rigid_stop import RigidStop
 
 KINK = TOUCH  # step below which a branch may bend by any angle where the number of contacts changes
 BROKEN = 1e-8  # asymmetry of an orbit that is more than rounding,
@@ -37,6 +41,10 @@ EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit b
 MEETING_STEP = 1e-4  # longest step over which a doubled branch may meet the one it comes from
 LONGER_CROSSINGS = (1.0, 10.0, 100.0)  # steps from a crossing, over `SHORTEST_CROSSING`
 FARTHEST_CROSSING = 1e-4  # distance of one from which a step may begin
+GRAZES = 1e-4  # depth over size at which a walk that cannot go on is at a grazing of a rigid stop
+SLIGHTEST = 1e-7  # impact with one that is followed: multipliers go with its inverse
+NEAR_NODE = 1e-4  # phase from an impact to one of shooting from which a walk may pass it
+PAST_NODE = 1e-8, 1e-7, 1e-6, 1e-5, 1e-4  # relative steps of the frequency over it
 MOST_BEHIND = 4  # points behind the last one that tell where a branch goes on
 LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
 RECENT = 10  # points behind a walk that it does not come back to
@@ -64,6 +72,58 @@ class StepperState:
     step: float
     behind: Real
     count: int
+
+
+def _grazes_rigid(point: BranchPoint, least: float, most: float) -> StopReason | None:
+    """The reason to stop, if the slightest impact with a rigid stop, or nearest miss, is so deep.
+
+    Both bounds are shares of the orbit's size.
+    """
+    found = rigid_grazing(point.orbit)
+    if found is None or not least < found[2] / length_unit(point.orbit) < most:
+        return None
+    return Ending.GRAZES_RIGID.told(hz=f"{point.orbit.frequency_hz:.9g}")
+
+
+def _past_impact_at_node(here: BranchPoint) -> tuple[BranchPoint, float, float] | None:
+    """Next point where the phase of an impact with a rigid stop passes one of shooting, or None.
+
+    The state there jumps from that before the impact to that behind it, or back.
+    """
+    orbit, problem = here.orbit, here.orbit.problem
+    nodes = _beyond_impacts(orbit)
+    if nodes is None:
+        return None
+    by_frequency = np.zeros(orbit.point.size)
+    by_frequency[-1] = math.copysign(1.0, here.tangent[-1])
+    for shift in PAST_NODE:
+        guess = np.append(nodes, orbit.point[-1] + shift * by_frequency[-1])
+        found = problem.correct(guess, by_frequency, longest=NEAR_NODE, max_iterations=8)
+        if found.converged:
+            other = Orbit.of(problem, found, orbit.observe)
+            change = other.max_abs_displacement / orbit.max_abs_displacement - 1.0
+            if other.impacts == orbit.impacts and abs(change) < NEAR_NODE:
+                tangent = problem.tangent(found, by_frequency)
+                return BranchPoint(other, tangent, here.arclength + shift), 0.0, 0.0
+    return None
+
+
+def _beyond_impacts(orbit: Orbit) -> Real | None:
+    """States at the shooting phases, those beside impacts from the other side; None without any."""
+    problem, motion = orbit.problem, orbit.trajectory
+    phases, full = problem.phases[:-1], 2.0 * math.pi * orbit.period
+    nodes, found = problem.nodes(orbit.point).copy(), False
+    for stop, each in enumerate(orbit.system.stops):
+        hits = rigid_impacts(motion, stop) if isinstance(each, RigidStop) else None
+        for piece, phase in zip(*hits[:2], strict=True) if hits else ():
+            after = (phase - phases + 0.5 * full) % full - 0.5 * full
+            for node in np.flatnonzero(np.abs(after) <= NEAR_NODE):
+                found = True
+                if after[node] >= 0.0:
+                    nodes[node] = motion.record.start[piece]
+                else:
+                    nodes[node] = motion.states(np.array([np.nextafter(phase, -math.inf)]))[0]
+    return nodes if found else None
 
 
 @dataclass
@@ -115,7 +175,7 @@ class Stepper:
             here, step, behind = self.stride.here, self.stride.step, self.stride.behind
             attempt = self._shortened(problem, behind, here, step)
             if attempt is None:
-                self.stop_reason = Ending.SHORT_STEP.told(
+                self.stop_reason = _grazes_rigid(here, -GRAZES, GRAZES) or Ending.SHORT_STEP.told(
                     step=f"{self.options.min_step:g}", obstacle=self._obstacle
                 )
                 return
@@ -141,6 +201,11 @@ class Stepper:
                 )
                 yield end
                 return
+            grazes = _grazes_rigid(point, 0.0, SLIGHTEST)
+            if grazes:
+                self.stop_reason = grazes
+                yield point
+                return
             if self.closes(here, point):
                 self.stop_reason = Ending.CLOSED_BRANCH.told()
                 yield point
@@ -152,7 +217,9 @@ class Stepper:
                 self.stop_reason = Ending.MEETS_OPEN_END.told()
                 yield point
                 return
-            bent = step <= KINK and point.orbit.impacts != here.orbit.impacts
+            bent = step <= KINK and (
+                point.orbit.impacts != here.orbit.impacts or point.orbit.system.jumps
+            )
             growth = 0.7 * self.options.max_angle / max(angle, 1e-3)
             growth = min(growth, math.sqrt(0.5 * self.options.max_miss / max(miss, 1e-6)))
             step = min(step * min(max(growth, 0.5), 1.6), self.options.max_step)
@@ -179,7 +246,8 @@ class Stepper:
                 return step, *attempt
             step *= 0.5
             if not tried and self.options.min_step <= step < SHORTEST_CROSSING:
-                tried, attempt = True, self._past_crossing(here)
+                tried = True
+                attempt = _past_impact_at_node(here) or self._past_crossing(here)
                 if attempt is not None:
                     return attempt[0].arclength - here.arclength, *attempt
         return None
@@ -228,7 +296,7 @@ class Stepper:
         # a switch passes one of shooting, as the state there has a corner
         if step <= KINK and miss < 1.0:
             orbit = Orbit.of(problem, found, here.orbit.observe)
-            jumps = any(stop.dashpot for stop in problem.flow.system.stops)
+            jumps = problem.flow.system.jumps
             if jumps or orbit.impacts != here.orbit.impacts:
                 tangent = problem.tangent(found, direction)
                 return BranchPoint(orbit, tangent, here.arclength + step), 0.0, 0.0

@@ -40,6 +40,7 @@ class Ending(Enum):
     DISSOLVED = "the branch point dissolves, as the symmetry does that brings it about"
     CORNER = "a stop is grazed, where the curve has a corner that is not followed"
     OTHER_EXTREME = "another extreme gets as large as the one held, where that has a corner"
+    GRAZES_RIGID = "grazes a rigid stop at {hz} Hz, where a multiplier tends to infinity"
     MOST_POINTS = "{points} points"
     SHORT_STEP = "step below {step}: {obstacle}"
     OTHER = "{sentence}"  # of an earlier version

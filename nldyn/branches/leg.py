@@ -14,6 +14,7 @@ from nldyn.base.errors import ConvergenceError, LocateError
 from nldyn.bifurcations.branch_crossing import NEIGHBOUR, distance, same_crossing, without_repeats
 from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.bifurcations.touching import rigid_grazing
 from nldyn.bifurcations.within_step import insert_dip, special_points_between
 from nldyn.branches.arclength import Stepper, StepperState
 from nldyn.branches.branch import WalkEnd
@@ -127,6 +128,8 @@ class LegBuilder:
                     keep()
         self._search(len(self.nodes) - 1, closely=False)
         ending = self.walk.stop_reason.ending
+        if ending is Ending.GRAZES_RIGID:
+            self.special_points.append(_grazing_at_end(self.nodes))
         if ending is Ending.COMES_BACK:
             self.notes.append(self.walk.stop_reason)
         special = self.special_points
@@ -262,6 +265,18 @@ class LegBuilder:
         way = [replace(p, arclength=x) for p, x in zip(between, lengths, strict=True)]
         found, lost = _in_pieces([a, *way, b])
         return None if lost else found
+
+
+def _grazing_at_end(nodes: Sequence[BranchPoint]) -> SpecialPoint:
+    """The grazing of a rigid stop at which a walk has ended, with what is left of the way to it."""
+    last = nodes[-1]
+    error = last.orbit.error
+    here = rigid_grazing(last.orbit)
+    before = rigid_grazing(nodes[-2].orbit) if len(nodes) > 1 else None
+    if here and before and before[2] != here[2]:
+        way = last.orbit.frequency_hz - nodes[-2].orbit.frequency_hz
+        error += abs(way * here[2] / (before[2] - here[2]))
+    return SpecialPoint("GR", last, error)
 
 
 def not_told_apart(found: Sequence[SpecialPoint]) -> list[str]:

@@ -32,6 +32,7 @@ from nldyn.orbits.extremes import nearest
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import metric_length
 from nldyn.system.chart import Chart
+from nldyn.system.rigid_stop import is_linear
 
 UNFOLDED = 1e-6  # unfolding number from which a branch point has dissolved
 MEETING = 1e-9  # arclength within which a curve and a grazing meet
@@ -208,7 +209,7 @@ def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> list[CurvePo
     try:
         grazing = Grazing.of(here.orbit)
         family = here.found.at.family
-        linear = here.orbit.system.stops[grazing.stop].exponent == 1.0
+        linear = is_linear(here.orbit.system.stops[grazing.stop])
         if linear:
             found = _meeting(here.found.at, here.condition, grazing, 10.0 * CORNER_STEP)
         else:
@@ -315,7 +316,7 @@ def extremes_meet(here: CurvePoint) -> bool:
 def _grazes_linear(orbit: Orbit) -> bool:
     """Whether the extreme nearest to zero is one of a linear stop."""
     try:
-        return orbit.system.stops[Grazing.of(orbit).stop].exponent == 1.0
+        return is_linear(orbit.system.stops[Grazing.of(orbit).stop])
     except SystemModelError:
         return False
 

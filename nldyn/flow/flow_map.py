@@ -45,10 +45,11 @@ from nldyn.flow.kernels.layout import (
 from nldyn.flow.kernels.newton import Corrector, newton
 from nldyn.flow.kernels.sample import local_extremes, sample_states
 from nldyn.flow.options import FlowOptions, _floats, _nodes_for_switch
-from nldyn.flow.packing import parameter_tables
+from nldyn.flow.packing import bond_row, parameter_tables, stop_row
 from nldyn.runtime.interruption import behind
 from nldyn.runtime.kernel_cache import first_call
-from nldyn.system.contact_law import duration_factor, law_address
+from nldyn.system.contact_law import law_address
+from nldyn.system.elements import Stop
 from nldyn.system.linear import ForcedResponse
 from nldyn.system.parameters import Parameter
 from nldyn.system.system import System, same_system
@@ -212,11 +213,11 @@ class FlowMap:
     @cached_property
     def tables(self) -> GaussTables:
         """Collocation tables."""
-        exponents = [stop.exponent for stop in self.system.stops]
+        exponents = [stop.exponent for stop in self.system.elastic_stops]
         smooth = all(float(2.0 * exponent).is_integer() for exponent in exponents)
         power = 2 if smooth else 4
         nodes, tail = self.options.panel_nodes, self.options.panel_tail
-        for stop in self.system.stops:
+        for stop in self.system.elastic_stops:
             viscous = stop.dissipation != 0.0 or stop.dashpot != 0.0
             nodes = _nodes_for_switch(stop.exponent, power, viscous, nodes, tail)
         return gauss_tables(nodes, power)
@@ -231,7 +232,7 @@ class FlowMap:
         vectors = [*self._pushed, *s.participation.values()]
         rows = [s.displacement_row(v) for v in vectors]
         for stop, row in zip(s.stops, rows[: len(s.stops)], strict=True):
-            if not stop.pulls:
+            if isinstance(stop, Stop) and not stop.pulls:
                 rows.append(row + stop.dashpot / stop.stiffness * s.linear.times_block(row))
         return np.array(rows).reshape(len(rows), 2 * s.size)
 
@@ -259,21 +260,11 @@ class FlowMap:
         force = np.array([s.force_column(v) for v in vectors]).reshape(-1, 2 * s.size)
         releases = itertools.count(float(len(vectors) + len(s.participation)))
         stops = [
-            StopRow(
-                gap=stop.gap,
-                stiffness=stop.stiffness,
-                exponent=stop.exponent,
-                dissipation=stop.dissipation,
-                dashpot=stop.dashpot,
-                mobility=float(v @ v),
-                duration=duration_factor(stop.exponent),
-                instant=self.options.instant(0.0 if stop.dashpot else stop.exponent),
-                release=-1.0 if stop.pulls else next(releases),
-            )
+            stop_row(stop, float(v @ v), self.options, releases)
             for stop, v in zip(s.stops, vectors, strict=False)
         ]
         stops += [
-            StopRow(0.0, 1.0, 1.0, 0.0, 0.0, float(v @ v), 1.0, 0.0, 1.0, bond.drag, bond.cubic)
+            bond_row(bond, float(v @ v))
             for bond, v in zip(s.bonds, vectors[len(s.stops) :], strict=True)
         ]
         powers = np.zeros((len(stops), max((len(b.coefficients) for b in s.bonds), default=0)))

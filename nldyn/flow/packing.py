@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,11 +12,66 @@ from numpy.typing import NDArray
 from nldyn.base.arrays import Complex
 from nldyn.base.errors import check_types
 from nldyn.flow.kernels.layout import FIRST_POWER, StopRow
+from nldyn.flow.options import FlowOptions
+from nldyn.system.contact_law import duration_factor
 from nldyn.system.parameters import OF_SPRINGS, OF_STOPS, Parameter, check_exact
+from nldyn.system.rigid_stop import AnyStop, RigidStop
+from nldyn.system.springs import Bond
 from nldyn.system.system import System
 
+_NONE = 1.0  # stands in a row for what only an elastic stop has
 _COLUMNS = {name: StopRow._fields.index(name) for name in OF_STOPS}
 _EXCITATION = -1
+
+
+def stop_row(
+    stop: AnyStop, mobility: float, options: FlowOptions, releases: Iterator[float]
+) -> StopRow:
+    """Numbers of a stop as the kernels take them, with its mobility in 1/kg.
+
+    `releases` are the outputs that tell when stops let go that never pull.
+    """
+    if isinstance(stop, RigidStop):
+        restitution = 0.0 if callable(stop.restitution) else float(stop.restitution)
+        return StopRow(
+            gap=stop.gap,
+            stiffness=_NONE,
+            exponent=_NONE,
+            dissipation=0.0,
+            dashpot=0.0,
+            mobility=mobility,
+            duration=_NONE,
+            instant=options.instant(0.0),
+            restitution=restitution,
+        )
+    return StopRow(
+        gap=stop.gap,
+        stiffness=stop.stiffness,
+        exponent=stop.exponent,
+        dissipation=stop.dissipation,
+        dashpot=stop.dashpot,
+        mobility=mobility,
+        duration=duration_factor(stop.exponent),
+        instant=options.instant(0.0 if stop.dashpot else stop.exponent),
+        release=-1.0 if stop.pulls else next(releases),
+    )
+
+
+def bond_row(bond: Bond, mobility: float) -> StopRow:
+    """Numbers of a bond as the kernels take them, but for the coefficients of its powers."""
+    return StopRow(
+        gap=0.0,
+        stiffness=_NONE,
+        exponent=_NONE,
+        dissipation=0.0,
+        dashpot=0.0,
+        mobility=mobility,
+        duration=_NONE,
+        instant=0.0,
+        bond=1.0,
+        drag=bond.drag,
+        cubic=bond.cubic,
+    )
 
 
 def parameter_tables(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -26,18 +26,27 @@ from nldyn.system.elements import (
 )
 from nldyn.system.linear import LinearPart
 from nldyn.system.parameters import strength
+from nldyn.system.rigid_stop import TRIED_SPEEDS, AnyStop, Restitution, RigidStop
 from nldyn.system.springs import LARGEST_DEGREE, CubicDamper, PolynomialSpring, Spring
 from nldyn.system.system import AnyDamper, AnySpring, System
 
 TRIALS = ((0.1, 0.0), (1.0, 0.1), (1.0, -0.1))  # penetration over its unit, speed in m/s
 STATE_UNIT = "m kg^0.5"
 
-Laws = Mapping[int, ContactLaw]
+Laws = Mapping[int, Callable[..., Any]]  # of elastic stops, restitutions of rigid ones
 
 
 def laws_of(system: System) -> Laws:
     """Contact laws of a system's own, by the numbers of their stops."""
-    return {i: stop.law for i, stop in enumerate(system.stops) if stop.law}
+    rigid = {
+        i: stop.restitution
+        for i, stop in enumerate(system.stops)
+        if isinstance(stop, RigidStop) and callable(stop.restitution)
+    }
+    return {
+        **{i: s.law for i, s in enumerate(system.stops) if isinstance(s, Stop) and s.law},
+        **rigid,
+    }
 
 
 def checked_laws(laws: Laws | None) -> Laws:
@@ -68,7 +77,8 @@ def write_flow(group: Any, flow: FlowMap) -> None:
     put(basis, "left", linear.left, "kg^0.5 for displacements")
     put(basis, "growth", linear.growth, "1")
     set_attribute(basis, "condition", linear.condition)
-    stops = system.stops
+    stops = system.elastic_stops
+    _write_rigid_stops(group, system)
     _write_columns(
         group.create_group("stops"),
         {"at": [s.at for s in stops], "against": [s.against or "" for s in stops]},
@@ -142,6 +152,60 @@ def _coefficients(spring: AnySpring) -> list[float]:
     return known + [math.nan] * (LARGEST_DEGREE - len(known))
 
 
+def _write_rigid_stops(group: Any, system: System) -> None:
+    """Write the rigid stops, if there are some, with their places among all."""
+    placed = [(i, s) for i, s in enumerate(system.stops) if isinstance(s, RigidStop)]
+    if not placed:
+        return
+    stops = [stop for _, stop in placed]
+    _write_columns(
+        group.create_group("rigid_stops"),
+        {"at": [s.at for s in stops], "against": [s.against or "" for s in stops]},
+        {
+            "place": ("1", [i for i, _ in placed]),
+            "gap": ("m", [s.gap for s in stops]),
+            "direction": ("1", [s.direction for s in stops]),
+            "is_against": ("1", [s.against is not None for s in stops]),
+            "has_own_law": ("1", [s.law is not None for s in stops]),
+            "restitution": ("1", [[s.restitution_at(v) for v in TRIED_SPEEDS] for s in stops]),
+        },
+    )
+
+
+def _read_rigid_stops(group: Group, laws: Laws) -> dict[int, RigidStop]:
+    """The rigid stops by their places among all."""
+    at, against = group.texts("at"), group.texts("against")
+    count = len(at)
+    names = ("place", "gap", "direction", "is_against", "has_own_law")
+    values = {name: group.array(name, count) for name in names}
+    trials = group.array("restitution", count, len(TRIED_SPEEDS))
+    found = {}
+    for i in range(count):
+        place = int(values["place"][i])
+        restitution: float | Restitution = float(trials[i, 0])
+        if values["has_own_law"][i]:
+            if place not in laws:
+                raise SystemModelError(
+                    f"{group.path}: the restitution of stop {place} at '{at[i]}' is a function, "
+                    f"which a file cannot hold: pass laws={{{place}: restitution}}"
+                )
+            restitution = laws[place]
+        stop = RigidStop(
+            at[i],
+            restitution,
+            float(values["gap"][i]),
+            int(values["direction"][i]),
+            against[i] if values["is_against"][i] else None,
+        )
+        if [stop.restitution_at(v) for v in TRIED_SPEEDS] != trials[i].tolist():
+            raise SystemModelError(
+                f"{group.path}: the restitution passed for stop {place} at '{at[i]}' is not the "
+                "one with which the file was written: its values differ"
+            )
+        found[place] = stop
+    return found
+
+
 def _kind(source: Excitation) -> str:
     """Kind of excitation in files, with its harmonic unless that is the usual one."""
     if isinstance(source, ConstantForce):
@@ -188,7 +252,7 @@ def read_flow(group: Group, laws: Laws) -> FlowMap:
             omega,
             group.array("damping", n, n),
             dict(zip(names, vectors, strict=True)),
-            _read_stops(group.group("stops"), laws),
+            _read_stops(group, laws),
             _read_dampers(group.group("dampers")),
             _read_excitation(group.group("excitation")),
             _read_loads(group, n),
@@ -212,27 +276,37 @@ def read_flow(group: Group, laws: Laws) -> FlowMap:
     return FlowMap(system, FlowOptions(group.number("rtol"), nodes, tail))
 
 
-def _read_stops(group: Group, laws: Laws) -> tuple[Stop, ...]:
+def _read_stops(group: Group, laws: Laws) -> tuple[AnyStop, ...]:
+    rigid = _read_rigid_stops(group.group("rigid_stops"), laws) if "rigid_stops" in group else {}
+    own = {i: law for i, law in laws.items() if i not in rigid}
+    elastic = _read_elastic_stops(group.group("stops"), own, set(rigid))
+    stops: dict[int, AnyStop] = {**rigid, **elastic}
+    return tuple(stops[i] for i in sorted(stops))
+
+
+def _read_elastic_stops(group: Group, laws: Laws, taken: set[int]) -> dict[int, Stop]:
+    """The elastic stops by their places among all, of which others are taken."""
     at, against = group.texts("at"), group.texts("against")
     count = len(at)
+    places = [i for i in range(count + len(taken)) if i not in taken]
     numbers = ("stiffness", "exponent", "gap", "direction", "dissipation")
     values = {name: group.array(name, count) for name in (*numbers, "is_against", "has_own_law")}
     values["dashpot"] = group.array("dashpot", count) if "dashpot" in group else np.zeros(count)
     values["pulls"] = group.array("pulls", count) if "pulls" in group else np.ones(count)
     trials = group.array("law_trials", *((count, len(TRIALS), 3) if count else (0,)))
     for i in laws:
-        if i not in range(count) or not values["has_own_law"][i]:
+        if i not in places or not values["has_own_law"][places.index(i)]:
             raise SystemModelError(f"{group.path}: laws: no stop {i} has a law of its own")
-    stops = []
-    for i in range(count):
-        law = None
+    stops = {}
+    for i, place in enumerate(places):
+        law: ContactLaw | None = None
         if values["has_own_law"][i]:
-            if i not in laws:
+            if place not in laws:
                 raise SystemModelError(
-                    f"{group.path}: stop {i} at '{at[i]}' has a law of its own, which a file "
-                    f"cannot hold: pass laws={{{i}: law}}"
+                    f"{group.path}: stop {place} at '{at[i]}' has a law of its own, which a file "
+                    f"cannot hold: pass laws={{{place}: law}}"
                 )
-            law = laws[i]
+            law = laws[place]
         stop = Stop(
             at[i],
             float(values["stiffness"][i]),
@@ -247,11 +321,11 @@ def _read_stops(group: Group, laws: Laws) -> tuple[Stop, ...]:
         )
         if not np.array_equal(_trials(stop), trials[i]):
             raise SystemModelError(
-                f"{group.path}: the law passed for stop {i} at '{at[i]}' is not the one with "
+                f"{group.path}: the law passed for stop {place} at '{at[i]}' is not the one with "
                 "which the file was written: its forces differ"
             )
-        stops.append(stop)
-    return tuple(stops)
+        stops[place] = stop
+    return stops
 
 
 def _read_dampers(group: Group) -> tuple[AnyDamper, ...]:

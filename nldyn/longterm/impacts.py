@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, check_whole
 from nldyn.flow.flow_map import FlowMap
+from nldyn.flow.rigid import rigid_impacts
 from nldyn.longterm.simulation import Motion, end_state, motion_of
 from nldyn.orbits.orbit import Orbit
+from nldyn.system.rigid_stop import RigidStop
 from nldyn.system.system import System
 
 if TYPE_CHECKING:
@@ -111,7 +113,8 @@ def impacts(motion: Motion | Orbit) -> Impacts:
     a contact over the end of the period counts where it begins.
 
     Times, impulses and losses are as accurate as the flow map; peaks come from the polynomials of
-    the contact panels and are good to about 1e-6, the work to about 1e-4.
+    the contact panels and are good to about 1e-6, the work to about 1e-4. An impact with a rigid
+    stop takes no time; its force is infinite, its impulse is not.
 
     Parameters
     ----------
@@ -274,6 +277,8 @@ def _peaks(values: Real) -> Real:
 
 def _of_stop(motion: Motion, pieces: _Pieces, stop: int) -> dict[str, NDArray[Any]]:
     """Columns of the complete contacts with one stop."""
+    if isinstance(motion.flow.system.stops[stop], RigidStop):
+        return _of_rigid_stop(motion, stop)
     first, last, panels, group = contact_runs(pieces.depth[:, stop], pieces.event, stop)
     table = _panel_table(motion, pieces, stop, panels)
     count = first.size
@@ -292,6 +297,34 @@ def _of_stop(motion: Motion, pieces: _Pieces, stop: int) -> dict[str, NDArray[An
         "work": np.bincount(group, table.work, count),
         "loss": np.bincount(group, table.loss, count),
         "frequency_hz": pieces.hz[first],
+    }
+
+
+def _of_rigid_stop(motion: Motion, stop: int) -> dict[str, NDArray[Any]]:
+    """Columns of the impacts with a rigid stop, which take no time and no way."""
+    c = motion.system.stop_vector(motion.system.stops[stop])
+    mass = 1.0 / float(c @ c)
+    parts = []
+    for begin, stretch in zip(motion.begins, motion.stretches, strict=False):
+        hits = rigid_impacts(stretch, stop)
+        time = begin + (hits.phase - stretch.record.phase[0]) / stretch.omega
+        hz = np.full(time.shape, stretch.omega / (2.0 * np.pi))
+        parts.append(np.array([time, hits.phase, hits.speed, hits.rebound, hz]))
+    time, phase, speed, rebound, hz = np.concatenate(parts, axis=1)
+    none = np.zeros(time.shape)
+    return {
+        "stop": np.full(time.shape, stop, dtype=np.int64),
+        "time": time,
+        "phase_deg": np.degrees(phase) % 360.0,
+        "duration": none,
+        "speed": speed,
+        "rebound_speed": rebound,
+        "penetration": none,
+        "peak_force": np.full(time.shape, np.inf),
+        "impulse": mass * (speed + rebound),
+        "work": 0.5 * mass * speed**2,
+        "loss": 0.5 * mass * (speed**2 - rebound**2),
+        "frequency_hz": hz,
     }
 
 

@@ -22,6 +22,7 @@ from nldyn.base.errors import (
     shown,
 )
 from nldyn.flow.flow_map import FlowMap, Trajectory, flow_of
+from nldyn.flow.rigid import rest_forces
 from nldyn.orbits.newton import check_bounded
 from nldyn.orbits.orbit import History, Orbit, check_observe, history_of
 from nldyn.runtime.executors import check_execution, values_of
@@ -172,7 +173,13 @@ class Motion:
         """
         check_whole("history: samples", samples, 1, MOST_PERIODS)
         time = np.linspace(self.start_time, self.end_time, samples + 1)
-        return history_of(self.system, time, self.states(time))
+        states, where = self.states(time), self._stretch_at(time)
+        rest = np.zeros((time.size, len(self.system.stops)))
+        for k in np.unique(where):
+            within, stretch = where == k, self.stretches[k]
+            phases = stretch.record.phase[0] + stretch.omega * (time[within] - self.begins[k])
+            rest[within] = rest_forces(stretch, phases, self.flow.to_state(states[within]))
+        return history_of(self.system, time, states, rest)
 
     def extremes(self, interface: str | None = None) -> tuple[Real, Real]:
         """Times (k,) in s and values (k,) in m of the local extremes of a displacement.

@@ -25,6 +25,7 @@ from nldyn.orbits.extremes import nearest
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import metric_length
 from nldyn.system.chart import FREQUENCY, Chart
+from nldyn.system.elements import Stop
 from nldyn.system.parameters import Parameter
 
 KINDS = ("LP", "PD", "NS", "BP", "GR")
@@ -308,8 +309,8 @@ def peak_force(orbit: Orbit) -> float:
 
     Where a force depends on the speed, it is that of the recorded motion.
     """
-    stops = orbit.system.stops
-    if any(stop.depends_on_speed for stop in stops):
+    stops = orbit.system.elastic_stops
+    if len(stops) < len(orbit.system.stops) or any(stop.depends_on_speed for stop in stops):
         return max((impact.force for impact in orbit.impact_list), default=0.0)
     return max((float(stops[i].force(depth)) for i, depth in _depths(orbit)), default=0.0)
 
@@ -328,7 +329,7 @@ def _depths(orbit: Orbit) -> list[tuple[int, float]]:
     """Each stop with the depth of its deepest penetration."""
     found = []
     for index, peaks in enumerate(orbit.penetration_peaks):
-        if peaks.values.size:
+        if peaks.values.size and isinstance(orbit.system.stops[index], Stop):
             phase = float(peaks.phases[int(np.argmax(peaks.values))])
             depth = exact_output(orbit, index, phase) - orbit.system.stops[index].gap
             found.append((index, depth))
@@ -340,7 +341,12 @@ def _extremes_of(monitor: Callable[[Orbit], float], orbit: Orbit) -> list[float]
     if monitor is max_abs_displacement:
         return [float(x) for x in np.abs(orbit.observed_extremes.values)]
     peaks = zip(orbit.system.stops, orbit.penetration_peaks, strict=True)
-    depths = [(stop, float(depth)) for stop, found in peaks for depth in found.values]
+    depths = [
+        (stop, float(depth))
+        for stop, found in peaks
+        if isinstance(stop, Stop)
+        for depth in found.values
+    ]
     if monitor is max_penetration:
         return [depth for _, depth in depths]
     return [float(stop.force(depth)) for stop, depth in depths] if monitor is peak_force else []

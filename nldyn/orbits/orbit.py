@@ -13,6 +13,7 @@ from scipy.optimize import minimize_scalar
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_types, check_whole, numbers
 from nldyn.flow.flow_map import FlowError, FlowMap, Solution, Trajectory, chain
+from nldyn.flow.rigid import rest_forces, rigid_impacts
 from nldyn.orbits.multipliers import (
     COARSE,
     MOST_PARTS,
@@ -26,8 +27,10 @@ from nldyn.orbits.multipliers import (
 )
 from nldyn.orbits.shooting import ShootingProblem
 from nldyn.system.elements import Stop
+from nldyn.system.rigid_stop import AnyStop, RigidStop
 from nldyn.system.system import System
 
+SAME_PHASE = 1e-9  # in rad: an extreme and an impact
 SHALLOW = 1e-3  # of the deepest extreme: depths up to it are told exactly where stops are touched
 
 
@@ -101,7 +104,7 @@ class Impact:
     penetration : float
         Deepest penetration in m.
     force : float
-        Largest contact force in N.
+        Largest contact force in N; infinite at a rigid stop, see `nldyn.impacts` for the impulse.
     """
 
     stop: int
@@ -292,7 +295,8 @@ class Orbit:
     def liouville_error(self) -> float:
         """|det Φ / exp(-∫ (tr D + Σ v² ∂F/∂δ') dt) - 1|: Liouville's formula.
 
-        v² is the velocity jump per unit impulse at a stop whose force depends on the speed. The
+        v² is the velocity jump per unit impulse at a stop whose force depends on the speed. An
+        impact with a rigid stop multiplies the determinant by e (e + v de/dv). The
         determinant is the product of those of the segments. The error is nan where damping is so
         strong that rounding hides the third digit of 1e-6 even so.
         """
@@ -301,6 +305,8 @@ class Orbit:
             return math.nan
         exact = -float(np.trace(self.system.total_damping)) * self.duration
         exact -= contact_damping(self.problem.flow, self.trajectory)
+        if math.isinf(exact):  # at rest on a rigid stop, or without rebound: directions are lost
+            return math.nan
         return math.inf if math.isnan(value) else abs(math.expm1(min(value - exact, 700.0)))
 
     @cached_property
@@ -347,7 +353,23 @@ class Orbit:
     def _as_extremes(self, found: Real, output: int) -> Extremes:
         stops = self.system.stops
         offset = stops[output].gap if output < len(stops) else 0.0
-        return Extremes(found[:, 0], found[:, 1] - offset, found[:, 2] > 0.0)
+        phases, values, kinds = found[:, 0], found[:, 1] - offset, found[:, 2] > 0.0
+        if output < len(stops) and isinstance(stops[output], RigidStop):
+            values = self._beyond_rigid_stop(output, phases, values)
+        return Extremes(phases, values, kinds)
+
+    def _beyond_rigid_stop(self, stop: int, phases: Real, values: Real) -> Real:
+        """Extremes of the penetration, with the speed over ω for the depth where a body hits.
+
+        So an impact is no near miss, whatever rounding makes of a gap that is just closed.
+        """
+        hits = rigid_impacts(self.trajectory, stop)
+        full = 2.0 * math.pi * self.period
+        deep = values.copy()
+        for phase, speed in zip(hits.phase, hits.speed, strict=True):
+            apart = np.abs((phases - phase + 0.5 * full) % full - 0.5 * full)
+            deep[apart <= SAME_PHASE] = speed / self.omega
+        return deep
 
     @cached_property
     def observed_extremes(self) -> Extremes:
@@ -373,7 +395,11 @@ class Orbit:
     @cached_property
     def max_penetration(self) -> float:
         """Deepest penetration over all stops in m (zero if none is touched)."""
-        values = [float(p.values.max()) for p in self.penetration_peaks if p.values.size]
+        values = [
+            float(p.values.max())
+            for stop, p in zip(self.system.stops, self.penetration_peaks, strict=True)
+            if p.values.size and not isinstance(stop, RigidStop)
+        ]
         return max(0.0, *values) if values else 0.0
 
     @cached_property
@@ -388,7 +414,7 @@ class Orbit:
             Impact(
                 index,
                 float(phase / self.omega),
-                float(depth),
+                0.0 if isinstance(stop, RigidStop) else float(depth),
                 self._largest_force(index, float(phase), float(depth)),
             )
             for index, (stop, peaks) in enumerate(
@@ -402,6 +428,8 @@ class Orbit:
     def _largest_force(self, index: int, phase: float, depth: float) -> float:
         """Largest force of the contact whose penetration is deepest at a phase."""
         stop = self.system.stops[index]
+        if isinstance(stop, RigidStop):
+            return math.inf
         if not stop.depends_on_speed:
             return float(stop.force(depth))
 
@@ -462,17 +490,31 @@ class Orbit:
         """
         check_whole("history: samples", samples, 1)
         phases = np.linspace(0.0, 2.0 * np.pi * self.period, samples + 1)
-        return history_of(self.system, phases / self.omega, self.states(phases))
+        return self.history_at(phases)
+
+    def history_at(self, phases: Real, states: Real | None = None) -> History:
+        """Sample the orbit at forcing phases (k,) in radians; modal states there may be known."""
+        states = self.states(phases) if states is None else states
+        rest = rest_forces(
+            self.trajectory,
+            phases % (2.0 * np.pi * self.period),
+            self.problem.flow.to_state(states),
+        )
+        return history_of(self.system, phases / self.omega, states, rest)
 
 
-def history_of(system: System, time: Real, states: Real) -> History:
-    """Displacements and forces at modal states (k, 2n), with their times (k,) in s."""
+def history_of(system: System, time: Real, states: Real, rest: Real) -> History:
+    """Displacements and forces at modal states (k, 2n), with their times (k,) in s.
+
+    `rest` (k, n_stops) are the forces of rigid stops on what rests on them.
+    """
     q = states[:, : system.size]
     depth = np.empty((len(system.stops), time.size))
-    force = np.empty_like(depth)
+    force = rest.T.copy()
     for row, stop in enumerate(system.stops):
         depth[row], speed = _depth_and_speed(system, stop, states)
-        force[row] = stop.force(depth[row], speed)
+        if isinstance(stop, Stop):
+            force[row] = stop.force(depth[row], speed)
     return History(
         time,
         q,
@@ -484,14 +526,18 @@ def history_of(system: System, time: Real, states: Real) -> History:
 
 
 def contact_damping(flow: FlowMap, motion: Trajectory) -> float:
-    """∫ Σ v² ∂F/∂δ' dt over the contacts of a motion, by the quadrature of their panels."""
+    """∫ Σ v² ∂F/∂δ' dt over the contacts of a motion, by the quadrature of their panels.
+
+    With -ln of what impacts with rigid stops make of a volume of states.
+    """
     system = flow.system
+    contraction = impact_contraction(motion)
     if not system.loses_by_speed:
-        return 0.0
+        return contraction
     phases, weights = motion.contact_quadrature()
     states = flow.to_modal(motion.states(phases))
-    total = 0.0
-    for stop in system.stops:
+    total = contraction
+    for stop in system.elastic_stops:
         v = system.stop_vector(stop)
         total += float(v @ v * weights @ stop.viscosity(*_depth_and_speed(system, stop, states)))
     for bond in system.bonds:
@@ -501,7 +547,20 @@ def contact_damping(flow: FlowMap, motion: Trajectory) -> float:
     return total
 
 
-def _depth_and_speed(system: System, stop: Stop, states: Real) -> tuple[Real, Real]:
+def impact_contraction(motion: Trajectory) -> float:
+    """-Σ ln(e (e + v de/dv)) over the impacts with rigid stops; infinite where a body rests."""
+    total = 0.0
+    for index, stop in enumerate(motion.flow.system.stops):
+        if isinstance(stop, RigidStop):
+            if motion.record.depth[:, index].any():
+                return math.inf
+            for speed in rigid_impacts(motion, index).speed.tolist():
+                factor = stop.determinant(speed)
+                total += -math.log(factor) if factor > 0.0 else math.inf
+    return total
+
+
+def _depth_and_speed(system: System, stop: AnyStop, states: Real) -> tuple[Real, Real]:
     """Penetration of a stop (negative when open) and its rate at modal states (k, 2n)."""
     v = system.stop_vector(stop)
     return states[:, : system.size] @ v - stop.gap, states[:, system.size :] @ v

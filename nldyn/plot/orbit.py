@@ -182,7 +182,7 @@ def plot_contact_force(orbit: Orbit, ax: Axes | None = None, *, samples: int = 4
     _checked(orbit, ax, None, samples)
     phases = drawn_phases(orbit, samples)
     system = orbit.system
-    forces = contact_forces(system, orbit.states(phases))
+    forces = orbit.history_at(phases).force.T
     factor, unit = force_unit(float(np.abs(forces).max(initial=0.0)))
     ax = _axes(ax, orbit)
     ax.axhline(0.0, color="0.6", linewidth=0.6)
@@ -223,16 +223,6 @@ def motion_at(orbit: Orbit, interface: str, phases: Real) -> tuple[Real, Real]:
     """Displacement and velocity of an interface at forcing phases."""
     phi, states = orbit.system.participation[interface], orbit.states(phases)
     return states[:, : phi.size] @ phi, states[:, phi.size :] @ phi
-
-
-def contact_forces(system: System, states: Real) -> Real:
-    """Forces in N of the stops (n_stops, k) at modal states (k, 2n)."""
-    forces = np.zeros((len(system.stops), len(states)))
-    for row, stop in enumerate(system.stops):
-        v = system.stop_vector(stop)
-        depth = states[:, : system.size] @ v - stop.gap
-        forces[row] = stop.force(depth, states[:, system.size :] @ v)
-    return forces
 
 
 def force_unit(largest: float) -> tuple[float, str]:

@@ -17,7 +17,7 @@ from nldyn.branches.branch import Branch
 from nldyn.orbits.harmonics import harmonics
 from nldyn.orbits.orbit import Orbit
 from nldyn.plot.diagram import MARKER_NAMES, period_name, stop_places
-from nldyn.plot.orbit import FLOOR, contact_forces, drawn_phases, motion_at, stop_name
+from nldyn.plot.orbit import FLOOR, drawn_phases, motion_at, stop_name
 
 MOST_ORBITS = 120
 SPECIAL_SHARE = 2 / 3  # of them, at most, are those at special points
@@ -150,9 +150,12 @@ def _motion(orbit: Orbit) -> dict[str, Any]:
         "time": floats(phases / orbit.omega),
         "displacement": floats(y),
         "velocity": floats(speed),
-        "forces": [floats(force) for force in contact_forces(orbit.system, states)],
+        "forces": [floats(force) for force in orbit.history_at(phases, states).force.T],
         "strobe": [value.tolist() for value in start],
-        "impacts": [[hit.time, hit.stop, hit.penetration, hit.force] for hit in orbit.impact_list],
+        "impacts": [
+            [hit.time, hit.stop, hit.penetration, hit.force if math.isfinite(hit.force) else None]
+            for hit in orbit.impact_list
+        ],
     }
 
 

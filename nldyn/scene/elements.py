@@ -23,6 +23,7 @@ from nldyn.system.elements import (
     hertz_stiffness,
 )
 from nldyn.system.measured import MeasuredForce, measured_force
+from nldyn.system.rigid_stop import AnyStop, RigidStop
 from nldyn.system.springs import CubicDamper, PolynomialSpring, Spring
 from nldyn.system.system import AnyDamper, AnySpring
 
@@ -32,7 +33,7 @@ logger = logging.getLogger("nldyn")
 class Acting(NamedTuple):
     """What acts at the interfaces of a structure."""
 
-    stops: tuple[Stop, ...]
+    stops: tuple[AnyStop, ...]
     dampers: tuple[AnyDamper, ...]
     excitation: tuple[Excitation, ...]
     springs: tuple[AnySpring, ...]
@@ -67,7 +68,10 @@ def _spring(table: SpringTable) -> AnySpring:
     return Spring(table.at, table.stiffness, table.against)
 
 
-def _stop(table: StopTable) -> Stop:
+def _stop(table: StopTable) -> AnyStop:
+    if table.law == "rigid":
+        assert table.restitution is not None
+        return RigidStop(table.at, table.restitution, table.gap, table.direction, table.against)
     stiffness = table.stiffness
     if stiffness is None:
         assert table.radius is not None and table.youngs_modulus is not None

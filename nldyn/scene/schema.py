@@ -409,10 +409,10 @@ class DamperTable(Table):
 
 
 class StopTable(Table):
-    """``[[stops]]``: an elastic stop that an interface hits."""
+    """``[[stops]]``: an elastic or rigid stop that an interface hits."""
 
     at: str
-    law: Literal["hertz", "linear"] = "hertz"
+    law: Literal["hertz", "linear", "rigid"] = "hertz"
     stiffness: Positive | None = None
     exponent: Annotated[float, Field(ge=1, le=LARGEST_EXPONENT)] | None = None
     radius: Positive | None = None
@@ -422,7 +422,7 @@ class StopTable(Table):
     dissipation: NotNegative | None = None
     dashpot: NotNegative = 0.0
     pulls: bool = True
-    restitution: Annotated[float, Field(gt=0, le=1)] | None = None
+    restitution: Annotated[float, Field(ge=0, le=1)] | None = None
     impact_speed: Positive | None = None
     direction: Literal[1, -1] = 1
     against: str | None = None
@@ -437,6 +437,10 @@ class StopTable(Table):
     @model_validator(mode="after")
     def _complete(self) -> StopTable:
         _refuse_own(self)
+        if self.law == "rigid":
+            return self._complete_rigid()
+        if self.restitution == 0.0:
+            raise ValueError("needs a 'restitution' above 0, or the law 'rigid'")
         if (self.restitution is None) != (self.impact_speed is None):
             raise ValueError("needs both 'restitution' and 'impact_speed', or neither")
         if self.restitution is not None:
@@ -460,6 +464,18 @@ class StopTable(Table):
             )
         else:
             _refuse(self, ("exponent",), "a stop given by its radius (it is 1.5)")
+        return self
+
+
+    def _complete_rigid(self) -> StopTable:
+        elastic = ("stiffness", "exponent", "radius", "youngs_modulus", "poissons_ratio")
+        _refuse(self, (*elastic, "dissipation", "impact_speed"), "a rigid stop")
+        if self.dashpot:
+            raise ValueError("has 'dashpot', which is not a key of a rigid stop")
+        if self.restitution is None:
+            raise ValueError("needs 'restitution' (from 0 to 1)")
+        if self.gap < 0.0:
+            raise ValueError("needs a 'gap' of at least 0: a preload needs a stop with a stiffness")
         return self
 
 

@@ -42,6 +42,7 @@ UNITS = {
     "exponent": "1",
     "dissipation": "s/m",
     "dashpot": "N s/m",
+    "restitution": "1",
     "amplitude": "N",
     "mass_times_radius": "kg m",
     "force": "N",
@@ -54,7 +55,10 @@ BOUNDS = {
     name: (0.0, math.inf)
     for name in ("stiffness", "dissipation", "dashpot", *SOURCES, *_OF_DAMPERS, *_OF_MODES)
     if name != "force"  # has either sign
-} | {"exponent": (1.0, LARGEST_EXPONENT)}  # between which there are systems
+} | {  # between which there are systems
+    "exponent": (1.0, LARGEST_EXPONENT),
+    "restitution": (0.0, 1.0),
+}
 POSITIVE = ("stiffness", "natural_frequency_hz")  # there is no system where they are zero
 NAMES = (
     *(FREQUENCY, *_OF_STOPS, *SOURCES, *_OF_DAMPERS, *_OF_SPRINGS),
@@ -75,11 +79,11 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
     system : System
         The system that must have it.
     parameter : str or Parameter
-        frequency_hz; gap, stiffness, exponent, dissipation or dashpot of a stop; amplitude,
-        mass_times_radius or force of an excitation; coefficient of a damper; spring_stiffness of a
-        linear spring; k1, k2, ... of a polynomial one; modal_damping (ratio) or
-        natural_frequency_hz of a mode. The index -1 of modal_damping means all modes, which then
-        have one ratio.
+        frequency_hz; gap, stiffness, exponent, dissipation, dashpot or restitution of a stop;
+        amplitude, mass_times_radius or force of an excitation; coefficient of a damper;
+        spring_stiffness of a linear spring; k1, k2, ... of a polynomial one; modal_damping (ratio)
+        or natural_frequency_hz of a mode. The index -1 of modal_damping means all modes, which
+        then have one ratio.
 
     Raises
     ------

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 from nldyn.base.errors import SystemModelError, check_types, check_whole
 from nldyn.system.elements import Excitation
+from nldyn.system.rigid_stop import RigidStop
 from nldyn.system.springs import LARGEST_DEGREE, PolynomialSpring
 from nldyn.system.system import System
 
-OF_STOPS = ("gap", "stiffness", "exponent", "dissipation", "dashpot")
+OF_STOPS = ("gap", "stiffness", "exponent", "dissipation", "dashpot", "restitution")
 OF_SPRINGS = tuple(f"k{power}" for power in range(1, LARGEST_DEGREE + 1))
 SOURCES = ("amplitude", "mass_times_radius", "force")
 
@@ -34,9 +35,9 @@ class Parameter:
     Parameters
     ----------
     name : str
-        gap, stiffness, exponent, dissipation or dashpot of a stop (not of one with a law of its
-        own, but for the gap), amplitude, mass_times_radius or force of an excitation; k1, k2, ...,
-        the coefficients of a polynomial spring.
+        gap, stiffness, exponent, dissipation, dashpot or restitution of a stop (not of one with a
+        law of its own, but for the gap), amplitude, mass_times_radius or force of an excitation;
+        k1, k2, ..., the coefficients of a polynomial spring.
     index : int
         Which of the stops, excitations, springs, dampers or modes of the system.
 
@@ -78,7 +79,11 @@ def check_exact(system: System, parameter: Parameter) -> None:
     name, index = parameter.name, parameter.index
     if name in OF_STOPS:
         check_index(parameter, "stop", len(system.stops))
-        if name != "gap" and system.stops[index].law is not None:
+        stop = system.stops[index]
+        if not hasattr(stop, name):
+            kind = "rigid" if isinstance(stop, RigidStop) else "elastic"
+            raise SystemModelError(f"parameter '{name}': stop {index} is {kind}, it has no {name}")
+        if name != "gap" and stop.law is not None:
             raise SystemModelError(
                 f"parameter '{name}': stop {index} has a law of its own, which knows no {name}"
             )

@@ -10,6 +10,7 @@ from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import SystemModelError
 from nldyn.system.contact_law import power_law
 from nldyn.system.elements import Stop
+from nldyn.system.rigid_stop import RigidStop
 from nldyn.system.springs import Bond
 from nldyn.system.system import System
 
@@ -17,6 +18,7 @@ MOST_STEPS = 200
 SHORTEST = 1e-14  # last step, relative
 FLAT = 1e-12  # of the stops' largest stiffness, below which a rigid motion counts as not held
 NOT_HELD = 1e-9  # share of a force, or of a direction, that counts as none
+RIGID = 1e8  # stiffness of what stands in for a rigid stop, beside the structure's
 MOST_STARTS = 100  # in the search for all rest positions
 SAME = 1e-6  # share of their size by which two of them may differ
 FARTHEST = 1e9  # m kg^0.5, where a motion counts as running away
@@ -30,8 +32,9 @@ def rest(system: System) -> Real:
     forces have the potential ``q Ω² q / 2 - f q + Σ k δ^(m + 1) / (m + 1)``, which is convex:
     Newton's method with shortened steps [Nocedal and Wright 2006, section 3.1] comes to its only
     minimum; a body that nothing holds yet moves along the force to the next stop. A stop with a law
-    of its own counts with its stiffness and exponent. Where polynomial springs make several minima,
-    it is the first of `rest_positions`.
+    of its own counts with its stiffness and exponent, a rigid one as a spring 1e8 times as stiff
+    as the structure. Where polynomial springs make several minima, it is the first of
+    `rest_positions`.
 
     Raises
     ------
@@ -50,6 +53,7 @@ def rest(system: System) -> Real:
     >>> float(rest(free)[0].round(9))
     0.14
     """
+    system = with_springs_for_rigid_stops(system)
     if system.bonds:
         return rest_positions(system)[0]
     return _settled(system, np.zeros(system.size))
@@ -77,6 +81,7 @@ def rest_positions(system: System) -> list[Real]:
     """
     if not system.bonds:
         return [rest(system)]
+    system = with_springs_for_rigid_stops(system)
     push = constant_force(system)
     starts = [np.zeros(system.size), *_rests_of_bonds(system, push)]
     found: list[Real] = []
@@ -155,6 +160,24 @@ def _settled(system: System, q: Real) -> Real:
     return q
 
 
+def with_springs_for_rigid_stops(system: System) -> System:
+    """The system with a stiff linear stop in the place of each rigid one."""
+    if len(system.elastic_stops) == len(system.stops):
+        return system
+    push = float(np.linalg.norm(constant_force(system)))
+    stops: list[Stop] = []
+    for stop in system.stops:
+        if isinstance(stop, RigidStop):
+            c = float(np.linalg.norm(system.stop_vector(stop)))
+            pace = float(system.natural_frequencies.max()) ** 2 / (c * c or 1.0)
+            stiffness = RIGID * (pace or c * push or 1.0)
+            stop = Stop.linear(
+                stop.at, stiffness, gap=stop.gap, direction=stop.direction, against=stop.against
+            )
+        stops.append(stop)
+    return system.with_elements(stops=tuple(stops))
+
+
 def constant_force(system: System) -> Real:
     """Modal force (n,) of all that acts constantly."""
     push = np.zeros(system.size)
@@ -190,7 +213,7 @@ def _downhill(system: System, q: Real, slope: Real) -> Real:
         return np.asarray(-np.linalg.lstsq(stiffness, slope, rcond=None)[0])
     force = float(np.linalg.norm(free))
     ways = []
-    for stop in system.stops:
+    for stop in system.elastic_stops:
         c = system.stop_vector(stop)
         pace, left = float(c @ free) / force, stop.gap - float(c @ q)
         if pace > NOT_HELD * np.linalg.norm(c) and left >= 0.0:
@@ -206,11 +229,16 @@ def _downhill(system: System, q: Real, slope: Real) -> Real:
 
 def closed_at_rest(system: System, q: Real) -> list[tuple[int, float, float]]:
     """Number, penetration in m and force in N of each stop that is closed at rest."""
-    return [(i, depth, float(system.stops[i].force(depth))) for i, _, depth in _closed(system, q)]
+    springs = with_springs_for_rigid_stops(system).elastic_stops
+    return [
+        (i, 0.0 if isinstance(system.stops[i], RigidStop) else depth, float(stop.force(depth)))
+        for i, stop, _, depth in _closed(springs, system, q)
+    ]
 
 
 def held_response(system: System, q: Real, omega: float) -> Complex:
     """Amplitude (n,) of the small steady motion q + Re(a e^{iωt}) about a rest position q."""
+    system = with_springs_for_rigid_stops(system)
     force = np.zeros(system.size, dtype=complex)
     for source in system.excitation:
         if source.harmonic == 1:
@@ -234,8 +262,8 @@ def held_motion(system: System, q: Real, omega: float, phases: Real) -> Real:
 def tangent_stiffness(system: System, q: Real) -> Real:
     """Stiffness (n, n) of the structure with its closed stops at modal displacements q."""
     matrix = np.array(system.stiffness)
-    for i, c, depth in _closed(system, q):
-        matrix += _elastic(system.stops[i], depth)[1] * np.outer(c, c)
+    for _, stop, c, depth in _closed(system.elastic_stops, system, q):
+        matrix += _elastic(stop, depth)[1] * np.outer(c, c)
     for bond in system.bonds:
         c = _vector(system, bond)
         matrix += float(bond.stiffness(c @ q)) * np.outer(c, c)
@@ -247,13 +275,15 @@ def _vector(system: System, bond: Bond) -> Real:
     return system.vector_between(bond.at, bond.against)
 
 
-def _closed(system: System, q: Real) -> Iterator[tuple[int, Real, float]]:
-    """Numbers of the stops that are closed at modal displacements q, vectors and penetrations."""
-    for i, stop in enumerate(system.stops):
+def _closed(
+    stops: tuple[Stop, ...], system: System, q: Real
+) -> Iterator[tuple[int, Stop, Real, float]]:
+    """Those of some stops that are closed at modal displacements q: vectors and penetrations."""
+    for i, stop in enumerate(stops):
         c = system.stop_vector(stop)
         depth = float(c @ q) - stop.gap
         if depth > 0.0:
-            yield i, c, depth
+            yield i, stop, c, depth
 
 
 def _elastic(stop: Stop, depth: float) -> tuple[float, float]:
@@ -264,18 +294,17 @@ def _elastic(stop: Stop, depth: float) -> tuple[float, float]:
 
 def _slope(system: System, push: Real, q: Real) -> Real:
     slope = system.stiffness @ q - push
-    for i, c, depth in _closed(system, q):
-        slope = slope + _elastic(system.stops[i], depth)[0] * c
+    for _, stop, c, depth in _closed(system.elastic_stops, system, q):
+        slope += _elastic(stop, depth)[0] * c
     for bond in system.bonds:
         c = _vector(system, bond)
-        slope = slope + float(bond.force(c @ q)) * c
+        slope += float(bond.force(c @ q)) * c
     return np.asarray(slope)
 
 
 def _potential(system: System, push: Real, q: Real) -> float:
     energy = 0.5 * float(q @ system.stiffness @ q) - float(push @ q)
-    for i, _, depth in _closed(system, q):
-        stop = system.stops[i]
+    for _, stop, _, depth in _closed(system.elastic_stops, system, q):
         energy += _elastic(stop, depth)[0] * depth / (stop.exponent + 1.0)
     for bond in system.bonds:
         energy += float(bond.energy(_vector(system, bond) @ q))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Protocol, TypeVar
@@ -23,6 +23,7 @@ from nldyn.system.linear import (
     linear_part,
     without_rounding,
 )
+from nldyn.system.rigid_stop import AnyStop, RigidStop
 from nldyn.system.springs import Bond, CubicDamper, PolynomialSpring, Spring, bonds_of
 
 Element = TypeVar("Element")
@@ -84,7 +85,7 @@ class System:
     natural_frequencies: Real
     damping: Real
     participation: Mapping[str, Real]
-    stops: tuple[Stop, ...] = ()
+    stops: tuple[AnyStop, ...] = ()
     dampers: tuple[AnyDamper, ...] = ()
     excitation: tuple[Excitation, ...] = ()
     loads: Mapping[str, Real] = field(default_factory=dict)
@@ -115,7 +116,7 @@ class System:
         participation: Mapping[str, ArrayLike],
         *,
         modal_damping: float | ArrayLike = 0.0,
-        stops: Sequence[Stop] = (),
+        stops: Sequence[AnyStop] = (),
         dampers: Sequence[AnyDamper] = (),
         excitation: Sequence[Excitation] = (),
         loads: Mapping[str, ArrayLike] = MappingProxyType({}),
@@ -167,7 +168,7 @@ class System:
         *,
         damping: ArrayLike | None = None,
         modal_damping: float | ArrayLike = 0.0,
-        stops: Sequence[Stop] = (),
+        stops: Sequence[AnyStop] = (),
         dampers: Sequence[AnyDamper] = (),
         excitation: Sequence[Excitation] = (),
         loads: Mapping[str, ArrayLike] = MappingProxyType({}),
@@ -261,7 +262,7 @@ class System:
         reduced: ReducedModelLike,
         *,
         modal_damping: float | ArrayLike = 0.0,
-        stops: Sequence[Stop] = (),
+        stops: Sequence[AnyStop] = (),
         dampers: Sequence[AnyDamper] = (),
         excitation: Sequence[Excitation] = (),
         loads: Mapping[str, ArrayLike] = MappingProxyType({}),
@@ -397,7 +398,7 @@ class System:
         return _rank(held, int(free.sum())) < int(free.sum())
 
     @property
-    def _holders(self) -> tuple[Stop | AnySpring, ...]:
+    def _holders(self) -> tuple[AnyStop | AnySpring, ...]:
         return (*self.stops, *self.springs)
 
     @cached_property
@@ -407,17 +408,20 @@ class System:
         damped = damped or np.any(_or_zero(self.circulatory))
         return not damped and not self.loses_by_speed
 
+    @property
+    def jumps(self) -> bool:
+        """Whether a force or a velocity jumps where a stop is hit."""
+        return any(isinstance(s, RigidStop) or s.dashpot != 0.0 for s in self.stops)
+
     @cached_property
     def symmetric(self) -> bool:
         """Whether -x(t + T/2) is a motion if x(t) is one: each stop has one opposite to it.
 
         All excitation must change its sign after half its period T: it has odd harmonics only.
         """
-
-        def law_of(s: Stop) -> tuple[object, ...]:
-            return s.stiffness, s.exponent, s.gap, s.dissipation, s.dashpot, s.law, s.pulls
-
-        stops = [(self.stop_vector(s), law_of(s)) for s in self.stops]
+        stops = [
+            (self.stop_vector(s), replace(s, at="", direction=1, against=None)) for s in self.stops
+        ]
         odd = not np.any(self.drive[self.orders % 2 == 0.0])
         return (
             odd
@@ -429,6 +433,11 @@ class System:
             )
         )
 
+    @property
+    def elastic_stops(self) -> tuple[Stop, ...]:
+        """The stops that are not rigid."""
+        return tuple(stop for stop in self.stops if isinstance(stop, Stop))
+
     @cached_property
     def linear(self) -> LinearPart:
         """Independent pairs of coordinates of the linear part."""
@@ -439,7 +448,7 @@ class System:
             D = without_rounding(modes.T @ D @ modes)
             cross = None if cross is None else modes.T @ cross @ modes
         squares = np.zeros(self.size)
-        for stop in self.stops:
+        for stop in self.elastic_stops:
             if stop.exponent == 1.0 or stop.gap < 0.0:
                 preload = max(-stop.gap, 0.0) ** (stop.exponent - 1.0)
                 slope = stop.exponent * stop.stiffness * preload
@@ -457,7 +466,7 @@ class System:
         c = self.participation[at]
         return c if against is None else c - self.participation[against]
 
-    def stop_vector(self, stop: Stop) -> Real:
+    def stop_vector(self, stop: AnyStop) -> Real:
         """Modal vector c with penetration ``c @ q - gap``, shape (n,)."""
         return stop.direction * self.vector_between(stop.at, stop.against)
 
@@ -522,7 +531,7 @@ class System:
     def with_elements(
         self,
         *,
-        stops: tuple[Stop, ...] | None = None,
+        stops: tuple[AnyStop, ...] | None = None,
         excitation: tuple[Excitation, ...] | None = None,
         springs: tuple[AnySpring, ...] | None = None,
     ) -> System:
@@ -573,7 +582,7 @@ class System:
     def _check_interfaces(self) -> None:
         known = ", ".join(self.participation) or "none"
         for kind, elements, classes in (
-            ("stop", self.stops, Stop),
+            ("stop", self.stops, AnyStop),
             ("damper", self.dampers, AnyDamper),
             ("spring", self.springs, AnySpring),
             ("excitation", self.excitation, Excitation),

@@ -86,7 +86,7 @@ def grazing_start(depth: str) -> dict[str, Any]:
     steady = free.response(omega).amplitudes[0]
     amplitude = abs(complex(flow.rows[0] @ steady))
     gap = amplitude * (1.0 - float(depth))
-    stop = Stop("middle", free.stops[0].stiffness, gap=gap)
+    stop = Stop("middle", free.elastic_stops[0].stiffness, gap=gap)
     system = System(
         free.natural_frequencies, free.damping, free.participation, (stop,), (), free.excitation
     )

@@ -10,6 +10,7 @@ from hard import (
     grazing,
     modes,
     resonance,
+    rigid,
     stiffness,
     unstable,
 )
@@ -24,5 +25,6 @@ CASES: tuple[Case, ...] = (
     *chatter.CASES,
     *resonance.CASES,
     *elements.CASES,
+    *rigid.CASES,
     *continuation.CASES,
 )

@@ -17,6 +17,7 @@ from nldyn.flow.kernels.flights import (
 from nldyn.flow.kernels.law import (
     depends_on_speed,
     is_bond,
+    is_rigid,
     law,
     never_pulls,
     singular_slope,
@@ -35,10 +36,13 @@ from nldyn.flow.kernels.layout import (
     MOBILITY,
     OK,
     RELEASE,
+    RELEASED,
     STIFFNESS,
 )
 from nldyn.flow.kernels.panel import node_outputs, panel_end, solve_panel
 from nldyn.flow.kernels.resolution import (
+    at_end,
+    at_start,
     first_doubt,
     first_root,
     interpolate,
@@ -48,6 +52,7 @@ from nldyn.flow.kernels.resolution import (
     refined,
     resolved,
     shows_decay,
+    slope_at_end,
 )
 
 
@@ -177,6 +182,10 @@ def first_event(fl, tab, kind, phase, w, h, closed, panel, w_end):
                 creep_time = fl.stops[s, DASHPOT] / fl.stops[s, STIFFNESS]
                 for i in range(m):
                     inner[0, i] += creep_time * panel.output[panel.active.size + position, i]
+            if is_rigid(fl, s):
+                noise, speed = pressing_noise(fl, s, w), 0.0
+                start = at_start(tab, panel.output, position) + fl.stops[s, GAP]
+                end = at_end(tab, panel.output, position) + fl.stops[s, GAP]
         else:
             node_outputs(fl, tab, kind, phase, w, h, panel, out, inner)
             for i in range(m):
@@ -291,7 +300,7 @@ def guess_panel(fl, tab, phase, w, h, h_mapped, start_switch, panel):
     ends = False
     length = h
     for a in range(active.size):
-        if is_bond(fl, active[a]):
+        if is_bond(fl, active[a]) or is_rigid(fl, active[a]):
             continue
         _, duration, left = expected_contact(fl, active[a], w, phase)
         depth, speed = creep(fl, active[a], w, phase, duration)
@@ -310,6 +319,11 @@ def guess_panel(fl, tab, phase, w, h, h_mapped, start_switch, panel):
     for a in range(active.size):
         if is_bond(fl, active[a]):
             hold_still(fl, phase, w, a, panel)
+            continue
+        if is_rigid(fl, active[a]):
+            _, _, push, _ = output_derivatives(fl, active[a], w, phase, 0.0)
+            for i in range(tab.nodes.size):
+                delta[a, i] = push
             continue
         peak, duration, left = expected_contact(fl, active[a], w, phase)
         depth, speed = creep(fl, active[a], w, phase, duration)
@@ -405,6 +419,26 @@ def time_to_event(fl, stop, closed, w, phase):
 
 
 @inner
+def pressing_noise(fl, stop, w):
+    """Rounding error of the acceleration that a rigid stop takes from what rests on it."""
+    return 1e-14 * output_size(fl, stop, w, 2)
+
+
+@inner
+def time_to_release(fl, tab, stop, kind, h, panel):
+    """Time from the end of a panel to where a rigid stop's force changes its sign, or inf.
+
+    The panel must not be stretched at its end.
+    """
+    for a in range(panel.active.size):
+        if panel.active[a] == stop:
+            slope = slope_at_end(tab, panel.output, a) / (h * (1.0 if kind == 0 else 2.0))
+            if slope < 0.0:
+                return -at_end(tab, panel.output, a) / slope
+    return np.inf
+
+
+@inner
 def coarsest_instant(fl):
     """Largest error allowed in the instant of an event, as a share of a panel."""
     found = 0.0
@@ -423,11 +457,22 @@ def at_switch(fl, stop, w, phase, allowed, closed):
 
 @inner
 def with_event(fl, stop, w, phase, allowed, closed):
-    """Whether a stop is to open or close now, to within a time allowed or rounding."""
-    if is_bond(fl, stop) or not at_switch(fl, stop, w, phase, allowed, closed):
+    """Whether a stop is to open or close now, to within a time allowed or rounding.
+
+    A rigid one does so by itself, see `rigid.impact`.
+    """
+    if is_bond(fl, stop) or is_rigid(fl, stop):
+        return False
+    if not at_switch(fl, stop, w, phase, allowed, closed):
         return False
     _, speed, _ = watched_pace(fl, stop, closed, w, phase)
     return closed[stop] != (speed > 0.0)
+
+
+@inner
+def resting(fl, stop, closed):
+    """Whether a body rests on a stop that is rigid."""
+    return closed[stop] and is_rigid(fl, stop)
 
 
 @inner
@@ -447,7 +492,7 @@ def stop_at_switch(fl, w, phase, h, closed):
     stop, nearest = -1, np.inf
     allowed = 10.0 * coarsest_instant(fl) * h
     for s in range(closed.size):
-        if is_bond(fl, s):
+        if is_bond(fl, s) or (is_rigid(fl, s) and closed[s]):
             continue
         late = abs(time_to_event(fl, s, closed, w, phase))
         gap, _, _ = watched_pace(fl, s, closed, w, phase)
@@ -517,6 +562,8 @@ def contact_panel(
     rounding = np.empty(panel.output.shape[0])
     for a in range(active.size):
         rounding[a] = output_noise(fl, active[a], w)  # events are found in the state
+        if is_rigid(fl, active[a]):
+            rounding[a] = pressing_noise(fl, active[a], w)
     for o in range(active.size, rounding.size):
         rounding[o] = rate_noise(fl, active[o - active.size], w)
     noise = rounding.copy()
@@ -538,7 +585,8 @@ def contact_panel(
         for a in range(active.size):
             more = carried_noise(fl, active[a], w, phase, panel.depth[0, a], h)
             panel.depth[3, a] = panel.depth[1, a] + more
-            noise[a] = min(panel.depth[3, a], rounding[a])
+            if not is_rigid(fl, active[a]):
+                noise[a] = min(panel.depth[3, a], rounding[a])
         found = solve_panel(fl, tab, kind, phase, w, h, noise, panel)
         if found:
             decays = shows_decay(fl, tab, kind, h, panel)
@@ -570,8 +618,8 @@ def contact_panel(
         at_end = where > 1.0 - near_end
         lost = attempt % 20 == 19  # the instant that is aimed at goes to and fro
         if event >= 0 and (aim < 0 or not at_end) and not lost:
-            goal = switch
             aim = event
+            goal = smooth if resting(fl, aim, closed) else switch
             if h * where > h_mapped:  # half the way first
                 goal, aim, where = smooth, -1, 0.5 * where
             keep_profile(fl, tab, kind, goal, where, panel, guess)
@@ -580,18 +628,19 @@ def contact_panel(
             continue
         if aim < 0 and kind % 2 == 1 and h < h_max:  # a release was expected here: follow it
             for a in range(active.size):
-                if (
-                    aim < 0
-                    and not is_bond(fl, active[a])
-                    and time_to_event(fl, active[a], closed, w_end, end_phase) < h
-                ):
-                    aim = active[a]
+                s = active[a]
+                elastic = aim < 0 and not (is_rigid(fl, s) or is_bond(fl, s))
+                if elastic and time_to_event(fl, s, closed, w_end, end_phase) < h:
+                    aim = s
         if aim >= 0 and not lost:
             dh = time_to_event(fl, aim, closed, w_end, end_phase)
-            late, _, _ = watched_pace(fl, aim, closed, w_end, end_phase)
-            rounded = output_noise(fl, watched(fl, aim, closed, w_end, end_phase), w)
+            off, _, _ = watched_pace(fl, aim, closed, w_end, end_phase)
+            there = abs(off) <= output_noise(fl, watched(fl, aim, closed, w_end, end_phase), w)
+            if resting(fl, aim, closed):
+                dh = time_to_release(fl, tab, aim, kind, h, panel)
+                there = abs(dh) <= RELEASED * h
             if abs(dh) <= instant_with(fl, aim, w_end, end_phase, h, closed) or (
-                dh < np.inf and abs(late) <= rounded
+                dh < np.inf and there
             ):
                 if fine:
                     return OK, kind, h, aim

@@ -177,7 +177,7 @@ def term_since(terms, k, omega, phase, t):
 
 @inner
 def term_by_omega(terms, k, omega, phase, t):
-    """Derivatives with respect to ω of a term and its rate at a time t after a fixed phase.
+    """Derivatives with respect to ω of a term, its rate and acceleration, t after a fixed phase.
 
     `phase` is that at the time.
     """
@@ -186,12 +186,16 @@ def term_by_omega(terms, k, omega, phase, t):
     e, first, second = term(terms, k, omega, phase)
     if kind == STEADY:
         by = 1j * order * t * e
-        return by, 1j * order * (e + omega * by)
+        pace = 1j * order * omega
+        return by, 1j * order * e + pace * by, pace * (2j * order * e + pace * by)
     if kind == GROWTH:
+        turn = turned(order * phase)
         by = order * growth_by_omega(rate, order * omega, order * phase) + first * (t / omega)
-        return by, rate * by + 1j * order * t * turned(order * phase)
+        by_rate = rate * by + 1j * order * t * turn
+        return by, by_rate, rate * by_rate + 1j * order * (1.0 + 1j * order * omega * t) * turn
     since = (t - phase / omega) / omega
-    return first * since, second * since
+    third = rate.real * second - rate.imag * first
+    return first * since, second * since, third * since
 
 
 @inner
@@ -273,23 +277,59 @@ def swollen(fl, out, phase, t):
 
 
 @inner
-def add_swelling_by(fl, out, phase, t, rate, factor, sums):
-    """Add the derivatives of an output's terms, or their rates', at time t after a fixed phase.
+def add_swelling_by(fl, out, order, phase, t, factor, sums):
+    """Add the derivatives of an output's terms at time t after a fixed phase.
 
-    `phase` is that at the time. sums (n_columns,) ends with the columns of the parameters and of
+    Order 1 stands for those of their rates, 2 of their accelerations; `phase` is that at the time.
+    sums (n_columns,) ends with the columns of the parameters and of
     ω, as in `panel_columns`.
     """
     never_inline()
     last = sums.size - 1
     first = sums.size + 1 - fl.forced.shape[1]
     for k in range(fl.terms.kinds.size):
-        e, e1, _ = term(fl.terms, k, fl.omega, phase)
-        d, d1 = term_by_omega(fl.terms, k, fl.omega, phase, t)
-        if rate:
-            e, d = e1, d1
+        e, e1, e2 = term(fl.terms, k, fl.omega, phase)
+        d, d1, d2 = term_by_omega(fl.terms, k, fl.omega, phase, t)
+        if order > 0:
+            e, d = (e1, d1) if order == 1 else (e2, d2)
         sums[last] += factor * (fl.forced[1 + k, 1, out] * e + fl.forced[1 + k, 0, out] * d).real
         for c in range(first, last):
             sums[c] += factor * (fl.forced[1 + k, 2 + c - first, out] * e).real
+
+
+@inner
+def add_forced_by(fl, out, order, phase, t, factor, sums):
+    """Add the derivatives of an output's response to the excitation, as `add_swelling_by`."""
+    last = sums.size - 1
+    first = sums.size + 1 - fl.forced.shape[1]
+    turn = turned(phase)
+    steady = fl.forced[0, 0, out] * turn
+    pace, slope = 1.0 + 0j, 0j  # (iω)^order and its derivative
+    if order == 1:
+        pace, slope = 1j * fl.omega, 1j
+    elif order == 2:
+        pace, slope = complex(-fl.omega * fl.omega, 0.0), complex(-2.0 * fl.omega, 0.0)
+    by = fl.forced[0, 1, out] * turn + 1j * t * steady
+    sums[last] += factor * (pace * by + slope * steady).real
+    for c in range(first, last):
+        sums[c] += factor * (pace * fl.forced[0, 2 + c - first, out] * turn).real
+    if fl.terms.kinds.size > 0:
+        add_swelling_by(fl, out, order, phase, t, factor, sums)
+
+
+@inner
+def output_columns(fl, out, order, phase, t, columns):
+    """Sensitivities (n_columns,) of an output, its rate or acceleration in flight (order 0 to 2).
+
+    At a time t after a fixed phase; `phase` is that at the time. Columns as in `panel_columns`.
+    """
+    never_inline()
+    found = np.zeros(columns.shape[1])
+    for c in range(found.size):
+        for k in range(columns.shape[0]):
+            found[c] += fl.rows[order, out, k] * columns[k, c]
+    add_forced_by(fl, out, order, phase, t, 1.0, found)
+    return found
 
 
 @inner
@@ -300,7 +340,7 @@ def add_growth(fl, phase, sign, w, columns):
     first = columns.shape[1] + 1 - fl.response.shape[1]
     for k in range(fl.terms.kinds.size):
         e, _, _ = term(fl.terms, k, fl.omega, phase)
-        d, _ = term_by_omega(fl.terms, k, fl.omega, phase, 0.0)
+        d, _, _ = term_by_omega(fl.terms, k, fl.omega, phase, 0.0)
         e, d = sign * e, sign * d
         for i in range(w.size):
             w[i] += (fl.response[1 + k, 0, i] * e).real
@@ -354,12 +394,12 @@ def distance(fl, stop, w, phase):
 
 @inner
 def output_size(fl, out, w, order):
-    """Sum of the sizes of an output's terms (order 0), or of those of its rate (order 1)."""
-    pace = fl.omega if order == 1 else 1.0
-    total = abs(fl.forced[0, 0, out]) * pace
+    """Sum of the sizes of an output's terms (order 0), or those of its rate or acceleration."""
+    total = abs(fl.forced[0, 0, out]) * fl.omega**order
     for k in range(fl.terms.kinds.size):
         size, rate = term_sizes(fl.terms, k, fl.omega)
-        total += abs(fl.forced[1 + k, 0, out]) * (rate if order == 1 else size)
+        share = size if order == 0 else rate * fl.omega ** (order - 1)
+        total += abs(fl.forced[1 + k, 0, out]) * share
     for j in range(w.size):
         total += abs(fl.rows[order, out, j] * w[j])
     return total
@@ -418,6 +458,8 @@ def safe_step(h, h1, h2, bound):
         if h >= 0.0:
             return -2.0 * h1 / h2 if h2 > 0.0 else np.inf
         square = h1 * h1 - 2.0 * h * h2
+        if h1 < 0.0 and h2 > 0.0:  # it comes back: the root without cancellation
+            return (math.sqrt(square) - h1) / h2
         top = h1 + math.sqrt(square) if square >= 0.0 else 0.0
         return -2.0 * h / top if top > 0.0 else np.inf
     if h >= 0.0:

@@ -19,7 +19,9 @@ from nldyn.flow.kernels.layout import (
     EXPONENT,
     FIRST_POWER,
     GAP,
+    MOBILITY,
     RELEASE,
+    RESTITUTION,
     ROUND,
     STIFFNESS,
 )
@@ -74,11 +76,26 @@ def bond_law(numbers, u, speed):
 
 
 @inner
+def is_rigid(fl, stop):
+    """Whether a stop is rigid."""
+    return fl.stops[stop, RESTITUTION] >= 0.0
+
+
+@inner
+def restitution_at(fl, stop, speed):
+    """Coefficient of restitution of a rigid stop at an impact speed, and its derivative by it."""
+    if fl.laws[stop] == 0:
+        return fl.stops[stop, RESTITUTION], 0.0
+    restitution, _, slope = call_law(fl.laws[stop], 0.0, speed)
+    return restitution, slope
+
+
+@inner
 def law(fl, stop, delta, speed):
-    """Contact force and its derivatives with respect to penetration and speed."""
+    """Contact force of an elastic stop and its derivatives by penetration and speed."""
     if is_bond(fl, stop):
         return bond_law(fl.stops[stop], delta, speed)
-    if delta <= 0.0:
+    if delta <= 0.0 or is_rigid(fl, stop):
         return 0.0, 0.0, 0.0
     if (
         never_pulls(fl, stop)
@@ -110,8 +127,10 @@ def closed_law(fl, stop, delta, speed):
 
     There a law whose slope sets in almost at once goes on beyond the switch, as an odd function:
     the outermost node may come to lie on its other side, and would drop the whole stiffness. So
-    does a dashpot.
+    does a dashpot. A rigid stop makes the acceleration vanish, which stands in for the penetration.
     """
+    if is_rigid(fl, stop):
+        return delta / fl.stops[stop, MOBILITY], 1.0 / fl.stops[stop, MOBILITY], 0.0
     if is_bond(fl, stop):
         return law(fl, stop, delta, speed)
     if delta > 0.0:
@@ -128,7 +147,7 @@ def depends_on_speed(fl, stop):
     """Whether a force depends on the speed of penetration, as far as one knows."""
     lossy = fl.stops[stop, DISSIPATION] != 0.0 or fl.stops[stop, DASHPOT] != 0.0
     lossy = lossy or fl.stops[stop, DRAG] != 0.0 or fl.stops[stop, CUBIC] != 0.0
-    return fl.laws[stop] != 0 or lossy
+    return not is_rigid(fl, stop) and (fl.laws[stop] != 0 or lossy)
 
 
 @inner
@@ -164,4 +183,5 @@ def law_by(fl, stop, column, delta, speed):
 def singular_slope(fl, stop):
     """Whether the slope of a stop's force is singular at its switch."""
     exponent = fl.stops[stop, EXPONENT]
-    return fl.laws[stop] != 0 or exponent != math.floor(exponent)
+    singular = fl.laws[stop] != 0 or exponent != math.floor(exponent)
+    return singular and not is_rigid(fl, stop)

@@ -30,6 +30,7 @@ CREEP = 100.0  # such an exponent over an elastic contact: the damping alone dec
 OPEN, NOISE = 1e-7, 1e-12
 PRELOADED = 1e-14  # the same of the preloads' size: forces that hold each other up are rounded, too
 STEADY = 1e-3  # share by which the Jacobians may change in a step that only shows rounding
+RELEASED = 1e-11  # error allowed in the instant of a rigid stop's release, where nothing jumps
 HALF_CONTACT = 2.5  # phase of the stiffness of a stop in half a contact, at most, in rad
 # the share of a slope in a Jacobian's error, kick (4 tail)², is less than rtol, (tail / 0.3)², as
 # long as KICK kick is less than one
@@ -47,14 +48,15 @@ class StopRow(NamedTuple):
     mobility: float  # velocity jump per unit impulse in 1/kg
     duration: float  # of a free contact, over (peak penetration / speed)
     instant: float  # error allowed in the instant of an event, as a share of the panel
+    restitution: float = -1.0  # of a rigid stop; -1 for an elastic one
     bond: float = 0.0  # 1 for what is no stop but acts all the time, with the law `bond_law`
     drag: float = 0.0  # of a bond: coefficients of u² u' and u'^3
     cubic: float = 0.0
     release: float = -1.0  # output δ + δ' dashpot/stiffness of a stop that never pulls, or -1
 
 
-GAP, STIFFNESS, EXPONENT, DISSIPATION, DASHPOT, MOBILITY, DURATION, INSTANT = range(8)
-BOND, DRAG, CUBIC, RELEASE = range(len(StopRow._fields) - 4, len(StopRow._fields))
+GAP, STIFFNESS, EXPONENT, DISSIPATION, DASHPOT, MOBILITY, DURATION, INSTANT, RESTITUTION = range(9)
+BOND, DRAG, CUBIC, RELEASE = range(9, len(StopRow._fields))
 FIRST_POWER = len(
     StopRow._fields
 )  # column of the coefficient of u of a bond; those of u²... follow
@@ -73,7 +75,8 @@ class SystemData(NamedTuple):
     orders: Real  # (h,) multiples of the excitation frequency at which something acts; 1 first
     drive: Complex  # (h, 3, 2n) excitation Σ Re(Σ_p ω^p drive[h, p] e^{i orders[h] ωt}) of z
     stops: Real  # (n_stops, ...), rows as `StopRow`, bonds last; then coefficients of bonds
-    laws: NDArray[np.int64]  # (n_stops,) address of a compiled law, or 0 for the power law
+    # (n_stops,) address of a compiled law (of a rigid stop: of its restitution), or 0
+    laws: NDArray[np.int64]
     tail: float  # largest relative Legendre tail accepted on a contact panel
     node_angle: float  # phase of the fastest mode from node to node, in rad
 
@@ -135,7 +138,8 @@ class Panel(NamedTuple):
 
     They are filled by `solve_panel`; what depends on kind and length alone serves the next panel
     of the same stops too. Outputs are the na penetrations and, if a force depends on them, their
-    na rates.
+    na rates. That of a rigid stop is the acceleration with which the gap would close without its
+    own force; the force is in proportion to it.
     """
 
     active: NDArray[np.int64]  # (na,) closed stops

@@ -6,8 +6,8 @@ import numpy as np
 
 from nldyn.flow.kernels.compiling import always_inline, inner
 from nldyn.flow.kernels.flights import (
+    add_forced_by,
     add_rates,
-    add_swelling_by,
     flown,
     fly,
     fly_state,
@@ -20,7 +20,7 @@ from nldyn.flow.kernels.flights import (
     there_and_back,
     turned,
 )
-from nldyn.flow.kernels.law import closed_law, law, law_by, needs_speed
+from nldyn.flow.kernels.law import closed_law, is_rigid, law, law_by, needs_speed
 from nldyn.flow.kernels.layout import DECAY, GAP, Panel
 from nldyn.flow.kernels.resolution import at_end, largest
 
@@ -61,6 +61,21 @@ def same_stops(active, other):
 
 
 @inner
+def output_order(fl, stop, rate):
+    """Which row of a stop an output of a panel is: a rigid stop's is its acceleration."""
+    return 2 if rate == 0 and is_rigid(fl, stop) else rate
+
+
+@inner
+def between(fl, stop, other):
+    """Speed that a unit impulse at another stop takes from the closing of a stop's gap, in 1/kg."""
+    mobility = 0.0
+    for k in range(fl.force.shape[0]):
+        mobility += fl.rows[1, stop, k] * fl.force[k, other]
+    return mobility
+
+
+@inner
 def panel_responses(fl, tab, kind, h, panel):
     """Fill what a panel of length h needs to know of the linear part: to, rise, back and G."""
     m = tab.nodes.size
@@ -76,7 +91,8 @@ def panel_responses(fl, tab, kind, h, panel):
             e00, e01, e10, e11, i00, i01, i10, i11, d00, d11 = there_and_back(fl.blocks[b], t)
             for o in range(to.shape[0]):
                 stop = panel.active[o % na]
-                x, y = fl.rows[o // na, stop, j], fl.rows[o // na, stop, j + 1]
+                order = output_order(fl, stop, o // na)
+                x, y = fl.rows[order, stop, j], fl.rows[order, stop, j + 1]
                 to[o, i, j] = x * e00 + y * e10
                 to[o, i, j + 1] = x * e01 + y * e11
                 if o < na:
@@ -93,6 +109,10 @@ def panel_responses(fl, tab, kind, h, panel):
             for i in range(m):
                 for j in range(m):
                     G[o * m + i, a * m + j] = h * tab.integrate[kind, i, j] * product[i, j]
+            if o < na and a != o and is_rigid(fl, panel.active[o]):  # what acts at once
+                kick = between(fl, panel.active[o], panel.active[a])
+                for i in range(m):
+                    G[o * m + i, a * m + i] += kick
 
 
 @inner
@@ -171,7 +191,12 @@ def free_outputs(fl, tab, kind, phase, w, h, panel, free):
         swing = swung(start, fl.omega * h * tab.chi[kind, i])
         for o in range(panel.to.shape[0]):
             steady = fl.forced[0, 0, panel.active[o % na]]
-            if o < na:
+            order = output_order(fl, panel.active[o % na], o // na)
+            if order == 2:
+                value = -fl.omega * fl.omega * (steady * (start + swing)).real
+                for k in range(w.size):
+                    value += panel.to[o, i, k] * w[k]
+            elif order == 0:
                 value = panel.depth[0, o] + (steady * swing).real
                 for k in range(w.size):
                     value += panel.rise[o, i, k] * w[k]
@@ -185,11 +210,13 @@ def free_outputs(fl, tab, kind, phase, w, h, panel, free):
             stop = panel.active[o % na]
             for i in range(m):
                 t = h * tab.chi[kind, i]
-                if o < na:
+                order = output_order(fl, stop, o // na)
+                if order == 0:
                     more = swollen(fl, stop, phase, t)
                 else:
                     here = phase + fl.omega * t
-                    _, more, _, _ = swelling(fl, stop, here)
+                    _, rate, acceleration, _ = swelling(fl, stop, here)
+                    more = rate if order == 1 else acceleration
                 free[o * m + i] += more
 
 
@@ -450,23 +477,14 @@ def panel_columns(fl, tab, kind, phase, t0, h, panel, columns):
             for c in range(n_columns):
                 forces[p, c] += slope * part[i, c]
             t = h * tab.chi[kind, i]
-            turn = turned(phase + fl.omega * t)
-            d_omega = fl.forced[0, 1, stop] + 1j * (t0 + t) * fl.forced[0, 0, stop]
-            if o < na:
-                forces[p, n_columns - 1] += slope * (d_omega * turn).real
-            else:
-                d_omega = fl.omega * d_omega + fl.forced[0, 0, stop]
-                forces[p, n_columns - 1] -= slope * (d_omega * turn).imag
-            if fl.terms.kinds.size > 0:
-                here = phase + fl.omega * t
-                add_swelling_by(fl, stop, here, t0 + t, o >= na, slope, forces[p])
+            order = output_order(fl, stop, o // na)
+            add_forced_by(fl, stop, order, phase + fl.omega * t, t0 + t, slope, forces[p])
             for c in range(fl.parameters.shape[0]):
-                q = columns.shape[0] + c
-                by = fl.forced[0, 2 + c, stop] * turn
-                forces[p, q] += slope * (by.real if o < na else -fl.omega * by.imag)
-                if o < na and fl.parameters[c, 1] == stop and fl.parameters[c, 0] >= GAP:
+                own = fl.parameters[c, 1] == stop and fl.parameters[c, 0] >= GAP
+                if own and order == 0:
                     speed = panel.output[na + o, i] if panel.slope.shape[0] > na else 0.0
-                    forces[p, q] += law_by(fl, stop, fl.parameters[c, 0], panel.output[o, i], speed)
+                    by = law_by(fl, stop, fl.parameters[c, 0], panel.output[o, i], speed)
+                    forces[p, columns.shape[0] + c] += by
     factor_panel(panel)
     lu_apply(panel.factors, panel.order, forces)
     change = np.empty(columns.shape)

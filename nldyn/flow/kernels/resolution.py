@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from nldyn.flow.kernels.compiling import inner
-from nldyn.flow.kernels.law import singular_slope
+from nldyn.flow.kernels.law import is_rigid, singular_slope
 from nldyn.flow.kernels.layout import (
     DECAY,
     EXPONENT,
@@ -45,6 +45,25 @@ def at_end(tab, values, a):
     total = 0.0
     for degree in range(tab.nodes.size):
         total += legendre_coefficient(tab, values, a, degree)
+    return total
+
+
+@inner
+def at_start(tab, values, a):
+    """Its value at the start, where Legendre's polynomials alternate."""
+    total, sign = 0.0, 1.0
+    for degree in range(tab.nodes.size):
+        total += sign * legendre_coefficient(tab, values, a, degree)
+        sign = -sign
+    return total
+
+
+@inner
+def slope_at_end(tab, values, a):
+    """Its slope at the end over the stretched time of a panel: n (n + 1) of each of Legendre's."""
+    total = 0.0
+    for degree in range(tab.nodes.size):
+        total += degree * (degree + 1) * legendre_coefficient(tab, values, a, degree)
     return total
 
 
@@ -93,7 +112,8 @@ def resolved(fl, tab, kind, h, noise, panel):
     na = panel.active.size
     stiffness = 0.0
     for a in range(na):
-        stiffness += fl.stops[panel.active[a], MOBILITY] * largest(panel.slope, a)
+        if not is_rigid(fl, panel.active[a]):
+            stiffness += fl.stops[panel.active[a], MOBILITY] * largest(panel.slope, a)
     longest = fl.node_angle * tab.nodes.size * (1.0 if kind == 0 else 0.75 / tab.power)
     if h * math.sqrt(stiffness) > max(longest, HALF_CONTACT):
         return False
@@ -130,7 +150,7 @@ def resolved(fl, tab, kind, h, noise, panel):
         if o >= na and largest(panel.output, o) > 0.0:  # by speed: its share in the force counts
             size = max(size, largest(panel.F, a) / largest(panel.output, o))
         kick = 1.0
-        if o < na:
+        if o < na and not is_rigid(fl, panel.active[a]):
             kick = KICK * fl.stops[panel.active[a], MOBILITY] * largest(panel.slope, o)
             kick = max(kick * h / fl.omega, 1.0)
         tail = max(goal * fl.tail / (swayed[a] * math.sqrt(kick)), floor)

@@ -18,20 +18,20 @@ from nldyn.flow.kernels.contact import (
 )
 from nldyn.flow.kernels.flights import (
     add_growth,
-    add_rates,
-    add_swelling_by,
     at_frequency,
     closing_time,
     distance,
     fastest_moved,
     fly,
     fly_state,
+    output_columns,
     output_derivatives,
     output_noise,
+    rate_noise,
     term,
     turned,
 )
-from nldyn.flow.kernels.law import is_bond, law, never_pulls
+from nldyn.flow.kernels.law import is_bond, is_rigid, never_pulls
 from nldyn.flow.kernels.layout import (
     CONTACT_FAILED,
     DASHPOT,
@@ -49,6 +49,14 @@ from nldyn.flow.kernels.layout import (
 )
 from nldyn.flow.kernels.panel import new_panel, panel_columns, same_stops
 from nldyn.flow.kernels.resolution import at_end
+from nldyn.flow.kernels.rigid import (
+    contact_forces,
+    departure,
+    hit_stop,
+    impact,
+    settle,
+    state_rate,
+)
 
 
 @inner
@@ -132,31 +140,30 @@ def propagate(
             columns[i, size + c] = -(fl.response[0, 2 + c, i] * turn).real
     add_growth(fl, phase, -1.0, w, columns)
     closed = np.zeros(n_stops, dtype=np.bool_)
+    bounces = np.zeros(n_stops, dtype=np.int64)
     for s in range(n_stops):
         value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
         left = output_noise(fl, s, w) if speed < 0.0 else 0.0  # it opens at this instant
-        closed[s] = is_bond(fl, s) or value - fl.stops[s, GAP] > left
+        shut = value - fl.stops[s, GAP] > left and not is_rigid(fl, s)
+        closed[s] = is_bond(fl, s) or shut
         if never_pulls(fl, s) and closed[s]:
             release = int(fl.stops[s, RELEASE])
             value, speed, _, _ = output_derivatives(fl, release, w, phase, 0.0)
             left = output_noise(fl, release, w) if speed < 0.0 else 0.0
             closed[s] = value - fl.stops[s, GAP] > left
+    begin_on_rigid_stops(fl, phase, closed, closings, bounces, with_columns, w, columns)
     pushes = np.full(n_stops, np.nan)
     status = run_pieces(
-        fl, tab, w, columns, phase, before, duration, closed, closings, with_columns, rec,
+        fl, tab, w, columns, phase, before, duration, closed, closings, bounces, with_columns, rec,
         recording, pushes,
     )  # fmt: skip
     end_phase = phase + fl.omega * duration
     turn = turned(end_phase)
-    rate = np.zeros(size)
-    add_rates(fl.blocks, w, rate)
+    forces, _ = contact_forces(fl, w, end_phase, closed)
     for s in range(n_stops):
-        value, speed, _, _ = output_derivatives(fl, s, w, end_phase, 0.0)
-        force, _, _ = law(fl, s, value - fl.stops[s, GAP], speed)
         if not np.isnan(pushes[s]):
-            force = pushes[s]
-        for i in range(size):
-            rate[i] -= fl.force[i, s] * force
+            forces[s] = pushes[s]
+    rate = state_rate(fl, w, forces)
     add_growth(fl, end_phase, 1.0, w, columns)
     for i in range(size):
         end[i] = w[i] + (fl.response[0, 0, i] * turn).real
@@ -171,6 +178,19 @@ def propagate(
 
 
 @inner
+def begin_on_rigid_stops(fl, phase, closed, closings, bounces, with_columns, w, columns):
+    """Let a body that begins at or beyond rigid stops rebound, rest or leave."""
+    hit, _ = hit_stop(fl, w, phase, -1)
+    if hit >= 0:
+        impact(
+            fl, hit, False, phase, 0.0, closed, closings, bounces, with_columns, w, columns
+        )  # fmt: skip
+    else:
+        struck, shift = np.zeros(closed.size, dtype=np.bool_), np.zeros(columns.shape[1])
+        settle(fl, -1, phase, 0.0, shift, closed, struck, with_columns, w, columns)
+
+
+@inner
 def jump_columns(fl, stop, phase, t, closes, columns):
     """Change of the sensitivities as a dashpot begins or ceases to act, a time t after the start.
 
@@ -179,22 +199,25 @@ def jump_columns(fl, stop, phase, t, closes, columns):
     """
     never_inline()
     n = columns.shape[1]
-    depth = np.zeros(n)
-    for c in range(n):
-        for k in range(columns.shape[0]):
-            depth[c] += fl.rows[0, stop, k] * columns[k, c]
-    turn = turned(phase)
-    depth[n - 1] += ((fl.forced[0, 1, stop] + 1j * t * fl.forced[0, 0, stop]) * turn).real
+    depth = output_columns(fl, stop, 0, phase, t, columns)
     for c in range(fl.parameters.shape[0]):
-        q = columns.shape[0] + c
-        depth[q] += (fl.forced[0, 2 + c, stop] * turn).real
         if fl.parameters[c, 0] == GAP and fl.parameters[c, 1] == stop:
-            depth[q] -= 1.0
-    add_swelling_by(fl, stop, phase, t, False, 1.0, depth)
+            depth[columns.shape[0] + c] -= 1.0
     impulse = -fl.stops[stop, DASHPOT] if closes else fl.stops[stop, DASHPOT]
     for k in range(columns.shape[0]):
         for c in range(n):
             columns[k, c] += impulse * fl.force[k, stop] * depth[c]
+
+
+@inner
+def leave_rigid_stops(fl, event, w, phase, closed, shortest, skips):
+    """Times (n_stops,) to pass before a gap that has opened without speed is looked at again."""
+    for s in range(closed.size):
+        if is_rigid(fl, s) and not closed[s]:
+            value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
+            shut = s == event or value - fl.stops[s, GAP] >= -10.0 * output_noise(fl, s, w)
+            if shut and abs(speed) <= 10.0 * rate_noise(fl, s, w):
+                skips[s] = departure(fl, s, w, phase, shortest)
 
 
 @inner
@@ -233,14 +256,14 @@ def switch_with(fl, w, phase, t, h, closed, closings, with_columns, columns):
 
 @inlined
 def run_pieces(
-    fl, tab, w, columns, phase, before, duration, closed, closings, with_columns, rec, recording,
-    pushes,
+    fl, tab, w, columns, phase, before, duration, closed, closings, bounces, with_columns, rec,
+    recording, pushes,
 ):  # fmt: skip
     """Advance w and its sensitivities in place over a segment, piece by piece.
 
     `before` is the phase of the whole turns before it, which only the record shows. `pushes`
     (n_stops,) is filled with the forces at the end of stops that damp so strongly that they cannot
-    be told from the state there.
+    be told from the state there. `bounces`: see `impact`.
     """
     m = tab.nodes.size
     n_stops = closed.size
@@ -253,7 +276,7 @@ def run_pieces(
     shortest = max(1e-10 / max(fastest, fl.omega), 1e-15 * duration)
     t = 0.0
     start_switch = 1 if duration < 0.0 else 0  # written so that one version is compiled, not two
-    skip = 0.0
+    skips = np.zeros(n_stops)
     flight, none = (FLIGHT, -1) if duration >= 0.0 else (0, 0)  # as above
     w_end = np.empty(w.size)
     # penetrations that are carried from panel to panel, and their rounding errors
@@ -280,7 +303,7 @@ def run_pieces(
         if n_active == 0:
             first, stop = remain, none
             for s in range(n_stops):
-                at = closing_time(fl, s, w, here, skip, first, shortest)
+                at = closing_time(fl, s, w, here, skips[s], first, shortest)
                 if at < 0.0:
                     return TOO_MANY_STEPS
                 if at < first:
@@ -291,18 +314,26 @@ def run_pieces(
             if with_columns:
                 fly(fl, columns, first)
             t = duration if stop < 0 else t + first
-            skip = 0.0
+            skips[:] = 0.0
             if stop >= 0:
                 here = phase + fl.omega * t
-                switch(fl, stop, w, here, t, closed, with_columns, columns)
-                closings[stop] += 1
-                switch_with(fl, w, here, t, 0.0, closed, closings, with_columns, columns)
                 start_switch = 1
+                if is_rigid(fl, stop):
+                    start_switch = 0
+                    impact(
+                        fl, stop, True, here, t, closed, closings, bounces, with_columns, w, columns
+                    )  # fmt: skip
+                    leave_rigid_stops(fl, stop, w, here, closed, shortest, skips)
+                else:
+                    switch(fl, stop, w, here, t, closed, with_columns, columns)
+                    closings[stop] += 1
+                switch_with(fl, w, here, t, 0.0, closed, closings, with_columns, columns)
             continue
         active = active[:n_active]
         if not same_stops(active, panel.active):
             panel = new_panel(fl, m, w.size, active)
-        if n_active == 1 and start_switch == 1 and not bonded:
+        lone = n_active == 1 and start_switch == 1
+        if lone and not bonded and not is_rigid(fl, active[0]):
             peak, _, left = expected_contact(fl, active[0], w, here)
             noise = output_noise(fl, active[0], w)
             if lost_to_rounding(fl, active[0], w, peak, noise) > WORST_ROUNDING:
@@ -310,7 +341,8 @@ def run_pieces(
             if peak <= 100.0 * noise:  # a touch without force
                 switch(fl, active[0], w, here, t, closed, with_columns, columns)
                 closings[active[0]] -= 1
-                start_switch, skip = 0, max(left, shortest)
+                start_switch = 0
+                skips[:] = max(left, shortest)
                 continue
         h_max = min(remain, h_mapped if start_switch == 1 else h_even, reach)
         for a in range(n_active):
@@ -358,12 +390,22 @@ def run_pieces(
         if event >= 0:
             panel.decay[:] = 0.0
             here = phase + fl.omega * t
-            switch(fl, event, w, here, t, closed, with_columns, columns)
-            start_switch = 1
-            if closed[event]:
-                closings[event] += 1
+            skips[:] = shortest if h < shortest else 0.0
+            if is_rigid(fl, event):
+                if closed[event]:
+                    closed[event] = False
+                else:
+                    impact(
+                        fl, event, True, here, t, closed, closings, bounces, with_columns, w,
+                        columns,
+                    )  # fmt: skip
+                leave_rigid_stops(fl, event, w, here, closed, shortest, skips)
+            else:
+                switch(fl, event, w, here, t, closed, with_columns, columns)
+                start_switch = 1
+                if closed[event]:
+                    closings[event] += 1
             switch_with(fl, w, here, t, h, closed, closings, with_columns, columns)
-            skip = shortest if h < shortest else 0.0
     return TOO_MANY_PIECES
 
 

@@ -15,6 +15,7 @@ from nldyn.scene.component import build_component
 from nldyn.scene.load_case import load_case_of
 from nldyn.scene.read import load_scene, parse_scene
 from nldyn.scene.run import compute
+from nldyn.system.rigid_stop import RigidStop
 
 MODAL = """
 [modal]
@@ -216,6 +217,20 @@ def test_dissipation_of_a_stop_is_given_or_follows_from_restitution():
         ("restitution=0.9\nimpact_speed=0.1\ndissipation=1.0\n", "dissipation"),
         ("dissipation=-1.0\n", "dissipation"),
         ("restitution=1.2\nimpact_speed=0.1\n", "restitution"),
+    ):
+        with pytest.raises(SceneError, match=words):
+            parse_scene(MODAL + stop + wrong)
+
+
+def test_a_rigid_stop_has_a_restitution_and_nothing_elastic():
+    stop = "[[stops]]\nat='a'\nlaw='rigid'\n"
+    (built,) = build_system(parse_scene(MODAL + stop + "restitution=0.8\ngap=1e-3\n")).stops
+    assert built == RigidStop("a", 0.8, 1e-3)
+    for wrong, words in (
+        ("", "needs 'restitution'"),
+        ("restitution=0.8\nstiffness=1e9\n", "'stiffness', which is not a key of a rigid stop"),
+        ("restitution=0.8\ndashpot=1.0\n", "'dashpot', which is not a key of a rigid stop"),
+        ("restitution=0.8\ngap=-1e-3\n", "a preload needs a stop with a stiffness"),
     ):
         with pytest.raises(SceneError, match=words):
             parse_scene(MODAL + stop + wrong)

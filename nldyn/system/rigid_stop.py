@@ -1,0 +1,168 @@
+"""Rigid stops: Newton's law of impact with a coefficient of restitution."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from nldyn.base.errors import SystemModelError, check_types, is_finite, shown
+from nldyn.system.contact_law import ContactLaw
+from nldyn.system.elements import Stop
+
+Restitution = Callable[[float], tuple[float, float]]
+TRIED_SPEEDS = tuple(10.0**k for k in range(-12, 4))  # m/s
+
+
+@dataclass(frozen=True)
+class RigidStop:
+    r"""One-sided rigid stop: a body that closes the gap at the speed v leaves it at e v.
+
+    The penetration δ is that of a `Stop`. At an impact the velocities jump by an impulse that acts
+    on all retained modes, :math:`\dot q^+ = \dot q^- - c\,(1 + e)\,v / (c \cdot c)` with the vector
+    c of the gap; more modes make the mass 1/(c·c) that takes part smaller. Impacts that follow each
+    other ever faster end in rest on the stop, under a force that lasts until it would have to pull.
+    Where several rigid stops are hit at once, impacts follow each other within the instant, the
+    fastest first, until no gap closes: energy never grows.
+
+    Parameters
+    ----------
+    at : str
+        Interface that hits the stop.
+    restitution : float or callable
+        Coefficient e, from 0 to 1. Or a function of the impact speed in m/s that gives e and its
+        derivative de/dv in s/m; numba must be able to compile it.
+    gap : float
+        Distance in m at rest, not negative.
+    direction : {1, -1}
+        Sign of the displacement that closes the gap.
+    against : str, optional
+        Interface on the other side; the ground unless given.
+
+    Raises
+    ------
+    SystemModelError
+        For a value that is out of range.
+
+    References
+    ----------
+    S. W. Shaw, P. J. Holmes (1983), *J. Sound Vib.* 90, 129-155; F. Pfeiffer, C. Glocker (1996),
+    *Multibody Dynamics with Unilateral Contacts*, ch. 8.
+
+    Examples
+    --------
+    >>> RigidStop("middle", restitution=0.8).gap
+    0.0
+    """
+
+    at: str
+    restitution: float | Restitution
+    gap: float = 0.0
+    direction: int = 1
+    against: str | None = None
+
+    def __post_init__(self) -> None:
+        check_types(**{"stop: at": (self.at, str), "stop: against": (self.against, str, None)})
+        owner = f"rigid stop at '{self.at}'"
+        if callable(self.restitution):
+            for speed in TRIED_SPEEDS:
+                _check_restitution(owner, self.restitution, speed)
+        elif not (is_finite(self.restitution) and 0.0 <= self.restitution <= 1.0):
+            raise SystemModelError(
+                f"{owner}: restitution must lie between 0 and 1, got {shown(self.restitution)}"
+            )
+        if not (is_finite(self.gap) and self.gap >= 0.0):
+            raise SystemModelError(
+                f"{owner}: gap must not be negative, got {shown(self.gap)}: a preload needs a "
+                "stop with a stiffness"
+            )
+        if self.against == self.at:
+            raise SystemModelError(f"{owner}: against must be another interface")
+        if isinstance(self.direction, bool | np.bool_) or self.direction not in (1, -1):
+            raise SystemModelError(f"{owner}: direction must be +1 or -1, got {self.direction}")
+
+    @property
+    def law(self) -> ContactLaw | None:
+        """The restitution as kernels call a law, where it is a function of the speed."""
+        return _as_law(self.restitution) if callable(self.restitution) else None
+
+    @property
+    def depends_on_speed(self) -> bool:
+        """Whether an impact takes energy out."""
+        return callable(self.restitution) or self.restitution != 1.0
+
+    def determinant(self, speed: float) -> float:
+        """Factor e (e + v de/dv) by which an impact at a speed changes volumes of states.
+
+        Examples
+        --------
+        >>> RigidStop("middle", 0.5).determinant(1.0)
+        0.25
+        """
+        if not callable(self.restitution):
+            return self.restitution**2
+        e, slope = self.restitution(speed)
+        return float(e * (e + speed * slope))
+
+    def restitution_at(self, speed: float) -> float:
+        """Coefficient of restitution at an impact speed in m/s.
+
+        Examples
+        --------
+        >>> RigidStop("middle", 0.8).restitution_at(1.0)
+        0.8
+        """
+        return float(self.restitution(speed)[0]) if callable(self.restitution) else self.restitution
+
+
+AnyStop = Stop | RigidStop
+
+
+def is_linear(stop: AnyStop) -> bool:
+    """Whether a stop is a one-sided linear spring."""
+    return isinstance(stop, Stop) and stop.exponent == 1.0
+
+
+def _check_restitution(owner: str, restitution: Restitution, speed: float) -> None:
+    """Refuse a function that gives no coefficient at a speed, or a wrong derivative."""
+
+    def values(speed: float) -> tuple[float, float]:
+        try:
+            e, slope = (float(x) for x in restitution(speed))
+        except (TypeError, ValueError, ArithmeticError) as error:
+            raise SystemModelError(
+                f"{owner}: restitution({speed:g}) must give two numbers (the coefficient and its "
+                f"derivative by the speed): {error}"
+            ) from None
+        if not (0.0 <= e <= 1.0 and is_finite(slope)):
+            raise SystemModelError(
+                f"{owner}: restitution({speed:g}) must lie between 0 and 1 with a finite "
+                f"derivative, got {e:g} and {slope:g}"
+            )
+        return e, slope
+
+    step = 1e-5 * speed
+    _, slope = values(speed)
+    change = (values(speed + step)[0] - values(speed - step)[0]) / (2.0 * step)
+    if abs(change - slope) > 1e-3 * abs(slope) + 1e-10 / speed:
+        raise SystemModelError(
+            f"{owner}: restitution says {slope:g} for its derivative at {speed:g} m/s, but it "
+            f"changes by {change:g}"
+        )
+
+
+@cache
+def _as_law(restitution: Restitution) -> ContactLaw:
+    numba: Any = import_module("numba")  # its stubs lack what is needed here
+    inner = restitution if hasattr(restitution, "py_func") else numba.njit(restitution)
+
+    def law(delta: float, speed: float) -> tuple[float, float, float]:
+        e, slope = inner(speed)
+        return e, 0.0, slope
+
+    law.__name__ = getattr(restitution, "__name__", "restitution")
+    return law

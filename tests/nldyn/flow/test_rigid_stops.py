@@ -1,0 +1,275 @@
+"""Rigid stops: impacts, rest and their sensitivities, against closed forms and an integrator."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from event_driven import MOST_HITS, integrate
+from scipy.optimize import brentq
+
+from nldyn import (
+    ConstantForce,
+    FlowMap,
+    HarmonicForce,
+    Parameter,
+    RigidStop,
+    Stop,
+    System,
+    SystemModelError,
+    impacts,
+    simulate,
+)
+
+G = 9.81
+PERIOD = np.array([0.0, 2.0 * np.pi])
+
+
+def ball(restitution, table=0.0, frequency_hz=10.0):
+    """A ball of 1 kg on a table that shakes with the acceleration -table g cos ωt, seen from it."""
+    return System.from_matrices(
+        [[1.0]], [[0.0]], {"ball": [1.0]}, stops=[RigidStop("ball", restitution, direction=-1)],
+        excitation=[HarmonicForce("ball", table * G), ConstantForce("ball", -G)],
+    )  # fmt: skip
+
+
+def random_system(rng):
+    """1 to 4 masses with 1 to 3 rigid stops, and what `integrate` needs to know of them."""
+    n, count = int(rng.integers(1, 5)), int(rng.integers(1, 4))
+    root = rng.normal(size=(n, n))
+    stiffness = root @ root.T + np.eye(n)
+    damping = 0.05 * stiffness
+    names = {f"x{i}": np.eye(n)[i] for i in range(n)}
+    stops, plain = [], []
+    for _ in range(count):
+        at, direction = int(rng.integers(n)), int(rng.choice([-1, 1]))
+        against = int(rng.integers(n)) if n > 1 and rng.random() < 0.3 else at
+        gap, restitution = float(rng.uniform(0.05, 0.5)), float(rng.uniform(0.5, 1.0))
+        c = direction * (np.eye(n)[at] - (np.eye(n)[against] if against != at else 0.0))
+        other = f"x{against}" if against != at else None
+        stops.append(RigidStop(f"x{at}", restitution, gap, direction, other))
+        plain.append((c, gap, restitution))
+    force = np.abs(rng.normal(size=n))
+    system = System.from_matrices(
+        np.eye(n), stiffness, names, damping=damping, stops=stops,
+        excitation=[HarmonicForce(f"x{i}", float(force[i])) for i in range(n)],
+    )  # fmt: skip
+    return system, stiffness, damping, force, plain
+
+
+def check_random(seed):
+    rng = np.random.default_rng(seed)
+    system, stiffness, damping, force, plain = random_system(rng)
+    omega, n = float(rng.uniform(0.5, 2.0)), system.size
+    start = np.concatenate([np.zeros(n), rng.normal(size=n)])
+    duration = 2.0 * np.pi / omega
+    end, hits, slowest = integrate(
+        np.eye(n), stiffness, damping, lambda t: force * np.cos(omega * t), plain, start, duration
+    )
+    if slowest < 1e-2 or hits.sum() > MOST_HITS:  # errors grow near a graze; it knows no rest
+        return 0
+    flow = FlowMap(system)
+    modal = np.concatenate([to_modal(system, start[:n]), to_modal(system, start[n:])])
+    found = flow.shoot(flow.to_state(modal)[None], PERIOD, omega)
+    assert not found.failure
+    assert found.closings.tolist() == hits.tolist()
+    rows = np.array([system.participation[f"x{i}"] for i in range(n)])
+    q = flow.to_modal(found.ends)[0]
+    seen = np.concatenate([rows @ q[:n], rows @ q[n:]])
+    growth = 1.0 + np.abs(found.jacobians).max()
+    assert np.abs(seen - end).max() < 1e-10 * growth
+    return int(hits.sum())
+
+
+def to_modal(system, x):
+    rows = np.array([system.participation[f"x{i}"] for i in range(system.size)])
+    return np.linalg.solve(rows, x)
+
+
+def test_random_systems_move_as_an_integrator_with_events_says():
+    """1e-12 of the integrator, times what the motion makes of an error."""
+    assert sum(check_random(seed) for seed in range(25)) > 40
+
+
+@pytest.mark.slow
+def test_hundreds_of_random_systems_do():
+    assert sum(check_random(seed) for seed in range(25, 500)) > 500
+
+
+def differences(system, start, omega, phases, step=1e-6):
+    """Central differences of the flow by the start, (2n, 2n), and by ω, (2n,)."""
+    flow = FlowMap(system)
+
+    def end(state, omega):
+        found = flow.shoot(state[None], phases, omega, sensitivities=False)
+        assert not found.failure
+        return found.ends[0]
+
+    by_start = [
+        (end(start + step * d, omega) - end(start - step * d, omega)) / (2.0 * step)
+        for d in np.eye(start.size)
+    ]
+    return np.array(by_start).T, (end(start, omega + step) - end(start, omega - step)) / (2 * step)
+
+
+K2 = np.array([[2.0, -1.0], [-1.0, 2.0]])
+PAIRS = {
+    "two rigid": [RigidStop("a", 0.7, 0.1), RigidStop("b", 0.5, 0.1, -1)],
+    "no rebound, beside a linear one": [RigidStop("a", 0.0, 0.1), Stop("b", 50.0, 1.0, 0.01)],
+    "between the masses": [
+        RigidStop("a", 0.3, 0.1, against="b"),
+        Stop("b", 50.0, 1.5, 0.01, dissipation=0.3),
+    ],
+    "beside a dashpot": [RigidStop("a", 0.3, 0.1), Stop("b", 50.0, 1.0, 0.01, dashpot=1.0)],
+}
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_sensitivities_are_those_of_differences(name):
+    """With impacts, rest and release on the way; differences are good to 1e-8 of the Jacobian."""
+    system = System.from_matrices(
+        np.eye(2), K2, {"a": [1.0, 0.0], "b": [0.0, 1.0]}, damping=0.05 * K2, stops=PAIRS[name],
+        excitation=[HarmonicForce("a", 1.0), ConstantForce("a", 0.6)],
+    )  # fmt: skip
+    flow = FlowMap(system)
+    start = flow.to_state(np.array([0.05, 0.1, 0.3, -0.2]))
+    found = flow.shoot(start[None], 2.0 * PERIOD, 1.7)
+    assert found.closings.min() > 0
+    by_start, by_omega = differences(system, start, 1.7, 2.0 * PERIOD)
+    size = np.abs(found.jacobians).max()
+    assert np.abs(found.jacobians[0] - by_start).max() < 3e-8 * size
+    assert np.abs(found.d_omega[0] - by_omega).max() < 3e-8 * np.abs(by_omega).max()
+
+
+def slower(speed):
+    """Restitution that falls with the speed."""
+    return 0.9 / (1.0 + 0.5 * speed), -0.45 / (1.0 + 0.5 * speed) ** 2
+
+
+@pytest.mark.parametrize("restitution", [0.8, slower], ids=["constant", "of the speed"])
+def test_derivatives_by_parameters_and_speed(restitution):
+    system = System.from_matrices(
+        [[1.0]], [[1.0]], {"a": [1.0]}, damping=[[0.05]],
+        stops=[RigidStop("a", restitution, 0.2)], excitation=[HarmonicForce("a", 1.0)],
+    )  # fmt: skip
+    flow = FlowMap(system)
+    start = np.array([0.1, 0.3])
+    names = ["gap", "amplitude"] + (["restitution"] if restitution == 0.8 else [])
+    found = flow.shoot(start[None], PERIOD, 2.3, parameters=[Parameter(name) for name in names])
+    assert found.closings.tolist() == [1]
+    by_start, by_omega = differences(system, start, 2.3, PERIOD)
+    assert np.abs(found.jacobians[0] - by_start).max() < 1e-8
+    assert np.abs(found.d_omega[0] - by_omega).max() < 1e-8
+
+    def end(name, value):
+        (stop,), (force,) = system.stops, system.excitation
+        if name == "amplitude":
+            other = system.with_elements(excitation=(replace(force, amplitude=value),))
+        else:
+            other = system.with_elements(stops=(replace(stop, **{name: value}),))
+        return FlowMap(other).shoot(start[None], PERIOD, 2.3, sensitivities=False).ends[0]
+
+    for column, (name, value) in enumerate(zip(names, [0.2, 1.0, 0.8], strict=False)):
+        change = (end(name, value + 1e-6) - end(name, value - 1e-6)) / 2e-6
+        assert np.abs(found.d_parameters[0, :, column] - change).max() < 1e-8
+
+
+@pytest.mark.parametrize("restitution", [0.5, 0.8, 0.95])
+def test_a_ball_on_a_table_comes_to_rest_when_the_series_says(restitution):
+    """Dropped from h it rests after √(2h/g) (1 + e) / (1 - e), with all impacts before."""
+    height = 0.3
+    fall = math.sqrt(2.0 * height / G)
+    duration = fall * (1.0 + restitution) / (1.0 - restitution)
+    flow = FlowMap(ball(restitution))
+    start = flow.to_state(np.array([height, 0.0]))[None]
+    omega = 2.0 * np.pi / (1.001 * duration)
+    found = flow.shoot(start, PERIOD, omega)
+    q = flow.to_modal(found.ends)[0]
+    assert np.abs(q).max() < 1e-13
+    assert np.abs(found.jacobians).max() < 1e-10  # both directions are lost
+    before = flow.to_modal(flow.shoot(start, 0.9 * PERIOD, omega).ends)[0]
+    assert before[0] > 0.0
+    hits = impacts(simulate(ball(restitution), 1.0 / (1.001 * duration), 1, start=[height, 0.0]))
+    speeds = math.sqrt(2.0 * G * height) * restitution ** np.arange(len(hits))
+    # an instant is known to rounding of the height, 1e-16 m, over the speed
+    assert np.abs(hits.speed[:10] - speeds[:10]).max() < 1e-11
+    flights = 2.0 * fall * restitution ** np.arange(1, 10)
+    times = fall + np.concatenate([[0.0], np.cumsum(flights)])
+    assert np.abs(hits.time[:10] - times).max() < 1e-10
+
+
+def test_rest_ends_where_the_table_falls_faster_than_the_ball():
+    """With e = 0 and 1.5 g: it leaves at cos ωt = 1/1.5 and lands at the root of its way."""
+    omega, table = 2.0 * np.pi * 10.0, 1.5
+    leaves = -math.acos(1.0 / table) / omega  # the force exceeds the weight from there on
+
+    def way(t):
+        """Height over the table at a time t, left at `leaves` without speed."""
+        swing = np.cos(omega * t) - np.cos(omega * leaves)
+        swing += omega * (t - leaves) * np.sin(omega * leaves)
+        return -table * G * swing / omega**2 - 0.5 * G * (t - leaves) ** 2
+
+    lands = brentq(way, leaves + 0.02, leaves + 0.09, xtol=1e-15)
+    speed = -(
+        -table * G * (np.sin(omega * leaves) - np.sin(omega * lands)) / omega - G * (lands - leaves)
+    )
+    hits = impacts(simulate(ball(0.0, table), 10.0, 4, start=[0.0, 0.0]))
+    assert hits.speed[1:] == pytest.approx(speed, rel=1e-10)
+    assert hits.time[1:] % 0.1 == pytest.approx(lands, abs=1e-12)
+
+
+def test_the_force_of_rest_is_the_weight_less_the_shaking():
+    motion = simulate(ball(0.3, 0.5), 10.0, 1, start=[0.0, 0.0])
+    history = motion.history(50)
+    exact = G * (1.0 - 0.5 * np.cos(2.0 * np.pi * 10.0 * history.time))
+    assert history.force[:, 0] == pytest.approx(exact, rel=1e-12)
+    assert np.abs(history.penetration).max() < 1e-15
+
+
+def test_two_stops_hit_at_once_take_energy_one_after_the_other():
+    """Symmetric: both masses hit at one instant and each rebounds with its own restitution."""
+    system = System.from_matrices(
+        np.eye(2), np.eye(2), {"a": [1.0, 0.0], "b": [0.0, 1.0]},
+        stops=[RigidStop("a", 0.5, 0.1), RigidStop("b", 0.25, 0.1)],
+    )  # fmt: skip
+    flow = FlowMap(system)
+    state = flow.to_state(flow_start(system, [0.0, 0.0], [1.0, 1.0]))
+    hit = math.asin(0.1)
+    found = flow.shoot(state[None], np.array([0.0, hit + 1e-9]), 1.0)
+    q = flow.to_modal(found.ends)[0]
+    rows = np.array([system.participation[name] for name in "ab"])
+    fast = math.cos(hit)
+    assert found.closings.tolist() == [1, 1]
+    assert rows @ q[2:] == pytest.approx([-0.5 * fast, -0.25 * fast], abs=1e-8)
+
+
+def flow_start(system, x, v):
+    rows = np.array([system.participation[name] for name in "ab"])
+    return np.concatenate([np.linalg.solve(rows, x), np.linalg.solve(rows, v)])
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"restitution": 1.2}, "restitution must lie between 0 and 1, got 1.2"),
+        ({"restitution": -0.1}, "restitution must lie between 0 and 1"),
+        ({"gap": -1e-3}, "a preload needs a stop with a stiffness"),
+        ({"direction": 2}, "direction must be"),
+        ({"against": "a"}, "against must be another interface"),
+        ({"restitution": lambda v: (2.0, 0.0)}, r"restitution\(1e-12\) must lie between 0 and 1"),
+        ({"restitution": lambda v: (0.5, 1.0)}, "restitution says 1 for its derivative"),
+        ({"restitution": lambda v: 0.5}, "must give two numbers"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(changes, words):
+    with pytest.raises(SystemModelError, match=words):
+        RigidStop(**{"at": "a", "restitution": 0.5, **changes})
+
+
+def test_a_rigid_stop_has_no_stiffness_and_an_elastic_one_no_restitution():
+    system = ball(0.5).with_elements(stops=(RigidStop("ball", 0.5), Stop("ball", 1.0)))
+    for name, index in (("stiffness", 0), ("restitution", 1)):
+        with pytest.raises(SystemModelError, match=f"it has no {name}"):
+            FlowMap(system).shoot(
+                np.zeros((1, 2)), PERIOD, 1.0, parameters=[Parameter(name, index)]
+            )
