@@ -14,6 +14,8 @@ from nldyn.bifurcations.point import SpecialPoint as SpecialPoint
 from nldyn.bifurcations.switching import switch_branch as switch_branch
 
 # branches
+from nldyn.branches.backbone import Backbone as Backbone
+from nldyn.branches.backbone import backbone as backbone
 from nldyn.branches.branch import Branch as Branch
 from nldyn.branches.cascades import Cascade as Cascade
 from nldyn.branches.cascades import cascade as cascade

@@ -104,7 +104,8 @@ def solve_orbit(
     if flow.system.conservative and not flow.system.driven:
         raise ConvergenceError(
             "nothing excites the system and nothing damps it, so that its free motions are a "
-            "family over the energy and none of them stands alone: give excitation or damping"
+            "family over the energy and none of them stands alone: give excitation or damping, or "
+            "follow the family by backbone"
         )
     if guess is not None:
         return first_orbit(problem, [guessed_nodes(problem, guess, omega)], omega, observe)

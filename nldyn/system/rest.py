@@ -99,7 +99,7 @@ def rest_positions(system: System) -> list[Real]:
         raise SystemModelError(
             "the structure has no rest position: the springs that soften let it run away"
         )
-    return sorted(found, key=lambda q: _potential(system, push, q))
+    return sorted(found, key=lambda q: potential_at(system, push, q))
 
 
 def _rests_of_bonds(system: System, push: Real) -> Iterator[Real]:
@@ -121,7 +121,7 @@ def _beside(system: System, push: Real, q: Real, way: Real) -> Real:
     steps = 2.0 ** np.arange(-60.0, 60.0)
     size = max(float(np.abs(_vector(system, bond) @ way)) for bond in system.bonds) or 1.0
     energies = [
-        min(_potential(system, push, q + s * way), _potential(system, push, q - s * way))
+        min(potential_at(system, push, q + s * way), potential_at(system, push, q - s * way))
         for s in steps / size
     ]
     rises = np.flatnonzero(np.diff(energies) > 0.0)
@@ -137,18 +137,19 @@ def _settled(system: System, q: Real) -> Real:
     """Where Newton's method goes downhill from q; not finite if it runs away."""
     push = constant_force(system)
     for _ in range(MOST_STEPS):
-        slope = _slope(system, push, q)
+        slope = force_at(system, push, q)
         step = _downhill(system, q, slope)
         if not np.linalg.norm(q) < FARTHEST:
             return np.full(system.size, np.nan)
-        size, potential, steepness = 1.0, _potential(system, push, q), float(np.linalg.norm(slope))
+        size, potential = 1.0, potential_at(system, push, q)
+        steepness = float(np.linalg.norm(slope))
         while size > SHORTEST:
             there = q + size * step
             foretold = potential + SHARE * size * float(slope @ step)
             # near the minimum the potential is rounding, the forces are not
             if (
-                _potential(system, push, there) <= foretold
-                or np.linalg.norm(_slope(system, push, there)) < steepness
+                potential_at(system, push, there) <= foretold
+                or np.linalg.norm(force_at(system, push, there)) < steepness
             ):
                 break
             size *= 0.5
@@ -292,7 +293,8 @@ def _elastic(stop: Stop, depth: float) -> tuple[float, float]:
     return force, stiffness
 
 
-def _slope(system: System, push: Real, q: Real) -> Real:
+def force_at(system: System, push: Real, q: Real) -> Real:
+    """Modal force (n,) of all springs and closed stops at q, less a constant force."""
     slope = system.stiffness @ q - push
     for _, stop, c, depth in _closed(system.elastic_stops, system, q):
         slope += _elastic(stop, depth)[0] * c
@@ -302,7 +304,8 @@ def _slope(system: System, push: Real, q: Real) -> Real:
     return np.asarray(slope)
 
 
-def _potential(system: System, push: Real, q: Real) -> float:
+def potential_at(system: System, push: Real, q: Real) -> float:
+    """Energy in J of all springs and closed stops at q, less that of a constant force."""
     energy = 0.5 * float(q @ system.stiffness @ q) - float(push @ q)
     for _, stop, _, depth in _closed(system.elastic_stops, system, q):
         energy += _elastic(stop, depth)[0] * depth / (stop.exponent + 1.0)

@@ -1,0 +1,86 @@
+"""Families of free motions, against elliptic integrals and piecewise linear oscillators."""
+
+import numpy as np
+import pytest
+from scipy.special import ellipk
+
+from nldyn import (
+    HarmonicForce,
+    PolynomialSpring,
+    RigidStop,
+    Spring,
+    Stop,
+    System,
+    SystemModelError,
+    backbone,
+)
+
+
+def oscillator(**elements):
+    return System.from_matrices([[1.0]], [[1.0]], {"x": [1.0]}, **elements)
+
+
+def duffing_hz(amplitude, linear, cubic):
+    """Frequency of u'' + a u + b u³ = 0 [Kovacic and Brennan 2011, table 4.1]."""
+    total = linear + cubic * amplitude**2
+    m = cubic * amplitude**2 / (2.0 * total)
+    return np.sqrt(total) / (4.0 * ellipk(m))
+
+
+@pytest.mark.parametrize(("cubic", "largest"), [(1.0, 10.0), (-1.0, 0.9)], ids=["hard", "soft"])
+def test_duffings_backbone_is_an_elliptic_integral(cubic, largest):
+    system = oscillator(springs=[PolynomialSpring("x", [0.0, 0.0, cubic])])
+    found = backbone(system, amplitude_m=(1e-3, largest))
+    assert found.reason == "end of the range of amplitudes"
+    assert found.amplitude[0] == pytest.approx(1e-3, rel=1e-2)
+    exact = duffing_hz(found.amplitude, 1.0, cubic)
+    assert found.frequency_hz == pytest.approx(exact, rel=1e-9)
+    size = found.amplitude
+    assert found.energy == pytest.approx(0.5 * size**2 + 0.25 * cubic * size**4, rel=1e-8)
+    assert found.stable.all()
+
+
+def test_a_bilinear_oscillator_has_one_frequency():
+    found = backbone(oscillator(stops=[Stop.linear("x", 3.0)]), amplitude_m=(1e-4, 1.0))
+    assert found.frequency_hz == pytest.approx(2.0 / (1.0 + 0.5) / (2.0 * np.pi), rel=1e-9)
+
+
+def test_a_gap_leaves_the_frequency_alone_until_it_is_closed():
+    system = oscillator(stops=[Stop.linear("x", 3.0, gap=0.5)])
+    found = backbone(system, amplitude_m=(0.05, 2.0))
+    open_gap = found.amplitude < 0.5
+    assert open_gap.sum() > 3
+    assert found.frequency_hz[open_gap] == pytest.approx(1.0 / (2.0 * np.pi), rel=1e-9)
+    # to the free side a cos t; in contact u'' + 4 u = 1.5, entered at 0.5 with u'² = a² - 0.25
+    low = np.array([-orbit.observed_extremes.values.min() for orbit in found.orbits])[~open_gap]
+    flight = 2.0 * (np.pi - np.arccos(0.5 / low))
+    contact = np.arctan2(0.5 * np.sqrt(low**2 - 0.25), 0.125)
+    assert found.frequency_hz[~open_gap] == pytest.approx(1.0 / (flight + contact), rel=1e-8)
+
+
+@pytest.mark.parametrize(("mode", "linear", "cubic"), [(1, 1.0, 0.0), (2, 1.4, 4.0)])
+def test_two_masses_with_a_cubic_spring_between(mode, linear, cubic):
+    """In phase linear; against each other u'' + (1 + 2 · 0.2) u + 8 · 0.5 u³ = 0."""
+    system = System.from_matrices(
+        np.eye(2), np.eye(2), {"a": [1.0, 0.0], "b": [0.0, 1.0]},
+        springs=[Spring("a", 0.2, "b"), PolynomialSpring("a", [0.0, 0.0, 0.5], "b")],
+    )  # fmt: skip
+    found = backbone(system, mode, amplitude_m=(1e-3, 1.0))
+    exact = duffing_hz(found.amplitude, linear, cubic)
+    assert found.frequency_hz == pytest.approx(exact, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("changes", "arguments", "words"),
+    [
+        ({"modal_damping": 0.01}, {}, "needs a system that nothing damps"),
+        ({"stops": [Stop.linear("x", 1.0, dashpot=1.0)]}, {}, "that nothing damps"),
+        ({"excitation": [HarmonicForce("x", 1.0)]}, {}, "leave out all excitation"),
+        ({"stops": [RigidStop("x", 1.0)]}, {}, "not followed against rigid stops"),
+        ({}, {"mode": 2}, "mode must be"),
+        ({}, {"amplitude_m": (1.0, 0.1)}, "two ascending positive numbers"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(changes, arguments, words):
+    with pytest.raises(SystemModelError, match=words):
+        backbone(oscillator(**changes), **{"amplitude_m": (0.1, 1.0), **arguments})
