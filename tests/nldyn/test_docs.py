@@ -56,6 +56,35 @@ def test_example_of_the_elements_prints_folds_and_wells(capsys):
     assert wells == [2.0, 2.0]
 
 
+def printed_by(page, capsys):
+    """Lines that the only example of a page prints."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.S)
+    exec(code, {})
+    return capsys.readouterr().out.splitlines()
+
+
+def test_examples_of_rigid_stops_print_what_the_pages_say(capsys):
+    """The frequencies of the first are closed forms, see `test_impact_oscillator`."""
+    _, *told = printed_by("how-to/rigid_stops.md", capsys)
+    assert [line.split()[0] for line in told] == ["Grazing", "Flip", "Grazing"]
+    assert [line.split()[2] for line in told] == ["0.135786", "0.329426", "0.331059"]
+    (line,) = printed_by("results/rigid_stops.md", capsys)
+    text = (ROOT / "docs" / "results" / "rigid_stops.md").read_text(encoding="utf-8")
+    (row,) = re.findall(r"rigid, e = 0.7 \|.*\| (.*?) \| grazes at (.*?) Hz", text)
+    (grazing, *flips) = ast.literal_eval(line)
+    assert grazing == ("GR", float(row[1]))
+    assert flips == [("PD", float(hz)) for hz in row[0].split(", ")]
+
+
+def test_example_of_backbones_keeps_its_energy(capsys):
+    """Farthest from the stop all of it is in the springs."""
+    said, last = printed_by("how-to/backbones.md", capsys)
+    assert said.startswith("<Backbone of mode 1:")
+    _, size, energy = map(float, last.strip("[]").split())
+    assert energy == pytest.approx(0.5 * size**2 + 0.025 * size**4, rel=1e-6)
+
+
 def test_every_kind_of_special_point_is_in_the_table():
     text = THEORY.read_text(encoding="utf-8")
     for kind in ("LP", "PD", "BP", "NS", "GR"):
