@@ -181,7 +181,7 @@ def test_what_is_given_twice_is_told_in_words_of_toml(tmp_path, text, fault):
         (
             "stiffness = 5e9",
             "law = 'hertzian'\nstiffness = 5e9",
-            "stops[0].law must be 'hertz' or 'linear', not 'hertzian'",
+            "stops[0].law must be 'hertz', 'linear' or 'rigid', not 'hertzian'",
         ),
         (
             "[13.1, 125.1]",
