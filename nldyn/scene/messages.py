@@ -186,6 +186,8 @@ def _wanted(kind: str, context: Mapping[str, Any]) -> str:
         "greater_than_equal": "at least {ge:g}",
         "less_than": "less than {lt:g}",
         "less_than_equal": "at most {le:g}",
+        "too_long": "a list of at most {max_length} values",
+        "too_short": "a list of at least {min_length} values",
     }
     if kind in bounds:
         return bounds[kind].format(**context)

@@ -22,6 +22,7 @@ RIGID = 1e8  # stiffness of what stands in for a rigid stop, beside the structur
 MOST_STARTS = 100  # in the search for all rest positions
 SAME = 1e-6  # share of their size by which two of them may differ
 FARTHEST = 1e9  # m kg^0.5, where a motion counts as running away
+BALANCED = 1e-9  # share of the forces that may be left at rest
 SHARE = 0.1  # of the decrease that the slope foretells, with which a step is taken
 
 
@@ -86,10 +87,13 @@ def rest_positions(system: System) -> list[Real]:
     starts = [np.zeros(system.size), *_rests_of_bonds(system, push)]
     found: list[Real] = []
     for start in starts:
-        if not np.all(np.isfinite(q := _settled(system, start))):
+        q = _settled(system, start)
+        if not (np.all(np.isfinite(q)) and _balanced(system, push, q)):
             continue
         values, vectors = np.linalg.eigh(tangent_stiffness(system, q))
-        if values[0] < -FLAT * abs(values[-1]):
+        flat = FLAT * float(np.abs(values).max())
+        falls = values[0] <= flat and _falls(system, push, q, vectors[:, 0])
+        if values[0] < -flat or falls:
             if len(starts) < MOST_STARTS:
                 away = _beside(system, push, q, vectors[:, 0])
                 starts += [q + away, q - away]
@@ -97,7 +101,8 @@ def rest_positions(system: System) -> list[Real]:
             found.append(q)
     if not found:
         raise SystemModelError(
-            "the structure has no rest position: the springs that soften let it run away"
+            "the structure has no rest position: nothing holds it against the constant force, or "
+            "the springs that soften let it run away"
         )
     return sorted(found, key=lambda q: potential_at(system, push, q))
 
@@ -110,10 +115,38 @@ def _rests_of_bonds(system: System, push: Real) -> Iterator[Real]:
         forces = np.zeros(max(len(bond.coefficients), 1) + 1)
         forces[1 : len(bond.coefficients) + 1] = bond.coefficients
         forces[:2] += -float(push @ way), float(way @ system.stiffness @ way)
-        roots = np.polynomial.polynomial.polyroots(np.trim_zeros(forces, "b"))
-        for root in roots:
+        forces = np.trim_zeros(forces, "b")
+        for root in np.polynomial.polynomial.polyroots(forces) if forces.size > 1 else ():
             if abs(root.imag) <= 1e-9 * abs(root):
                 yield root.real * way
+
+
+def _balanced(system: System, push: Real, q: Real) -> bool:
+    """Whether the forces at q cancel."""
+    parts = [push, system.stiffness @ q]
+    parts += [stop_force * c for c, stop_force in _pushes(system, q)]
+    size = sum(float(np.linalg.norm(part)) for part in parts)
+    return float(np.linalg.norm(force_at(system, push, q))) <= BALANCED * size
+
+
+def _pushes(system: System, q: Real) -> Iterator[tuple[Real, float]]:
+    """Vectors and forces of the closed stops and of the bonds."""
+    for _, stop, c, depth in _closed(system.elastic_stops, system, q):
+        yield c, _elastic(stop, depth)[0]
+    for bond in system.bonds:
+        c = _vector(system, bond)
+        yield c, float(bond.force(c @ q))
+
+
+def _falls(system: System, push: Real, q: Real, way: Real) -> bool:
+    """Whether the energy falls from q along a direction without curvature, either way."""
+    here = potential_at(system, push, q)
+    size = max(float(np.abs(_vector(system, bond) @ way)) for bond in system.bonds) or 1.0
+    for step in 2.0 ** np.arange(-20.0, 20.0) / size:
+        sides = np.array([potential_at(system, push, q + s * way) for s in (step, -step)]) - here
+        if np.abs(sides).max() > 1e-12 * abs(here) + 1e-300:
+            return bool(sides.min() < 0.0)
+    return False
 
 
 def _beside(system: System, push: Real, q: Real, way: Real) -> Real:
@@ -204,15 +237,9 @@ def _downhill(system: System, q: Real, slope: Real) -> Real:
         flat = vectors[:, np.abs(values) <= FLAT * np.abs(values).max()]
         free[rigid] = -flat @ (flat.T @ slope[rigid])
     # what rounding shows of a force along a flat direction is none
-    if np.linalg.norm(free) <= NOT_HELD * np.linalg.norm(slope):
-        if system.bonds:  # away from maxima, too
-            values, vectors = np.linalg.eigh(stiffness)
-            sizes = np.abs(values)
-            along = vectors[:, sizes > FLAT * sizes.max()]
-            sizes = sizes[sizes > FLAT * sizes.max()]
-            return np.asarray(-along @ ((along.T @ slope) / sizes))
-        return np.asarray(-np.linalg.lstsq(stiffness, slope, rcond=None)[0])
     force = float(np.linalg.norm(free))
+    if force <= NOT_HELD * np.linalg.norm(slope):
+        return _newton_step(system, stiffness, slope)
     ways = []
     for stop in system.elastic_stops:
         c = system.stop_vector(stop)
@@ -220,12 +247,25 @@ def _downhill(system: System, q: Real, slope: Real) -> Real:
         if pace > NOT_HELD * np.linalg.norm(c) and left >= 0.0:
             depth = (force / (stop.stiffness * pace)) ** (1.0 / stop.exponent)
             ways.append((left + depth) / pace)
-    if not ways:
-        raise SystemModelError(
-            "a constant force acts on a body that neither a spring nor a stop holds against it; "
-            "hold it, or turn the force or the stop round"
-        )
-    return np.asarray(min(ways) / force * free)
+    if ways:
+        return np.asarray(min(ways) / force * free)
+    if system.bonds:  # they may hold it elsewhere, where another start leads
+        return _newton_step(system, stiffness, slope)
+    raise SystemModelError(
+        "a constant force acts on a body that neither a spring nor a stop holds against it; "
+        "hold it, or turn the force or the stop round"
+    )
+
+
+def _newton_step(system: System, stiffness: Real, slope: Real) -> Real:
+    """Newton's step, with bonds away from maxima, too, and none where there is no stiffness."""
+    if not system.bonds:
+        return np.asarray(-np.linalg.lstsq(stiffness, slope, rcond=None)[0])
+    values, vectors = np.linalg.eigh(stiffness)
+    sizes = np.abs(values)
+    stiff = sizes > FLAT * sizes.max()
+    along = vectors[:, stiff]
+    return np.asarray(-along @ ((along.T @ slope) / sizes[stiff]))
 
 
 def closed_at_rest(system: System, q: Real) -> list[tuple[int, float, float]]:
@@ -296,11 +336,8 @@ def _elastic(stop: Stop, depth: float) -> tuple[float, float]:
 def force_at(system: System, push: Real, q: Real) -> Real:
     """Modal force (n,) of all springs and closed stops at q, less a constant force."""
     slope = system.stiffness @ q - push
-    for _, stop, c, depth in _closed(system.elastic_stops, system, q):
-        slope += _elastic(stop, depth)[0] * c
-    for bond in system.bonds:
-        c = _vector(system, bond)
-        slope += float(bond.force(c @ q)) * c
+    for c, force in _pushes(system, q):
+        slope += force * c
     return np.asarray(slope)
 
 

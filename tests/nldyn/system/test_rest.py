@@ -8,8 +8,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from nldyn import ConvergenceError, HarmonicForce, Stop, System, find_orbits, solve_orbit
-from nldyn.system.rest import rest, tangent_stiffness
+from nldyn import (
+    ConstantForce,
+    ConvergenceError,
+    HarmonicForce,
+    PolynomialSpring,
+    Stop,
+    System,
+    SystemModelError,
+    find_orbits,
+    solve_orbit,
+)
+from nldyn.system.rest import rest, rest_positions, tangent_stiffness
 
 OWN = 20.0 * math.pi  # rad/s
 
@@ -95,3 +105,39 @@ def test_an_orbit_that_is_told_closes(stiffness, gap, force):
     found = problem.flow.shoot(nodes, problem.phases, orbit.omega)
     open_by = np.linalg.norm(found.ends - np.roll(nodes, -1, axis=0))
     assert open_by <= 1e-7 * np.linalg.norm(nodes)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "coefficients", "force", "rests"),
+    [
+        (1.0, [-1.0, 0.0, 1.0], 0.1, [0.1 ** (1 / 3)]),  # no stiffness at zero
+        (0.0, [0.0, 0.0, 1.0], 0.5, [0.5 ** (1 / 3)]),
+        (0.0, [0.0, 0.0, 0.0, 0.0, 1.0], 0.5, [0.5**0.2]),
+        (1.0, [-1.0, 0.0, 1.0], 0.0, [0.0]),
+        (1.0, [-1.0, 0.0, -1.0], 0.0, []),  # it falls away by the fourth power
+        (1.0, [-1.0, 1.0], -0.1, []),
+        (1.0, [-1.0], 0.1, []),
+    ],
+)
+def test_rest_on_a_spring_that_has_no_stiffness_at_zero(stiffness, coefficients, force, rests):
+    system = System.from_matrices(
+        [[1.0]], [[stiffness]], {"x": [1.0]}, springs=[PolynomialSpring("x", coefficients)],
+        excitation=[ConstantForce("x", force)],
+    )  # fmt: skip
+    if not rests:
+        with pytest.raises(SystemModelError, match="has no rest position"):
+            rest_positions(system)
+    else:
+        assert [q[0] for q in rest_positions(system)] == pytest.approx(rests, abs=1e-12)
+
+
+def test_a_free_mass_beside_a_nonlinear_spring_falls_on_its_stop():
+    system = System.from_matrices(
+        np.eye(2), np.zeros((2, 2)), {"a": [1.0, 0.0], "b": [0.0, 1.0]},
+        springs=[PolynomialSpring("a", [0.0, 0.0, 1.0])],
+        stops=[Stop.linear("b", 50.0, gap=0.1)],
+        excitation=[ConstantForce("a", 0.3), ConstantForce("b", 2.0)],
+    )  # fmt: skip
+    (q,) = rest_positions(system)
+    rows = np.array([system.participation[name] for name in "ab"])
+    assert rows @ q == pytest.approx([0.3 ** (1 / 3), 0.14], rel=1e-9)
