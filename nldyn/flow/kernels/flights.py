@@ -538,6 +538,13 @@ def rising_time(fl, stop, out, w, phase, start, end, shortest):
 
 
 @inner
+def calm_time(fl, out, w, phase, change):
+    """Time in which the third derivative of an output cannot make more than a change of it."""
+    _, _, _, bound = output_derivatives(fl, out, w, phase, 0.0)
+    return (6.0 * change / bound) ** (1.0 / 3.0) if bound > 0.0 else np.inf
+
+
+@inner
 def fly_state(blocks, w, t):
     """Advance a state (2n,) in place by a flight of duration t."""
     for b in range(blocks.shape[0]):

@@ -19,6 +19,7 @@ from nldyn.flow.kernels.contact import (
 from nldyn.flow.kernels.flights import (
     add_growth,
     at_frequency,
+    calm_time,
     closing_time,
     distance,
     fastest_moved,
@@ -342,7 +343,8 @@ def run_pieces(
                 switch(fl, active[0], w, here, t, closed, with_columns, columns)
                 closings[active[0]] -= 1
                 start_switch = 0
-                skips[:] = max(left, shortest)
+                calm = calm_time(fl, active[0], w, here, 100.0 * noise)
+                skips[active[0]] = max(min(left, calm), shortest)
                 continue
         h_max = min(remain, h_mapped if start_switch == 1 else h_even, reach)
         for a in range(n_active):
