@@ -296,8 +296,7 @@ class Stepper:
         # a switch passes one of shooting, as the state there has a corner
         if step <= KINK and miss < 1.0:
             orbit = Orbit.of(problem, found, here.orbit.observe)
-            jumps = problem.flow.system.jumps
-            if jumps or orbit.impacts != here.orbit.impacts:
+            if problem.flow.system.jumps or orbit.impacts != here.orbit.impacts:
                 tangent = problem.tangent(found, direction)
                 return BranchPoint(orbit, tangent, here.arclength + step), 0.0, 0.0
         if miss > self.options.max_miss:

@@ -176,7 +176,7 @@ def backbone(
     >>> bilinear = System.from_matrices([[1.0]], [[1.0]], {"x": [1.0]},
     ...     stops=[Stop.linear("x", 3.0)])
     >>> found = backbone(bilinear, amplitude_m=(0.01, 0.1))
-    >>> exact = 2.0 / (1.0 + 0.5) / (2.0 * np.pi) / 1.0   # half at 1 rad/s, half at 2 rad/s
+    >>> exact = 2.0 / (1.0 + 0.5) / (2.0 * np.pi)  # half at 1 rad/s, half at 2 rad/s
     >>> bool(np.allclose(found.frequency_hz, exact, rtol=1e-9))
     True
     """

@@ -19,7 +19,7 @@ from nldyn.system.rigid_stop import AnyStop, RigidStop
 from nldyn.system.springs import Bond
 from nldyn.system.system import System
 
-_NONE = 1.0  # stands in a row for what only an elastic stop has
+_NO_STOP = StopRow(0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0)  # what has no elastic contact
 _COLUMNS = {name: StopRow._fields.index(name) for name in OF_STOPS}
 _EXCITATION = -1
 
@@ -33,14 +33,9 @@ def stop_row(
     """
     if isinstance(stop, RigidStop):
         restitution = 0.0 if callable(stop.restitution) else float(stop.restitution)
-        return StopRow(
+        return _NO_STOP._replace(
             gap=stop.gap,
-            stiffness=_NONE,
-            exponent=_NONE,
-            dissipation=0.0,
-            dashpot=0.0,
             mobility=mobility,
-            duration=_NONE,
             instant=options.instant(0.0),
             restitution=restitution,
         )
@@ -59,19 +54,7 @@ def stop_row(
 
 def bond_row(bond: Bond, mobility: float) -> StopRow:
     """Numbers of a bond as the kernels take them, but for the coefficients of its powers."""
-    return StopRow(
-        gap=0.0,
-        stiffness=_NONE,
-        exponent=_NONE,
-        dissipation=0.0,
-        dashpot=0.0,
-        mobility=mobility,
-        duration=_NONE,
-        instant=0.0,
-        bond=1.0,
-        drag=bond.drag,
-        cubic=bond.cubic,
-    )
+    return _NO_STOP._replace(mobility=mobility, bond=1.0, drag=bond.drag, cubic=bond.cubic)
 
 
 def parameter_tables(

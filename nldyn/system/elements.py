@@ -37,6 +37,14 @@ def check_ends(kind: str, at: object, against: object) -> None:
         raise SystemModelError(f"{kind} at '{at}': against must be another interface")
 
 
+def check_sides(owner: str, at: str, against: str | None, direction: int) -> None:
+    """Refuse a stop between an interface and itself, and a direction that is no sign."""
+    if against == at:
+        raise SystemModelError(f"{owner}: against must be another interface")
+    if isinstance(direction, bool | np.bool_) or direction not in (1, -1):
+        raise SystemModelError(f"{owner}: direction must be +1 or -1, got {direction}")
+
+
 def hertz_stiffness(
     radius: float,
     youngs_modulus: float,
@@ -257,10 +265,7 @@ class Stop:
                 "without one never pull, but for a loss by dissipation"
             )
         _finite(owner, "gap", self.gap)
-        if self.against == self.at:
-            raise SystemModelError(f"{owner}: against must be another interface")
-        if isinstance(self.direction, bool | np.bool_) or self.direction not in (1, -1):
-            raise SystemModelError(f"{owner}: direction must be +1 or -1, got {self.direction}")
+        check_sides(owner, self.at, self.against, self.direction)
 
     @property
     def depends_on_speed(self) -> bool:

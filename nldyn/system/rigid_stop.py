@@ -8,11 +8,9 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-import numpy as np
-
 from nldyn.base.errors import SystemModelError, check_types, is_finite, shown
 from nldyn.system.contact_law import ContactLaw
-from nldyn.system.elements import Stop
+from nldyn.system.elements import Stop, check_sides
 
 Restitution = Callable[[float], tuple[float, float]]
 TRIED_SPEEDS = tuple(10.0**k for k in range(-12, 4))  # m/s
@@ -80,10 +78,7 @@ class RigidStop:
                 f"{owner}: gap must not be negative, got {shown(self.gap)}: a preload needs a "
                 "stop with a stiffness"
             )
-        if self.against == self.at:
-            raise SystemModelError(f"{owner}: against must be another interface")
-        if isinstance(self.direction, bool | np.bool_) or self.direction not in (1, -1):
-            raise SystemModelError(f"{owner}: direction must be +1 or -1, got {self.direction}")
+        check_sides(owner, self.at, self.against, self.direction)
 
     @property
     def law(self) -> ContactLaw | None:

@@ -340,24 +340,23 @@ class System:
     @cached_property
     def total_damping(self) -> Real:
         """Modal damping matrix with the point dampers, (n, n), 1/s."""
-        D = np.array(self.damping)
-        for damper in self.dampers:
-            if isinstance(damper, CubicDamper):
-                continue
-            phi = self.vector_between(damper.at, damper.against)
-            D += damper.coefficient * np.outer(phi, phi)
-        return D
+        linear = [d for d in self.dampers if isinstance(d, Damper)]
+        return self._with(self.damping, [(d.at, d.against, d.coefficient) for d in linear])
 
     @cached_property
     def spring_stiffness(self) -> Real:
         """Modal stiffness of the linear springs, (n, n), 1/s²."""
-        K = np.zeros((self.size, self.size))
-        for spring in self.springs:
-            if isinstance(spring, PolynomialSpring):
-                continue
-            phi = self.vector_between(spring.at, spring.against)
-            K += spring.stiffness * np.outer(phi, phi)
-        return K
+        linear = [s for s in self.springs if isinstance(s, Spring)]
+        none = np.zeros((self.size, self.size))
+        return self._with(none, [(s.at, s.against, s.stiffness) for s in linear])
+
+    def _with(self, start: Real, elements: Sequence[tuple[str, str | None, float]]) -> Real:
+        """A modal matrix (n, n) with linear elements: both ends, and the coefficient."""
+        matrix = np.array(start)
+        for at, against, coefficient in elements:
+            phi = self.vector_between(at, against)
+            matrix += coefficient * np.outer(phi, phi)
+        return matrix
 
     @cached_property
     def stiffness(self) -> Real:
