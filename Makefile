@@ -1,13 +1,14 @@
 # `make paper` reproduces the paper's figures, `make atlas` follows all known branches of its larger
 # models (hours; it goes on where it was interrupted), `make test` runs the tests, `make bench` measures
 # speed against error, `make hard` computes the hard cases, `make faults` tries thousands of bad
-# inputs and hundreds of kills, `make slow` runs all tests that are too long for `make test`.
+# inputs and hundreds of kills, `make docs` builds the site of the documentation, `make slow` runs all
+# tests that are too long for `make test`.
 # All set up a virtual environment in .venv first.
 PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 
-.PHONY: paper atlas test slow check bench hard faults clean
+.PHONY: paper atlas test slow check bench hard faults docs clean
 
 $(VENV)/.installed: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -44,6 +45,12 @@ hard: $(VENV)/.installed
 # what no input and no machine may do to a run: docs/explanation/faults.md
 faults: $(VENV)/.installed
 	$(BIN)/python -m pytest tests/faults -m "slow or not slow" -o addopts=-q
+
+# a broken link or a public name without a docstring ends the build
+docs: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[docs]"
+	$(BIN)/python -m sphinx -q -E -W --keep-going -j auto -b html docs results/site
+	@echo "open results/site/index.html"
 
 clean:
 	rm -rf results $(VENV)

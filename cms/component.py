@@ -47,13 +47,16 @@ class ComponentLike(Protocol):
     """
 
     @property
-    def stiffness(self) -> Any: ...
+    def stiffness(self) -> Any:
+        """Symmetric (N, N) matrix."""
 
     @property
-    def mass(self) -> Any: ...
+    def mass(self) -> Any:
+        """Symmetric (N, N) matrix."""
 
     @property
-    def interfaces(self) -> Mapping[str, Any]: ...
+    def interfaces(self) -> Mapping[str, Any]:
+        """Vectors by name."""
 
 
 @dataclass(frozen=True, eq=False)

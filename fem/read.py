@@ -158,7 +158,7 @@ def read_mesh(
     ignore
         Cells to leave out: names of groups, kinds of cells such as "quad", element types of
         Abaqus such as "S4R", or "ungrouped" for those in no group. Of an Abaqus file also what is
-        refused: element types and keywords such as "GAPUNI" and "*CONTACT PAIR".
+        refused: element types and keywords such as ``GAPUNI`` and ``*CONTACT PAIR``.
 
     Returns
     -------

@@ -82,7 +82,7 @@ def read_abaqus(
     include_folders
         Folders below which included files may be, beside that of the file.
     ignore
-        Keywords and element types that are not read, such as "GAPUNI" or "*CONTACT PAIR", and
+        Keywords and element types that are not read, such as ``GAPUNI`` or ``*CONTACT PAIR``, and
         that are left out instead of refused; other names in it have no effect here.
 
     Returns

@@ -56,7 +56,7 @@ class Stability:
     multiplier : complex
         The largest multiplier (of a complex pair the upper one).
     log_modulus : float
-        ln |μ|: its distance from the unit circle, negative inside.
+        ``ln |μ|``: its distance from the unit circle, negative inside.
     uncertainty : float
         Of `log_modulus`.
 

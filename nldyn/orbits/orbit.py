@@ -293,7 +293,7 @@ class Orbit:
 
     @cached_property
     def liouville_error(self) -> float:
-        """|det Φ / exp(-∫ (tr D + Σ v² ∂F/∂δ') dt) - 1|: Liouville's formula.
+        """``|det Φ / exp(-∫ (tr D + Σ v² ∂F/∂δ') dt) - 1|``: Liouville's formula.
 
         v² is the velocity jump per unit impulse at a stop whose force depends on the speed. An
         impact with a rigid stop multiplies the determinant by e (e + v de/dv). The

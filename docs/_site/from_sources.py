@@ -1,0 +1,162 @@
+"""What the site takes from elsewhere: lists of pages, docstrings, the gallery, formulas.
+
+The pages stay plain Markdown that can be read in the repository. Before Sphinx parses them, the
+list of pages becomes the navigation, ``{public}`` becomes the docstrings of a room, and a script
+of the gallery becomes a page and a notebook.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import jupytext
+from docutils import nodes
+from latex2mathml.converter import convert
+from sphinx.application import Sphinx
+from sphinx.util import logging
+from sphinx.writers.html5 import HTML5Translator
+
+import nldyn
+
+log = logging.getLogger(__name__)
+PUBLIC = re.compile(r"```\{public\} ([\w.]+)\n```\n")
+LISTED = re.compile(r"^\*\*([\w ]+)\*\*:(.*?)(?:\n\n|\Z)", flags=re.M | re.S)
+FRONT = '<!doctype html><meta http-equiv="refresh" content="0; url=README.html">'
+
+
+def navigation(text: str) -> str:
+    """The list of pages as hidden tables of contents, one for each paragraph of it."""
+    for caption, body in LISTED.findall(text):
+        pages = "\n".join(re.findall(r"\]\(([\w/-]+)\.md\)", body))
+        text += f"\n\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{pages}\n```\n"
+    return text
+
+
+def public_names(room: str) -> list[str]:
+    """Full names of what a package shows, or a room of nldyn."""
+    listed = [f"nldyn.{name}" for name, home in nldyn._HOMES.items() if home.startswith(f"{room}.")]
+    shown = getattr(import_module(room), "__all__", ())
+    return listed or [f"{room}.{name}" for name in shown]
+
+
+def undocumented(name: str, thing: Any) -> Iterator[str]:
+    """Names of what lacks a docstring: the thing itself, its public methods and properties."""
+    if not inspect.getdoc(thing):
+        yield name
+    if inspect.isclass(thing):
+        own = {key: value for key, value in vars(thing).items() if not key.startswith("_")}
+        for key, value in own.items():
+            if (inspect.isfunction(value) or isinstance(value, property)) and not value.__doc__:
+                yield f"{name}.{key}"
+
+
+def docstrings(room: str, page: str) -> str:
+    """Directives for all public names of a room; what has no docstring is a fault."""
+    lines = ["```{eval-rst}"]
+    names = public_names(room)
+    if not names:
+        log.warning("%s shows no public name", room, location=page)
+    for name in sorted(names, key=str.lower):
+        package, _, last = name.rpartition(".")
+        thing = getattr(import_module(package), last)
+        for lacking in undocumented(name, thing):
+            log.warning("%s has no docstring", lacking, location=page)
+        kind = "class" if inspect.isclass(thing) else "function" if callable(thing) else "data"
+        kind = "exception" if kind == "class" and issubclass(thing, BaseException) else kind
+        lines += [f".. auto{kind}:: {name}", ""]
+    return "\n".join([*lines, "```", ""])
+
+
+def parts_of(script: str) -> tuple[str, str, str]:
+    """Title, text and code of a script of the gallery."""
+    title, _, text = (ast.get_docstring(ast.parse(script)) or "").partition("\n")
+    code = script.split('"""', 2)[2].strip()
+    return title.rstrip("."), text.strip(), code
+
+
+def gallery_page(script: str, name: str) -> str:
+    """A script of the gallery as a page."""
+    title, text, code = parts_of(script)
+    return (
+        f"# {title}\n\n{text}\n\n![{title}](images/{name}.png)\n\n```python\n{code}\n```\n\n"
+        f'<a href="{name}.ipynb" download>As a notebook</a>, '
+        f'<a href="{name}.py" download>as a script</a>. [All examples](README.md)\n'
+    )
+
+
+def notebook(script: str) -> str:
+    """A script of the gallery as a notebook, as JSON."""
+    title, text, code = parts_of(script)
+    said = "\n".join(f"# {line}".rstrip() for line in f"# {title}\n\n{text}".splitlines())
+    cells = jupytext.reads(f"# %% [markdown]\n{said}\n\n# %%\n{code}\n", "py:percent")
+    return jupytext.writes(cells, "ipynb")
+
+
+def without_far_links(text: str, folder: Path) -> str:
+    """The text without links to folders and to programs, which are no part of the site."""
+
+    def kept(link: re.Match[str]) -> str:
+        target = folder / link[2]
+        program = target.suffix == ".py" and target.parent.name != "gallery"
+        return link[1] if target.is_dir() or program else link[0]
+
+    return re.sub(r"(?<!!)\[([^\]]*)\]\(([\w./-]+)\)", kept, text)
+
+
+def plain_references(*event: Any) -> None:
+    """Numbers of references as text: docutils takes them for links, which are no one's own."""
+    lines = event[-1]
+    lines[:] = [re.sub(r"\[(\d+)\]_", r"[\1]", line) for line in lines]
+    lines[:] = [re.sub(r"^\.\. \[(\d+)\]", r"*  [\1]", line) for line in lines]
+
+
+def read_source(app: Sphinx, page: str, source: list[str]) -> None:
+    """Make Markdown of what is not yet."""
+    path = Path(app.env.doc2path(page))
+    if page == app.config.root_doc:
+        source[0] = navigation(source[0])
+    elif path.suffix == ".py":
+        source[0] = gallery_page(source[0], path.stem)
+    elif page == "gallery/README":
+        source[0] += "\n```{toctree}\n:hidden:\n:glob:\n\n[!R]*\n```\n"
+    source[0] = without_far_links(source[0], path.parent)
+    source[0] = PUBLIC.sub(lambda found: docstrings(found[1], page), source[0])
+
+
+def finish(app: Sphinx, exception: Exception | None) -> None:
+    """Write the front page, and scripts and notebooks of the gallery."""
+    if exception:
+        return
+    (app.outdir / "index.html").write_text(FRONT, encoding="utf-8")
+    for path in (app.srcdir / "gallery").glob("*.py"):
+        script = path.read_text(encoding="utf-8")
+        (app.outdir / "gallery" / path.name).write_text(script, encoding="utf-8")
+        book = (app.outdir / "gallery" / path.name).with_suffix(".ipynb")
+        book.write_text(notebook(script), encoding="utf-8")
+
+
+def inline_formula(translator: HTML5Translator, node: nodes.math) -> None:
+    """A formula within a line."""
+    translator.body.append(convert(node.astext()))
+    raise nodes.SkipNode
+
+
+def formula(translator: HTML5Translator, node: nodes.math_block) -> None:
+    """A formula on a line of its own."""
+    translator.body.append(convert(node.astext(), display="block"))
+    raise nodes.SkipNode
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Take part in the build."""
+    app.connect("source-read", read_source)
+    app.connect("build-finished", finish)
+    app.connect("autodoc-process-docstring", plain_references, priority=1000)
+    app.add_html_math_renderer("mathml", (inline_formula, None), (formula, None))
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
