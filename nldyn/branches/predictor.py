@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from nldyn.flow.kernels.compiling import inner, njit
+from nldyn.flow.kernels.compiling import allocating, inner, njit
 
 APART = 0.1  # of the step: a polynomial farther from the cubic is not believed
 
@@ -61,7 +61,7 @@ def distance(weights, a, b):
     return math.sqrt(total)
 
 
-@inner
+@allocating
 def foretold_error(points, tangents, weights, count):
     """Distance of the newest point from the polynomial through some points before it."""
     row = unit_row(tangents[1], weights)
@@ -72,7 +72,7 @@ def foretold_error(points, tangents, weights, count):
     return distance(weights, found, points[0])
 
 
-@inner
+@allocating
 def unit_row(tangent, weights):
     """The covector of the direction of a tangent."""
     length = 0.0
@@ -81,7 +81,7 @@ def unit_row(tangent, weights):
     return weights * tangent / math.sqrt(length)
 
 
-@inner
+@allocating
 def hermite(points, tangents, weights, first, last, step):
     """Polynomial through points and tangents from `first` up to `last`, a step ahead of the first.
 

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from nldyn.flow.kernels.compiling import inner, njit
+from nldyn.flow.kernels.compiling import allocating, inner, njit
 
 EPS = 2.0**-52
 MAX_STEPS = 150  # for one or two eigenvalues; three or four are usual, thirty at a triple one
@@ -227,7 +227,7 @@ def make_hessenberg(A):
 # Iteration
 
 
-@inner
+@allocating
 def deflate_all(A, values, exponents):
     """Split off one or two eigenvalues after the other; the squeeze, and whether it converged."""
     h = A.shape[0] - 1
@@ -294,7 +294,7 @@ def pair_squeeze(A, lo):
     return abs(a * d - b * c) / size if size > 0.0 else 0.0
 
 
-@inner
+@allocating
 def corner(A, first, last):
     """Product of the diagonal blocks of all triangular factors, and its exponent."""
     h = A.shape[0] - 1
@@ -319,7 +319,7 @@ def corner(A, first, last):
     return P, exponent
 
 
-@inner
+@allocating
 def pair(A, lo, values, exponents):
     """Eigenvalues of a block of two.
 
@@ -353,7 +353,7 @@ def pair(A, lo, values, exponents):
         values[lo + 1], exponents[lo + 1] = det / large, det_exponent - exponent
 
 
-@inner
+@allocating
 def double_step(A, lo, hi, unshifted, exceptional):
     """An implicit QR step with two shifts on the diagonal blocks from `lo` to `hi`.
 
@@ -376,7 +376,7 @@ def double_step(A, lo, hi, unshifted, exceptional):
         annihilate(A, c + 1, c, bottom, lo, hi)
 
 
-@inner
+@allocating
 def start_of_step(A, lo, hi, unshifted):
     """First column of (M - σ₁)(M - σ₂), of any length, for the product M and its shifts σ."""
     h = A.shape[0] - 1
@@ -399,7 +399,7 @@ def start_of_step(A, lo, hi, unshifted):
     return x, c * (a + d - 2.0 * real), c * e
 
 
-@inner
+@allocating
 def shifts(A, hi):
     """The pair real ± i imaginary of the last two rows of the product, and its exponent.
 
@@ -423,7 +423,7 @@ def shifts(A, hi):
 # Zeros on the diagonal of a triangular factor
 
 
-@inner
+@allocating
 def split_at_zero(A, lo, hi, negligible):
     """Split off the zero eigenvalue of a triangular factor's zero on the diagonal, if any."""
     h = A.shape[0] - 1
@@ -437,7 +437,7 @@ def split_at_zero(A, lo, hi, negligible):
     return False
 
 
-@inner
+@allocating
 def decouple_above(A, j, zero, lo, hi):
     """Make H[zero, zero - 1] zero: a QR step whose last rotation ends at the zero of factor j."""
     h = A.shape[0] - 1
@@ -455,7 +455,7 @@ def decouple_above(A, j, zero, lo, hi):
         turn_columns(A, h, i, turns[i, 0], turns[i, 1], lo, hi)
 
 
-@inner
+@allocating
 def decouple_below(A, j, zero, lo, hi):
     """Make H[zero + 1, zero] zero: a QR step from the right, ending at the zero of factor j."""
     h = A.shape[0] - 1

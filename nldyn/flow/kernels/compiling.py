@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numba
 from numba import types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.extending import intrinsic
 
 from nldyn.runtime.kernel_cache import ensure_cache, resting_on
@@ -18,15 +22,69 @@ ensure_cache()
 OURS = sorted(map(str, Path(__file__).parent.glob("*.py")))
 FILES = (*OURS, linear.__file__, contact_law.__file__)
 
-njit: Any = numba.njit  # its stubs lack the options that spare what only Python callers need
+
+class _WithinCallers(JITCodeLibrary):
+    """Code of a kernel that other kernels call: it is optimised and translated as part of them.
+
+    numba optimises each function together with all that it calls and makes machine code of both,
+    so that code ten calls deep would be compiled ten times.
+    """
+
+    codegen: Any = SimpleNamespace(set_env=lambda *_: None)  # has no place yet: see `_Entry`
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        return 0
+
+
+class _Compiler(CompilerBase):
+    """numba's compiler."""
+
+    def define_pipelines(self) -> list[Any]:
+        return [DefaultPassBuilder.define_nopython_pipeline(self.state)]
+
+
+class _Inner(_Compiler):
+    """numba's compiler, its last steps left to the caller's."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.state.library = _WithinCallers(self.state.targetctx.codegen(), "inner")
+
+
+class _Entry(_Compiler):
+    """numba's compiler; what it compiles also brings the environments of the inner kernels."""
+
+    def compile_extra(self, function: Any) -> Any:
+        result = super().compile_extra(function)
+        for environment in result._find_referenced_environments():
+            result.library.codegen.set_env(environment.env_name, environment)
+        return result
+
+
+_INNER: Any = {
+    "error_model": "numpy",
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "pipeline_class": _Inner,
+}
+_jit: Any = numba.njit  # its stubs lack the options that spare what only Python callers need
+njit: Any = partial(_jit, pipeline_class=_Entry)
 # a kernel that Python calls
 entry = resting_on(njit(cache=True, nogil=True, error_model="numpy"), *FILES)
-# kernels that are called by other kernels only
-inner = resting_on(
-    njit(cache=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True), *FILES
-)
-# those with one caller: every level of calls is optimised anew, so this saves compile time
-inlined = resting_on(njit(cache=True, error_model="numpy", inline="always"), *FILES)
+# Kernels that are called by other kernels only. They make no arrays, nor call what does: so
+# references need not be counted, which would cost as much time as what they compute.
+inner = _jit(**_INNER, _nrt=False)
+# such as make arrays, or call what does
+allocating = _jit(**_INNER)
+# those with one caller, as part of its text
+inlined = _jit(error_model="numpy", inline="always")
 
 
 @intrinsic

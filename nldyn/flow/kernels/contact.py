@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from nldyn.flow.kernels.compiling import always_inline, inner
+from nldyn.flow.kernels.compiling import allocating, always_inline, inner
 from nldyn.flow.kernels.flights import (
     carried_noise,
     output_derivatives,
@@ -154,7 +154,7 @@ def watched_pace(fl, stop, closed, w, phase):
     return value - fl.stops[stop, GAP], speed, accel
 
 
-@inner
+@allocating
 def first_event(fl, tab, kind, phase, w, h, closed, panel, w_end):
     """Stop that first opens or closes within a panel and the fraction of the panel, or (-1, 2).
 
@@ -375,7 +375,7 @@ def first_panel(fl, tab, rec, before, phase, w, h_max, h_mapped, start_switch, p
     return kind, length, event
 
 
-@inner
+@allocating
 def remember(rec):
     """Keep what a motion before needs to serve as a guess at the end of its own record."""
     used, size = rec.used[0], rec.phase.size
@@ -545,7 +545,7 @@ def far_off(fl, phase, w, h, tried, panel, event, where, closed):
     return not (h * where > 1e-12 * tried or at_switch(fl, event, w, phase, allowed, closed))
 
 
-@inner
+@allocating
 def contact_panel(
     fl, tab, before, phase, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec
 ):  # fmt: skip

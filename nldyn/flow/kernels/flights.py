@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from nldyn.flow.kernels.compiling import always_inline, inner, never_inline
+from nldyn.flow.kernels.compiling import allocating, always_inline, inner, never_inline
 from nldyn.flow.kernels.layout import GAP, MOST_STEPS, RELEASE, FlowData
 from nldyn.system.linear import DRIFT, DRIFT_ON, GROWTH, NEAR, STEADY, Terms
 
@@ -317,7 +317,7 @@ def add_forced_by(fl, out, order, phase, t, factor, sums):
         add_swelling_by(fl, out, order, phase, t, factor, sums)
 
 
-@inner
+@allocating
 def output_columns(fl, out, order, phase, t, columns):
     """Sensitivities (n_columns,) of an output, its rate or acceleration in flight (order 0 to 2).
 
@@ -429,7 +429,7 @@ def carried_noise(fl, stop, w, phase, depth, h):
     return 1e-15 * (abs(depth) + change)
 
 
-@inner
+@allocating
 def fastest_moved(blocks, force):
     """Largest |eigenvalue|, in 1/s, of the blocks that stops move by more than rounding."""
     fastest, least = 0.0, 0.0
@@ -636,7 +636,7 @@ def slow_rate(block, omega):
     return complex(trace, determinant), slow
 
 
-@inner
+@allocating
 def further_terms(blocks, orders, omega):
     """The terms of a system's response beside the steady one at order 1."""
     most = orders.size * (1 + 2 * blocks.shape[0])
@@ -705,7 +705,7 @@ def respond(blocks, order, omega, x, row, steady, first, response):
     return k
 
 
-@inner
+@allocating
 def at_frequency(system, omega, parameters, drive_by):
     """Numbers of the system at an excitation frequency (rad/s), see `shoot`."""
     blocks, rows, drive, orders = system.blocks, system.rows, system.drive, system.orders

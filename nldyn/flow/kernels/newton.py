@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.flow.kernels.compiling import entry, inner
+from nldyn.flow.kernels.compiling import allocating, entry, inner
 from nldyn.flow.kernels.layout import (
     DIVERGED,
     GAP,
@@ -91,7 +91,7 @@ def cosine(row, along, state_weight):
     return abs(product) / math.sqrt(length * pace)
 
 
-@inner
+@allocating
 def preloaded(system):
     """Size of the state that would relieve the most preloaded stop."""
     largest = 0.0

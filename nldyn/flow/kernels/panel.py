@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nldyn.flow.kernels.compiling import always_inline, inner
+from nldyn.flow.kernels.compiling import allocating, always_inline, inner
 from nldyn.flow.kernels.flights import (
     add_forced_by,
     add_rates,
@@ -25,7 +25,7 @@ from nldyn.flow.kernels.layout import DECAY, GAP, Panel
 from nldyn.flow.kernels.resolution import at_end, largest
 
 
-@inner
+@allocating
 def new_panel(fl, m, n_states, active):
     """An empty panel."""
     na = active.size
@@ -75,7 +75,7 @@ def between(fl, stop, other):
     return mobility
 
 
-@inner
+@allocating
 def panel_responses(fl, tab, kind, h, panel):
     """Fill what a panel of length h needs to know of the linear part: to, rise, back and G."""
     m = tab.nodes.size
@@ -304,7 +304,7 @@ def rounded_force(panel, force, a, i):
     return error
 
 
-@inner
+@allocating
 def solve_panel(fl, tab, kind, phase, w, h, noise, panel):
     """Newton's method for the forces at the nodes; the penetrations in `output` are the guess.
 
@@ -379,7 +379,7 @@ def solve_panel(fl, tab, kind, phase, w, h, noise, panel):
     return False
 
 
-@inner
+@allocating
 def panel_end(fl, tab, kind, phase, w, h, panel, w_end):
     """State w_end and penetrations at the end of a panel from the forces at its nodes.
 
@@ -401,7 +401,7 @@ def panel_end(fl, tab, kind, phase, w, h, panel, w_end):
     hold(fl, tab, kind, phase + fl.omega * h, h, panel, w_end)
 
 
-@inner
+@allocating
 def hold(fl, tab, kind, end_phase, h, panel, w_end):
     """Correct the end of a panel by the speeds of the stops that damp strongly.
 
@@ -456,7 +456,7 @@ def add_kicks(fl, stops, kicks, w):
             w[k] += fl.force[k, stops[a]] * kicks[a]
 
 
-@inner
+@allocating
 def panel_columns(fl, tab, kind, phase, t0, h, panel, columns):
     """Advance sensitivities (2n, n_columns) in place over a panel.
 
@@ -499,7 +499,7 @@ def panel_columns(fl, tab, kind, phase, t0, h, panel, columns):
     fly(fl, columns, h)
 
 
-@inner
+@allocating
 def node_outputs(fl, tab, kind, phase, w, h, panel, out, values):
     """Fill an output at the nodes of a panel, (1, m), with the forces at work."""
     m = tab.nodes.size

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from nldyn.flow.kernels.compiling import inner
+from nldyn.flow.kernels.compiling import allocating, inner
 from nldyn.flow.kernels.law import is_rigid, singular_slope
 from nldyn.flow.kernels.layout import (
     DECAY,
@@ -96,7 +96,7 @@ def nearly_opens(tab, kind, values, a, noise):
     return False
 
 
-@inner
+@allocating
 def resolved(fl, tab, kind, h, noise, panel):
     """Whether the Legendre tails of each force and of its slopes are small beside their largest.
 
@@ -251,7 +251,7 @@ def minimum_beside(tab, values, places, heights):
     return here, here_value
 
 
-@inner
+@allocating
 def refined(tab, values):
     """Polynomial through `values` on a grid four times as fine as the nodes."""
     fine = np.empty(tab.fine_grid.size)

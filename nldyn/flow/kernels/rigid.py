@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nldyn.flow.kernels.compiling import inner, never_inline
+from nldyn.flow.kernels.compiling import allocating, inner, never_inline
 from nldyn.flow.kernels.flights import (
     add_rates,
     output_columns,
@@ -31,7 +31,7 @@ ROUNDS = 100  # of impacts within one instant with restitution; then without
 LOW = 10.0  # a body that would rebound no higher than this many roundings of the gap stays
 
 
-@inner
+@allocating
 def resting_stops(fl, closed):
     """The rigid stops on which a body rests, (k,)."""
     found = np.empty(closed.size, dtype=np.int64)
@@ -43,7 +43,7 @@ def resting_stops(fl, closed):
     return found[:n]
 
 
-@inner
+@allocating
 def mobilities(fl, stops):
     """Speeds of closing per unit impulse of each stop (k, k), factored, and the row swaps (k,)."""
     matrix = np.empty((stops.size, stops.size))
@@ -55,7 +55,7 @@ def mobilities(fl, stops):
     return matrix, order
 
 
-@inner
+@allocating
 def contact_forces(fl, w, phase, closed):
     """Forces (n_stops,) of the closed stops, and the closing accelerations with them, (n_stops,).
 
@@ -83,7 +83,7 @@ def contact_forces(fl, w, phase, closed):
     return forces, rates
 
 
-@inner
+@allocating
 def state_rate(fl, w, forces):
     """Rate of change (2n,) of the homogeneous state with forces (n_stops,) at work."""
     rate = np.zeros(w.size)
@@ -116,7 +116,7 @@ def low(fl, stop, w, rebound, push):
     return push > 0.0 and rebound * rebound <= 2.0 * LOW * output_noise(fl, stop, w) * push
 
 
-@inner
+@allocating
 def impact(fl, first, crossed, phase, t, closed, closings, bounces, with_columns, w, columns):
     """Impacts at the instant at which rigid stop `first` is hit, a time t after the start.
 
@@ -171,7 +171,7 @@ def move(columns, rate, shift):
             columns[k, c] += rate[k] * shift[c]
 
 
-@inner
+@allocating
 def shifted_columns(fl, stop, order, phase, t, shift, w, columns):
     """Sensitivities of an output (order 0) or its rate at an instant that shifts, (n_columns,).
 
@@ -185,7 +185,7 @@ def shifted_columns(fl, stop, order, phase, t, shift, w, columns):
     return found
 
 
-@inner
+@allocating
 def strike(fl, stop, speed, restitution, slope, phase, t, shift, with_columns, w, columns):
     """One impact: the impulse on the state, and its sensitivities."""
     mobility = fl.stops[stop, MOBILITY]
@@ -204,7 +204,7 @@ def strike(fl, stop, speed, restitution, slope, phase, t, shift, with_columns, w
         w[k] -= fl.force[k, stop] * impulse
 
 
-@inner
+@allocating
 def settle(fl, first, phase, t, shift, closed, struck, with_columns, w, columns):
     """Close the rigid stops on which the body rests now and open the others.
 
@@ -230,7 +230,7 @@ def settle(fl, first, phase, t, shift, closed, struck, with_columns, w, columns)
     hold(fl, phase, t, shift, closed, with_columns, w, columns)
 
 
-@inner
+@allocating
 def hold(fl, phase, t, shift, closed, with_columns, w, columns):
     """Shut the gaps of the stops that a body rests on, and stop their rates, in all sensitivities.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nldyn.flow.kernels.compiling import FILES, inner, njit
+from nldyn.flow.kernels.compiling import FILES, allocating, inner, njit
 from nldyn.flow.kernels.flights import (
     block_exponential,
     fastest_moved,
@@ -83,7 +83,7 @@ def impulses(blocks, force, tab, kind, h, forces, shares):
         fly_state(blocks, shares[j], -h * tab.chi[kind, j])
 
 
-@inner
+@allocating
 def state_at(blocks, tab, kind, h, start, shares, t, w):
     """Fill w with the homogeneous state a time t after the start of a piece."""
     if kind == FLIGHT:
@@ -167,7 +167,7 @@ def output_rate(row, row1, terms, forced, omega, phase, t, w):
     return value, rate
 
 
-@inner
+@allocating
 def leave_unseen(blocks, row, forced, w):
     """Set to zero what an output ``row @ w`` shows by rounding alone; fastest vibration in rad/s.
 
@@ -301,7 +301,7 @@ def local_extremes(
     return found[:n]
 
 
-@inner
+@allocating
 def turning_point(
     blocks, tab, kind, h, start, shares, row, row1, terms, forced, omega,
     phase, spacing, sign, lo, hi, rate_lo, rate_hi, v,
@@ -354,7 +354,7 @@ def shrink(new, old):
     return weight if weight > 0.0 else 0.5
 
 
-@inner
+@allocating
 def append_extreme(found, n, phase, value, sign):
     """Append to a table that grows; returns it and its length."""
     if n == found.shape[0]:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from nldyn.flow.kernels.compiling import inlined, inner, never_inline
+from nldyn.flow.kernels.compiling import allocating, inlined, inner, never_inline
 from nldyn.flow.kernels.contact import (
     bond_length,
     contact_panel,
@@ -178,7 +178,7 @@ def propagate(
     return status
 
 
-@inner
+@allocating
 def begin_on_rigid_stops(fl, phase, closed, closings, bounces, with_columns, w, columns):
     """Let a body that begins at or beyond rigid stops rebound, rest or leave."""
     hit, _ = hit_stop(fl, w, phase, -1)
@@ -191,7 +191,7 @@ def begin_on_rigid_stops(fl, phase, closed, closings, bounces, with_columns, w, 
         settle(fl, -1, phase, 0.0, shift, closed, struck, with_columns, w, columns)
 
 
-@inner
+@allocating
 def jump_columns(fl, stop, phase, t, closes, columns):
     """Change of the sensitivities as a dashpot begins or ceases to act, a time t after the start.
 
@@ -234,7 +234,7 @@ def jumps(fl, stop, w, phase):
     return fl.stops[stop, DASHPOT] > 0.0
 
 
-@inner
+@allocating
 def switch(fl, stop, w, phase, t, closed, with_columns, columns):
     """Close a stop that is open, or open one that is closed, a time t after the start."""
     closed[stop] = not closed[stop]
@@ -242,7 +242,7 @@ def switch(fl, stop, w, phase, t, closed, with_columns, columns):
         jump_columns(fl, stop, phase, t, closed[stop], columns)
 
 
-@inner
+@allocating
 def switch_with(fl, w, phase, t, h, closed, closings, with_columns, columns):
     """Open and close the stops that do so at the very instant of another one's event.
 
