@@ -1,6 +1,6 @@
-"""Five ways to reduce a cantilever.
+"""Ways to reduce a cantilever.
 
-How far the tip goes under a steady force, by the modes that are kept. Rubin's, MacNeal's and
+How far the tip goes under a steady force, by the modes that are kept. Rubin's and
 Craig and Bampton's models have the static flexibility $L^3/3EI$ from the first mode on; a model of
 free modes only has not, and lets the tip move too little.
 """
