@@ -9,9 +9,12 @@ from typing import Any
 
 import numba
 from numba import types
+from numba.core import cgutils
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.extending import intrinsic
+from numba.core.imputils import impl_ret_borrowed, lower_getattr_generic
+from numba.core.typing.templates import AttributeTemplate, infer_getattr
+from numba.extending import intrinsic, models, register_model
 
 from nldyn.runtime.kernel_cache import ensure_cache, resting_on
 from nldyn.system import contact_law, linear
@@ -85,6 +88,55 @@ inner = _jit(**_INNER, _nrt=False)
 allocating = _jit(**_INNER)
 # those with one caller, as part of its text
 inlined = _jit(error_model="numpy", inline="always")
+
+
+class _Reference(types.Type):
+    """A named tuple by its address: its thirteen arrays are a hundred numbers to pass."""
+
+    def __init__(self, structure: Any) -> None:
+        self.structure = structure
+        super().__init__(f"reference to {structure}")
+
+
+@register_model(_Reference)
+class _ReferenceModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: _Reference) -> None:
+        address = manager.lookup(kind.structure).get_value_type().as_pointer()
+        super().__init__(manager, kind, address)
+
+
+@infer_getattr
+class _ReferenceFields(AttributeTemplate):
+    key = _Reference
+
+    def generic_resolve(self, kind: _Reference, name: str) -> Any:
+        fields = kind.structure.fields
+        return kind.structure.types[fields.index(name)] if name in fields else None
+
+
+@lower_getattr_generic(_Reference)
+def _field(context: Any, builder: Any, kind: _Reference, address: Any, name: str) -> Any:
+    place = kind.structure.fields.index(name)
+    value = builder.load(cgutils.gep_inbounds(builder, address, 0, place))
+    return impl_ret_borrowed(context, builder, kind.structure.types[place], value)
+
+
+@intrinsic
+def by_reference(typing, structure):
+    """Address of a named tuple; its arrays must live until `keep` tells that they may go."""
+
+    def codegen(context, builder, signature, arguments):
+        address = cgutils.alloca_once(builder, arguments[0].type)
+        builder.store(arguments[0], address)
+        return address
+
+    return _Reference(structure)(structure), codegen
+
+
+@intrinsic
+def keep(typing, structure):
+    """Nothing but a use of a named tuple, so that its arrays are not released before."""
+    return types.void(structure), lambda context, *_: context.get_dummy_value()
 
 
 @intrinsic

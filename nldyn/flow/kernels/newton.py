@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.flow.kernels.compiling import allocating, entry, inner
+from nldyn.flow.kernels.compiling import allocating, by_reference, entry, inner
 from nldyn.flow.kernels.layout import (
     DIVERGED,
     GAP,
@@ -138,6 +138,7 @@ def newton(
     ends, jacobians, d_omegas, d_parameters, closings
         What `shoot` gives at the point before the last step, where the record is from, too.
     """
+    tables, pieces = by_reference(tab), by_reference(rec)
     row, max_iterations = corrector.row, corrector.max_iterations
     k = phases.size - 1
     size = 2 * system.blocks.shape[0]
@@ -160,7 +161,7 @@ def newton(
         for i in range(unknowns - 1):
             nodes[i // size, i % size] = point[i]
         ends, jacobians, d_omegas, d_parameters, closings, status = shoot(
-            system, tab, rec, recording, omega, nodes, phases, chained, with_columns,
+            system, tables, pieces, recording, omega, nodes, phases, chained, with_columns,
             parameters, drive_by,
         )  # fmt: skip
         if status != OK or max_iterations == 0:

@@ -6,7 +6,14 @@ import math
 
 import numpy as np
 
-from nldyn.flow.kernels.compiling import allocating, inlined, inner, never_inline
+from nldyn.flow.kernels.compiling import (
+    allocating,
+    by_reference,
+    inlined,
+    inner,
+    keep,
+    never_inline,
+)
 from nldyn.flow.kernels.contact import (
     bond_length,
     contact_panel,
@@ -356,12 +363,15 @@ def run_pieces(
                 doubt[active[a]] = 0.0 if begins else noise
             panel.depth[0, a], panel.depth[1, a] = depth[active[a]], doubt[active[a]]
         status, kind, h, event = contact_panel(
-            fl, tab, before, here, w, h_max, h_mapped, start_switch, closed, panel, w_end, rec
-        )
+            fl, tab, before, here, w, h_max, h_mapped, start_switch, closed, by_reference(panel),
+            w_end, rec,
+        )  # fmt: skip
+        keep(panel)
         if status != OK:
             return status
         if bonded and h > 0.0:
-            grown = growth_of_panel(fl, tab, panel) * h
+            grown = growth_of_panel(fl, tab, by_reference(panel)) * h
+            keep(panel)
             cut = event >= 0 or h >= remain or start_switch == 1
             reach = max(reach, grown) if cut else grown
         if h > 0.0:
@@ -382,7 +392,8 @@ def run_pieces(
                 if panel.decay[1, a] > DECAY:
                     pushes[active[a]] = at_end(tab, panel.F, a)
             if with_columns:
-                panel_columns(fl, tab, kind, here, t, h, panel, columns)
+                panel_columns(fl, tab, kind, here, t, h, by_reference(panel), columns)
+                keep(panel)
             for k in range(w.size):
                 w[k] = w_end[k]
             t = duration if h >= remain else t + h
@@ -421,7 +432,8 @@ def shoot(
     Derivatives are also taken with respect to parameters (n, 2), see `FlowData`; drive_by
     (n, h, 3, 2n) is the derivative of `SystemData.drive` with respect to each.
     """
-    fl = at_frequency(system, omega, parameters, drive_by)
+    numbers = at_frequency(system, omega, parameters, drive_by)
+    fl = by_reference(numbers)
     k = phases.size - 1
     size = nodes.shape[1]
     ends = np.zeros((k, size))
@@ -442,4 +454,5 @@ def shoot(
         )  # fmt: skip
         if status != OK:
             break
+    keep(numbers)
     return ends, jacobians, d_omegas, d_parameters, closings, status
