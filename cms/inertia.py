@@ -15,13 +15,18 @@ BALANCE_TOLERANCE = 1e-12
 
 
 def balanced(pencil: Pencil, loads: FloatArray, rigid: FloatArray) -> FloatArray:
-    """``F - M R R^T F``: the loads (N, m) less the inertia of the rigid motion they cause.
+    """Loads (N, m) that the inertia of the rigid motion they cause balances.
 
     What is left at rounding level, where a load causes nothing but rigid motion, is zero.
     """
-    left = loads - times(pencil.mass, rigid) @ (rigid.T @ loads)
+    left = relieved(pencil, loads, rigid)
     rounding = np.abs(left).max(axis=0) <= BALANCE_TOLERANCE * np.abs(loads).max(axis=0)
     return np.where(rounding, 0.0, left)
+
+
+def relieved(pencil: Pencil, forces: FloatArray, rigid: FloatArray) -> FloatArray:
+    """``F - M R R^T F``, the forces (N, m) less the inertia of the rigid motion they cause."""
+    return forces - times(pencil.mass, rigid) @ (rigid.T @ forces)
 
 
 def elastic_solutions(pencil: Pencil, shifted: Shifted, loads: FloatArray) -> FloatArray:
@@ -50,8 +55,9 @@ def elastic_solutions(pencil: Pencil, shifted: Shifted, loads: FloatArray) -> Fl
     -----
     A floating component has no factor of K, but one of K + s M. It serves as preconditioner of a
     conjugate gradient iteration, in which K has the eigenvalues :math:`\omega^2/(\omega^2 + s)`,
-    nearly all of them 1. For inertia relief see Craig and Chang (1977) and Craig and Kurdila
-    (2006), section 17.2.
+    nearly all of them 1. Matrices of few digits have no K R = 0: what K u leaves of forces on R is
+    balanced by inertia, too, which keeps the iteration symmetric. For inertia relief see Craig and
+    Chang (1977) and Craig and Kurdila (2006), section 17.2.
     """
     if shifted.shift == 0.0:
         return refined_solutions(pencil, shifted, loads)
@@ -68,7 +74,7 @@ def elastic_solutions(pencil: Pencil, shifted: Shifted, loads: FloatArray) -> Fl
         if not np.any(running):
             break
         move = ahead + move * quotient(energy, before)
-        stretch = pencil.forces(move)
+        stretch = relieved(pencil, pencil.forces(move), rigid)
         length = np.where(running, quotient(energy, column_products(move, stretch)), 0.0)
         solution = solution + move * length
         residual = residual - stretch * length
@@ -96,7 +102,7 @@ def check_solution(
     pencil: Pencil, shifted: Shifted, solution: FloatArray, loads: FloatArray, whole: FloatArray
 ) -> None:
     """Raise ReductionError where K u differs from the load by more than 1e-6 in energy."""
-    left = loads - pencil.forces(solution)
+    left = relieved(pencil, loads - pencil.forces(solution), shifted.rigid_modes)
     error = np.sqrt(np.abs(column_products(left, shifted.factor.solve(left))))
     failed = error > RESIDUAL_TOLERANCE * np.sqrt(whole)
     if np.any(failed):

@@ -109,13 +109,13 @@ quad 0 at (0.5, 0.5, 0) and quad 1 at (1.5, 0.25, 0)
     """
     if model.separate:
         return
-    for facets in (_of_solids(model), _of_shells(model)):
+    for facets in (outer_facets(model), facets_of_shells(model)):
         if facets is not None:
             _refuse(model, facets)
 
 
 def _refuse(model: StructureModel, facets: Facets) -> None:
-    held = _held(model)
+    held = held_nodes(model)
     tolerance = COINCIDENT * model.mesh.size
     found = [np.empty((0, 2), dtype=np.int64)]
     for pairs in _near(facets, tolerance):
@@ -130,18 +130,18 @@ def _refuse(model: StructureModel, facets: Facets) -> None:
     raise ModelError(
         f"{model.mesh.source}: {len(np.unique(pairs))} {'edges' if _lines(facets) else 'faces'} lie"
         " against others without having their nodes, the first at"
-        f" {place_of(facets.centres[smaller])}, between {_cell(model, facets, first)} and"
-        f" {_cell(model, facets, second)}; give both sides the same nodes, or say that they are"
+        f" {place_of(facets.centres[smaller])}, between {told_cell(model, facets, first)} and"
+        f" {told_cell(model, facets, second)}; give both sides the same nodes, or say that they are"
         " not joined there ('separate')"
     )
 
 
-def _cell(model: StructureModel, facets: Facets, at: int) -> str:
+def told_cell(model: StructureModel, facets: Facets, at: int) -> str:
     kind, number = NAMES[facets.kinds[at]], int(facets.numbers[at])
     return cell_at(kind, number, model.mesh.points[model.mesh.cells[kind][number]])
 
 
-def _held(model: StructureModel) -> BoolArray:
+def held_nodes(model: StructureModel) -> BoolArray:
     """Whether couplings or equations say how each node moves, shape (n,)."""
     held = np.zeros(len(model.mesh.points), dtype=np.bool_)
     for coupling in model.attached.couplings:
@@ -151,7 +151,7 @@ def _held(model: StructureModel) -> BoolArray:
     return held
 
 
-def _of_solids(model: StructureModel) -> Facets | None:
+def outer_facets(model: StructureModel) -> Facets | None:
     """The outer faces of solids; in the plane, their outer edges."""
     by_corners: dict[int, list[Sides]] = {}
     for name, (_, kinds) in model.solids.items():
@@ -167,7 +167,7 @@ def _of_solids(model: StructureModel) -> Facets | None:
     return _joined(found) if found else None
 
 
-def _of_shells(model: StructureModel) -> Facets | None:
+def facets_of_shells(model: StructureModel) -> Facets | None:
     """The edges of shells, each once."""
     blocks = []
     for name, part in model.parts.items():

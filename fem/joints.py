@@ -2,20 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from itertools import combinations
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import connected_components
 
+from fem.cells import KINDS, facet_keys
+from fem.errors import ModelError, quoted
 from fem.links import link_terms
 from fem.mesh import IntArray
 from fem.pieces import place_of
 from fem.structure import AXES, StructureModel, axis_index
 from fem.trusses import loose_nodes, loose_sentences
 
+MEANT = ", or say that it is meant ('pinned')"
 
-def hinge_warnings(model: StructureModel) -> Iterator[str]:
-    """One sentence for every shell part with nodes on solids that only hold their place.
+
+def joint_warnings(model: StructureModel) -> Iterator[str]:
+    """One sentence for everything that turns at nodes of solids, but for the ``pinned`` parts.
+
+    Raises
+    ------
+    ModelError
+        For a part that is said to be pinned, but turns nowhere.
+    """
+    found = [*shells_that_turn(model), *beams_that_turn(model), *solids_that_turn(model)]
+    free = [name for name in model.pinned if not any(name in parts for parts, _ in found)]
+    if free:
+        raise ModelError(
+            f"{model.mesh.source}: {quoted(free)} of 'pinned' meets no solid in nodes that it turns"
+            " about; leave it out there"
+        )
+    for parts, text in found:
+        if not set(parts).intersection(model.pinned):
+            yield text
+
+
+def shells_that_turn(model: StructureModel) -> Iterator[tuple[list[str], str]]:
+    """Each shell part with nodes on solids that only hold their place, and a sentence on it.
 
     Nodes of solids have no rotation, so that a shell that shares the nodes of an edge with a solid
     can turn about it. It cannot where a whole facet of it lies on or in the solid, and where a
@@ -31,7 +57,7 @@ def hinge_warnings(model: StructureModel) -> Iterator[str]:
     ...     fem.joined([block, plate]),
     ...     {"block": fem.SolidPart(steel), "plate": fem.ShellPart(steel, 0.01)},
     ... )
-    >>> [text.split(": ")[1] for text in hinge_warnings(model)]
+    >>> [text.split(": ")[1] for _, text in shells_that_turn(model)]
     ["part 'plate' shares 2 nodes with solids"]
     """
     solid = np.zeros(len(model.mesh.points), dtype=np.bool_)
@@ -49,15 +75,16 @@ def hinge_warnings(model: StructureModel) -> Iterator[str]:
         used = np.unique(np.concatenate([facets.ravel() for facets in kinds.values()]))
         count = int((solid & ~held)[used].sum())
         if count:
-            yield (
+            text = (
                 f"{model.mesh.source}: part {name!r} shares {count} nodes with solids: these hold"
                 " their place only, so that the shell turns there as on a hinge; let it go on by a"
-                " cell along the face or into the solid, or couple these nodes rigidly to a point"
+                " cell along the face or into the solid, couple these nodes rigidly to a point"
             )
+            yield [name], text + MEANT
 
 
-def pin_warnings(model: StructureModel) -> Iterator[str]:
-    """One sentence for every beam part with nodes on solids that only hold their place.
+def beams_that_turn(model: StructureModel) -> Iterator[tuple[list[str], str]]:
+    """Each beam part with nodes on solids that only hold their place, and a sentence on it.
 
     Nothing is said of a node whose rotations a support holds, that a shell or a coupling joins, or
     from which a line goes to another node of one cell, along the solid or into it.
@@ -75,7 +102,7 @@ def pin_warnings(model: StructureModel) -> Iterator[str]:
     ...         "rod": fem.BeamPart(steel, fem.CircularSection(0.02)),
     ...     },
     ... )
-    >>> [text.split(": ")[1] for text in pin_warnings(model)]
+    >>> [text.split(": ")[1] for _, text in beams_that_turn(model)]
     ["part 'rod' shares 1 nodes with solids, the first 'a' at (1, 0, 0)"]
     """
     if not model.solids or not model.beams:
@@ -99,12 +126,103 @@ def pin_warnings(model: StructureModel) -> Iterator[str]:
     for name, (_, ends) in model.beams.items():
         at = np.unique(ends[pinned[ends]])
         if len(at):
-            yield (
+            text = (
                 f"{model.mesh.source}: part {name!r} shares {len(at)} nodes with solids, the first"
                 f" {_point(model, int(at[0]))}: solids hold the place of a node only, so that the"
                 " beam turns there as on a ball joint; to clamp it, couple a face of the solid to"
                 " the end of the beam ('couplings' in a scene, fem.Coupling)"
             )
+            yield [name], text + MEANT
+
+
+def solids_that_turn(model: StructureModel) -> Iterator[tuple[list[str], str]]:
+    """The parts of solids that meet in a node or on a line only, and a sentence on it.
+
+    Nothing is said of nodes that a rigid coupling joins.
+
+    Examples
+    --------
+    >>> import fem
+    >>> cubes = [fem.box_mesh(name, (1.0, 1.0, 1.0), (1, 1, 1), origin=(x, x, 0.0))
+    ...     for name, x in (("one", 0.0), ("other", 1.0))]
+    >>> part = fem.SolidPart(fem.Material(2.1e11, 7800.0, 0.3))
+    >>> model = fem.StructureModel(fem.joined(cubes), {"one": part, "other": part})
+    >>> [(parts, text.split(": ")[1]) for parts, text in solids_that_turn(model)]
+    [(['one', 'other'], "solids of 'one', 'other' meet in 3 nodes, but in no face there")]
+    """
+    if not model.solids:
+        return
+    body, blocks = _bodies(model), _solid_cells(model)
+    owners = np.repeat(np.arange(len(body)), np.concatenate([_widths(b) for b in blocks]))
+    nodes = np.concatenate([cells.ravel() for cells in blocks])
+    met = _on_axes(model, np.unique(np.stack([nodes, body[owners]], axis=1), axis=0))
+    for coupling in model.attached.couplings:
+        if coupling.kind == "rigid":
+            met = np.setdiff1d(met, model.mesh.nodes(coupling.face))
+    if not len(met):
+        return
+    names = np.repeat(
+        list(model.solids), [_cell_count(kinds) for _, kinds in model.solids.values()]
+    )
+    parts = [str(name) for name in dict.fromkeys(names[owners[np.isin(nodes, met)]])]
+    text = (
+        f"{model.mesh.source}: solids of {quoted(parts)} meet in {len(met)} nodes, but in no face"
+        f" there: they turn about these, the first of which is {_point(model, int(met[0]))}; give"
+        " them a common face"
+    )
+    yield parts, text + MEANT
+
+
+def _on_axes(model: StructureModel, pairs: IntArray) -> IntArray:
+    """Nodes of several bodies, out of pairs (p, 2) of a node and a body, that are all on one line.
+
+    Looked at are two bodies at a time; in the plane they turn only about a single node.
+    """
+    bodies_of: dict[int, list[int]] = {}
+    for node, body in pairs[np.isin(pairs[:, 0], pairs[1:, 0][np.diff(pairs[:, 0]) == 0])].tolist():
+        bodies_of.setdefault(node, []).append(body)
+    shared: dict[tuple[int, int], list[int]] = {}
+    for node, bodies in bodies_of.items():
+        for two in combinations(bodies, 2):
+            shared.setdefault(two, []).append(node)
+    found: set[int] = set()
+    for nodes in shared.values():
+        spans = model.mesh.points[nodes] - model.mesh.points[nodes[0]]
+        rank = np.linalg.matrix_rank(spans, tol=1e-6 * model.mesh.size)
+        if rank < (1 if model.is_plane else 2):
+            found.update(nodes)
+    return np.array(sorted(found), dtype=np.int64)
+
+
+def _bodies(model: StructureModel) -> IntArray:
+    """For each solid cell the number of the body whose cells hang together by faces."""
+    first = 0
+    sides: dict[int, list[tuple[IntArray, IntArray]]] = {}
+    for _, kinds in model.solids.values():
+        for kind, cells in kinds.items():
+            for facet, nodes in KINDS[kind].facets_of(cells).items():
+                corners = np.sort(nodes[:, : len(KINDS[facet].corners)])
+                owners = first + np.repeat(np.arange(len(cells)), len(nodes) // len(cells))
+                sides.setdefault(corners.shape[1], []).append((corners, owners))
+            first += len(cells)
+    links = []
+    for blocks in sides.values():
+        corners, owners = (np.concatenate(column) for column in zip(*blocks, strict=True))
+        keys = facet_keys(corners[:, :3])
+        order = np.argsort(keys, kind="stable")
+        same = np.flatnonzero(np.diff(keys[order]) == 0)
+        links.append(np.stack([owners[order[same]], owners[order[same + 1]]], axis=1))
+    pairs = np.concatenate(links)
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(first, first))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _widths(cells: IntArray) -> IntArray:
+    return np.full(len(cells), cells.shape[1])
+
+
+def _cell_count(kinds: Mapping[str, IntArray]) -> int:
+    return sum(len(cells) for cells in kinds.values())
 
 
 def _solid_cells(model: StructureModel) -> list[IntArray]:
@@ -114,7 +232,7 @@ def _solid_cells(model: StructureModel) -> list[IntArray]:
 def _in_one_cell(model: StructureModel, lines: IntArray) -> IntArray:
     """Those of some lines (e, 2) both of whose ends are nodes of one solid cell."""
     blocks = _solid_cells(model)
-    widths = np.concatenate([np.full(len(cells), cells.shape[1]) for cells in blocks])
+    widths = np.concatenate([_widths(cells) for cells in blocks])
     owners = np.repeat(np.arange(len(widths)), widths)
     used = np.concatenate([cells.ravel() for cells in blocks])
     shape = (len(model.mesh.points), len(widths))

@@ -28,6 +28,10 @@ SYSTEMS = {1: "cylindrical", 2: "spherical"}
 """MED's other systems of coordinates, by their numbers."""
 
 
+UNKNOWN = ("", "INCONNUE", "SANS UNITE", "UNKNOWN")
+"""What stands where no unit is known."""
+
+
 def read_med(path: Path) -> meshio.Mesh:
     """Read the nodes, cells and groups of a MED file with one mesh.
 
@@ -40,7 +44,7 @@ def read_med(path: Path) -> meshio.Mesh:
     -------
     meshio.Mesh
         One block for each kind of cell; groups of cells as cell sets, groups of nodes as point
-        sets. Its ``info`` is a list of sentences: which unit the file states if it is not the m.
+        sets. Its ``info`` is the unit that the file states, or empty.
 
     Raises
     ------
@@ -69,7 +73,7 @@ def read_med(path: Path) -> meshio.Mesh:
         step = mesh if "NOE" in mesh else _only_step(path, mesh)
         families = file["FAS"][names[0]] if "FAS" in file and names[0] in file["FAS"] else {}
         content = _content(path, step, families, int(mesh.attrs["ESP"]))
-        content.info = _told_unit(path, mesh)
+        content.info = _stated_unit(mesh)
         return content
 
 
@@ -82,17 +86,11 @@ def _check_cartesian(path: Path, mesh: Any) -> None:
         )
 
 
-def _told_unit(path: Path, mesh: Any) -> list[str]:
-    """What to say of the unit of the axes, which have 16 letters each."""
+def _stated_unit(mesh: Any) -> str:
+    """The unit of the axes, which have 16 letters each; empty where none is stated."""
     letters = bytes(mesh.attrs.get("UNI", b"")).decode("latin-1").replace("\0", " ")
     units = dict.fromkeys(letters[i : i + 16].strip() for i in range(0, len(letters), 16))
-    others = [unit for unit in units if unit not in ("", "m")]
-    if not others:
-        return []
-    return [
-        f"{path}: states the unit {quoted(others)} for its coordinates, but they are taken as they"
-        " are, in m unless 'unit' in [mesh] says otherwise"
-    ]
+    return ", ".join(unit for unit in units if unit.upper() not in UNKNOWN)
 
 
 def _only_step(path: Path, mesh: Any) -> Any:

@@ -44,6 +44,8 @@ class FrameMesh:
         What the file holds and the mesh, by intention, does not.
     notes
         What was left out on request, a sentence each.
+    unit
+        Unit of lengths that the file states, whatever the coordinates are taken to be in.
 
     Raises
     ------
@@ -70,6 +72,7 @@ class FrameMesh:
     described: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     left_out: Sequence[LeftOut] = ()
     notes: Sequence[str] = ()
+    unit: str = ""
 
     def __post_init__(self) -> None:
         points = numbers(f"{self.source}: points", self.points, np.float64)

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import redirect_stderr
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TypeVar
@@ -30,6 +31,7 @@ from fem.mesh import FloatArray, FrameMesh, IntArray
 from fem.nastran import read_nastran
 from fem.structure_mesh import StructureMesh
 from fem.unpacking import bounded_unpacking
+from fem.unv import read_unv
 
 Mesh = TypeVar("Mesh", FrameMesh, StructureMesh)
 
@@ -40,6 +42,9 @@ GHOSTS = {"vtkGhostType": 1 | 8 | 32, "vtkGhostLevels": 255}
 
 FIELD_DATA = re.compile(rb"<FieldData\b(?:[^>]*/>|.*?</FieldData>)", re.DOTALL)
 """What a VTK file says of the whole, such as ParaView's time; meshio stops at it in a piece."""
+
+OFFSET = re.compile(rb"""\boffset\s*=\s*["']\s*(\d+)\s*["']""")
+"""Where a VTK file says at which byte of its appended data an array begins."""
 
 LEGACY_ARRAY = re.compile(
     rb"^(?:SCALARS +)?(set\S+) +(?:\d+ +\d+ +)?[a-z]\w*(?: +\d+)?[ \r]*$", re.MULTILINE
@@ -60,6 +65,11 @@ def read_vtu(path: Path) -> meshio.Mesh:
     """Read a VTK file, without unpacking endlessly; what meshio would leave out is an error."""
     before, appended, data = path.read_bytes().partition(b"<AppendedData")
     told = FIELD_DATA.sub(b"", before)
+    pieces = told.count(b"<Piece")
+    if pieces > 1:
+        raise ModelError(
+            f"{path}: has {pieces} pieces, not one; pyvista.read(file).save(other_file) joins them"
+        )
     for _, arrays in re.findall(rb"<(PointData|CellData)\b(.*?)</\1>", told, re.DOTALL):
         found = re.findall(rb"<DataArray\b[^>]*?\bName=[\"']([^\"']*)[\"']", arrays)
         _check_each_once([unescape(name.decode("utf-8", "replace")) for name in found], path)
@@ -67,10 +77,39 @@ def read_vtu(path: Path) -> meshio.Mesh:
         readable = path
         if told != before:
             readable = Path(folder) / "mesh.vtu"
-            readable.write_bytes(told + appended + data)
+            offsets = [int(offset) for offset in OFFSET.findall(before)]
+            readable.write_bytes(_packed(told, offsets, data) if appended else told)
         content = _without_warning(meshio.vtu.read, readable)
     _check_no_ghosts(content, path)
     return content
+
+
+def _packed(told: bytes, offsets: Sequence[int], data: bytes) -> bytes:
+    """A VTK file with only those blocks of its appended data that it tells of.
+
+    Parameters
+    ----------
+    told
+        What stands before the appended data.
+    offsets
+        Of all blocks in ``data``.
+    data
+        From the end of ``<AppendedData`` on.
+    """
+    head, mark, rest = data.partition(b"_")
+    blob, close, tail = rest.rpartition(b"</AppendedData>")
+    blob = blob.rstrip(b" ").removesuffix(b"\n")
+    ends = dict(pairwise([*sorted(set(offsets)), len(blob)]))
+    kept: list[bytes] = []
+
+    def moved(found: re.Match[bytes]) -> bytes:
+        offset = int(found[1])
+        place = sum(map(len, kept))
+        kept.append(blob[offset : ends[offset]])
+        return b'offset="%d"' % place
+
+    told = OFFSET.sub(moved, told)
+    return told + b"<AppendedData" + head + mark + b"".join(kept) + b"\n" + close + tail
 
 
 def read_vtk(path: Path) -> meshio.Mesh:
@@ -78,13 +117,20 @@ def read_vtk(path: Path) -> meshio.Mesh:
 
     VTK writes a blank in a name as %20, a percent sign as %25, and so on; meshio leaves it so.
     """
-    for arrays in re.split(rb"^(?:POINT|CELL)_DATA\b", path.read_bytes(), flags=re.MULTILINE)[1:]:
+    whole = path.read_bytes()
+    if re.search(rb"^DATASET\s+POLYDATA\b", whole[:1024], re.MULTILINE):
+        raise ModelError(
+            f"{path}: holds POLYDATA, no unstructured grid;"
+            " pyvista.read(file).cast_to_unstructured_grid().save('mesh.vtu') makes it one"
+        )
+    for arrays in re.split(rb"^(?:POINT|CELL)_DATA\b", whole, flags=re.MULTILINE)[1:]:
         _check_each_once([unquote(name) for name in LEGACY_ARRAY.findall(arrays)], path)
     try:
         content = _without_warning(meshio.vtk.read, path)
     except (meshio.ReadError, KeyError) as error:
         raise ModelError(
-            f"{path}: is cut off, or holds what is not read of VTK legacy files; save it as '.vtu'"
+            f"{path}: is cut off, or holds what is not read of VTK legacy files"
+            f" ({_reason(error)}); save it as '.vtu'"
         ) from error
     for data in (content.point_data, content.cell_data):
         for name in list(data):
@@ -126,6 +172,7 @@ READERS: dict[str, tuple[str, Callable[[Path], meshio.Mesh]]] = {
     ".vtu": ("VTK", read_vtu),
     ".vtk": ("VTK", read_vtk),
     ".med": ("MED", read_med),
+    ".unv": ("universal", read_unv),
 }
 DECK = ".inp"
 """The extension of files that hold more than a mesh."""
@@ -149,6 +196,7 @@ def read_mesh(
           a cell array ``set:NAME`` that is 1 on the elements of a part, else 0, names the part,
           and a point array ``set:NAME`` that is 1 at one node names a point.
         - ``.med``: MED of version 3 or later. Groups of edges and of nodes are parts and points.
+        - ``.unv``: universal file, as Salome writes it, with its groups likewise.
         - ``.bdf``, ``.nas``: Nastran bulk data, of which solids are read, so for `read_structure`
           only. Properties are the parts, "PSOLID 3"; there are no names of points.
         - ``.inp``: Abaqus input. ELSET and NSET, also those given on ``*ELEMENT`` and ``*NODE``.
@@ -244,7 +292,7 @@ def _read(
             return replace(_noted(build(content, str(path)), said), left_out=left_out)
         whole = READERS[extension][1](path)
         content, said = without_cells(whole, ignore, str(path))
-        return _noted(_noted(build(content, str(path)), whole.info or ()), said)
+        return _noted(_with_unit(build(content, str(path)), whole.info), said)
     except ModelError:
         raise
     except (Exception, SystemExit) as error:
@@ -272,6 +320,17 @@ def _deck_mesh(
         described=found.described,
         left_out=found.left_out,
     )
+
+
+def _with_unit(mesh: Mesh, unit: str | None) -> Mesh:
+    """A mesh with the unit that its file states."""
+    if unit in (None, "", "m"):
+        return mesh
+    note = (
+        f"{mesh.source}: states the unit {unit!r} for its coordinates, which are taken as they are,"
+        " in m unless 'unit' in [mesh] says otherwise"
+    )
+    return _noted(replace(mesh, unit=unit), [note])
 
 
 def _noted(mesh: Mesh, said: Sequence[str]) -> Mesh:

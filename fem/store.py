@@ -99,7 +99,8 @@ def save_structure(model: StructureModel, path: str | os.PathLike[str]) -> None:
     for name, found in mesh.element_types.items():
         arrays |= {f"type {kind} {name}": cells for kind, cells in found.items()}
     arrays |= {f"point {name}": nodes for name, nodes in mesh.point_sets.items()}
-    _write(path, STRUCTURE_FORMAT, _attached(model, STRUCTURE_LISTS), arrays)
+    attached = {**_attached(model, STRUCTURE_LISTS), "pinned": model.pinned}
+    _write(path, STRUCTURE_FORMAT, attached, arrays)
 
 
 def load_model(path: str | os.PathLike[str]) -> FrameModel:
@@ -145,7 +146,7 @@ def load_structure(path: str | os.PathLike[str]) -> StructureModel:
             attachments=_from_file(attached),
             element_types=_named_by_kind(arrays, "type "),
         )
-        items = _items(attached, STRUCTURE_LISTS)
+        items = _items(attached, STRUCTURE_LISTS) | {"pinned": attached.get("pinned", ())}
         # the mesh that was saved has the points of the couplings
         items["couplings"] = [replace(coupling, at=None) for coupling in items["couplings"]]
         return StructureModel(mesh, **items)

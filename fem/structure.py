@@ -153,6 +153,9 @@ class StructureModel:
         Whether nodes at one place may belong to pieces that nothing joins, and cells lie against
         each other without having the same nodes. Else `fem.assemble` refuses both: as a rule they
         were to be joined.
+    pinned
+        Names of parts that are meant to meet solids in nodes or edges about which they turn. Of
+        others a `JointWarning` tells.
 
     Raises
     ------
@@ -185,6 +188,7 @@ class StructureModel:
     foundations: Sequence[Foundation] = ()
     interfaces: Mapping[str, Interface] = field(default_factory=dict)
     separate: bool = False
+    pinned: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         if isinstance(self.mesh, FrameMesh):
@@ -198,6 +202,7 @@ class StructureModel:
             given, what = getattr(self, name), f"by name, of {words}"
             object.__setattr__(self, name, by_name(self.mesh.source, name, given, sort, what))
         self._check_parts()
+        self._check_pinned()
         object.__setattr__(self, "mesh", self._with_coupled_points())
         self._check_plane()
         self._check_names()
@@ -332,6 +337,18 @@ class StructureModel:
             short = np.flatnonzero(np.linalg.norm(spans, axis=1) <= 1e-12 * mesh.size)
             if len(short):
                 raise ModelError(f"{mesh.source}: line {short[0]} of {name!r} has zero length")
+
+    def _check_pinned(self) -> None:
+        given = self.pinned
+        if isinstance(given, str) or not all(isinstance(name, str) for name in given):
+            raise ModelError(f"{self.mesh.source}: pinned must be names of parts, not {given!r}")
+        object.__setattr__(self, "pinned", tuple(given))
+        wrong = [name for name in self.pinned if name not in self.parts]
+        if wrong:
+            raise ModelError(
+                f"{self.mesh.source}: {wrong[0]!r} of 'pinned' is no part; there are"
+                f" {quoted(self.parts)}"
+            )
 
     def _check_doubles(self) -> None:
         """No part, and no two of solids, may hold a cell twice; beams may lie side by side."""

@@ -27,7 +27,7 @@ from fem.constraints import (
 from fem.distorted import distortion_warnings
 from fem.errors import JointWarning, ModelError
 from fem.hanging import check_nothing_hangs
-from fem.joints import hinge_warnings, mechanism_warnings, pin_warnings
+from fem.joints import joint_warnings, mechanism_warnings
 from fem.links import link_rows
 from fem.load_vectors import InertiaLoads
 from fem.locking import locking_warnings
@@ -41,6 +41,7 @@ from fem.natural import (
     natural_form,
     solid_rows,
 )
+from fem.overlapping import overlap_warnings
 from fem.pieces import check_joined
 from fem.scatter import (
     SparseArray,
@@ -174,12 +175,13 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     DistortionWarning
         If cells are out of shape.
     JointWarning
-        If a shell meets solids at an edge only, or a beam at a node, about which it can turn, or a
-        truss has a node that is not held in all directions.
+        If a shell meets solids at an edge only, or a beam at a node, about which it can turn, or
+        solids meet each other so, but for parts that are ``pinned``; if a truss has a node that is
+        not held in all directions; if cells on a curved face lack nodes of others that lie there.
     """
     slits = check_joined(model)
     check_conforming(model)
-    told = (*hinge_warnings(model), *pin_warnings(model), *mechanism_warnings(model), *slits)
+    told = (*joint_warnings(model), *mechanism_warnings(model), *slits)
     for text in told:
         warnings.warn(text, JointWarning, stacklevel=3)
     for text in locking_warnings(model):
@@ -190,6 +192,8 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     constraints = constrain(model, numbering)
     stiffness, mass = unconstrained_matrices(model, numbering)
     check_nothing_hangs(model)
+    for text in overlap_warnings(model):
+        warnings.warn(text, JointWarning, stacklevel=3)
     K = constraints.reduced(stiffness)
     del stiffness
     M = constraints.reduced(mass)

@@ -47,6 +47,8 @@ class StructureMesh:
         Material and section of parts, by the name of the part, as far as the file gives them.
     left_out
         What the file holds and the mesh, by intention, does not.
+    unit
+        Unit of lengths that the file states, whatever the coordinates are taken to be in.
 
     Raises
     ------
@@ -78,6 +80,7 @@ class StructureMesh:
     element_types: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)
     described: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     left_out: Sequence[LeftOut] = ()
+    unit: str = ""
 
     def __post_init__(self) -> None:
         points = numbers(f"{self.source}: points", self.points, np.float64)
@@ -272,6 +275,7 @@ def structure_mesh(frame: FrameMesh) -> StructureMesh:
         element_types={name: {"line": cells} for name, cells in frame.element_types.items()},
         described=frame.described,
         left_out=frame.left_out,
+        unit=frame.unit,
     )
 
 

@@ -95,6 +95,9 @@ def _in_metres(scene: Scene, mesh: Mesh) -> Mesh:
     """The mesh with its coordinates in m; what else a file holds cannot be converted."""
     assert scene.mesh is not None
     unit = scene.mesh.unit
+    if mesh.unit and "unit" not in scene.mesh.model_fields_set:
+        fault = f"states the unit {mesh.unit!r} for its coordinates: say in [mesh] which 'unit' to"
+        raise scene_error(scene.file, ("mesh", "file"), f"{fault} take, 'm' if it is wrong")
     if unit == "m":
         return mesh
     if mesh.attachments or scene.mesh.parts_from_file:
@@ -137,6 +140,7 @@ def _structure_model(scene: Scene, mesh: fem.StructureMesh) -> fem.StructureMode
         ],
         foundations=[fem.Foundation(f.at, f.stiffness) for f in scene.foundations],
         separate=scene.mesh is not None and scene.mesh.separate,
+        pinned=scene.mesh.pinned if scene.mesh is not None else (),
         **_attached(scene),
     )
 

@@ -66,13 +66,15 @@ class MeshTable(Table):
     ignore: list[str] = []
     merge: bool | Positive = False
     separate: bool = False
+    pinned: list[str] = []
 
     @model_validator(mode="after")
     def _one_mesh(self) -> MeshTable:
         if self.merge and self.separate:
             raise ValueError("has both 'merge' and 'separate'; keep one")
-        if self.merge and self.model == "frame":
-            raise ValueError("has 'merge', which needs model = \"structure\"")
+        for key in ("merge", "pinned"):
+            if getattr(self, key) and self.model == "frame":
+                raise ValueError(f"has '{key}', which needs model = \"structure\"")
         return self
 
 
@@ -465,7 +467,6 @@ class StopTable(Table):
         else:
             _refuse(self, ("exponent",), "a stop given by its radius (it is 1.5)")
         return self
-
 
     def _complete_rigid(self) -> StopTable:
         elastic = ("stiffness", "exponent", "radius", "youngs_modulus", "poissons_ratio")

@@ -166,11 +166,11 @@ def test_a_negative_mass_beyond_noise_is_refused():
         cms.reduce(cms.Matrices(K, M, {"x": np.eye(24)[0]}), modes=4)
 
 
-@pytest.mark.parametrize(
-    ("seed", "digits", "first"), [(1, 7, 0), (1, 12, 27), (2, 7, 27), (2, 8, 0), (3, 8, 27)]
-)
-def test_skew_massless_directions_of_few_digits(seed, digits, first):
-    """The w^2 lie within the change that rounding of all entries may cause, in the first order."""
+def skew_network(seed, digits, first):
+    """A network whose massless directions are skew to its coordinates: K, M, w^2 and modes.
+
+    With them the same with few digits, with the three directions of a point as interfaces.
+    """
     K, M, squares, modes = spring_network(10, 4, seed)
     chance = np.random.default_rng(seed + 100)
     mixed = np.triu(chance.standard_normal(K.shape), 1) * (chance.uniform(size=K.shape) < 0.15)
@@ -178,14 +178,44 @@ def test_skew_massless_directions_of_few_digits(seed, digits, first):
     K, M = ((A + A.T) / 2 for A in (T.T @ K @ T, T.T @ M @ T))
     named = {axis: T[first + i] for i, axis in enumerate("xyz")}
     few = cms.Matrices(rounded(K, digits), rounded(M, digits), named)
+    return K, M, squares, linalg.solve(T, modes), few
+
+
+@pytest.mark.parametrize(
+    ("seed", "digits", "first"),
+    [(1, 7, 0), (1, 12, 27), (2, 7, 27), (2, 8, 0), (3, 8, 27), (3, 6, 27), (4, 6, 27)],
+)
+def test_skew_massless_directions_of_few_digits(seed, digits, first):
+    """The w^2 lie within the change that rounding of all entries may cause, in the first order."""
+    K, M, squares, modes, few = skew_network(seed, digits, first)
     found = cms.reduce(few, modes=10)
     assert found.rigid_body_modes == 6
-    shapes = np.abs(linalg.solve(T, modes[:, 6:10]))
+    shapes = np.abs(modes[:, 6:10])
     sizes = [np.sum(shapes * (np.abs(A) @ shapes), axis=0) for A in (K, M)]
     change = 0.5 * 10.0 ** (1 - digits) * (sizes[0] + squares[6:10] * sizes[1])
     assert np.all(change < 10.0 ** (3 - digits) * squares[6:10])
     moved = (2 * np.pi * found.frequencies_hz[6:10]) ** 2 - squares[6:10]
     assert np.all(np.abs(moved) < change)
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_answers_of_a_massless_interface_of_six_digits(seed):
+    """With all modes the reduced model answers as K and M do, but for what rounding may cause."""
+    K, M, squares, _, few = skew_network(seed, 6, 27)
+    found = cms.reduce(few, modes=18)
+    load = np.array(list(few.interfaces.values())).T
+    squared = squares[6] / 2
+    answer = linalg.solve(K - squared * M, load)
+    sizes = np.abs(answer)
+    change = 0.5e-5 * sizes.T @ (np.abs(K) + squared * np.abs(M)) @ sizes
+    exact = load.T @ answer
+    assert np.all(change < 0.01 * np.abs(exact).max())
+    rows = np.array(list(found.participation.values()))
+    stiffness = (2 * np.pi * found.frequencies_hz) ** 2 - squared
+    answered = rows / stiffness @ rows.T
+    if found.residual_flexibility is not None:
+        answered = answered + found.residual_flexibility
+    assert np.all(np.abs(answered - exact) < change)
 
 
 def test_more_modes_than_have_mass_are_refused_with_their_number():

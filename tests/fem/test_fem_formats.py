@@ -7,8 +7,11 @@ import meshio
 import numpy as np
 import pytest
 from structures import lowest_hz
+from universal_files import write_unv
+from with_gmsh import gmsh_at_work
 
 import fem
+from fem.cells import KINDS as KINDS_OF_CELLS
 from fem.med import KINDS
 
 STEEL = fem.Material(2.1e11, 7800.0, 0.3)
@@ -89,7 +92,9 @@ def write_med(mesh: fem.StructureMesh, path) -> None:
 
 
 def write(mesh: fem.StructureMesh, path) -> None:
-    if path.suffix == ".med":
+    if path.suffix == ".unv":
+        write_unv(mesh, path)
+    elif path.suffix == ".med":
         write_med(mesh, path)
     elif path.suffix == ".vtk":
         meshio.write(path, as_meshio(mesh), file_format="vtk")
@@ -109,7 +114,7 @@ def component(mesh: fem.StructureMesh):
     )
 
 
-@pytest.mark.parametrize("extension", [".vtu", ".vtk", ".med"])
+@pytest.mark.parametrize("extension", [".vtu", ".vtk", ".med", ".unv"])
 def test_every_format_gives_the_same_component(tmp_path, extension):
     mesh, path = block(), tmp_path / f"block{extension}"
     write(mesh, path)
@@ -124,6 +129,60 @@ def test_every_format_gives_the_same_component(tmp_path, extension):
     known, read = component(mesh), component(found)
     assert fem.mass_properties(read).mass == pytest.approx(15.6, rel=1e-12)
     np.testing.assert_allclose(lowest_hz(read, 4), lowest_hz(known, 4), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "shape"),
+    [
+        ("tetra10", "Tetrahedron"),
+        ("wedge15", "Prism"),
+        ("hexahedron20", "Hexahedron"),
+        ("quad8", "Quadrangle"),
+        ("triangle6", "Triangle"),
+    ],
+)
+def test_a_universal_file_of_gmsh_has_the_nodes_of_each_cell_in_their_places(tmp_path, kind, shape):
+    own = KINDS_OF_CELLS[kind]
+    size = own.dimension
+    made = fem.box_mesh("whole", (1.0, 2.0, 3.0)[:size], (1, 1, 1)[:size], kind=kind)
+    with gmsh_at_work() as gmsh:
+        code = gmsh.model.mesh.getElementType(shape, 2, True)
+        local = gmsh.model.mesh.getElementProperties(code)[4].reshape(-1, size)
+        local = (local - local.min(axis=0)) / np.ptp(local, axis=0)
+        order = [int(np.abs(own.nodes - place).sum(axis=1).argmin()) for place in local]
+        gmsh.model.addDiscreteEntity(size, 1)
+        labels = np.arange(1, len(made.points) + 1)
+        gmsh.model.mesh.addNodes(size, 1, labels, made.points.ravel())
+        nodes = made.cells[kind][:, order] + 1
+        gmsh.model.mesh.addElementsByType(1, code, [], nodes.ravel())
+        gmsh.model.addPhysicalGroup(size, [1], name="whole")
+        gmsh.option.setNumber("Mesh.SaveGroupsOfElements", 1)
+        gmsh.write(str(tmp_path / "box.unv"))
+    found = fem.read_structure(tmp_path / "box.unv")
+    assert list(found.groups) == ["whole"]
+    assert (found.points[found.cells[kind]] == made.points[made.cells[kind]]).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("       116", "       117", "element 117 of 20 nodes \\(8, first in line 190"),
+        ("  2467\n", "   781\n", "dataset 781 \\(1, first in line"),
+        ("    -1\n  2411", "  2411", "has no end"),
+        ("1.0000000000000001E-01", "1.00000000x", "dataset 2411 from line 9 on is cut off or"),
+        ("       116         2         1         7        20", "       116         2         1"
+         "         7         8", "element 1 has 8 nodes where 20"),
+        ("         8         1         0", "         9         1         0", "of kind 9, which is"),
+    ],
+)  # fmt: skip
+def test_what_is_not_read_of_a_universal_file_is_refused(tmp_path, old, new, said):
+    path = tmp_path / "block.unv"
+    write_unv(block(), path)
+    text = path.read_text().replace("D+", "E+").replace("D-", "E-")
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(fem.ModelError, match=said):
+        fem.read_structure(path)
 
 
 def step_of(file):
@@ -173,7 +232,7 @@ def test_what_is_no_med_file_is_refused(tmp_path):
         fem.read_structure(path)
 
 
-@pytest.mark.parametrize("extension", [".unv", ".cdb"])
+@pytest.mark.parametrize("extension", [".e", ".cdb"])
 def test_other_formats_are_refused_with_what_to_do(tmp_path, extension):
     path = tmp_path / f"block{extension}"
     path.write_text("")
@@ -240,10 +299,11 @@ def test_med_in_other_coordinates_is_refused_and_another_unit_told(tmp_path):
             file["ENS_MAA/block"].attrs["REP"] = system
         with pytest.raises(fem.ModelError, match=rf"are {name} \(REP = {system}\)"):
             fem.read_structure(path)
-    for unit, told in (("m", False), ("", False), ("mm", True)):
+    for unit, told in (("m", False), ("", False), ("INCONNUE", False), ("mm", True)):
         with h5py.File(path, "r+") as file:
             file["ENS_MAA/block"].attrs["REP"] = 0
             file["ENS_MAA/block"].attrs["UNI"] = np.bytes_(3 * f"{unit:16}")
         mesh = fem.read_structure(path)
         assert (mesh.points == box.points).all()
         assert len(mesh.notes) == told and all("the unit 'mm'" in note for note in mesh.notes)
+        assert mesh.unit == ("mm" if told else "")

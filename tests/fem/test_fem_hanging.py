@@ -10,6 +10,7 @@ from with_gmsh import gmsh_at_work
 
 import fem
 from fem.hanging import check_nothing_hangs
+from fem.overlapping import overlap_warnings
 
 E, LENGTH, THICKNESS = 2.0e11, 2.0, 0.01
 SOFT_SIDED = fem.Material(E, 8000.0, 0.0)
@@ -144,11 +145,47 @@ def test_a_mesh_of_gmsh_in_which_sizes_change_is_let_be(order, tmp_path):
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.setOrder(order)
         gmsh.write(str(tmp_path / "body.msh"))
-    mesh = fem.read_structure(tmp_path / "body.msh")
-    check_nothing_hangs(model_of(mesh, fem.SolidPart(STEEL)))
+    model = model_of(fem.read_structure(tmp_path / "body.msh"), fem.SolidPart(STEEL))
+    check_nothing_hangs(model)
+    assert not list(overlap_warnings(model))
 
 
-def rod_on_block(inner=None, couplings=()):
+def ring(radius, around, kind):
+    """A sector of 1 rad between two radii, as high as it is thick."""
+    flat = fem.box_mesh("ring", (0.5, 1.0, 0.5), (1, around, 1), origin=(radius, 0, 0), kind=kind)
+    r, angle, z = flat.points.T
+    return flat.with_points(np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1))
+
+
+@pytest.mark.parametrize(
+    ("kind", "around", "nodes"),
+    [
+        ("hexahedron20", 2, 10),  # in the middles of 4 arcs above and below, of 2 lines upwards
+        ("hexahedron20", 3, 14),
+        ("hexahedron27", 2, 12),
+        ("wedge15", 2, 10),
+        ("tetra10", 2, 12),
+        ("hexahedron", 8, 16),
+    ],
+)
+def test_cells_that_hang_on_a_curved_face_are_told_of(kind, around, nodes):
+    other = around + 1 if around == 3 else 2 * around
+    part = fem.SolidPart(STEEL)
+    torn = model_of(fem.joined([ring(0.5, around, kind), ring(1.0, other, kind)]), part)
+    [said] = overlap_warnings(torn)
+    assert f": {nodes} nodes lie on curved faces of cells that do not have them" in said
+    assert not list(overlap_warnings(replace(torn, separate=True)))
+    whole = model_of(fem.joined([ring(r, around, kind) for r in (0.5, 1.0)]), part)
+    assert not list(overlap_warnings(whole))
+
+
+def test_a_hanging_curved_face_is_told_when_the_model_is_assembled():
+    torn = fem.joined([ring(0.5, 2, "hexahedron20"), ring(1.0, 4, "hexahedron20")])
+    with pytest.warns(fem.JointWarning, match="10 nodes lie on curved faces"):
+        fem.assemble(model_of(torn, fem.SolidPart(STEEL)))
+
+
+def rod_on_block(inner=None, couplings=(), pinned=()):
     """A round rod of 1 m from the middle of a face of a cube, or from a place within the cube."""
     block = fem.box_mesh("block", (1.0, 1.0, 1.0), (2, 2, 2), kind="hexahedron20")
     ends = {"face": (1.0, 0.5, 0.5), "tip": (2.0, 0.5, 0.5)}
@@ -165,6 +202,7 @@ def rod_on_block(inner=None, couplings=()):
         },
         supports=[fem.Support("x0", ("x", "y", "z"))],
         couplings=couplings,
+        pinned=pinned,
     )
 
 
@@ -190,3 +228,31 @@ def test_a_beam_that_goes_on_within_a_cell_is_not_told_of():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         fem.assemble(rod_on_block(inner=0.5))
+
+
+def test_a_joint_that_is_meant_is_not_told_of(tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        meant = fem.assemble(rod_on_block(pinned=["rod"]))
+    assert lowest_hz(meant, 3)[2] < 0.1
+    meant.save(tmp_path / "rod.npz")
+    assert fem.StructureComponent.load(tmp_path / "rod.npz").model.pinned == ("rod",)
+    with pytest.raises(fem.ModelError, match="'rods' of 'pinned' is no part; there are 'block', "):
+        rod_on_block(pinned=["rods"])
+    with pytest.raises(fem.ModelError, match="'rod' of 'pinned' meets no solid in nodes that it"):
+        fem.assemble(rod_on_block(inner=0.5, pinned=["rod"]))
+
+
+@pytest.mark.parametrize(("place", "nodes"), [((1.0, 1.0, 0.0), 3), ((1.0, 1.0, 1.0), 1)])
+def test_solids_that_meet_in_an_edge_or_a_node_are_told_of(place, nodes):
+    cubes = [
+        fem.box_mesh(name, (1.0, 1.0, 1.0), (1, 1, 1), origin=at)
+        for name, at in (("one", (0.0, 0.0, 0.0)), ("other", place))
+    ]
+    model = model_of(fem.joined(cubes), fem.SolidPart(STEEL))
+    said = f"solids of 'one', 'other' meet in {nodes} nodes, but in no face there"
+    with pytest.warns(fem.JointWarning, match=said):
+        fem.assemble(model)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fem.assemble(replace(model, pinned=["other"]))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import meshio
 import numpy as np
 import pytest
+import pyvista
 from scipy.linalg import eigh
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
 import fem
 
@@ -367,3 +370,45 @@ def test_what_a_vtk_file_says_of_the_whole_is_passed_over(tmp_path, place):
     plain = fem.read_structure(path)
     path.write_text(path.read_text().replace(place, time + place))
     assert (fem.read_structure(path).points == plain.points).all()
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_appended_data_of_the_whole_are_passed_over(tmp_path, compressed):
+    """As ParaView writes the time of a step, with blanks after the offsets."""
+    box = fem.box_mesh("bar", (1.0, 0.1, 0.1), (4, 1, 1), kind="hexahedron")
+    grid = pyvista.UnstructuredGrid({12: box.cells["hexahedron"]}, box.points)
+    grid.field_data["TimeValue"] = np.array([0.5])
+    path = tmp_path / "bar.vtu"
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetFileName(str(path))
+    writer.SetInputData(grid)
+    writer.SetDataModeToAppended()
+    writer.EncodeAppendedDataOff()
+    if not compressed:
+        writer.SetCompressorTypeToNone()
+    assert writer.Write()
+    text = path.read_bytes()
+    assert b"<FieldData>" in text and b'format="appended"' in text
+    path.write_bytes(re.sub(rb'(offset="\d+)"', rb'\1     "', text))
+    found = fem.read_structure(path)
+    assert (found.points == box.points).all()
+    assert (found.cells["hexahedron"] == box.cells["hexahedron"]).all()
+
+
+def test_the_advice_for_other_vtk_files_makes_them_readable(tmp_path):
+    plane = pyvista.Plane(i_resolution=2, j_resolution=1)
+    plane.save(tmp_path / "plane.vtk")
+    with pytest.raises(fem.ModelError, match=r"holds POLYDATA.*cast_to_unstructured_grid\(\)"):
+        fem.read_structure(tmp_path / "plane.vtk")
+    pyvista.read(tmp_path / "plane.vtk").cast_to_unstructured_grid().save(tmp_path / "mesh.vtu")
+    assert len(fem.read_structure(tmp_path / "mesh.vtu").cells["quad"]) == 2
+    meshio.write(tmp_path / "one.vtu", content(), binary=False)
+    text = (tmp_path / "one.vtu").read_text()
+    piece = text[text.index("<Piece") : text.index("</UnstructuredGrid>")]
+    (tmp_path / "two.vtu").write_text(text.replace(piece, 2 * piece))
+    with pytest.raises(fem.ModelError, match=r"has 2 pieces, not one; pyvista\.read\(file\)\.save"):
+        fem.read_structure(tmp_path / "two.vtu")
+    pyvista.read(tmp_path / "two.vtu").save(tmp_path / "joined.vtu")
+    one, both = (fem.read_structure(tmp_path / f"{name}.vtu") for name in ("one", "joined"))
+    for kind, cells in one.cells.items():
+        assert len(both.cells[kind]) == 2 * len(cells)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from universal_files import write_unv
 
 import fem
 from nldyn.app.cli import main
@@ -82,6 +83,19 @@ def test_a_mesh_in_millimetres_is_the_same_component(tmp_path):
         assert abs(found - known).max() <= 1e-12 * abs(known).max()
 
 
+@pytest.mark.parametrize("unit", ["mm", "m"])
+def test_a_unit_that_the_file_states_must_be_confirmed_in_the_scene(tmp_path, unit):
+    """The mesh of a universal file that states millimetres; the scene may say that it is wrong."""
+    mesh, size = bar(0.0, 1.0, 8), 1000.0 if unit == "mm" else 1.0
+    write_unv(mesh.with_points(size * mesh.points), tmp_path / "mesh.unv", per_metre=1000.0)
+    text = SCENE.format(file="mesh.unv", mesh="")
+    with pytest.raises(SceneError, match=r"mesh\.file states the unit 'mm'.*which 'unit' to take"):
+        build_component(parse_scene(text, tmp_path / "scene.toml"))
+    text = SCENE.format(file="mesh.unv", mesh=f'unit = "{unit}"')
+    found = build_component(parse_scene(text, tmp_path / "scene.toml"))
+    assert fem.mass_properties(found).mass == pytest.approx(7800.0 * 0.05**2, rel=1e-9)
+
+
 def test_what_is_ignored_is_not_there_and_is_told(tmp_path):
     mesh = bar(0.0, 1.0, 8)
     corners = mesh.cells["hexahedron20"][0, :4][None]
@@ -103,6 +117,8 @@ def test_what_is_ignored_is_not_there_and_is_told(tmp_path):
         ("at = [1.0, 0.05, 0.05]", "at = [0.9, 0.05, 0.05]", "no node is at"),
         ("at = [1.0, 0.05, 0.05]", "", "needs one of 'at' and 'box'"),
         ('model = "structure"', 'model = "structure"\nmerge = true\nseparate = true', "keep one"),
+        ('model = "structure"', 'pinned = ["bar"]', "has 'pinned', which needs model = \"str"),
+        ('model = "structure"', 'model = "structure"\npinned = ["ba"]', "'ba' of 'pinned' is no"),
     ],
 )
 def test_what_makes_no_sense_is_one_sentence(tmp_path, old, new, said):
