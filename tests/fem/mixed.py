@@ -1,6 +1,7 @@
-"""Blocks in which hexahedra, wedges, pyramids and tetrahedra meet face to face."""
+"""Blocks in which hexahedra, wedges, pyramids and tetrahedra meet face to face, as patches."""
 
 import numpy as np
+from scipy.sparse.linalg import spsolve
 
 import fem
 from fem.cells import CUBE, KINDS
@@ -66,3 +67,26 @@ def inner_nodes(component):
     """Nodes that are on no outer face."""
     outer = [nodes.ravel() for nodes in component.model.facets.values()]
     return np.setdiff1d(np.arange(len(component.model.mesh.points)), np.concatenate(outer))
+
+
+STRETCH = np.array([[0.3, -0.2, 0.5], [0.1, 0.4, -0.6], [0.7, 0.2, 0.1]])
+"""A linear displacement of points (n, 3), by ``points @ STRETCH``."""
+
+
+def jiggled(corners):
+    """Corners inside move by up to a sixth of a cell in each direction, those outside too."""
+    return corners + np.random.default_rng(3).uniform(-0.12, 0.12, corners.shape)
+
+
+def patch_error(component, exact):
+    """Greatest error of the nodes inside, with exact displacements (n, 3) outside, by the largest.
+
+    There must be three nodes inside at least.
+    """
+    inner = np.zeros(len(exact), dtype=bool)
+    inner[inner_nodes(component)] = True
+    assert inner.sum() >= 3
+    free = np.repeat(inner, 3)
+    K = component.stiffness.tocsr()
+    found = spsolve(K[free][:, free].tocsc(), -K[free][:, ~free] @ exact.ravel()[~free])
+    return np.abs(found - exact.ravel()[free]).max() / np.abs(exact).max()

@@ -5,7 +5,7 @@ import warnings
 import meshio
 import numpy as np
 import pytest
-from mixed import FAMILIES, mixed_block
+from mixed import FAMILIES, STRETCH, jiggled, mixed_block, patch_error
 from structures import STEEL, lowest_hz
 from with_gmsh import gmsh_at_work
 
@@ -109,7 +109,8 @@ def write_gmsh_22(mesh, path):
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_mixed_meshes_come_back_from_every_format(family, tmp_path):
-    mesh = mixed_block(family)
+    """The distorted patch in the order of Gmsh, VTK and Abaqus: counts, frequencies, stretch."""
+    mesh = mixed_block(family, jiggled)
     expected = frequencies(mesh)[6:]
     assert expected.min() > 1.0
     write_gmsh_22(mesh, tmp_path / "mixed.msh")
@@ -124,6 +125,8 @@ def test_mixed_meshes_come_back_from_every_format(family, tmp_path):
             k: len(c) for k, c in mesh.cells.items()
         }
         np.testing.assert_allclose(frequencies(back)[6:], expected, rtol=1e-9)
+        component = fem.assemble(fem.StructureModel(back, {"body": fem.SolidPart(STEEL)}))
+        assert patch_error(component, back.points @ STRETCH) < 1e-12
 
 
 def test_a_cell_that_a_format_has_not_is_told(tmp_path):
