@@ -414,14 +414,19 @@ def face_products(model: StructureModel, face: str, nodes: IntArray) -> SparseAr
     return found
 
 
+def measures(kind: str, coordinates: FloatArray) -> FloatArray:
+    """Volume (area, length) at each place of integration of cells or facets (f, k, d), (f, q)."""
+    places, weights = KINDS[kind].quadrature
+    _, reference = KINDS[kind].basis(places)
+    J = np.einsum("fbi,qbj->fqij", coordinates, reference)
+    return np.asarray(np.sqrt(np.linalg.det(J.swapaxes(-1, -2) @ J)) * weights)
+
+
 def facet_products(kind: str, coordinates: FloatArray) -> FloatArray:
     """Integrals over facets of products of shape functions, (f, k, k), in m² or m."""
-    cell = KINDS[kind]
-    places, weights = cell.quadrature
-    values, reference = cell.basis(places)
-    J = np.einsum("fbi,qbj->fqij", coordinates, reference)
-    measure = np.sqrt(np.linalg.det(J.swapaxes(-1, -2) @ J))
+    values, _ = KINDS[kind].basis(KINDS[kind].quadrature[0])
+    found = measures(kind, coordinates)
     return np.asarray(
-        np.einsum("fq,qa,qb->fab", measure * weights, values, values, optimize=True),
+        np.einsum("fq,qa,qb->fab", found, values, values, optimize=True),
         dtype=np.float64,
     )

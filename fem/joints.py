@@ -9,10 +9,10 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
-from fem.cells import KINDS, facet_keys
 from fem.errors import ModelError, quoted
 from fem.links import link_terms
 from fem.mesh import IntArray
+from fem.neighbours import shared_facets
 from fem.pieces import place_of
 from fem.structure import AXES, StructureModel, axis_index
 from fem.trusses import loose_nodes, loose_sentences
@@ -153,6 +153,8 @@ def solids_that_turn(model: StructureModel) -> Iterator[tuple[list[str], str]]:
     if not model.solids:
         return
     body, blocks = _bodies(model), _solid_cells(model)
+    if not body.any():
+        return
     owners = np.repeat(np.arange(len(body)), np.concatenate([_widths(b) for b in blocks]))
     nodes = np.concatenate([cells.ravel() for cells in blocks])
     met = _on_axes(model, np.unique(np.stack([nodes, body[owners]], axis=1), axis=0))
@@ -196,24 +198,9 @@ def _on_axes(model: StructureModel, pairs: IntArray) -> IntArray:
 
 def _bodies(model: StructureModel) -> IntArray:
     """For each solid cell the number of the body whose cells hang together by faces."""
-    first = 0
-    sides: dict[int, list[tuple[IntArray, IntArray]]] = {}
-    for _, kinds in model.solids.values():
-        for kind, cells in kinds.items():
-            for facet, nodes in KINDS[kind].facets_of(cells).items():
-                corners = np.sort(nodes[:, : len(KINDS[facet].corners)])
-                owners = first + np.repeat(np.arange(len(cells)), len(nodes) // len(cells))
-                sides.setdefault(corners.shape[1], []).append((corners, owners))
-            first += len(cells)
-    links = []
-    for blocks in sides.values():
-        corners, owners = (np.concatenate(column) for column in zip(*blocks, strict=True))
-        keys = facet_keys(corners[:, :3])
-        order = np.argsort(keys, kind="stable")
-        same = np.flatnonzero(np.diff(keys[order]) == 0)
-        links.append(np.stack([owners[order[same]], owners[order[same + 1]]], axis=1))
-    pairs = np.concatenate(links)
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(first, first))
+    count = sum(_cell_count(kinds) for _, kinds in model.solids.values())
+    pairs = np.concatenate([cells for _, cells in shared_facets(model)])
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from fem.cells import KINDS, all_facets
-from fem.constraints import facet_products
+from fem.constraints import measures
 from fem.mesh import FloatArray, IntArray
 from fem.structure import SolidPart, StructureModel, once
 
@@ -46,9 +46,9 @@ def stiffening(part: SolidPart, ratio: float) -> float:
 
 def thickness(points: FloatArray, kinds: Mapping[str, IntArray]) -> float:
     """Of a part in m: twice the volume of its cells over the surface around all of them."""
-    volume = sum(float(facet_products(kind, points[nodes]).sum()) for kind, nodes in kinds.items())
+    volume = sum(float(measures(kind, points[nodes]).sum()) for kind, nodes in kinds.items())
     outer = {kind: once(facets, kind) for kind, facets in all_facets([kinds]).items()}
-    surface = sum(float(facet_products(kind, points[nodes]).sum()) for kind, nodes in outer.items())
+    surface = sum(float(measures(kind, points[nodes]).sum()) for kind, nodes in outer.items())
     return 2.0 * volume / surface
 
 

@@ -41,6 +41,7 @@ from fem.natural import (
     natural_form,
     solid_rows,
 )
+from fem.neighbours import check_not_folded
 from fem.overlapping import overlap_warnings
 from fem.pieces import check_joined
 from fem.scatter import (
@@ -181,6 +182,7 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     """
     slits = check_joined(model)
     check_conforming(model)
+    check_not_folded(model)
     told = (*joint_warnings(model), *mechanism_warnings(model), *slits)
     for text in told:
         warnings.warn(text, JointWarning, stacklevel=3)

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from fem.constraints import measures
 from fem.frame import Component
+from fem.mesh import FloatArray, FrameMesh, IntArray
+from fem.model import BeamPart, FrameModel, TrussPart
 from fem.pieces import described, place_of
+from fem.structure import StructureModel
 from fem.structure_assembly import StructureComponent
+from fem.structure_mesh import StructureMesh
+from fem.tapers import along
 
 MOST_NAMES = 30
 
@@ -56,6 +63,51 @@ def mass_properties(component: Component | StructureComponent) -> MassProperties
     return MassProperties(float(f"{mass:.12g}"), (x, y, z))
 
 
+def volume(model: FrameModel | StructureModel) -> float:
+    """Volume in m³ of everything that a model is made of, hinges and masses at points apart.
+
+    Examples
+    --------
+    >>> import fem
+    >>> rod = fem.BeamPart(fem.Material(2.1e11, 7800.0), fem.RectangularSection(0.1, 0.02))
+    >>> mesh = fem.frame_mesh({"a": (0, 0), "b": (3, 0)}, [("rod", "a", "b", 2)])
+    >>> round(volume(fem.FrameModel(mesh, {"rod": rod})), 12)
+    0.006
+    """
+    mesh, found = model.mesh, 0.0
+    lines: dict[str, tuple[BeamPart | TrussPart, IntArray]] = {}
+    if isinstance(model, FrameModel):
+        for name, part in model.parts.items():
+            lines[name] = part, model.mesh.lines[model.mesh.part(name)]
+    else:
+        lines.update(model.beams)
+        for solid, kinds in model.solids.values():
+            found += (solid.thickness or 1.0) * _size(mesh.points, kinds)
+        for shell, kinds in model.shells.values():
+            found += shell.thickness * _size(mesh.points, kinds)
+        for truss, kinds in model.trusses.values():
+            found += truss.area * _size(mesh.points, kinds)
+    for name, (part, ends) in lines.items():
+        lengths = np.linalg.norm(mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]], axis=1)
+        found += float(np.sum(lengths * _mean_area(part, mesh, ends, name)))
+    return found
+
+
+def _size(points: FloatArray, kinds: Mapping[str, IntArray]) -> float:
+    return sum(float(measures(kind, points[cells]).sum()) for kind, cells in kinds.items())
+
+
+def _mean_area(
+    part: BeamPart | TrussPart, mesh: FrameMesh | StructureMesh, ends: IntArray, name: str
+) -> FloatArray:
+    """Of each line, in m², by Simpson's rule, which is exact where lengths change linearly."""
+    if isinstance(part, TrussPart):
+        return np.full(len(ends), part.area)
+    section = along(part, mesh, ends, name, np.array([0.0, 0.5, 1.0])).section
+    areas = np.broadcast_to(np.asarray(section.area), (len(ends), 3))
+    return areas @ [1 / 6, 4 / 6, 1 / 6]
+
+
 def summary(component: Component | StructureComponent) -> str:
     """What a component was made of, in lines for a person.
 
@@ -75,6 +127,7 @@ def summary(component: Component | StructureComponent) -> str:
     lines = [
         f"mesh {mesh.source}: {len(mesh.points)} nodes; {_cells(component)}",
         f"extents: {place_of(low)} to {place_of(high)} m",
+        f"volume: {volume(component.model):.8g} m³",
         f"mass: {properties.mass:.8g} kg, centre at {place_of(np.array(properties.centre))} m",
         *_names(component),
         *described(component.model),

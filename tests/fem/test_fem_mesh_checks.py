@@ -13,6 +13,8 @@ from scipy.linalg import eigh
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
 import fem
+from fem.cells import KINDS
+from fem.summary import volume
 
 STEEL = fem.Material(2.1e11, 7800.0, 0.3)
 BAR = {"bar": fem.SolidPart(STEEL)}
@@ -307,6 +309,52 @@ def test_mass_and_centre_of_a_frame():
     assert found.centre == pytest.approx(
         ((1.5 * beam + 3.0 * post + 300.0) / total, (2.0 * post + 400.0) / total, 0.0), rel=1e-9
     )
+
+
+@pytest.mark.parametrize("kind", ["tetra", "tetra10", "triangle", "triangle6"])
+def test_cells_that_are_turned_over_are_refused_and_mirrored_ones_taken(kind):
+    """The middle node beyond its neighbours: the volumes of the cells are more than the body's."""
+    size = 2 if kind.startswith("triangle") else 3
+    box = fem.box_mesh("bar", (1.0,) * size, (2,) * size, kind=kind)
+    part = fem.SolidPart(STEEL, "stress", 1.0) if size == 2 else fem.SolidPart(STEEL)
+    corners = KINDS[kind].corners.shape[0]
+    first = fem.StructureModel(box, {"bar": part})
+    middle = np.flatnonzero(np.abs(box.points[:, :size] - 0.5).max(axis=1) < 1e-9)[0]
+    points = box.points.copy()
+    points[middle, 0] = 1.3
+    for cells in box.cells.values():  # nodes on edges stay in the middle
+        points[cells] = KINDS[kind].filled(points[cells[:, :corners]])
+    folded = fem.StructureModel(box.with_points(points), {"bar": part})
+    assert volume(folded) > 1.1 > volume(first)
+    with pytest.raises(fem.ModelError, match=rf"pairs of cells overlap, .* {kind} \d+ at .*folded"):
+        fem.assemble(folded)
+    order = {"tetra": [1, 0, 2, 3], "tetra10": [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]}
+    order |= {"triangle": [1, 0, 2], "triangle6": [1, 0, 2, 3, 5, 4]}
+    mirrored = box.cells[kind].copy()
+    mirrored[::2] = mirrored[::2][:, order[kind]]
+    turned = replace(box, cells={kind: mirrored})
+    found = fem.mass_properties(fem.assemble(fem.StructureModel(turned, {"bar": part}))).mass
+    assert found == pytest.approx(7800.0, rel=1e-12)
+
+
+def test_the_volume_of_every_kind_of_part_is_told():
+    rod = fem.frame_mesh({"a": (0, 0), "b": (3, 0)}, [("bar", "a", "b", 3)])
+    round_bars = fem.CircularSection(0.2), fem.CircularSection(0.1)
+    cone = fem.BeamPart(STEEL, fem.TaperedSection(*round_bars, "a", "b"))
+    box = fem.box_mesh("bar", (1.0, 0.2, 0.1), (2, 2, 1))
+    sheet = fem.box_mesh("bar", (1.0, 0.2), (2, 2))
+    space = fem.structure_mesh(rod)
+    for model, expected in (
+        (fem.StructureModel(box, BAR), 0.02),
+        (fem.StructureModel(sheet, {"bar": fem.SolidPart(STEEL, "stress", 0.03)}), 0.006),
+        (fem.StructureModel(sheet, {"bar": fem.ShellPart(STEEL, 0.01)}), 0.002),
+        (fem.StructureModel(space, {"bar": fem.TrussPart(STEEL, 0.004)}), 0.012),
+        (fem.StructureModel(space, {"bar": cone}), np.pi / 4.0 * 0.07),
+        (fem.FrameModel(rod, {"bar": cone}), np.pi / 4.0 * 0.07),
+        (fem.FrameModel(rod, {"bar": fem.TrussPart(STEEL, 0.004)}), 0.012),
+    ):
+        assert volume(model) == pytest.approx(expected, rel=1e-12)
+    assert "\nvolume: 0.02 m³\n" in fem.summary(fem.assemble(fem.StructureModel(box, BAR)))
 
 
 def test_a_line_that_is_no_edge_of_a_solid_is_lost_and_one_that_is_names_a_place():
