@@ -109,9 +109,9 @@ class _ReferenceModel(models.PrimitiveModel):
 class _ReferenceFields(AttributeTemplate):
     key = _Reference
 
-    def generic_resolve(self, kind: _Reference, name: str) -> Any:
-        fields = kind.structure.fields
-        return kind.structure.types[fields.index(name)] if name in fields else None
+    def generic_resolve(self, value: Any, attr: str) -> Any:
+        fields = value.structure.fields
+        return value.structure.types[fields.index(attr)] if attr in fields else None
 
 
 @lower_getattr_generic(_Reference)
