@@ -109,7 +109,7 @@ class _ReferenceModel(models.PrimitiveModel):
 class _ReferenceFields(AttributeTemplate):
     key = _Reference
 
-    def generic_resolve(self, value: Any, attr: str) -> Any:
+    def generic_resolve(self, value: Any, attr: str) -> Any:  # type: ignore[override]
         fields = value.structure.fields
         return value.structure.types[fields.index(attr)] if attr in fields else None
 
