@@ -326,9 +326,11 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
     with plain_errors():
         import cms
         import fem
+        from nldyn.base.errors import SystemModelError
         from nldyn.runtime.progress import messages_shown
         from nldyn.scene.build import build_any, build_candidates, build_reduced, build_system
         from nldyn.scene.checks import check_computable, range_remark
+        from nldyn.scene.faults import told_as
         from nldyn.scene.read import load_scene
 
         loaded = load_scene(scene, mesh_folders)
@@ -341,6 +343,8 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
             elif component is not None:
                 reduced = build_reduced(loaded, component)
             system = build_system(loaded, reduced)
+            with told_as(loaded, (), SystemModelError):
+                at_rest = describe_rest(system)
         if as_json:
             from nldyn.report.modes import mode_table
             from nldyn.scene.build import Structure
@@ -359,7 +363,7 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
                         name: static_flexibility(system, name) for name in system.interfaces
                     },
                     "stops": [describe_stop(stop) for stop in system.stops],
-                    "at_rest": describe_rest(system),
+                    "at_rest": at_rest,
                     "notes": [remark] if remark else [],
                 }
             )
@@ -368,7 +372,8 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
             click.echo(f"matrices of {component.mass.shape[0]} degrees of freedom")
         elif component is not None:
             click.echo(fem.summary(component))
-        click.echo(describe_system(system, 0 if reduced is None else reduced.residual_modes))
+        described = describe_system(system, 0 if reduced is None else reduced.residual_modes)
+        click.echo("\n".join([described, *at_rest]))
         check_computable(loaded, scene)
         if candidates is not None and loaded.reduction is not None:
             click.echo(
@@ -708,7 +713,7 @@ def describe_system(system: System, residual: int = 0) -> str:
     if np.any(system.spring_stiffness):
         hz = ", ".join(f"{value:.6f}" for value in system.linear.frequencies_hz)
         lines.append(f"frequencies with the springs: {hz} Hz")
-    return "\n".join([*lines, *describe_rest(system)])
+    return "\n".join(lines)
 
 
 def describe_rest(system: System) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import tomllib
+from difflib import get_close_matches
 from pathlib import Path
 
 from nldyn.base.errors import SceneError
@@ -113,8 +114,11 @@ def copy_example(name: str, directory: str | Path | None = None) -> Path:
     """
     stem = name.removesuffix(".toml")
     if f"{stem}.toml" not in examples():
-        known = ", ".join(each.removesuffix(".toml") for each in examples())
-        raise SceneError(f"there is no example {stem!r}; there are {known}")
+        known = [each.removesuffix(".toml") for each in examples()]
+        longer = [each for each in known if stem and each.startswith(stem.lower())]
+        guess = longer or get_close_matches(stem.lower(), known, n=1)
+        hint = f"did you mean {guess[0]!r}? There" if guess else "there"
+        raise SceneError(f"there is no example {stem!r}; {hint} are {', '.join(known)}")
     source = example(f"{stem}.toml")
     text = source.read_text(encoding="utf-8")
     folder = Path(stem if directory is None else directory)

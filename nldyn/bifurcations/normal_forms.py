@@ -30,6 +30,7 @@ from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special
 from nldyn.bifurcations.touching import rigid_grazing
 from nldyn.orbits.orbit import Orbit, minimal_period
 from nldyn.orbits.shooting import asymmetry, metric_length
+from nldyn.system.naming import stop_name
 from nldyn.system.rigid_stop import RigidStop
 
 CLOSE = 1e-3  # relative distance in frequency of a special point that counts as close
@@ -516,9 +517,7 @@ def touching(orbit: Orbit) -> list[tuple[int, float, bool]]:
 
 
 def _stop_name(orbit: Orbit, index: int, phase: float) -> str:
-    stops = orbit.system.stops
-    number = f" {index + 1}" if len(stops) > 1 else ""
-    return f"stop{number} at '{stops[index].at}' ({1e3 * phase / orbit.omega:.4g} ms)"
+    return f"{stop_name(orbit.system.stops, index)} ({1e3 * phase / orbit.omega:.4g} ms)"
 
 
 def _stability_at_grazing(special: SpecialPoint, others: Sequence[SpecialPoint]) -> str:

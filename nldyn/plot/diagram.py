@@ -20,6 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 from nldyn.base.errors import check_choice, check_types
 from nldyn.branches.branch import check_branches
 from nldyn.plot.hover import show_labels
+from nldyn.system.naming import stop_name
+from nldyn.system.rigid_stop import AnyStop
 
 if TYPE_CHECKING:
     from nldyn.branches.branch import Branch
@@ -274,7 +276,7 @@ def plot_orbit(
     upper, lower = axes if axes is not None else new_axes_pair()
     places = stop_places(orbit.system, orbit.observe)
     _draw_displacement(upper, history.time, history.displacement[orbit.observe], places)
-    _draw_forces(lower, history.time, history.force, [s.at for s in orbit.system.stops])
+    _draw_forces(lower, history.time, history.force, orbit.system.stops)
     _mark_deepest((upper, lower), [impact.time for impact in orbit.impact_list])
     name = period_name(orbit.period)
     upper.set_title(f"{name} orbit at {orbit.frequency_hz:.6g} Hz")
@@ -446,15 +448,15 @@ def _draw_displacement(
 
 
 def _draw_forces(
-    ax: Axes, time: NDArray[np.float64], forces: NDArray[np.float64], names: Sequence[str]
+    ax: Axes, time: NDArray[np.float64], forces: NDArray[np.float64], stops: Sequence[AnyStop]
 ) -> None:
-    for number, name in enumerate(names):
+    for number in range(len(stops)):
         colour = PERIOD_COLOURS[(number + 1) % len(PERIOD_COLOURS)]
-        label = f"stop at {name}" if names.count(name) == 1 else f"stop {number} at {name}"
+        label = stop_name(stops, number)
         ax.plot(time, forces[:, number], color=colour, linewidth=1.2, label=label)
     ax.set_ylabel("contact force (N)")
     ax.set_ylim(bottom=0.0)
-    if len(names) > 1:
+    if len(stops) > 1:
         ax.legend(fontsize="small", loc="upper right")
 
 

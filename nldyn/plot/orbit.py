@@ -20,7 +20,7 @@ from nldyn.plot.diagram import (
     period_name,
     stop_places,
 )
-from nldyn.system.system import System
+from nldyn.system.naming import stop_name
 
 FORCE_PREFIXES = ((1e6, "MN"), (1e3, "kN"), (1.0, "N"), (1e-3, "mN"), (1e-6, "µN"))
 FLOOR = 1e-7  # amplitudes below this share of the largest are not shown
@@ -195,7 +195,7 @@ def plot_contact_force(orbit: Orbit, ax: Axes | None = None, *, samples: int = 4
             color=colour,
             linewidth=1.4,
             linestyle=style,
-            label=stop_name(system, row),
+            label=stop_name(system.stops, row),
         )
     if system.stops:
         _draw_legend(ax)
@@ -234,21 +234,6 @@ def force_unit(largest: float) -> tuple[float, str]:
     (1000.0, 'kN')
     """
     return next((p for p in FORCE_PREFIXES if largest >= p[0]), (1.0, "N"))
-
-
-def stop_name(system: System, index: int) -> str:
-    """Name a stop by its place, and by its number where there are several.
-
-    Examples
-    --------
-    >>> from nldyn import Stop, System
-    >>> stop_name(System.from_modal([13.1], {"tip": [0.6]}, stops=[Stop("tip", 1e9)]), 0)
-    'stop at tip'
-    """
-    stop = system.stops[index]
-    number = f" {index + 1}" if len(system.stops) > 1 else ""
-    against = f" against {stop.against}" if stop.against else ""
-    return f"stop{number} at {stop.at}{against}"
 
 
 def _axes(ax: Axes | None, orbit: Orbit) -> Axes:

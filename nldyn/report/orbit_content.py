@@ -17,7 +17,8 @@ from nldyn.branches.branch import Branch
 from nldyn.orbits.harmonics import harmonics
 from nldyn.orbits.orbit import Orbit
 from nldyn.plot.diagram import MARKER_NAMES, period_name, stop_places
-from nldyn.plot.orbit import FLOOR, drawn_phases, motion_at, stop_name
+from nldyn.plot.orbit import FLOOR, drawn_phases, motion_at
+from nldyn.system.naming import stop_name
 
 MOST_ORBITS = 120
 SPECIAL_SHARE = 2 / 3  # of them, at most, are those at special points
@@ -214,7 +215,7 @@ def stops_of(orbit: Orbit) -> dict[str, Any]:
     """The stops' names, and the displacements at which the observed interface meets some."""
     system = orbit.system
     return {
-        "names": [stop_name(system, index) for index in range(len(system.stops))],
+        "names": [stop_name(system.stops, index) for index in range(len(system.stops))],
         "places": stop_places(system, orbit.observe),
     }
 

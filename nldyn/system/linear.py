@@ -316,8 +316,8 @@ def diagonalised(omega: Real, added: Real) -> tuple[Real, Real]:
     rounding = 8.0 * n * _EPS * (modes**2).T @ sizes
     if np.any(squares < -rounding):
         raise SystemModelError(
-            "the springs make the linear stiffness negative in a direction, so that the structure "
-            "runs away; what bounds it belongs into the same PolynomialSpring"
+            "springs make the linear stiffness negative in a direction, so that the structure runs "
+            "away; give it and what bounds it as coefficients [k1, k2, k3, ...] of one spring"
         )
     return np.sqrt(np.where(squares > rounding, squares, 0.0)), modes
 

@@ -82,10 +82,10 @@ def check_exact(system: System, parameter: Parameter) -> None:
         stop = system.stops[index]
         if not hasattr(stop, name):
             kind = "rigid" if isinstance(stop, RigidStop) else "elastic"
-            raise SystemModelError(f"parameter '{name}': stop {index} is {kind}, it has no {name}")
+            raise SystemModelError(f"parameter '{name}': stops[{index}] is {kind}, without {name}")
         if name != "gap" and stop.law is not None:
             raise SystemModelError(
-                f"parameter '{name}': stop {index} has a law of its own, which knows no {name}"
+                f"parameter '{name}': stops[{index}] has a law of its own, which knows no {name}"
             )
     elif name in SOURCES:
         check_index(parameter, "excitation", len(system.excitation))

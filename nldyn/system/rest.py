@@ -101,10 +101,18 @@ def rest_positions(system: System) -> list[Real]:
             found.append(q)
     if not found:
         raise SystemModelError(
-            "the structure has no rest position: nothing holds it against the constant force, or "
-            "the springs that soften let it run away"
+            f"{_what_runs_away(system)}, so that the structure has no rest position"
         )
     return sorted(found, key=lambda q: potential_at(system, push, q))
+
+
+def _what_runs_away(system: System) -> str:
+    soft = [bond for bond in system.bonds if bond.coefficients and not bond.bounded]
+    if not soft:
+        return "excitation is constant, and nothing holds the structure against it"
+    between = f"'{soft[0].at}'" + (f" against '{soft[0].against}'" if soft[0].against else "")
+    bounds = "a last coefficient of an odd power and above 0 would bound them"
+    return f"springs at {between} let it run away ({bounds})"
 
 
 def _rests_of_bonds(system: System, push: Real) -> Iterator[Real]:
@@ -252,8 +260,8 @@ def _downhill(system: System, q: Real, slope: Real) -> Real:
     if system.bonds:  # they may hold it elsewhere, where another start leads
         return _newton_step(system, stiffness, slope)
     raise SystemModelError(
-        "a constant force acts on a body that neither a spring nor a stop holds against it; "
-        "hold it, or turn the force or the stop round"
+        "excitation by a constant force acts on a body that neither a spring nor a stop holds "
+        "against it; hold it, or turn the force or the stop round"
     )
 
 

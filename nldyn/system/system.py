@@ -94,11 +94,14 @@ class System:
 
     def __repr__(self) -> str:
         """One line: modes, interfaces, and what acts."""
-        hz = ", ".join(f"{value:.6g}" for value in self.frequencies_hz[:4])
+        sprung = bool(np.any(self.spring_stiffness))
+        own = self.linear.frequencies_hz if sprung else self.frequencies_hz
+        hz = ", ".join(f"{value:.6g}" for value in own[:4])
         more = ", ..." if self.size > 4 else ""
         names = ", ".join(map(repr, self.interfaces)) or "none"
         return (
-            f"<System of {self.size} modes at {hz}{more} Hz; interfaces {names}; "
+            f"<System of {self.size} modes at {hz}{more} Hz{' with the springs' * sprung}; "
+            f"interfaces {names}; "
             f"{len(self.stops)} stops, {len(self.dampers)} dampers, "
             + (f"{len(self.springs)} springs, " if self.springs else "")
             + f"{len(self.excitation)} excitations>"
@@ -329,7 +332,10 @@ class System:
 
     @property
     def frequencies_hz(self) -> Real:
-        """Modal frequencies in Hz, shape (n,)."""
+        """Modal frequencies in Hz, shape (n,), of the structure without its springs.
+
+        Those with the linear springs are `linear.frequencies_hz`.
+        """
         return self.natural_frequencies / (2.0 * np.pi)
 
     @property
@@ -589,14 +595,15 @@ class System:
             for element in elements:
                 if not isinstance(element, classes):
                     raise SystemModelError(f"{kind} cannot be {shown(element)}")
-                for name in (element.at, getattr(element, "against", None)):
+                ends = ("at", element.at), ("against", getattr(element, "against", None))
+                for end, name in ends:
                     if name is None:
                         continue
                     if kind == "excitation" and name in self.loads:
                         continue
                     if name not in self.participation:
                         raise SystemModelError(
-                            f"{kind} at unknown interface '{name}'; there are: {known}"
+                            f"{kind} {end} unknown interface '{name}'; there are: {known}"
                             + _told_of_loads(kind, self.loads)
                         )
 

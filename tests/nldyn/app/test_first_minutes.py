@@ -43,6 +43,8 @@ def test_new_lists_copies_and_overwrites_nothing(tmp_path, monkeypatch):
     assert (again.exit_code, scene.read_text()) == (2, "mine")
     assert again.stderr.endswith("is there already; choose another folder\n")
     assert "there is no example 'none'; there are bilinear" in invoke("new", "none").stderr
+    for name, meant in (("two_dof", "two_dof_xi_0.001"), ("brumper", "bumper")):
+        assert f"no example '{name}'; did you mean '{meant}'? There" in invoke("new", name).stderr
 
 
 def test_warm_says_where_compiled_code_is_kept():

@@ -486,3 +486,30 @@ def test_words_that_users_try_lead_to_what_there_is(table, words):
     with pytest.raises(SceneError) as told:
         parse_scene(text)
     assert words in str(told.value)
+
+
+@pytest.mark.parametrize("structure", [MODAL, """
+[matrices]
+mass = [[1.0]]
+stiffness = [[1.0]]
+interfaces.middle = [1.0]
+[[excitation]]
+at = "middle"
+kind = "harmonic"
+amplitude = 1.0
+[continuation]
+range_hz = [0.1, 0.2]
+"""])  # fmt: skip
+@pytest.mark.parametrize("command", ["check", "run"])
+@pytest.mark.parametrize(
+    ("spring", "fault"),
+    [
+        ("stiffness = -1e9", "make the linear stiffness negative in a direction"),
+        ("coefficients = [-1e9, 0.0, -1.0]", "at 'middle' let it run away"),
+    ],
+)
+def test_springs_that_let_the_structure_run_away_are_told_as_springs(
+    tmp_path, structure, command, spring, fault
+):
+    said = check(tmp_path, f'{structure}[[springs]]\nat = "middle"\n{spring}\n', command)
+    assert said.startswith(f"scene.toml: springs {fault}")

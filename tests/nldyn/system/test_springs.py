@@ -139,6 +139,8 @@ def test_what_makes_no_sense_is_refused():
         Spring("a", np.nan)
     with pytest.raises(SystemModelError, match="damper at 'a': against must be another interface"):
         Damper("a", 1.0, "a")
+    with pytest.raises(SystemModelError, match="spring against unknown interface 'z'"):
+        System.from_modal([1.0], {"a": [1.0]}, springs=[Spring("a", 1.0, against="z")])
     with pytest.raises(SystemModelError, match="spring at unknown interface 'z'"):
         replace(pair(True), springs=(Spring("z", 1.0),))
     with pytest.raises(SystemModelError, match="negative in a direction"):
@@ -246,7 +248,7 @@ def test_rest_positions_that_there_are_not():
         [[1.0]], [[1.0]], {"a": [1.0]}, springs=[PolynomialSpring("a", [0.0, 0.0, -1.0])],
         excitation=[nldyn.ConstantForce("a", 5.0)],
     )  # fmt: skip
-    with pytest.raises(SystemModelError, match="no rest position: nothing holds it against"):
+    with pytest.raises(SystemModelError, match="springs at 'a' let it run away"):
         rest(softening)
 
 
@@ -278,3 +280,9 @@ def test_the_beam_with_two_wells_rests_where_beam_theory_says():
     end_found = flow.shoot(here, np.array([0.0, 2.0 * np.pi]), 25.0).ends[0]
     row = system.participation["tip"]
     assert row @ flow.to_modal(end_found)[:4] == pytest.approx(row @ end[:4], rel=1e-8)
+
+
+def test_the_line_of_a_system_knows_its_linear_springs():
+    """One mass of 1 kg on 1 N/m and a spring of 3 N/m: 2 rad/s, not 1."""
+    sprung = System.from_matrices([[1.0]], [[1.0]], {"a": [1.0]}, springs=[Spring("a", 3.0)])
+    assert "0.31831 Hz with the springs" in repr(sprung)
