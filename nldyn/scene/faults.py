@@ -21,7 +21,7 @@ def told_as(scene: Scene, key: KeyPath, *kinds: type[Exception], hint: str = "")
         table = table_at(Scene, key)
         if key and table is not None and word in table.model_fields:
             raise scene_error(scene.file, (*key, word), rest) from error
-        if word in Scene.model_fields:  # it names another table
+        if word in Scene.model_fields:  # another table
             raise scene_error(scene.file, (word,), rest) from error
         raise scene_error(scene.file, key, text, sep=": ") from error
 

@@ -18,6 +18,7 @@ from nldyn.scene.schema import ContinuationTable, Scene
 from nldyn.search.diagram import Diagram, Seed, diagram
 from nldyn.search.exploration import Exploration, ExploreOptions
 from nldyn.search.explore import explore
+from nldyn.system.rest import rest_positions
 
 CHOICE = 1.0  # time to choose modes by a tolerance, relative to that of the diagram
 
@@ -193,6 +194,8 @@ def _to_follow(scene: Scene, structure: Structure) -> tuple[FlowMap, Continuatio
     table = scene.continuation
     assert table is not None
     with told_as(scene, ("continuation",), SystemModelError):
+        if system.bonds:  # searches start where it rests
+            rest_positions(system)
         return FlowMap(system, FlowOptions(table.rtol)), table
 
 
