@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import io, sparse
 
-from cms.component import SparseMatrix, symmetric_matrix
+from cms.component import SYMMETRY_TOLERANCE, SparseMatrix, symmetric_matrix
 from cms.errors import ReductionError
 from cms.file_entries import chosen_entry
 from cms.harwell_boeing import is_harwell_boeing, read_harwell_boeing
@@ -194,6 +194,29 @@ def read_matrix(source: str | Path, what: str) -> FileMatrix:
         hint = "; a file of one triangle must say 'symmetric' in its first line" if triangle else ""
         raise ReductionError(f"{found.source}: {error}{hint}") from None
     return FileMatrix(entries, found.source, found.labels)
+
+
+def read_skew(source: str | Path, what: str) -> SparseMatrix:
+    """Read a skew matrix (n, n), told as "gyroscopic" or "circulatory" in errors.
+
+    Raises
+    ------
+    ReductionError
+        If the file cannot be read, tells nodes, or holds no skew matrix of finite real numbers.
+    """
+    found = _read(source)
+    if found.labels is not None:
+        raise ReductionError(f"{found.source}: must give rows, as .mtx and .npz do, and no nodes")
+    entries = sparse.csc_array(found.entries)
+    if np.iscomplexobj(entries.data) or not np.all(np.isfinite(entries.data)):
+        raise ReductionError(f"{found.source}: the {what} matrix must hold finite real numbers")
+    if entries.shape[0] != entries.shape[1]:
+        raise ReductionError(f"{found.source}: the {what} matrix must be square")
+    if abs(entries + entries.T).max() > SYMMETRY_TOLERANCE * abs(entries).max():
+        raise ReductionError(
+            f"{found.source}: the {what} matrix must be skew: its transpose must be minus itself"
+        )
+    return sparse.csc_array((entries - entries.T) * 0.5)
 
 
 def read_vector(source: str | Path) -> FloatArray:

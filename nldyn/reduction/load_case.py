@@ -101,6 +101,8 @@ def system_of_reduced(
     dampers: Sequence[AnyDamper],
     excitation: Sequence[Excitation],
     springs: Sequence[AnySpring] = (),
+    gyroscopic: ArrayLike | None = None,
+    circulatory: ArrayLike | None = None,
 ) -> System:
     """The system of a reduced model, for parameters as those of `LoadCase`.
 
@@ -118,6 +120,8 @@ def system_of_reduced(
         dampers=dampers,
         excitation=excitation,
         springs=springs,
+        gyroscopic=gyroscopic,
+        circulatory=circulatory,
     )
 
 

@@ -18,7 +18,7 @@ from nldyn.scene.component import build_component
 from nldyn.scene.elements import Acting, acting_elements
 from nldyn.scene.faults import told_as
 from nldyn.scene.load_case import load_case_of
-from nldyn.scene.matrices import build_matrices
+from nldyn.scene.matrices import build_matrices, skew_matrices
 from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import Scene
 from nldyn.system.system import System
@@ -246,8 +246,15 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
             return _unreduced(scene, build_matrices(scene), acting)
         reduced = reduced or build_reduced(scene)
         check_ratio_count(scene, len(reduced.frequencies_hz), scene.file)
+        skew = {} if scene.matrices is None else skew_matrices(scene, reduced.basis.shape[0])
+        projected = {name: reduced.basis.T @ (A @ reduced.basis) for name, A in skew.items()}
         return system_of_reduced(
-            reduced, scene.observed, rayleigh, modal_damping=ratio, **acting._asdict()
+            reduced,
+            scene.observed,
+            rayleigh,
+            modal_damping=ratio,
+            **acting._asdict(),
+            **projected,
         )
 
 
@@ -269,8 +276,7 @@ def _unreduced(scene: Scene, component: cms.Matrices, acting: Acting) -> System:
             damping=component.damping,
             modal_damping=scene.damping.modal_ratio,
             loads=loads,
-            gyroscopic=scene.matrices.gyroscopic,
-            circulatory=scene.matrices.circulatory,
+            **{name: skew.toarray() for name, skew in skew_matrices(scene, rows).items()},
             **acting._asdict(),
         )
 

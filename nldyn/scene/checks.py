@@ -237,9 +237,10 @@ def _check_matrices(scene: Scene, report: Report) -> None:
         return
     for name in ("gyroscopic", "circulatory"):
         skew = getattr(table, name)
-        if skew is not None and scene.reduction is not None:
-            raise report(("reduction",), f"cannot stand beside matrices.{name}")
-        if skew is not None:
+        if skew is not None and scene.reduction is not None and scene.reduction.tolerance:
+            fault = f"knows no matrices.{name}; give 'modes' or 'cutoff_hz' instead"
+            raise report(("reduction", "tolerance"), fault)
+        if isinstance(skew, list):
             _check_skew(skew, ("matrices", name), report)
     mass, typed = table.mass, {}
     for key in ("mass", "stiffness", "damping"):

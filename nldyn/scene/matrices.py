@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 import cms
-from cms.matrix_files import FileMatrix, joined, read_matrix, read_vector, split_source
+from cms.matrix_files import FileMatrix, joined, read_matrix, read_skew, read_vector, split_source
 from nldyn.base.arrays import Real
 from nldyn.scene.component import readable_path
 from nldyn.scene.faults import told_as
@@ -57,6 +57,31 @@ def build_matrices(scene: Scene) -> cms.Matrices:
         for name, value in getattr(table, kind).items()
     }
     return replace(read.component(vectors), load_vectors=tuple(table.loads))
+
+
+def skew_matrices(scene: Scene, rows: int) -> dict[str, Any]:
+    """The ``gyroscopic`` and the ``circulatory`` matrix that ``[matrices]`` gives, (rows, rows).
+
+    Raises
+    ------
+    SceneError
+        If a file cannot be read, or a matrix is not skew or not of this size.
+    """
+    found = {}
+    for key in ("gyroscopic", "circulatory"):
+        value, place = getattr(scene.matrices, key), ("matrices", key)
+        if value is None:
+            continue
+        if isinstance(value, str):
+            with told_as(scene, place, cms.ReductionError):
+                matrix = read_skew(_source(scene, value, place), key)
+        else:
+            matrix = sparse.csc_array(np.array(value, dtype=float))
+        if matrix.shape[0] != rows:
+            fault = f"has {matrix.shape[0]} rows, but {rows} rows of the matrices can move"
+            raise scene_error(scene.file, place, fault)
+        found[key] = matrix
+    return found
 
 
 def _matrix(scene: Scene, key: str, value: list[list[float]] | str) -> FileMatrix:

@@ -363,8 +363,8 @@ class MatricesTable(Table):
     mass: RowsOrFile
     stiffness: RowsOrFile
     damping: RowsOrFile | None = None
-    gyroscopic: Matrix | None = None
-    circulatory: Matrix | None = None
+    gyroscopic: RowsOrFile | None = None
+    circulatory: RowsOrFile | None = None
     interfaces: Annotated[dict[str, VectorOrPlace], Field(min_length=1)]
     loads: dict[str, VectorOrPlace] = {}
 

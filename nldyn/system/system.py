@@ -270,6 +270,8 @@ class System:
         excitation: Sequence[Excitation] = (),
         loads: Mapping[str, ArrayLike] = MappingProxyType({}),
         springs: Sequence[AnySpring] = (),
+        gyroscopic: ArrayLike | None = None,
+        circulatory: ArrayLike | None = None,
     ) -> System:
         """System from a reduced model (anything with frequencies and participations).
 
@@ -281,6 +283,8 @@ class System:
         modal_damping, stops, dampers, excitation, loads, springs
             As for `from_modal`; interfaces that are `load_vectors` of the reduced model are loads,
             too.
+        gyroscopic, circulatory : (n, n) array_like, optional
+            Skew matrices ``basis.T @ G @ basis`` in 1/s and 1/s², as for `from_matrices`.
 
         Raises
         ------
@@ -314,15 +318,19 @@ class System:
             damping = _symmetric("damping", damping)
             if damping.shape != system.damping.shape:
                 raise SystemModelError(f"damping is {damping.shape} for {system.size} modes")
+        total = system.damping if damping is None else system.damping + damping
+        if gyroscopic is not None:
+            total = total + _skew("gyroscopic", gyroscopic, system.size)
         return cls(
             system.natural_frequencies,
-            system.damping if damping is None else system.damping + damping,
+            total,
             system.participation,
             _listed("stops", stops),
             _listed("dampers", dampers),
             _listed("excitation", excitation),
             {**system.loads, **_vectors("loads", loads)},
             _listed("springs", springs),
+            None if circulatory is None else _skew("circulatory", circulatory, system.size),
         )
 
     @property
@@ -687,7 +695,7 @@ def _or_zero(matrix: Real | None) -> Real:
 def _skew(name: str, values: ArrayLike, size: int) -> Real:
     matrix = np.atleast_2d(numbers(name, values))
     if matrix.shape != (size, size):
-        raise SystemModelError(f"{name} is {matrix.shape} but mass is {(size, size)}")
+        raise SystemModelError(f"{name} is {matrix.shape}, it must be {(size, size)}")
     largest = float(np.abs(matrix).max())
     if not np.allclose(matrix, -matrix.T, rtol=1e-10, atol=1e-12 * largest):
         raise SystemModelError(f"{name} must be skew: its transpose must be minus itself")

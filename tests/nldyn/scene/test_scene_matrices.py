@@ -175,3 +175,55 @@ def test_studies_tell_files_of_matrices_apart(tmp_path):
         save(tmp_path / name, matrix)
         keys.append(key())
     assert keys[0] == keys[1] and len(set(keys)) == 3
+
+
+WHIRL = """
+[matrices]
+mass = "M.mtx"
+stiffness = "K.mtx"
+gyroscopic = "G.mtx"
+interfaces.x = {row = 19}
+interfaces.y = {row = 20}
+[reduction]
+modes = 4
+"""
+
+
+def rotor(folder, G=None):
+    """A chain of 10 masses that whirls: K the chain's in both planes, G = 0.3 (0 1; -1 0)."""
+    chain = sparse.diags_array([-1.0, 2.0, -1.0], offsets=[-1, 0, 1], shape=(10, 10))
+    spin = sparse.kron(sparse.eye_array(10), [[0.0, 0.3], [-0.3, 0.0]])
+    for name, matrix in (
+        ("K", sparse.kron(chain, sparse.eye_array(2))),
+        ("M", sparse.eye_array(20)),
+        ("G", spin if G is None else G),
+    ):
+        io.mmwrite(folder / f"{name}.mtx", matrix)
+    return parse_scene(WHIRL, folder / "scene.toml")
+
+
+def test_gyroscopic_matrix_of_a_file_goes_through_a_reduction(tmp_path):
+    """The planes whirl at sqrt(w² + g²/4) -+ g/2, with the chain's w = 2 sin(k pi/22)."""
+    rates = np.linalg.eigvals(build_system(rotor(tmp_path)).linear.blocks)
+    found = np.sort(np.unique(abs(rates.imag.ravel()).round(12)))[:4]
+    w = 2.0 * np.sin(np.array([1, 2]) * np.pi / 22)
+    exact = [np.sqrt(w**2 + 0.15**2) - 0.15, np.sqrt(w**2 + 0.15**2) + 0.15]
+    np.testing.assert_allclose(found, np.sort(np.ravel(exact)), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("G", "fault"),
+    [
+        (np.eye(20), "the gyroscopic matrix must be skew"),
+        (np.array([[0.0, 1.0], [-1.0, 0.0]]), "has 2 rows, but 20 rows of the matrices can move"),
+    ],
+)
+def test_gyroscopic_matrix_of_a_file_that_does_not_fit(tmp_path, G, fault):
+    with pytest.raises(SceneError, match=rf"matrices\.gyroscopic.* {fault}"):
+        build_system(rotor(tmp_path, G))
+
+
+def test_modes_are_not_chosen_beside_a_gyroscopic_matrix(tmp_path):
+    text = WHIRL.replace("modes = 4", "tolerance = 0.01")
+    with pytest.raises(SceneError, match=r"reduction\.tolerance knows no matrices\.gyroscopic"):
+        parse_scene(text, tmp_path / "scene.toml")

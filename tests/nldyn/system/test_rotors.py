@@ -132,15 +132,22 @@ def test_what_makes_no_sense_is_refused():
         rotor(c=0.1, kc=0.5)  # more than c ω
     with pytest.raises(SystemModelError, match="gyroscopic must be skew"):
         System.from_matrices(np.eye(2), np.eye(2), PLACES, gyroscopic=np.eye(2))
-    with pytest.raises(SystemModelError, match=r"circulatory is .3, 3. but mass is .2, 2."):
+    with pytest.raises(SystemModelError, match=r"circulatory is .3, 3., it must be .2, 2."):
         System.from_matrices(np.eye(2), np.eye(2), PLACES, circulatory=np.zeros((3, 3)))
     with pytest.raises(SystemModelError, match="a skew part, as of rotors, is given as circulator"):
         System.from_matrices(np.eye(2), [[1.0, 0.2], [0.0, 1.0]], PLACES)
     text = example("rotor_against_stator.toml").read_text()
     with pytest.raises(SceneError, match=r"matrices.circulatory must be skew"):
         build_system(parse_scene(text.replace("-8e3", "8e3")))
-    with pytest.raises(SceneError, match=r"reduction cannot stand beside matrices.circulatory"):
-        parse_scene(text + "\n[reduction]\nmodes = 1\n")
+
+
+def test_a_reduction_to_all_modes_keeps_the_circulatory_matrix():
+    text = example("rotor_against_stator.toml").read_text()
+    rates = [
+        np.sort_complex(np.linalg.eigvals(build_system(parse_scene(each)).linear.blocks).ravel())
+        for each in (text, text + "\n[reduction]\nmodes = 2\n")
+    ]
+    np.testing.assert_allclose(rates[1], rates[0], rtol=1e-9)
 
 
 def test_the_example_touches_its_first_pad_where_the_closed_form_says():
