@@ -454,6 +454,54 @@ def open_page(page: Path) -> None:
         )
 
 
+@main.command()
+@scene_argument
+@out_option
+@mesh_option
+@click.option(
+    "--mode",
+    type=click.IntRange(1, 100_000),
+    default=1,
+    show_default=True,
+    help="Linear mode at which the family begins.",
+)
+@click.option(
+    "--amplitude-m",
+    type=click.FloatRange(1e-30, 1e30),
+    required=True,
+    metavar="M",
+    help="Largest displacement in m at the observed interface, up to which it is followed.",
+)
+@quiet_option
+def backbone(
+    scene: Path,
+    out: Path,
+    mesh_folders: tuple[Path, ...],
+    mode: int,
+    amplitude_m: float,
+    quiet: bool,
+) -> None:
+    """Follow the free motions of a scene, without its damping and excitation, from a mode on.
+
+    Writes backbone.csv and a picture of amplitude against frequency.
+    """
+    with plain_errors():
+        from nldyn.runtime.progress import progress_line
+        from nldyn.runtime.result_directory import check_directory
+        from nldyn.scene.read import load_scene
+
+        loaded = load_scene(scene, mesh_folders)
+        check_directory(out)
+        from nldyn.report.backbone import write_backbone
+        from nldyn.scene.backbone import backbone_of
+
+        with progress_line(quiet):
+            found = backbone_of(loaded, amplitude_m, mode)
+        write_backbone(found, out, loaded.text, loaded.title)
+    click.echo(repr(found).strip("<>"))
+    click.echo(f"written to {out}: {written_by(out, 'backbone')}")
+
+
 def written_by(out: Path, kind: str) -> str:
     """The files that a command wrote into a directory of results."""
     from nldyn.runtime.result_directory import written_files

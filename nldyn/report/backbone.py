@@ -1,0 +1,55 @@
+"""Table and picture of a backbone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from matplotlib.axes import Axes
+
+from nldyn.branches.backbone import Backbone
+from nldyn.plot.diagram import PERIOD_COLOURS, length_unit, new_axes, save_figure
+from nldyn.report.results import write_table
+from nldyn.runtime.result_directory import result_directory
+
+COLUMNS = ("frequency_hz", "energy_j", "amplitude_m", "impacts", "stable", "error")
+
+
+def write_backbone(found: Backbone, directory: str | Path, text: str, title: str = "") -> Path:
+    """Write ``backbone.csv``, ``backbone.png`` and ``.svg``, and the text of the scene.
+
+    Raises
+    ------
+    OutputError
+        If the directory holds only other people's files or cannot be written.
+    """
+    rows = zip(
+        found.frequency_hz.tolist(),
+        found.energy.tolist(),
+        found.amplitude.tolist(),
+        [orbit.impacts for orbit in found.orbits],
+        [int(stable) for stable in found.stable],
+        [orbit.error for orbit in found.orbits],
+        strict=True,
+    )
+    with result_directory(directory, "backbone") as folder:
+        write_table(folder / "backbone.csv", COLUMNS, rows)
+        save_figure(plot_backbone(found, title), folder / "backbone")
+        (folder / "scene.toml").write_text(text, encoding="utf-8")
+    return Path(directory)
+
+
+def plot_backbone(found: Backbone, title: str = "") -> Axes:
+    """Draw the amplitude against the frequency of the free motion; crosses are unstable."""
+    ax = new_axes()
+    factor, unit = length_unit(float(found.amplitude.max()))
+    ax.plot(found.frequency_hz, found.amplitude / factor, ".-", color=PERIOD_COLOURS[0])
+    unstable = ~found.stable
+    if unstable.any():
+        sizes = found.amplitude[unstable] / factor
+        ax.plot(found.frequency_hz[unstable], sizes, "x", color="0.2", label="unstable")
+        ax.legend(fontsize="small")
+    ax.set_xlabel("frequency of the free motion (Hz)")
+    ax.set_ylabel(f"largest displacement at '{found.orbits[0].observe}' ({unit})")
+    name = f"Backbone of mode {found.mode}"
+    ax.set_title(f"{title}: {name.lower()}" if title else name)
+    return ax

@@ -1,0 +1,62 @@
+"""The free motions of a scene: its backbones."""
+
+from __future__ import annotations
+
+from nldyn.base.errors import SystemModelError
+from nldyn.branches.backbone import Backbone, backbone
+from nldyn.scene.build import build_reduced, build_system
+from nldyn.scene.faults import told_as
+from nldyn.scene.schema import DampingTable, Scene
+
+BEGIN = 1e-3  # smallest amplitude, relative to the largest
+
+
+def undamped(scene: Scene) -> Scene:
+    """The scene without its damping and without what swings; mean loads stay.
+
+    Examples
+    --------
+    >>> from nldyn.base.resources import example
+    >>> from nldyn.scene.read import load_scene
+    >>> free = undamped(load_scene(example("one_dof.toml")))
+    >>> free.damping.modal_ratio, free.excitation, len(free.stops)
+    (0.0, [], 1)
+    """
+    changed: dict[str, object] = {
+        "damping": DampingTable(),
+        "dampers": [],
+        "excitation": [e for e in scene.excitation if e.kind in ("constant", "weight")],
+    }
+    if scene.matrices is not None:
+        changed["matrices"] = scene.matrices.model_copy(update={"damping": None})
+    return scene.model_copy(update=changed)
+
+
+def backbone_of(scene: Scene, amplitude_m: float, mode: int = 1) -> Backbone:
+    """Follow the free motions of a scene from a linear mode up to an amplitude, see `backbone`.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its damping and its swinging excitation are left out.
+    amplitude_m : float
+        Largest displacement in m at the observed interface, where the family ends; it begins at a
+        thousandth of it.
+    mode : int
+        Mode of the small vibrations about the rest position, counted from 1.
+
+    Raises
+    ------
+    SceneError
+        As `build_system`, and for what `backbone` refuses, as stops that lose energy.
+    ConvergenceError
+        As `backbone`.
+    """
+    free = undamped(scene)
+    if scene.reduction is not None and scene.reduction.tolerance is not None:
+        reduced = build_reduced(scene)  # as 'nldyn run' chooses them: by the damped response
+    else:
+        reduced = None
+    system = build_system(free, reduced)
+    with told_as(scene, (), SystemModelError):
+        return backbone(system, mode, amplitude_m=(BEGIN * amplitude_m, amplitude_m))
