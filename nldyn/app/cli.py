@@ -396,6 +396,13 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
 @mesh_option
 @drawn_modes_option
 @view_option
+@click.option(
+    "--against",
+    type=any_path,
+    metavar="SCENE.toml",
+    help="Compare with the modes of another scene: another mesh, or more modes.",
+)
+@click.option("--animate", "animated", is_flag=True, help="Draw each mode as a GIF, too.")
 @click.option("--open", "opened", is_flag=True, help="Open the page where there is a screen.")
 @json_option
 def modes(
@@ -404,12 +411,16 @@ def modes(
     mesh_folders: tuple[Path, ...],
     modes: list[int] | None,
     view: str,
+    against: Path | None,
+    animated: bool,
     opened: bool,
     as_json: bool,
 ) -> None:
     """Tell and draw the modes of a scene: frequencies, effective masses, participation."""
     if opened and out is None:
         raise click.UsageError("'--open' needs '--out'")
+    if animated and out is None:
+        raise click.UsageError("'--animate' needs '--out'")
     with plain_errors():
         from nldyn.report.modes import check_modes, mode_table
         from nldyn.report.render import render_modes_of
@@ -419,20 +430,36 @@ def modes(
         from nldyn.scene.read import load_scene
 
         loaded = load_scene(scene, mesh_folders)
+        other = None if against is None else load_scene(against, mesh_folders)
         if out is not None:
             check_directory(out)
+        compared = None
         with messages_shown():
             structure = build_structure(loaded)
+            if other is not None:
+                from nldyn.report.comparison import compare_modes
+
+                compared = compare_modes(loaded, structure, other, build_structure(other))
         table = mode_table(loaded, structure)
         check_modes(loaded, modes or (), len(table.frequencies_hz))
         missing = ""
         if out is not None:
-            missing = render_modes_of(loaded, structure, out, modes=modes or (), view=view)
+            missing = render_modes_of(
+                loaded, structure, out, modes=modes or (), view=view, against=compared,
+                animated=animated,
+            )  # fmt: skip
     if as_json:
         rows = [row for row in table.as_json() if not modes or row["mode"] in modes]
-        print_json({"scene": str(scene), "mass_kg": table.mass, "modes": rows})
+        told = {"scene": str(scene), "mass_kg": table.mass, "modes": rows}
+        if compared is not None:
+            told["against"] = [
+                dict(zip(compared.columns(), row, strict=True)) for row in compared.rows()
+            ]
+        print_json(told)
     else:
         click.echo(table.report(modes or ()))
+        if compared is not None:
+            click.echo(compared.report(tuple(modes or ())))
         if out is not None:
             click.echo(f"written to {out}: {written_by(out, 'modes')}")
     if missing:

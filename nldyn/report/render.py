@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import fem
     from fem.render import StopSphere
     from nldyn.orbits.orbit import Impact, Orbit
+    from nldyn.report.comparison import Comparison
     from nldyn.runtime.progress import Progress
     from nldyn.scene.schema import Scene
     from nldyn.system.system import System
@@ -199,8 +200,13 @@ def render_modes_of(
     *,
     modes: Sequence[int] = (),
     view: str = "oblique",
+    against: Comparison | None = None,
+    animated: bool = False,
 ) -> str:
     """Write ``modes.csv``, ``mode_shapes.png`` and the page ``mode_shapes.html`` of a scene.
+
+    With a comparison also ``mac.csv`` and ``comparison.png``, which shows each mode beside the one
+    of the other scene that is most like it; animated, a ``mode_1.gif`` and so on.
 
     Parameters
     ----------
@@ -212,6 +218,10 @@ def render_modes_of(
         Those to draw, from 1; all unless given.
     view : str
         From where the picture is taken: one of `fem.render.VIEWS`.
+    against : Comparison, optional
+        What `compare_modes` gave for this scene and another.
+    animated : bool
+        Draw each mode in motion, too.
 
     Returns
     -------
@@ -229,12 +239,14 @@ def render_modes_of(
     check_modes(scene, modes, len(table.frequencies_hz))
     with result_directory(directory, "modes") as folder:
         write_table(folder / "modes.csv", table.columns(), table.rows())
+        if against is not None:
+            write_table(folder / "mac.csv", against.columns(), against.rows())
         if scene.mesh is None or structure.reduced is None:
             return ""
         component: Any = structure.component
         drawing = Drawing(scene, component, structure.reduced, folder, silent, tuple(modes), view)
         drawing.mode_page()
-        return drawing.mode_picture()
+        return drawing.mode_picture(against, animated)
 
 
 def save_orbit(orbit: Orbit, folder: Path) -> None:
@@ -279,8 +291,8 @@ class Drawing:
     modes: tuple[int, ...] = ()
     view: str = "oblique"
 
-    def mode_picture(self) -> str:
-        """Draw the modes; say what to install if something is missing for it."""
+    def mode_picture(self, against: Comparison | None = None, animated: bool = False) -> str:
+        """Draw the modes, also beside others or in motion; say what is missing for it."""
         from fem.render import RenderError, gl_available
 
         available, advice = gl_available()
@@ -288,6 +300,10 @@ class Drawing:
             return advice
         try:
             self.draw_modes()
+            if against is not None:
+                self.draw_comparison(against)
+            if animated:
+                self.draw_moving_modes()
         except RenderError as error:
             return str(error)
         return ""
@@ -370,6 +386,50 @@ class Drawing:
             mirror=_mirror(self.scene),
             view=self.view,
         )
+
+    def draw_comparison(self, against: Comparison) -> None:
+        """Draw the modes, and beside each the other's mode that is most like it."""
+        import imageio.v3 as iio
+
+        from fem.render import render_modes, write_image
+
+        other: Any = against.structure
+        partners = [against.partners[number] for number in self.chosen]
+        titles = [
+            f"mode {partner + 1}: {against.other_hz[partner]:.1f} Hz, "
+            f"MAC {against.mac[number, partner]:.3f}"
+            for number, partner in zip(self.chosen, partners, strict=True)
+        ]
+        path = self.folder / "comparison.png"
+        render_modes(
+            other.component,
+            other.reduced.basis[:, partners] * against.signs[self.chosen],
+            titles,
+            path,
+            mirror=_mirror(against.scene),
+            view=self.view,
+        )
+        left, right = iio.imread(self.folder / "mode_shapes.png"), iio.imread(path)
+        write_image(path, np.concatenate([left, right], axis=1))
+
+    def draw_moving_modes(self) -> None:
+        """Animate one period of each mode, with 24 pictures."""
+        from fem.render import animate
+
+        turns = np.arange(24) / 24
+        for number, title in zip(self.chosen, self.mode_titles, strict=True):
+            hz = self.reduced.frequencies_hz[number]
+            animate(
+                self.component,
+                np.outer(np.cos(2.0 * np.pi * turns), self.reduced.basis[:, number]),
+                self.folder / f"mode_{number + 1}.gif",
+                times=turns / hz if hz > 0.0 else turns,
+                title=f"{title}, at a modal mass of 1 kg",
+                mirror=_mirror(self.scene),
+                view=self.view,
+                fps=12.0,
+                size=(760, 420),
+            )
 
     def deepest_contact(self, orbit: Orbit) -> None:
         """Draw the structure at the instant of deepest contact: displacement, then stress."""
