@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 import cms
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SceneError
+from nldyn.report.modes import mode_table
 from nldyn.scene.build import Structure
 from nldyn.scene.schema import Scene
 
@@ -112,7 +113,8 @@ def compare_modes(
     SceneError
         If one has no mesh, or a node lies farther from the other mesh than 5 % of the structure.
     """
-    mine, theirs = moved_nodes(scene, structure), moved_nodes(other, other_structure)
+    scenes = (scene, structure), (other, other_structure)
+    mine, theirs = (moved_nodes(*given) for given in scenes)
     if len(mine[0]) <= len(theirs[0]):
         onto, shapes, others = mine[0], mine[1], carried(*theirs, mine[0], scene, other)
     else:
@@ -120,9 +122,9 @@ def compare_modes(
     flat = [values.reshape(3 * len(onto), -1) for values in (shapes, others)]
     values = cms.mac(*flat)
     cross = (flat[0].T @ flat[1])[np.arange(len(values)), values.argmax(axis=1)]
-    frequencies = [s.reduced.frequencies_hz for s in (structure, other_structure) if s.reduced]
+    first, second = (mode_table(*given).frequencies_hz for given in scenes)
     signs = np.where(cross < 0.0, -1.0, 1.0)
-    return Comparison(values, *frequencies, other, other_structure, signs)
+    return Comparison(values, first, second, other, other_structure, signs)
 
 
 def moved_nodes(scene: Scene, structure: Structure) -> tuple[Real, Real]:
@@ -140,7 +142,8 @@ def moved_nodes(scene: Scene, structure: Structure) -> tuple[Real, Real]:
 
 def carried(points: Real, shapes: Real, onto: Real, scene: Scene, other: Scene) -> Real:
     """Shapes (n, 3, k) at points, carried to other places (m, 3): moving least squares."""
-    near, index = cKDTree(points).query(onto, k=min(NEIGHBOURS, len(points)))
+    tree: Any = cKDTree(points)  # whose types depend on k
+    near, index = tree.query(onto, k=min(NEIGHBOURS, len(points)))
     size = float(np.linalg.norm(np.ptp(onto, axis=0)))
     worst = int(near[:, 0].argmax())
     if near[worst, 0] > FARTHEST * size:
