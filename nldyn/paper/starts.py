@@ -1,6 +1,6 @@
 """Orbits from which the branches of the larger models are followed.
 
-The search for them (`nldyn.paper.search`) takes longer than to follow what it finds, and chaotic
+The search for them takes longer than to follow what it finds, and chaotic
 motions make its outcome differ by a few small branches between versions of the program. So its
 orbits are kept, one of each branch; every one is solved for again before its branch is followed.
 """

@@ -1,6 +1,5 @@
 """Orbits from which the branches of the larger models are followed."""
 
-import re
 from dataclasses import replace
 from functools import partial
 
@@ -13,6 +12,7 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.orbit import stroboscopic
 from nldyn.orbits.starts import orbit_near
 from nldyn.paper.atlas import (
+    CHARTS,
     LONG,
     atlas_folder,
     chart_named,
@@ -22,12 +22,10 @@ from nldyn.paper.atlas import (
     start_path,
 )
 from nldyn.paper.jobs import scene_system
-from nldyn.paper.search import MODELS, known_branches, main, search, search_by_detour
 from nldyn.paper.starts import Start, follow_starts, read_starts, starts_path, write_starts
 from nldyn.runtime.progress import silent
 from nldyn.runtime.result_directory import OutputError
 from nldyn.search.diagram import middle_orbit
-from nldyn.search.exploration import steps_between
 from nldyn.search.fixed_point_index import index_note
 
 WITHOUT_DOUBLED = (1, 50)
@@ -40,7 +38,7 @@ def found():
     return explore(scene_system("two_dof_xi_0.01"), (35.5, 36.5), 3, effort=effort).diagram
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", [chart.name for chart in CHARTS])
 def test_starts_are_orbits_of_their_period(name):
     """Every tenth of them; `nldyn paper` and the atlas solve for all, and tell which are none."""
     chart = chart_named(name)
@@ -210,151 +208,3 @@ def test_the_atlas_of_other_code_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("nldyn.paper.atlas.stamp", lambda: "another")
     with pytest.raises(OutputError, match="is an atlas of another version"):
         atlas_folder(place)
-
-
-@pytest.fixture
-def two_known(monkeypatch, tmp_path):
-    """A short range of the 2-DOF model, and a directory with two starts."""
-    job = chart_named("two_dof_xi_0.01")
-    low, high = 35.5, 35.95
-    monkeypatch.setattr("nldyn.paper.atlas.CHARTS", (replace(job, range_hz=(low, high)),))
-    head, *rows = starts_path(job.name).read_text(encoding="utf-8").splitlines(keepends=True)
-    within = [row for row in rows if low < float(row.split(",")[1]) < high]
-    starts_path(job.name, tmp_path).write_text("".join([head, *within[:2]]), encoding="utf-8")
-    return job.name, tmp_path
-
-
-@pytest.mark.slow
-def test_a_detour_gives_starts(two_known):
-    name, folder = two_known
-    known = read_starts(name, folder)
-    done = search_by_detour(name, folder, {"excitation": 2.0})
-    assert done.notes[-1].startswith("at 2 of the excitation: ")
-    assert len(read_starts(name, folder)) == len(done.branches) > len(known) == 2
-
-
-@pytest.mark.parametrize(
-    ("way", "what"),
-    [
-        ("pseudo-orbits", "pseudo-orbits"),
-        ("crossover", "mixtures"),
-        pytest.param("closed-walks", "closed walks", marks=pytest.mark.slow),
-    ],
-)
-def test_guesses_give_starts(way, what, two_known, monkeypatch, capsys):
-    name, folder = two_known
-    command = ["search", str(folder), name, f"--{way}", "3", "--range", "35.6", "35.95"]
-    numbers = ["--periods", "1", "2", "--spacing", "0.005", "--tries", "30"]
-    monkeypatch.setattr("sys.argv", command + numbers)
-    main()
-    last = capsys.readouterr().out.splitlines()[-1]
-    tried = 2 * 30 * steps_between(35.6, 35.95, 0.005)
-    assert f" {what} led to an orbit" in last
-    made = int(re.search(r" of (\d+) ", last)[1])
-    assert made == tried if way == "crossover" else 0 < made <= tried
-    added = int(re.search(r", (\d+) branch(es)? beside those given", last)[1])
-    assert len(read_starts(name, folder)) == 2 + added > 2
-
-
-@pytest.mark.slow  # 27 s
-def test_a_search_is_kept_and_gives_starts_from_which_the_next_one_begins(two_known, monkeypatch):
-    name, folder = two_known
-    first = starts_path(name, folder).read_bytes()
-    nothing_more = {"pseudo_orbits": 0, "mixtures": 0, "walks": 0}
-    effort = ExploreOptions(spacing=0.02, starts=1, settling=100, **nothing_more)
-    done = search(name, folder, effort)
-    found = read_starts(name, folder)
-    assert len(found) == len(done.diagram.branches) > done.stage.given == 2
-    monkeypatch.setattr("nldyn.paper.search.follow_starts", None)  # all are followed already
-    more = search_by_detour(name, folder, {"damping": 0.5})
-    assert len(read_starts(name, folder)) == len(more.branches) >= len(found)
-    starts_path(name, folder).write_bytes(first)
-    again = search(name, folder, effort)
-    assert again.question.effort.seed == done.question.effort.seed + 1
-    ended = [path.read_text() for path in folder.glob("*.searches.csv")]
-    assert [text.count("\n") for text in ended] == [3]  # a line of names, and two searches
-    assert not list(folder.glob("*.searched.h5"))
-    assert again.stage.given == 2
-
-
-def test_the_command_tells_all_notes(two_known, monkeypatch, capsys):
-    name, folder = two_known
-    factors = ["damping=0.5", "natural_frequency_hz[1]=1.01"]
-    monkeypatch.setattr("sys.argv", ["search", str(folder), name, "--detour", *factors])
-    main()
-    first, *others, last = capsys.readouterr().out.splitlines()
-    assert first == f"{name}: from 2 starts of period 2, 3, each an orbit"
-    assert any(note.startswith("indices of the fixed points of P to P^3 ") for note in others)
-    assert last.startswith("at 0.5 of the damping and 1.01 of natural_frequency_hz[1]: ")
-
-
-def test_branches_of_another_model_are_refused(two_known, monkeypatch):
-    """Their file is named after the starts, which lead to orbits of a changed model as well."""
-    name, folder = two_known
-    chart = chart_named(name)
-    known, _, _ = known_branches(chart, folder, silent)
-    assert len(known.branches) == 2
-    system = scene_system(name)
-    changed = replace(system, damping=1.001 * system.damping)
-    monkeypatch.setattr("nldyn.paper.search.scene_system", lambda name: changed)
-    with pytest.raises(SystemModelError, match="are of another model; delete them"):
-        known_branches(chart, folder, silent)
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        (["damping"], "'damping' is not of the form NAME=FACTOR or NAME[INDEX]=FACTOR"),
-        (["stiffness[a]=2"], "is not of the form"),
-        (["damping=half"], "is not of the form"),
-        (["damping=0.5", "damping=0.3"], "names something twice"),
-        (["damping=0.5", "--detour", "damping=0.3"], "names something twice"),
-        (
-            ["damping=0.5", "--pseudo-orbits", "1"],
-            "--pseudo-orbits: not allowed with argument --detour",
-        ),
-        (["damping=0.5", "--crossover", "1"], "--crossover: not allowed with argument --detour"),
-        (["damping=0.5", "--crossover", "-1"], "'-1' is no whole number from zero on"),
-        (["gap=2"], "two_dof_xi_0.01: factors: gap[0] is zero, which no factor changes"),
-        (["natural_frequency_hz[2]=2"], "there is no mode 2"),
-        (["modal_damping[-1]=1"], "that of modal_damping of all modes must be a number"),
-        (["nonsense=2"], "'nonsense' is none of damping, "),
-        (
-            ["damping=0.5", "--tries", "3"],
-            "--tries: goes only with --pseudo-orbits, --crossover and --closed-walks",
-        ),
-    ],
-)
-def test_detours_that_make_no_sense_are_refused(two_known, given, message, monkeypatch, capsys):
-    name, folder = two_known
-    new = folder / "new"
-    monkeypatch.setattr("sys.argv", ["search", str(new), name, "--detour", *given])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 2
-    assert message in capsys.readouterr().err
-    assert not new.exists()
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        (["--range", "30", "35.9"], "range_hz = (30, 35.9) must lie within that of the branches"),
-        (["--range", "36", "35"], "range_hz must be two positive frequencies, ascending"),
-        (["--periods", "1", "4"], "--periods must be two, ascending"),
-        (["--periods", "3", "2"], "--periods must be two, ascending"),
-        (["--spacing", "0"], "--spacing must be at least"),
-        (["--tries", "0"], "--tries must be"),
-        (["--states", "0"], "--states must be"),
-        (["--states", "9"], "argument --states: goes only with --closed-walks"),
-    ],
-)
-def test_numbers_that_make_no_sense_are_refused(two_known, given, message, monkeypatch, capsys):
-    name, folder = two_known
-    new = folder / "new"
-    monkeypatch.setattr("sys.argv", ["search", str(new), name, "--crossover", "1", *given])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 2
-    assert message in capsys.readouterr().err
-    assert not new.exists()
