@@ -80,7 +80,6 @@ from nldyn.runtime.executors import run_all as run_all
 
 # scene
 from nldyn.scene.study import parameter_study as parameter_study
-from nldyn.search.by_pseudo_orbits import by_pseudo_orbits as by_pseudo_orbits
 
 # search
 from nldyn.search.diagram import Diagram as Diagram
@@ -89,10 +88,11 @@ from nldyn.search.diagram import diagram as diagram
 from nldyn.search.exploration import Exploration as Exploration
 from nldyn.search.exploration import ExploreOptions as ExploreOptions
 from nldyn.search.explore import explore as explore
+from nldyn.search.extend import extend_diagram as extend_diagram
 from nldyn.search.fixed_point_index import index_sum as index_sum
-from nldyn.search.homotopy import by_detour as by_detour
-from nldyn.search.mixtures import by_crossover as by_crossover
-from nldyn.search.random_walks import by_closed_walks as by_closed_walks
+from nldyn.search.mixtures import Mixtures as Mixtures
+from nldyn.search.pseudo_orbits import PseudoOrbits as PseudoOrbits
+from nldyn.search.random_walks import ClosedWalks as ClosedWalks
 from nldyn.system.elements import BaseMotion as BaseMotion
 from nldyn.system.elements import ConstantForce as ConstantForce
 

@@ -18,7 +18,6 @@ COMPILES = ("nldyn/orbits/test_multipliers.py",)
 SCENES = "nldyn/scene/test_scene_errors.py", "nldyn/scene/test_scene_documented.py"
 NEEDS_NO_KERNELS = ("cms", "fem", *SCENES)
 LONGEST = (
-    "nldyn/search/test_homotopy.py",
     "nldyn/search/test_exploration.py",
     "nldyn/curves/test_curves.py",
     "nldyn/branches/test_close_branches.py",

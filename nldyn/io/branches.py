@@ -256,7 +256,7 @@ def _write_exploration(group: Any, found: Exploration, flows: list[FlowMap]) -> 
         if value is not None:
             set_attribute(group, f"effort {name}", value)
     _write_options(group, question.options)
-    for name in ("steps", "branches", "notes", "given", "folds_followed"):
+    for name in ("steps", "branches", "notes", "given"):
         set_attribute(group, name, getattr(stage, name))
     put(group, "carried", stage.carried, STATE_UNIT)
     put(group, "met", np.asarray(stage.met, dtype=np.int64), "1 where motions came to a branch")
@@ -484,9 +484,7 @@ def _read_exploration(
     group: Group, flows: Sequence[FlowMap], diagram: Diagram
 ) -> tuple[Question, Stage]:
     efforts: dict[str, Any] = {
-        item.name: (group.number if item.name in ("spacing", "fold_factor") else group.whole)(
-            f"effort {item.name}"
-        )
+        item.name: (group.number if item.name == "spacing" else group.whole)(f"effort {item.name}")
         for item in fields(ExploreOptions)
         if item.name == "spacing" or group.has_attribute(f"effort {item.name}")
     }
@@ -501,10 +499,7 @@ def _read_exploration(
         _read_options(group),
     )
     steps, branches, notes = (group.whole(name) for name in ("steps", "branches", "notes"))
-    given, folded = (
-        group.whole(name) if group.has_attribute(name) else 0
-        for name in ("given", "folds_followed")
-    )
+    given = group.whole("given") if group.has_attribute("given") else 0
     carried = group.array("carried", -1, 2 * question.flow.system.size)
     coverage = _read_coverage(group.group("coverage"))
     ends = tuple(group.array("ends", -1, kind=np.int64).tolist())
@@ -517,11 +512,10 @@ def _read_exploration(
         ("branches", branches, len(diagram.branches)),
         ("notes", notes, len(diagram.notes)),
         ("given", given, branches),
-        ("folds_followed", folded, branches),
     ):
         if not 0 <= value <= most:
             raise group.fault("attribute", name, f"is {value}, but there are {most}")
-    return question, Stage(steps, branches, notes, carried, coverage, met, ends, given, folded)
+    return question, Stage(steps, branches, notes, carried, coverage, met, ends, given)
 
 
 def _read_coverage(group: Group) -> tuple[Coverage, ...]:

@@ -18,7 +18,7 @@ from nldyn.base.errors import (
     check_types,
 )
 from nldyn.flow.flow_map import FlowMap, flow_of
-from nldyn.orbits.homotopy import DAMPING, Homotopy
+from nldyn.orbits.homotopy import Homotopy
 from nldyn.orbits.newton import check_bounded, first_orbit, guessed_nodes, spread
 from nldyn.orbits.orbit import Orbit, check_observe
 from nldyn.orbits.shooting import ShootingProblem, shooting_problem
@@ -186,13 +186,13 @@ def _by_more_damping(
     if not np.any(problem.flow.system.total_damping):
         return None
     for factor in MORE_DAMPING:
-        detour = Homotopy(problem.flow, {DAMPING: factor})
+        way = Homotopy(problem.flow, factor)
         try:
-            more = replace(problem, flow=detour.flow(1.0))
+            more = replace(problem, flow=way.flow(1.0))
             orbit = first_orbit(more, _simulated(more, omega, pieces, limit), omega, observe)
         except (ConvergenceError, SystemModelError):
             continue
-        found = detour.carried(orbit, 1.0, 0.0, lambda: limit.look("a way back from more damping"))
+        found = way.carried(orbit, 1.0, 0.0, lambda: limit.look("a way back from more damping"))
         if found is not None:
             return found
     return None

@@ -592,7 +592,6 @@ class ExploreTable(Table):
     mixtures: Annotated[int, Field(ge=0, le=1_000_000)] = 10
     walks: Annotated[int, Field(ge=0, le=1_000_000)] = 10
     walk_states: Annotated[int, Field(ge=1, le=100_000)] = 500
-    fold_factor: Annotated[float, Field(ge=1, le=100)] = 1.0
     seed: Annotated[int, Field(ge=0, le=2**32)] = 20
 
 

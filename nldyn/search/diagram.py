@@ -183,18 +183,6 @@ class Collector:
         passing = (i for i, branch in enumerate(self.branches) if branch.contains(orbit))
         return next(passing, None)
 
-    def with_fold(self, orbit: Orbit) -> int | None:
-        """Index of the branch that has a fold at an orbit."""
-        return next(
-            (
-                index
-                for index, branch in enumerate(self.branches)
-                for special in branch.special_points
-                if special.kind == "LP" and is_at(orbit, special)
-            ),
-            None,
-        )
-
     def of_period(self, period: int) -> list[Branch]:
         return [branch for branch in self.branches if branch.period == period]
 

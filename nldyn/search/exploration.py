@@ -20,16 +20,14 @@ from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.orbits.starts import MOST_COUNT, settling_periods
 from nldyn.search.diagram import Diagram, counted
 from nldyn.search.fixed_point_index import index_note, is_damped
-from nldyn.search.folds import leading_parameter
 
 FINEST_SPACING = 1e-6
 MOST_NUMBERS = 10**7  # of counts of closed walks: states times the longest period
 CAN_BE_MISSING = (
     "may be missing all the same: isolas that no motion came near, and what is stable in small "
-    "basins or between two frequencies; another seed, more rounds, "
-    "by_closed_walks, by_crossover, by_pseudo_orbits or by_detour may find them"
+    "basins or between two frequencies; another seed, more rounds "
+    "or extend_diagram may find them"
 )
-LARGEST_FACTOR = 100.0  # by which a parameter is changed in search of folds
 
 
 @dataclass(frozen=True)
@@ -64,20 +62,15 @@ class ExploreOptions:
     pseudo_orbits : int
         Most closed sequences of pieces of known orbits, of each length up to `unstable_period`,
         beside which orbits are looked for at each frequency on the way down, see
-        `by_pseudo_orbits`.
+        `PseudoOrbits`.
     mixtures : int
         Mixtures of two known orbits, of each length up to `unstable_period`, beside which orbits
-        are looked for at each frequency on the way down, see `by_crossover`.
+        are looked for at each frequency on the way down, see `Mixtures`.
     walks : int
         Most closed walks among random states, of each length up to `unstable_period`, beside which
-        orbits are looked for at each frequency on the way down, see `by_closed_walks`.
+        orbits are looked for at each frequency on the way down, see `ClosedWalks`.
     walk_states : int
         How many random states these are among.
-    fold_factor : float
-        After each round the folds found are followed in frequency and damping, or where the modes
-        share no damping ratio in frequency and excitation, which are divided and multiplied by up
-        to this factor. Where such a curve comes back to the system's own value, another branch may
-        begin. 1 means that they are not followed.
     seed : int
         Seed of the random initial states: results are repeatable.
 
@@ -99,7 +92,6 @@ class ExploreOptions:
     mixtures: int = 10
     walks: int = 10
     walk_states: int = 500
-    fold_factor: float = 1.0
     seed: int = 20
 
     def __post_init__(self) -> None:
@@ -116,11 +108,6 @@ class ExploreOptions:
         check_whole("explore: mixtures", self.mixtures, 0, MOST_COUNT)
         check_whole("explore: walks", self.walks, 0, MOST_COUNT)
         check_walk_states("explore: walk_states", self.walk_states, max(1, self.unstable_period))
-        if not (is_finite(self.fold_factor) and 1.0 <= self.fold_factor <= LARGEST_FACTOR):
-            raise SystemModelError(
-                f"explore: fold_factor must lie between 1 and {LARGEST_FACTOR:g}, "
-                f"got {shown(self.fold_factor)}"
-            )
         check_whole("explore: seed", self.seed, 0)
 
 
@@ -236,8 +223,6 @@ class Stage:
         Number of branches at the end of each round that is done.
     given : int
         How many of the branches were known before.
-    folds_followed : int
-        How many of the branches had their folds followed.
     """
 
     steps: int
@@ -248,7 +233,6 @@ class Stage:
     met: NDArray[np.bool_]
     ends: tuple[int, ...]
     given: int = 0
-    folds_followed: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,19 +260,11 @@ class Exploration:
 
     @property
     def finished(self) -> bool:
-        """Whether all rounds were done, or one that found nothing new, and all folds followed."""
+        """Whether all rounds were done, or one that found nothing new."""
         done = len(self.stage.ends)
-        if done == 0 or self.folds_due:
+        if done == 0:
             return False
         return done >= self.question.effort.rounds or self.new_branches[done - 1] == 0
-
-    @property
-    def folds_due(self) -> bool:
-        """Whether a round has done its simulations, and folds of branches are to be followed."""
-        stage = self.stage
-        between = stage.steps > 0 and self.question.place(stage.steps)[1] == 0
-        wanted = self.question.effort.fold_factor > 1.0
-        return wanted and between and stage.folds_followed < stage.branches
 
     @property
     def new_branches(self) -> tuple[int, ...]:
@@ -358,10 +334,7 @@ class Exploration:
         if not self.finished:
             turn, steps, length = self.question.place(self.stage.steps)
             lines.append(
-                f"not finished: of round {turn} the folds of {self.stage.folds_followed} of "
-                f"{self.stage.branches} branches are followed"
-                if self.folds_due
-                else f"not finished: {steps} of {length} steps up and down of round {turn + 1} are "
+                f"not finished: {steps} of {length} steps up and down of round {turn + 1} are "
                 "done"
             )
         lines += self._rounds()
@@ -373,7 +346,7 @@ class Exploration:
                 f"motions that did not settle (chaos, longer periods or slow decay): "
                 f"{open_ranges} Hz"
             )
-        tried = self._unstable() + self._folds() + self._beside() + self._cut()
+        tried = self._unstable() + self._beside() + self._cut()
         return lines + tried + self._indices + [CAN_BE_MISSING]
 
     def _rounds(self) -> list[str]:
@@ -401,19 +374,6 @@ class Exploration:
         return [
             f"unstable orbits{above} were not looked for (unstable_period={longest}): they are "
             "found only where a branch of the others leads to them"
-        ]
-
-    def _folds(self) -> list[str]:
-        """Whose folds were followed, and in what."""
-        factor, count = self.question.effort.fold_factor, self.stage.folds_followed
-        if factor == 1.0 or count == 0:
-            return []
-        parameter = leading_parameter(self.question.flow.system)
-        if parameter is None:
-            return ["no folds were followed: there is neither damping nor excitation to change"]
-        return [
-            f"the folds of the first {count} branches, up to period {self.question.max_period}, "
-            f"were followed in {parameter.name}, from 1/{factor:g} of it to {factor:g} times"
         ]
 
     def _beside(self) -> list[str]:

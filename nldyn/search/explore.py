@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from itertools import product
@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import (
-    ConvergenceError,
     SystemModelError,
     check_range,
     check_types,
     check_whole,
     shown,
 )
-from nldyn.bifurcations.point import is_at
 from nldyn.branches.branch import Branch
 from nldyn.branches.checkpoint import Checkpoint
 from nldyn.branches.options import ContinuationOptions
@@ -39,15 +37,13 @@ from nldyn.orbits.starts import (
 )
 from nldyn.runtime.progress import Progress, silent
 from nldyn.runtime.threads import one_thread
-from nldyn.search.by_pseudo_orbits import near_pseudo_orbits
 from nldyn.search.diagram import MOST_JOBS, Collector, Diagram, check_known
 from nldyn.search.exploration import Coverage, Exploration, ExploreOptions, Question, Stage
-from nldyn.search.extend import Guesses
+from nldyn.search.extend import Place, Strategy
 from nldyn.search.fixed_point_index import is_damped, sum_of_indices, without_index_note
-from nldyn.search.folds import connected_folds, leading_parameter
-from nldyn.search.mixtures import near_mixtures
-from nldyn.search.random_walks import near_closed_walks
-from nldyn.system.parameters import Parameter
+from nldyn.search.mixtures import Mixtures
+from nldyn.search.pseudo_orbits import PseudoOrbits
+from nldyn.search.random_walks import ClosedWalks
 from nldyn.system.system import System
 
 RETURNS = 3.0  # recorded periods after settling, over the longest period looked for
@@ -105,8 +101,7 @@ def explore(
     [Farrell, Birkisson and Funke 2015], and from flips, at each of which the doubled branch is
     followed as long as its period is within `max_period`, and from branch points. On the way down,
     others come from pieces and mixtures of known orbits and from closed walks among random states,
-    see `by_pseudo_orbits`, `by_crossover` and `by_closed_walks`. The folds of all of these may be
-    followed in damping or excitation to further ones (`ExploreOptions.fold_factor`).
+    see `PseudoOrbits`, `Mixtures` and `ClosedWalks`.
 
     Isolas of unstable orbits that no motion passes, attractors with small basins that exist
     between two of the frequencies only, and orbits of longer periods can still be missing.
@@ -192,12 +187,21 @@ def explore(
     if checkpoint is None or not survey.goes_on_in(checkpoint):
         box.take(known.branches, known.notes)
     with box.checkpoint, computing_ahead(flow, jobs, executor) as box.ahead:
-        while not (found := survey.so_far(box.branches)).finished:
-            if found.folds_due:
-                survey.follow_folds()
-            else:
-                survey.step()
+        while not survey.so_far(box.branches).finished:
+            survey.step()
     return survey.so_far(box.branches)
+
+
+def strategies_of(effort: ExploreOptions) -> list[tuple[int, Strategy]]:
+    """What guesses on the way down, each with the number that its random numbers have."""
+    found: list[tuple[int, Strategy]] = []
+    if effort.pseudo_orbits:
+        found.append((4, PseudoOrbits(effort.pseudo_orbits)))
+    if effort.mixtures:
+        found.append((2, Mixtures(effort.mixtures)))
+    if effort.walks:
+        found.append((3, ClosedWalks(effort.walk_states, effort.walks)))
+    return found
 
 
 def _check_known(known: Diagram, question: Question) -> None:
@@ -323,7 +327,6 @@ class _Survey:
             met,
             (*stage.ends, len(box.branches)) if last else stage.ends,
             stage.given,
-            stage.folds_followed,
         )
         if box.checkpoint.work is None:
             box.checkpoint.work = lambda: None  # the coverage is worth keeping without a branch too
@@ -340,44 +343,6 @@ class _Survey:
         met = np.zeros((rounds, len(self.box.branches)), dtype=bool)
         met[: len(self.stage.met), : self.stage.branches] = self.stage.met
         return met
-
-    def follow_folds(self) -> None:
-        """Follow the folds of the next branch in a second parameter, and what they lead to."""
-        box, stage = self.box, self.stage
-        branch = box.branches[stage.folds_followed]
-        parameter = leading_parameter(box.flow.system)
-        if branch.period <= self.max_period and parameter is not None:
-            self._beyond_folds(branch, parameter)
-        self.stage = replace(
-            stage,
-            branches=len(box.branches),
-            notes=len(box.notes),
-            met=self._met(len(stage.met)),
-            ends=(*stage.ends[:-1], len(box.branches)),
-            folds_followed=stage.folds_followed + 1,
-        )
-        box.checkpoint.offer()
-
-    def _beyond_folds(self, branch: Branch, parameter: Parameter) -> None:
-        """Follow the branches to which curves of a branch's folds come back."""
-        box, factor = self.box, self.effort.fold_factor
-        passed: list[Orbit] = []
-        for fold in branch.special_points:
-            if fold.kind != "LP" or any(is_at(orbit, fold) for orbit in passed):
-                continue
-            box.tell("folds", fold.frequency_hz)
-            which = f"the fold of branch {branch.name} at {fold.frequency_hz:.6g} Hz"
-            try:
-                found, broken = connected_folds(fold, parameter, factor, box.range_hz, box.options)
-            except (ConvergenceError, SystemModelError) as error:
-                box.notes.append(f"{which} was not followed in {parameter.name}: {error}")
-                continue
-            for reason in broken:
-                box.notes.append(f"the curve in {parameter.name} of {which} broke off: {reason}")
-            passed += found
-            for orbit in found:
-                if box.with_fold(orbit) is None:
-                    self._follow(orbit)
 
     def _search(
         self, starts: Real, known: _Known, *, also_unstable: bool
@@ -462,29 +427,14 @@ class _Survey:
         self._beside(runs, known, BESIDE_PASSING)
 
     def _follow_guesses(self, frequency_hz: float, seed: Sequence[int]) -> None:
-        """Follow the orbits to which pieces, mixtures and closed walks lead."""
-        for guesses in self._guesses(frequency_hz, seed):
-            for _, orbits in guesses:
+        """Follow the orbits to which the strategies lead, each with random numbers of its own."""
+        spacing, periods = self.effort.spacing, self._unstable_periods()
+        for number, strategy in strategies_of(self.effort):
+            rng = np.random.default_rng((*seed, AGAIN + number))
+            place = Place(frequency_hz, spacing, periods, rng)
+            for _, orbits in strategy.guesses(self.box, self.box.branches, place):
                 for orbit in orbits:
                     self._follow(orbit)
-
-    def _guesses(self, frequency_hz: float, seed: Sequence[int]) -> Iterator[Guesses]:
-        """Pseudo-orbits, mixtures and closed walks at a frequency, each with its own numbers."""
-        box, effort, periods = self.box, self.effort, self._unstable_periods()
-        mixing, walking, ordering = (
-            np.random.default_rng((*seed, AGAIN + number)) for number in (2, 3, 4)
-        )
-        if effort.pseudo_orbits:
-            yield near_pseudo_orbits(
-                box, box.branches, frequency_hz, effort.spacing, periods, effort.pseudo_orbits,
-                ordering,
-            )  # fmt: skip
-        if effort.mixtures and box.branches:
-            yield near_mixtures(box, box.branches, frequency_hz, periods, effort.mixtures, mixing)
-        if effort.walks:
-            yield near_closed_walks(
-                box, box.branches, frequency_hz, periods, effort.walk_states, effort.walks, walking
-            )
 
     def _unstable_periods(self) -> range:
         return range(1, min(self.effort.unstable_period, self.max_period) + 1)

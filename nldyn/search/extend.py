@@ -1,4 +1,4 @@
-"""What searches beside known branches have in common."""
+"""Further branches beside known ones: one driver, and what a strategy has to give it."""
 
 from __future__ import annotations
 
@@ -7,18 +7,21 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Protocol
 
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import SystemModelError, check_range, check_types, check_whole
+from nldyn.base.errors import SystemModelError, check_range, check_types, check_whole, shown
 from nldyn.branches.branch import Branch, check_branches
 from nldyn.branches.checkpoint import BranchFile, Tally, checkpoint_of_several
 from nldyn.branches.continuation import extended
 from nldyn.branches.options import ContinuationOptions
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import LONGEST_PERIOD
+from nldyn.orbits.starts import MOST_COUNT
 from nldyn.runtime.progress import Progress, silent
+from nldyn.runtime.threads import one_thread
 from nldyn.search.diagram import Collector, Diagram, check_known, counted, middle_orbit
 from nldyn.search.exploration import check_spacing, steps_between
 from nldyn.search.fixed_point_index import index_note, is_damped, without_index_note
@@ -30,44 +33,210 @@ Guesses = Iterator[tuple[set[int], Sequence[Orbit]]]  # branches each was made o
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """What a search beside known branches looks for, and where.
+class Place:
+    """Where guesses are made, and of how many excitation periods.
+
+    Parameters
+    ----------
+    frequency_hz : float
+        In Hz.
+    spacing : float
+        Relative distance to the next such frequency.
+    periods : range
+        Of the orbits wanted, one after the other.
+    rng : Generator
+        Of what is random.
+    """
+
+    frequency_hz: float
+    spacing: float
+    periods: range
+    rng: np.random.Generator
+
+    @property
+    def omega(self) -> float:
+        """Frequency in rad/s."""
+        return 2.0 * math.pi * self.frequency_hz
+
+
+class Strategy(Protocol):
+    """How `extend_diagram` guesses where further orbits lie.
+
+    For developers: a frozen dataclass of its numbers, checked when it is made. Its repr tells it
+    from another one in a file that keeps a search.
+    """
+
+    @property
+    def what(self) -> str:
+        """What its guesses are called."""
+
+    @property
+    def of_known(self) -> bool:
+        """Whether guesses are made of known orbits, which are not counted as met by their own."""
+
+    @property
+    def seed(self) -> int:
+        """Of the random numbers."""
+
+    def check(self, longest: int) -> None:
+        """Raise a `SystemModelError` unless it can guess orbits up to so many periods."""
+
+    def guesses(self, box: Collector, branches: Sequence[Branch], place: Place) -> Guesses:
+        """Of each guess the indices of the branches it was made of, and the orbits near it.
+
+        Parameters
+        ----------
+        box : Collector
+            Of the system; its `tell` is called before each guess.
+        branches : sequence of Branch
+            Those known.
+        place : Place
+            Where to guess.
+        """
+
+
+@one_thread()
+def extend_diagram(
+    known: Diagram,
+    strategy: Strategy,
+    *,
+    min_period: int = 1,
+    max_period: int = 3,
+    range_hz: tuple[float, float] | None = None,
+    spacing: float = 0.01,
+    options: ContinuationOptions | None = None,
+    progress: Progress | None = None,
+    checkpoint: BranchFile | None = None,
+) -> Diagram:
+    """Find further branches beside those known.
+
+    At one frequency after the other a strategy guesses where orbits lie, and the Gauss-Newton
+    method [Allgower and Georg 1990, chapter 3] goes to the nearest orbit, at a frequency that it
+    finds. If that lies on no known branch, its branch is followed, with what it leads to. Flips of
+    the branches given are not followed: begin with what `explore` or `diagram` has found. Call it
+    again with what it has found, and with another seed, until it finds no more.
+
+    Parameters
+    ----------
+    known : Diagram
+        Branches of a system, from `diagram` or `explore`, with their orbits.
+    strategy : Strategy
+        How guesses are made: `PseudoOrbits`, `Mixtures`, `ClosedWalks`, or another one with the
+        methods of `Strategy`.
+    min_period, max_period : int
+        Shortest and longest orbits guessed, in excitation periods.
+    range_hz : (float, float), optional
+        Frequencies at which guesses are made, within those of `known`; all of these if not given.
+        Branches found are followed through all.
+    spacing : float
+        Relative distance of these frequencies.
+    options : ContinuationOptions, optional
+        Step control.
+    progress : callable, optional
+        Called as ``progress(what, frequency_hz, done)``.
+    checkpoint : CheckpointFile, optional
+        File that keeps the branches found, also those of an earlier call: they count as known.
+        The same call with the same file goes on after the frequencies done, and gives the same
+        once all are; another search takes the place of this one in the file.
+
+    Returns
+    -------
+    Diagram
+        The branches known, then those found. The last note tells what was tried, and to how many of
+        the branches given, of these periods and frequencies, guesses led that were not made of
+        them: had each alone been unknown, it would have found about so many. The note before tells,
+        if every mode is damped, whether the indices add up to one, see `index_sum`. What `known`
+        notes of them is left out.
+
+    Raises
+    ------
+    SystemModelError
+        For input that makes no sense.
+    OutputError
+        If `checkpoint` cannot be written.
+
+    Examples
+    --------
+    >>> from nldyn import Diagram, Mixtures, Stop, System, Unbalance
+    >>> from nldyn import continue_branch, find_orbits, solve_orbit
+    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
+    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> range_hz = 36.0, 38.5
+    >>> orbits = [solve_orbit(system, 37.0), *find_orbits(system, 37.0, 3)[:1]]
+    >>> branches = tuple(continue_branch(orbit, range_hz) for orbit in orbits)
+    >>> more = extend_diagram(Diagram(branches, range_hz, "middle"), Mixtures(tries=50))
+    >>> [branch.period for branch in more.branches]
+    [1, 3, 2]
+    """
+    check_types(
+        known=(known, Diagram),
+        options=(options, ContinuationOptions, None),
+        progress=(progress, Callable, None),
+    )
+    check_strategy(strategy)
+    check_whole("max_period", max_period, 1, LONGEST_PERIOD)
+    check_whole("min_period", min_period, 1, max_period)
+    check_spacing("spacing", spacing)
+    check_branches("known: branches", known.branches)
+    if not known.branches:
+        raise SystemModelError("known: has no branches to begin with")
+    check_known(known, known.branches[0].points[0].problem.flow)
+    strategy.check(max_period)
+    within = _range_within(known.range_hz, range_hz)
+    search = _Search(
+        known, strategy, range(min_period, max_period + 1), inner_frequencies(within, spacing),
+        spacing,
+    )  # fmt: skip
+    box = collector_beside(known, options, progress, checkpoint)
+    with box.checkpoint:
+        _take_kept(box, max_period)
+        tally = search.follow_new(box)
+    if is_damped(box.flow.system):
+        box.notes.append(index_note(box.branches, box.range_hz, max_period))
+    box.notes.append(search.note(tally, box.branches))
+    return Diagram(tuple(box.branches), box.range_hz, box.observe, tuple(box.notes))
+
+
+def check_strategy(strategy: object) -> None:
+    """Raise unless this is a strategy."""
+    if isinstance(strategy, type) or not hasattr(strategy, "guesses"):
+        raise SystemModelError(
+            f"strategy must be a strategy such as Mixtures(), got {shown(strategy)}"
+        )
+
+
+def check_numbers(strategy: Strategy, tries: int) -> None:
+    """Raise unless the numbers that strategies share make sense."""
+    name = type(strategy).__name__
+    check_whole(f"{name}: tries", tries, 1, MOST_COUNT)
+    check_whole(f"{name}: seed", strategy.seed, 0)
+
+
+@dataclass(frozen=True)
+class _Search:
+    """What is looked for beside which branches, and where.
 
     Parameters
     ----------
     known : Diagram
         Branches with their orbits.
+    strategy : Strategy
+        That guesses.
     periods : range
         Of the orbits wanted, one after the other.
     frequencies : sequence of float
         Where guesses are made, in Hz.
+    spacing : float
+        Relative distance of these.
     """
 
     known: Diagram
+    strategy: Strategy
     periods: range
     frequencies: Sequence[float]
+    spacing: float
 
-    @classmethod
-    def checked(
-        cls,
-        known: Diagram,
-        min_period: int,
-        max_period: int,
-        range_hz: tuple[float, float] | None,
-        spacing: float,
-    ) -> Wanted:
-        """What input wants, once `check_search` has passed.
-
-        Raises
-        ------
-        SystemModelError
-            If the shortest period or the range makes no sense.
-        """
-        check_whole("min_period", min_period, 1, max_period)
-        within = range_within(known.range_hz, range_hz)
-        return cls(known, range(min_period, max_period + 1), inner_frequencies(within, spacing))
-
-    @property
     def given(self) -> set[int]:
         """Indices of the branches known of these periods that reach one of the frequencies."""
         low, high = self.frequencies[0], self.frequencies[-1]
@@ -79,29 +248,67 @@ class Wanted:
             and branch.frequency_hz.min() <= high
         }
 
+    def follow_new(self, box: Collector) -> Tally:
+        """Follow the orbits that lie on no branch; what was tried.
 
-def check_search(
-    known: Diagram,
-    max_period: int,
-    spacing: float,
-    options: ContinuationOptions | None,
-    progress: Progress | None,
-) -> None:
-    """Raise unless the input of a search beside known branches makes sense."""
-    check_types(
-        known=(known, Diagram),
-        options=(options, ContinuationOptions, None),
-        progress=(progress, Callable, None),
-    )
-    check_whole("max_period", max_period, 1, LONGEST_PERIOD)
-    check_spacing("spacing", spacing)
-    check_branches("known: branches", known.branches)
-    if not known.branches:
-        raise SystemModelError("known: has no branches to begin with")
-    check_known(known, known.branches[0].points[0].problem.flow)
+        How many frequencies are done is kept in the file of the box; a search with the same
+        strategy, known branches, periods, frequencies and options goes on after them. At each
+        frequency guesses are made from the branches that were known when it was begun.
+        """
+        given, to_meet = set(range(len(self.known.branches))), self.given()
+        longest, question = self.periods[-1], self._digest(box.options)
+        tally = box.checkpoint.tally
+        if tally is None or tally.question != question:
+            tally = Tally(question, len(to_meet), len(box.branches))
+        for number in range(tally.done, len(self.frequencies)):
+            box.done = number / len(self.frequencies)
+            box.checkpoint.tally = tally
+            box.checkpoint.offer()
+            tried, came, met = 0, 0, set[int]()
+            known, place = box.branches[: tally.known], self._place(number)
+            for used, orbits in self.strategy.guesses(box, known, place):
+                tried += 1
+                came += bool(orbits)
+                for orbit in orbits:
+                    on = box.branch_of(orbit)
+                    if on is None:
+                        box.follow(orbit, longest, longest, None)
+                    elif on not in used and used <= given:
+                        met.add(on)
+            tally = replace(
+                tally,
+                known=len(box.branches),
+                done=number + 1,
+                tried=tally.tried + tried,
+                came=tally.came + came,
+                met=tally.met | (met & to_meet),
+            )
+        box.checkpoint.tally = tally
+        return tally
+
+    def _place(self, number: int) -> Place:
+        rng = np.random.default_rng([self.strategy.seed, number])
+        return Place(self.frequencies[number], self.spacing, self.periods, rng)
+
+    def _digest(self, options: ContinuationOptions) -> str:
+        """A name that tells this search from others."""
+        digest = hashlib.sha256(np.array(self.frequencies).tobytes())
+        digest.update(f"{self.strategy!r} {self.periods} {options}".encode())
+        for branch in self.known.branches:
+            digest.update(branch.frequency_hz.tobytes())
+        return digest.hexdigest()[:16]
+
+    def note(self, tally: Tally, branches: Sequence[Branch]) -> str:
+        """What was tried and found."""
+        new = counted(branches[len(self.known.branches) :])
+        of_others = ", not made of them," if self.strategy.of_known else ""
+        return (
+            f"{tally.came} of {tally.tried} {self.strategy.what} led to an orbit, and{of_others} "
+            f"to {len(tally.met)} of the {tally.given} given there, {new} beside those given"
+        )
 
 
-def range_within(
+def _range_within(
     known: tuple[float, float], range_hz: tuple[float, float] | None
 ) -> tuple[float, float]:
     """A range in Hz within that of the branches known, which is meant if there is none."""
@@ -132,104 +339,13 @@ def collector_beside(
     return box
 
 
-def take_kept(box: Collector, max_period: int) -> None:
+def _take_kept(box: Collector, max_period: int) -> None:
     """Finish the branches that the file holds, and follow what they lead to."""
     count = len(box.branches)
     for branch in box.checkpoint.new_branches(lambda branch: box.known(middle_orbit(branch))):
         progress = partial(box.tell, f"1/{branch.period}")
         box.take_in(extended(branch, progress=progress, checkpoint=box.checkpoint))
     box.follow_up(count, max_period, max_period, None)
-
-
-def search_beside(
-    box: Collector,
-    wanted: Wanted,
-    what: str,
-    numbers: str,
-    near: Callable[[int, Sequence[Branch]], Guesses],
-    *,
-    from_known: bool = True,
-) -> Diagram:
-    """Follow the orbits that lie on no branch, found near one frequency after the other.
-
-    How many frequencies are done is kept in the file of the box; a search with the same name,
-    numbers, known branches, periods, frequencies and options goes on after them.
-
-    Parameters
-    ----------
-    box : Collector
-        See `collector_beside`.
-    wanted : Wanted
-        What to look for, and where.
-    what : str
-        What guesses are called.
-    numbers : str
-        Of how they are made.
-    near : callable
-        Gives the guesses at the frequency of a number, and their orbits, from the branches that
-        were known when it was begun.
-    from_known : bool
-        Whether guesses are made of known orbits, which are not counted as met by their own.
-    """
-    max_period = wanted.periods[-1]
-    with box.checkpoint:
-        take_kept(box, max_period)
-        question = f"{what}, {numbers}, {_digest(wanted, box.options)}"
-        tally = _follow_new(box, wanted, question, near)
-    new = counted(box.branches[len(wanted.known.branches) :])
-    of_others = ", not made of them," if from_known else ""
-    note = (
-        f"{tally.came} of {tally.tried} {what} led to an orbit, and{of_others} to "
-        f"{len(tally.met)} of the {tally.given} given there, {new} beside those given"
-    )
-    return diagram_of(box, max_period, note)
-
-
-def _follow_new(
-    box: Collector,
-    wanted: Wanted,
-    question: str,
-    near: Callable[[int, Sequence[Branch]], Guesses],
-) -> Tally:
-    """Follow the orbits that lie on no branch; what was tried, see `search_beside`."""
-    given, to_meet = set(range(len(wanted.known.branches))), wanted.given
-    max_period = wanted.periods[-1]
-    tally = box.checkpoint.tally
-    if tally is None or tally.question != question:
-        tally = Tally(question, len(to_meet), len(box.branches))
-    for place in range(tally.done, len(wanted.frequencies)):
-        box.done = place / len(wanted.frequencies)
-        box.checkpoint.tally = tally
-        box.checkpoint.offer()
-        tried, came, met = 0, 0, set[int]()
-        for used, orbits in near(place, box.branches[: tally.known]):
-            tried += 1
-            came += bool(orbits)
-            for orbit in orbits:
-                on = box.branch_of(orbit)
-                if on is None:
-                    box.follow(orbit, max_period, max_period, None)
-                elif on not in used and used <= given:
-                    met.add(on)
-        tally = replace(
-            tally,
-            known=len(box.branches),
-            done=place + 1,
-            tried=tally.tried + tried,
-            came=tally.came + came,
-            met=tally.met | (met & to_meet),
-        )
-    box.checkpoint.tally = tally
-    return tally
-
-
-def _digest(wanted: Wanted, options: ContinuationOptions) -> str:
-    """A name of branches, periods, frequencies and options that tells them from others."""
-    digest = hashlib.sha256(np.array(wanted.frequencies).tobytes())
-    digest.update(f"{wanted.periods} {options}".encode())
-    for branch in wanted.known.branches:
-        digest.update(branch.frequency_hz.tobytes())
-    return digest.hexdigest()[:16]
 
 
 def relative_distance(reached: Real, frequency_hz: float) -> float:
@@ -252,14 +368,3 @@ def inner_frequencies(range_hz: tuple[float, float], spacing: float) -> list[flo
     count = steps_between(low, high, spacing)
     found: list[float] = np.geomspace(low, high, count + 2)[1:-1].tolist()
     return found
-
-
-def diagram_of(box: Collector, max_period: int, note: str) -> Diagram:
-    """What a collector has, with notes on the indices, if every mode is damped, and on the search.
-
-    Indices that add up to one prove nothing; others prove that orbits are missing.
-    """
-    if is_damped(box.flow.system):
-        box.notes.append(index_note(box.branches, box.range_hz, max_period))
-    box.notes.append(note)
-    return Diagram(tuple(box.branches), box.range_hz, box.observe, tuple(box.notes))

@@ -1,4 +1,4 @@
-"""Further branches beside closed walks among random states: what need resemble no known orbit."""
+"""Guesses: closed walks among random states, which need resemble no known orbit."""
 
 from __future__ import annotations
 
@@ -14,35 +14,21 @@ from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import check_whole
 from nldyn.branches.branch import Branch
-from nldyn.branches.checkpoint import BranchFile
-from nldyn.branches.options import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.newton import spread
 from nldyn.orbits.orbit import stroboscopic
 from nldyn.orbits.shooting import SEGMENTS_PER_PERIOD, shooting_problem
-from nldyn.orbits.starts import (
-    MOST_COUNT,
-    SHORT_STEPS,
-    nearest_orbit,
-    random_states,
-    reach,
-    simulate,
-)
-from nldyn.runtime.progress import Progress
-from nldyn.runtime.threads import one_thread
-from nldyn.search.diagram import Collector, Diagram
+from nldyn.orbits.starts import SHORT_STEPS, nearest_orbit, random_states, reach, simulate
+from nldyn.search.diagram import Collector
 from nldyn.search.exploration import MOST_NUMBERS, check_walk_states
 from nldyn.search.extend import (
     WINDOW,
     Guesses,
-    Wanted,
-    check_search,
-    collector_beside,
+    Place,
+    check_numbers,
     orbits_near,
     relative_distance,
-    search_beside,
 )
 
 NEIGHBOURS = 20  # states near an image to which a walk may go on
@@ -54,47 +40,23 @@ MOST_DRAWS = 100  # of as many states as are wanted
 AT_ONCE = 32  # states from which walks are counted together
 
 
-@one_thread()
-def by_closed_walks(
-    known: Diagram,
-    *,
-    min_period: int = 1,
-    max_period: int = 3,
-    range_hz: tuple[float, float] | None = None,
-    spacing: float = 0.01,
-    states: int = 5000,
-    tries: int = 500,
-    seed: int = 0,
-    options: ContinuationOptions | None = None,
-    progress: Progress | None = None,
-    checkpoint: BranchFile | None = None,
-) -> Diagram:
-    """Find further branches beside closed walks from one random state to the next.
+@dataclass(frozen=True)
+class ClosedWalks:
+    """A strategy of `extend_diagram`: to guess along closed walks among random states.
 
     At each frequency random states are carried over one excitation period. From each an edge goes
     to the twenty nearest to its image: a graph like that of the cell-to-cell mapping [Hsu 1987],
     with points for cells. A closed walk of n edges is a pseudo-orbit of period n, and in a
-    hyperbolic set an orbit is near every one whose jumps are small [Bowen 1975]; from there the
-    Gauss-Newton method [Allgower and Georg 1990, chapter 3] goes to the nearest orbit, at a
-    frequency that it finds. If that lies on no known branch, its branch is followed, with what it
-    leads to. Known orbits near the frequency, and ten motions of ten periods, only tell where
-    states may lie: these have their mean and covariance, by which nearness is measured, and are no
-    deeper in a stop than the deepest of them, or than a standard deviation beyond the mean. So an
-    orbit need not resemble a known one, nor need a motion come near it; orbits are met the less
-    often the less stable they are, and many modes need many states. Flips of the branches given are
-    not followed.
+    hyperbolic set an orbit is near every one whose jumps are small [Bowen 1975]. Known orbits near
+    the frequency, and ten motions of ten periods, only tell where states may lie: these have their
+    mean and covariance, by which nearness is measured, and are no deeper in a stop than the deepest
+    of them, or than a standard deviation beyond the mean. So an orbit need not resemble a known
+    one, nor need a motion come near it; orbits are met the less often the less stable they are, and
+    many modes need many states. That all branches given were met is no proof that there are no
+    others, since their orbits have helped to place the states.
 
     Parameters
     ----------
-    known : Diagram
-        Branches of a system, from `diagram` or `explore`, with their orbits.
-    min_period, max_period : int
-        Shortest and longest walks.
-    range_hz : (float, float), optional
-        Frequencies at which walks are made, within those of `known`; all of these if not given.
-        Branches found are followed through all.
-    spacing : float
-        Relative distance of the frequencies at which walks are made.
     states : int
         How many random states at each frequency; fewer are found where hundreds of stops press.
     tries : int
@@ -102,88 +64,50 @@ def by_closed_walks(
         which there is one.
     seed : int
         Of the random numbers; another one tries others.
-    options : ContinuationOptions, optional
-        Step control.
-    progress : callable, optional
-        Called as ``progress(what, frequency_hz, done)``.
-    checkpoint : CheckpointFile, optional
-        File that keeps the branches found, also those of an earlier call: they count as known.
-        The same call with the same file goes on after the frequencies done, and gives the same
-        once all are; another search takes the place of this one in the file.
-
-    Returns
-    -------
-    Diagram
-        The branches known, then those found. The last note tells what was tried, and to how many of
-        the branches given, of these periods and frequencies, walks led. Had they been unknown, it
-        would have found about so many, though their orbits have helped to place the states: that
-        all were met is no proof that there are no others. The note before tells, if every mode is
-        damped, whether the indices add up to one, see `index_sum`. What `known` notes of them is
-        left out.
 
     Raises
     ------
     SystemModelError
-        For input that makes no sense.
-    OutputError
-        If `checkpoint` cannot be written.
+        For numbers that make no sense.
 
     Examples
     --------
-    >>> from nldyn import Diagram, Stop, System, Unbalance, continue_branch, solve_orbit
-    >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
-    ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
-    ...     excitation=[Unbalance("middle", 4.92e-6)])
-    >>> range_hz = 36.0, 38.5
-    >>> harmonic = continue_branch(solve_orbit(system, 37.0), range_hz)
-    >>> more = by_closed_walks(Diagram((harmonic,), range_hz, "middle"), states=1000, tries=50)
-    >>> sorted(branch.period for branch in more.branches)
-    [1, 2, 3]
+    >>> ClosedWalks(states=1000, tries=50)
+    ClosedWalks(states=1000, tries=50, seed=0)
     """
-    check_search(known, max_period, spacing, options, progress)
-    wanted = Wanted.checked(known, min_period, max_period, range_hz, spacing)
-    check_walk_states("states", states, max_period)
-    check_whole("tries", tries, 1, MOST_COUNT)
-    check_whole("seed", seed, 0)
-    box = collector_beside(known, options, progress, checkpoint)
 
-    def near(place: int, branches: Sequence[Branch]) -> Guesses:
-        rng, frequency_hz = np.random.default_rng([seed, place]), wanted.frequencies[place]
-        return near_closed_walks(box, branches, frequency_hz, wanted.periods, states, tries, rng)
+    states: int = 5000
+    tries: int = 500
+    seed: int = 0
 
-    numbers = f"{states} states, {tries} each, seed {seed}"
-    return search_beside(box, wanted, "closed walks", numbers, near, from_known=False)
+    what = "closed walks"
+    of_known = False
 
+    def __post_init__(self) -> None:
+        self.check(1)
+        check_numbers(self, self.tries)
 
-def near_closed_walks(
-    box: Collector,
-    branches: Sequence[Branch],
-    frequency_hz: float,
-    periods: Sequence[int],
-    states: int,
-    tries: int,
-    rng: np.random.Generator,
-) -> Guesses:
-    """Closed walks of each length at a frequency, made of no branch, and the orbit near by.
+    def check(self, longest: int) -> None:
+        """Raise unless walks so long can be counted among so many states."""
+        check_walk_states("ClosedWalks: states", self.states, longest)
 
-    No orbit that is out of the range.
-    """
-    flow, omega = box.flow, 2.0 * math.pi * frequency_hz
-    asked = partial(box.tell, "closed walks", frequency_hz)
-    asked()
-    known = _known_states(flow, branches, frequency_hz, rng)
-    if not len(known):  # every motion failed, and no orbit is known
-        return
-    cloud = Cloud.of(flow, known)
-    graph = StateGraph.of(flow, omega, cloud, states, rng, asked)
-    one_period = shooting_problem(flow, 1)
-    for period in periods:
-        for walk in islice(graph.closed_walks(period, rng), tries):
-            asked()
-            nodes = np.array([spread(one_period, graph.states[at], omega) for at in walk])
-            nodes = nodes.reshape(period, SEGMENTS_PER_PERIOD, -1)
-            orbit = nearest_orbit(flow, nodes, omega, box.observe, SHORT_STEPS)
-            yield set(), box.within([orbit])
+    def guesses(self, box: Collector, branches: Sequence[Branch], place: Place) -> Guesses:
+        """No branch, and the orbit near each walk if that is in the range."""
+        flow, omega, rng = box.flow, place.omega, place.rng
+        asked = partial(box.tell, self.what, place.frequency_hz)
+        asked()
+        known = _known_states(flow, branches, place.frequency_hz, rng)
+        if not len(known):  # every motion failed, and no orbit is known
+            return
+        graph = StateGraph.of(flow, omega, Cloud.of(flow, known), self.states, rng, asked)
+        one_period = shooting_problem(flow, 1)
+        for period in place.periods:
+            for walk in islice(graph.closed_walks(period, rng), self.tries):
+                asked()
+                nodes = np.array([spread(one_period, graph.states[at], omega) for at in walk])
+                nodes = nodes.reshape(period, SEGMENTS_PER_PERIOD, -1)
+                orbit = nearest_orbit(flow, nodes, omega, box.observe, SHORT_STEPS)
+                yield set(), box.within([orbit])
 
 
 def _known_states(

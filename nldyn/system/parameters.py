@@ -15,22 +15,17 @@ OF_SPRINGS = tuple(f"k{power}" for power in range(1, LARGEST_DEGREE + 1))
 SOURCES = ("amplitude", "mass_times_radius", "force")
 
 
-def size_of(source: Excitation) -> str:
-    """Name of the number that tells how strong a source of excitation is."""
-    return next(name for name in SOURCES if hasattr(source, name))
-
-
 def strength(source: Excitation) -> float:
-    """The number itself, in the unit of its kind."""
-    return float(getattr(source, size_of(source)))
+    """How strong a source of excitation is, in the unit of its kind."""
+    return float(next(getattr(source, name) for name in SOURCES if hasattr(source, name)))
 
 
 @dataclass(frozen=True)
 class Parameter:
     """A number of a system.
 
-    Motions have exact derivatives by the numbers of stops and excitations. `continue_in`,
-    `by_detour` and the like know those of dampers and modes, too, see `nldyn.system.chart`.
+    Motions have exact derivatives by the numbers of stops and excitations. `continue_in`
+    and the like know those of dampers and modes, too, see `nldyn.system.chart`.
 
     Parameters
     ----------

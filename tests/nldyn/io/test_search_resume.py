@@ -2,30 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from dataclasses import replace
 from functools import partial
 
 import h5py
+import numpy as np
 import pytest
 from branches_alike import assert_same_branches, without
 
 from nldyn import (
     CheckpointFile,
+    ClosedWalks,
     ContinuationOptions,
-    Diagram,
+    Mixtures,
+    PseudoOrbits,
     SystemModelError,
-    by_closed_walks,
-    by_crossover,
-    by_pseudo_orbits,
+    extend_diagram,
+    save,
 )
-from nldyn.io.branches import load_branches
+from nldyn.branches.checkpoint import Checkpoint
+from nldyn.io.branches import load_branches, save_branches
+from nldyn.search.diagram import Collector
 
-Search = Callable[..., Diagram]
-WAYS: dict[str, Search] = {
-    "closed walks": partial(by_closed_walks, states=50, tries=4, spacing=0.006, seed=1),
-    "mixtures": partial(by_crossover, tries=4, spacing=0.006, seed=1),
-    "pseudo-orbits": partial(by_pseudo_orbits, tries=2, spacing=0.006),
+WAYS = {
+    "closed walks": ClosedWalks(states=50, tries=4, seed=1),
+    "mixtures": Mixtures(tries=4, seed=1),
+    "pseudo-orbits": PseudoOrbits(tries=2),
 }
+search = partial(extend_diagram, spacing=0.006)
 
 
 class Frequencies:
@@ -42,7 +47,9 @@ class Frequencies:
                 raise KeyboardInterrupt
 
 
-@pytest.fixture(params=WAYS)
+@pytest.fixture(
+    params=[way if way == "mixtures" else pytest.param(way, marks=pytest.mark.slow) for way in WAYS]
+)
 def way(request):
     return request.param
 
@@ -52,37 +59,39 @@ def interrupted(three, way, tmp_path):
     """A file of a search that was interrupted at its third frequency."""
     place = tmp_path / "found.h5"
     with pytest.raises(KeyboardInterrupt):
-        WAYS[way](three, progress=Frequencies(way, 3), checkpoint=CheckpointFile(place))
+        search(three, WAYS[way], progress=Frequencies(way, 3), checkpoint=CheckpointFile(place))
     return place
 
 
 def test_interrupted_it_gives_what_an_uninterrupted_one_gives(three, way, interrupted):
     whole, rest = Frequencies(way), Frequencies(way)
-    wanted = WAYS[way](three, progress=whole)
-    resumed = WAYS[way](three, progress=rest, checkpoint=CheckpointFile(interrupted))
+    wanted = search(three, WAYS[way], progress=whole)
+    resumed = search(three, WAYS[way], progress=rest, checkpoint=CheckpointFile(interrupted))
     assert len(whole.tried) > 3
     assert rest.tried == whole.tried[2:]
     assert resumed.notes == wanted.notes
     nothing = Frequencies(way)
-    again = WAYS[way](three, progress=nothing, checkpoint=CheckpointFile(interrupted))
+    again = search(three, WAYS[way], progress=nothing, checkpoint=CheckpointFile(interrupted))
     assert not nothing.tried
     assert again.notes == wanted.notes
 
 
 def test_another_search_begins_anew(three, way, interrupted):
     """With other numbers, or beside other branches."""
-    for known, numbers in (
-        (three, {"tries": 5}),
-        (three, {"max_period": 2}),
-        (three, {"options": ContinuationOptions(max_points=30)}),
-        (without(three, three.of_period(2)[0]), {}),
+    strategy = WAYS[way]
+    for known, other, numbers in (
+        (three, replace(strategy, tries=5), {}),
+        (three, strategy, {"max_period": 2}),
+        (three, strategy, {"options": ContinuationOptions(max_points=30)}),
+        (without(three, three.of_period(2)[0]), strategy, {}),
     ):
         tried = Frequencies(way, 1)
+        place = CheckpointFile(interrupted)
         with pytest.raises(KeyboardInterrupt):
-            WAYS[way](known, progress=tried, checkpoint=CheckpointFile(interrupted), **numbers)
+            search(known, other, progress=tried, checkpoint=place, **numbers)
         fresh = Frequencies(way, 1)
         with pytest.raises(KeyboardInterrupt):
-            WAYS[way](known, progress=fresh, **numbers)
+            search(known, other, progress=fresh, **numbers)
         assert tried.tried == fresh.tried
 
 
@@ -101,7 +110,8 @@ def test_what_it_has_found_is_not_lost_and_changes_nothing_where_it_goes_on(thre
     (left_out,) = three.of_period(2)
     known, place = without(three, left_out), tmp_path / "found.h5"
     many = {"states": 400} if way == "closed walks" else {}
-    search = partial(WAYS[way], tries=30, spacing=0.012, **many)
+    strategy = replace(WAYS[way], tries=30, **many)
+    search = partial(extend_diagram, strategy=strategy, spacing=0.012)
     whole = Frequencies(way)
     wanted = search(known, progress=whole)
     tried: list[float] = []
@@ -132,10 +142,10 @@ def test_a_search_of_an_earlier_version_begins_anew(three, way, interrupted):
         del file["search"].attrs["known"]
     tried = Frequencies(way, 1)
     with pytest.raises(KeyboardInterrupt):
-        WAYS[way](three, progress=tried, checkpoint=CheckpointFile(interrupted))
+        search(three, WAYS[way], progress=tried, checkpoint=CheckpointFile(interrupted))
     fresh = Frequencies(way, 1)
     with pytest.raises(KeyboardInterrupt):
-        WAYS[way](three, progress=fresh)
+        search(three, WAYS[way], progress=fresh)
     assert tried.tried == fresh.tried
 
 
@@ -143,4 +153,64 @@ def test_a_damaged_place_is_told_by_its_name(three, way, interrupted):
     with h5py.File(interrupted, "r+") as file:
         del file["search"].attrs["done"]
     with pytest.raises(SystemModelError, match=r"found\.h5: attribute '/search/done' is missing"):
-        WAYS[way](three, checkpoint=CheckpointFile(interrupted))
+        search(three, WAYS[way], checkpoint=CheckpointFile(interrupted))
+
+
+@pytest.fixture
+def all_repeated(monkeypatch):
+    """Every branch that is followed turns out to repeat a known one."""
+    monkeypatch.setattr(Collector, "_repeats", lambda box, branch: True)
+
+
+def test_a_branch_that_repeats_a_known_one_is_not_kept(three, all_repeated, tmp_path):
+    known, place = without(three, three.of_period(2)[0]), tmp_path / "found.h5"
+    done = search(known, Mixtures(tries=30), spacing=0.1, checkpoint=CheckpointFile(place))
+    assert int(re.match(r"\d+", done.notes[-1])[0]) > 0
+    assert done.branches == known.branches
+    assert load_branches(place) == []
+
+
+def test_a_branch_of_the_file_that_turns_out_to_be_known_is_not_added(
+    three, all_repeated, tmp_path
+):
+    (second,), place = three.of_period(2), tmp_path / "found.h5"
+    save_branches(place, [second])
+    known = without(three, second)
+    done = search(known, Mixtures(tries=1), spacing=0.5, checkpoint=CheckpointFile(place))
+    assert done.branches == known.branches
+
+
+def test_what_a_file_holds_stays_there_also_with_another_strategy(three, tmp_path):
+    (second,), place = three.of_period(2), tmp_path / "found.h5"
+    save_branches(place, [second])
+    known = without(three, second)
+    for strategy in (Mixtures(tries=1), PseudoOrbits(tries=1)):
+        found = search(known, strategy, spacing=0.5, checkpoint=CheckpointFile(place))
+        for branch in (found.branches[-1], load_branches(place)[0]):
+            assert np.array_equal(branch.frequency_hz, second.frequency_hz)
+    save(found, place)
+    with pytest.raises(SystemModelError, match="holds a diagram or exploration"):
+        search(known, Mixtures(tries=1), checkpoint=CheckpointFile(place))
+
+
+@pytest.mark.parametrize("at", ["test", "work"])
+def test_no_branch_of_a_file_is_lost_to_an_interrupt(at):
+    kept: list[str] = []
+    given = ["known", "tested", "later"]
+
+    def write(branches):
+        kept[:] = branches
+
+    held: list[str] = []
+    checkpoint = Checkpoint(lambda some: write([*held, *some]), earlier=given, held=held)
+
+    def is_known(branch: str) -> bool:
+        if branch == "tested" and at == "test":
+            raise KeyboardInterrupt
+        return branch == "known"
+
+    with pytest.raises(KeyboardInterrupt), checkpoint:
+        for _ in checkpoint.new_branches(is_known):
+            raise KeyboardInterrupt
+    checkpoint.write()
+    assert sorted(kept) == sorted(given)

@@ -2,87 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from itertools import pairwise, product
 
 import numpy as np
 import pytest
-from branches_alike import without
 from hypothesis import given
 from hypothesis import strategies as st
-from problems import THREE_HZ
 
-from nldyn import (
-    CheckpointFile,
-    Diagram,
-    SystemModelError,
-    by_pseudo_orbits,
-    continue_branch,
-    index_sum,
-    save,
-    solve_orbit,
-)
-from nldyn.branches.endings import Ending
-from nldyn.io.branches import load_branches, load_diagram
 from nldyn.orbits.starts import nearest_orbit
-from nldyn.paper.jobs import scene_system
 from nldyn.search import pseudo_orbits
-from nldyn.search.by_pseudo_orbits import WAYS
-from nldyn.search.exploration import steps_between
-from nldyn.search.fixed_point_index import index_gaps
-from nldyn.search.pseudo_orbits import FARTHEST, NEAR, NODES, Pieces
-
-
-@pytest.mark.parametrize("period", [pytest.param(1, marks=pytest.mark.slow), 2, 3])
-def test_a_branch_is_found_from_pieces_of_the_others(three, period):
-    (left_out,) = three.of_period(period)
-    done = by_pseudo_orbits(without(three, left_out), tries=50)
-    (found,) = done.branches[2:]
-    assert found.period == period
-    assert all(left_out.contains(orbit) for orbit in found.points)
-    assert done.notes[-1].endswith("1 branch beside those given")
-    assert [index_sum(done.branches, 36.5, n) for n in (1, 2, 3)] == [1, 1, 1]
-
-
-def test_what_is_known_is_met_and_not_found_again(three):
-    done = by_pseudo_orbits(three, tries=50)
-    assert len(done.branches) == 3
-    assert ", not made of them, to 3 of the 3 given there, 0 branches" in done.notes[-1]
-    assert done.notes[:-2] == tuple(n for n in three.notes if not n.startswith("indices"))
-
-
-def test_an_orbit_alone_gives_no_pseudo_orbit(three):
-    """The harmonic changes so little within 0.1 % that its pieces give nothing else."""
-    harmonic = Diagram(tuple(three.of_period(1)), THREE_HZ, "middle")
-    done = by_pseudo_orbits(harmonic, spacing=0.001)
-    assert len(done.branches) == 1
-    assert done.notes[-1].startswith("0 of 0 pseudo-orbits led to an orbit")
-
-
-def test_different_orbits_of_one_branch_lead_to_others():
-    """Two modes from 28.5 to 30.5 Hz, the harmonic alone known; nothing is met without it."""
-    system, range_hz = scene_system("two_dof_xi_0.01"), (28.5, 30.5)
-    harmonic = continue_branch(solve_orbit(system, 29.5), range_hz)
-    known = Diagram((harmonic,), range_hz, "middle")
-    assert index_gaps(known.branches, range_hz, 2)
-    done = by_pseudo_orbits(known, max_period=2, tries=200)
-    assert not index_gaps(done.branches, range_hz, 2)
-    assert " and, not made of them, to 0 of the 1 given" in done.notes[-1]
-
-
-def test_no_longer_orbits_are_looked_for_than_wanted(three):
-    (third,) = three.of_period(3)
-    done = by_pseudo_orbits(without(three, third), max_period=2)
-    assert len(done.branches) == 2
-    assert " of the 2 given" in done.notes[-1]
-
-
-def test_no_more_are_tried_than_wanted(three):
-    """One of each length at each of the frequencies, at most."""
-    done = by_pseudo_orbits(three, tries=1, spacing=0.02)
-    tried = int(re.search(r"of (\d+) pseudo-orbits", done.notes[-1])[1])
-    assert 0 < tried <= 3 * steps_between(*THREE_HZ, 0.02)
+from nldyn.search.pseudo_orbits import FARTHEST, NEAR, NODES, WAYS, Pieces
 
 
 def test_short_steps_between_more_states_lead_back_to_an_orbit_more_often(three):
@@ -213,56 +143,3 @@ def test_of_very_many_pieces_some_of_the_sequences_are_left_out(seed, nearest, m
         steps = zip(sequence, sequence[1:] + sequence[:1], strict=True)
         far = sum(ranks[a, b] >= nearest for a, b in steps)
         assert (sequence in near) == (far <= 1)  # the last step back to the first may be long
-
-
-def test_a_branch_that_was_begun_is_finished(three, tmp_path):
-    """Interrupted on the way along it, and with the known branches read from a file."""
-    (left_out,) = three.of_period(3)
-    place, known = tmp_path / "found.h5", tmp_path / "known.h5"
-    save(without(three, left_out), known)
-    seen = []
-
-    def interrupt(what: str, frequency_hz: float, done: float) -> None:
-        seen.append(what)
-        if seen.count("1/3") == 5:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        by_pseudo_orbits(
-            load_diagram(known), tries=50, progress=interrupt, checkpoint=CheckpointFile(place)
-        )
-    (begun,) = load_branches(place)
-    assert Ending.NOT_FINISHED.value in begun.stop_reasons
-    (found,) = by_pseudo_orbits(
-        load_diagram(known), tries=50, checkpoint=CheckpointFile(place)
-    ).branches[2:]
-    assert len(begun.points) < len(found.points)
-    assert Ending.NOT_FINISHED.value not in found.stop_reasons
-    ends = [special.frequency_hz for special in found.special_points if special.kind == "LP"]
-    wanted = [special.frequency_hz for special in left_out.special_points if special.kind == "LP"]
-    assert sorted(ends) == pytest.approx(sorted(wanted), rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"tries": 0}, "tries must be"),
-        ({"tries": 1.5}, "tries must be"),
-        ({"seed": -1}, "seed must be"),
-        ({"max_period": 0}, "max_period must be"),
-        ({"spacing": 0.0}, "spacing must be at least 1e-06 and less than 1, got 0"),
-        ({"spacing": float("nan")}, "spacing must be at least"),
-        ({"known": None}, "known must be a Diagram"),
-        ({"progress": 3}, "progress must be"),
-    ],
-)
-def test_what_makes_no_sense_is_refused(three, change, message):
-    known = change.get("known", three)
-    options = {key: value for key, value in change.items() if key != "known"}
-    with pytest.raises(SystemModelError, match=message):
-        by_pseudo_orbits(known, **options)
-
-
-def test_a_diagram_without_branches_is_refused(three):
-    with pytest.raises(SystemModelError, match="known: has no branches to begin with"):
-        by_pseudo_orbits(replace(three, branches=()))

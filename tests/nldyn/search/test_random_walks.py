@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from problems import make_one_dof
 
-from nldyn import Stop, SystemModelError, by_closed_walks, index_sum
+from nldyn import ClosedWalks, Stop
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.orbit import stroboscopic
-from nldyn.search.extend import WINDOW, orbits_near
+from nldyn.search.extend import WINDOW, Place, orbits_near
 from nldyn.search.random_walks import (
     LEAST,
     NARROWEST,
@@ -22,47 +21,10 @@ from nldyn.search.random_walks import (
     Cloud,
     StateGraph,
     _known_states,
-    near_closed_walks,
 )
 from nldyn.system.system import System
 
 OMEGA = 2.0 * np.pi * 37.0
-
-
-def test_from_one_branch_all_others_are_found(three):
-    """The harmonic, and a few motions, tell where states lie, no more."""
-    (harmonic,) = three.of_period(1)
-    known = replace(three, branches=(harmonic,))
-    done = by_closed_walks(known, states=1000, tries=50, spacing=0.02)
-    assert sorted(branch.period for branch in done.branches) == [1, 2, 3]
-    for wanted in three.branches:
-        (found,) = done.of_period(wanted.period)
-        assert all(wanted.contains(orbit) for orbit in found.points)
-    assert done.notes[-1].endswith("to 1 of the 1 given there, 2 branches beside those given")
-    assert [index_sum(done.branches, 36.5, n) for n in (1, 2, 3)] == [1, 1, 1]
-
-
-def test_what_is_known_is_met_and_not_found_again(three):
-    done = by_closed_walks(three, states=1000, tries=50, spacing=0.02)
-    assert done.branches == three.branches
-    assert done.notes[-1].endswith("to 3 of the 3 given there, 0 branches beside those given")
-
-
-def test_only_the_periods_and_frequencies_wanted_are_tried(three):
-    tried = set()
-    done = by_closed_walks(
-        three, min_period=2, max_period=2, range_hz=(37.2, 38.0), tries=3, spacing=0.005,
-        states=500, progress=lambda what, hz, done: tried.add(hz),
-    )  # fmt: skip
-    assert 37.2 < min(tried) < max(tried) < 38.0
-    assert f" of {3 * len(tried)} closed walks led to" in done.notes[-1]
-    assert " of the 1 given there, " in done.notes[-1]  # period 3 ends below
-
-
-def test_the_same_seed_gives_the_same_and_another_one_other_walks(three):
-    search = partial(by_closed_walks, three, states=200, tries=20, spacing=0.02)
-    notes = [search(seed=n).notes[-1] for n in (1, 1, 2)]
-    assert notes[0] == notes[1] != notes[2]
 
 
 def graph_of(count=400, seed=0):
@@ -201,8 +163,8 @@ def test_states_that_cannot_be_carried_on_are_left_out(monkeypatch):
     nothing = StateGraph.of(flow, OMEGA, cloud, 200, np.random.default_rng(0))
     assert list(nothing.closed_walks(3, np.random.default_rng(0))) == []
     box = SimpleNamespace(flow=flow, tell=lambda *_: None)
-    walks = near_closed_walks(box, [], 37.0, range(1, 3), 50, 5, np.random.default_rng(0))
-    assert list(walks) == []
+    place = Place(37.0, 0.01, range(1, 3), np.random.default_rng(0))
+    assert list(ClosedWalks(states=50, tries=5).guesses(box, [], place)) == []
 
 
 def test_a_long_walk_to_which_few_of_all_lead_is_found():
@@ -228,25 +190,3 @@ def test_states_that_are_all_alike_give_others_near_them(size):
     assert np.ptp(states, axis=0).min() > 0.0
     assert np.abs(states - size).max() < 5.0 * LEAST * (size or 1.0)  # five standard deviations
     assert np.abs(cloud.scaled(states - size)).max() < 5.0
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"states": 0}, "states must be"),
-        ({"states": 10.5}, "states must be"),
-        ({"states": 10**6, "max_period": 11}, "states must be a whole number from 1 to 909090"),
-        ({"tries": 0}, "tries must be"),
-        ({"seed": -1}, "seed must be"),
-        ({"max_period": 0}, "max_period must be"),
-        ({"range_hz": (30.0, 37.0)}, r"\(30, 37\) must lie within that of .*, \(36, 38.5\)"),
-        ({"spacing": 0.0}, "spacing must be at least 1e-06 and less than 1, got 0"),
-        ({"known": None}, "known must be a Diagram"),
-        ({"progress": 3}, "progress must be"),
-    ],
-)
-def test_what_makes_no_sense_is_refused(three, change, message):
-    known = change.get("known", three)
-    options = {key: value for key, value in change.items() if key != "known"}
-    with pytest.raises(SystemModelError, match=message):
-        by_closed_walks(known, **options)
