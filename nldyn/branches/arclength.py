@@ -31,7 +31,7 @@ from nldyn.flow.rigid import rigid_impacts
 from nldyn.orbits.bordered import length_unit
 from nldyn.orbits.conditions import TOUCH, depth_row
 from nldyn.orbits.orbit import Orbit
-from nldyn.orbits.shooting import ShootingProblem, asymmetry, metric_length, shifts
+from nldyn.orbits.shooting import FROM_NEAR, ShootingProblem, asymmetry, metric_length, shifts
 from nldyn.system.rigid_stop import RigidStop
 
 KINK = TOUCH  # step below which a branch may bend by any angle where the number of contacts changes
@@ -98,7 +98,7 @@ def _past_impact_at_node(here: BranchPoint) -> tuple[BranchPoint, float, float] 
     by_frequency[-1] = math.copysign(1.0, here.tangent[-1])
     for shift in PAST_NODE:
         guess = np.append(nodes, orbit.point[-1] + shift * by_frequency[-1])
-        found = problem.correct(guess, by_frequency, longest=NEAR_NODE, max_iterations=8)
+        found = problem.correct(guess, by_frequency, longest=NEAR_NODE, max_iterations=FROM_NEAR)
         if found.converged:
             other = Orbit.of(problem, found, orbit.observe)
             change = other.max_abs_displacement / orbit.max_abs_displacement - 1.0
@@ -276,7 +276,7 @@ class Stepper:
             row,
             offset=float(row @ straight),
             longest=1.1 * self.options.max_miss * step if step > KINK else 2.0 * step,
-            max_iterations=8,
+            max_iterations=FROM_NEAR,
             like=here.orbit.motion,
             aim=cubic,
             # behind a grazing point the branch may turn on a very short length
@@ -345,7 +345,7 @@ class Stepper:
             return None
         weights = problem.metric(here.orbit.point)
         guess = here.orbit.point + step * here.tangent / metric_length(weights, here.tangent)
-        found = problem.correct(guess, row, longest=2.0 * KINK, max_iterations=8)
+        found = problem.correct(guess, row, longest=2.0 * KINK, max_iterations=FROM_NEAR)
         if not found.converged or _jumped(problem, here.orbit.point, guess, found.point):
             return None
         orbit = Orbit.of(problem, found, here.orbit.observe)

@@ -30,7 +30,7 @@ from nldyn.orbits.bordered import (
 from nldyn.orbits.conditions import Both, BranchPoint, Grazing, Held, Singular
 from nldyn.orbits.extremes import nearest
 from nldyn.orbits.orbit import Orbit
-from nldyn.orbits.shooting import metric_length
+from nldyn.orbits.shooting import FROM_NEAR, metric_length
 from nldyn.system.chart import Chart
 from nldyn.system.rigid_stop import is_linear
 
@@ -426,7 +426,7 @@ class CurveWalk:
         row /= np.linalg.norm(row)
         predicted = straight + 0.5 * step**2 * curvature
         found = correct(
-            family, predicted, here.condition, row, float(row @ straight), max_iterations=8
+            family, predicted, here.condition, row, float(row @ straight), max_iterations=FROM_NEAR
         )
         if not found.converged:
             self._obstacle = found.failure

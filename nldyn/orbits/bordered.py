@@ -22,7 +22,7 @@ from nldyn.base.errors import ConvergenceError, SystemModelError
 from nldyn.flow.flow_map import FlowMap, Segments
 from nldyn.flow.options import FlowOptions
 from nldyn.orbits.orbit import Orbit
-from nldyn.orbits.shooting import ShootingProblem, metric_length
+from nldyn.orbits.shooting import ITERATIONS, ShootingProblem, metric_length
 from nldyn.system.chart import FREQUENCY, Chart, has_exact_derivatives, value_of, with_value
 from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
@@ -45,6 +45,7 @@ BENT, SHORTEST_BEND = 0.02, 3e-6
 ROUNDING_BEND = 1e-9  # second difference that four values good to 1e-10 may have
 ROUNDING = 1e-7  # a Newton step below this that is no shorter than the last has met rounding
 KEEP_SLOPES = 1e-3  # after a Newton step shorter than this the slopes of g still serve
+CONVERGED = 1e-9  # relative length of a Newton step after which to stop
 SATISFIED = 1e-7  # residual of a condition up to which a solution counts
 
 
@@ -391,8 +392,7 @@ def correct(
     row: Real | None = None,
     level: float = 0.0,
     *,
-    rtol: float = 1e-9,
-    max_iterations: int = 12,
+    max_iterations: int = ITERATIONS,
 ) -> Corrected:
     """Newton's method for R = 0, g = 0 and, if a row is given, ``row @ point = level``.
 
@@ -408,8 +408,6 @@ def correct(
         Normal of a plane.
     level : float
         Offset of the plane.
-    rtol : float
-        Relative length of a step after which to stop.
     max_iterations : int
         Most steps.
 
@@ -429,7 +427,7 @@ def correct(
             point = point + change
             if not step < 2.0:
                 raise ConvergenceError("Newton's method diverged")
-            if step <= rtol or (step < ROUNDING and step > 0.3 * before):
+            if step <= CONVERGED or (step < ROUNDING and step > 0.3 * before):
                 found = Corrected(family.at(point), condition, step, iteration, "")
                 if found.residual(condition) < SATISFIED:
                     return found

@@ -491,7 +491,7 @@ def _beside(kind: str, orbit: Orbit) -> Corrected | None:
     try:
         family, condition = defined_by(kind, family, orbit)
         guess = family.unknowns(orbit)
-        found = correct(family, guess, condition, max_iterations=12)
+        found = correct(family, guess, condition)
     except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
         return None
     apart = metric_length(family.metric(guess), found.at.point - guess)

@@ -13,6 +13,7 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.newton import refine, spread
 from nldyn.orbits.orbit import Orbit, minimal_period, same_orbit
 from nldyn.orbits.shooting import shifts, shooting_problem
+from nldyn.orbits.starts import GUESS_ITERATIONS
 
 LONGEST = 0.5  # step of an iteration, relative to the orbit
 ITERATIONS = 20
@@ -49,7 +50,7 @@ def deflated_orbit(
     else:
         return None
     try:
-        orbit = refine(problem, problem.nodes(point), omega, observe, max_iterations=10)
+        orbit = refine(problem, problem.nodes(point), omega, observe, GUESS_ITERATIONS)
     except ConvergenceError:
         return None
     if minimal_period(orbit) < period or any(same_orbit(orbit, other) for other in known):

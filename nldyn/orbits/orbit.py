@@ -31,6 +31,8 @@ from nldyn.system.rigid_stop import AnyStop, RigidStop
 from nldyn.system.system import System
 
 SAME_PHASE = 1e-9  # in rad: an extreme and an impact
+SAME = 1e-5  # distance of orbits that are one, relative to their size
+REPEATS = 1e-6  # the same of an orbit from itself some periods later
 SHALLOW = 1e-3  # of the deepest extreme: depths up to it are told exactly where stops are touched
 
 
@@ -586,11 +588,11 @@ def stroboscopic(orbit: Orbit) -> Real:
     return problem.nodes(orbit.point)[:: problem.segments // problem.period]
 
 
-def same_orbit(a: Orbit, b: Orbit, rtol: float = 1e-5) -> bool:
+def same_orbit(a: Orbit, b: Orbit) -> bool:
     """Whether two orbits at one frequency agree up to a shift by whole excitation periods."""
     if a.period != b.period or not math.isclose(a.omega, b.omega, rel_tol=1e-9):
         return False
-    return shifted_alike(stroboscopic(a), stroboscopic(b), rtol * a.problem.scale(a.point))
+    return shifted_alike(stroboscopic(a), stroboscopic(b), SAME * a.problem.scale(a.point))
 
 
 def shifted_alike(a: Real, b: Real, size: float) -> bool:
@@ -600,14 +602,14 @@ def shifted_alike(a: Real, b: Real, size: float) -> bool:
     )
 
 
-def minimal_period(orbit: Orbit, rtol: float = 1e-6) -> int:
+def minimal_period(orbit: Orbit) -> int:
     """Smallest number of excitation periods after which the orbit really repeats."""
     states = stroboscopic(orbit)
     scale = orbit.problem.scale(orbit.point)
     for n in range(1, orbit.period):
         if orbit.period % n == 0:
             shifted = np.roll(states, n, axis=0)
-            if float(np.abs(states - shifted).max()) <= rtol * scale:
+            if float(np.abs(states - shifted).max()) <= REPEATS * scale:
                 return n
     return orbit.period
 

@@ -21,6 +21,9 @@ SEGMENTS_PER_PERIOD = 2
 LONGEST_PERIOD = 10**4  # excitation periods of an orbit
 MOST_SEGMENTS = 10**5
 
+TOLERANCE = 1e-11  # relative length of a Newton step after which to stop
+ITERATIONS = 12  # most Newton steps
+FROM_NEAR = 8  # the same from a point that was predicted or nearly found: more mean it went astray
 AT_REST = 1e-6  # size of an orbit, relative to the guess, that may be rounding
 
 
@@ -89,9 +92,8 @@ class ShootingProblem:
         row: Real,
         *,
         offset: float | None = None,
-        rtol: float = 1e-11,
         longest: float = 1e3,
-        max_iterations: int = 12,
+        max_iterations: int = ITERATIONS,
         like: Trajectory | None = None,
         aim: Real | None = None,
         closings: int = -1,
@@ -109,8 +111,8 @@ class ShootingProblem:
 
         def solved(start: Real, near: Trajectory | None, expected: Real) -> Solution:
             corrector = Corrector(
-                row, level, self._weight(start), rtol, longest, max_iterations, expected, closings,
-                turn,
+                row, level, self._weight(start), TOLERANCE, longest, max_iterations, expected,
+                closings, turn,
             )  # fmt: skip
             return self.flow.newton(start, corrector, self.phases, near)
 

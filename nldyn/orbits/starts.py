@@ -14,6 +14,7 @@ from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.orbits.newton import check_bounded, refine, spread
 from nldyn.orbits.orbit import Orbit, check_observe, minimal_period, same_orbit, stroboscopic
 from nldyn.orbits.shooting import (
+    FROM_NEAR,
     SEGMENTS_PER_PERIOD,
     ShootingProblem,
     metric_length,
@@ -29,6 +30,7 @@ FEWEST, UNDAMPED = 30, 600  # periods of it: at least, and where nothing decays
 MOST_COUNT = 10**7  # of starts, periods and candidates
 FREQUENCY_WEIGHT = 10.0  # of a relative change of the frequency against one of the states
 NEARBY = 1e-3  # a step of least length that is short enough to end with
+GUESS_ITERATIONS = 10  # Newton steps from a state that may lead nowhere
 LONG_STEPS = 0.5, 14  # of least length: the longest, and how many at most
 SHORT_STEPS = 0.1, 30  # lead to nine in ten of the orbits that 80 lead to
 FREQUENCY_SHIFT = 0.05  # how far the frequency may go, relative
@@ -182,12 +184,12 @@ def orbit_near(flow: FlowMap, start: Real, period: int, omega: float, observe: s
     """Orbit that Newton's method finds from a state z, by its minimal period; None if none."""
     problem = shooting_problem(flow, period)
     try:
-        orbit = refine(problem, spread(problem, start, omega), omega, observe, max_iterations=10)
+        orbit = refine(problem, spread(problem, start, omega), omega, observe, GUESS_ITERATIONS)
         shorter = minimal_period(orbit)
         if shorter < period:
             problem = shooting_problem(flow, shorter)
             nodes = spread(problem, stroboscopic(orbit)[0], omega)
-            orbit = refine(problem, nodes, omega, observe, max_iterations=10)
+            orbit = refine(problem, nodes, omega, observe, GUESS_ITERATIONS)
     except ConvergenceError:
         return None
     return orbit
@@ -237,7 +239,7 @@ def nearest_orbit(
         if solution is None:
             return None
         usual = [_thinned(vector, nodes.shape) for vector in solution]
-        found = problem.correct(*usual, max_iterations=8)
+        found = problem.correct(*usual, max_iterations=FROM_NEAR)
         if not found.converged:
             return None
         orbit = Orbit.of(problem, found, observe)
@@ -283,7 +285,7 @@ def _thinned(vector: Real, shape: tuple[int, ...]) -> Real:
 def _refined(problem: ShootingProblem, start: Real, omega: float, observe: str) -> Orbit | None:
     """Orbit that Newton's method finds from a state at phase zero, if it finds one soon."""
     try:
-        return refine(problem, spread(problem, start, omega), omega, observe, max_iterations=10)
+        return refine(problem, spread(problem, start, omega), omega, observe, GUESS_ITERATIONS)
     except ConvergenceError:
         return None
 
