@@ -56,12 +56,12 @@ def save_branches(path: str | Path, branches: Sequence[Branch], tally: Tally | N
 
 
 def save_diagram(path: str | Path, diagram: Diagram) -> None:
-    """Write a diagram with its branches to one file, whole or not at all; see `Diagram.save`."""
+    """Write a diagram with its branches to one file, whole or not at all."""
     _write(path, diagram.branches, _of_diagram(diagram))
 
 
 def save_exploration(path: str | Path, found: Exploration) -> None:
-    """Write an exploration to one file, whole or not at all; see `Exploration.save`."""
+    """Write an exploration to one file, whole or not at all."""
     diagram = found.diagram
     _write(path, diagram.branches, _of_diagram(diagram), found)
 
@@ -70,49 +70,8 @@ def _of_diagram(diagram: Diagram) -> dict[str, Any]:
     return {"range_hz": diagram.range_hz, "observe": diagram.observe, "notes": diagram.notes}
 
 
-def load_branch(path: str | Path, name: str | None = None, *, laws: Laws | None = None) -> Branch:
-    """Read a branch that `Branch.save` or `Diagram.save` wrote.
-
-    Its points, special points and orbits have the numbers of the branch that was saved, and it can
-    be extended as that one could.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    name : str, optional
-        Name of the branch, if there are several in the file.
-    laws : mapping of int to callable, optional
-        Contact laws of the user's own by the number of their stop: a file holds numbers, no code.
-
-    Returns
-    -------
-    Branch
-
-    Raises
-    ------
-    SystemModelError
-        If the file is not one of branches, is damaged, or was written by a later version; if the
-        name does not tell one branch; if a law is missing or is another one.
-
-    Examples
-    --------
-    >>> load_branch("nowhere.h5")
-    Traceback (most recent call last):
-        ...
-    nldyn.base.errors.SystemModelError: nowhere.h5: there is no such file
-    """
-    branches = load_branches(path, laws=laws)
-    found = branches if name is None else [b for b in branches if b.name == name]
-    if len(found) != 1:
-        names = ", ".join(f"'{branch.name}'" for branch in branches) or "none"
-        wanted = "a name must choose one of its branches" if name is None else f"no '{name}'"
-        raise SystemModelError(f"{path}: {wanted}; there are: {names}")
-    return found[0]
-
-
 def load_branches(path: str | Path, *, laws: Laws | None = None) -> list[Branch]:
-    """Read all branches of a file; see `load_branch`."""
+    """Read all branches of a file; see `nldyn.load`."""
     with opened(path, FORMAT, FORMAT_VERSION) as root:
         return _read_branches(root, _read_flows(root, laws))
 
@@ -127,52 +86,18 @@ def load_bare_branches(path: Path, laws: Laws) -> tuple[list[Branch], Tally | No
 
 
 def load_diagram(path: str | Path, *, laws: Laws | None = None) -> Diagram:
-    """Read a diagram that `Diagram.save` wrote.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    laws : mapping of int to callable, optional
-        See `load_branch`.
-
-    Returns
-    -------
-    Diagram
-
-    Raises
-    ------
-    SystemModelError
-        As `load_branch`, and if the file holds branches without a diagram.
-    """
+    """Read a diagram with its branches."""
     with opened(path, FORMAT, FORMAT_VERSION) as root:
         if not root.has_attribute("range_hz"):
-            raise SystemModelError(f"{path}: holds branches without a diagram; use load_branches")
+            raise SystemModelError(f"{path}: holds branches without a diagram")
         return _read_diagram(root, _read_flows(root, laws))
 
 
 def load_exploration(path: str | Path, *, laws: Laws | None = None) -> Exploration:
-    """Read an exploration that `Exploration.save` wrote, or what `explore` keeps while it works.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    laws : mapping of int to callable, optional
-        See `load_branch`.
-
-    Returns
-    -------
-    Exploration
-
-    Raises
-    ------
-    SystemModelError
-        As `load_branch`, and if the file holds no exploration.
-    """
+    """Read an exploration, or what `explore` keeps while it works."""
     with opened(path, FORMAT, FORMAT_VERSION) as root:
         if "exploration" not in root:
-            raise SystemModelError(f"{path}: holds no exploration; use load_branches")
+            raise SystemModelError(f"{path}: holds no exploration")
         flows = _read_flows(root, laws)
         diagram = _read_diagram(root, flows)
         question, stage = _read_exploration(root.group("exploration"), flows, diagram)

@@ -67,52 +67,15 @@ def save_curves(path: str | Path, curves: Sequence[Curve]) -> None:
 def load_curves(
     path: str | Path, *, laws: Laws | None = None, monitor: OwnMonitor | None = None
 ) -> list[Curve]:
-    """Read all curves of a file; see `load_curve`."""
+    """Read all curves of a file; see `nldyn.load`.
+
+    Their orbits are made of their unknowns when they are asked for, by the flow map.
+    """
     known = checked_laws(laws)
     check_types(monitor=(monitor, Callable, None))
     with opened(path, FORMAT, FORMAT_VERSION) as root:
         groups = root.group("curves").groups()
         return [_read_curve(group, known, monitor) for group in groups]
-
-
-def load_curve(
-    path: str | Path, *, laws: Laws | None = None, monitor: OwnMonitor | None = None
-) -> Curve:
-    """Read a curve that `Curve.save` wrote.
-
-    Its points have the unknowns of the curve that was saved, to the last digit; the orbits are made
-    of them when they are asked for, by the flow map.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    laws : mapping of int to callable, optional
-        Contact laws of the user's own by the number of their stop, see `load_branch`.
-    monitor : callable, optional
-        The user's own function that was held constant: a file holds no code.
-
-    Returns
-    -------
-    Curve
-
-    Raises
-    ------
-    SystemModelError
-        If the file is not one of curves, is damaged, holds several, or was written by a later
-        version; if a law or the monitor is missing or is another one.
-
-    Examples
-    --------
-    >>> load_curve("nowhere.h5")
-    Traceback (most recent call last):
-        ...
-    nldyn.base.errors.SystemModelError: nowhere.h5: there is no such file
-    """
-    curves = load_curves(path, laws=laws, monitor=monitor)
-    if len(curves) != 1:
-        raise SystemModelError(f"{path}: holds {len(curves)} curves; use load_curves")
-    return curves[0]
 
 
 def _write_curve(group: Any, curve: Curve) -> None:

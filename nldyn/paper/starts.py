@@ -136,7 +136,7 @@ def follow_starts(
     whole : bool
         Whether the branches are to be followed any further; if not, see `keep_numbers`.
     keep_at : callable, optional
-        Gives the file that keeps what the start of a number leads to, as `Diagram.save` writes it.
+        Gives the file that keeps what the start of a number leads to, as `nldyn.save` writes it.
         What an interrupted run of the same system, starts and options has kept there is taken from
         it.
 

@@ -127,7 +127,7 @@ def explore(
         Called as ``progress(what, frequency_hz, done)``.
     checkpoint : CheckpointFile, optional
         File that keeps what is found, written now and then, at the end, and when an exception such
-        as Ctrl-C ends the exploration; `load_exploration` reads it at any time. If it holds this
+        as Ctrl-C ends the exploration; `load` reads it at any time. If it holds this
         very exploration, that one goes on and gives what an uninterrupted one gives.
     jobs, executor
         As for `diagram`: they share the branches, and change nothing in what is found.

@@ -41,7 +41,7 @@ from nldyn.bifurcations.normal_forms import switch_at_branch_point
 from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.branches.arclength import Stepper
 from nldyn.branches.cascades import cascades_in
-from nldyn.io.curves import load_curve
+from nldyn.io.curves import load_curves
 from nldyn.plot.curves import plot_curves
 from nldyn.plot.diagram import plot_diagram
 from nldyn.plot.orbit import plot_contact_force, plot_history, plot_phase_portrait, plot_spectrum
@@ -283,7 +283,7 @@ def test_other_arguments_of_a_wrong_kind_are_named(one_dof, orbit, harmonic_bran
     curve = tmp_path / "curve.h5"
     save(continue_in(orbit, "frequency_hz", (25.5, 26.5)), curve)
     for name in ("laws", "monitor"):
-        said = refused(lambda x, name=name: load_curve(curve, **{name: x}), 3, "text", [1])
+        said = refused(lambda x, name=name: load_curves(curve, **{name: x}), 3, "text", [1])
         check_named(said, f"{name} must be")
     check_named(refused(lambda x: Stepper(x, (25.0, 27.0), ContinuationOptions())), "start must be")
     check_named(refused(lambda x: one_dof.with_elements(stops=x), 3, [3]), "stop")

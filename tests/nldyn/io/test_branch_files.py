@@ -29,7 +29,7 @@ from nldyn import (
     solve_orbit,
 )
 from nldyn.io import branches as store
-from nldyn.io.branches import load_branch, load_branches, load_diagram
+from nldyn.io.branches import load_branches, load_diagram
 from nldyn.runtime.files import check_writable
 from nldyn.runtime.result_directory import OutputError
 
@@ -73,7 +73,7 @@ def copy(saved, tmp_path):
 def refused(path, *words, **options):
     """The file is refused with one sentence that names it and has the words."""
     with pytest.raises(SystemModelError) as caught:
-        load_branch(path, **options)
+        load_branches(path, **options)
     text = str(caught.value)
     assert text.startswith(f"{path}: ") and "\n" not in text
     for word in words:
@@ -84,7 +84,7 @@ def refused(path, *words, **options):
 
 
 def test_loaded_branch_has_every_number_of_the_saved_one(branch, saved):
-    loaded = load_branch(saved)
+    loaded = load_branches(saved)[0]
     assert_same_branches(loaded, branch)
     assert loaded.name == "Ast 1"
     flow = loaded.points[0].problem.flow
@@ -95,13 +95,13 @@ def test_loaded_branch_has_every_number_of_the_saved_one(branch, saved):
 
 def test_loaded_motions_are_those_of_the_saved_branch(branch, saved):
     phases = np.linspace(0.0, 2.0 * np.pi, 50)
-    for mine, other in zip(load_branch(saved).points, branch.points, strict=True):
+    for mine, other in zip(load_branches(saved)[0].points, branch.points, strict=True):
         assert np.array_equal(mine.states(phases), other.states(phases))
         assert mine.impact_list == other.impact_list
 
 
 def test_tables_of_a_loaded_branch_are_the_same(branch, saved):
-    loaded = load_branch(saved)
+    loaded = load_branches(saved)[0]
     for part in ("points", "special_points", "requested"):
         mine, other = loaded.table(part), branch.table(part)
         assert list(mine) == list(other)
@@ -111,7 +111,7 @@ def test_tables_of_a_loaded_branch_are_the_same(branch, saved):
 
 def test_special_points_and_folds_of_a_long_branch_come_back(harmonic_branch, tmp_path):
     save(harmonic_branch, tmp_path / "harmonic.h5")
-    loaded = load_branch(tmp_path / "harmonic.h5")
+    loaded = load_branches(tmp_path / "harmonic.h5")[0]
     assert {s.kind for s in loaded.special_points} >= {"LP", "PD", "GR"}
     assert_same_branches(loaded, harmonic_branch)
 
@@ -122,24 +122,24 @@ def test_a_branch_without_a_stop_comes_back(tmp_path):
     )
     branch = continue_branch(solve_orbit(system, 10.0), (9.0, 12.0))
     save(branch, tmp_path / "linear.h5")
-    assert_same_branches(load_branch(tmp_path / "linear.h5"), branch)
+    assert_same_branches(load_branches(tmp_path / "linear.h5")[0], branch)
 
 
 def test_saving_a_loaded_branch_gives_the_same_file(saved, tmp_path):
-    save(load_branch(saved), tmp_path / "again.h5")
+    save(load_branches(saved)[0], tmp_path / "again.h5")
     assert (tmp_path / "again.h5").read_bytes() == saved.read_bytes()
 
 
 def test_states_keep_their_coordinates_where_another_basis_would_be_computed(saved, monkeypatch):
     """Another linear algebra library may choose other signs of the eigenvectors."""
-    right = load_branch(saved).points[0].system.linear.right
+    right = load_branches(saved)[0].points[0].system.linear.right
 
     def other_signs(*arguments):
         return dataclasses.replace(linear_part(*arguments), right=-right)
 
     linear_part = System.linear.func.__globals__["linear_part"]
     monkeypatch.setitem(System.linear.func.__globals__, "linear_part", other_signs)
-    assert np.array_equal(load_branch(saved).points[0].system.linear.right, right)
+    assert np.array_equal(load_branches(saved)[0].points[0].system.linear.right, right)
 
 
 def test_several_branches_in_one_file(one_dof, tmp_path):
@@ -152,10 +152,6 @@ def test_several_branches_in_one_file(one_dof, tmp_path):
     for mine, other in zip(loaded.branches, whole.branches, strict=True):
         assert_same_branches(mine, other)
         assert mine.points[0].problem.flow is loaded.branches[0].points[0].problem.flow
-    name = whole.branches[1].name
-    assert_same_branches(load_branch(path, name), whole.branches[1])
-    refused(path, "a name must choose", f"'{name}'")
-    refused(path, "no 'other'", name="other")
 
 
 def test_a_file_of_one_branch_is_no_diagram(saved):
@@ -212,7 +208,7 @@ def test_a_law_of_the_users_own_is_passed_again(tmp_path):
     branch = continue_branch(solve_orbit(system, 26.0), (25.8, 26.2))
     path = tmp_path / "law.h5"
     save(branch, path)
-    assert_same_branches(load_branch(path, laws={0: hertz}), branch)
+    assert_same_branches(load_branches(path, laws={0: hertz})[0], branch)
     refused(path, "stop 0 at 'middle'", "laws={0: law}")
     refused(path, "no stop 1 has a law of its own", laws={0: hertz, 1: hertz})
     refused(path, "stop 0 at 'middle'", "is not the one", laws={0: stiffer})
@@ -234,7 +230,7 @@ def test_a_file_of_version_1_has_a_dataset_for_each_open_end(branch, copy):
         del course["open_ends"]
         course["open_ends/0000"] = branch.points[3].point
         course["open_ends/0001"] = np.zeros(3)
-    assert np.array_equal(load_branch(copy).course.open_ends, [branch.points[3].point])
+    assert np.array_equal(load_branches(copy)[0].course.open_ends, [branch.points[3].point])
 
 
 def test_foreign_files_are_refused(tmp_path):
@@ -334,7 +330,7 @@ def test_a_flipped_bit_is_noticed_or_does_no_harm(branch, saved, tmp_path_factor
     path = tmp_path_factory.mktemp("flipped") / "branch.h5"
     path.write_bytes(content)
     try:
-        loaded = load_branch(path)
+        loaded = load_branches(path)[0]
     except SystemModelError as error:
         assert str(error).startswith(f"{path}: ")
     else:
@@ -388,7 +384,7 @@ def test_places_that_cannot_be_written_are_named(branch, tmp_path):
 
 def test_what_is_not_a_name_of_a_file_is_refused(branch):
     with pytest.raises(SystemModelError, match="3 is not the name of a file"):
-        load_branch(3)
+        load_branches(3)
     for name in (3, "a\0b"):
         with pytest.raises(OutputError, match="cannot be the name of a file"):
             save(branch, name)
@@ -410,7 +406,7 @@ def test_writing_follows_a_link(branch, tmp_path):
     for _ in range(2):
         save(branch, link)
         assert link.is_symlink() and [entry.name for entry in there.iterdir()] == ["branch.h5"]
-        assert_same_branches(load_branch(link), branch)
+        assert_same_branches(load_branches(link)[0], branch)
 
 
 def test_a_link_to_where_nothing_can_be_written_is_refused_before_any_work(tmp_path):

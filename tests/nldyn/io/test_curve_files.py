@@ -24,8 +24,8 @@ from nldyn import (
     solve_orbit,
 )
 from nldyn.curves import curves
-from nldyn.io.branches import load_branch
-from nldyn.io.curves import load_curve, load_curves, save_curves
+from nldyn.io.branches import load_branches
+from nldyn.io.curves import load_curves, save_curves
 from nldyn.orbits.conditions import peak_force
 
 
@@ -81,7 +81,7 @@ def curve(request):
 def loaded(curve, tmp_path_factory):
     path = tmp_path_factory.mktemp("curves") / "curve.h5"
     save(curve, path)
-    return load_curve(path, monitor=force if curve.kind == "force" else None)
+    return load_curves(path, monitor=force if curve.kind == "force" else None)[0]
 
 
 def test_loaded_curve_has_the_unknowns_of_the_saved_one(curve, loaded):
@@ -142,7 +142,7 @@ def test_a_loaded_curve_goes_on(tmp_path):
     short = continue_in(start, Parameter("stiffness"), (1e9, 2e10), options=few)
     assert "3 points" in short.stop_reasons
     save(short, tmp_path / "short.h5")
-    longer = load_curve(tmp_path / "short.h5").extend([(1e9, 2e10)])
+    longer = load_curves(tmp_path / "short.h5")[0].extend([(1e9, 2e10)])
     assert longer.values[[0, -1], 0] == pytest.approx([1e9, 2e10], rel=1e-14)
     assert longer.stop_reasons == ("end of the range of stiffness",) * 2
 
@@ -163,7 +163,7 @@ def test_an_interrupted_curve_is_kept_and_finished(tmp_path, share):
 
     with pytest.raises(KeyboardInterrupt):
         continue_special(found, pair, ranges, progress=stop, checkpoint=CheckpointFile(path))
-    kept = load_curve(path)
+    kept = load_curves(path)[0]
     assert kept.stop_reasons == ("not finished", "not finished") and not kept.marks
     assert len(kept.points) >= len(seen) - 1
     assert (kept.points[0].arclength < 0.0) is (share > 0.5)
@@ -175,7 +175,7 @@ def test_an_interrupted_curve_is_kept_and_finished(tmp_path, share):
     assert [mark.kind for mark in done.marks] == [mark.kind for mark in whole.marks]
     for mark, other in zip(done.marks, whole.marks, strict=True):
         assert mark.values == pytest.approx(other.values, rel=1e-8)
-    again = load_curve(path)
+    again = load_curves(path)[0]
     assert np.array_equal(again.values, done.values) and again.stop_reasons == done.stop_reasons
     few = ContinuationOptions(max_points=2)
     next_flip = special(make_one_dof(), "PD", (12.0, 20.0), 20.0)
@@ -213,7 +213,7 @@ def test_an_interrupted_closed_curve_closes_where_it_began(tmp_path, monkeypatch
         continue_in(
             orbit, "frequency_hz", (11.0, 12.0), progress=stop, checkpoint=CheckpointFile(path)
         )
-    done = load_curve(path).extend([(11.0, 12.0)])
+    done = load_curves(path)[0].extend([(11.0, 12.0)])
     assert done.stop_reasons == whole.stop_reasons
     length = [curve.points[-1].arclength for curve in (done, whole)]
     assert length[0] == pytest.approx(length[1], rel=0.2)
@@ -229,21 +229,19 @@ def test_several_curves_in_one_file_and_what_is_refused(tmp_path):
     few = continue_in(solve_orbit(make_one_dof(), 26.0), "frequency_hz", (25.9, 26.1))
     save_curves(path, [few, few])
     assert [c.kind for c in load_curves(path)] == ["orbit", "orbit"]
-    with pytest.raises(SystemModelError, match="holds 2 curves; use load_curves"):
-        load_curve(path)
     with pytest.raises(SystemModelError, match="is not a file of branches"):
-        load_branch(path)
+        load_branches(path)
     with pytest.raises(SystemModelError, match="curves must be a list of curves, got 3"):
         save_curves(path, 3)
     save(curve, path)
     with pytest.raises(SystemModelError, match="a file cannot hold: pass monitor="):
-        load_curve(path)
+        load_curves(path)
     with pytest.raises(SystemModelError, match="the monitor passed is not 'force'"):
-        load_curve(path, monitor=lambda orbit: 2.0 * force(orbit))
+        load_curves(path, monitor=lambda orbit: 2.0 * force(orbit))
     with h5py.File(path, "a") as file:
         file.attrs["format_version"] = 99
     with pytest.raises(SystemModelError, match="has format version 99, written by nldyn"):
-        load_curve(path, monitor=force)
+        load_curves(path, monitor=force)
     path.write_bytes(path.read_bytes()[:3000])
     with pytest.raises(SystemModelError, match="cut off or damaged"):
-        load_curve(path)
+        load_curves(path)

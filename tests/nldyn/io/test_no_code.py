@@ -16,8 +16,8 @@ from fem.store import load_model, load_structure
 from nldyn import CheckpointFile, diagram, parameter_study
 from nldyn.app.cli import main
 from nldyn.base.resources import example
-from nldyn.io.branches import load_branch, load_branches, load_diagram, load_exploration
-from nldyn.io.curves import load_curve, load_curves
+from nldyn.io.branches import load_branches, load_diagram, load_exploration
+from nldyn.io.curves import load_curves
 from nldyn.runtime.unfinished import unfinished_path
 
 RUN_CODE = {"pickle", "_pickle", "cloudpickle", "dill", "joblib", "marshal", "shelve"}
@@ -76,7 +76,7 @@ def test_the_malicious_file_would_run_code():
 @pytest.mark.parametrize(
     "load",
     [
-        load_branch, load_branches, load_diagram, load_exploration, load_curve, load_curves,
+        load_branches, load_diagram, load_exploration, load_curves,
         load_model, load_structure, ReducedModel.load,
     ],
     ids=lambda load: load.__qualname__,

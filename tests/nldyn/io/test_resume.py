@@ -29,7 +29,7 @@ from nldyn import (
 from nldyn.branches.arclength import Stepper
 from nldyn.branches.checkpoint import Checkpoint
 from nldyn.branches.endings import Ending
-from nldyn.io.branches import load_branch, load_branches
+from nldyn.io.branches import load_branches
 from nldyn.runtime import keeper
 from nldyn.runtime.result_directory import OutputError
 
@@ -83,7 +83,7 @@ def test_a_run_stopped_after_some_points_goes_on_as_if_uninterrupted(start, whol
     part = continue_branch(start, RANGE_HZ, options=ContinuationOptions(max_points=count), at=AT)
     assert len(part.nodes) < len(whole.nodes)
     save(part, tmp_path / "part.h5")
-    loaded = load_branch(tmp_path / "part.h5")
+    loaded = load_branches(tmp_path / "part.h5")[0]
     assert_same_branches(continue_branch(loaded, options=ContinuationOptions()), whole)
 
 
@@ -91,7 +91,9 @@ def test_a_run_stopped_after_some_points_goes_on_as_if_uninterrupted(start, whol
 def test_a_wider_range_gives_the_points_of_one_continuation(start, whole, tmp_path, range_hz):
     part = continue_branch(start, range_hz)
     save(part, tmp_path / "part.h5")
-    assert_same_branches(continue_branch(load_branch(tmp_path / "part.h5"), RANGE_HZ, at=AT), whole)
+    assert_same_branches(
+        continue_branch(load_branches(tmp_path / "part.h5")[0], RANGE_HZ, at=AT), whole
+    )
 
 
 def test_extension_in_many_small_pieces(start, whole):
@@ -157,20 +159,20 @@ def test_an_interrupted_run_loses_nothing(start, whole, tmp_path, count):
             checkpoint=CheckpointFile(path),
         )
     if count:
-        part = load_branch(path)
+        part = load_branches(path)[0]
         assert len(part.nodes) >= count - 1
         assert Ending.NOT_FINISHED.value in part.stop_reasons
         assert_same_branches(continue_branch(part), whole)
     again = continue_branch(start, RANGE_HZ, at=AT, checkpoint=CheckpointFile(path))
     assert_same_branches(again, whole)
-    assert_same_branches(load_branch(path), whole)
+    assert_same_branches(load_branches(path)[0], whole)
 
 
 def test_points_known_are_not_computed_again(start, tmp_path):
     path = tmp_path / "run.h5"
     with pytest.raises(RuntimeError):
         continue_branch(start, (20.0, 40.0), progress=stopper(60), checkpoint=CheckpointFile(path))
-    known = len(load_branch(path).nodes)
+    known = len(load_branches(path)[0].nodes)
     seen = []
     branch = continue_branch(
         start, (20.0, 40.0), progress=seen.append, checkpoint=CheckpointFile(path)
@@ -194,7 +196,7 @@ def test_every_checkpoint_on_the_way_goes_on_to_the_same_branch(
     for number, content in enumerate(kept[::5]):
         file = tmp_path / f"{number}.h5"
         file.write_bytes(content)
-        assert_same_branches(continue_branch(load_branch(file)), branch)
+        assert_same_branches(continue_branch(load_branches(file)[0]), branch)
 
 
 KILLED = """
@@ -219,7 +221,7 @@ def test_a_killed_run_goes_on(start, whole, tmp_path):
         [sys.executable, "-c", KILLED], cwd=tmp_path, env={**os.environ, "PYTHONPATH": folders}
     )
     assert run.returncode == -signal.SIGKILL
-    part = load_branch(tmp_path / "run.h5")
+    part = load_branches(tmp_path / "run.h5")[0]
     assert len(part.nodes) == 25
     assert_same_branches(continue_branch(part, at=AT), whole)
 
@@ -234,13 +236,13 @@ def test_an_interrupted_extension_goes_on(start, whole, tmp_path):
             continue_branch(
                 part, RANGE_HZ, at=AT, progress=stopper(30), checkpoint=CheckpointFile(path)
             )
-        assert len(load_branch(path).nodes) > len(part.nodes)
+        assert len(load_branches(path)[0].nodes) > len(part.nodes)
         seen = []
         longer = continue_branch(
             part, RANGE_HZ, at=AT, progress=seen.append, checkpoint=CheckpointFile(path)
         )
         assert_same_branches(longer, whole)
-        assert_same_branches(load_branch(path), whole)
+        assert_same_branches(load_branches(path)[0], whole)
         assert len(seen) < len(whole.nodes) - len(part.nodes) - 20
 
 
@@ -321,7 +323,7 @@ def test_a_continuation_begun_at_a_fold_goes_on(whole, tmp_path, often):
     path = tmp_path / "branch.h5"
     with pytest.raises(RuntimeError):
         continue_branch(fold.orbit, range_hz, progress=stopper(5), checkpoint=CheckpointFile(path))
-    assert len(load_branch(path).nodes) >= 5
+    assert len(load_branches(path)[0].nodes) >= 5
     resumed = continue_branch(fold.orbit, range_hz, checkpoint=CheckpointFile(path))
     assert_same_branches(resumed, continue_branch(fold.orbit, range_hz))
 
