@@ -71,21 +71,38 @@ class _Entry(_Compiler):
         return result
 
 
-_INNER: Any = {
-    "error_model": "numpy",
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-    "pipeline_class": _Inner,
-}
 _jit: Any = numba.njit  # its stubs lack the options that spare what only Python callers need
+
+
+def _kernel(**options: bool) -> Any:
+    """Decorator of a kernel that other kernels call; it is compiled once for all constants."""
+    compiled = _jit(
+        error_model="numpy",
+        no_cpython_wrapper=True,
+        no_cfunc_wrapper=True,
+        pipeline_class=_Inner,
+        **options,
+    )
+
+    def decorate(function: Any) -> Any:
+        kernel = compiled(function)
+        template = kernel.get_call_template
+        kernel.get_call_template = lambda arguments, named: template(
+            tuple(map(types.unliteral, arguments)), named
+        )
+        return kernel
+
+    return decorate
+
+
 njit: Any = partial(_jit, pipeline_class=_Entry)
 # a kernel that Python calls
 entry = resting_on(njit(cache=True, nogil=True, error_model="numpy"), *FILES)
 # Kernels that are called by other kernels only. They make no arrays, nor call what does: so
 # references need not be counted, which would cost as much time as what they compute.
-inner = _jit(**_INNER, _nrt=False)
+inner = _kernel(_nrt=False)
 # such as make arrays, or call what does
-allocating = _jit(**_INNER)
+allocating = _kernel()
 # those with one caller, as part of its text
 inlined = _jit(error_model="numpy", inline="always")
 
