@@ -269,7 +269,7 @@ def test_what_makes_no_sense_is_refused(changes, words):
 def test_a_rigid_stop_has_no_stiffness_and_an_elastic_one_no_restitution():
     system = ball(0.5).with_elements(stops=(RigidStop("ball", 0.5), Stop("ball", 1.0)))
     for name, index in (("stiffness", 0), ("restitution", 1)):
-        with pytest.raises(SystemModelError, match=f"it has no {name}"):
+        with pytest.raises(SystemModelError, match=f"without {name}"):
             FlowMap(system).shoot(
                 np.zeros((1, 2)), PERIOD, 1.0, parameters=[Parameter(name, index)]
             )
