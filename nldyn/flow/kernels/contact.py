@@ -274,8 +274,9 @@ def growth_of_panel(fl, tab, panel):
                 if top > 0.0:
                     strain = max(strain, legendre_tail(tab, panel.slope, o) / (4.0 * top))
             top = largest(panel.F, a)
+            rounding = 20.0 * panel.depth[1, a] * largest(panel.slope, a)
             if top > 0.0:
-                strain = max(strain, legendre_tail(tab, panel.F, a) / top)
+                strain = max(strain, (legendre_tail(tab, panel.F, a) - rounding) / top)
     growth = 0.9 * (fl.tail / strain) ** (1.0 / (m - 1))
     return min(max(growth, 0.5), 1.6)
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from nldyn.flow.kernels.compiling import allocating, inner
-from nldyn.flow.kernels.law import is_rigid, singular_slope
+from nldyn.flow.kernels.law import is_bond, is_rigid, singular_slope
 from nldyn.flow.kernels.layout import (
     DECAY,
     EXPONENT,
@@ -140,9 +140,11 @@ def resolved(fl, tab, kind, h, noise, panel):
             goal *= SHARP_TAIL
         floor = 20.0 * noise[a] / deepest
         tail = max(goal * fl.tail / forced[a], floor)
-        shake = 0.0  # of the force by the rounding of the rate
+        shake = 0.0  # of the force by rounding: terms of a bond cancel where it is at rest
+        if is_bond(fl, panel.active[a]):
+            shake = 20.0 * noise[a] * largest(panel.slope, a)
         if o < na < slopes.shape[0]:
-            shake = 20.0 * noise[na + a] * largest(panel.slope, na + a)
+            shake += 20.0 * noise[na + a] * largest(panel.slope, na + a)
         if o < na and legendre_tail(tab, panel.F, a) > tail * largest(panel.F, a) + shake:
             return False
         shake *= fl.stops[panel.active[a], EXPONENT] / deepest * largest(tab.slope, kind)

@@ -261,3 +261,12 @@ def test_both_wells_hold_an_orbit_and_a_motion_settles_in_one():
     assert means[0] < -0.5
     assert means[0] == pytest.approx(-means[-1], abs=1e-8)
     assert nldyn.classify(system, 1.0 / (2.0 * math.pi)).kind == "periodic"
+
+
+def test_a_motion_comes_to_rest_where_the_terms_of_a_force_cancel():
+    system = one(0.0, 0.2, 0.0, springs=[WELLS])
+    motion = nldyn.simulate(system, 0.15, periods=200, start=np.array([0.5, 0.3]))
+    assert not motion.failure
+    displacement, velocity = motion.states([motion.end_time])[0]
+    assert abs(displacement) == pytest.approx(1.0, rel=1e-14)
+    assert abs(velocity) < 1e-14
