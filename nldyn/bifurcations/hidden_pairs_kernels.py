@@ -5,51 +5,59 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
-from nldyn.flow.kernels import compiling
-from nldyn.flow.kernels.compiling import njit
-from nldyn.orbits import multiplier_tests, periodic_schur
+from nldyn.base.arrays import Real
+from nldyn.flow.kernels.compiling import inner, njit
+from nldyn.orbits import multiplier_tests
 from nldyn.orbits.multiplier_tests import number_outside, travel
 from nldyn.orbits.periodic_schur import product_eigenvalues
 from nldyn.runtime.kernel_cache import resting_on
 
-_files = (multiplier_tests.__file__, periodic_schur.__file__)
-inner = resting_on(compiling.inner, *_files)
-compiled = resting_on(njit(cache=True, error_model="numpy"), *_files)
+compiled = resting_on(njit(cache=True, error_model="numpy"), multiplier_tests.__file__)
 
 
 @compiled
-def interpolated(jacobians, places, first, last, sigmas):
-    """Multipliers (m, n) at positions (m,) between the Jacobians (p, k, n, n) of p orbits.
+def jacobians_between(jacobians, places, first, last, sigmas):
+    """Jacobians (m, k, n, n) at positions (m,) between those (p, k, n, n) of p orbits.
 
-    Those from first up to last are taken, a polynomial for each segment, and then the product.
+    Those from first up to last are taken, a polynomial for each segment.
     """
-    k, n = jacobians.shape[1:3]
-    found = np.empty((sigmas.size, n), dtype=np.complex128)
+    found = np.zeros((sigmas.size, *jacobians.shape[1:]))
     for at in range(sigmas.size):
-        pieces = np.zeros((k, n, n))
         for i in range(first, last):
             weight = 1.0
             for j in range(first, last):
                 if j != i:
                     weight *= (sigmas[at] - places[j]) / (places[i] - places[j])
-            pieces += weight * jacobians[i]
-        found[at] = product_eigenvalues(pieces)[0]
+            found[at] += weight * jacobians[i]
     return found
 
 
-@compiled
-def error_half_way(jacobians, places, first, middle):
+def interpolated(
+    jacobians: Real, places: Real, first: int, last: int, sigmas: Real
+) -> NDArray[np.complex128]:
+    """Multipliers (m, n) of those Jacobians: they themselves are not smooth where they meet.
+
+    In Python: the eigenvalues would be compiled once more for each kernel that needs them.
+    """
+    between = jacobians_between(jacobians, places, first, last, sigmas)
+    return np.array([product_eigenvalues(pieces)[0] for pieces in between])
+
+
+def error_half_way(
+    jacobians: Real, places: Real, first: int, middle: NDArray[np.complex128]
+) -> float:
     """How far the multipliers near the circle move where an orbit is left out.
 
     They are those half-way between the places first and first + 1.
     """
     sigmas = np.array([0.5])
     if places.size == 3:
-        return travel(middle, interpolated(jacobians, places, first, first + 2, sigmas)[0])
+        return float(travel(middle, interpolated(jacobians, places, first, first + 2, sigmas)[0]))
     left = interpolated(jacobians, places, 0, 3, sigmas)[0]
     right = interpolated(jacobians, places, 1, 4, sigmas)[0]
-    return max(travel(middle, left), travel(middle, right))
+    return float(max(travel(middle, left), travel(middle, right)))
 
 
 @compiled
