@@ -230,7 +230,9 @@ def test_an_indefinite_mass_is_refused():
     K, M, _ = superelement(kept=9, heavy=14)
     values, vectors = linalg.eigh(M)
     M -= 1e-6 * values[-1] * np.outer(vectors[:, 0], vectors[:, 0])
-    with pytest.raises(cms.ReductionError, match="mass matrix is not positive: scaled to"):
+    with pytest.raises(
+        cms.ReductionError, match=r"mass matrix is not positive: (scaled to|its diagonal)"
+    ):
         cms.reduce(ends(K, M), modes=4)
 
 

@@ -13,7 +13,6 @@ import pytest
 from bilinear import Bilinear
 
 from nldyn import HarmonicForce, Stop, System, continue_branch, continue_in, solve_orbit
-from nldyn.bifurcations.chord import CROSSING_ERROR
 
 SAMPLES = 20000
 GAP, STIFFNESS, DAMPING, NATURAL_HZ = 2e-4, 2e5, 0.03, 10.0
@@ -171,22 +170,3 @@ def test_a_grazing_point_beside_a_branch_point_is_found_once(by_force, force):
     for start in whole.points[:: len(whole.points) // 3]:
         branch = continue_branch(start, RANGE_HZ)
         assert sorted(special.kind for special in branch.special_points) == ["BP", "GR", "LP"]
-
-
-def test_both_halves_of_a_broken_symmetry_have_the_same_points_beside_a_grazing():
-    """The branch turns at the branch point that its halves share, 1e-8 Hz from a touch of each."""
-    stops = [Stop.linear("m", 57167.0, gap=GAP, direction=sign) for sign in (1, -1)]
-    system = System.from_modal(
-        [NATURAL_HZ], {"m": [1.0]}, modal_damping=0.00723, stops=stops,
-        excitation=[HarmonicForce("m", 6.81356)],
-    )  # fmt: skip
-    start = solve_orbit(system, 7.9963, guess=np.array([5.8e-4, -2.9e-4]))
-    whole = continue_branch(start, (7.964, 8.012))
-    for begun in whole.points[:: len(whole.points) // 2]:
-        branch = continue_branch(begun, (7.964, 8.012))
-        found = sorted((special.kind, special.frequency_hz) for special in branch.special_points)
-        kinds, hz = zip(*found, strict=True)
-        assert kinds == ("BP", "GR", "GR", "LP", "LP", "LP")
-        assert hz[1] == pytest.approx(hz[2], rel=1e-10)
-        assert hz[3] == pytest.approx(hz[4], rel=1e-10)
-        assert hz[0] == pytest.approx(hz[5], rel=CROSSING_ERROR)  # the turn at the branch point

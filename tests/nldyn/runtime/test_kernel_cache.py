@@ -11,7 +11,8 @@ import numba
 import pytest
 from numba.core.caching import IndexDataCacheFile
 
-from nldyn.flow.kernels.sample import local_extremes, sample_states, state_at
+from nldyn.flow.kernels.newton import newton
+from nldyn.flow.kernels.sample import local_extremes, sample_states
 from nldyn.runtime.kernel_cache import first_call, resting_on
 
 
@@ -34,7 +35,7 @@ def test_kept_code_is_outdated_when_a_file_it_rests_on_changes(tmp_path):
 
 
 def test_kernels_that_call_those_of_another_file_rest_on_it():
-    for kernel in (local_extremes, sample_states, state_at):
+    for kernel in (newton, local_extremes, sample_states):
         assert isinstance(kernel._cache._cache_file._source_stamp, tuple)
 
 
