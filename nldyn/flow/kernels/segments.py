@@ -283,9 +283,8 @@ def run_pieces(
     # 1.6e-11 periods of the excitation or of the fastest mode, but more than rounding of the time
     shortest = max(1e-10 / max(fastest, fl.omega), 1e-15 * duration)
     t = 0.0
-    start_switch = 1 if duration < 0.0 else 0  # written so that one version is compiled, not two
+    start_switch = 0
     skips = np.zeros(n_stops)
-    flight, none = (FLIGHT, -1) if duration >= 0.0 else (0, 0)  # as above
     w_end = np.empty(w.size)
     # penetrations that are carried from panel to panel, and their rounding errors
     depth, doubt = np.zeros(n_stops), np.full(n_stops, np.inf)
@@ -309,14 +308,14 @@ def run_pieces(
             else:
                 doubt[s] = np.inf
         if n_active == 0:
-            first, stop = remain, none
+            first, stop = remain, -1
             for s in range(n_stops):
                 at = closing_time(fl, s, w, here, skips[s], first, shortest)
                 if at < 0.0:
                     return TOO_MANY_STEPS
                 if at < first:
                     first, stop = at, s
-            if recording and record_piece(fl, rec, before, here, first, flight, stop, w) < 0:
+            if recording and record_piece(fl, rec, before, here, first, FLIGHT, stop, w) < 0:
                 return RECORD_FULL
             fly_state(fl.blocks, w, first)
             if with_columns:
