@@ -322,7 +322,11 @@ def report(
 @mesh_option
 @json_option
 def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
-    """Check a scene, and print the modes of its structure."""
+    """Check a scene, and print the modes of its structure.
+
+    Tells what was read of the mesh, the static flexibility of each interface, and the stops. It
+    compiles nothing and takes a second or two.
+    """
     with plain_errors():
         import cms
         import fem
@@ -589,7 +593,11 @@ def render(
     quiet: bool,
     jobs: int,
 ) -> None:
-    """Draw mode shapes, deepest contact and one period in motion of a scene with a mesh."""
+    """Draw mode shapes, deepest contact and one period in motion of a scene with a mesh.
+
+    Writes modes.csv, pictures, an animation, and the pages mode_shapes.html and
+    deepest_contact.html for a browser. DIR may be that of a run.
+    """
     if period != 1 and frequency_hz is None:
         raise click.UsageError("'--period' needs '--frequency-hz'")
     with plain_errors():
@@ -677,7 +685,10 @@ def converge(
     quiet: bool,
     jobs: int,
 ) -> None:
-    """Compute the harmonic branch with more and more modes, and compare."""
+    """Compute the harmonic branch with more and more modes, and compare.
+
+    Also by several methods, or on several meshes.
+    """
     with plain_errors():
         from nldyn.runtime.progress import progress_line
         from nldyn.runtime.result_directory import check_directory

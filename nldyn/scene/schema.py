@@ -1,8 +1,8 @@
 """What may stand in a scene file: one class per table, one attribute per key.
 
-Every key is described with its unit and its default in ``docs/reference/scene.md``. A class here
-checks what can be judged inside one table; what joins two tables is checked in
-``nldyn.scene.checks``.
+The docstring of a key begins with its unit in square brackets; `nldyn.scene.reference` makes the
+tables of ``docs/reference/scene.md`` of them. A class here checks what can be judged inside one
+table; what joins two tables is checked in ``nldyn.scene.checks``.
 """
 
 from __future__ import annotations
@@ -59,14 +59,37 @@ class MeshTable(Table):
     """``[mesh]``: the file of the finite element mesh."""
 
     file: str
+    """Mesh: Gmsh `.msh`, VTK `.vtu` or `.vtk`, MED `.med`, universal `.unv`, Abaqus or CalculiX
+    `.inp`, solids of Nastran `.bdf`. A path that is not absolute is relative to the folder of
+    the scene file; where it may lead is [told below](#a-scene-is-data)."""
     model: Literal["frame", "structure"] = "frame"
+    """`"frame"`: the lines of the mesh are a frame in a plane z = constant. `"structure"`:
+    solids, shells and beams in space or in the plane, see [structures.md](structures.md)."""
     mirror: str | None = None
+    """Of a frame: point on the plane of symmetry of a half model. `nldyn render` then draws the
+    whole structure; nothing else changes."""
     parts_from_file: list[str] = []
+    """Names of parts whose material and section are taken from an Abaqus or CalculiX file, see
+    [decks.md](decks.md); they are not in `[parts]`."""
     unit: Literal["m", "cm", "mm", "inch"] = "m"
+    """Unit of the lengths in the file: `"m"`, `"cm"`, `"mm"` or `"inch"`. It must be given
+    where the file states another one than m. Everything else, in the scene and in all output,
+    is SI. Not for files whose masses, springs or parts are taken over."""
     ignore: list[str] = []
+    """Cells to leave out by name: groups, kinds of cells such as `"quad"`, element types of
+    Abaqus such as `"S4R"`, or `"ungrouped"` for the cells in no group. `nldyn check` tells how
+    many."""
     merge: bool | Positive = False
+    """[m] Of a structure: make nodes at one place one node; `true` for within 1e-9 of the size
+    of the mesh, or a distance. `nldyn check` tells how many and how far apart they were.
+    Springs between nodes that become one are refused."""
     separate: bool = False
+    """Nodes at one place that nothing joins, and cells that lie against each other without the
+    same nodes, are meant. Else pieces that touch so and cells that hang are refused, and slits
+    within a piece told."""
     pinned: list[str] = []
+    """Of a structure: names of parts that are meant to meet solids in nodes or edges, about
+    which they turn. Of others `nldyn check` tells."""
 
     @model_validator(mode="after")
     def _one_mesh(self) -> MeshTable:
@@ -82,7 +105,10 @@ class PlaceTable(Table):
     """``[places.NAME]``: a point set by coordinates or by a box, where the mesh has no name."""
 
     at: Triple | None = None
+    """[m] Place [x, y, z] of one node, to within 1e-6 of the size of the mesh; or:"""
     box: Annotated[list[Triple], Field(min_length=2, max_length=2)] | None = None
+    """[m] The corners [[x, y, z], [x, y, z]] with the lowest and the highest coordinates: all
+    nodes inside."""
 
     @model_validator(mode="after")
     def _one_way(self) -> PlaceTable:
@@ -94,30 +120,63 @@ class PartTable(Table):
     """``[parts.NAME]``: material of one part of the mesh, and what it is: a beam, a shell, ..."""
 
     kind: Literal["beam", "truss", "solid", "shell"] = "beam"
+    """`"beam"`, `"truss"`, or in a structure `"solid"` or `"shell"`."""
     youngs_modulus: Positive
+    """[N/m²] Young's modulus."""
     density: Positive
+    """[kg/m³] Density."""
     poissons_ratio: Annotated[float, Field(gt=-1, lt=0.5)] | None = None
+    """Poisson's ratio, above -1 and below 0.5. Solids, shells, Timoshenko beams and beams of a
+    structure need it."""
     plane: Literal["stress", "strain"] | None = None
+    """Of a solid of triangles or quadrilaterals: `"stress"` or `"strain"`."""
     thickness: Positive | None = None
+    """[m] Of a solid in the plane, or of a shell."""
     width: Positive | None = None
+    """[m] Width of a rectangle, normal to the plane of the frame."""
     height: Positive | None = None
+    """[m] Height of a rectangle, in the plane of the frame."""
     diameter: Positive | None = None
+    """[m] Outer diameter of a round section."""
     bore: Positive | None = None
+    """[m] Inner diameter of a tube."""
     taper: Annotated[list[str], Field(min_length=2, max_length=2)] | None = None
+    """The two points of the mesh between which the section changes, `["from", "to"]`: from
+    `width`, `height`, `diameter` and `bore` to the following ones, linearly on the straight way
+    between the points."""
     width_end: Positive | None = None
+    """[m] Width at the end of the taper; as at its start if left out."""
     height_end: Positive | None = None
+    """[m] Height there."""
     diameter_end: Positive | None = None
+    """[m] Outer diameter there."""
     bore_end: NotNegative | None = None
+    """[m] Inner diameter there."""
     area: Positive | None = None
+    """[m²] Area of a general section, or of a truss."""
     second_moment: Positive | None = None
+    """[m⁴] Second moment of area of a general section, for bending in the plane (along the
+    height)."""
     second_moment_across: Positive | None = None
+    """[m⁴] Second moment of area of a general section, for bending along the width."""
     torsion_constant: Positive | None = None
+    """[m⁴] Saint-Venant's torsion constant of a general section."""
     shear_area: Positive | None = None
+    """[m²] Area that carries shear along the height, of a general section of a Timoshenko beam."""
     shear_area_across: Positive | None = None
+    """[m²] The same along the width."""
     theory: Literal["euler-bernoulli", "timoshenko"] | None = None
+    """`"euler-bernoulli"` (as if left out), or `"timoshenko"` with shear deformation and rotary
+    inertia."""
     axial_force: Number | None = None
+    """[N] Preload of a beam, positive for tension."""
     orientation: Triple | None = None
+    """In a structure: direction (x, y, z) of the section's height. If left out, the height lies
+    in planes z = constant; along z, all but round bars need it."""
     offset: Number | Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
+    """[m] In a structure: place of the beam's axis (along the height, along the width) as seen
+    from the line of the mesh. Of a shell one number: place of its middle surface along the
+    normal as seen from the nodes, about which they run anticlockwise."""
 
     @field_validator("offset", mode="before")
     @classmethod
@@ -198,18 +257,27 @@ class SupportTable(Table):
     """``[[supports]]``: directions in which the nodes of a point set cannot move."""
 
     at: str
+    """Point of the mesh, or a set of points, all of which are held."""
     fixed: Annotated[list[Direction], Field(min_length=1)]
+    """List of directions that cannot move there. In a frame all three clamp the point; `["x",
+    "rotation"]` is symmetry about a line along y. Of a solid `["x", "y", "z"]` clamps a face
+    and `["x"]` is symmetry."""
 
 
 class PointMassTable(Table):
     """``[[point_masses]]``: a lumped mass at a point set."""
 
     at: str
+    """Point of the mesh."""
     mass: NotNegative
+    """[kg] Lumped mass, 0 or more."""
     rotary_inertia: (
         NotNegative | Annotated[list[NotNegative], Field(min_length=3, max_length=3)]
     ) = 0.0
+    """[kg m²] Moment of inertia about the centre of mass: about the normal of the plane; in a
+    structure about all axes, or a list of three, about x, y and z."""
     offset: Triple | None = None
+    """[m] In a structure: place (x, y, z) of the centre of mass as seen from the point."""
 
     @field_validator("rotary_inertia", mode="before")
     @classmethod
@@ -229,12 +297,20 @@ class SpringTable(Table):
     """``[[springs]]``: a spring at an interface or, with a direction, at a point of the mesh."""
 
     at: str
+    """Interface or, with a `direction`, point of the mesh."""
     direction: Direction | None = None
+    """Direction of a spring of the mesh: from the point to the ground, and reduced with the
+    mesh."""
     stiffness: Number | None = None
+    """[N/m, N m/rad] Stiffness: above 0 with a `direction`; else a negative one must leave the
+    structure stable."""
     coefficients: Annotated[list[Number], Field(min_length=1, max_length=LARGEST_DEGREE)] | None = (
         None
     )
+    """[N/m^j] Of a nonlinear spring at an interface, instead of `stiffness`: F = k₁u + k₂u² +
+    ..., up to nine, of either sign."""
     against: str | None = None
+    """Interface at the other end; the ground unless given."""
 
     @model_validator(mode="after")
     def _one_kind(self) -> SpringTable:
@@ -257,41 +333,61 @@ class HingeTable(Table):
     """``[[hinges]]``: a rotary joint, at which one part keeps a rotation of its own."""
 
     at: str
+    """Point of the mesh where parts meet."""
     part: str
+    """Part that is hinged there: it keeps a rotation of its own."""
 
 
 class CouplingTable(Table):
     """``[[couplings]]``: joins the nodes of a face to a point."""
 
     at: str
+    """Name of the point: one of the mesh, or a new one."""
     face: str
+    """Face whose nodes are joined to it."""
     kind: Literal["rigid", "averaging"] = "rigid"
+    """`"rigid"`: the face moves with the point as one rigid body. `"averaging"`: the point
+    moves with the face in the mean and does not stiffen it."""
     place: Triple | None = None
+    """[m] Coordinates (x, y, z) of a new point; if left out, the centre of the face."""
     directions: Annotated[list[Literal["x", "y", "z"]], Field(min_length=1)] = ["x", "y", "z"]
+    """Of a rigid coupling: the translations of the face that follow the point."""
 
 
 class FoundationTable(Table):
     """``[[foundations]]``: an elastic foundation under a face, an edge or a beam."""
 
     at: str
+    """Face of solids, edge of solids in the plane, or part of beams."""
     stiffness: Annotated[list[NotNegative], Field(min_length=3, max_length=3)]
+    """[N/m³, N/m²] Along x, y and z: per area of a face, or per length of an edge or a beam."""
 
 
 class InterfaceTable(Table):
     """``[interfaces.NAME]``: a point and direction where something acts or is observed."""
 
     at: str
+    """Point of the mesh."""
     direction: Direction
+    """A direction."""
 
 
 class ReductionTable(Table):
     """``[reduction]``: which modes of the mesh's model are kept."""
 
     modes: Annotated[int, Field(ge=0)] | None = None
+    """Number of free-interface modes, lowest first."""
     cutoff_hz: Frequency | None = None
+    """[Hz] Keep the modes up to this frequency."""
     tolerance: Annotated[float, Field(ge=1e-6, lt=1.0)] | None = None
+    """Choose the modes: leaving the others out changes the harmonic response over the range of
+    the continuation by at most this share, from 1e-6 to below 1; see
+    [reduction_studies.md](../how-to/reduction_studies.md)."""
     residual: bool = True
+    """`false` is short for `method = "truncation"`."""
     method: Literal["rubin", "craig-bampton", "guyan", "truncation"] = "rubin"
+    """`"rubin"`, `"craig-bampton"`, `"guyan"` (takes none of these three) or `"truncation"`;
+    see [cms.md](cms.md)."""
 
     @model_validator(mode="after")
     def _one_choice(self) -> ReductionTable:
@@ -311,17 +407,26 @@ class ModalTable(Table):
     """``[modal]``: a structure given by its modes instead of a mesh."""
 
     frequencies_hz: Annotated[list[ModeFrequency], Field(min_length=1)]
+    """[Hz] List of the modes' frequencies."""
     participation: Annotated[dict[str, list[Number]], Field(min_length=1)]
+    """[1/√kg] `participation.NAME = [...]`: displacement of each mode at interface NAME. A mode
+    with modal mass m if scaled to 1 at the interface has the participation 1/√m."""
     loads: dict[str, list[Number]] = {}
+    """[√kg] `loads.NAME = [...]`: modal force of what acts on the whole structure, as a weight
+    does: Φᵀ M r."""
 
 
 class PlaceOfMatrices(Table):
-    """``interfaces.NAME`` of matrices: a row, rows with weights, or a node and its direction."""
+    """``[matrices.interfaces.NAME]``: a row, rows with weights, or a node and its direction."""
 
     row: Annotated[int, Field(ge=1)] | None = None
+    """The row of the load vector that is 1; rows are counted from 1."""
     rows: dict[str, Number] | None = None
+    """Some rows with their weights: `rows = {12 = 1.0, 40 = -1.0}`."""
     node: Annotated[int, Field(ge=1)] | None = None
+    """A node of files that tell nodes; it needs `direction`."""
     direction: Literal["x", "y", "z", "rotation_x", "rotation_y", "rotation_z"] | None = None
+    """In which the node is moved."""
 
     @field_validator("rows")
     @classmethod
@@ -361,22 +466,38 @@ class MatricesTable(Table):
     """``[matrices]``: a structure given by its matrices instead of a mesh."""
 
     mass: RowsOrFile
+    """[kg] Mass matrix, symmetric and positive definite: a list of rows, or a file."""
     stiffness: RowsOrFile
+    """[N/m] Stiffness matrix, symmetric: a list of rows, or a file."""
     damping: RowsOrFile | None = None
+    """[N s/m] Damping matrix, symmetric; adds to the modal damping."""
     gyroscopic: RowsOrFile | None = None
+    """[N s/m] Skew matrix, typed in or a file, that adds to the damping: of a rotor at one
+    speed, which does not change with the excitation. A `[reduction]` projects it on its modes;
+    it needs `modes` or `cutoff_hz`."""
     circulatory: RowsOrFile | None = None
+    """[N/m] Skew matrix, typed in or a file, that adds to the stiffness: the cross-coupling of
+    bearings and seals. A stiffness K without symmetry is (K + Kᵀ)/2 and this, (K − Kᵀ)/2."""
     interfaces: Annotated[dict[str, VectorOrPlace], Field(min_length=1)]
+    """`interfaces.NAME = ...`: load vector of interface NAME. Its displacement is the product
+    of this vector with the coordinates."""
     loads: dict[str, VectorOrPlace] = {}
+    """[kg] `loads.NAME = ...`: load vector M r of a weight or a moving base along r."""
 
 
 class DampingTable(Table):
     """``[damping]``: the damping ratio of the modes, one number or one per mode; Rayleigh's."""
 
     modal_ratio: float | list[float] = 0.0
+    """Damping ratio of the modes, from 0 to below 1: one number for all, or a list with one per
+    mode of the reduced model (residual modes are modes of it)."""
     rayleigh_mass: NotNegative = 0.0
+    """[1/s] With a `[reduction]`: Rayleigh's damping, this times the mass matrix. It adds to
+    that of the modes."""
     rayleigh_stiffness: NotNegative = 0.0
+    """[s] The same with the stiffness matrix."""
 
-    @field_validator("modal_ratio", mode="plain")
+    @field_validator("modal_ratio", mode="before")
     @classmethod
     def _ratios(cls, value: Any) -> float | list[float]:
         numbers = value if isinstance(value, list) else [value]
@@ -398,9 +519,13 @@ class DamperTable(Table):
     """``[[dampers]]``: a damper between an interface and the ground or another one."""
 
     at: str
+    """Interface."""
     coefficient: NotNegative
+    """[N s/m] Coefficient c, 0 or more; above 0 in N s³/m³ or N s/m³ for the other laws."""
     law: Literal["linear", "cubic", "displacement"] = "linear"
+    """`"linear"`, `"cubic"` for the force c u'³, or `"displacement"` for c u² u'."""
     against: str | None = None
+    """Interface at the other end; the ground unless given."""
 
     @model_validator(mode="after")
     def _two_ends(self) -> DamperTable:
@@ -414,20 +539,42 @@ class StopTable(Table):
     """``[[stops]]``: an elastic or rigid stop that an interface hits."""
 
     at: str
+    """Interface that hits the stop."""
     law: Literal["hertz", "linear", "rigid"] = "hertz"
+    """`"hertz"`, `"linear"` for a one-sided spring, or `"rigid"` for
+    [impacts](../how-to/rigid_stops.md) that take no time."""
     stiffness: Positive | None = None
+    """[N/m^exponent] Stiffness, above 0. Needed unless `radius` is given."""
     exponent: Annotated[float, Field(ge=1, le=LARGEST_EXPONENT)] | None = None
+    """Exponent of the law `"hertz"`, from 1 to 4; 1.5 unless given."""
     radius: Positive | None = None
+    """[m] Radius of a sphere against a plane of the same material, instead of `stiffness`."""
     youngs_modulus: Positive | None = None
+    """[N/m²] Young's modulus that goes with `radius`."""
     poissons_ratio: Annotated[float, Field(gt=-1, le=0.5)] | None = None
+    """Poisson's ratio that goes with `radius`; 0.3 unless given."""
     gap: Number = 0.0
+    """[m] Clearance at rest. A negative gap is a preload: the stop presses on the structure at
+    rest; a rigid one has none."""
     dissipation: NotNegative | None = None
+    """[s/m] Loss of the contact (Hunt and Crossley): it grows with the penetration, 0 or more;
+    none unless given."""
     dashpot: NotNegative = 0.0
+    """[N s/m] Dashpot parallel to the spring (Kelvin and Voigt): the force jumps at the
+    contact, and pulls at its end."""
     pulls: bool = True
+    """`false`: the force of a linear stop with a dashpot is never negative; it lets go where it
+    would pull."""
     restitution: Annotated[float, Field(ge=0, le=1)] | None = None
+    """Coefficient of restitution from 0 to 1: of a rigid stop, which needs it; of an elastic
+    one instead of `dissipation`, above 0, that of a free body that hits the stop."""
     impact_speed: Positive | None = None
+    """[m/s] Speed at which `restitution` holds; slower impacts lose less."""
     direction: Literal[1, -1] = 1
+    """`1` if positive displacements close the gap, `-1` if negative ones do."""
     against: str | None = None
+    """Another interface that carries the stop, so that the relative displacement counts; the
+    ground unless given."""
 
     @field_validator("direction", mode="before")
     @classmethod
@@ -495,17 +642,32 @@ class ExcitationTable(Table):
     """``[[excitation]]``: what moves the structure, by its kind."""
 
     kind: Literal["unbalance", "harmonic", "constant", "measured", "weight", "base"]
+    """One of those above."""
     at: str | None = None
+    """Interface, or a name in `loads` of `[matrices]` or `[modal]`."""
     mass_times_radius: Positive | None = None
+    """[kg m] Unbalanced mass times its radius."""
     amplitude: Positive | None = None
+    """[N; m, m/s or m/s² of a base] Amplitude."""
     force: Number | None = None
+    """[N] Constant force."""
     phase_deg: Annotated[Number, Field(ge=-LARGEST_PHASE, le=LARGEST_PHASE)] | None = None
+    """[degrees] Phase, up to 1e6 either way; 0 unless given."""
     harmonic: Annotated[int, Field(ge=1, le=MOST_HARMONIC)] | None = None
+    """Multiple m of the frequency, a whole number up to 1000; 1 unless given. Where half orders
+    act, the frequency is that of the whole cycle."""
     file: str | None = None
+    """Samples at 0, T/n, ..., (n − 1) T/n, beside the scene; `#` begins a remark. What the
+    harmonics leave out is told."""
     harmonics: Annotated[int, Field(ge=1, le=MOST_HARMONIC)] | None = None
+    """How many harmonics of a measured force are taken; 20 unless given."""
     acceleration: Annotated[list[Number], Field(min_length=2, max_length=3)] | None = None
+    """[m/s²] Of the weight: `[0.0, -9.81]` in a plane frame, three components else."""
     direction: Literal["x", "y", "z"] | None = None
+    """`"x"`, `"y"` or `"z"` of a moving base."""
     quantity: Literal["displacement", "velocity", "acceleration"] | None = None
+    """What of a base keeps its amplitude at every frequency: `"displacement"`, `"velocity"` or
+    `"acceleration"`; the first unless given."""
 
     @model_validator(mode="after")
     def _complete(self) -> ExcitationTable:
@@ -538,17 +700,31 @@ class ObserveTable(Table):
     """``[observe]``: the interface whose displacement is reported and drawn."""
 
     at: str
+    """Interface whose displacement is tabulated and drawn. Without the table it is the first
+    interface."""
 
 
 class ContinuationTable(Table):
     """``[continuation]``: which branches of periodic orbits are followed, and how far."""
 
     range_hz: list[Frequency]
+    """[Hz] Lowest and highest excitation frequency."""
     periods: Annotated[list[Period], Field(min_length=1)] = [1, 2, 3]
+    """Periods of the orbits to look for, in periods of the excitation: 1 is the harmonic
+    branch, 3 the 1/3 subharmonics."""
     follow_doublings: Annotated[int, Field(ge=0, le=10)] = 0
+    """How many more (up to 10) doublings to follow at the flips of branches whose doubled
+    period is beyond `periods`: with 1 also the 1/4 subharmonics born from the 1/2 ones, with 2
+    the 1/8 ones, and so on."""
     search_points: Annotated[int, Field(ge=1, le=1000)] = 12
+    """Number of frequencies (up to 1000), spread over the range, at which time simulations look
+    for orbits."""
     max_step: Annotated[float, Field(ge=0.01, le=1.0)] = 0.05
+    """Longest step along a branch, relative: at 0.05 orbit or frequency change by 5 %. Shorter
+    steps (down to 0.01) give smoother curves and take longer."""
     rtol: Annotated[float, Field(ge=1e-13, le=1e-2)] = 1e-9
+    """Relative error to aim at in the motion over a period, 1e-13 to 1e-2; multipliers are
+    about ten times less exact."""
 
     @field_validator("range_hz")
     @classmethod
@@ -573,26 +749,55 @@ class SeedTable(Table):
     """``[[subharmonics]]``: where to look for the start of a branch by time simulation."""
 
     period: Period
+    """Period of the orbits, in periods of the excitation."""
     near_hz: Frequency
+    """[Hz] Excitation frequency to look at."""
 
 
 class ExploreTable(Table):
     """``[explore]``: find all branches without naming places to look at."""
 
     max_period: Period = 8
+    """Longest orbits wanted, in periods of the excitation."""
     spacing: Annotated[float, Field(ge=1e-6, le=0.5)] = 0.005
+    """Largest relative distance of the frequencies at which motions are simulated, up to 0.5.
+    What is stable in a narrower window only may be missed."""
     starts: Annotated[int, Field(ge=1, le=1000)] = 12
+    """Random initial states at each of them (up to 1000), beside the motions carried over from
+    the frequency before."""
     rounds: Annotated[int, Field(ge=1, le=1000)] = 1
+    """Most searches through the range, each from other random states at frequencies between
+    those before; one that finds no new branch is the last. With two or more the report
+    estimates how many branches are missing."""
     settling: Annotated[int, Field(ge=1, le=10_000_000)] = 50000
+    """Most periods of the excitation that a motion gets to settle. It gets four decay times of
+    the slowest mode, and where this key cuts that, a line says so."""
     unstable_period: Annotated[int, Field(ge=0, le=100)] = 3
+    """Longest unstable orbits looked for by near returns and deflation; 0 for none."""
     doubled_period: Period = 1
+    """Longest orbits followed from flips, where that is longer than `max_period`."""
     doubled_points: Annotated[int, Field(ge=2, le=1_000_000)] | None = None
+    """Most points in one direction of branches longer in period than `max_period`; those that
+    are broken off are noted."""
     passing: Annotated[int, Field(ge=0, le=1000)] = 0
+    """Further random states at each frequency (up to 1000), whose motions are followed for 60
+    periods only: beside them unstable orbits are looked for."""
     pseudo_orbits: Annotated[int, Field(ge=0, le=1_000_000)] = 10
+    """Most closed sequences (up to 1 000 000) of pieces of known orbits, of each length up to
+    `unstable_period`, beside which [orbits are looked for](../how-to/exploring.md) at each
+    frequency on the way down."""
     mixtures: Annotated[int, Field(ge=0, le=1_000_000)] = 10
+    """Mixtures (up to 1 000 000) of two known orbits, of each length up to `unstable_period`,
+    beside which [orbits are looked for](../how-to/exploring.md) at each frequency on the way
+    down."""
     walks: Annotated[int, Field(ge=0, le=1_000_000)] = 10
+    """Most closed walks (up to 1 000 000) among random states, of each length up to
+    `unstable_period`, beside which [orbits are looked for](../how-to/exploring.md) at each
+    frequency on the way down."""
     walk_states: Annotated[int, Field(ge=1, le=100_000)] = 500
+    """How many random states (up to 100 000) these walks are among."""
     seed: Annotated[int, Field(ge=0, le=2**32)] = 20
+    """Seed of the random initial states."""
 
 
 class Scene(Table):
@@ -610,6 +815,7 @@ class Scene(Table):
     """
 
     title: str = ""
+    """Title of the diagram."""
     mesh: MeshTable | None = None
     places: dict[str, PlaceTable] = {}
     parts: dict[str, PartTable] = {}

@@ -9,9 +9,11 @@ import pytest
 from nldyn.base.resources import example, examples
 from nldyn.scene.messages import all_keys, table_at
 from nldyn.scene.read import load_scene, parse_scene
-from nldyn.scene.schema import Scene
+from nldyn.scene.reference import with_tables
+from nldyn.scene.schema import PlaceOfMatrices, Scene
 
 DOC = (Path(__file__).parents[3] / "docs" / "reference" / "scene.md").read_text(encoding="utf-8")
+LOAD_VECTOR = {f"matrices.interfaces.NAME.{key}" for key in PlaceOfMatrices.model_fields}
 
 
 def documented():
@@ -21,9 +23,9 @@ def documented():
         if line.startswith("#"):
             heading = re.search(r"`\[+([\w.]+)\]+`", line)
             table = heading.group(1) + "." if heading else ""
-        row = re.fullmatch(r"\| `(\w+)` \|(.*?)\|(.*?)\|(.*)\|", line)
+        row = re.fullmatch(r"\| `(\w+)` \|.*?\|.*?\|(.*?)\|(.*)\|", line)
         if row:
-            rows[table + row.group(1)] = (row.group(3).strip(), row.group(4).strip())
+            rows[table + row.group(1)] = (row.group(2).strip(), row.group(3).strip())
     return rows
 
 
@@ -42,8 +44,26 @@ def field(key):
     return table_at(Scene, tuple(path)).model_fields[name]
 
 
+def test_the_tables_are_what_the_schema_says():
+    assert with_tables(DOC) == DOC, "python -m nldyn.scene.reference docs/reference/scene.md"
+
+
 def test_every_key_is_documented_and_no_other():
-    assert set(documented()) == set(schema_keys())
+    assert set(documented()) == set(schema_keys()) | LOAD_VECTOR
+
+
+def test_types_and_units_are_those_of_the_schema():
+    begins = {
+        tuple(cell.strip() for cell in row.split("|")[1:4])
+        for row in DOC.splitlines()
+        if row.startswith("| `")
+    }
+    assert begins >= {
+        ("`youngs_modulus`", "number above 0", "N/m²"),
+        ("`exponent`", "number from 1 to 4", ""),
+        ("`box`", "list of 2 lists of 3 numbers", "m"),
+        ("`law`", '`"hertz"`, `"linear"`, `"rigid"`', ""),
+    }
 
 
 @pytest.mark.parametrize("key", schema_keys())

@@ -1,0 +1,150 @@
+"""The tables of keys in the reference of the scene file, made from the schema.
+
+``python -m nldyn.scene.reference docs/reference/scene.md`` writes them anew. What stands between
+them is written by hand.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import json
+import re
+import sys
+from collections.abc import Mapping
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from nldyn.scene import schema
+
+HEAD = "| key | type | unit | default | meaning |\n|---|---|---|---|---|\n"
+TABLE = re.compile(r"^\| key \|.*\n(?:\|.*\n)+", flags=re.M)
+NAME = re.compile(r"`\[+([\w.]+)\]+`")
+KINDS = {"string": "text", "number": "number", "integer": "whole number", "boolean": "true, false"}
+BOUNDS = (
+    ("above", ("exclusiveMinimum", "gt")),
+    ("from", ("minimum", "ge")),
+    ("below", ("exclusiveMaximum", "lt")),
+    ("to", ("maximum", "le")),
+)
+
+
+def tables() -> dict[str, type[schema.Table]]:
+    """The tables of a scene by the names that their docstrings begin with; "" is its top.
+
+    Examples
+    --------
+    >>> tables()["stops"].__name__
+    'StopTable'
+    """
+    named = {
+        found[1]: table
+        for table in schema.Table.__subclasses__()
+        if (found := NAME.search(table.__doc__ or ""))
+    }
+    return {"": schema.Scene, **named}
+
+
+@cache
+def meanings() -> dict[str, dict[str, str]]:
+    """What stands below each key in the schema, by the names of classes and keys."""
+    classes = [c for c in ast.parse(inspect.getsource(schema)).body if isinstance(c, ast.ClassDef)]
+    return {
+        table.name: {
+            key.target.id: " ".join(below.value.value.split())
+            for key, below in pairwise(table.body)
+            if isinstance(key, ast.AnnAssign)
+            and isinstance(key.target, ast.Name)
+            and isinstance(below, ast.Expr)
+            and isinstance(below.value, ast.Constant)
+            and isinstance(below.value.value, str)
+        }
+        for table in classes
+    }
+
+
+def keys_table(table: type[schema.Table]) -> str:
+    """Keys of a table with type, unit, default and meaning, as Markdown."""
+    told = table.model_json_schema()
+    required = told.get("required", ())
+    return HEAD + "".join(
+        row(name, told["properties"][name], name in required, meaning)
+        for name, meaning in meanings()[table.__name__].items()
+    )
+
+
+def row(name: str, said: Mapping[str, Any], required: bool, meaning: str) -> str:
+    """One key; its meaning begins with its unit in square brackets, if it has one."""
+    found = re.fullmatch(r"(?:\[([^]]*)\] )?(.*)", meaning)
+    assert found is not None
+    default = "" if required else default_text(said["default"])
+    cells = [f"`{name}`", type_text(said), found[1], default, found[2]]
+    return "|" + "|".join(f" {cell} " if cell else " " for cell in cells) + "|\n"
+
+
+def default_text(value: object) -> str:
+    """A default as it would stand in a scene."""
+    return "none" if value is None else f"`{json.dumps(value)}`"
+
+
+def type_text(said: Mapping[str, Any]) -> str:
+    """What JSON Schema says of a value, in words.
+
+    Examples
+    --------
+    >>> type_text({"type": "integer", "minimum": 1, "maximum": 100})
+    'whole number from 1 to 100'
+    >>> type_text({"anyOf": [{"type": "number", "gt": 0}, {"type": "null"}]})
+    'number above 0'
+    >>> type_text({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2})
+    'list of 2 numbers'
+    """
+    options = said.get("anyOf") or said.get("oneOf")
+    if options:
+        return " or ".join(type_text(o) for o in options if o.get("type") != "null")
+    if "enum" in said:
+        return ", ".join(f"`{json.dumps(value)}`" for value in said["enum"])
+    if "const" in said:
+        return f"`{json.dumps(said['const'])}`"
+    if "$ref" in said or said.get("type") == "object":
+        inner = said.get("additionalProperties")
+        return f"table of {several(inner)}" if inner else "table"
+    if said.get("type") == "array":
+        return f"list of {how_many(said)}{several(said['items'])}"
+    return KINDS[said["type"]] + bounds(said)
+
+
+def several(said: Mapping[str, Any]) -> str:
+    """The type of the entries of a list, in the plural."""
+    return re.sub(r"^(text|number|whole number|list)\b", r"\1s", type_text(said))
+
+
+def how_many(said: Mapping[str, Any]) -> str:
+    """How many entries a list has, if that is bounded."""
+    least, most = said.get("minItems", 0), said.get("maxItems")
+    return "" if most is None else f"{most} " if least == most else f"{least} to {most} "
+
+
+def bounds(said: Mapping[str, Any]) -> str:
+    """The bounds of a number."""
+    known = [(word, said[name]) for word, names in BOUNDS for name in names if name in said]
+    return "".join(f" {word} {value:g}" for word, value in known)
+
+
+def with_tables(page: str) -> str:
+    """The page with the tables of keys made anew; the heading above each names its table."""
+    known = tables()
+
+    def made(found: re.Match[str]) -> str:
+        heading = re.findall(r"^#+ .*$", page[: found.start()], flags=re.M)[-1]
+        named = NAME.search(heading)
+        return keys_table(known[named[1] if named else ""])
+
+    return TABLE.sub(made, page)
+
+
+if __name__ == "__main__":
+    target = Path(sys.argv[1])
+    target.write_text(with_tables(target.read_text(encoding="utf-8")), encoding="utf-8")
