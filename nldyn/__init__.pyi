@@ -35,6 +35,7 @@ from nldyn.flow.options import FlowOptions as FlowOptions
 
 # io
 from nldyn.io.checkpoint import CheckpointFile as CheckpointFile
+from nldyn.io.history_files import write_history as write_history
 from nldyn.io.store import load as load
 from nldyn.io.store import save as save
 
@@ -62,6 +63,7 @@ from nldyn.longterm.wear import spectra_map as spectra_map
 # orbits
 from nldyn.orbits.harmonics import Harmonics as Harmonics
 from nldyn.orbits.harmonics import harmonics as harmonics
+from nldyn.orbits.history import History as History
 from nldyn.orbits.multipliers import Stability as Stability
 from nldyn.orbits.orbit import Orbit as Orbit
 from nldyn.orbits.solve import solve_orbit as solve_orbit

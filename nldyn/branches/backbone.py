@@ -24,6 +24,7 @@ from nldyn.base.errors import (
     check_whole,
     is_finite,
 )
+from nldyn.base.optional import optional
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.orbits.newton import spread
 from nldyn.orbits.orbit import Orbit, check_observe
@@ -108,9 +109,7 @@ class Backbone:
 
     def to_pandas(self) -> pandas.DataFrame:
         """Frequency, energy, amplitude, impacts, stability and error of each orbit."""
-        import pandas
-
-        return pandas.DataFrame(
+        return optional("pandas", "to_pandas").DataFrame(
             {
                 "frequency_hz": self.frequency_hz,
                 "energy_j": self.energy,

@@ -260,10 +260,14 @@ class Branch:
 
     def to_xarray(self, part: Part = "points") -> xarray.Dataset:
         """As `table`, with the Floquet multipliers, as a Dataset over ``point`` (needs xarray)."""
-        size = self.nodes[0].orbit.problem.size
-        multipliers = np.array([point.orbit.multipliers for point in self._part(part)])
         about = {"branch": self.name, "stop_reasons": list(self.stop_reasons)}
-        return to_xarray(self.table(part), multipliers.reshape(-1, size), about)
+        return to_xarray(self.table(part), self.multipliers(part), about)
+
+    def multipliers(self, part: Part = "points") -> NDArray[np.complex128]:
+        """Floquet multipliers (k, 2n) of the orbits of a `table`."""
+        size = self.nodes[0].orbit.problem.size
+        found = [point.orbit.multipliers for point in self._part(part)]
+        return np.array(found, dtype=complex).reshape(-1, size)
 
     def contains(self, orbit: Orbit) -> bool:
         """Whether the branch passes through an orbit (up to a shift by whole periods)."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.base.errors import SystemModelError
+from nldyn.base.optional import optional
 from nldyn.base.version import software_version
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.orbits.orbit import Orbit
@@ -111,11 +111,7 @@ def special_columns(
 
 def to_pandas(columns: Mapping[str, NDArray[Any]], about: Mapping[str, Any]) -> pandas.DataFrame:
     """Give columns as a DataFrame, with what they are about as its attributes."""
-    try:
-        import pandas
-    except ImportError:
-        raise SystemModelError("to_pandas needs pandas, which is not installed") from None
-    frame = pandas.DataFrame(columns)
+    frame = optional("pandas", "to_pandas").DataFrame(columns)
     frame.index.name = "point"
     frame.attrs = {**about, "software": f"nldyn {software_version()}"}
     return frame
@@ -127,16 +123,13 @@ def to_xarray(
     about: Mapping[str, Any],
 ) -> xarray.Dataset:
     """Give columns and multipliers (n, 2n_modes) as a Dataset over ``point``."""
-    try:
-        import xarray
-    except ImportError:
-        raise SystemModelError("to_xarray needs xarray, which is not installed") from None
     data = {
         name: ("point", column, {"units": UNITS[name]} if name in UNITS else {})
         for name, column in columns.items()
     }
-    return xarray.Dataset(
+    made: xarray.Dataset = optional("xarray", "to_xarray").Dataset(
         {**data, "multipliers": (("point", "multiplier"), multipliers, {"units": "1"})},
         coords={"point": np.arange(len(multipliers))},
         attrs={**about, "software": f"nldyn {software_version()}"},
     )
+    return made

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, check_whole
+from nldyn.base.optional import optional
 from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.rigid import rigid_impacts
 from nldyn.longterm.simulation import Motion, end_state, motion_of
@@ -92,9 +93,7 @@ class Impacts:
 
     def to_pandas(self) -> pandas.DataFrame:
         """The impacts as a table; its attribute ``attrs["units"]`` has the units."""
-        import pandas
-
-        frame = pandas.DataFrame(self.columns())
+        frame = optional("pandas", "to_pandas").DataFrame(self.columns())
         frame.attrs["units"] = dict(UNITS)
         return frame
 

@@ -23,8 +23,9 @@ from nldyn.base.errors import (
 )
 from nldyn.flow.flow_map import FlowMap, Trajectory, flow_of
 from nldyn.flow.rigid import rest_forces
+from nldyn.orbits.history import History
 from nldyn.orbits.newton import check_bounded
-from nldyn.orbits.orbit import History, Orbit, check_observe, history_of
+from nldyn.orbits.orbit import Orbit, check_observe, history_of
 from nldyn.runtime.executors import check_execution, values_of
 from nldyn.system.system import System
 

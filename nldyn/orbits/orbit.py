@@ -14,6 +14,7 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_types, check_whole, numbers
 from nldyn.flow.flow_map import FlowError, FlowMap, Solution, Trajectory, chain
 from nldyn.flow.rigid import rest_forces, rigid_impacts
+from nldyn.orbits.history import History
 from nldyn.orbits.multipliers import (
     COARSE,
     MOST_PARTS,
@@ -60,37 +61,6 @@ class Extremes:
             return "<Extremes: none>"
         low, high = self.values.min(), self.values.max()
         return f"<Extremes: {self.values.size} from {low:.4g} to {high:.4g} m>"
-
-
-@dataclass(frozen=True, eq=False)
-class History:
-    """A motion sampled in time.
-
-    Parameters
-    ----------
-    time : (k,)
-        Time in s from forcing phase zero.
-    modal : (k, n)
-        Modal displacements q.
-    modal_velocity : (k, n)
-        Modal velocities.
-    displacement : dict of str to (k,)
-        Displacement of each interface in m.
-    penetration, force : (k, n_stops)
-        Penetration (m, negative when open) and contact force (N) of each stop.
-    """
-
-    time: Real
-    modal: Real
-    modal_velocity: Real
-    displacement: dict[str, Real]
-    penetration: Real
-    force: Real
-
-    def __repr__(self) -> str:
-        """One line: samples, duration, interfaces."""
-        names = ", ".join(map(repr, self.displacement)) or "no interface"
-        return f"<History: {self.time.size} samples up to {self.time[-1]:.4g} s of {names}>"
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,10 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nldyn.base.errors import (
     ConvergenceError,
@@ -39,6 +40,7 @@ from nldyn.branches.continuation import (
 )
 from nldyn.branches.endings import Ending
 from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.tables import Part, to_pandas, to_xarray
 from nldyn.flow.ahead import Ahead, Task, computing_ahead
 from nldyn.flow.flow_map import FlowMap, flow_of, same_flow
 from nldyn.orbits.orbit import Orbit, check_observe, minimal_period, stroboscopic
@@ -55,6 +57,10 @@ from nldyn.runtime.progress import Progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.search.outlook import Outlook
 from nldyn.system.system import System
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 Found = tuple[tuple[str, ...], dict[int, list[Orbit]]]  # failures, and orbits by their periods
 
@@ -121,6 +127,38 @@ class Diagram:
     def of_period(self, period: int) -> list[Branch]:
         """Branches of one period multiple."""
         return [b for b in self.branches if b.period == period]
+
+    def table(self, part: Part = "points") -> dict[str, NDArray[Any]]:
+        """Columns of numbers, one row per orbit, of all branches: see `Branch.table`.
+
+        The first column has the name of the branch.
+
+        Raises
+        ------
+        SystemModelError
+            For an unknown part, or if there is no branch.
+        """
+        if not self.branches:
+            raise SystemModelError("table: the diagram has no branch")
+        tables = [branch.table(part) for branch in self.branches]
+        rows = [table["period"].size for table in tables]
+        names = np.repeat([branch.name for branch in self.branches], rows)
+        columns = {key: np.concatenate([table[key] for table in tables]) for key in tables[0]}
+        return {"branch": names, **columns}
+
+    def to_pandas(self, part: Part = "points") -> pandas.DataFrame:
+        """As `table`, as a DataFrame (needs pandas)."""
+        return to_pandas(self.table(part), self._about)
+
+    def to_xarray(self, part: Part = "points") -> xarray.Dataset:
+        """As `table`, with the Floquet multipliers, as a Dataset over ``point`` (needs xarray)."""
+        table = self.table(part)
+        multipliers = np.concatenate([branch.multipliers(part) for branch in self.branches])
+        return to_xarray(table, multipliers, self._about)
+
+    @property
+    def _about(self) -> dict[str, Any]:
+        return {"range_hz": self.range_hz, "observe": self.observe, "notes": list(self.notes)}
 
 
 def check_known(known: Diagram, flow: FlowMap) -> None:

@@ -109,6 +109,7 @@ def test_example_of_the_branches_prints_what_it_says(capsys, tmp_path, monkeypat
         "harmonic.h5",
         "harmonic.png",
         "force.png",
+        "peak.csv",
     }
 
 

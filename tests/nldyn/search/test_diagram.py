@@ -15,6 +15,7 @@ from nldyn import (
     ContinuationOptions,
     ConvergenceError,
     Damper,
+    Diagram,
     FlowMap,
     SearchOptions,
     Seed,
@@ -234,3 +235,21 @@ def test_stop_that_nothing_touches_is_told():
     assert note.startswith("no orbit that touches a stop was found")
     pressed = two_modes_before_a_gap(-1e-5)
     assert diagram(pressed, (90.0, 91.0), [1], search_points=1).notes == ()
+
+
+def test_a_diagram_as_one_table(harmonic_branch):
+    """Rows of all branches below each other, in pandas and xarray."""
+    pytest.importorskip("pandas")
+    pytest.importorskip("xarray")
+    other = dataclasses.replace(harmonic_branch, name="again")
+    whole = Diagram((harmonic_branch, other), (5.0, 90.0), "middle", ("a note",))
+    frame, data = whole.to_pandas("special_points"), whole.to_xarray()
+    table = harmonic_branch.table("special_points")
+    assert list(frame.columns) == ["branch", *table]
+    assert frame[frame["branch"] == "again"]["frequency_hz"].tolist() == [*table["frequency_hz"]]
+    assert frame.attrs["observe"] == data.attrs["observe"] == "middle"
+    count = len(harmonic_branch.nodes)
+    assert data.sizes["point"] == 2 * count
+    assert np.array_equal(data["multipliers"][count:], data["multipliers"][:count])
+    with pytest.raises(SystemModelError, match="the diagram has no branch"):
+        Diagram((), (5.0, 90.0), "middle").to_xarray()
