@@ -332,7 +332,14 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
         import fem
         from nldyn.base.errors import SystemModelError
         from nldyn.runtime.progress import messages_shown
-        from nldyn.scene.build import build_any, build_candidates, build_reduced, build_system
+        from nldyn.scene.build import (
+            build_any,
+            build_candidates,
+            build_parts,
+            build_reduced,
+            build_system,
+            join,
+        )
         from nldyn.scene.checks import check_computable, range_remark
         from nldyn.scene.faults import told_as
         from nldyn.scene.read import load_scene
@@ -346,6 +353,9 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
                 reduced = candidates.reduced()
             elif component is not None:
                 reduced = build_reduced(loaded, component)
+            parts = {"": component} if component is not None else build_parts(loaded)
+            if loaded.components:
+                reduced = join(loaded, parts)
             system = build_system(loaded, reduced)
             with told_as(loaded, (), SystemModelError):
                 at_rest = describe_rest(system)
@@ -360,7 +370,7 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
                 {
                     "scene": str(scene),
                     "title": loaded.title,
-                    "degrees_of_freedom": None if component is None else component.mass.shape[0],
+                    "degrees_of_freedom": sum(p.mass.shape[0] for p in parts.values()) or None,
                     "mass_kg": table.mass,
                     "modes": table.as_json(),
                     "static_flexibility_m_per_n": {
@@ -372,10 +382,13 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
                 }
             )
             return
-        if isinstance(component, cms.Matrices):
-            click.echo(f"matrices of {component.mass.shape[0]} degrees of freedom")
-        elif component is not None:
-            click.echo(fem.summary(component))
+        for name, part in parts.items():
+            if name:
+                click.echo(f"component '{name}':")
+            if isinstance(part, cms.Matrices):
+                click.echo(f"matrices of {part.mass.shape[0]} degrees of freedom")
+            else:
+                click.echo(fem.summary(part))
         described = describe_system(system, 0 if reduced is None else reduced.residual_modes)
         click.echo("\n".join([described, *at_rest]))
         check_computable(loaded, scene)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 from nldyn.base.errors import SystemModelError
 from nldyn.branches.backbone import Backbone, backbone
 from nldyn.scene.build import build_reduced, build_system
 from nldyn.scene.faults import told_as
-from nldyn.scene.schema import DampingTable, Scene
+from nldyn.scene.schema import DampingTable, Scene, StructureTables
 
+Given = TypeVar("Given", bound=StructureTables)
 BEGIN = 1e-3  # smallest amplitude, relative to the largest
 
 
@@ -27,9 +30,17 @@ def undamped(scene: Scene) -> Scene:
         "dampers": [],
         "excitation": [e for e in scene.excitation if e.kind in ("constant", "weight")],
     }
-    if scene.matrices is not None:
-        changed["matrices"] = scene.matrices.model_copy(update={"damping": None})
-    return scene.model_copy(update=changed)
+    changed["components"] = {name: _without_damping(c) for name, c in scene.components.items()}
+    return _without_damping(scene).model_copy(update=changed)
+
+
+def _without_damping(tables: Given) -> Given:
+    """A structure without the damping matrix that may come with its others."""
+    if tables.matrices is None:
+        return tables
+    return tables.model_copy(
+        update={"matrices": tables.matrices.model_copy(update={"damping": None})}
+    )
 
 
 def backbone_of(scene: Scene, amplitude_m: float, mode: int = 1) -> Backbone:

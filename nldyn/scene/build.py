@@ -5,10 +5,13 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
 
 import cms
 import fem
+from nldyn.base.arrays import Real
 from nldyn.base.errors import LARGEST_DENSE, ConvergenceError, SystemModelError
 from nldyn.reduction.candidates import Candidates, candidate_modes
 from nldyn.reduction.load_case import system_of_reduced
@@ -16,7 +19,7 @@ from nldyn.runtime.progress import Progress
 from nldyn.scene.checks import check_ratio_count
 from nldyn.scene.component import build_component
 from nldyn.scene.elements import Acting, acting_elements
-from nldyn.scene.faults import told_as
+from nldyn.scene.faults import told_as, within_component
 from nldyn.scene.load_case import load_case_of
 from nldyn.scene.matrices import build_matrices, skew_matrices
 from nldyn.scene.messages import scene_error
@@ -50,9 +53,9 @@ class Structure:
     Parameters
     ----------
     component : fem.Component, fem.StructureComponent or cms.Matrices, optional
-        None where the scene gives modes, or matrices that are not reduced.
+        None where the scene gives modes, several components, or matrices that are not reduced.
     reduced : cms.ReducedModel, optional
-        None with it.
+        None where nothing is reduced.
     """
 
     component: AnyComponent | None = None
@@ -69,6 +72,8 @@ def build_structure(scene: Scene, progress: Progress | None = None) -> Structure
     >>> build_structure(load_scene(example("one_dof.toml")))
     Structure(component=None, reduced=None)
     """
+    if scene.components:
+        return Structure(None, build_reduced(scene))
     if scene.reduction is None:
         return Structure()
     component = build_any(scene)
@@ -85,7 +90,7 @@ def build_reduced(
     Parameters
     ----------
     scene : Scene
-        A scene with a ``[mesh]`` or ``[matrices]``, and a ``[reduction]``.
+        A scene with a ``[mesh]`` or ``[matrices]``, and a ``[reduction]``, or one with components.
     component : optional
         What `build_any` gave for this scene, if it is at hand.
     progress : callable, optional
@@ -109,9 +114,12 @@ def build_reduced(
     >>> len(reduced.frequencies_hz)
     2
     """
+    if scene.components:
+        return join(scene)
     component = component or build_any(scene)
     table = scene.reduction
-    assert table is not None
+    if table is None:
+        return _unreduced_model(scene, component)
     if table.tolerance is not None:
         selection = build_selection(scene, component, progress)
         logger.info(selection.report())
@@ -135,6 +143,80 @@ def build_reduced(
             numbers = ", ".join(map(str, reduced.unseen_modes))
             logger.info(f"kept modes that no interface can see: {numbers}; they change nothing")
         return reduced
+
+
+def _unreduced_model(scene: Scene, component: AnyComponent) -> cms.ReducedModel:
+    """All modes of a component of matrices that are small enough."""
+    rows = component.mass.shape[0]
+    _check_small(scene, rows)
+    with told_as(scene, ("matrices",), cms.ReductionError):
+        return cms.reduce(component, modes=rows)
+
+
+def _check_small(scene: Scene, rows: int) -> None:
+    if rows > LARGEST_DENSE:
+        fault = f"is missing: matrices of {rows} rows, more than {LARGEST_DENSE}, must be reduced"
+        raise scene_error(scene.file, ("reduction",), f"{fault}, as by modes = 10")
+
+
+def build_parts(scene: Scene) -> dict[str, AnyComponent]:
+    """The components of a scene by name, before they are reduced and joined.
+
+    Raises
+    ------
+    SceneError
+        As `build_any`, with the name of the component.
+    """
+    parts = {}
+    for name, part in scene.component_scenes.items():
+        with within_component(scene, name):
+            parts[name] = build_any(part)
+    return parts
+
+
+def join(scene: Scene, parts: Mapping[str, AnyComponent] | None = None) -> cms.ReducedModel:
+    """Reduce the components of a scene, each by itself, and join them.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with ``[components]``.
+    parts : mapping, optional
+        What `build_parts` gave for this scene, if it is at hand.
+
+    Returns
+    -------
+    cms.ReducedModel
+        Its interfaces are named "component.interface".
+
+    Raises
+    ------
+    SceneError
+        As `build_reduced`, and if the joints leave nothing that moves.
+    """
+    parts = parts or build_parts(scene)
+    models = {}
+    for name, part in scene.component_scenes.items():
+        with within_component(scene, name):
+            models[name] = build_reduced(part, parts[name])
+    joints = [
+        cms.Joint(place(joint.at), None if joint.against is None else place(joint.against))
+        for joint in scene.joints
+    ]
+    with told_as(scene, ("joints",), cms.ReductionError):
+        return cms.couple(models, joints)
+
+
+def place(interface: str) -> tuple[str, str]:
+    """Component and interface that "component.interface" names.
+
+    Examples
+    --------
+    >>> place("arm.tip")
+    ('arm', 'tip')
+    """
+    component, _, name = interface.partition(".")
+    return component, name
 
 
 def build_candidates(scene: Scene, component: AnyComponent | None = None) -> Candidates:
@@ -228,7 +310,7 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
         acting = acting_elements(scene)
         ratio = scene.damping.modal_ratio
         rayleigh = scene.damping.rayleigh
-        if any(rayleigh) and scene.reduction is None:
+        if any(rayleigh) and scene.reduction is None and not scene.components:
             fault = "has Rayleigh's damping, which needs a [reduction]"
             raise scene_error(scene.file, ("damping",), fault)
         if scene.modal is not None:
@@ -246,8 +328,9 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
             return _unreduced(scene, build_matrices(scene), acting)
         reduced = reduced or build_reduced(scene)
         check_ratio_count(scene, len(reduced.frequencies_hz), scene.file)
-        skew = {} if scene.matrices is None else skew_matrices(scene, reduced.basis.shape[0])
-        projected = {name: reduced.basis.T @ (A @ reduced.basis) for name, A in skew.items()}
+        projected = _projected_skew(scene, reduced)
+        if scene.components:
+            _check_held(scene, reduced)
         return system_of_reduced(
             reduced,
             scene.observed,
@@ -258,13 +341,45 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
         )
 
 
+def _check_held(scene: Scene, reduced: cms.ReducedModel) -> None:
+    """Refuse what nothing holds: rigid-body motions that no spring and no stop feels."""
+    rigid = reduced.frequencies_hz == 0.0
+    ends = [(stop.at, stop.against) for stop in scene.stops]
+    ends += [(spring.at, spring.against) for spring in scene.interface_springs.values()]
+    felt = np.array([_stretch(reduced, *pair)[rigid] for pair in ends])
+    count = np.count_nonzero(rigid)
+    loose = count - (np.linalg.matrix_rank(felt) if felt.size else 0)
+    if loose > 0:
+        motions = "motion" if loose == 1 else "motions"
+        fault = f"float: {loose} rigid-body {motions} of the whole, which no support, joint, spring"
+        raise scene_error(scene.file, ("components",), f"{fault} or stop holds")
+
+
+def _stretch(reduced: cms.ReducedModel, at: str, against: str | None) -> Real:
+    """How each mode moves an interface, as seen from another one or from the ground."""
+    moved = reduced.participation[at]
+    return moved if against is None else moved - reduced.participation[against]
+
+
+def _projected_skew(scene: Scene, reduced: cms.ReducedModel) -> dict[str, Any]:
+    """The skew matrices of a scene, or of all its components, on the modes of the whole."""
+    total: dict[str, Any] = {}
+    rows = dict(reduced.components) or {"": (0, reduced.basis.shape[0])}
+    parts = scene.component_scenes or {"": scene}
+    for component, part in parts.items():
+        basis = reduced.basis[slice(*rows[component])]
+        with within_component(scene, component):
+            skew = {} if part.matrices is None else skew_matrices(part, basis.shape[0])
+        for name, A in skew.items():
+            total[name] = total.get(name, 0.0) + basis.T @ (A @ basis)
+    return total
+
+
 def _unreduced(scene: Scene, component: cms.Matrices, acting: Acting) -> System:
     """The system of matrices that are small enough as they are."""
     assert scene.matrices is not None
     rows = component.mass.shape[0]
-    if rows > LARGEST_DENSE:
-        fault = f"is missing: matrices of {rows} rows, more than {LARGEST_DENSE}, must be reduced"
-        raise scene_error(scene.file, ("reduction",), f"{fault}, as by modes = 10")
+    _check_small(scene, rows)
     check_ratio_count(scene, rows, scene.file)
     loads = {name: component.interfaces[name] for name in component.load_vectors}
     interfaces = {name: v for name, v in component.interfaces.items() if name not in loads}

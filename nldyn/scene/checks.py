@@ -61,6 +61,8 @@ def check_scene(scene: Scene, file: Path) -> None:
     _check_structure(scene, report)
     _check_modal(scene, report)
     _check_matrices(scene, report)
+    _check_components(scene, file)
+    _check_joints(scene, report)
     _check_interface_names(scene, report)
     _check_seeds(scene, report)
     _check_explore(scene, report)
@@ -189,14 +191,18 @@ def _check_name(key: KeyPath, name: str, report: Report) -> None:
 
 
 def _check_structure(scene: Scene, report: Report) -> None:
-    kinds = [kind for kind in ("mesh", "modal", "matrices") if getattr(scene, kind) is not None]
+    every = ("mesh", "modal", "matrices", "components")
+    kinds = [kind for kind in every if getattr(scene, kind)]
     if not kinds:
-        raise report((), "gives no structure; it needs one of [mesh], [modal] and [matrices]")
+        wanted = "one of [mesh], [modal], [matrices] and [components.NAME]"
+        raise report((), f"gives no structure; it needs {wanted}")
     if len(kinds) > 1:
         raise report((kinds[1],), f"cannot stand beside [{kinds[0]}]; keep one of them")
     if scene.mesh is None:
         for key in MESH_ONLY:
             given = scene.mesh_springs if key == "springs" else getattr(scene, key)
+            if given and kinds[0] == "components":
+                raise report((key,), f"must be in a component, as [components.NAME.{key}]")
             if given and (key, kinds[0]) != ("reduction", "matrices"):
                 raise report(
                     (key,), f"describes a mesh, but the structure is given by [{kinds[0]}]"
@@ -220,6 +226,64 @@ def _check_structure(scene: Scene, report: Report) -> None:
         if part.kind in ("solid", "shell"):
             fault = f"'{part.kind}' needs [mesh] with model = 'structure'"
             raise report(("parts", name, "kind"), fault)
+
+
+def _check_components(scene: Scene, file: Path) -> None:
+    """Check each component as a structure of its own, and its names."""
+    for name, part in scene.component_scenes.items():
+        here: KeyPath = ("components", name)
+
+        def report(key: KeyPath, fault: str, here: KeyPath = here) -> SceneError:
+            return scene_error(file, (*here, *key), fault)
+
+        _check_name((), name, report)
+        if "." in name:
+            raise report((), "must be a name without a dot")
+        _check_names(part, report)
+        if part.mesh is None and part.matrices is None:
+            raise report((), "gives no structure; it needs a [mesh] or [matrices] of its own")
+        _check_structure(part, report)
+        _check_matrices(part, report)
+        if part.reduction is not None and part.reduction.tolerance is not None:
+            fault = "is for a single component; give 'modes' or 'cutoff_hz'"
+            raise report(("reduction", "tolerance"), fault)
+        for number, spring in part.interface_springs.items():
+            fault = f"acts at an interface: give it in [[springs]] of the scene, at '{name}."
+            raise report(("springs", number), f"{fault}{spring.at}'")
+
+
+def _check_joints(scene: Scene, report: Report) -> None:
+    """Check that joints name interfaces which can move as one, each pair once."""
+    if scene.joints and not scene.components:
+        raise report(("joints",), "needs [components.NAME], which it joins")
+    known, turning = scene.interface_names, _rotations(scene)
+    seen: dict[frozenset[str], int] = {}
+    for number, joint in enumerate(scene.joints):
+        for key, end in zip(("at", "against"), joint.ends, strict=False):
+            component, dot, _ = end.partition(".")
+            if dot and component not in scene.components:
+                fault = unknown_name(component, scene.components, "a component")
+                raise report(("joints", number, key), fault)
+            if end not in known:
+                raise report(("joints", number, key), unknown_name(end, known, "an interface"))
+        if len({turning[end] for end in joint.ends if end in turning}) > 1:
+            turns = next(end for end in joint.ends if turning[end])
+            other = next(end for end in joint.ends if not turning[end])
+            fault = f"joins '{turns}', a rotation, to '{other}', a displacement"
+            raise report(("joints", number), fault)
+        pair = frozenset(joint.ends)
+        if pair in seen:
+            raise report(("joints", number), f"joins what joints[{seen[pair]}] joins already")
+        seen[pair] = number
+
+
+def _rotations(scene: Scene) -> dict[str, bool]:
+    """Whether each interface whose direction is known is a rotation."""
+    return {
+        f"{name}.{at}": interface.direction.startswith("rotation")
+        for name, part in scene.components.items()
+        for at, interface in part.interfaces.items()
+    }
 
 
 def _check_modal(scene: Scene, report: Report) -> None:
@@ -308,11 +372,26 @@ def _check_interface_names(scene: Scene, report: Report) -> None:
     for number, table in enumerate(scene.excitation):
         if table.load is None:
             continue
+        if scene.components:
+            _check_load_of_all(scene, number, table.load, report)
+            continue
         if scene.mesh is None:
             wanted = "a [mesh]; give 'loads' of the matrices and name one of them in 'at'"
             raise report(("excitation", number, "kind"), f"'{table.kind}' needs {wanted}")
         if table.load in scene.interfaces:
             raise report(("interfaces", table.load), "is the name of a load vector; rename it")
+
+
+def _check_load_of_all(scene: Scene, number: int, load: str, report: Report) -> None:
+    """Check that all components are of meshes, where a load acts on the whole of each."""
+    for name, part in scene.components.items():
+        if part.mesh is None:
+            fault = f"acts on meshes only, but component '{name}' is given by matrices: give it"
+            wanted = f"{fault} a vector in its 'loads' and name the load of each component in 'at'"
+            raise report(("excitation", number), wanted)
+        if load in part.interfaces:
+            fault = "is the name of a load vector; rename it"
+            raise report(("components", name, "interfaces", load), fault)
 
 
 def _check_seeds(scene: Scene, report: Report) -> None:

@@ -49,6 +49,10 @@ def convergence_study_of(
     SceneError
         As `build_component`, and if a model cannot be made or no branch is found.
     """
+    if scene.components:
+        fault = "cannot be compared by 'nldyn converge'; a study can vary"
+        wanted = f"{fault} 'components.NAME.reduction.modes'"
+        raise scene_error(scene.file, ("components",), wanted)
     setting = load_case_of(scene)
     if min(refinements) < 1:
         raise SystemModelError("converge: a refinement must be 1 or more")

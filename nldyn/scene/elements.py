@@ -95,8 +95,17 @@ def _stop(table: StopTable) -> AnyStop:
 
 
 def _excitation(scene: Scene, number: int, table: ExcitationTable) -> tuple[Excitation, ...]:
-    at, phase, harmonic = table.load or table.at, table.phase_deg or 0.0, table.harmonic or 1
-    assert at is not None
+    if table.load is None:
+        assert table.at is not None
+        return _excitation_at(scene, number, table, table.at)
+    loads = [f"{name}.{table.load}" for name in scene.components] or [table.load]
+    return tuple(one for at in loads for one in _excitation_at(scene, number, table, at))
+
+
+def _excitation_at(
+    scene: Scene, number: int, table: ExcitationTable, at: str
+) -> tuple[Excitation, ...]:
+    phase, harmonic = table.phase_deg or 0.0, table.harmonic or 1
     if table.kind == "measured":
         force = _measured(scene, number, at, table)
         logger.info(f"excitation at '{at}': {force!r}")

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from nldyn.base.errors import SceneError
 from nldyn.scene.messages import KeyPath, scene_error, table_at
 from nldyn.scene.schema import Scene
 
@@ -24,6 +25,18 @@ def told_as(scene: Scene, key: KeyPath, *kinds: type[Exception], hint: str = "")
         if word in Scene.model_fields:  # another table
             raise scene_error(scene.file, (word,), rest) from error
         raise scene_error(scene.file, key, text, sep=": ") from error
+
+
+@contextmanager
+def within_component(scene: Scene, name: str) -> Iterator[None]:
+    """Tell a fault of the scene of one component as one of the whole scene's."""
+    try:
+        yield
+    except SceneError as error:
+        if not name:
+            raise
+        fault = str(error).removeprefix(f"{scene.file}: ")
+        raise scene_error(scene.file, ("components", name), fault, sep=": ") from error
 
 
 def check_regular(path: Path) -> None:

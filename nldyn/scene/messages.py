@@ -31,7 +31,7 @@ WORDS = {  # that users try for a table, and what there is
     "impact": "impacts are computed at [[stops]]",
     "dashpot": "dashpots are [[dampers]]; that of a stop is a key of [[stops]]",
     "nonlinear_spring": f"nonlinear springs that push on contact are [[stops]]; {BETWEEN}",
-    "connection": BETWEEN,
+    "connection": f"{BETWEEN}; what joins [components.NAME] is [[joints]]",
     "connector": BETWEEN,
     "constraint": "what is held is in [[supports]], what is joined in [[couplings]]",
     "boundary_condition": "what is held is in [[supports]]",
@@ -174,6 +174,8 @@ def _fault(model: type[BaseModel], detail: ErrorDetails) -> str:
         return "must not be empty"
     if kind == "list_type" and isinstance(given, dict) and table_at(model, (*detail["loc"], 0)):
         return f"must be written with two brackets: [[{format_key(detail['loc'])}]]"
+    if kind == "dict_type" and isinstance(given, list):
+        return f"must be written with a name: [{format_key(detail['loc'])}.NAME]"
     if kind == "model_type":
         return f"must be a table: [{format_key(detail['loc'])}]"
     return f"must be {_wanted(kind, context)}, not {show(given)}"

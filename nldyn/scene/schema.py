@@ -800,7 +800,47 @@ class ExploreTable(Table):
     """Seed of the random initial states."""
 
 
-class Scene(Table):
+class StructureTables(Table):
+    """The tables that describe a structure by a mesh or by matrices."""
+
+    mesh: MeshTable | None = None
+    places: dict[str, PlaceTable] = {}
+    parts: dict[str, PartTable] = {}
+    supports: list[SupportTable] = []
+    point_masses: list[PointMassTable] = []
+    springs: list[SpringTable] = []
+    hinges: list[HingeTable] = []
+    couplings: list[CouplingTable] = []
+    foundations: list[FoundationTable] = []
+    interfaces: dict[str, InterfaceTable] = {}
+    reduction: ReductionTable | None = None
+    matrices: MatricesTable | None = None
+
+
+class ComponentTable(StructureTables):
+    """``[components.NAME]``: one of several structures that are joined."""
+
+
+class JointTable(Table):
+    """``[[joints]]``: two interfaces that move as one, or one that the ground holds."""
+
+    at: str
+    """Interface of a component."""
+    against: str | None = None
+    """Interface of another one that moves with it; the ground holds it unless given."""
+
+    @model_validator(mode="after")
+    def _two_ends(self) -> JointTable:
+        _refuse_own(self)
+        return self
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """The interfaces that it joins."""
+        return (self.at,) if self.against is None else (self.at, self.against)
+
+
+class Scene(StructureTables):
     """A whole scene: a structure, what acts on it, and what to compute.
 
     Read one with `nldyn.load_scene`. Units are SI; keys that end in ``_hz`` are in Hz.
@@ -816,19 +856,9 @@ class Scene(Table):
 
     title: str = ""
     """Title of the diagram."""
-    mesh: MeshTable | None = None
-    places: dict[str, PlaceTable] = {}
-    parts: dict[str, PartTable] = {}
-    supports: list[SupportTable] = []
-    point_masses: list[PointMassTable] = []
-    springs: list[SpringTable] = []
-    hinges: list[HingeTable] = []
-    couplings: list[CouplingTable] = []
-    foundations: list[FoundationTable] = []
-    interfaces: dict[str, InterfaceTable] = {}
-    reduction: ReductionTable | None = None
     modal: ModalTable | None = None
-    matrices: MatricesTable | None = None
+    components: dict[str, ComponentTable] = {}
+    joints: list[JointTable] = []
     damping: DampingTable = DampingTable()
     dampers: list[DamperTable] = []
     stops: list[StopTable] = []
@@ -874,13 +904,31 @@ class Scene(Table):
             return list(self.modal.participation)
         if self.matrices is not None:
             return list(self.matrices.interfaces)
+        if self.components:
+            parts = self.component_scenes.items()
+            return [f"{name}.{at}" for name, part in parts for at in part.interface_names]
         return list(self.interfaces)
 
     @property
     def load_names(self) -> list[str]:
         """Names of the load vectors that are given with modes or matrices."""
+        if self.components:
+            parts = self.component_scenes.items()
+            return [f"{name}.{load}" for name, part in parts for load in part.load_names]
         given = self.modal or self.matrices
         return list(given.loads) if given else []
+
+    @property
+    def component_scenes(self) -> dict[str, Scene]:
+        """A scene for each component, with what acts on the whole of it."""
+        on_all = [table for table in self.excitation if table.load is not None]
+        return {name: self._of_component(table, on_all) for name, table in self.components.items()}
+
+    def _of_component(self, table: ComponentTable, on_all: list[ExcitationTable]) -> Scene:
+        tables = {name: getattr(table, name) for name in ComponentTable.model_fields}
+        part = Scene(**tables, excitation=on_all)
+        part._file, part._mesh_folders = self._file, self._mesh_folders
+        return part
 
     @property
     def observed(self) -> str:
@@ -897,7 +945,7 @@ def _exactly_one(table: BaseModel, *names: str) -> None:
         raise ValueError(f"{fault} {listed}" + ("; keep one" if given else ""))
 
 
-def _refuse_own(table: StopTable | SpringTable | DamperTable) -> None:
+def _refuse_own(table: StopTable | SpringTable | DamperTable | JointTable) -> None:
     if table.against == table.at:
         raise ValueError("needs another interface than its own in 'against'")
 

@@ -35,9 +35,10 @@ def case_keys(
     read: dict[str, str] = {}
     keys = []
     for tables in cases:
-        sources = [tables.get("mesh", {}), *tables.get("excitation", [])]
+        structures = [tables, *tables.get("components", {}).values()]
+        sources = [*(s.get("mesh", {}) for s in structures), *tables.get("excitation", [])]
         files = [str(source.get("file", "")) for source in sources]
-        files += _matrix_files(tables.get("matrices", {}))
+        files += [file for s in structures for file in _matrix_files(s.get("matrices", {}))]
         for file in files:
             if file not in read:
                 read[file] = _bytes_hash(folder / file) if file else ""
@@ -48,7 +49,8 @@ def case_keys(
 
 def _matrix_files(table: Mapping[str, Any]) -> list[str]:
     """Files that matrices and their vectors are read from, and those read beside them."""
-    values = [table.get(key) for key in ("mass", "stiffness", "damping")]
+    keys = ("mass", "stiffness", "damping", "gyroscopic", "circulatory")
+    values = [table.get(key) for key in keys]
     for kind in ("interfaces", "loads"):
         values += table.get(kind, {}).values()
     files = [split_source(value)[0] for value in values if isinstance(value, str)]

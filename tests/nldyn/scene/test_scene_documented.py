@@ -30,9 +30,16 @@ def documented():
 
 
 def schema_keys():
-    """Give the keys that hold a value, without those that hold tables."""
-    keys = list(all_keys(Scene))
-    return [key for key in keys if not any(other.startswith(key + ".") for other in keys)]
+    """Give the keys that hold a value, without those that hold tables, each once.
+
+    A component has the tables of a scene's structure.
+    """
+    keys = [key for key in all_keys(Scene) if not key.startswith("components.NAME.")]
+    return [
+        key
+        for key in keys
+        if key != "components" and not any(other.startswith(key + ".") for other in keys)
+    ]
 
 
 def field(key):
