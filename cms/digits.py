@@ -13,6 +13,7 @@ FloatArray = NDArray[np.float64]
 
 EPS = float(np.finfo(np.float64).eps)
 FEWEST_DIGITS = 6  # fewer are taken for exact numbers, such as 2 or 16877
+FEWEST_IN_DOUBT = 4  # so few may be of either kind: what hangs on it is refused
 MOST_DIGITS = 15  # from 16 on the rounding is that of double precision
 SAMPLE = 4000
 FEWEST_VALUES = 3
@@ -34,19 +35,36 @@ def significant_digits(value: float) -> int:
     return max(len(mantissa.strip("0")), 1)
 
 
+def digits_of(entries: FloatArray) -> NDArray[np.intp]:
+    """Significant digits of each number among the entries, or of a sample of them."""
+    values = np.unique(np.abs(entries[entries != 0.0]))
+    if values.size > SAMPLE:
+        values = np.random.default_rng(0).choice(values, SAMPLE, replace=False)
+    return np.array([significant_digits(value) for value in values], dtype=np.intp)
+
+
 def entry_digits(entries: FloatArray) -> int | None:
     """Digits to which the entries have been rounded; None if they show no rounding.
 
     Rounded numbers differ from exact ones, such as 2 or 16877, in that many of them use all digits.
     """
-    values = np.unique(np.abs(entries[entries != 0.0]))
-    if values.size > SAMPLE:
-        values = np.random.default_rng(0).choice(values, SAMPLE, replace=False)
-    counts = np.array([significant_digits(value) for value in values])
+    counts = digits_of(entries)
     if not counts.size or not FEWEST_DIGITS <= counts.max() <= MOST_DIGITS:
         return None
     full = np.count_nonzero(counts >= counts.max() - 1)
     return int(counts.max()) if full >= max(FEWEST_VALUES, SHARE * counts.size) else None
+
+
+def doubtful_digits(entries: FloatArray) -> int | None:
+    """Digits to which the entries may have been rounded, or typed in; None if there are too few.
+
+    A quarter of the numbers, and at least two, use all of 4 to 14 digits.
+    """
+    counts = digits_of(entries)
+    if not counts.size or not FEWEST_IN_DOUBT <= counts.max() < MOST_DIGITS:
+        return None
+    full = np.count_nonzero(counts >= counts.max() - 1)
+    return int(counts.max()) if full >= max(FEWEST_VALUES - 1, SHARE * counts.size) else None
 
 
 def relative_rounding(digits: int | None) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 from cms.component import ComponentLike, FloatArray, Pencil, checked_pencil, symmetric_matrix, times
 from cms.condensed import condensed
 from cms.constraint import fixed_interface, fixed_interface_errors
+from cms.doubt import check_doubtful_digits
 from cms.eigen import (
     SUMMED,
     Modes,
@@ -179,6 +180,7 @@ def reduce(
     if method in FIXED and not pencil.names:
         raise ReductionError(f"method '{method}' needs an interface, and the component has none")
     with announced(progress), one_thread():
+        check_doubtful_digits(component, pencil)
         try:
             if method in FIXED:
                 reduced = reduced_fixed(pencil, modes, cutoff_hz, method)

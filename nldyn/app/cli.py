@@ -661,7 +661,8 @@ def render(
     "--modes",
     callback=number_list,
     metavar="LIST",
-    help="Numbers of kept modes, such as 1-10,20; by default 1 to 10, 12, 16, 20, 30 and 40.",
+    help="Numbers of kept modes, such as 1-10,20; by default 1 to 10, 12, 16, 20, 30 and 40, "
+    "as far as there are so many.",
 )
 @click.option(
     "--methods",
@@ -709,14 +710,13 @@ def converge(
 
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)
-        from nldyn.reduction.convergence import COUNTS
         from nldyn.report.convergence import write_study
         from nldyn.scene.convergence import convergence_study_of
 
         with progress_line(quiet) as report:
             study = convergence_study_of(
                 loaded,
-                modes=modes or COUNTS,
+                modes=modes,
                 methods=[name.strip() for name in methods.split(",")],
                 refinements=refinements or [1],
                 meshes=[name.strip() for name in meshes.split(",")] if meshes else (),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import cms
+from cms.component import checked_pencil
 from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import ConvergenceError, SystemModelError
 from nldyn.branches.branch import Branch
@@ -288,7 +289,7 @@ def convergence_study(
     components: Mapping[str, cms.ComponentLike] | cms.ComponentLike,
     setting: LoadCase,
     *,
-    modes: Sequence[int] = COUNTS,
+    modes: Sequence[int] | None = None,
     methods: Sequence[str] = ("rubin",),
     at_hz: float | None = None,
     full: bool = False,
@@ -303,8 +304,9 @@ def convergence_study(
         The component, or the same on several meshes by name, the finest last.
     setting : LoadCase
         What acts on it and what range is asked for.
-    modes : sequence of int
-        Numbers of kept component modes.
+    modes : sequence of int, optional
+        Numbers of kept component modes; by default those of 1 to 10, 12, 16, 20, 30 and 40 that
+        every component and method can keep.
     methods : sequence of str
         Names as for `cms.reduce`. By "macneal" interfaces have no mass, so that there is no
         equation of motion with a stop: only the linear numbers are compared.
@@ -343,7 +345,7 @@ def convergence_study(
     """
     if not isinstance(components, Mapping):
         components = {"": components}
-    if not components or not modes or not methods:
+    if not components or (modes is not None and not modes) or not methods:
         raise SystemModelError("converge: give at least one component, count and method")
     at_hz = setting.middle_hz if at_hz is None else at_hz
     if not setting.range_hz[0] <= at_hz <= setting.range_hz[1]:
@@ -354,9 +356,13 @@ def convergence_study(
             f"converge: full is for components with up to {ALL_MODES_UP_TO} degrees of freedom, "
             f"this one has {finest.mass.shape[0]}"
         )
-    whole = reference_model(finest, max(modes))
+    most = min(most_modes(component, methods) for component in components.values())
+    wanted = modes or counts_up_to(most)
+    whole = reference_model(finest, max(wanted))
+    if modes is None:
+        wanted = [count for count in wanted if count >= whole.rigid_body_modes] or [max(wanted)]
     linear = measured_linear("", FULL if is_full(whole) else REFERENCE, whole, setting)
-    counts = sorted(set(modes))
+    counts = sorted(set(wanted))
     cases = [
         (name, reduced)
         for name, component in components.items()
@@ -373,6 +379,24 @@ def convergence_study(
     errors = tuple(errors_of(model, linear, best, full) for model in models)
     known = 0.0 if is_full(whole) else receptance_bound(finest, whole, linear, setting)
     return ConvergenceStudy(setting, at_hz, tuple(models), errors, best, known)
+
+
+def counts_up_to(most: int) -> list[int]:
+    """The default numbers of modes up to a largest one.
+
+    Examples
+    --------
+    >>> counts_up_to(14)
+    [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12]
+    """
+    return [count for count in COUNTS if count <= most] or [most]
+
+
+def most_modes(component: cms.ComponentLike, methods: Sequence[str]) -> int:
+    """How many modes a component has by each of some methods: those with mass, less the held."""
+    pencil = checked_pencil(component)
+    held = len(pencil.names) if "craig-bampton" in methods else 0
+    return max(pencil.size - int(pencil.massless.shape[1]) - held, 1)
 
 
 def _cost(reduced: cms.ReducedModel) -> float:
@@ -498,7 +522,8 @@ def reference_model(component: cms.ComponentLike, modes: int) -> cms.ReducedMode
     """All modes of a component that an interface sees; of a large one more than a study's."""
     size = int(component.mass.shape[0])
     if size <= ALL_MODES_UP_TO:
-        return visible_modes(cms.reduce(component, modes=size, method="truncation"))
+        count = most_modes(component, ())
+        return visible_modes(cms.reduce(component, modes=count, method="truncation"))
     return cms.reduce(component, modes=min(max(2 * modes, FEWEST_REFERENCE_MODES), size))
 
 

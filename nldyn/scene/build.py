@@ -11,6 +11,7 @@ import numpy as np
 
 import cms
 import fem
+from cms.doubt import check_unreduced
 from nldyn.base.arrays import Real
 from nldyn.base.errors import LARGEST_DENSE, ConvergenceError, SystemModelError
 from nldyn.reduction.candidates import Candidates, candidate_modes
@@ -381,6 +382,8 @@ def _unreduced(scene: Scene, component: cms.Matrices, acting: Acting) -> System:
     rows = component.mass.shape[0]
     _check_small(scene, rows)
     check_ratio_count(scene, rows, scene.file)
+    with told_as(scene, ("matrices",), cms.ReductionError):
+        check_unreduced(component)
     loads = {name: component.interfaces[name] for name in component.load_vectors}
     interfaces = {name: v for name, v in component.interfaces.items() if name not in loads}
     with told_as(scene, ("matrices",), SystemModelError):

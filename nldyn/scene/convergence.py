@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import cms
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_choice
-from nldyn.reduction.convergence import COUNTS, METHODS, ConvergenceStudy, convergence_study
+from nldyn.reduction.convergence import METHODS, ConvergenceStudy, convergence_study
 from nldyn.scene.component import build_component
 from nldyn.scene.load_case import load_case_of
 from nldyn.scene.messages import scene_error
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def convergence_study_of(
     scene: Scene,
     *,
-    modes: Sequence[int] = COUNTS,
+    modes: Sequence[int] | None = None,
     methods: Sequence[str] = ("rubin",),
     refinements: Sequence[int] = (1,),
     meshes: Sequence[str] = (),

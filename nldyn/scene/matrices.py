@@ -56,7 +56,7 @@ def build_matrices(scene: Scene) -> cms.Matrices:
         for kind in ("interfaces", "loads")
         for name, value in getattr(table, kind).items()
     }
-    return replace(read.component(vectors), load_vectors=tuple(table.loads))
+    return replace(read.component(vectors), load_vectors=tuple(table.loads), digits=table.digits)
 
 
 def skew_matrices(scene: Scene, rows: int) -> dict[str, Any]:

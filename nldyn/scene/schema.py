@@ -478,6 +478,9 @@ class MatricesTable(Table):
     circulatory: RowsOrFile | None = None
     """[N/m] Skew matrix, typed in or a file, that adds to the stiffness: the cross-coupling of
     bearings and seals. A stiffness K without symmetry is (K + Kᵀ)/2 and this, (K − Kᵀ)/2."""
+    digits: Annotated[int, Field(ge=3, le=17)] | None = None
+    """To how many decimal digits the entries were rounded, 17 if they are exact. Where it is not
+    given it is [read off the entries](cms.md#matrices-of-other-codes)."""
     interfaces: Annotated[dict[str, VectorOrPlace], Field(min_length=1)]
     """`interfaces.NAME = ...`: load vector of interface NAME. Its displacement is the product
     of this vector with the coordinates."""

@@ -1,5 +1,7 @@
 """Matrices of other codes: few digits, massless directions, mixed units."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy import linalg, sparse
@@ -311,3 +313,47 @@ def test_sparse_matrices_and_vectors(kind):
         np.testing.assert_allclose(b.frequencies_hz, a.frequencies_hz)
         np.testing.assert_allclose(b.damping, 1e-3 * np.eye(b.size), atol=1e-9)
     assert cms.check(given, b, modes=3).mac.shape == (3,)
+
+
+TOO_FEW = "the (mass|stiffness) leave open (whether the component floats|which (modes|directions))"
+
+
+@pytest.mark.parametrize("stated", [False, True])
+@pytest.mark.parametrize("elements", [1, 2, 3, 10, 40, 100])
+@pytest.mark.parametrize("digits", [4, 5, 6, 9, 13, 15])
+def test_a_floating_beam_is_right_or_refused_for_its_digits(digits, elements, stated):
+    K, M = (rounded(A, digits) for A in free_beam(elements))
+    tip = cms.Matrices(K, M, {"tip": np.eye(len(K))[0]}, digits=digits if stated else None)
+    try:
+        found = cms.reduce(tip, modes=4)
+    except cms.ReductionError as error:
+        assert digits < 14 and re.search(TOO_FEW, str(error)), error
+        return
+    first, second, *elastic = linalg.eigh(K, M, eigvals_only=True, subset_by_index=[0, 3])
+    assert found.rigid_body_modes == 2
+    if found.rigid_bound_hz:
+        assert max(abs(first), abs(second)) <= (2 * np.pi * found.rigid_bound_hz) ** 2
+    floor = 1e-13 * elements**4
+    np.testing.assert_allclose(
+        found.frequencies_hz[2:4], np.sqrt(elastic) / (2 * np.pi), rtol=max(1e-9, floor)
+    )
+
+
+def test_a_mass_of_few_digits_is_refused_for_them():
+    """Condensed masses have fewer of them than degrees of freedom; rounding gives the rest some."""
+    K, M, _ = superelement(kept=9, heavy=14, noise=0.0, held=True)
+    with pytest.raises(cms.ReductionError, match="5 digits of the mass leave open which direc"):
+        cms.reduce(ends(K, rounded(M, 5)), modes=2)
+    assert cms.reduce(ends(K, M), modes=2).rigid_body_modes == 0
+
+
+def test_exact_entries_of_few_digits_are_no_rounding():
+    """Springs of whole numbers between masses: what floats floats, what is held is held."""
+    springs = np.array([1234.0, 5678.0, 9012.0, 3456.0, 7891.0])
+    for ground in (0.0, 321.0):
+        across = np.diff(np.eye(6), axis=0)
+        K = across.T @ (springs[:, None] * across) + ground * np.outer(np.eye(6)[0], np.eye(6)[0])
+        found = cms.reduce(cms.Matrices(K, np.eye(6), {"end": np.eye(6)[5]}), modes=3)
+        exact = np.sqrt(np.maximum(linalg.eigvalsh(K)[:3], 0.0)) / (2 * np.pi)
+        assert found.rigid_body_modes == (0 if ground else 1)
+        np.testing.assert_allclose(found.frequencies_hz[:3], exact, rtol=1e-9, atol=1e-6)

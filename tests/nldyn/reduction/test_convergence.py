@@ -273,6 +273,19 @@ def test_solids_are_refined_in_the_mesher():
         build_component(load_scene(example("plate.toml")), 2)
 
 
+def test_the_counts_that_are_not_given_fit_the_model():
+    """Three masses on a string, the last of which may be nothing."""
+    K = 1e5 * (2.0 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1))
+    for masses, methods, counts in (
+        ([1.0, 1.0, 1.0], ("rubin",), {1, 2, 3}),
+        ([1.0, 1.0, 1.0], ("craig-bampton",), {1, 2}),
+        ([1.0, 1.0, 0.0], ("rubin",), {1, 2}),
+    ):
+        chain = cms.Matrices(K, np.diag(masses), {"middle": np.eye(3)[1]})
+        found = convergence_study(chain, SETTING, methods=methods)
+        assert {model.modes for model in found.models if model.method in methods} == counts
+
+
 @pytest.mark.parametrize(
     "changed, words",
     [

@@ -227,3 +227,25 @@ def test_modes_are_not_chosen_beside_a_gyroscopic_matrix(tmp_path):
     text = WHIRL.replace("modes = 4", "tolerance = 0.01")
     with pytest.raises(SceneError, match=r"reduction\.tolerance knows no matrices\.gyroscopic"):
         parse_scene(text, tmp_path / "scene.toml")
+
+
+def test_matrices_that_float_but_for_their_digits(tmp_path):
+    """A free chain, rounded: unreduced its rigid mode would not lie at 0 Hz."""
+    across = np.diff(np.eye(6), axis=0)
+    exact = across.T @ (1e4 * np.sqrt([[2.0], [3.0], [5.0], [7.0], [11.0]]) * across)
+    np.save(tmp_path / "M.npy", np.eye(6))
+    scene = tmp_path / "chain.toml"
+    text = '[matrices]\nstiffness = "K.npy"\nmass = "M.npy"\ninterfaces.load.row = 1\n'
+    for digits, fault in (
+        (7, "with 7 digits the stiffness holds by rounding what has 1 rigid-body mode: it needs"),
+        (5, "5 digits of the stiffness leave open whether"),
+    ):
+        np.save(tmp_path / "K.npy", [[float(f"{x:.{digits - 1}e}") for x in row] for row in exact])
+        scene.write_text(text + REST)
+        with pytest.raises(SceneError, match=fault):
+            build_system(load_scene(scene))
+        scene.write_text(f"{text}digits = {digits}\n[reduction]\nmodes = 4\n{REST}")
+        hz = build_system(load_scene(scene)).frequencies_hz
+        known = np.sqrt(np.linalg.eigvalsh(exact)[1:4]) / (2 * np.pi)
+        assert hz[0] == 0.0
+        np.testing.assert_allclose(hz[1:4], known, rtol=10.0 ** (1 - digits))
