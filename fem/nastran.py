@@ -124,7 +124,8 @@ def read_nastran(path: Path) -> tuple[meshio.Mesh, list[LeftOut]]:
         )
         raise ModelError(
             f"{path}: holds cards that are not read: {told}; solids are (GRID, CTETRA, CPYRAM,"
-            " CPENTA, CHEXA); write other elements as '.inp', give masses and springs in the scene"
+            " CPENTA, CHEXA); write other elements as '.inp'; take out masses and springs and give"
+            " them in the scene"
         )
     if not cells:
         raise ModelError(f"{path}: is no Nastran bulk data with solids (GRID, CTETRA, CHEXA, ...)")

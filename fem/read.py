@@ -177,6 +177,7 @@ READERS: dict[str, tuple[str, Callable[[Path], meshio.Mesh]]] = {
 DECK = ".inp"
 """The extension of files that hold more than a mesh."""
 NASTRAN = (".bdf", ".nas")
+ARCHIVE = ".cdb"
 EXTENSIONS = (*READERS, DECK, *NASTRAN)
 
 
@@ -275,6 +276,12 @@ def _read(
     path = Path(path)
     extension = path.suffix.lower()
     if extension not in EXTENSIONS:
+        if extension == ARCHIVE:
+            raise ModelError(
+                f"{path}: archives of Ansys are not read, and no conversion that keeps their"
+                " components is known; the matrices that Ansys writes by HBMAT are read: give them"
+                " as [matrices] in the scene"
+            )
         raise ModelError(
             f"{path}: unknown mesh extension {path.suffix!r}; known are {quoted(EXTENSIONS)};"
             " export it as one of these from the program that made it: converters lose the names"

@@ -115,6 +115,38 @@ def test_grid_points_that_are_held_for_good_are_told(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore::fem.LockingWarning")
+def test_the_advice_for_masses_and_for_shells_gives_the_model_that_was_meant(tmp_path):
+    """A mass of the deck is given to the model; shells are written as a deck of Abaqus."""
+    path = tmp_path / "brick.bdf"
+    with_mass = BRICK.replace("ENDDATA", "CONM2,77,7,,0.25\nENDDATA", 1)
+    path.write_text(with_mass)
+    with pytest.raises(
+        fem.ModelError, match=r"CONM2 \(1, .*; take out masses and"
+    ):
+        fem.read_structure(path)
+    path.write_text("".join(r for r in with_mass.splitlines(True) if not r.startswith("CONM2")))
+    mesh = fem.read_structure(path)
+    model = fem.StructureModel(
+        mesh.with_point_sets({"corner": np.array([6])}),
+        dict.fromkeys(mesh.groups, fem.SolidPart(STEEL)),
+        point_masses=[fem.PointMass("corner", 0.25)],
+    )
+    assert fem.mass_properties(fem.assemble(model)).mass == pytest.approx(STEEL.density + 0.25)
+    path.write_text(BRICK.replace("ENDDATA", "CQUAD4,9,3,5,6,7,8\nENDDATA", 1))
+    with pytest.raises(fem.ModelError, match=r"CQUAD4 \(1, .*; write other elements as '.inp'"):
+        fem.read_structure(path)
+    cells = mesh.cells | {"quad": mesh.cells["hexahedron"][:, 4:]}
+    groups = {**mesh.groups, "lid": {"quad": np.array([0])}}
+    types = {"S4": {"quad": np.array([0])}}
+    lid = fem.StructureMesh(mesh.points, cells, groups, element_types=types)
+    fem.write_mesh(lid, tmp_path / "brick.inp")
+    parts = dict.fromkeys(mesh.groups, fem.SolidPart(STEEL)) | {"lid": fem.ShellPart(STEEL, 0.01)}
+    read = fem.read_structure(tmp_path / "brick.inp")
+    found = fem.mass_properties(fem.assemble(fem.StructureModel(read, parts)))
+    assert found.mass == pytest.approx(1.01 * STEEL.density)
+
+
+@pytest.mark.filterwarnings("ignore::fem.LockingWarning")
 @pytest.mark.parametrize("form", ["fixed-small", "fixed-large", "free"])
 @pytest.mark.parametrize("family", ["first order", "serendipity"])
 def test_meshio_writes_the_same_solids(tmp_path, family, form):
