@@ -157,11 +157,10 @@ def asymmetry(problem: ShootingProblem, point: Real) -> float:
 
 def shifts(problem: ShootingProblem, point: Real) -> list[Real]:
     """Shooting unknowns (N + 1,) of an orbit shifted by each of its excitation periods."""
-    nodes = problem.nodes(point)
-    every = problem.segments // problem.period
-    moves = range(every, problem.segments, every)
-    moved = [np.append(np.roll(nodes, move, axis=0).ravel(), point[-1]) for move in moves]
-    return [point, *moved]
+    size, every = point.size - 1, problem.segments // problem.period * problem.size
+    twice = np.concatenate([point[:-1], point[:-1]])
+    moves = range(size - every, 0, -every)
+    return [point, *(np.append(twice[move : move + size], point[-1]) for move in moves)]
 
 
 def shooting_problem(flow: FlowMap, period: int, segments: int | None = None) -> ShootingProblem:
