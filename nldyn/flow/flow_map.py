@@ -321,7 +321,7 @@ class FlowMap:
             numbers that make no sense.
         """
         status, *_, ends, jacobians, d_omegas, d_parameters, closings = self._fly(
-            self._no_record, False, nodes, phases, omega, chained, sensitivities, parameters
+            self.no_record, False, nodes, phases, omega, chained, sensitivities, parameters
         )
         return Segments(ends, jacobians, d_omegas, d_parameters, closings, self._reason(status))
 
@@ -535,7 +535,8 @@ class FlowMap:
         return _REASONS[status]
 
     @cached_property
-    def _no_record(self) -> Record:
+    def no_record(self) -> Record:
+        """A record without room, for what need not be recorded."""
         return self._record(0)
 
     @cached_property
@@ -685,7 +686,7 @@ class Trajectory:
         legs = np.stack([rec.phase[start], phases[inside]], axis=1).ravel()
         nodes = np.repeat(rec.start[start], 2, axis=0)[:-1]
         status, *_, ends, _, _, _, _ = flow._call(
-            flow._no_record, False, self.omega, np.append(nodes, 0.0), legs, False, False, ()
+            flow.no_record, False, self.omega, np.append(nodes, 0.0), legs, False, False, ()
         )
         return (inside, ends[::2]) if status == OK else none
 

@@ -12,8 +12,10 @@ import cms
 from nldyn.base.resources import example
 from nldyn.branches.branch import Branch
 from nldyn.branches.options import ContinuationOptions
-from nldyn.flow.flow_map import flow_of
+from nldyn.branches.predictor import predicted
+from nldyn.flow.flow_map import Trajectory, flow_of
 from nldyn.longterm.attractors import AttractorOptions, classify
+from nldyn.orbits.multipliers import floquet_spectrum
 from nldyn.orbits.orbit import check_observe
 from nldyn.orbits.starts import orbit_near
 from nldyn.paper.kept import kept_diagram
@@ -300,3 +302,16 @@ def compile_kernels(quiet: bool = False) -> None:
         system = scene_system("one_dof")
         diagram(system, (33.0, 34.5), (1, 2), search_points=1)
         classify(system, 36.0, options=AttractorOptions(periods=32))
+
+
+def compile_beside(quiet: bool = False) -> None:
+    """Compile the kernels that come after the flow's, as long as another process compiles those.
+
+    Nothing is told, as the other process does.
+    """
+    with compilations.silenced():
+        flow = flow_of(scene_system("one_dof"))
+        Trajectory(flow, 1.0, flow.no_record, np.zeros(1, dtype=np.int64), "").extremes(0)
+        floquet_spectrum(np.eye(2)[None])
+        point = np.ones(3)
+        predicted(point, point, np.empty((0, 3)), point, 1.0)
