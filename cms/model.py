@@ -121,6 +121,15 @@ class ReducedModel:
         rows = {name: read_only(row) for name, row in self.participation.items()}
         object.__setattr__(self, "participation", rows)
 
+    def __repr__(self) -> str:
+        """One line: modes, their frequencies, the method and the interfaces."""
+        names = ", ".join(map(repr, self.participation)) or "none"
+        span = f" from {self.frequencies_hz.min():.4g} to {self.frequencies_hz.max():.4g} Hz"
+        return (
+            f"<ReducedModel: {self.size} modes, {self.modes} of them kept,"
+            f"{span if self.size else ''} by '{self.method}'; interfaces {names}>"
+        )
+
     @property
     def size(self) -> int:
         """Number r of modal coordinates."""

@@ -87,6 +87,15 @@ class Impacts:
     def __len__(self) -> int:
         return int(self.time.size)
 
+    def __repr__(self) -> str:
+        """One line: how many, and the largest speed and force."""
+        if not len(self):
+            return "<Impacts: none>"
+        return (
+            f"<Impacts: {len(self)} from {self.time[0]:.4g} to {self.time[-1]:.4g} s, "
+            f"at most {self.speed.max():.4g} m/s and {self.peak_force.max():.4g} N>"
+        )
+
     def columns(self) -> dict[str, NDArray[Any]]:
         """The columns by name; their units are in `nldyn.longterm.impacts.UNITS`."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
