@@ -109,6 +109,7 @@ from nldyn.system.measured import MeasuredForce as MeasuredForce
 from nldyn.system.measured import measured_force as measured_force
 from nldyn.system.parameters import Parameter as Parameter
 from nldyn.system.rigid_stop import RigidStop as RigidStop
+from nldyn.system.spin import Spin as Spin
 from nldyn.system.springs import CubicDamper as CubicDamper
 from nldyn.system.springs import PolynomialSpring as PolynomialSpring
 from nldyn.system.springs import Spring as Spring

@@ -27,6 +27,7 @@ from nldyn.system.elements import (
 from nldyn.system.linear import LinearPart
 from nldyn.system.parameters import strength
 from nldyn.system.rigid_stop import TRIED_SPEEDS, AnyStop, Restitution, RigidStop
+from nldyn.system.spin import Spin
 from nldyn.system.springs import LARGEST_DEGREE, CubicDamper, PolynomialSpring, Spring
 from nldyn.system.system import AnyDamper, AnySpring, System
 
@@ -55,6 +56,14 @@ def checked_laws(laws: Laws | None) -> Laws:
     return laws or {}
 
 
+_OF_SPIN = {"gyroscopic": "1", "circulatory": "1/s"}
+
+
+def _read_spin(group: Group, n: int) -> Spin:
+    matrices = {name: group.array(name, n, n) for name in _OF_SPIN if name in group}
+    return Spin(group.number("hz"), **matrices)
+
+
 def write_flow(group: Any, flow: FlowMap) -> None:
     """Write the numbers of a flow map into a group."""
     for key, value in asdict(flow.options).items():
@@ -65,6 +74,12 @@ def write_flow(group: Any, flow: FlowMap) -> None:
     put(group, "damping", system.damping, "1/s")
     if system.circulatory is not None:
         put(group, "circulatory", system.circulatory, "1/s^2")
+    if system.spin is not None:
+        spin = group.create_group("spin")
+        set_attribute(spin, "hz", system.spin.hz)
+        for name, unit in _OF_SPIN.items():
+            if getattr(system.spin, name) is not None:
+                put(spin, name, getattr(system.spin, name), unit)
     set_attribute(group, "interfaces", system.interfaces)
     vectors = np.array([system.participation[name] for name in system.interfaces], dtype=float)
     put(group, "participation", vectors.reshape(-1, system.size), "kg^-0.5")
@@ -258,6 +273,7 @@ def read_flow(group: Group, laws: Laws) -> FlowMap:
             _read_loads(group, n),
             _read_springs(group.group("springs")) if "springs" in group else (),
             group.array("circulatory", n, n) if "circulatory" in group else None,
+            _read_spin(group.group("spin"), n) if "spin" in group else None,
         )
     except SystemModelError as error:
         if str(error).startswith(str(group.path)):

@@ -23,7 +23,14 @@ from nldyn.flow.flow_map import FlowMap, Segments
 from nldyn.flow.options import FlowOptions
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import ITERATIONS, ShootingProblem, metric_length
-from nldyn.system.chart import FREQUENCY, Chart, has_exact_derivatives, value_of, with_value
+from nldyn.system.chart import (
+    FREQUENCY,
+    Chart,
+    has_exact_derivatives,
+    moves_frequency,
+    value_of,
+    with_value,
+)
 from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
 
@@ -178,7 +185,7 @@ class Evaluation:
         """Excitation frequency in rad/s."""
         hz = self.family.frequency_hz
         for chart, value in zip(self.family.charts, self.values.tolist(), strict=True):
-            if chart.parameter.name == FREQUENCY:
+            if moves_frequency(chart.parameter):
                 hz = value
         return 2.0 * math.pi * hz
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from nldyn.base.errors import SystemModelError, check_frequency
 from nldyn.system.elements import Excitation, Stop
+from nldyn.system.spin import Spin
 from nldyn.system.system import AnyDamper, AnySpring, System
 
 if TYPE_CHECKING:
@@ -103,6 +104,7 @@ def system_of_reduced(
     springs: Sequence[AnySpring] = (),
     gyroscopic: ArrayLike | None = None,
     circulatory: ArrayLike | None = None,
+    spin: Spin | None = None,
 ) -> System:
     """The system of a reduced model, for parameters as those of `LoadCase`.
 
@@ -122,6 +124,7 @@ def system_of_reduced(
         springs=springs,
         gyroscopic=gyroscopic,
         circulatory=circulatory,
+        spin=spin,
     )
 
 

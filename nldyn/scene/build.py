@@ -25,6 +25,7 @@ from nldyn.scene.load_case import load_case_of
 from nldyn.scene.matrices import build_matrices, skew_matrices
 from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import Scene
+from nldyn.system.spin import Spin
 from nldyn.system.system import System
 
 if TYPE_CHECKING:
@@ -368,12 +369,26 @@ def _projected_skew(scene: Scene, reduced: cms.ReducedModel) -> dict[str, Any]:
     rows = dict(reduced.components) or {"": (0, reduced.basis.shape[0])}
     parts = scene.component_scenes or {"": scene}
     for component, part in parts.items():
+        if part.matrices is None:
+            continue
         basis = reduced.basis[slice(*rows[component])]
         with within_component(scene, component):
-            skew = {} if part.matrices is None else skew_matrices(part, basis.shape[0])
-        for name, A in skew.items():
-            total[name] = total.get(name, 0.0) + basis.T @ (A @ basis)
+            for name, A in skew_matrices(part, basis.shape[0]).items():
+                total[name] = total.get(name, 0.0) + basis.T @ (A @ basis)
+            if part.matrices.spin is not None:
+                if "spin" in total:
+                    raise scene_error(scene.file, ("matrices", "spin"), "is a second shaft")
+                total["spin"] = _spin(part, basis)
     return total
+
+
+def _spin(scene: Scene, basis: Real) -> Spin:
+    """The speed of the shaft, and what goes with it on some modes (n, r)."""
+    assert scene.matrices is not None and scene.matrices.spin is not None
+    given = skew_matrices(scene, basis.shape[0], "spin")
+    return Spin(
+        scene.matrices.spin.hz, **{name: basis.T @ (A @ basis) for name, A in given.items()}
+    )
 
 
 def _unreduced(scene: Scene, component: cms.Matrices, acting: Acting) -> System:
@@ -386,6 +401,7 @@ def _unreduced(scene: Scene, component: cms.Matrices, acting: Acting) -> System:
         check_unreduced(component)
     loads = {name: component.interfaces[name] for name in component.load_vectors}
     interfaces = {name: v for name, v in component.interfaces.items() if name not in loads}
+    spin = None if scene.matrices.spin is None else _spin(scene, np.eye(rows))
     with told_as(scene, ("matrices",), SystemModelError):
         return System.from_matrices(
             component.mass,
@@ -394,6 +410,7 @@ def _unreduced(scene: Scene, component: cms.Matrices, acting: Acting) -> System:
             damping=component.damping,
             modal_damping=scene.damping.modal_ratio,
             loads=loads,
+            spin=spin,
             **{name: skew.toarray() for name, skew in skew_matrices(scene, rows).items()},
             **acting._asdict(),
         )

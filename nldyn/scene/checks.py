@@ -306,6 +306,12 @@ def _check_matrices(scene: Scene, report: Report) -> None:
             raise report(("reduction", "tolerance"), fault)
         if isinstance(skew, list):
             _check_skew(skew, ("matrices", name), report)
+        turning = getattr(table.spin, name, None)
+        if isinstance(turning, list):
+            _check_skew(turning, ("matrices", "spin", name), report)
+    if table.spin is not None and scene.reduction is not None and scene.reduction.tolerance:
+        fault = "knows no matrices.spin; give 'modes' or 'cutoff_hz' instead"
+        raise report(("reduction", "tolerance"), fault)
     mass, typed = table.mass, {}
     for key in ("mass", "stiffness", "damping"):
         matrix = getattr(table, key)

@@ -59,8 +59,17 @@ def build_matrices(scene: Scene) -> cms.Matrices:
     return replace(read.component(vectors), load_vectors=tuple(table.loads), digits=table.digits)
 
 
-def skew_matrices(scene: Scene, rows: int) -> dict[str, Any]:
+def skew_matrices(scene: Scene, rows: int, table: str = "") -> dict[str, Any]:
     """The ``gyroscopic`` and the ``circulatory`` matrix that ``[matrices]`` gives, (rows, rows).
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with ``[matrices]``.
+    rows : int
+        How many rows they must have.
+    table : str
+        ``"spin"`` for those of ``[matrices.spin]``.
 
     Raises
     ------
@@ -68,8 +77,10 @@ def skew_matrices(scene: Scene, rows: int) -> dict[str, Any]:
         If a file cannot be read, or a matrix is not skew or not of this size.
     """
     found = {}
+    where: KeyPath = ("matrices", table) if table else ("matrices",)
+    given = getattr(scene.matrices, table) if table else scene.matrices
     for key in ("gyroscopic", "circulatory"):
-        value, place = getattr(scene.matrices, key), ("matrices", key)
+        value, place = getattr(given, key, None), (*where, key)
         if value is None:
             continue
         if isinstance(value, str):

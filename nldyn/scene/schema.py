@@ -462,6 +462,25 @@ VectorOrPlace = Annotated[
 ]
 
 
+class SpinTable(Table):
+    """``[matrices.spin]``: the speed of a shaft, and what is in proportion to it."""
+
+    hz: Annotated[float, Field(ge=-LARGEST_FREQUENCY, le=LARGEST_FREQUENCY)]
+    """[Hz] Speed of the shaft, of either sign. It is kept while the frequency changes; a study may
+    vary it."""
+    gyroscopic: RowsOrFile | None = None
+    """[kg] Skew matrix, typed in or a file: times the speed in rad/s it adds to the damping."""
+    circulatory: RowsOrFile | None = None
+    """[N s/m] Skew matrix, typed in or a file: times the speed in rad/s it adds to the
+    stiffness."""
+
+    @model_validator(mode="after")
+    def _some(self) -> SpinTable:
+        if self.gyroscopic is None and self.circulatory is None:
+            raise ValueError("needs 'gyroscopic' or 'circulatory'")
+        return self
+
+
 class MatricesTable(Table):
     """``[matrices]``: a structure given by its matrices instead of a mesh."""
 
@@ -481,6 +500,7 @@ class MatricesTable(Table):
     digits: Annotated[int, Field(ge=3, le=17)] | None = None
     """To how many decimal digits the entries were rounded, 17 if they are exact. Where it is not
     given it is [read off the entries](cms.md#matrices-of-other-codes)."""
+    spin: SpinTable | None = None
     interfaces: Annotated[dict[str, VectorOrPlace], Field(min_length=1)]
     """`interfaces.NAME = ...`: load vector of interface NAME. Its displacement is the product
     of this vector with the coordinates."""

@@ -50,7 +50,7 @@ def case_keys(
 def _matrix_files(table: Mapping[str, Any]) -> list[str]:
     """Files that matrices and their vectors are read from, and those read beside them."""
     keys = ("mass", "stiffness", "damping", "gyroscopic", "circulatory")
-    values = [table.get(key) for key in keys]
+    values = [place.get(key) for place in (table, table.get("spin", {})) for key in keys]
     for kind in ("interfaces", "loads"):
         values += table.get(kind, {}).values()
     files = [split_source(value)[0] for value in values if isinstance(value, str)]

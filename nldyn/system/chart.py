@@ -29,6 +29,7 @@ from nldyn.system.springs import PolynomialSpring
 from nldyn.system.system import System
 
 FREQUENCY = "frequency_hz"
+SPIN, SPEED = "spin_hz", "speed_hz"  # of a shaft; the same with the excitation, once per turn
 EVERY_MODE = -1
 
 _OF_STOPS = OF_STOPS
@@ -37,6 +38,8 @@ _OF_SPRINGS = {"spring_stiffness": "stiffness"}  # and what it is called there
 _OF_MODES = ("modal_damping", "natural_frequency_hz")
 UNITS = {
     "frequency_hz": "Hz",
+    SPIN: "Hz",
+    SPEED: "Hz",
     "gap": "m",
     "stiffness": "N/m^exponent",
     "exponent": "1",
@@ -62,7 +65,7 @@ BOUNDS = {
 POSITIVE = ("stiffness", "natural_frequency_hz")  # there is no system where they are zero
 NAMES = (
     *(FREQUENCY, *_OF_STOPS, *SOURCES, *_OF_DAMPERS, *_OF_SPRINGS),
-    *(*OF_SPRINGS, *_OF_MODES),
+    *(*OF_SPRINGS, *_OF_MODES, SPIN, SPEED),
 )
 
 
@@ -82,8 +85,9 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
         frequency_hz; gap, stiffness, exponent, dissipation, dashpot or restitution of a stop;
         amplitude, mass_times_radius or force of an excitation; coefficient of a damper;
         spring_stiffness of a linear spring; k1, k2, ... of a polynomial one; modal_damping (ratio)
-        or natural_frequency_hz of a mode. The index -1 of modal_damping means all modes, which
-        then have one ratio.
+        or natural_frequency_hz of a mode; spin_hz of a system with a `Spin`, or speed_hz, which is
+        spin and frequency in one where they are equal. The index -1 of modal_damping means all
+        modes, which then have one ratio.
 
     Raises
     ------
@@ -109,7 +113,30 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
         check_index(parameter, "mode", system.size)
     if parameter.name == "modal_damping":
         _damping_ratio(system, parameter.index)
+    if parameter.name in (SPIN, SPEED):
+        spin_of(system, parameter)
     return parameter
+
+
+def moves_frequency(parameter: Parameter) -> bool:
+    """Whether a parameter is, or goes with, the excitation frequency."""
+    return parameter.name in (FREQUENCY, SPEED)
+
+
+def spin_of(system: System, parameter: Parameter) -> float:
+    """Speed in Hz of a system that has a `Spin`.
+
+    Raises
+    ------
+    SystemModelError
+        If it has none.
+    """
+    if system.spin is None:
+        raise SystemModelError(
+            f"parameter '{parameter.name}': the system has no spin; give System.from_matrices a "
+            "Spin with what goes with the speed"
+        )
+    return system.spin.hz
 
 
 def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float:
@@ -125,6 +152,14 @@ def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float
     name, index = parameter.name, parameter.index
     if name == FREQUENCY:
         return frequency_hz
+    if name in (SPIN, SPEED):
+        hz = spin_of(system, parameter)
+        if name == SPEED and abs(hz - frequency_hz) > 1e-9 * frequency_hz:
+            raise SystemModelError(
+                f"parameter '{SPEED}': the shaft spins at {hz:g} Hz, but the excitation has "
+                f"{frequency_hz:g} Hz; begin where they are equal"
+            )
+        return hz
     if name == "modal_damping":
         return _damping_ratio(system, index)
     if name == "natural_frequency_hz":
@@ -152,6 +187,8 @@ def with_value(system: System, parameter: Parameter, value: float) -> System:
     name, index = parameter.name, parameter.index
     if name == FREQUENCY:
         return system
+    if name in (SPIN, SPEED):
+        return system.with_spin(value)
     if name in _OF_STOPS:
         return system.with_elements(stops=_replaced(system.stops, index, name, value))
     if name in OF_SPRINGS:
@@ -249,7 +286,7 @@ class Chart:
             raise SystemModelError(
                 f"the range of {name} must be two finite numbers, ascending; got {shown(limits)}"
             )
-        if name == FREQUENCY and not SMALLEST_FREQUENCY <= low < high <= LARGEST_FREQUENCY:
+        if moves_frequency(parameter) and not SMALLEST_FREQUENCY <= low < high <= LARGEST_FREQUENCY:
             raise SystemModelError(
                 f"the range of {name} must be positive, from {SMALLEST_FREQUENCY:g} to "
                 f"{LARGEST_FREQUENCY:g}, got {shown(limits)}"

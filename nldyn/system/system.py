@@ -24,6 +24,7 @@ from nldyn.system.linear import (
     without_rounding,
 )
 from nldyn.system.rigid_stop import AnyStop, RigidStop
+from nldyn.system.spin import Spin, same_spin, skew
 from nldyn.system.springs import Bond, CubicDamper, PolynomialSpring, Spring, bonds_of
 
 Element = TypeVar("Element")
@@ -66,6 +67,8 @@ class System:
         What acts at the interfaces all the time. The modes are those of the structure without.
     circulatory : (n, n) array, optional
         Skew part of the modal stiffness, 1/s²; the damping may have a skew part, too.
+    spin : Spin, optional
+        What of both is in proportion to the speed of a shaft, in modal coordinates.
 
     Raises
     ------
@@ -91,6 +94,7 @@ class System:
     loads: Mapping[str, Real] = field(default_factory=dict)
     springs: tuple[AnySpring, ...] = ()
     circulatory: Real | None = None
+    spin: Spin | None = None
 
     def __repr__(self) -> str:
         """One line: modes, interfaces, and what acts."""
@@ -104,7 +108,9 @@ class System:
             f"interfaces {names}; "
             f"{len(self.stops)} stops, {len(self.dampers)} dampers, "
             + (f"{len(self.springs)} springs, " if self.springs else "")
-            + f"{len(self.excitation)} excitations>"
+            + f"{len(self.excitation)} excitations"
+            + ("" if self.spin is None else f", spinning at {self.spin.hz:.6g} Hz")
+            + ">"
         )
 
     def __post_init__(self) -> None:
@@ -178,6 +184,7 @@ class System:
         springs: Sequence[AnySpring] = (),
         gyroscopic: ArrayLike | None = None,
         circulatory: ArrayLike | None = None,
+        spin: Spin | None = None,
     ) -> System:
         """System from mass, stiffness and damping matrices.
 
@@ -201,6 +208,8 @@ class System:
         circulatory : (n, n) array_like, optional
             Skew matrix in N/m, added to the stiffness: the cross-coupling of bearings and seals.
             A stiffness K that is not symmetric is (K + Kᵀ)/2 and this, (K - Kᵀ)/2.
+        spin : Spin, optional
+            What of both is in proportion to the speed of a shaft; it adds to them.
 
         Raises
         ------
@@ -235,7 +244,7 @@ class System:
                 raise SystemModelError(f"damping is {C.shape} but mass is {M.shape}")
             D = D + modes.T @ C @ modes
         G, N = (
-            None if given is None else modes.T @ _skew(name, given, omega.size) @ modes
+            None if given is None else modes.T @ skew(name, given, omega.size) @ modes
             for name, given in (("gyroscopic", gyroscopic), ("circulatory", circulatory))
         )
         if G is not None:
@@ -257,7 +266,7 @@ class System:
             modal_loads,
             _listed("springs", springs),
             N,
-        )
+        )._spun(None if spin is None else _of_size(spin, omega.size).on(modes))
 
     @classmethod
     def from_reduced(
@@ -272,6 +281,7 @@ class System:
         springs: Sequence[AnySpring] = (),
         gyroscopic: ArrayLike | None = None,
         circulatory: ArrayLike | None = None,
+        spin: Spin | None = None,
     ) -> System:
         """System from a reduced model (anything with frequencies and participations).
 
@@ -285,6 +295,8 @@ class System:
             too.
         gyroscopic, circulatory : (n, n) array_like, optional
             Skew matrices ``basis.T @ G @ basis`` in 1/s and 1/s², as for `from_matrices`.
+        spin : Spin, optional
+            As for `from_matrices`, with matrices on the same basis.
 
         Raises
         ------
@@ -320,7 +332,7 @@ class System:
                 raise SystemModelError(f"damping is {damping.shape} for {system.size} modes")
         total = system.damping if damping is None else system.damping + damping
         if gyroscopic is not None:
-            total = total + _skew("gyroscopic", gyroscopic, system.size)
+            total = total + skew("gyroscopic", gyroscopic, system.size)
         return cls(
             system.natural_frequencies,
             total,
@@ -330,8 +342,8 @@ class System:
             _listed("excitation", excitation),
             {**system.loads, **_vectors("loads", loads)},
             _listed("springs", springs),
-            None if circulatory is None else _skew("circulatory", circulatory, system.size),
-        )
+            None if circulatory is None else skew("circulatory", circulatory, system.size),
+        )._spun(None if spin is None else _of_size(spin, system.size))
 
     @property
     def size(self) -> int:
@@ -541,6 +553,30 @@ class System:
         """Whether no motion without contact is bounded at ω (rad/s), see `ForcedResponse`."""
         return self.response(omega).unbounded(omega) is not None
 
+    def with_spin(self, hz: float) -> System:
+        """The same rotor at another speed.
+
+        Raises
+        ------
+        SystemModelError
+            If it has no spin, or its motion without contact would grow.
+        """
+        if self.spin is None:
+            raise SystemModelError("the system has no spin")
+        return self._faster(replace(self.spin, hz=hz), hz - self.spin.hz)
+
+    def _spun(self, spin: Spin | None) -> System:
+        """The system with what the speed of a shaft adds."""
+        return self if spin is None else self._faster(spin, spin.hz)
+
+    def _faster(self, spin: Spin, turns: float) -> System:
+        G, N = spin.added(turns, self.size)
+        if self.circulatory is not None:
+            N = self.circulatory + N
+        return replace(
+            self, damping=self.damping + G, circulatory=N if np.any(N) else None, spin=spin
+        )
+
     def with_elements(
         self,
         *,
@@ -681,6 +717,7 @@ def same_system(a: System, b: System) -> bool:
         )
         and (a.stops, a.dampers, a.excitation, a.springs)
         == (b.stops, b.dampers, b.excitation, b.springs)
+        and same_spin(a.spin, b.spin)
     )
 
 
@@ -688,18 +725,14 @@ def _rank(rows: Sequence[Real], columns: int) -> int:
     return int(np.linalg.matrix_rank(np.array(rows).reshape(-1, columns))) if columns else 0
 
 
+def _of_size(spin: Spin, size: int) -> Spin:
+    """The spin, if its matrices have so many rows."""
+    spin.added(0.0, size)
+    return spin
+
+
 def _or_zero(matrix: Real | None) -> Real:
     return np.zeros(0) if matrix is None else matrix
-
-
-def _skew(name: str, values: ArrayLike, size: int) -> Real:
-    matrix = np.atleast_2d(numbers(name, values))
-    if matrix.shape != (size, size):
-        raise SystemModelError(f"{name} is {matrix.shape}, it must be {(size, size)}")
-    largest = float(np.abs(matrix).max())
-    if not np.allclose(matrix, -matrix.T, rtol=1e-10, atol=1e-12 * largest):
-        raise SystemModelError(f"{name} must be skew: its transpose must be minus itself")
-    return 0.5 * (matrix - matrix.T)
 
 
 def _negative(K: Real) -> bool:

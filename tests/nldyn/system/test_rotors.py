@@ -15,6 +15,7 @@ from nldyn import (
     FlowMap,
     HarmonicForce,
     SceneError,
+    Spin,
     Spring,
     Stop,
     System,
@@ -164,3 +165,127 @@ def test_the_example_touches_its_first_pad_where_the_closed_form_says():
     branch = nldyn.continue_branch(nldyn.solve_orbit(system, exact - 0.5), (exact - 1, exact + 0.2))
     grazing = [p.frequency_hz for p in branch.special_points if p.kind == "GR"]
     assert min(abs(hz - exact) for hz in grazing) < 1e-8 * exact
+
+
+K, C, ME, IT, IP = 4.0, 0.1, 0.02, 1.0, 0.4
+
+
+def disc(omega=1.2, stops=(), circulatory=None, c=C):
+    """An overhung disc that tilts about two axes: its gyroscopic moment goes with the speed."""
+    spin = Spin(omega / (2.0 * np.pi), IP * SKEW, circulatory)
+    sources = [Unbalance("x", ME), Unbalance("y", ME, -90.0)]
+    return System.from_matrices(
+        IT * np.eye(2), K * np.eye(2), PLACES, damping=c * np.eye(2), spin=spin,
+        excitation=sources, stops=stops,
+    )  # fmt: skip
+
+
+def whirl(omega):
+    """Forward whirl of the disc at the speed of its unbalance."""
+    return ME * omega**2 / abs(K - (IT - IP) * omega**2 + 1j * C * omega)
+
+
+def touching(gap):
+    """Speed in rad/s at which the whirl reaches a gap."""
+    return brentq(lambda omega: whirl(omega) - gap, 1.2, 2.0, xtol=1e-14)
+
+
+def test_a_disc_is_followed_in_its_speed_as_the_closed_form_says(tmp_path):
+    stop = Stop.linear("x", 40.0, gap=0.03)
+    system = disc(1.6, [stop])
+    exact = touching(0.03) / (2.0 * np.pi)
+    curve = nldyn.continue_in(
+        nldyn.solve_orbit(system, system.spin.hz), "speed_hz", (0.25, exact + 1e-5)
+    )
+    assert len(curve.points) > 2
+    for orbit in (point.orbit for point in curve.points):
+        assert orbit.system.spin.hz == pytest.approx(orbit.frequency_hz, rel=1e-14)
+        if not orbit.impacts:
+            assert orbit.max_abs_displacement == pytest.approx(whirl(orbit.omega), rel=1e-9)
+    grazing = curve.marks[0]
+    assert grazing.kind == "GR" and grazing.frequency_hz == pytest.approx(exact, rel=1e-9)
+    wide = nldyn.continue_special(
+        grazing, ("speed_hz", "gap"), ((0.28, 0.286), (0.02, 0.04)),
+        options=nldyn.ContinuationOptions(max_points=3),
+    )  # fmt: skip
+    assert np.ptp(wide.values[:, 1]) > 1e-4
+    for hz, gap in wide.values:
+        assert whirl(2.0 * np.pi * hz) == pytest.approx(gap, rel=1e-8)
+    beyond = curve.points[-1].orbit
+    assert beyond.impacts == 1
+    flow = beyond.problem.flow
+    start = flow.to_modal(beyond.problem.nodes(beyond.point)[0])
+    turned = System.from_matrices(
+        IT * np.eye(2), K * np.eye(2), PLACES, damping=C * np.eye(2), stops=[stop],
+        gyroscopic=beyond.omega * IP * SKEW, excitation=system.excitation,
+    )  # fmt: skip
+    end, tangent = Motion(turned).run(start, (0.0, 2.0 * np.pi), beyond.omega, max_step=0.005)
+    assert end == pytest.approx(start, abs=1e-8)
+    exact_multipliers = np.linalg.eigvals(tangent)
+    for multiplier in beyond.multipliers:
+        assert np.abs(exact_multipliers - multiplier).min() < 1e-5
+    nldyn.save(curve, tmp_path / "c.h5")
+    (back,) = nldyn.load(tmp_path / "c.h5")
+    assert back.points[-1].orbit.system.spin.hz == beyond.system.spin.hz
+    assert back.values == pytest.approx(curve.values, rel=1e-15)
+
+
+def test_the_speed_ends_where_internal_damping_lets_the_whirl_grow():
+    """N = n Ω: the free whirl at σ grows from n Ω = c σ on, with σ² = G Ω σ + k."""
+    n, c = 0.5, 0.25
+    onset = np.sqrt(K / (n / c * (n / c - IP))) / (2.0 * np.pi)
+    system = disc(0.9 * 2.0 * np.pi * onset, circulatory=n * SKEW, c=c)
+    limits = (0.8 * onset, 1.2 * onset)
+    curve = nldyn.continue_in(nldyn.solve_orbit(system, system.spin.hz), "spin_hz", limits)
+    assert curve.values.max() == pytest.approx(onset, rel=1e-6)
+    assert curve.values.min() == pytest.approx(0.8 * onset, rel=1e-9)
+
+
+SPINNING = """
+[matrices]
+mass = [[1.0, 0.0], [0.0, 1.0]]
+stiffness = [[4.0, 0.0], [0.0, 4.0]]
+damping = [[0.1, 0.0], [0.0, 0.1]]
+interfaces.x = [1.0, 0.0]
+interfaces.y = [0.0, 1.0]
+[matrices.spin]
+hz = 0.25
+gyroscopic = [[0.0, 0.4], [-0.4, 0.0]]
+[[excitation]]
+at = "x"
+kind = "unbalance"
+mass_times_radius = 0.02
+[[excitation]]
+at = "y"
+kind = "unbalance"
+mass_times_radius = 0.02
+phase_deg = -90.0
+"""
+
+
+@pytest.mark.parametrize("more", ["", "[reduction]\nmodes = 2\n"])
+def test_a_scene_has_a_speed(more):
+    system = build_system(parse_scene(SPINNING + more))
+    orbit = nldyn.solve_orbit(system, 0.25)
+    assert orbit.max_abs_displacement == pytest.approx(whirl(0.5 * np.pi), rel=1e-9)
+    faster = nldyn.solve_orbit(system.with_spin(0.3), 0.3)
+    assert faster.max_abs_displacement == pytest.approx(whirl(0.6 * np.pi), rel=1e-9)
+
+
+def test_spins_that_make_no_sense_are_refused():
+    with pytest.raises(SystemModelError, match="spin: gyroscopic must be skew"):
+        Spin(1.0, np.eye(2))
+    with pytest.raises(SystemModelError, match="spin needs a gyroscopic or a circulatory matrix"):
+        Spin(1.0)
+    with pytest.raises(SystemModelError, match="spin has matrices of 3 rows, the system 2"):
+        System.from_matrices(np.eye(2), np.eye(2), PLACES, spin=Spin(1.0, np.zeros((3, 3))))
+    start = nldyn.solve_orbit(disc(), 0.1)
+    with pytest.raises(
+        SystemModelError, match=r"spins at 0\.19.* Hz, but the excitation"
+    ):
+        nldyn.continue_in(start, "speed_hz", (0.1, 0.2))
+    still = nldyn.solve_orbit(rotor(excitation=[Unbalance("x", 0.02)]), 0.1)
+    with pytest.raises(SystemModelError, match="'spin_hz': the system has no spin"):
+        nldyn.continue_in(still, "spin_hz", (0.1, 0.2))
+    with pytest.raises(SceneError, match=r"matrices.spin.gyroscopic must be skew"):
+        parse_scene(SPINNING.replace("-0.4", "0.4"))
