@@ -6,6 +6,7 @@ import ast
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from nldyn.branches.tables import UNITS
@@ -47,11 +48,14 @@ def test_example_of_the_loads_prints_the_folds(capsys):
 
 
 def test_example_of_the_elements_prints_folds_and_wells(capsys):
-    """The folds are those of harmonic balance, see `test_bonds`."""
+    """The folds are those of harmonic balance, see `test_bonds`; the whirl has a closed form."""
     text = (ROOT / "docs" / "how-to" / "elements.md").read_text(encoding="utf-8")
-    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.S)
-    exec(code, {})
-    folds, wells = (ast.literal_eval(line) for line in capsys.readouterr().out.splitlines())
+    for code in re.findall(r"```python\n(.*?)```", text, flags=re.S):
+        exec(code, {})
+    folds, wells, whirl = (ast.literal_eval(line) for line in capsys.readouterr().out.splitlines())
+    speed = 2.0 * np.pi * 0.41
+    exact = 0.02 * speed**2 / abs(4.0 - 0.6 * speed**2 + 0.1j * speed)
+    assert whirl == pytest.approx(exact, abs=6e-10)
     assert sorted(folds) == pytest.approx([0.210759, 0.283251], abs=5e-7)
     assert wells == [2.0, 2.0]
 
