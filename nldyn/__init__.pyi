@@ -103,6 +103,7 @@ from nldyn.system.elements import Damper as Damper
 from nldyn.system.elements import HarmonicForce as HarmonicForce
 from nldyn.system.elements import Stop as Stop
 from nldyn.system.elements import Unbalance as Unbalance
+from nldyn.system.elements import dashpot_for as dashpot_for
 from nldyn.system.elements import dissipation_for as dissipation_for
 from nldyn.system.elements import hertz_stiffness as hertz_stiffness
 from nldyn.system.measured import MeasuredForce as MeasuredForce

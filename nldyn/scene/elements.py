@@ -19,6 +19,7 @@ from nldyn.system.elements import (
     HarmonicForce,
     Stop,
     Unbalance,
+    dashpot_for,
     dissipation_for,
     hertz_stiffness,
 )
@@ -81,6 +82,9 @@ def _stop(table: StopTable) -> AnyStop:
     loss = table.dissipation or 0.0
     if table.restitution is not None and table.impact_speed is not None:
         loss = dissipation_for(table.restitution, table.impact_speed)
+    dashpot = table.dashpot
+    if table.restitution is not None and table.mass is not None:
+        dashpot = dashpot_for(table.restitution, stiffness, table.mass, pulls=table.pulls)
     return Stop(
         table.at,
         stiffness,
@@ -89,8 +93,8 @@ def _stop(table: StopTable) -> AnyStop:
         table.direction,
         table.against,
         loss,
-        dashpot=table.dashpot,
-        pulls=table.pulls,
+        dashpot=dashpot,
+        pulls=table.pulls or not dashpot,
     )
 
 

@@ -593,6 +593,9 @@ class StopTable(Table):
     one instead of `dissipation`, above 0, that of a free body that hits the stop."""
     impact_speed: Positive | None = None
     """[m/s] Speed at which `restitution` holds; slower impacts lose less."""
+    mass: Positive | None = None
+    """[kg] Mass of a free body whose `restitution` a linear stop has at every speed; its dashpot
+    follows from that. Instead of `impact_speed`."""
     direction: Literal[1, -1] = 1
     """`1` if positive displacements close the gap, `-1` if negative ones do."""
     against: str | None = None
@@ -613,8 +616,11 @@ class StopTable(Table):
             return self._complete_rigid()
         if self.restitution == 0.0:
             raise ValueError("needs a 'restitution' above 0, or the law 'rigid'")
+        if self.mass is not None:
+            return self._complete_viscous()
         if (self.restitution is None) != (self.impact_speed is None):
-            raise ValueError("needs both 'restitution' and 'impact_speed', or neither")
+            other = "'impact_speed' or 'mass'" if self.law == "linear" else "'impact_speed'"
+            raise ValueError(f"needs both 'restitution' and {other}, or neither")
         if self.restitution is not None:
             _refuse(self, ("dissipation",), "a stop whose 'restitution' is given")
         if not self.pulls and (self.law != "linear" or not self.dashpot):
@@ -638,8 +644,20 @@ class StopTable(Table):
             _refuse(self, ("exponent",), "a stop given by its radius (it is 1.5)")
         return self
 
+    def _complete_viscous(self) -> StopTable:
+        if self.law != "linear" or self.restitution is None:
+            raise ValueError("has 'mass', which goes with the 'restitution' of a linear stop")
+        own = "a linear stop whose 'restitution' goes with a 'mass'"
+        others = ("radius", "youngs_modulus", "poissons_ratio", "exponent", "dissipation")
+        _refuse(self, (*others, "impact_speed"), own)
+        if self.dashpot:
+            raise ValueError(f"has 'dashpot', which is not a key of {own}")
+        if self.stiffness is None:
+            raise ValueError("needs 'stiffness' (N/m)")
+        return self
+
     def _complete_rigid(self) -> StopTable:
-        elastic = ("stiffness", "exponent", "radius", "youngs_modulus", "poissons_ratio")
+        elastic = ("stiffness", "exponent", "radius", "youngs_modulus", "poissons_ratio", "mass")
         _refuse(self, (*elastic, "dissipation", "impact_speed"), "a rigid stop")
         if self.dashpot:
             raise ValueError("has 'dashpot', which is not a key of a rigid stop")

@@ -175,6 +175,70 @@ def _exact_loss(restitution: float) -> float:
     return float(brentq(faster, least, most, xtol=1e-300, rtol=1e-14)) / restitution
 
 
+def dashpot_for(restitution: float, stiffness: float, mass: float, *, pulls: bool = True) -> float:
+    r"""Dashpot c of a linear `Stop` for a coefficient of restitution, the same at every speed.
+
+    A free mass m on k δ + c δ' is linear, so that speeds go out as a share of those with which they
+    come in. With :math:`\zeta = c/2\sqrt{km}` a stop that pulls is left after half a swing, with
+    :math:`e = \exp(-\pi\zeta/\sqrt{1 - \zeta^2})`; one that never pulls where k δ + c δ' = 0, with
+    :math:`e = \exp(-2\zeta\arccos\zeta/\sqrt{1 - \zeta^2})`, also for ζ > 1 [1]_.
+
+    Parameters
+    ----------
+    restitution : float
+        Coefficient of restitution e, above 0 and at most 1.
+    stiffness : float
+        k of the stop in N/m.
+    mass : float
+        m in kg of the free body.
+    pulls : bool
+        As that of the `Stop`.
+
+    Returns
+    -------
+    float
+        c in N s/m.
+
+    Raises
+    ------
+    SystemModelError
+        For values out of range.
+
+    References
+    ----------
+    .. [1] T. Schwager, T. Pöschel (2007), *Granular Matter* 9, 465-469.
+
+    Examples
+    --------
+    >>> round(dashpot_for(0.8, 1e4, 1.0), 3), round(dashpot_for(0.8, 1e4, 1.0, pulls=False), 3)
+    (14.17, 14.871)
+    """
+    owner = "dashpot_for"
+    for name, value in (("restitution", restitution), ("stiffness", stiffness), ("mass", mass)):
+        _positive(owner, name, value)
+    if restitution > 1.0:
+        raise SystemModelError(f"{owner}: restitution must be at most 1, got {restitution:g}")
+    lost = -math.log(restitution)
+    ratio = lost / math.hypot(math.pi, lost) if pulls else _ratio_without_pull(lost)
+    return 2.0 * ratio * math.sqrt(stiffness * mass)
+
+
+def _ratio_without_pull(lost: float) -> float:
+    """Solve 2 ζ arccos(ζ)/√(1 - ζ²) = lost for ζ."""
+
+    def excess(ratio: float) -> float:
+        off = 1.0 - ratio
+        if abs(off) < 1e-6:
+            share = 1.0 + off / 3.0
+        elif off > 0.0:
+            share = math.acos(ratio) / math.sqrt(off * (1.0 + ratio))
+        else:
+            share = math.acosh(ratio) / math.sqrt(-off * (1.0 + ratio))
+        return 2.0 * ratio * share - lost
+
+    return float(brentq(excess, 0.0, max(1.0, math.exp(0.5 * lost)), xtol=1e-300, rtol=1e-14))
+
+
 @dataclass(frozen=True)
 class Stop:
     r"""One-sided contact: :math:`F = k\,\delta^p (1 + a\dot\delta) + c\,\dot\delta` for δ > 0.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg as sla
@@ -13,10 +15,12 @@ from nldyn import (
     FlowOptions,
     HarmonicForce,
     Parameter,
+    SceneError,
     Stop,
     System,
     SystemModelError,
     continue_branch,
+    dashpot_for,
     load,
     save,
     solve_orbit,
@@ -25,7 +29,7 @@ from nldyn.base.arrays import Real
 from nldyn.base.resources import example
 from nldyn.branches.endings import Ending
 from nldyn.scene.build import build_system
-from nldyn.scene.read import load_scene
+from nldyn.scene.read import load_scene, parse_scene
 
 M, K, C, SPRING, DASHPOT, GAP, FORCE = 1.3, 4000.0, 3.0, 1e5, 60.0, 1e-3, 5.0
 HZ = 10.0
@@ -155,3 +159,43 @@ def test_dashpots_that_make_no_sense():
         Stop("x", 1.0, dashpot=-1.0)
     with pytest.raises(SystemModelError, match="dashpot or a law of your own"):
         Stop("x", 1.0, 1.0, law=lambda d, v: (d, 1.0, 0.0), dashpot=1.0)
+
+
+@pytest.mark.parametrize("pulls", [True, False])
+@pytest.mark.parametrize("restitution", [0.9999, 0.8, 0.1353, 0.01])
+def test_a_dashpot_gives_one_restitution_at_every_speed(restitution, pulls):
+    """A free body flies against the stop; 0.1353 is beside critical damping without pull."""
+    dashpot = dashpot_for(restitution, SPRING, M, pulls=pulls)
+    stop = Stop.linear("x", SPRING, dashpot=dashpot)
+    stop = replace(stop, pulls=pulls)
+    system = System.from_matrices([[M]], [[0.0]], {"x": [1.0]}, stops=[stop])
+    flow = FlowMap(system)
+    for speed in (1e-3, 1.0, 1e3):
+        start = flow.to_state(np.array([-1e-3, 1.0]) * speed * np.sqrt(M))
+        found = flow.shoot(start[None], np.array([0.0, 2.0 * np.pi]), 2.0 * np.pi / 2.0)
+        after = flow.to_modal(found.ends[0])[1] / np.sqrt(M)
+        assert -after / speed == pytest.approx(restitution, rel=1e-10)
+
+
+def test_a_scene_asks_for_a_restitution_at_every_speed():
+    text = "[modal]\nfrequencies_hz=[1.0]\nparticipation.a=[1.0]\n[[stops]]\nat='a'\n"
+    linear = f"{text}law='linear'\nstiffness=1e5\nrestitution=0.8\n"
+    (stop,) = build_system(parse_scene(f"{linear}mass=2.0\npulls=false\n")).stops
+    assert stop.dashpot == dashpot_for(0.8, 1e5, 2.0, pulls=False) and not stop.pulls
+    for wrong, words in (
+        (linear, "needs both 'restitution' and 'impact_speed' or 'mass', or neither"),
+        (f"{linear}mass=2.0\nimpact_speed=1.0\n", "'impact_speed', which is not a key of a linear"),
+        (
+            f"{linear}mass=2.0\ndashpot=1.0\n",
+            "'dashpot', which is not a key of a linear stop whose",
+        ),
+        (f"{text}stiffness=1e5\nrestitution=0.8\nmass=2.0\n", "with the 'restitution' of a linear"),
+    ):
+        with pytest.raises(SceneError, match=words):
+            parse_scene(wrong)
+
+
+@pytest.mark.parametrize("numbers", [(0.0, 1.0, 1.0), (1.1, 1.0, 1.0), (0.5, -1.0, 1.0)])
+def test_no_dashpot_for_what_makes_no_sense(numbers):
+    with pytest.raises(SystemModelError, match="dashpot_for: "):
+        dashpot_for(*numbers)

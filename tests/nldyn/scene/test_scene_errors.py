@@ -120,7 +120,7 @@ def test_what_is_given_twice_is_told_in_words_of_toml(tmp_path, text, fault):
             "zzz = 1\nstiffness = 5e9",
             "stops[0].zzz is not a known key; known here: 'at', 'law', 'stiffness', 'exponent', "
             "'radius', 'youngs_modulus', 'poissons_ratio', 'gap', 'dissipation', 'dashpot', "
-            "'pulls', 'restitution', 'impact_speed', 'direction', 'against'",
+            "'pulls', 'restitution', 'impact_speed', 'mass', 'direction', 'against'",
         ),
         ("5e9", "-5e9", "stops[0].stiffness must be greater than 0, not -5000000000.0"),
         ("5e9", "0.0", "stops[0].stiffness must be greater than 0, not 0.0"),
