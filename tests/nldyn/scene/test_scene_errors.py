@@ -453,7 +453,7 @@ def test_matrices(tmp_path):
         (one, "[[1.0, 0.5], [0.0, 1.0]]", "matrices.stiffness must be symmetric"),
         ("[[1.0]]", "[[1.0]]", "matrices.interfaces.a must have 1 number, one per"),
         ("[[1.0, 2.0], [2.0, 1.0]]", one, "matrices.mass must be positive definite"),
-        (one, "[[1.0, 0.0], [0.0, -1.0]]", "matrices.stiffness must not be negative"),
+        (one, "[[1.0, 0.0], [0.0, -1.0]]", "matrices: the stiffness matrix is not positive"),
         ("[[1e-320, 0], [0, 1]]", one, "matrices.mass[0][0] must be 0 or from 1e-50"),
         ("[[1e308, 0], [0, 1]]", one, "matrices.mass[0][0] must be 0 or from 1e-50"),
     ):
