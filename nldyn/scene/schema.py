@@ -820,9 +820,6 @@ class ExploreTable(Table):
     doubled_points: Annotated[int, Field(ge=2, le=1_000_000)] | None = None
     """Most points in one direction of branches longer in period than `max_period`; those that
     are broken off are noted."""
-    passing: Annotated[int, Field(ge=0, le=1000)] = 0
-    """Further random states at each frequency (up to 1000), whose motions are followed for 60
-    periods only: beside them unstable orbits are looked for."""
     pseudo_orbits: Annotated[int, Field(ge=0, le=1_000_000)] = 10
     """Most closed sequences (up to 1 000 000) of pieces of known orbits, of each length up to
     `unstable_period`, beside which [orbits are looked for](../how-to/exploring.md) at each

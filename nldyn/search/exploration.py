@@ -56,9 +56,6 @@ class ExploreOptions:
     doubled_points : int, optional
         Most points in one direction of a branch that is longer in period than those looked for;
         as on the others unless given. A note names each branch that is broken off.
-    passing : int
-        Further random initial states at each frequency on the way up, whose motions are followed
-        for 60 periods only, beside which unstable orbits are looked for.
     pseudo_orbits : int
         Most closed sequences of pieces of known orbits, of each length up to `unstable_period`,
         beside which orbits are looked for at each frequency on the way down, see
@@ -87,7 +84,6 @@ class ExploreOptions:
     unstable_period: int = 3
     doubled_period: int = 1
     doubled_points: int | None = None
-    passing: int = 0
     pseudo_orbits: int = 10
     mixtures: int = 10
     walks: int = 10
@@ -103,7 +99,6 @@ class ExploreOptions:
         check_whole("explore: doubled_period", self.doubled_period, 1, LONGEST_PERIOD)
         if self.doubled_points is not None:
             check_whole("explore: doubled_points", self.doubled_points, 2, MOST_POINTS)
-        check_whole("explore: passing", self.passing, 0, MOST_COUNT)
         check_whole("explore: pseudo_orbits", self.pseudo_orbits, 0, MOST_COUNT)
         check_whole("explore: mixtures", self.mixtures, 0, MOST_COUNT)
         check_whole("explore: walks", self.walks, 0, MOST_COUNT)

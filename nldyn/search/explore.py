@@ -51,7 +51,6 @@ NEAR = 0.1  # a return within this share of the motion is worth a Newton iterati
 ARRIVED = 0.01  # a motion this near to a known orbit, relative, has settled on it or passes it
 CANDIDATES = 5  # near returns of each motion and period from which Newton's method starts
 TRANSIENT = 5  # periods of a motion beside which no orbits are looked for
-PASSING, BESIDE_PASSING = 60, 10  # periods of a short motion, and candidates as above
 PIECE = 16  # periods simulated between two looks at the known orbits; later a quarter of all
 LIKELY_ROUNDS = 2  # after which, mostly, a round has found nothing new
 AGAIN = 12  # times that a frequency is searched again while its indices say that orbits are missing
@@ -302,15 +301,11 @@ class _Survey:
             starts = np.vstack([starts, random_states(flow, omega, self.effort.starts, seed)])
         known = _Known(box, frequency)
         here, carried = self._search(starts, known, also_unstable=up)
-        if up and self.effort.passing:
-            number = AGAIN + 1  # of the seed, after those of the searches again
-            seed = (self.effort.seed, turn, place, number)
-            self._pass_by(_at_random(flow, omega, self.effort.passing, seed), known)
         for again in range(AGAIN if up else 0):
             if not known.incomplete(min(self.effort.unstable_period, self.max_period)):
                 break
             seed = (self.effort.seed, turn, place, again + 1)
-            starts = _at_random(flow, omega, self.effort.starts, seed)
+            starts = random_states(flow, omega, self.effort.starts + 1, seed)[1:]  # without rest
             here = here.with_more(self._search(starts, known, also_unstable=True)[0])
         if not up and self.effort.unstable_period:
             self._follow_guesses(frequency, (self.effort.seed, turn, place))
@@ -364,7 +359,7 @@ class _Survey:
         adrift = [run[-1] for run in wandering]
         settled = [stroboscopic(orbit)[0] for orbit in attractors]
         if also_unstable:
-            self._beside(runs, known, CANDIDATES)
+            self._beside(runs, known)
             self._deflate(adrift + settled, known)
         coverage = Coverage(
             known.frequency_hz,
@@ -419,13 +414,6 @@ class _Survey:
     def _orbit_near(self, start: Real, period: int, omega: float) -> Orbit | None:
         return orbit_near(self.box.flow, start, period, omega, self.box.observe)
 
-    def _pass_by(self, starts: Real, known: _Known) -> None:
-        """Look for unstable orbits that short motions pass by."""
-        flow = self.box.flow
-        motions = [flow.strobe(start, known.omega, PASSING) for start in starts]
-        runs = [found.ends for found in motions if not found.failure]
-        self._beside(runs, known, BESIDE_PASSING)
-
     def _follow_guesses(self, frequency_hz: float, seed: Sequence[int]) -> None:
         """Follow the orbits to which the strategies lead, each with random numbers of its own."""
         spacing, periods = self.effort.spacing, self._unstable_periods()
@@ -439,11 +427,11 @@ class _Survey:
     def _unstable_periods(self) -> range:
         return range(1, min(self.effort.unstable_period, self.max_period) + 1)
 
-    def _beside(self, runs: Sequence[Real], known: _Known, candidates: int) -> None:
+    def _beside(self, runs: Sequence[Real], known: _Known) -> None:
         """Look for unstable orbits of short periods beside motions."""
         box, omega = self.box, known.omega
         for period, run in product(self._unstable_periods(), runs):
-            for start in near_returns(run[TRANSIENT:], period, candidates):
+            for start in near_returns(run[TRANSIENT:], period, CANDIDATES):
                 state = run[TRANSIENT + start]
                 number = known.beside(state, period)
                 if number is not None:
@@ -540,11 +528,6 @@ class _Known:
             if float(off.max()) < size:
                 return orbit
         return None
-
-
-def _at_random(flow: FlowMap, omega: float, count: int, seed: tuple[int, ...]) -> Real:
-    """Random states (count, 2n), without the rest that `random_states` begins with."""
-    return random_states(flow, omega, count + 1, seed)[1:]
 
 
 def _nearest(places: Real, state: Real) -> float:

@@ -93,7 +93,6 @@ settling = 1000
 unstable_period = 2
 doubled_period = 4
 doubled_points = 30
-passing = 2
 pseudo_orbits = 3
 mixtures = 3
 walks = 2

@@ -127,7 +127,7 @@ def test_a_frequency_is_searched_until_the_indices_of_its_orbits_add_up(
 
     monkeypatch.setattr(survey._Survey, "_search", given_in_the_end)
     known = replace(three, branches=tuple(three.of_period(1)))
-    effort = ExploreOptions(spacing=0.02, starts=1, passing=0, **NOTHING_MORE)
+    effort = ExploreOptions(spacing=0.02, starts=1, **NOTHING_MORE)
     flow = three.branches[0].points[0].problem.flow
     found = explore(flow, THREE_HZ, 3, effort=effort, known=known)
     counts = [searched.count(c.frequency_hz) for c in found.coverage]
@@ -140,33 +140,6 @@ def test_a_frequency_is_searched_until_the_indices_of_its_orbits_add_up(
         assert counts == [found_by + 1] + [2] * (len(counts) - 1)  # on the way up and down
         assert sums == {1}
         assert "P to P^3 add up to one from 36 to 38.5 Hz; isolas that are missing" in report
-
-
-def test_unstable_orbits_that_short_motions_pass_are_found(three, monkeypatch):
-    """Motions that begin a millionth off them; nothing else is tried."""
-    monkeypatch.setattr(survey._Survey, "_motion", lambda *_: (None, None))
-    monkeypatch.setattr(survey, "AGAIN", 0)
-    effort = ExploreOptions(spacing=0.02, starts=1, passing=3, **NOTHING_MORE)
-    flow = three.branches[0].points[0].problem.flow
-    given = []
-
-    def beside_orbits(flow, omega, count, seed):
-        hz = omega / (2.0 * math.pi)
-        orbits = [o for n in (2, 3) for b in three.of_period(n) for o in b.at(hz) if not o.stable]
-        given.append((hz, count, seed))
-        return np.array([(1.0 + 1e-6) * stroboscopic(orbit)[0] for orbit in orbits])
-
-    monkeypatch.setattr(survey, "_at_random", beside_orbits)
-    known = replace(three, branches=tuple(three.of_period(1)))
-    without = explore(flow, THREE_HZ, 3, effort=replace(effort, passing=0), known=known)
-    assert without.diagram.branches == known.branches and not given
-    found = explore(flow, THREE_HZ, 3, effort=effort, known=known)
-    assert sorted(branch.period for branch in found.diagram.branches) == [1, 2, 3]
-    for wanted in three.branches:
-        (branch,) = found.diagram.of_period(wanted.period)
-        assert all(wanted.contains(orbit) for orbit in branch.points)
-    assert [(hz, count) for hz, count, _ in given] == [(c.frequency_hz, 3) for c in found.coverage]
-    assert len({seed for _, _, seed in given}) == len(given)
 
 
 @pytest.mark.parametrize(
@@ -184,7 +157,7 @@ def test_further_guesses_on_the_way_down_lead_to_further_branches(
     monkeypatch.setattr(survey._Survey, "_motion", lambda *_: (None, None))
     monkeypatch.setattr(survey, "AGAIN", 0)
     known = replace(three, branches=tuple(b for b in three.branches if b.period in given))
-    few = ExploreOptions(spacing=0.02, starts=1, passing=0, walk_states=1000, **NOTHING_MORE)
+    few = ExploreOptions(spacing=0.02, starts=1, walk_states=1000, **NOTHING_MORE)
     without, found = (
         explore(three.branches[0].points[0].problem.flow, THREE_HZ, 3, known=known, effort=effort)
         for effort in (few, replace(few, **guesses))
@@ -642,7 +615,6 @@ def test_long_doubled_branches_are_broken_off_where_told(whole):
         ({"settling": 0}, "explore: settling"),
         ({"doubled_period": 0}, "explore: doubled_period"),
         ({"doubled_points": 1}, "explore: doubled_points"),
-        ({"passing": -1}, "explore: passing"),
         ({"pseudo_orbits": -1}, "explore: pseudo_orbits"),
         ({"mixtures": 1.5}, "explore: mixtures"),
         ({"walks": -1}, "explore: walks"),
