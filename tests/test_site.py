@@ -1,7 +1,13 @@
 """What `make docs` would miss: every page is listed, every room of nldyn has its page."""
 
+import json
 import re
+import runpy
 from pathlib import Path
+
+import matplotlib
+import matplotlib.pyplot as plt
+import pytest
 
 import nldyn
 
@@ -19,3 +25,21 @@ def test_every_room_with_public_names_has_a_page():
     rooms = {".".join(home.split(".")[:2]) for home in nldyn._HOMES.values()}
     shown = "".join(page.read_text(encoding="utf-8") for page in DOCS.glob("api/*.md"))
     assert rooms - set(re.findall(r"^```\{public\} (.*)$", shown, flags=re.M)) == set()
+
+
+def test_a_notebook_of_the_gallery_runs(monkeypatch, tmp_path):
+    """What can be downloaded from the site: its cells give what its script gives."""
+    for package in ("jupytext", "sphinx", "latex2mathml"):  # of the extra `docs`
+        pytest.importorskip(package)
+    monkeypatch.chdir(tmp_path)
+    matplotlib.use("Agg")
+    made = runpy.run_path(str(DOCS / "_site" / "from_sources.py"))
+    script = (DOCS / "gallery" / "cantilever_modes.py").read_text(encoding="utf-8")
+    told, *code = json.loads(made["notebook"](script))["cells"]
+    assert told["cell_type"] == "markdown" and "".join(told["source"]).startswith("# ")
+    names: dict[str, object] = {}
+    for cell in code:
+        assert cell["cell_type"] == "code"
+        exec("".join(cell["source"]), names)  # its own assertion fails where the number is another
+    assert plt.get_fignums()
+    plt.close("all")
