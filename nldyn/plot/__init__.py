@@ -10,6 +10,7 @@ from nldyn.plot.longterm import (
     plot_sweep,
     plot_wear,
 )
+from nldyn.plot.mac import plot_mac
 from nldyn.plot.orbit import plot_contact_force, plot_history, plot_phase_portrait, plot_spectrum
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "plot_curves",
     "plot_diagram",
     "plot_history",
+    "plot_mac",
     "plot_orbit_curve",
     "plot_phase_portrait",
     "plot_section",

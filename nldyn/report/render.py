@@ -205,8 +205,9 @@ def render_modes_of(
 ) -> str:
     """Write ``modes.csv``, ``mode_shapes.png`` and the page ``mode_shapes.html`` of a scene.
 
-    With a comparison also ``mac.csv`` and ``comparison.png``, which shows each mode beside the one
-    of the other scene that is most like it; animated, a ``mode_1.gif`` and so on.
+    With a comparison also ``mac.csv``, the map ``mac.png`` of it, and ``comparison.png``, which
+    shows each mode beside the one of the other scene that is most like it; animated, a
+    ``mode_1.gif`` and so on.
 
     Parameters
     ----------
@@ -241,12 +242,24 @@ def render_modes_of(
         write_table(folder / "modes.csv", table.columns(), table.rows())
         if against is not None:
             write_table(folder / "mac.csv", against.columns(), against.rows())
+            save_mac(against, folder)
         if scene.mesh is None or structure.reduced is None:
             return ""
         component: Any = structure.component
         drawing = Drawing(scene, component, structure.reduced, folder, silent, tuple(modes), view)
         drawing.mode_page()
         return drawing.mode_picture(against, animated)
+
+
+def save_mac(against: Comparison, folder: Path) -> None:
+    """Draw how much alike all modes of two scenes are, as ``mac.png`` and ``.svg``."""
+    from nldyn.plot.diagram import save_figure
+    from nldyn.plot.mac import plot_mac
+
+    hz, other_hz = against.frequencies_hz, against.other_hz
+    ax = plot_mac(against.mac, frequencies_hz=hz, other_hz=other_hz)
+    ax.set_xlabel(f"mode of {against.scene.file.name}")
+    save_figure(ax, folder / "mac")
 
 
 def save_orbit(orbit: Orbit, folder: Path) -> None:

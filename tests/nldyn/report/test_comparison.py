@@ -81,6 +81,7 @@ def test_the_command_tells_and_writes_the_comparison(tmp_path, monkeypatch):
     arguments = ["modes", scenes[0], "--against", scenes[1]]
     result = CliRunner().invoke(main, [*arguments, "--out", str(tmp_path / "out")])
     assert "most like" in result.stdout and (tmp_path / "out" / "mac.csv").is_file()
+    assert (tmp_path / "out" / "mac.png").is_file()
     told = json.loads(CliRunner().invoke(main, [*arguments, "--json"]).stdout)["against"]
     assert told[0]["partner"] == 1 and told[0]["mac_with_1"] == pytest.approx(1.0, abs=1e-9)
     refused = CliRunner().invoke(main, ["modes", scenes[0], "--animate"])
