@@ -174,16 +174,18 @@ def output_change(orbit: Orbit, output: int, phase: float, q: Real) -> tuple[flo
     """Derivatives of an output at a phase along a change q of the nodes, and with respect to P."""
     problem = orbit.problem
     row = problem.flow.rows[output]
+    carried = float(problem.flow.ride(output, orbit.omega).by_log_omega(np.array(phase)))
     j = int(np.searchsorted(problem.phases, phase, side="right")) - 1
     j = min(max(j, 0), problem.segments - 1)
     start = float(problem.phases[j])
     if phase - start < 1e-12:
-        return float(row @ q[j]), 0.0
+        return float(row @ q[j]), carried
     node = problem.nodes(orbit.point)[j]
     found = problem.flow.shoot(node[None], np.array([start, phase]), orbit.omega)
     if found.failure:
         raise CoefficientError(found.failure)
-    return float(row @ found.jacobians[0] @ q[j]), float(row @ found.d_omega[0]) * orbit.omega
+    by_omega = float(row @ found.d_omega[0]) * orbit.omega
+    return float(row @ found.jacobians[0] @ q[j]), by_omega + carried
 
 
 # --- flips ---------------------------------------------------------------------------------------

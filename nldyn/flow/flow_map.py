@@ -52,6 +52,7 @@ from nldyn.system.contact_law import law_address
 from nldyn.system.elements import Stop
 from nldyn.system.linear import ForcedResponse
 from nldyn.system.parameters import Parameter
+from nldyn.system.ride import Ride
 from nldyn.system.system import System, same_system
 
 __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
@@ -243,6 +244,13 @@ class FlowMap:
         return [s.stop_vector(stop) for stop in s.stops] + [
             s.vector_between(bond.at, bond.against) for bond in s.bonds
         ]
+
+    def ride(self, output: int, omega: float) -> Ride:
+        """What a moving base adds to an output at ω, see `System.with_absolute`."""
+        s = self.system
+        place = output - len(s.stops) - len(s.bonds)
+        observed = 0 <= place < len(s.interfaces)
+        return s.ride(s.interfaces[place], omega) if observed else Ride.of((), omega)
 
     @cached_property
     def rate_rows(self) -> Real:
@@ -716,7 +724,11 @@ class Trajectory:
         """The same with the values of the recorded polynomials, in contacts good to 1e-6."""
         flow = self.flow
         check_whole("output", output, 0, len(flow.rows) - 1)
-        return self._evaluate(local_extremes, flow.rows[output], flow.rate_rows[output])
+        row, ride = flow.rows[output], flow.ride(output, self.omega)
+        forced = np.append(self._response.amplitudes @ row, ride.amplitudes)
+        return self._evaluate(
+            local_extremes, row, flow.rate_rows[output], forced, more=ride.orders
+        )
 
     def with_exact_values(self, found: Real, output: int, wanted: NDArray[np.bool_]) -> Real:
         """Extremes (k, 3) of an output, those wanted (k,) with the values of the flow map."""
@@ -724,7 +736,9 @@ class Trajectory:
         order = order[wanted[order]]
         inside, solved = self._solved_in_contact(found[order, 0])
         exact = found.copy()
-        exact[order[inside], 1] = solved @ self.flow.rows[output]
+        phases = found[order[inside], 0]
+        carried = self.flow.ride(output, self.omega).at(phases)
+        exact[order[inside], 1] = solved @ self.flow.rows[output] + carried
         return exact
 
     def contact_quadrature(self) -> tuple[Real, Real]:
@@ -740,9 +754,13 @@ class Trajectory:
         """Response to the excitation."""
         return self.flow.system.response(self.omega)
 
-    def _evaluate(self, kernel: Any, *arguments: object) -> Real:
-        """Call a kernel of `_sample` on the recorded pieces."""
+    def _evaluate(self, kernel: Any, *arguments: object, more: Real | None = None) -> Real:
+        """Call a kernel of `_sample` on the recorded pieces, perhaps with more orders of terms."""
         data, tables, rec = self.flow._data, self.flow.tables, self.record
+        terms, amplitudes = self._response.terms, self._response.amplitudes
+        if more is not None and more.size:
+            terms = terms.with_steady(more)
+            amplitudes = np.vstack([amplitudes, np.zeros((more.size, amplitudes.shape[1]))])
         found = kernel(
             data.blocks,
             data.force,
@@ -754,8 +772,8 @@ class Trajectory:
             rec.start,
             rec.force,
             int(rec.used[0]),
-            self._response.terms,
-            self._response.amplitudes,
+            terms,
+            amplitudes,
             *arguments,
         )
         return np.asarray(found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
@@ -64,6 +65,15 @@ def _read_spin(group: Group, n: int) -> Spin:
     return Spin(group.number("hz"), **matrices)
 
 
+def _read_rides(group: Group) -> dict[str, dict[str, float]]:
+    fault = group.fault("attribute", "rides", "does not tell what rides on a base")
+    try:
+        told = json.loads(group.text("rides"))
+        return {name: {load: float(x) for load, x in on.items()} for name, on in told.items()}
+    except (ValueError, TypeError, AttributeError):
+        raise fault from None
+
+
 def write_flow(group: Any, flow: FlowMap) -> None:
     """Write the numbers of a flow map into a group."""
     for key, value in asdict(flow.options).items():
@@ -81,6 +91,8 @@ def write_flow(group: Any, flow: FlowMap) -> None:
             if getattr(system.spin, name) is not None:
                 put(spin, name, getattr(system.spin, name), unit)
     set_attribute(group, "interfaces", system.interfaces)
+    if system.rides:
+        set_attribute(group, "rides", json.dumps({k: dict(v) for k, v in system.rides.items()}))
     vectors = np.array([system.participation[name] for name in system.interfaces], dtype=float)
     put(group, "participation", vectors.reshape(-1, system.size), "kg^-0.5")
     if system.loads:
@@ -274,6 +286,7 @@ def read_flow(group: Group, laws: Laws) -> FlowMap:
             _read_springs(group.group("springs")) if "springs" in group else (),
             group.array("circulatory", n, n) if "circulatory" in group else None,
             _read_spin(group.group("spin"), n) if "spin" in group else None,
+            _read_rides(group) if group.has_attribute("rides") else {},
         )
     except SystemModelError as error:
         if str(error).startswith(str(group.path)):

@@ -139,6 +139,8 @@ class Plane:
             check_types(**{f"plane: {label}": (ends, Sequence, np.ndarray)})
         name = check_observe(system, interface)
         phi = system.participation[name]
+        if name in system.rides:
+            raise SystemModelError(f"plane: '{name}' rides on a base; take the relative motion")
         if not np.any(phi):
             raise SystemModelError(f"no mode moves interface '{name}'")
         along = phi / float(phi @ phi)

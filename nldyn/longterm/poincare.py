@@ -49,9 +49,7 @@ def stroboscopic_section(motion: Motion, interface: str | None = None) -> tuple[
     101
     """
     check_types(motion=(motion, Motion))
-    phi = motion.system.participation[check_observe(motion.system, interface)]
-    states = motion.strobe
-    return states[:, : phi.size] @ phi, states[:, phi.size :] @ phi
+    return motion.strobed(interface)
 
 
 def impact_section(motion: Motion, stop: int = 0) -> tuple[Real, Real]:

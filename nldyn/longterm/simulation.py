@@ -176,11 +176,13 @@ class Motion:
         time = np.linspace(self.start_time, self.end_time, samples + 1)
         states, where = self.states(time), self._stretch_at(time)
         rest = np.zeros((time.size, len(self.system.stops)))
+        turns, pace = np.zeros(time.size), np.zeros(time.size)
         for k in np.unique(where):
             within, stretch = where == k, self.stretches[k]
             phases = stretch.record.phase[0] + stretch.omega * (time[within] - self.begins[k])
+            turns[within], pace[within] = phases, stretch.omega
             rest[within] = rest_forces(stretch, phases, self.flow.to_state(states[within]))
-        return history_of(self.system, time, states, rest)
+        return history_of(self.system, time, turns, pace, states, rest)
 
     def extremes(self, interface: str | None = None) -> tuple[Real, Real]:
         """Times (k,) in s and values (k,) in m of the local extremes of a displacement.
@@ -211,12 +213,31 @@ class Motion:
         times, values = self.extremes(interface)
         ends, hz = self._periods
         index = np.searchsorted(ends, times, side="right") - 1
-        phi = self.system.participation[check_observe(self.system, interface)]
-        at_ends = np.abs(self.strobe[:, : phi.size] @ phi)
-        peaks = np.maximum(at_ends[:-1], at_ends[1:])
+        at_ends, _ = self.strobed(interface)
+        peaks = np.maximum(np.abs(at_ends[:-1]), np.abs(at_ends[1:]))
         inside = (index >= 0) & (index < hz.size)
         np.maximum.at(peaks, index[inside], np.abs(values[inside]))
         return hz, peaks
+
+    def strobed(self, interface: str | None = None) -> tuple[Real, Real]:
+        """Displacement and velocity (k + 1,) of an interface after each whole excitation period.
+
+        Where a base moves and its frequency changes, that of the period before counts.
+        """
+        system, states = self.system, self.strobe
+        name = check_observe(system, interface)
+        if name not in system.rides:
+            phi = system.participation[name]
+            return states[:, : phi.size] @ phi, states[:, phi.size :] @ phi
+        _, hz = self._periods
+        phase = np.array([self.stretches[0].record.phase[0]])
+        paces = 2.0 * np.pi * np.append(hz[:1], hz)
+        found = [
+            system.displacement(name, state[None], phase, pace)
+            for state, pace in zip(states, paces.tolist(), strict=True)
+        ]
+        u, v = np.array(found)[:, :, 0].T
+        return u, v
 
     @cached_property
     def _periods(self) -> tuple[Real, Real]:

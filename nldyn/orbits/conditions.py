@@ -279,7 +279,9 @@ def exact_output(orbit: Orbit, output: int, phase: float) -> float:
     """
     segment, found = _flown_to(orbit, phase, sensitivities=False)
     state = orbit.problem.nodes(orbit.point)[segment] if found is None else found.ends[0]
-    return float(orbit.problem.flow.rows[output] @ state)
+    flow = orbit.problem.flow
+    carried = flow.ride(output, orbit.omega).at(np.array(phase))
+    return float(flow.rows[output] @ state + carried)
 
 
 def _flown_to(orbit: Orbit, phase: float, sensitivities: bool) -> tuple[int, Segments | None]:

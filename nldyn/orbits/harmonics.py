@@ -9,6 +9,7 @@ import numpy as np
 from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import SystemModelError, check_types, check_whole, numbers, shown
 from nldyn.orbits.orbit import Orbit, check_observe
+from nldyn.system.ride import Ride
 from nldyn.system.system import System
 
 MOST_SAMPLES = 2**18
@@ -83,13 +84,18 @@ def harmonics(orbit: Orbit, interface: str | Real | None = None, *, orders: int 
     """
     check_types(orbit=(orbit, Orbit))
     check_whole("harmonics: orders", orders, 1, 10**4)
-    phi = modal_row(orbit.system, orbit.observe if interface is None else interface)
+    place = orbit.observe if interface is None else interface
+    system, ride = orbit.system, Ride.of((), orbit.omega)
+    if isinstance(place, str) and place in system.rides:
+        phi, ride = np.asarray(system.participation[place]), system.ride(place, orbit.omega)
+    else:
+        phi = modal_row(system, place)
     lines = orders * orbit.period
     samples = 2 ** int(np.ceil(np.log2(8 * lines)))
-    found = _coefficients(orbit, phi, lines, samples)
+    found = _coefficients(orbit, phi, ride, lines, samples)
     while samples < MOST_SAMPLES:
         samples *= 2
-        coarser, found = found, _coefficients(orbit, phi, lines, samples)
+        coarser, found = found, _coefficients(orbit, phi, ride, lines, samples)
         if np.abs(found - coarser).max() <= 1e-9 * np.abs(found).max():
             break
     multiples = np.arange(lines + 1, dtype=float)
@@ -105,7 +111,10 @@ def modal_row(system: System, point: str | Real | None) -> Real:
         For an unknown interface or a row of the wrong length.
     """
     if point is None or isinstance(point, str):
-        return np.asarray(system.participation[check_observe(system, point)])
+        name = check_observe(system, point)
+        if name in system.rides:
+            raise SystemModelError(f"'{name}' cannot be taken here, only a relative displacement")
+        return np.asarray(system.participation[name])
     if np.shape(point) != (system.size,):
         raise SystemModelError(
             f"interface must be a str or None, or the displacements of {system.size} modes, got "
@@ -114,9 +123,9 @@ def modal_row(system: System, point: str | Real | None) -> Real:
     return numbers("interface", point)
 
 
-def _coefficients(orbit: Orbit, phi: Real, lines: int, samples: int) -> Complex:
+def _coefficients(orbit: Orbit, phi: Real, ride: Ride, lines: int, samples: int) -> Complex:
     phases = 2.0 * np.pi * orbit.period * np.arange(samples) / samples
-    displacement = orbit.states(phases)[:, : phi.size] @ phi
+    displacement = orbit.states(phases)[:, : phi.size] @ phi + ride.at(phases)
     phasor = np.fft.rfft(displacement)[: lines + 1] / samples
     phasor[1:] *= 2.0
     return np.asarray(phasor)

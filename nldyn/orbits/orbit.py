@@ -472,13 +472,16 @@ class Orbit:
             phases % (2.0 * np.pi * self.period),
             self.problem.flow.to_state(states),
         )
-        return history_of(self.system, phases / self.omega, states, rest)
+        return history_of(self.system, phases / self.omega, phases, self.omega, states, rest)
 
 
-def history_of(system: System, time: Real, states: Real, rest: Real) -> History:
+def history_of(
+    system: System, time: Real, phases: Real, omega: float | Real, states: Real, rest: Real
+) -> History:
     """Displacements and forces at modal states (k, 2n), with their times (k,) in s.
 
-    `rest` (k, n_stops) are the forces of rigid stops on what rests on them.
+    `phases` (k,) are those of the excitation, `omega` its frequencies in rad/s, one or (k,). `rest`
+    (k, n_stops) are the forces of rigid stops on what rests on them.
     """
     q = states[:, : system.size]
     depth = np.empty((len(system.stops), time.size))
@@ -491,10 +494,24 @@ def history_of(system: System, time: Real, states: Real, rest: Real) -> History:
         time,
         q,
         states[:, system.size :],
-        {name: q @ phi for name, phi in system.participation.items()},
+        {
+            name: q @ phi + _carried(system, name, phases, omega)
+            for name, phi in system.participation.items()
+        },
         depth.T,
         force.T,
     )
+
+
+def _carried(system: System, interface: str, phases: Real, omega: float | Real) -> Real:
+    """What a moving base adds to the displacement of an interface, (k,)."""
+    found = np.zeros(phases.size)
+    if interface in system.rides:
+        paces = np.broadcast_to(omega, phases.shape)
+        for pace in np.unique(paces):
+            within = paces == pace
+            found[within] = system.ride(interface, float(pace)).at(phases[within])
+    return found
 
 
 def contact_damping(flow: FlowMap, motion: Trajectory) -> float:

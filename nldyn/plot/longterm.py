@@ -221,9 +221,12 @@ def strobe_curves(branch: Branch, interface: str) -> tuple[Real, Real, NDArray[n
     A branch of period n has n values at each of its points.
     """
     orbits = branch.points
-    phi = orbits[0].system.participation[check_observe(orbits[0].system, interface)]
-    states = [orbit.problem.flow.to_modal(stroboscopic(orbit)) for orbit in orbits]
-    values = [modal[:, : phi.size] @ phi for modal in states]
+    name = check_observe(orbits[0].system, interface)
+    values = []
+    for orbit in orbits:
+        modal = orbit.problem.flow.to_modal(stroboscopic(orbit))
+        phases = np.zeros(len(modal))
+        values.append(orbit.system.displacement(name, modal, phases, orbit.omega)[0])
     stable = np.array([orbit.stable for orbit in orbits], dtype=bool)
     return branch.frequency_hz, np.array(values), stable
 

@@ -221,8 +221,7 @@ def drawn_phases(orbit: Orbit, samples: int) -> Real:
 
 def motion_at(orbit: Orbit, interface: str, phases: Real) -> tuple[Real, Real]:
     """Displacement and velocity of an interface at forcing phases."""
-    phi, states = orbit.system.participation[interface], orbit.states(phases)
-    return states[:, : phi.size] @ phi, states[:, phi.size :] @ phi
+    return orbit.system.displacement(interface, orbit.states(phases), phases, orbit.omega)
 
 
 def force_unit(largest: float) -> tuple[float, str]:

@@ -145,7 +145,7 @@ def _motion(orbit: Orbit) -> dict[str, Any]:
     phases = drawn_phases(orbit, min(STEPS * orbit.period, MOST_SAMPLES // 2))
     phases = phases[even(phases.size, MOST_SAMPLES)]
     states = drawn_states(orbit, phases)
-    y, speed = (part @ orbit.system.participation[orbit.observe] for part in halves(states))
+    y, speed = orbit.system.displacement(orbit.observe, states, phases, orbit.omega)
     start = motion_at(orbit, orbit.observe, 2.0 * math.pi * np.arange(orbit.period, dtype=float))
     return {
         "time": floats(phases / orbit.omega),

@@ -30,6 +30,8 @@ def undamped(scene: Scene) -> Scene:
         "dampers": [],
         "excitation": [e for e in scene.excitation if e.kind in ("constant", "weight")],
     }
+    if scene.observe is not None:
+        changed["observe"] = scene.observe.model_copy(update={"absolute": False})
     changed["components"] = {name: _without_damping(c) for name, c in scene.components.items()}
     return _without_damping(scene).model_copy(update=changed)
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
 
 import cms
 import fem
@@ -25,6 +27,7 @@ from nldyn.scene.load_case import load_case_of
 from nldyn.scene.matrices import build_matrices, skew_matrices
 from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import Scene
+from nldyn.system.elements import BaseMotion
 from nldyn.system.spin import Spin
 from nldyn.system.system import System
 
@@ -308,6 +311,37 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
     >>> f"{build_system(load_scene(example('one_dof.toml'))).frequencies_hz[0]:.4f}"
     '13.1293'
     """
+    system = _relative_system(scene, reduced)
+    if scene.observe is None or not scene.observe.absolute:
+        return system
+    with told_as(scene, ("observe", "absolute"), SystemModelError):
+        return system.with_absolute(scene.observe.at, _carried(scene, system))
+
+
+def _carried(scene: Scene, system: System) -> dict[str, float]:
+    """How far the observed interface goes with each moving base, by its load vector."""
+    part, at, of = scene, scene.observed, ""
+    if scene.components:
+        name, at = place(scene.observed)
+        part, of = scene.component_scenes[name], f"{name}."
+    bases = {source.at for source in system.excitation if isinstance(source, BaseMotion)}
+    loads = [base.removeprefix(of) for base in sorted(bases) if base.startswith(of)]
+    if part.matrices is None:
+        directions = {load: load.removeprefix("base ") for load in loads}
+        along = part.interfaces[at].direction
+        return {f"{of}{load}": float(axis == along) for load, axis in directions.items()}
+    with within_component(scene, of.rstrip(".")):
+        component = build_matrices(part)
+    return {f"{of}{load}": _follows(component, at, load) for load in loads}
+
+
+def _follows(component: cms.Matrices, at: str, load: str) -> float:
+    """How far an interface moves in the rigid-body motion r of a load vector M r."""
+    moved = spsolve(sparse.csc_array(component.mass), component.interfaces[load])
+    return float(component.interfaces[at] @ np.atleast_1d(moved))
+
+
+def _relative_system(scene: Scene, reduced: cms.ReducedModel | None) -> System:
     with told_as(scene, (), SystemModelError):
         acting = acting_elements(scene)
         ratio = scene.damping.modal_ratio

@@ -64,6 +64,7 @@ def check_scene(scene: Scene, file: Path) -> None:
     _check_components(scene, file)
     _check_joints(scene, report)
     _check_interface_names(scene, report)
+    _check_absolute(scene, report)
     _check_seeds(scene, report)
     _check_explore(scene, report)
 
@@ -398,6 +399,20 @@ def _check_load_of_all(scene: Scene, number: int, load: str, report: Report) -> 
         if load in part.interfaces:
             fault = "is the name of a load vector; rename it"
             raise report(("components", name, "interfaces", load), fault)
+
+
+def _check_absolute(scene: Scene, report: Report) -> None:
+    """Check that there is a base that moves, where absolute displacements are asked for."""
+    if scene.observe is None or not scene.observe.absolute:
+        return
+    if not any(table.kind == "base" for table in scene.excitation):
+        raise report(("observe", "absolute"), "needs an [[excitation]] of kind 'base'")
+    if scene.modal is not None:
+        fault = "needs a mesh or matrices: modes do not tell how the structure moves as a whole"
+        raise report(("observe", "absolute"), fault)
+    if scene.reduction is not None and scene.reduction.tolerance is not None:
+        fault = "does not go with reduction.tolerance; give 'modes' or 'cutoff_hz'"
+        raise report(("observe", "absolute"), fault)
 
 
 def _check_seeds(scene: Scene, report: Report) -> None:

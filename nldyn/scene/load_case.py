@@ -21,6 +21,9 @@ def load_case_of(scene: Scene) -> LoadCase:
     check_computable(scene, scene.file)
     if scene.reduction is None:
         raise scene_error(scene.file, ("reduction",), "is missing: nothing is reduced")
+    if scene.observe is not None and scene.observe.absolute:
+        fault = "is not told where the modes are chosen or compared: leave it out there"
+        raise scene_error(scene.file, ("observe", "absolute"), fault)
     if isinstance(scene.damping.modal_ratio, list):
         fault = "must be one number where the number of modes is open"
         raise scene_error(scene.file, ("damping", "modal_ratio"), fault)

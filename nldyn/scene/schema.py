@@ -743,6 +743,8 @@ class ObserveTable(Table):
     at: str
     """Interface whose displacement is tabulated and drawn. Without the table it is the first
     interface."""
+    absolute: bool = False
+    """With a moving base: its absolute displacement, not that relative to the base."""
 
 
 class ContinuationTable(Table):

@@ -14,8 +14,8 @@ import scipy.linalg as sla
 from numpy.typing import ArrayLike
 
 from nldyn.base.arrays import Complex, Real
-from nldyn.base.errors import SystemModelError, numbers, shown
-from nldyn.system.elements import Damper, Excitation, Stop
+from nldyn.base.errors import SystemModelError, is_finite, numbers, shown
+from nldyn.system.elements import BaseMotion, Damper, Excitation, Stop
 from nldyn.system.linear import (
     ForcedResponse,
     LinearPart,
@@ -23,6 +23,7 @@ from nldyn.system.linear import (
     linear_part,
     without_rounding,
 )
+from nldyn.system.ride import Ride
 from nldyn.system.rigid_stop import AnyStop, RigidStop
 from nldyn.system.spin import Spin, same_spin, skew
 from nldyn.system.springs import Bond, CubicDamper, PolynomialSpring, Spring, bonds_of
@@ -69,6 +70,8 @@ class System:
         Skew part of the modal stiffness, 1/s²; the damping may have a skew part, too.
     spin : Spin, optional
         What of both is in proportion to the speed of a shaft, in modal coordinates.
+    rides : mapping of str to mapping
+        Interfaces whose displacement is observed as an absolute one, see `with_absolute`.
 
     Raises
     ------
@@ -95,6 +98,7 @@ class System:
     springs: tuple[AnySpring, ...] = ()
     circulatory: Real | None = None
     spin: Spin | None = None
+    rides: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """One line: modes, interfaces, and what acts."""
@@ -553,6 +557,77 @@ class System:
         """Whether no motion without contact is bounded at ω (rad/s), see `ForcedResponse`."""
         return self.response(omega).unbounded(omega) is not None
 
+    def with_absolute(self, interface: str, factors: Mapping[str, float]) -> System:
+        """The system with the absolute displacement of an interface, where a base moves.
+
+        It is observed as an interface of its own, named "... absolute", that comes first: orbits
+        and pictures report it unless asked for another one. Nothing can act there.
+
+        Parameters
+        ----------
+        interface : str
+            Interface whose displacement relative to the base is known.
+        factors : mapping of str to float
+            By the load vectors of moving bases: how far the interface moves with the structure as
+            a rigid body when the base moves by one.
+
+        Raises
+        ------
+        SystemModelError
+            For an unknown interface or load vector, or a factor that is no finite number.
+
+        Examples
+        --------
+        >>> from nldyn import BaseMotion, System
+        >>> shaken = System.from_matrices(
+        ...     [[2.0]], [[800.0]], {"mass": [1.0]}, loads={"table": [2.0]}, modal_damping=0.1,
+        ...     excitation=[BaseMotion("table", 1e-3)],
+        ... )
+        >>> shaken.with_absolute("mass", {"table": 1.0}).interfaces
+        ('mass absolute', 'mass')
+        """
+        if interface not in self.participation or interface in self.rides:
+            known = ", ".join(name for name in self.interfaces if name not in self.rides)
+            raise SystemModelError(f"unknown interface '{interface}'; there are: {known}")
+        for load, factor in _checked_names("factors", factors).items():
+            if load not in self.loads:
+                known = ", ".join(self.loads) or "none"
+                raise SystemModelError(f"'{load}' is not a load vector; there are: {known}")
+            if not is_finite(factor):
+                raise SystemModelError(f"factors: '{load}' must be finite, got {shown(factor)}")
+        name = f"{interface} absolute"
+        if name in self.participation or name in self.loads:
+            raise SystemModelError(f"there is an interface '{name}' already")
+        return replace(
+            self,
+            participation={name: self.participation[interface], **self.participation},
+            rides={**self.rides, name: dict(factors)},
+        )
+
+    def ride(self, interface: str, omega: float) -> Ride:
+        """What a moving base adds at ω (rad/s) to the displacement of an interface.
+
+        Nothing, unless the interface was made by `with_absolute`.
+        """
+        factors = self.rides.get(interface, {})
+        bases = [
+            (source, factors[source.at])
+            for source in self.excitation
+            if isinstance(source, BaseMotion) and source.at in factors
+        ]
+        return Ride.of(bases, omega)
+
+    def displacement(
+        self, interface: str, states: Real, phases: Real, omega: float
+    ) -> tuple[Real, Real]:
+        """Displacement and velocity (k,) of an interface at modal states (k, 2n).
+
+        The forcing phases (k,) and ω (rad/s) tell how a base moves, if it does.
+        """
+        phi, ride = self.participation[interface], self.ride(interface, omega)
+        u, v = states[:, : self.size] @ phi, states[:, self.size :] @ phi
+        return u + ride.at(phases), v + ride.speed(phases, omega)
+
     def with_spin(self, hz: float) -> System:
         """The same rotor at another speed.
 
@@ -645,6 +720,8 @@ class System:
                         continue
                     if kind == "excitation" and name in self.loads:
                         continue
+                    if name in self.rides:
+                        raise SystemModelError(f"{kind} {end} '{name}', which is only observed")
                     if name not in self.participation:
                         raise SystemModelError(
                             f"{kind} {end} unknown interface '{name}'; there are: {known}"
@@ -718,6 +795,7 @@ def same_system(a: System, b: System) -> bool:
         and (a.stops, a.dampers, a.excitation, a.springs)
         == (b.stops, b.dampers, b.excitation, b.springs)
         and same_spin(a.spin, b.spin)
+        and a.rides == b.rides
     )
 
 

@@ -193,7 +193,7 @@ def leave_unseen(blocks, row, forced, w):
 def local_extremes(
     blocks, force, omega, tab,
     rec_phase, rec_duration, rec_kind, rec_start, rec_force, count, terms, response,
-    row, row1,
+    row, row1, forced,
 ):  # fmt: skip
     """Phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output.
 
@@ -201,14 +201,11 @@ def local_extremes(
     that stops move in contact; its sign changes are refined. In flight, where a parabola through
     three samples of one sign comes near zero, it is looked for a change of sign there: two extremes
     closer than the samples. The motion is taken as periodic: an extreme at its start counts once.
+    forced (1 + k,) is what the terms add to the output.
     """
     found = np.empty((64, 3))
     n = 0
     w, v, start = np.empty(force.shape[0]), np.empty(force.shape[0]), np.empty(force.shape[0])
-    forced = np.zeros(response.shape[0], dtype=np.complex128)
-    for p in range(forced.size):
-        for k in range(row.size):
-            forced[p] += row[k] * response[p, k]
     shares = np.empty((tab.nodes.size, force.shape[0]))
     steps = np.empty((blocks.shape[0], 4))
     weights = np.empty((0, tab.nodes.size))
