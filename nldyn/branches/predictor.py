@@ -35,9 +35,10 @@ def predicted(point, tangent, behind, weights, step):
     """
     m = 1 + behind.shape[0] // 2
     points, tangents = np.empty((m, point.size)), np.empty((m, point.size))
-    points[0], tangents[0] = point, tangent
-    for k in range(1, m):
-        points[k], tangents[k] = behind[2 * k - 2], behind[2 * k - 1]
+    for i in range(point.size):
+        points[0, i], tangents[0, i] = point[i], tangent[i]
+        for k in range(1, m):
+            points[k, i], tangents[k, i] = behind[2 * k - 2, i], behind[2 * k - 1, i]
     cubic = hermite(points, tangents, weights, 0, min(m, 2), step)
     if m < 3:
         return cubic, cubic
@@ -89,22 +90,27 @@ def hermite(points, tangents, weights, first, last, step):
     """
     size, n = points.shape[1], 2 * (last - first)
     row = unit_row(tangents[first], weights)
-    nodes, table = np.empty(n), np.empty((n, size))
+    nodes, slopes = np.empty(n), np.empty(last - first)
     for k in range(last - first):
         at, pace = 0.0, 0.0
         for i in range(size):
             at += row[i] * (points[first + k, i] - points[first, i])
             pace += row[i] * tangents[first + k, i]
-        for j in (2 * k, 2 * k + 1):
-            nodes[j] = at
-            table[j] = points[first + k]
-        table[2 * k + 1] = tangents[first + k] / pace
-    for j in range(n - 2, 1, -2):
-        table[j] = (points[first + j // 2] - points[first + j // 2 - 1]) / (nodes[j] - nodes[j - 2])
-    for order in range(2, n):
-        for j in range(n - 1, order - 1, -1):
-            table[j] = (table[j] - table[j - 1]) / (nodes[j] - nodes[j - order])
-    value = table[n - 1].copy()
-    for j in range(n - 2, -1, -1):
-        value = value * (step - nodes[j]) + table[j]
-    return value
+        nodes[2 * k], nodes[2 * k + 1] = at, at
+        slopes[k] = pace
+    values, table = np.empty(size), np.empty(n)
+    for i in range(size):
+        for k in range(last - first):
+            table[2 * k] = points[first + k, i]
+            table[2 * k + 1] = tangents[first + k, i] / slopes[k]
+        for k in range(last - first - 1, 0, -1):
+            rise = points[first + k, i] - points[first + k - 1, i]
+            table[2 * k] = rise / (nodes[2 * k] - nodes[2 * k - 2])
+        for order in range(2, n):
+            for j in range(n - 1, order - 1, -1):
+                table[j] = (table[j] - table[j - 1]) / (nodes[j] - nodes[j - order])
+        value = table[n - 1]
+        for j in range(n - 2, -1, -1):
+            value = value * (step - nodes[j]) + table[j]
+        values[i] = value
+    return values

@@ -387,7 +387,9 @@ def remember(rec):
         n = size - used + i
         rec.phase[n], rec.duration[n] = rec.phase[i], rec.duration[i]
         rec.kind[n], rec.event[n] = rec.kind[i], rec.event[i]
-        rec.depth[n] = rec.depth[i]
+        for a in range(rec.depth.shape[1]):  # to assign a row would take 5 s to compile
+            for j in range(rec.depth.shape[2]):
+                rec.depth[n, a, j] = rec.depth[i, a, j]
     rec.used[1] = size - used
 
 

@@ -248,20 +248,20 @@ def hold(fl, phase, t, shift, closed, with_columns, w, columns):
             value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
             off[a, 0] = speed if rate == 1 else value - fl.stops[s, GAP]
             if with_columns:
-                off[a, 1:] = shifted_columns(fl, s, rate, phase, t, shift, w, columns)
+                shifted = shifted_columns(fl, s, rate, phase, t, shift, w, columns)
+                for c in range(n):
+                    off[a, 1 + c] = shifted[c]
                 for c in range(fl.parameters.shape[0]):
                     if rate == 0 and fl.parameters[c, 0] == GAP and fl.parameters[c, 1] == s:
                         off[a, 1 + columns.shape[0] + c] -= 1.0
         lu_apply(matrix, order, off)
         kick, along = np.empty(w.size), np.empty(w.size)
         for a in range(stops.size):
-            along[:] = 0.0
             for k in range(w.size):
                 kick[k] = fl.force[k, stops[a]]
+                along[k] = 0.0 if rate == 0 else kick[k]
             if rate == 0:
                 add_rates(fl.blocks, kick, along)
-            else:
-                along[:] = kick
             for k in range(w.size):
                 w[k] -= along[k] * off[a, 0]
                 for c in range(n):
