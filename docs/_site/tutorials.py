@@ -37,6 +37,6 @@ if __name__ == "__main__":
 
     matplotlib.use("Agg")
     for path in sorted(TUTORIALS.glob("*.md")):
-        if blocks(path, "python") and (len(sys.argv) == 1 or path.stem in sys.argv[1:]):
+        if blocks(path, "text") and (len(sys.argv) == 1 or path.stem in sys.argv[1:]):
             print(path.stem)
             keep_pictures(path)

@@ -779,7 +779,7 @@ def describe(diagram: Diagram, seconds: float, out: Path) -> str:
         f"in {seconds:.1f} s",
         f"special points: {found}",
         *(f"note: {note}" for note in dict.fromkeys(diagram.notes)),
-        f"written to {out}",
+        f"written to {out}; {out / 'report.html'} is a page for a browser",
     ]
     return "\n".join(lines)
 

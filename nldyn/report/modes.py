@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
 
 import cms
 from nldyn.base.arrays import Real
@@ -14,6 +16,7 @@ from nldyn.scene.build import Structure, build_structure, build_system
 from nldyn.scene.schema import Scene
 
 AXES = ("x", "y", "z")
+ROUNDING = 1e-12  # of the whole mass
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,27 +73,31 @@ class ModeTable:
 
     def report(self, modes: Sequence[int] = ()) -> str:
         """The table as text, of the modes asked for (from 1) or of all."""
+        plain = self
+        if self.effective_mass is not None and self.mass:
+            rounding = self.effective_mass < ROUNDING * self.mass
+            plain = replace(self, effective_mass=np.where(rounding, 0.0, self.effective_mass))
         head = [name.replace("effective_mass_", "eff. mass ") for name in self.columns()]
         head = [name.replace("_kg", " (kg)").replace("_hz", " (Hz)") for name in head]
         head = [name.replace("participation_", "at ") for name in head]
         widths = [max(12, len(name) + 2) for name in head]
         widths[0] = 5
         lines = ["".join(f"{name:>{width}}" for name, width in zip(head, widths, strict=True))]
-        for row in self.rows():
+        for row in plain.rows():
             if modes and row[0] not in modes:
                 continue
             cells = [f"{row[0]:>{widths[0]}.0f}", f"{row[1]:>{widths[1]}.6g}"]
             cells += [f"{v:>{w}.5g}" for v, w in zip(row[2:], widths[2:], strict=True)]
             mark = "  residual" if self.is_residual(int(row[0])) else ""
             lines.append("".join(cells) + mark)
-        if self.effective_mass is not None and self.mass:
-            total = self.effective_mass.sum(axis=0)
+        if plain.effective_mass is not None and plain.mass:
+            total = plain.effective_mass.sum(axis=0)
             told = ", ".join(
                 f"{axis} {value:.5g} kg" for axis, value in zip(AXES, total, strict=False)
             )
-            count = len(self.effective_mass)
+            count = len(plain.effective_mass)
             lines.append(
-                f"effective mass of {count} modes: {told}; the mesh has {self.mass:.5g} kg"
+                f"effective mass of {count} modes: {told}; the mesh has {plain.mass:.5g} kg"
             )
         lines.append("'at' is the displacement of an interface in each mode, in 1/sqrt(kg)")
         return "\n".join(lines)

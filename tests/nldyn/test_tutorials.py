@@ -10,7 +10,7 @@ import pytest
 
 DOCS = Path(__file__).parents[2] / "docs"
 blocks = runpy.run_path(str(DOCS / "_site" / "tutorials.py"))["blocks"]
-PAGES = [page for page in sorted((DOCS / "tutorials").glob("*.md")) if blocks(page, "python")]
+PAGES = [page for page in sorted((DOCS / "tutorials").glob("*.md")) if blocks(page, "text")]
 SLOW = {"all_branches", "chaos_and_basins"}  # above three seconds
 
 

@@ -42,6 +42,7 @@ def test_effective_masses_of_a_cantilever_are_those_of_euler_and_bernoulli():
         table.effective_mass[:, 1] / mass, (2 * sigma / roots) ** 2, rtol=1e-4
     )
     assert np.all(table.effective_mass[:, 0] < 1e-12 * mass)
+    assert "effective mass of 3 modes: x 0 kg, y " in table.report()  # no rounding is told
 
 
 def test_modes_are_told_and_written(tmp_path, monkeypatch):
