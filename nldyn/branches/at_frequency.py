@@ -86,8 +86,8 @@ def _chords_beside(places: Places, first: NDArray[np.intp], orbit: Orbit) -> NDA
     share = level[first] / (level[first] - level[first + 1])
     chords = states[first + 1] - states[first]
     line = states[first] + share[:, None, None] * chords
-    shifts = range(orbit.period)
-    away = [np.linalg.norm(line - np.roll(target, s, axis=0), axis=(1, 2)) for s in shifts]
+    twice, n = np.concatenate([target, target]), orbit.period
+    away = [np.linalg.norm(line - twice[shift : shift + n], axis=(1, 2)) for shift in range(n)]
     lengths = np.linalg.norm(chords, axis=(1, 2))
     near: NDArray[np.bool_] = np.min(away, axis=0) <= BESIDE * lengths + 1e-5 * float(
         np.linalg.norm(target)
