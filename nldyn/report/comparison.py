@@ -16,6 +16,7 @@ from nldyn.scene.build import Structure
 from nldyn.scene.schema import Scene
 
 NEIGHBOURS = 12
+ONE_FREQUENCY = 1e-3  # relative; on meshes without symmetry double modes lie apart
 FARTHEST = 0.05  # of the size of the structure
 
 
@@ -33,6 +34,8 @@ class Comparison:
         The other scene, and what it is made of.
     signs : (k,) array
         -1 where a mode and its partner are opposite, else 1.
+    turn : (l, l) array
+        Combines those of the other's modes that have one frequency, see `turned_alike`.
     """
 
     mac: Real
@@ -41,6 +44,7 @@ class Comparison:
     scene: Scene
     structure: Structure
     signs: Real
+    turn: Real
 
     def __repr__(self) -> str:
         """One line: how many modes, and how alike the worst pair is."""
@@ -95,7 +99,8 @@ def compare_modes(
     The displacements of the finer mesh are carried to the nodes of the coarser one, by planes that
     are fitted to those of its nearest nodes; at nodes that both have they are taken as they are.
     The modal assurance criterion is over the translations of these nodes, each with the same
-    weight, as if they had been measured there.
+    weight, as if they had been measured there. Modes of one frequency, as rigid-body modes are, are
+    known but for how they are combined: the other's are combined so as to be like these.
 
     Parameters
     ----------
@@ -120,11 +125,39 @@ def compare_modes(
     else:
         onto, shapes, others = theirs[0], carried(*mine, theirs[0], other, scene), theirs[1]
     flat = [values.reshape(3 * len(onto), -1) for values in (shapes, others)]
+    first, second = (mode_table(*given).frequencies_hz for given in scenes)
+    turn = turned_alike(flat[0], flat[1], second)
+    flat[1] = flat[1] @ turn
     values = cms.mac(*flat)
     cross = (flat[0].T @ flat[1])[np.arange(len(values)), values.argmax(axis=1)]
-    first, second = (mode_table(*given).frequencies_hz for given in scenes)
     signs = np.where(cross < 0.0, -1.0, 1.0)
-    return Comparison(values, first, second, other, other_structure, signs)
+    return Comparison(values, first, second, other, other_structure, signs, turn)
+
+
+def turned_alike(shapes: Real, others: Real, hz: Real) -> Real:
+    """A matrix (l, l) by which those of the other shapes (n, l) that have one frequency, within
+    0.1 %, are combined so as to be most like some of the shapes (n, k).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> tilted = np.array([[0.6, -0.8], [0.8, 0.6]])
+    >>> np.allclose(tilted @ turned_alike(np.eye(2), tilted, np.zeros(2)), np.eye(2))
+    True
+    """
+    turn = np.eye(len(hz))
+    first = 0
+    while first < len(hz):
+        last = first + int(np.searchsorted(hz[first:], (1.0 + ONE_FREQUENCY) * hz[first], "right"))
+        if last - first > 1:
+            group = slice(first, last)
+            combined = np.linalg.lstsq(others[:, group], shapes)[0]
+            left = np.linalg.norm(shapes - others[:, group] @ combined, axis=0)
+            alike = np.sort(np.argsort(left / np.linalg.norm(shapes, axis=0))[: last - first])
+            basis = np.linalg.svd(combined[:, alike])[0]
+            turn[group, group] = np.column_stack([combined[:, alike], basis[:, alike.size :]])
+        first = last
+    return turn
 
 
 def moved_nodes(scene: Scene, structure: Structure) -> tuple[Real, Real]:

@@ -416,7 +416,7 @@ class Drawing:
         path = self.folder / "comparison.png"
         render_modes(
             other.component,
-            other.reduced.basis[:, partners] * against.signs[self.chosen],
+            (other.reduced.basis @ against.turn)[:, partners] * against.signs[self.chosen],
             titles,
             path,
             mirror=_mirror(against.scene),

@@ -1,6 +1,7 @@
 """Modes of two meshes against each other: against the shapes of Euler and Bernoulli, and solids."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from nldyn.scene.build import Structure, build_structure
 from nldyn.scene.read import load_scene
 
 BEAM = load_scene(example("four_dof_xi_0.01.toml"))
+STEEL = fem.Material(2.1e11, 7800.0, poissons_ratio=0.3)
 ROOTS = np.array([1.8751040687, 4.6940911330, 7.8547574382])
 
 
@@ -66,6 +68,27 @@ def test_a_frame_and_solids_of_one_beam_have_the_same_modes():
     found = compare_modes(BEAM, build_structure(BEAM), solid, build_structure(solid))
     assert found.partners[:3] == [0, 1, 2]
     assert found.mac[[0, 1, 2], [0, 1, 2]].min() > 0.999
+
+
+def test_modes_of_one_frequency_are_compared_as_a_space():
+    """Rigid-body modes, and the two bending modes of a square bar in any two directions."""
+    free, square = [], []
+    for shape in ((4, 1, 1), (7, 1, 1)):
+        box = fem.box_mesh("bar", (0.4, 0.02, 0.02), shape, kind="hexahedron20")
+        for of, held in ((free, []), (square, [fem.Support("x0", ("x", "y", "z"))])):
+            model = fem.StructureModel(box, {"bar": fem.SolidPart(STEEL)}, held)
+            component = fem.assemble(model)
+            of.append((component, cms.reduce(component, modes=6, method="truncation")))
+    found = compare_modes(BEAM, Structure(*free[0]), BEAM, Structure(*free[1]))
+    np.testing.assert_allclose(found.mac.max(axis=1), 1.0, atol=1e-9)
+    assert sorted(found.partners) == list(range(6))
+    component, reduced = square[1]
+    turned = reduced.basis.copy()
+    turned[:, :2] = turned[:, :2] @ [[0.8, -0.6], [0.6, 0.8]]
+    other = Structure(component, replace(reduced, basis=turned))
+    found = compare_modes(BEAM, Structure(*square[0]), BEAM, other)
+    assert found.partners[:2] == [0, 1]
+    assert found.mac[:2].max(axis=1).min() > 0.999
 
 
 def test_another_structure_and_none_are_refused():
