@@ -40,6 +40,7 @@ from fem.structure import Foundation, SolidPart, StructureModel, symmetry
 from fem.structure_assembly import DistortionWarning, LockingWarning, StructureComponent
 from fem.structure_mesh import StructureMesh, box_mesh, joined, structure_mesh
 from fem.summary import MassProperties, mass_properties, summary
+from fem.unlikely import UnlikelyWarning
 from fem.write import write_mesh
 
 __all__ = [
@@ -77,6 +78,7 @@ __all__ = [
     "Support",
     "TaperedSection",
     "TrussPart",
+    "UnlikelyWarning",
     "assemble",
     "box_mesh",
     "calibrate",

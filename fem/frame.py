@@ -32,6 +32,7 @@ from fem.scatter import SparseArray, displacement_of, squares
 from fem.store import load_model, save_model
 from fem.tapers import along
 from fem.trusses import loose_nodes, loose_sentences
+from fem.unlikely import UnlikelyWarning, check_masses_carried, unlikely
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +122,9 @@ def assemble_frame(model: FrameModel) -> Component:
     slits = check_joined(model)
     for text in (*mechanism_warnings(model), *slits):
         warnings.warn(text, JointWarning, stacklevel=3)
+    check_masses_carried(model)
+    for text in unlikely(model):
+        warnings.warn(text, UnlikelyWarning, stacklevel=3)
     element_dofs = number_dofs(model)
     free = _free_dofs(model)
     stiffness, mass = _element_matrices(model)

@@ -58,6 +58,7 @@ from fem.store import load_structure, save_structure
 from fem.structure import AXES, SolidPart, StructureModel
 from fem.tapers import along
 from fem.truss_assembly import truss_form, truss_matrices
+from fem.unlikely import UnlikelyWarning, check_masses_carried, unlikely
 
 BATCH_BYTES = 1e8
 """Size of the element matrices that are made at a time."""
@@ -175,6 +176,8 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
         If a part of first-order cells is so thin that it is much too stiff in bending.
     DistortionWarning
         If cells are out of shape.
+    UnlikelyWarning
+        If a thickness or a point mass is unlikely.
     JointWarning
         If a shell meets solids at an edge only, or a beam at a node, about which it can turn, or
         solids meet each other so, but for parts that are ``pinned``; if a truss has a node that is
@@ -186,6 +189,9 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     told = (*joint_warnings(model), *mechanism_warnings(model), *slits)
     for text in told:
         warnings.warn(text, JointWarning, stacklevel=3)
+    check_masses_carried(model)
+    for text in unlikely(model):
+        warnings.warn(text, UnlikelyWarning, stacklevel=3)
     for text in locking_warnings(model):
         warnings.warn(text, LockingWarning, stacklevel=3)
     for text in distortion_warnings(model):

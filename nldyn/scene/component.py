@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -9,7 +10,7 @@ import fem
 from nldyn.base.errors import SceneError
 from nldyn.base.resources import data_directory
 from nldyn.scene.checks import check_mesh_names, check_structure_names
-from nldyn.scene.described_parts import with_described_parts
+from nldyn.scene.described_parts import told_otherwise, with_described_parts
 from nldyn.scene.faults import check_regular, told_as, unreadable
 from nldyn.scene.messages import KeyPath, scene_error
 from nldyn.scene.schema import PartTable, Scene
@@ -59,7 +60,7 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
                 structure = fem.joined(
                     [structure], None if scene.mesh.merge is True else scene.mesh.merge
                 )
-        structure = _with_places(scene, structure)
+        structure = _noted(scene, _with_places(scene, structure))
         scene = with_described_parts(scene, structure)
         check_structure_names(scene, structure, scene.file)
         if refinement > 1:
@@ -69,7 +70,7 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
             return _loaded(scene, fem.assemble(_structure_model(scene, structure)))
     with told_as(scene, ("mesh", "file"), fem.ModelError):
         mesh = _in_metres(scene, fem.read_mesh(path, _mesh_places(scene), ignore))
-    mesh = _with_places(scene, mesh)
+    mesh = _noted(scene, _with_places(scene, mesh))
     scene = with_described_parts(scene, mesh)
     check_mesh_names(scene, mesh, scene.file)
     with told_as(scene, (), fem.ModelError):
@@ -119,6 +120,12 @@ def _with_places(scene: Scene, mesh: Mesh) -> Mesh:
                 assert place.box is not None
                 sets[name] = fem.nodes_inside(mesh.points, place.box, mesh.source)
     return mesh.with_point_sets(sets) if sets else mesh
+
+
+def _noted(scene: Scene, mesh: Mesh) -> Mesh:
+    """The mesh with a note for each part that its file describes otherwise than the scene."""
+    said: list[str] = told_otherwise(scene, mesh)
+    return replace(mesh, notes=[*mesh.notes, *said]) if said else mesh
 
 
 def _frame_model(scene: Scene, mesh: fem.FrameMesh) -> fem.FrameModel:

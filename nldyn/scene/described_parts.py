@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Protocol
 
 from pydantic import ValidationError
 
-from nldyn.scene.messages import quoted, scene_error
+from nldyn.scene.messages import quoted, scene_error, show
 from nldyn.scene.schema import PartTable, Scene
 
 REFUSED = "refused"
+SAME = 1e-6  # relative
 
 
 class DescribedMesh(Protocol):
@@ -49,3 +51,31 @@ def with_described_parts(scene: Scene, mesh: DescribedMesh) -> Scene:
             fault = f"names '{name}', whose numbers in the mesh file make no part: {place}: "
             raise scene_error(scene.file, key, fault + first["msg"]) from None
     return scene.model_copy(update={"parts": parts})
+
+
+def told_otherwise(scene: Scene, mesh: DescribedMesh) -> list[str]:
+    """A sentence for each part of the scene that the file of its mesh describes otherwise."""
+    own = {n: t for n, t in scene.parts.items() if n in mesh.described}
+    for name in scene.mesh.parts_from_file if scene.mesh else ():
+        own.pop(name, None)
+    found = []
+    for name, table in own.items():
+        given = mesh.described[name]
+        if REFUSED in given:
+            found.append(f"part '{name}' is as in the scene, not as in the file: {given[REFUSED]}")
+            continue
+        other = [
+            f"{key} {show(getattr(table, key))}, not {show(value)}"
+            for key, value in given.items()
+            if getattr(table, key) not in (None, value) and not _near(getattr(table, key), value)
+        ]
+        if other:
+            found.append(
+                f"part '{name}' is as in the scene, not as in the file: {', '.join(other)}"
+            )
+    return found
+
+
+def _near(one: object, other: object) -> bool:
+    both = isinstance(one, int | float) and isinstance(other, int | float)
+    return both and math.isclose(float(one), float(other), rel_tol=SAME)  # type: ignore[arg-type]

@@ -1,6 +1,7 @@
 """Scenes whose mesh is a deck that says more than a mesh."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -109,3 +110,18 @@ def test_an_orthotropic_material_is_not_taken(folder):
     (folder / "deck.inp").write_text(DECK.replace("*ELASTIC", "*ELASTIC, TYPE=LAMINA"))
     with pytest.raises(SceneError, match=r"'BEAM': \*BEAM SECTION in line .* is not isotropic"):
         build_component(load_scene(folder / "file.toml"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("0.02, 0.01", "0.02, 0.012", "'BEAM' is as in the scene, not as in the file: height 0.01"),
+        ("SECTION=RECT", "SECTION=BOX", "not as in the file: .* a section 'BOX'"),
+        ("no change", "", ""),
+    ],
+)
+def test_a_part_that_the_deck_describes_otherwise_is_told(folder, old, new, said):
+    (folder / "deck.inp").write_text(DECK.replace(old, new))
+    told = CliRunner().invoke(main, ["check", str(folder / "given.toml")]).stdout
+    assert re.search(said, told)
+    assert ("as in the scene" in told) == bool(said)
