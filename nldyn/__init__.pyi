@@ -28,6 +28,7 @@ from nldyn.curves.curves import continue_constant as continue_constant
 from nldyn.curves.curves import continue_in as continue_in
 from nldyn.curves.curves import continue_special as continue_special
 from nldyn.curves.marks import refine_special as refine_special
+from nldyn.curves.phase_resonance import phase_resonance as phase_resonance
 
 # flow
 from nldyn.flow.flow_map import FlowMap as FlowMap

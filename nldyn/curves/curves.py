@@ -381,8 +381,9 @@ def continue_constant(
     ----------
     orbit : Orbit
         Where to start.
-    monitor : {"peak_force", "max_penetration", "max_abs_displacement"} or callable
-        What to hold, over all stops or of the observed interface; or a function of an orbit.
+    monitor : {"peak_force", "max_penetration", "max_abs_displacement", "phase_lag_deg"} or callable
+        What to hold, over all stops or of the observed interface; or a function of an orbit. The
+        lag is that of the observed displacement behind the only source that swings.
     parameters, ranges
         As for `continue_special`.
     value : float, optional

@@ -245,6 +245,12 @@ class FlowMap:
             s.vector_between(bond.at, bond.against) for bond in s.bonds
         ]
 
+    @cached_property
+    def force_columns(self) -> Real:
+        """What the forces of stops and bonds do to the rates of z, (2n, n_forces)."""
+        columns = [self.system.force_column(v) for v in self._pushed]
+        return np.ascontiguousarray(np.array(columns).reshape(-1, 2 * self.system.size).T)
+
     def ride(self, output: int, omega: float) -> Ride:
         """What a moving base adds to an output at ω, see `System.with_absolute`."""
         s = self.system
@@ -265,7 +271,6 @@ class FlowMap:
         thirds = np.abs(linear.times_block(accelerations))
         growth = np.repeat(linear.growth, 2)
         bounds = np.multiply(thirds, growth, out=np.zeros_like(thirds), where=thirds > 0.0)
-        force = np.array([s.force_column(v) for v in vectors]).reshape(-1, 2 * s.size)
         releases = itertools.count(float(len(vectors) + len(s.participation)))
         stops = [
             stop_row(stop, float(v @ v), self.options, releases)
@@ -282,7 +287,7 @@ class FlowMap:
             linear.blocks,
             np.array([self.rows, self.rate_rows, accelerations]),
             bounds,
-            np.ascontiguousarray(force.T),
+            self.force_columns,
             s.orders,
             s.drive,
             np.hstack([np.array(stops, dtype=float).reshape(-1, len(StopRow._fields)), powers]),

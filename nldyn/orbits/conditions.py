@@ -22,11 +22,13 @@ from nldyn.orbits.bordered import (
     reach_of_grazing,
 )
 from nldyn.orbits.extremes import nearest
+from nldyn.orbits.harmonics import line_by_balance
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import metric_length
 from nldyn.system.chart import FREQUENCY, Chart
-from nldyn.system.elements import Stop
+from nldyn.system.elements import BaseMotion, ConstantForce, HarmonicForce, Stop, Unbalance
 from nldyn.system.parameters import Parameter
+from nldyn.system.system import System
 
 KINDS = ("LP", "PD", "NS", "BP", "GR")
 
@@ -327,6 +329,42 @@ def max_abs_displacement(orbit: Orbit) -> float:
     return abs(exact_output(orbit, output, phase))
 
 
+def phase_lag_deg(orbit: Orbit) -> float:
+    """Lag in degrees of the observed displacement behind the excitation, from -90 to 270.
+
+    Of the part with the frequency of the one source that swings.
+
+    Raises
+    ------
+    SystemModelError
+        If there is no such source, or several.
+    """
+    source, _ = driving_source(orbit.system)
+    line = line_by_balance(orbit, orbit.observe, source.harmonic)
+    lag = math.degrees(float(np.angle(source.phasor) - np.angle(line)))
+    return (lag + 90.0) % 360.0 - 90.0
+
+
+def driving_source(system: System) -> tuple[HarmonicForce | Unbalance | BaseMotion, int]:
+    """The only source of excitation that swings, with its number.
+
+    Raises
+    ------
+    SystemModelError
+        If there is none, or several.
+    """
+    swinging = [
+        (source, number)
+        for number, source in enumerate(system.excitation)
+        if not isinstance(source, ConstantForce)
+    ]
+    if len(swinging) != 1:
+        raise SystemModelError(
+            f"a phase lag is that behind one source that swings, but there are {len(swinging)}"
+        )
+    return swinging[0]
+
+
 def _depths(orbit: Orbit) -> list[tuple[int, float]]:
     """Each stop with the depth of its deepest penetration."""
     found = []
@@ -358,6 +396,7 @@ MONITORS: dict[str, Callable[[Orbit], float]] = {
     "peak_force": peak_force,
     "max_penetration": max_penetration,
     "max_abs_displacement": max_abs_displacement,
+    "phase_lag_deg": phase_lag_deg,
 }
 
 

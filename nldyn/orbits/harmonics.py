@@ -102,6 +102,47 @@ def harmonics(orbit: Orbit, interface: str | Real | None = None, *, orders: int 
     return Harmonics(multiples * (orbit.frequency_hz / orbit.period), found)
 
 
+def line_by_balance(orbit: Orbit, interface: str, order: int) -> complex:
+    r"""Complex amplitude in m of one order of a displacement, by the balance of its forces.
+
+    :math:`(im\omega - A)z_m = g_m - B F_m` with the Fourier coefficients :math:`F_m` of the contact
+    forces by the quadrature of their panels: as good as the flow map, and without a sample of the
+    motion. For a damped system with elastic stops.
+
+    Parameters
+    ----------
+    orbit : Orbit
+        A periodic orbit.
+    interface : str
+        Whose displacement.
+    order : int
+        Multiple of the excitation frequency.
+
+    Raises
+    ------
+    SystemModelError
+        If the system has rigid stops, or an undamped mode of this very frequency.
+    """
+    system, flow, omega = orbit.system, orbit.problem.flow, orbit.omega
+    if len(system.elastic_stops) < len(system.stops):
+        raise SystemModelError("the forces of rigid stops have no balance by harmonics")
+    phases, weights = orbit.trajectory.contact_quadrature()
+    record = orbit.trajectory.record
+    forces = record.force[record.kind >= 0].transpose(0, 2, 1)
+    forces = forces.reshape(phases.size, record.force.shape[1])
+    pushed = 2.0 / orbit.duration * (weights * np.exp(-1j * order * phases)) @ forces
+    given = system.drive[system.orders == order].sum(axis=0)
+    right = np.array([1.0, omega, omega**2]) @ given - flow.force_columns @ pushed
+    matrices = 1j * order * omega * np.eye(2) - system.linear.blocks
+    try:
+        z = np.linalg.solve(matrices, right.reshape(-1, 2, 1)).ravel()
+    except np.linalg.LinAlgError:
+        raise SystemModelError("an undamped mode has the frequency of the excitation") from None
+    ride = system.ride(interface, omega)
+    carried = ride.amplitudes[ride.orders == order].sum()
+    return complex(system.displacement_row(system.participation[interface]) @ z + carried)
+
+
 def modal_row(system: System, point: str | Real | None) -> Real:
     """Displacement of each mode (n,) at an interface, or at any point that is given so.
 

@@ -82,8 +82,18 @@ def test_examples_of_rigid_stops_print_what_the_pages_say(capsys):
 
 
 def test_example_of_backbones_keeps_its_energy(capsys):
-    """Farthest from the stop all of it is in the springs."""
-    said, last = printed_by("how-to/backbones.md", capsys)
+    """Farthest from the stop all of it is in the springs; forced orbits are near the free ones."""
+    text = (ROOT / "docs" / "how-to" / "backbones.md").read_text(encoding="utf-8")
+    names = {}
+    for code in re.findall(r"```python\n(.*?)```", text, flags=re.S):
+        exec(code, names)
+    said, last, resonant = capsys.readouterr().out.splitlines()
+    free, forced = names["family"], names["resonant"]
+    sizes = [orbit.max_abs_displacement for orbit in forced.orbits]
+    inside = np.array(sizes) < free.amplitude[-1]
+    beside = np.interp(sizes, free.amplitude, free.frequency_hz)
+    assert forced.values[inside, 0] == pytest.approx(beside[inside], rel=3e-3)
+    assert resonant.startswith("<Curve of phase_lag_deg")
     assert said.startswith("<Backbone of mode 1:")
     _, size, energy = map(float, last.strip("[]").split())
     assert energy == pytest.approx(0.5 * size**2 + 0.025 * size**4, rel=1e-6)
