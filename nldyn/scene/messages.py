@@ -120,14 +120,21 @@ def unknown_name(name: str, known: Iterable[str], what: str) -> str:
 
 
 def from_validation(file: Path, model: type[BaseModel], error: ValidationError) -> SceneError:
-    """Turn pydantic's report into one sentence about the most telling of its faults."""
+    """Turn pydantic's report into one sentence for each fault, all in a line.
+
+    Unknown keys come first. What else is wrong in their tables may come of them, and is not told.
+    """
     details = error.errors(include_url=False)
-    first = min(details, key=lambda d: d["type"] != "extra_forbidden")
-    sentence = _fault(model, first)
-    more = len(details) - 1
-    if more and first["type"] != "extra_forbidden":
-        sentence += f" (and {more} more)"
-    return scene_error(file, _own_steps(model, first["loc"]), sentence)
+    unknown = [d for d in details if d["type"] == "extra_forbidden"]
+    misspelt = {_own_steps(model, d["loc"][:-1]) for d in unknown}
+    told: dict[KeyPath, str] = {}
+    for detail in (*unknown, *details):
+        key = _own_steps(model, detail["loc"])
+        if detail["type"] == "extra_forbidden" or key[:-1] not in misspelt:
+            told.setdefault(key, _fault(model, detail))
+    first, *others = list(told.items())[:MOST_SHOWN]
+    sentence = "".join([first[1], *(f"; also {format_key(key)} {fault}" for key, fault in others)])
+    return scene_error(file, first[0], sentence)
 
 
 def _own_steps(model: type[BaseModel], key: KeyPath) -> KeyPath:

@@ -1,4 +1,4 @@
-"""Every fault of a scene is told in one sentence, with the file, the key and exit code 2."""
+"""Every fault of a scene is told in one line, with the file, the key and exit code 2."""
 
 import os
 import re
@@ -515,3 +515,14 @@ def test_springs_that_let_the_structure_run_away_are_told_as_springs(
 ):
     said = check(tmp_path, f'{MATRICES}[[springs]]\nat = "middle"\n{spring}\n', command)
     assert said.startswith(f"scene.toml: springs {fault}")
+
+
+def test_all_faults_are_told_in_one_line(tmp_path):
+    """What else is wrong in a table with an unknown key may come of it: 'stiffness' is not missed."""
+    text = MODAL.replace("stiffness = 5e9", "stifness = 5e9").replace("[5.0, 90.0]", "[90.0, 5.0]")
+    assert check(tmp_path, text.replace('"unbalance"', '"unbalanced"')) == (
+        "scene.toml: stops[0].stifness is not a known key; did you mean 'stiffness'?; also "
+        "excitation[0].kind must be 'unbalance', 'harmonic', 'constant', 'measured', 'weight' or "
+        "'base', not 'unbalanced'; also continuation.range_hz must run from the lower to the "
+        "higher frequency, not [90.0, 5.0]"
+    )
