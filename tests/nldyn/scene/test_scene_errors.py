@@ -518,7 +518,7 @@ def test_springs_that_let_the_structure_run_away_are_told_as_springs(
 
 
 def test_all_faults_are_told_in_one_line(tmp_path):
-    """What else is wrong in a table with an unknown key may come of it: 'stiffness' is not missed."""
+    """But for what may come of an unknown key: that 'stiffness' is missing is not told."""
     text = MODAL.replace("stiffness = 5e9", "stifness = 5e9").replace("[5.0, 90.0]", "[90.0, 5.0]")
     assert check(tmp_path, text.replace('"unbalance"', '"unbalanced"')) == (
         "scene.toml: stops[0].stifness is not a known key; did you mean 'stiffness'?; also "
