@@ -118,6 +118,9 @@ def render_scene(
     from fem.render import check_video
 
     if scene.mesh is None:
+        if scene.components:
+            fault = "are not drawn: only a scene with one mesh is; 'nldyn modes' tells their modes"
+            raise scene_error(scene.file, ("components",), fault)
         raise scene_error(scene.file, ("mesh",), "is missing: only a mesh can be drawn")
     if scene.continuation is not None or frequency_hz is not None:
         check_computable(scene, scene.file)

@@ -270,6 +270,12 @@ def test_the_example_has_the_modes_of_its_whole():
     assert found == pytest.approx(np.sqrt(squares) / (2 * np.pi), rel=1e-7)
 
 
+def test_several_components_are_not_drawn(tmp_path):
+    scene = str(example("portal_with_absorber.toml"))
+    told = CliRunner().invoke(main, ["render", scene, "--out", str(tmp_path / "r")])
+    assert told.exit_code == 2 and "components are not drawn" in told.output
+
+
 def test_check_tells_of_every_component():
     told = CliRunner().invoke(main, ["check", str(example("portal_with_absorber.toml"))])
     assert told.exit_code == 0, told.output
