@@ -11,6 +11,7 @@ from fem.beams import local_axes, plane_matrices, spatial_matrices, to_nodes
 from fem.cells import KINDS
 from fem.elements import rotations
 from fem.errors import ModelError, quoted
+from fem.frame_surface import FrameSurface, outline
 from fem.mesh import FloatArray
 from fem.shell_assembly import shell_pieces
 from fem.shell_stress import outer_stress
@@ -19,7 +20,6 @@ from fem.solids import gradients_and_volumes, strains
 from fem.structure import SolidPart
 from fem.structure_assembly import StructureComponent
 from fem.structure_surface import StructureSurface, swept_parts
-from fem.sweep import FrameSurface, outline
 from fem.tapers import along
 
 COLOURS = {"displacement": "m", "stress": "Pa", "moment": "N m"}

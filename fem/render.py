@@ -21,13 +21,13 @@ from fem.colouring import surface_values
 from fem.errors import ModelError
 from fem.files import draft_of
 from fem.frame import Component
+from fem.frame_surface import FrameSurface, frame_surface
 from fem.gl import RenderError, gl_available, require_gl
 from fem.mesh import FloatArray
 from fem.scenery import Block, StopSphere, mass_blocks, stop_solids, support_solids
 from fem.structure_assembly import StructureComponent
 from fem.structure_scenery import Cube, mass_cubes, stop_bodies, support_marks
 from fem.structure_surface import StructureSurface, structure_surface, without_mirror
-from fem.sweep import FrameSurface, frame_surface
 
 __all__ = [
     "RenderError",

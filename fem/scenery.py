@@ -12,9 +12,9 @@ import numpy as np
 from fem.attachments import PointMass
 from fem.errors import ModelError
 from fem.frame import Component
+from fem.frame_surface import FrameSurface, nodes_on, outline, reflected, symmetry_normal
 from fem.mesh import FloatArray
 from fem.model import Support
-from fem.sweep import FrameSurface, nodes_on, outline, reflected, symmetry_normal
 from fem.tapers import along
 
 BLOCK_DENSITY = 7800.0

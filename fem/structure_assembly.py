@@ -27,10 +27,10 @@ from fem.constraints import (
 from fem.distorted import distortion_warnings
 from fem.errors import JointWarning, ModelError
 from fem.hanging import check_nothing_hangs
-from fem.joints import joint_warnings, mechanism_warnings
 from fem.links import link_rows
 from fem.load_vectors import InertiaLoads
 from fem.locking import locking_warnings
+from fem.mechanisms import joint_warnings, mechanism_warnings
 from fem.mesh import FloatArray, IntArray
 from fem.natural import (
     MatrixRows,

@@ -11,11 +11,11 @@ import numpy as np
 from fem.beams import local_axes, to_nodes
 from fem.cells import KINDS, SPANS
 from fem.errors import ModelError
+from fem.frame_surface import PartSurface, hermite, hermite_slope, open_ends, outline
 from fem.mesh import FloatArray, IntArray
 from fem.model import BeamPart
 from fem.structure import StructureModel
 from fem.structure_assembly import StructureComponent
-from fem.sweep import PartSurface, hermite, hermite_slope, open_ends, outline
 from fem.tapers import along
 from fem.trusses import chords
 

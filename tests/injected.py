@@ -97,7 +97,7 @@ FAULTS = [
     ),
     Fault(
         "the test function of a flip has no sign",
-        "nldyn/bifurcations/events.py",
+        "nldyn/bifurcations/sign_changes.py",
         "PD=flip_test(mu)",
         "PD=abs(flip_test(mu))",
         "nldyn/branches/test_harmonic_branch.py",
@@ -190,7 +190,7 @@ FAULTS = [
     ),
     Fault(
         "folds are told as flips, and flips as folds",
-        "nldyn/bifurcations/events.py",
+        "nldyn/bifurcations/sign_changes.py",
         "LP=float(point.tangent[-1]),\n            PD=flip_test(mu),",
         "PD=float(point.tangent[-1]),\n            LP=flip_test(mu),",
         "nldyn/branches/test_harmonic_branch.py",

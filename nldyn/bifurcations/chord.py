@@ -11,8 +11,8 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import LocateError
 from nldyn.bifurcations.branch_crossing import NEIGHBOUR, SHORTEST_CROSSING
 from nldyn.bifurcations.critical import correct_across
-from nldyn.bifurcations.events import crosses
 from nldyn.bifurcations.point import BranchPoint
+from nldyn.bifurcations.sign_changes import crosses
 from nldyn.orbits.conditions import TOUCH, depth_row
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import metric_length

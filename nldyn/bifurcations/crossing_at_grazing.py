@@ -19,13 +19,13 @@ from nldyn.base.errors import ConvergenceError, LocateError
 from nldyn.bifurcations.branch_crossing import CROSSES, NEAR_CRITICAL
 from nldyn.bifurcations.chord import BEND, CROSSING_ERROR, Chord
 from nldyn.bifurcations.critical import correct_across
-from nldyn.bifurcations.events import accounted, changed
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint
 from nldyn.bifurcations.roots import root
+from nldyn.bifurcations.sign_changes import accounted, changed
 from nldyn.bifurcations.touching import Touch, touches_sharply, touching_extremes
 from nldyn.orbits.bordered import length_unit
 from nldyn.orbits.conditions import Grazing
-from nldyn.orbits.multiplier_tests import branch_point_test
+from nldyn.orbits.critical_functions import branch_point_test
 from nldyn.orbits.orbit import Orbit
 
 MET = 1e-13  # of an orbit's size: how well a depth is met

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.flow.kernels.compiling import inner, njit
-from nldyn.orbits import multiplier_tests
-from nldyn.orbits.multiplier_tests import number_outside, travel
+from nldyn.orbits import critical_functions
+from nldyn.orbits.critical_functions import number_outside, travel
 from nldyn.orbits.periodic_schur import product_eigenvalues
 from nldyn.runtime.kernel_cache import resting_on
 
-compiled = resting_on(njit(cache=True, error_model="numpy"), multiplier_tests.__file__)
+compiled = resting_on(njit(cache=True, error_model="numpy"), critical_functions.__file__)
 
 
 @compiled

@@ -17,7 +17,9 @@ from nldyn.bifurcations.branch_crossing import (
 )
 from nldyn.bifurcations.chord import BESIDE, Chord
 from nldyn.bifurcations.critical import turns_near_crossing
-from nldyn.bifurcations.events import (
+from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.bifurcations.roots import root
+from nldyn.bifurcations.sign_changes import (
     CRITICAL,
     _on_unit_circle,
     accounted,
@@ -25,8 +27,6 @@ from nldyn.bifurcations.events import (
     leaves_circle,
     tests,
 )
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint
-from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.touching import Touch, changes_hidden_by_birth, touching_extremes
 from nldyn.orbits.orbit import Orbit
 

@@ -25,7 +25,7 @@ class BranchPoint:
     arclength : float
         Relative arclength from the branch's first computed point.
     tests : dict of str to float
-        Test functions, filled when first asked for (see `nldyn.bifurcations.events.tests`).
+        Test functions, filled when first asked for (see `nldyn.bifurcations.sign_changes.tests`).
     """
 
     orbit: Orbit

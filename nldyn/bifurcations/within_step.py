@@ -11,13 +11,13 @@ from nldyn.base.errors import LocateError
 from nldyn.bifurcations.branch_crossing import ON_CROSSING, lies_on_crossing
 from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.crossing_at_grazing import special_points_at_grazing
-from nldyn.bifurcations.events import changed, leaves_circle, tests
 from nldyn.bifurcations.hidden_pairs import Between
 from nldyn.bifurcations.locate import located_between
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.bifurcations.sign_changes import changed, leaves_circle, tests
 from nldyn.bifurcations.touching import touches_sharply, touching_extremes
+from nldyn.orbits.critical_functions import travel
 from nldyn.orbits.extremes import dip, extreme_dip
-from nldyn.orbits.multiplier_tests import travel
 
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
 MOST_LOOKS = 12  # times that a step is cut at such points

@@ -20,9 +20,9 @@ from nldyn.bifurcations.branch_crossing import (
     is_crossing,
     lies_on_crossing,
 )
-from nldyn.bifurcations.events import crosses
 from nldyn.bifurcations.period_doubling import flip_between, half_difference, passed_flip
 from nldyn.bifurcations.point import BranchPoint
+from nldyn.bifurcations.sign_changes import crosses
 from nldyn.bifurcations.touching import rigid_grazing
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.options import ContinuationOptions

@@ -10,7 +10,7 @@ from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import ConvergenceError
 from nldyn.orbits.bordered import Condition, Evaluation, nearest_depth
 from nldyn.orbits.conditions import BranchPoint, Grazing, Singular
-from nldyn.orbits.multiplier_tests import branch_point_test, flip_test, torus_test
+from nldyn.orbits.critical_functions import branch_point_test, flip_test, torus_test
 from nldyn.orbits.orbit import Orbit
 
 # Derivatives of the monodromy matrix are differences over at most 1e-3 of the orbit's size: its

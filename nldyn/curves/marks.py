@@ -10,9 +10,9 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, LocateError, check_whole
-from nldyn.bifurcations.events import leaves_circle
 from nldyn.bifurcations.point import check_special
 from nldyn.bifurcations.roots import root
+from nldyn.bifurcations.sign_changes import leaves_circle
 from nldyn.bifurcations.touching import Touch, touching_extremes
 from nldyn.curves.events import is_torus, torus_pair
 from nldyn.curves.walk import UNFOLDED, CurvePoint, between, curve_point, is_torus_curve

@@ -20,19 +20,25 @@ from nldyn.plot.diagram import (
     new_axes,
     stability_runs,
 )
+from nldyn.system.chart import UNITS
 from nldyn.system.parameters import Parameter
 
-LABELS = {
-    "frequency_hz": "excitation frequency (Hz)",
-    "stiffness": "contact stiffness (N/m$^p$)",
+TITLES = {
+    "frequency_hz": "excitation frequency",
+    "stiffness": "contact stiffness",
     "exponent": "exponent of the contact law",
-    "dissipation": "dissipation (s/m)",
-    "amplitude": "force amplitude (N)",
-    "mass_times_radius": "unbalance (kg m)",
-    "coefficient": "damper (N s/m)",
+    "dashpot": "dashpot of a stop",
+    "amplitude": "force amplitude",
+    "mass_times_radius": "unbalance",
+    "force": "constant force",
+    "coefficient": "damper",
+    "spring_stiffness": "spring",
     "modal_damping": "damping ratio",
-    "natural_frequency_hz": "frequency of a mode (Hz)",
+    "natural_frequency_hz": "frequency of a mode",
+    "spin_hz": "shaft speed",
+    "speed_hz": "shaft speed and excitation frequency",
 }
+POWERS = {"N/m^exponent": "N/m$^p$"}
 MONITOR_NAMES = {
     "peak_force": "constant peak force",
     "max_penetration": "constant penetration",
@@ -166,4 +172,5 @@ def _scale_and_label(parameter: Parameter, largest: float) -> tuple[float, str]:
     if parameter.name == "gap":
         factor, unit = length_unit(largest)
         return 1.0 / factor, f"gap ({unit})"
-    return 1.0, LABELS[parameter.name]
+    title, unit = TITLES.get(parameter.name, parameter.name), UNITS[parameter.name]
+    return 1.0, title if unit == "1" else f"{title} ({POWERS.get(unit, unit)})"

@@ -10,8 +10,8 @@ from structures import CLAMP, flexibility, lowest_hz
 
 import fem
 from fem.colouring import surface_values
+from fem.frame_surface import frame_surface
 from fem.structure_surface import structure_surface
-from fem.sweep import frame_surface
 
 E, RHO, NU = 2.0e11, 8000.0, 0.3
 STEEL = fem.Material(E, RHO, NU)

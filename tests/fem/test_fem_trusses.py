@@ -7,8 +7,8 @@ from structures import CLAMP, STEEL, flexibility, lowest_hz
 
 import fem
 from fem.colouring import surface_values
+from fem.frame_surface import frame_surface
 from fem.structure_surface import structure_surface
-from fem.sweep import frame_surface
 
 E, RHO, AREA = 2.0e11, 8000.0, 1e-4
 BAR = fem.TrussPart(fem.Material(E, RHO), AREA)

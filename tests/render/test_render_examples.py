@@ -8,7 +8,7 @@ import importlib
 import pytest
 
 
-@pytest.mark.parametrize("name", ["fem.gl", "fem.sweep", "fem.scenery", "fem.render"])
+@pytest.mark.parametrize("name", ["fem.gl", "fem.frame_surface", "fem.scenery", "fem.render"])
 def test_examples(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     results = doctest.testmod(importlib.import_module(name))

@@ -11,9 +11,9 @@ import pytest
 
 import fem
 from fem import gl, render
+from fem.frame_surface import frame_surface
 from fem.render import RenderError, StopSphere, animate, render_modes, render_shape
 from fem.scenery import mass_blocks, stop_solids
-from fem.sweep import frame_surface
 
 
 @pytest.fixture

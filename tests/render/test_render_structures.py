@@ -14,10 +14,10 @@ from scipy.sparse.linalg import spsolve
 import fem
 from fem import render
 from fem.colouring import surface_values
+from fem.frame_surface import frame_surface
 from fem.page import write_page
 from fem.render import RenderError, StopSphere, render_comparison, render_modes, render_shape
 from fem.structure_surface import structure_surface
-from fem.sweep import frame_surface
 
 STEEL = fem.Material(2.0e11, 8000.0, 0.3)
 CLAMP = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")

@@ -8,7 +8,7 @@ import pytest
 from nldyn import Branch, HarmonicForce, Stop, System, continue_branch, solve_orbit
 from nldyn.bifurcations.normal_forms import switch_at_branch_point
 from nldyn.bifurcations.period_doubling import switch_at_flip
-from nldyn.orbits.multiplier_tests import number_outside
+from nldyn.orbits.critical_functions import number_outside
 
 BESIDE = 1e-5  # of a multiplier to the unit circle: either side of it
 

@@ -11,10 +11,13 @@ from hypothesis import strategies as st
 from nldyn.base.resources import example
 from nldyn.branches.continuation import continue_branch
 from nldyn.orbits.solve import solve_orbit
+from nldyn.plot.curves import _scale_and_label
 from nldyn.plot.diagram import branch_curve, length_unit, plot_diagram, plot_orbit, stability_runs
 from nldyn.scene.build import build_system
 from nldyn.scene.read import load_scene
+from nldyn.system.chart import NAMES, UNITS
 from nldyn.system.elements import Stop, Unbalance
+from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
 
 
@@ -102,6 +105,14 @@ def test_axes_of_the_caller_are_used():
 )
 def test_unit(size, unit):
     assert length_unit(size)[1] == unit
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_axes_of_curves_name_every_parameter_and_its_unit(name):
+    _, label = _scale_and_label(Parameter(name), 1.0)
+    unit = UNITS[name].replace("exponent", "$p$").replace("^$p$", "$^p$")
+    assert label.endswith(f"({unit})") is (unit != "1")
+    assert label.split(" (")[0]
 
 
 def test_orbit_shows_displacement_impacts_and_force():

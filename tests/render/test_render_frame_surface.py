@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fem
-from fem.sweep import deflection, frame_surface, hermite, hermite_slope, outline, reflected
+from fem.frame_surface import deflection, frame_surface, hermite, hermite_slope, outline, reflected
 
 
 @pytest.mark.parametrize("coefficients", [*np.eye(4).tolist(), [0.3, -1.0, 2.0, 5.0]])

@@ -6,7 +6,7 @@ import numpy as np
 
 from nldyn.base.arrays import Complex
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint
-from nldyn.orbits.multiplier_tests import (
+from nldyn.orbits.critical_functions import (
     branch_point_test,
     flip_test,
     nearest_pair,
