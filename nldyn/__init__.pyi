@@ -96,10 +96,10 @@ from nldyn.search.fixed_point_index import index_sum as index_sum
 from nldyn.search.mixtures import Mixtures as Mixtures
 from nldyn.search.pseudo_orbits import PseudoOrbits as PseudoOrbits
 from nldyn.search.random_walks import ClosedWalks as ClosedWalks
-from nldyn.system.elements import BaseMotion as BaseMotion
-from nldyn.system.elements import ConstantForce as ConstantForce
 
 # system
+from nldyn.system.elements import BaseMotion as BaseMotion
+from nldyn.system.elements import ConstantForce as ConstantForce
 from nldyn.system.elements import Damper as Damper
 from nldyn.system.elements import HarmonicForce as HarmonicForce
 from nldyn.system.elements import Stop as Stop
