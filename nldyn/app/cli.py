@@ -516,6 +516,11 @@ def open_page(page: Path) -> None:
     metavar="M",
     help="Largest displacement in m at the observed interface, up to which it is followed.",
 )
+@click.option(
+    "--forced",
+    is_flag=True,
+    help="Follow the phase resonance of the damped, forced structure beside it, too.",
+)
 @quiet_option
 def backbone(
     scene: Path,
@@ -523,11 +528,13 @@ def backbone(
     mesh_folders: tuple[Path, ...],
     mode: int,
     amplitude_m: float,
+    forced: bool,
     quiet: bool,
 ) -> None:
     """Follow the free motions of a scene, without its damping and excitation, from a mode on.
 
-    Writes backbone.csv and a picture of amplitude against frequency.
+    Writes backbone.csv and a picture of amplitude against frequency; with --forced also
+    phase_resonance.csv, up to the strength of the scene's excitation.
     """
     with plain_errors():
         from nldyn.runtime.progress import progress_line
@@ -537,12 +544,15 @@ def backbone(
         loaded = load_scene(scene, mesh_folders)
         check_directory(out)
         from nldyn.report.backbone import write_backbone
-        from nldyn.scene.backbone import backbone_of
+        from nldyn.scene.backbone import backbone_of, phase_resonance_of
 
         with progress_line(quiet):
             found = backbone_of(loaded, amplitude_m, mode)
-        write_backbone(found, out, loaded.text, loaded.title)
+            resonant = phase_resonance_of(loaded, found) if forced else None
+        write_backbone(found, out, loaded.text, loaded.title, resonant)
     click.echo(repr(found).strip("<>"))
+    if resonant is not None:
+        click.echo(repr(resonant).strip("<>"))
     click.echo(f"written to {out}: {written_by(out, 'backbone')}")
 
 

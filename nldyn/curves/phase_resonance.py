@@ -121,7 +121,7 @@ def _forced(flow: FlowMap, free: Orbit, charts: tuple[Chart, Chart]) -> Orbit:
     problem = shooting_problem(flow, 1)
     nodes = np.array([flow.to_state(z) for z in free.states(problem.phases[:-1] + shift)])
     name = charts[1].parameter.name
-    value = _strength(system, free)
+    value = strength_of(system, free)
     sources = list(system.excitation)
     changed: dict[str, Any] = {name: value}
     sources[index] = replace(source, **changed)
@@ -149,8 +149,14 @@ def _forced(flow: FlowMap, free: Orbit, charts: tuple[Chart, Chart]) -> Orbit:
     return found.orbit
 
 
-def _strength(system: System, free: Orbit) -> float:
-    """Strength of the source that does the work which the damping takes from a free motion."""
+def strength_of(system: System, free: Orbit) -> float:
+    """Strength of the source that does the work which the damping takes from a free motion.
+
+    Raises
+    ------
+    SystemModelError
+        If the system has no damping, or the source does not act on what moves.
+    """
     source, _ = driving_source(system)
     v = _sampled(free)[:, system.size :]
     taken = float(np.einsum("ti,ij,tj->", v, system.total_damping, v)) / SAMPLES

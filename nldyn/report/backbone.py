@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 from matplotlib.axes import Axes
 
 from nldyn.branches.backbone import Backbone
+from nldyn.curves.curves import Curve
 from nldyn.plot.diagram import PERIOD_COLOURS, length_unit, new_axes, save_figure
 from nldyn.report.results import write_table
 from nldyn.runtime.result_directory import result_directory
@@ -14,8 +16,16 @@ from nldyn.runtime.result_directory import result_directory
 COLUMNS = ("frequency_hz", "energy_j", "amplitude_m", "impacts", "stable", "error")
 
 
-def write_backbone(found: Backbone, directory: str | Path, text: str, title: str = "") -> Path:
+def write_backbone(
+    found: Backbone,
+    directory: str | Path,
+    text: str,
+    title: str = "",
+    forced: Curve | None = None,
+) -> Path:
     """Write ``backbone.csv``, ``backbone.png`` and ``.svg``, and the text of the scene.
+
+    With the forced curve of phase resonance also ``phase_resonance.csv``.
 
     Raises
     ------
@@ -33,9 +43,23 @@ def write_backbone(found: Backbone, directory: str | Path, text: str, title: str
     )
     with result_directory(directory, "backbone") as folder:
         write_table(folder / "backbone.csv", COLUMNS, rows)
-        save_figure(plot_backbone(found, title), folder / "backbone")
+        ax = plot_backbone(found, title)
+        if forced is not None:
+            table = forced.table()
+            rows = zip(*(table[name].tolist() for name in table), strict=True)
+            write_table(folder / "phase_resonance.csv", tuple(table), rows)
+            draw_forced(ax, forced, length_unit(float(found.amplitude.max()))[0])
+        save_figure(ax, folder / "backbone")
         (folder / "scene.toml").write_text(text, encoding="utf-8")
     return Path(directory)
+
+
+def draw_forced(ax: Axes, forced: Curve, unit_m: float) -> None:
+    """Add a curve of phase resonance to a backbone that is drawn in a unit of so many metres."""
+    sizes = np.array([orbit.max_abs_displacement for orbit in forced.orbits])
+    hz = [orbit.frequency_hz for orbit in forced.orbits]
+    ax.plot(hz, sizes / unit_m, "--", color=PERIOD_COLOURS[1], label="forced, in phase resonance")
+    ax.legend(fontsize="small")
 
 
 def plot_backbone(found: Backbone, title: str = "") -> Axes:

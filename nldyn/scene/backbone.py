@@ -6,11 +6,17 @@ from typing import TypeVar
 
 from nldyn.base.errors import SystemModelError
 from nldyn.branches.backbone import Backbone, backbone
+from nldyn.branches.options import ContinuationOptions
+from nldyn.curves.curves import Curve
+from nldyn.curves.phase_resonance import phase_resonance, strength_of
+from nldyn.orbits.conditions import driving_source
 from nldyn.scene.build import build_reduced, build_system
 from nldyn.scene.faults import told_as
 from nldyn.scene.schema import DampingTable, Scene, StructureTables
+from nldyn.system.parameters import strength
 
 Given = TypeVar("Given", bound=StructureTables)
+LONG_STEPS = ContinuationOptions(max_step=0.2)  # along a curve that bends little
 BEGIN = 1e-3  # smallest amplitude, relative to the largest
 
 
@@ -43,6 +49,36 @@ def _without_damping(tables: Given) -> Given:
     return tables.model_copy(
         update={"matrices": tables.matrices.model_copy(update={"damping": None})}
     )
+
+
+def phase_resonance_of(scene: Scene, found: Backbone) -> Curve:
+    """The forced motions of a scene in phase resonance beside its backbone.
+
+    From a thousandth of the scene's own strength of excitation to that strength.
+
+    Raises
+    ------
+    SceneError
+        For what `phase_resonance` refuses, and if no free motion of the backbone needs a strength
+        within this range.
+    ConvergenceError
+        As `phase_resonance`.
+    """
+    system = build_system(scene)
+    with told_as(scene, (), SystemModelError):
+        source, _ = driving_source(system)
+        most = strength(source)
+        least = 1e-3 * most
+        need = (strength_of(system, orbit) for orbit in found.orbits)
+        beside = [o for o, s in zip(found.orbits, need, strict=True) if 1.2 * least < s < most]
+        if not beside:
+            raise SystemModelError(
+                f"excitation of strength {most:g} drives no free motion of the backbone against "
+                "the damping: follow it to other amplitudes"
+            )
+        hz = found.frequency_hz
+        range_hz = 0.5 * float(hz.min()), 2.0 * float(hz.max())
+        return phase_resonance(system, beside[0], (least, most), range_hz, options=LONG_STEPS)
 
 
 def backbone_of(scene: Scene, amplitude_m: float, mode: int = 1) -> Backbone:

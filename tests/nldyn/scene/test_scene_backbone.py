@@ -48,6 +48,22 @@ def test_bilinear_oscillator_has_one_frequency_at_any_amplitude(tmp_path):
     assert (tmp_path / "out" / "backbone.png").stat().st_size > 1000
 
 
+def test_the_forced_curve_is_written_beside_it(tmp_path):
+    """A linear oscillator: resonant at 1 rad/s, F over 2 zeta times the force of the damping."""
+    text = SCENE.replace("stiffness = 3.0", "stiffness = 3.0\ngap = 1e3")
+    text = text.replace("amplitude = 1.0", "amplitude = 0.02")
+    result = told(tmp_path, text, "--forced")
+    assert result.exit_code == 0, result.stderr
+    with (tmp_path / "out" / "phase_resonance.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    force = [float(row["amplitude"]) for row in rows]
+    assert max(force) == pytest.approx(0.02, rel=1e-9) and min(force) < 0.01
+    for row in rows:
+        assert float(row["frequency_hz"]) == pytest.approx(1.0 / (2.0 * math.pi), rel=1e-9)
+        size = float(row["max_abs_displacement_m"])
+        assert size == pytest.approx(float(row["amplitude"]) / (0.1 + 2.0 * 0.1), rel=1e-8)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "more", "fault"),
     [
