@@ -27,7 +27,6 @@ from nldyn.bifurcations.critical import (
     torus,
 )
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special
-from nldyn.bifurcations.touching import rigid_grazing
 from nldyn.orbits.orbit import Orbit, minimal_period
 from nldyn.orbits.shooting import asymmetry, metric_length
 from nldyn.system.naming import stop_name
@@ -466,27 +465,21 @@ def _rigid_grazing(special: SpecialPoint, stop: int, phase: float) -> NormalForm
     (1994), *Phys. Rev. E* 50, 4427-4444.
     """
     orbit = special.orbit
-    grazed = rigid_grazing(orbit)
     begins = (
         f"Grazing at {_hz(special)}: rigid {_stop_name(orbit, stop, phase)} is just touched, with "
-        "zero speed."
+        "zero speed. With impacts a multiplier goes to infinity with the inverse of their speed."
     )
-    infinite = "a multiplier goes to infinity with the inverse of the speed of that impact"
-    if grazed is not None and grazed[2] > 0.0:
-        return NormalForm("rigid grazing", f"{begins} The branch comes from impacts: {infinite}.")
     largest = orbit.largest_multiplier
     if abs(largest) >= 1.0:
-        follows = "The orbit is unstable before it"
+        follows = "Without them the orbit is unstable"
     elif largest.imag != 0.0 or largest.real <= 0.0:
         follows = (
-            "Its largest multiplier is not real and positive: no attractor with slight impacts is "
-            "to be expected behind it, the motion jumps"
+            "The largest multiplier without them is not real and positive: no attractor with "
+            "slight impacts is to be expected, the motion jumps"
         )
     else:
-        follows = f"Behind it {_behind_grazing(largest.real)}"
-    return NormalForm(
-        "rigid grazing", f"{begins} With impacts {infinite}. {follows}.", stable=orbit.stable
-    )
+        follows = f"With them {_behind_grazing(largest.real)}"
+    return NormalForm("rigid grazing", f"{begins} {follows}.", stable=orbit.stable)
 
 
 def _behind_grazing(multiplier: float) -> str:

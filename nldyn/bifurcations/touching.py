@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,16 +76,20 @@ def changes_hidden_by_birth(a: Orbit, b: Orbit) -> bool:
     return False
 
 
-def rigid_grazing(orbit: Orbit) -> tuple[int, float, float] | None:
+def rigid_grazing(
+    orbit: Orbit, but: Callable[[int, float], bool] | None = None
+) -> tuple[int, float, float] | None:
     """Rigid stop, phase and depth (in m) of the slightest impact or nearest miss; None without one.
 
-    The depth of an impact is its speed over ω.
+    The depth of an impact is its speed over ω. Those of which `but` (stop, phase) says so are left
+    out.
     """
     found = [
         (stop, float(phase), float(depth))
         for stop, each in enumerate(orbit.system.stops)
         if isinstance(each, RigidStop)
         for phase, depth in zip(*_maxima(orbit.touches(stop)), strict=True)
+        if but is None or not but(stop, float(phase))
     ]
     return min(found, key=lambda entry: abs(entry[2]), default=None)
 

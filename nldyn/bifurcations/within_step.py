@@ -18,6 +18,7 @@ from nldyn.bifurcations.sign_changes import changed, leaves_circle, tests
 from nldyn.bifurcations.touching import touches_sharply, touching_extremes
 from nldyn.orbits.critical_functions import travel
 from nldyn.orbits.extremes import dip, extreme_dip
+from nldyn.orbits.shooting import metric_length
 
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
 MOST_LOOKS = 12  # times that a step is cut at such points
@@ -25,6 +26,7 @@ MOST_HALVES = 8  # times that a step beside a grazing point is halved towards it
 SHORTEST_LOOK = 1e-6  # arclength of a step, below which it is not cut there
 CLOSE = 0.01  # part of a step within which a point beside it does not help
 FAR_ALONE = 0.3  # the same of the only pair of a single mode
+MOST_BENT = 10.0  # times that points may lie apart farther than their arclength says
 DIVES = 8  # points at which to look for a change of sign between two others
 
 
@@ -43,6 +45,8 @@ def special_points_between(
     LocateError
         If an orbit is not found where it should be.
     """
+    if passes_node(a, b) and not differs(a, b):
+        return []
     together = special_points_at_grazing(a, b)
     if together:
         return together
@@ -59,6 +63,16 @@ def special_points_between(
     if grazed and all(special.kind != "GR" for special in found):
         raise LocateError("a stop is touched, but no grazing point was found")
     return found
+
+
+def passes_node(a: BranchPoint, b: BranchPoint) -> bool:
+    """Whether an impact with a rigid stop passes a phase of shooting between two points.
+
+    The state there jumps to that on the other side of the impact, over a step of no length.
+    """
+    weights = a.orbit.problem.metric(a.orbit.point)
+    way = metric_length(weights, b.orbit.point - a.orbit.point)
+    return a.orbit.system.jumps and way > MOST_BENT * abs(b.arclength - a.arclength)
 
 
 def _inside(

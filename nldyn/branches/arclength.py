@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import ConvergenceError, check_types
+from nldyn.base.errors import ConvergenceError, SystemModelError, check_types
 from nldyn.base.rows import Rows
 from nldyn.bifurcations.branch_crossing import (
     ON_CROSSING,
@@ -27,12 +27,13 @@ from nldyn.bifurcations.touching import rigid_grazing
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.options import ContinuationOptions
 from nldyn.branches.predictor import predicted
-from nldyn.flow.rigid import rigid_impacts
-from nldyn.orbits.bordered import length_unit
+from nldyn.orbits.bordered import Free, OrbitFamily, correct, length_unit
 from nldyn.orbits.conditions import TOUCH, depth_row
+from nldyn.orbits.impact_phases import nodes_to_impacts, start_far_from_impacts
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import FROM_NEAR, ShootingProblem, asymmetry, metric_length, shifts
-from nldyn.system.rigid_stop import RigidStop
+from nldyn.system.chart import FREQUENCY, Chart
+from nldyn.system.parameters import Parameter
 
 KINK = TOUCH  # step below which a branch may bend by any angle where the number of contacts changes
 BROKEN = 1e-8  # asymmetry of an orbit that is more than rounding,
@@ -42,9 +43,10 @@ MEETING_STEP = 1e-4  # longest step over which a doubled branch may meet the one
 LONGER_CROSSINGS = (1.0, 10.0, 100.0)  # steps from a crossing, over `SHORTEST_CROSSING`
 FARTHEST_CROSSING = 1e-4  # distance of one from which a step may begin
 GRAZES = 1e-4  # depth over size at which a walk that cannot go on is at a grazing of a rigid stop
-SLIGHTEST = 1e-7  # impact with one that is followed: multipliers go with its inverse
+SLIGHTEST = 1e-6  # impact with one that is followed: multipliers go with its inverse
 NEAR_NODE = 1e-4  # phase from an impact to one of shooting from which a walk may pass it
-PAST_NODE = 1e-8, 1e-7, 1e-6, 1e-5, 1e-4  # relative steps of the frequency over it
+AT_NODE = 1e-7  # the same that is too near
+PAST_NODE = 1e-6, 1e-5, 1e-4, 1e-3  # relative steps of the frequency over it
 MOST_BEHIND = 4  # points behind the last one that tell where a branch goes on
 LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
 RECENT = 10  # points behind a walk that it does not come back to
@@ -85,45 +87,51 @@ def _grazes_rigid(point: BranchPoint, least: float, most: float) -> StopReason |
     return Ending.GRAZES_RIGID.told(hz=f"{point.orbit.frequency_hz:.9g}")
 
 
+def loses_impact(orbit: Orbit) -> bool:
+    """Whether the last step of Newton's method has lost or won a slight impact."""
+    grazed = rigid_grazing(orbit)
+    if grazed is None or abs(grazed[2]) > GRAZES * length_unit(orbit) or orbit.rests:
+        return False
+    problem = orbit.problem
+    found = problem.flow.shoot(
+        problem.nodes(orbit.point), problem.phases, orbit.omega, sensitivities=False
+    )
+    return bool(found.failure) or int(found.closings.sum()) != orbit.impacts
+
+
 def _past_impact_at_node(here: BranchPoint) -> tuple[BranchPoint, float, float] | None:
     """Next point where the phase of an impact with a rigid stop passes one of shooting, or None.
 
-    The state there jumps from that before the impact to that behind it, or back.
+    The state there jumps from that before the impact to that behind it, or back. So the orbit is
+    solved for by its states at other phases.
     """
     orbit, problem = here.orbit, here.orbit.problem
-    nodes = _beyond_impacts(orbit)
-    if nodes is None:
+    if nodes_to_impacts(orbit) > NEAR_NODE:
         return None
+    hz = orbit.frequency_hz
+    chart = Chart(Parameter(FREQUENCY), 0.5 * hz, 2.0 * hz)
+    family = replace(OrbitFamily.around(orbit, (chart,)), start=start_far_from_impacts(orbit))
     by_frequency = np.zeros(orbit.point.size)
     by_frequency[-1] = math.copysign(1.0, here.tangent[-1])
-    for shift in PAST_NODE:
-        guess = np.append(nodes, orbit.point[-1] + shift * by_frequency[-1])
-        found = problem.correct(guess, by_frequency, longest=NEAR_NODE, max_iterations=FROM_NEAR)
-        if found.converged:
-            other = Orbit.of(problem, found, orbit.observe)
-            change = other.max_abs_displacement / orbit.max_abs_displacement - 1.0
-            if other.impacts == orbit.impacts and abs(change) < NEAR_NODE:
-                tangent = problem.tangent(found, by_frequency)
-                return BranchPoint(other, tangent, here.arclength + shift), 0.0, 0.0
+    try:
+        guess = family.unknowns(orbit)
+        for shift in PAST_NODE:
+            guess[-1] = chart.coordinate(hz * math.exp(shift * by_frequency[-1]))
+            met = correct(family, guess, Free(), np.abs(by_frequency), float(guess[-1]))
+            if not met.converged or nodes_to_impacts(met.orbit) < AT_NODE:
+                continue
+            found = problem.correct(
+                met.orbit.point, by_frequency, longest=NEAR_NODE, max_iterations=FROM_NEAR
+            )
+            if found.converged:
+                other = Orbit.of(problem, found, orbit.observe)
+                change = other.max_abs_displacement / orbit.max_abs_displacement - 1.0
+                if other.impacts == orbit.impacts and abs(change) < 100.0 * shift + NEAR_NODE:
+                    tangent = problem.tangent(found, by_frequency)
+                    return BranchPoint(other, tangent, here.arclength + shift), 0.0, 0.0
+    except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
+        pass
     return None
-
-
-def _beyond_impacts(orbit: Orbit) -> Real | None:
-    """States at the shooting phases, those beside impacts from the other side; None without any."""
-    problem, motion = orbit.problem, orbit.trajectory
-    phases, full = problem.phases[:-1], 2.0 * math.pi * orbit.period
-    nodes, found = problem.nodes(orbit.point).copy(), False
-    for stop, each in enumerate(orbit.system.stops):
-        hits = rigid_impacts(motion, stop) if isinstance(each, RigidStop) else None
-        for piece, phase in zip(*hits[:2], strict=True) if hits else ():
-            after = (phase - phases + 0.5 * full) % full - 0.5 * full
-            for node in np.flatnonzero(np.abs(after) <= NEAR_NODE):
-                found = True
-                if after[node] >= 0.0:
-                    nodes[node] = motion.record.start[piece]
-                else:
-                    nodes[node] = motion.states(np.array([np.nextafter(phase, -math.inf)]))[0]
-    return nodes if found else None
 
 
 @dataclass
@@ -280,7 +288,7 @@ class Stepper:
             like=here.orbit.motion,
             aim=cubic,
             # behind a grazing point the branch may turn on a very short length
-            closings=here.orbit.impacts if step > self.options.grazing_step else -1,
+            closings=self._closings(here.orbit, step),
             turn=math.cos(1.1 * self.options.max_angle) if step > KINK else 0.0,
         )
         if not found.converged:
@@ -291,11 +299,15 @@ class Stepper:
         self._obstacle = "what Newton's method finds is not the next point of the branch"
         if _jumped(problem, here.orbit.point, straight, found.point):
             return None
+        if loses_impact(Orbit.of(problem, found, here.orbit.observe)):
+            return None
         miss = metric_length(weights, found.point - cubic) / step
         # a linear stop that is touched bends the branch; a force that jumps does where the phase of
         # a switch passes one of shooting, as the state there has a corner
         if step <= KINK and miss < 1.0:
             orbit = Orbit.of(problem, found, here.orbit.observe)
+            if orbit.impacts != here.orbit.impacts and _grazes_rigid(here, -GRAZES, GRAZES):
+                return None  # the branch with the impact and that without meet in a corner
             if problem.flow.system.jumps or orbit.impacts != here.orbit.impacts:
                 tangent = problem.tangent(found, direction)
                 return BranchPoint(orbit, tangent, here.arclength + step), 0.0, 0.0
@@ -328,6 +340,13 @@ class Stepper:
         if lies_on_crossing(orbit, min(0.1 * step, ON_CROSSING)):
             return None
         return point, angle, miss
+
+    def _closings(self, orbit: Orbit, step: float) -> int:
+        """How often stops close on the next orbit, or -1 for any number.
+
+        A series of impacts that ends in rest may be cut by a phase of shooting, and counts then.
+        """
+        return orbit.impacts if step > self.options.grazing_step and not orbit.rests else -1
 
     def _across_touch(
         self, problem: ShootingProblem, here: BranchPoint, step: float

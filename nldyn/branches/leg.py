@@ -20,6 +20,7 @@ from nldyn.branches.arclength import Stepper, StepperState
 from nldyn.branches.branch import WalkEnd
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.options import ContinuationOptions
+from nldyn.orbits.conditions import nearest_grazing
 from nldyn.orbits.shooting import metric_length
 
 AT_FLIP = 1e-5  # distance of a turn of a doubled branch from its end that may be the flip itself
@@ -129,7 +130,9 @@ class LegBuilder:
         self._search(len(self.nodes) - 1, closely=False)
         ending = self.walk.stop_reason.ending
         if ending is Ending.GRAZES_RIGID:
-            self.special_points.append(_grazing_at_end(self.nodes))
+            grazing = _grazing_at_end(self.nodes)
+            self.special_points.append(grazing)
+            self.walk.stop_reason = Ending.GRAZES_RIGID.told(hz=f"{grazing.frequency_hz:.9g}")
         if ending is Ending.COMES_BACK:
             self.notes.append(self.walk.stop_reason)
         special = self.special_points
@@ -268,8 +271,14 @@ class LegBuilder:
 
 
 def _grazing_at_end(nodes: Sequence[BranchPoint]) -> SpecialPoint:
-    """The grazing of a rigid stop at which a walk has ended, with what is left of the way to it."""
+    """The grazing of a rigid stop at which a walk has ended, solved by its defining system.
+
+    Where that fails it is the last point, with what is left of the way to the grazing.
+    """
     last = nodes[-1]
+    exact = nearest_grazing(last.orbit)
+    if exact is not None:
+        return SpecialPoint("GR", replace(last, orbit=exact, tests={}), exact.error)
     error = last.orbit.error
     here = rigid_grazing(last.orbit)
     before = rigid_grazing(nodes[-2].orbit) if len(nodes) > 1 else None

@@ -26,7 +26,13 @@ from nldyn.bifurcations.roots import root
 from nldyn.branches.endings import Ending, StopReasons, has_ending
 from nldyn.branches.options import ContinuationOptions
 from nldyn.branches.tables import orbit_columns
-from nldyn.curves.marks import CurveChord, Located, LocatedPoint, marks_between
+from nldyn.curves.marks import (
+    CurveChord,
+    Located,
+    LocatedPoint,
+    grazing_at_end,
+    marks_between,
+)
 from nldyn.curves.walk import CurvePoint, CurveWalk, curve_point, passages
 from nldyn.flow.flow_map import FlowMap, same_flow
 from nldyn.orbits.bordered import Condition, Free, OrbitFamily, correct, gradient, tangent_surface
@@ -553,6 +559,7 @@ def _followed(
     forward: list[CurvePoint] = []
     backward: list[CurvePoint] = []
     first, last = curve.stop_reasons
+    grazed: dict[bool, list[LocatedPoint]] = {False: [], True: []}  # at the end, the beginning
 
     def is_closed() -> bool:
         return has_ending((first, last), Ending.CLOSED_CURVE)
@@ -584,14 +591,17 @@ def _followed(
                 last = walk.stop_reason
             else:
                 first = walk.stop_reason
+            if len(leg) > 1 and walk.stop_reason.ending is Ending.GRAZES_RIGID:
+                grazed[leg is backward] = grazing_at_end(leg[-1])
         if is_closed():
             first = last = Ending.CLOSED_CURVE.told()
         points = whole().points
         if has_ending(curve.stop_reasons, Ending.NOT_FINISHED):
             marks, notes = _marked(points)
+            marks = [*grazed[True], *marks, *grazed[False]]
         else:
             (ahead, notes), (before, lost) = _marked(forward), _marked(backward)
-            marks = [*before[::-1], *curve.marks, *ahead]
+            marks = [*grazed[True], *before[::-1], *curve.marks, *ahead, *grazed[False]]
             notes = [*curve.notes, *notes, *lost]
         done = replace(
             curve, points=points, marks=tuple(marks), stop_reasons=(first, last), notes=tuple(notes)

@@ -43,11 +43,14 @@ def codimension_tests(
     """
     mu = at.orbit.multipliers
     if isinstance(condition, Singular):
-        return {
+        tests = {
             "LP": along_folds,
             "PD": along_flips,
             "NS": along_tori,
         }[condition.kind](condition, at.orbit, mu)
+        if at.family.start:  # the borders are of other phases than the orbit's
+            return {name: tests[name] for name in tests if name not in ("CP", "GPD")}
+        return tests
     if isinstance(condition, BranchPoint):
         return along_branch_points(mu)
     tests = {"PD": flip_test(mu), "NS": torus_test(mu) if mu.size > 2 else 1.0}

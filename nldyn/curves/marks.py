@@ -15,7 +15,14 @@ from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.sign_changes import leaves_circle
 from nldyn.bifurcations.touching import Touch, touching_extremes
 from nldyn.curves.events import is_torus, torus_pair
-from nldyn.curves.walk import UNFOLDED, CurvePoint, between, curve_point, is_torus_curve
+from nldyn.curves.walk import (
+    UNFOLDED,
+    CurvePoint,
+    between,
+    clear_of_nodes,
+    curve_point,
+    is_torus_curve,
+)
 from nldyn.orbits.bordered import Condition, Free, OrbitFamily, correct, length_unit
 from nldyn.orbits.conditions import Both, BranchPoint, Grazing, Singular, defined_by
 from nldyn.orbits.orbit import Orbit
@@ -169,6 +176,7 @@ class CurveChord:
 
 def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], list[str]]:
     """What is met between two neighbouring points of a curve, in order, and what may be missing."""
+    a, b = clear_of_nodes(a, b)
     chord = CurveChord(a, b)
     found: list[tuple[float, LocatedPoint]] = []
     notes: list[str] = []
@@ -194,6 +202,14 @@ def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], lis
         found.append((1.0, _marked(b.corner, b, b.found.step)))
     found.sort(key=lambda pair: pair[0])
     return [mark for _, mark in found], notes
+
+
+def grazing_at_end(end: CurvePoint) -> list[LocatedPoint]:
+    """The grazing of a rigid stop at which a curve of orbits in one parameter ends."""
+    if not isinstance(end.condition, Free):
+        return []
+    mark = _marked("GR", end, end.found.step)
+    return [mark]
 
 
 def _touched(touches: Sequence[Touch], chord: CurveChord) -> tuple[float, LocatedPoint]:

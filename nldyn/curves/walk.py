@@ -13,6 +13,8 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError
 from nldyn.bifurcations.period_doubling import passed_flip
+from nldyn.bifurcations.touching import rigid_grazing
+from nldyn.branches.arclength import GRAZES, SLIGHTEST, loses_impact
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.options import ContinuationOptions
 from nldyn.curves.events import codimension_tests, cosine_near, is_torus, torus_cosine
@@ -24,11 +26,13 @@ from nldyn.orbits.bordered import (
     Free,
     correct,
     gradient,
+    length_unit,
     nearest_depth,
     tangent_surface,
 )
 from nldyn.orbits.conditions import Both, BranchPoint, Grazing, Held, Singular
 from nldyn.orbits.extremes import nearest
+from nldyn.orbits.impact_phases import nodes_to_impacts, start_far_from_impacts
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import FROM_NEAR, metric_length
 from nldyn.system.chart import Chart
@@ -42,6 +46,11 @@ BEHIND = (1e-5, 1e-6, 1e-7)  # extremes, relative to the orbit, of a first point
 ALONG = 1e-12  # part of a unit tangent that is rounding
 AT_POINT = 1e-6  # share of a step within which two points are one
 CORNER_STEP = 1e-3  # a step shorter than this may have met a corner
+NEAR_NODE = 0.3  # rad from an impact to a phase of shooting that it may pass in the next step
+MOST_BENT = 3.0  # times that neighbours may lie apart farther than their arclength says
+FASTEST = 20.0  # change of an impact's phase with the arclength, at most, in rad
+CLEAR_OF_NODES = 3e-3  # rad from an impact to one, from which derivatives do not reach across it
+SHARES = (1.0, 0.8, 0.6, 0.4, 0.25)  # of a step that leads over a phase of shooting
 # The condition of a Neimark-Sacker point holds for neutral saddles, too, and some may be near: the
 # cosine of the pair's angle changes by no more than this from point to point.
 TURN = 0.1
@@ -114,6 +123,21 @@ class CurvePoint:
         found = replace(self.found, at=Evaluation(family, point))
         return replace(self, found=found, tangent=tangent)
 
+    def shot_from(self, start: float) -> CurvePoint:
+        """The same point with the states of its unknowns at other phases.
+
+        Raises
+        ------
+        ConvergenceError
+            If the flow map fails, or there is no tangent.
+        """
+        at = self.found.at
+        family = replace(at.family, start=start)
+        found = replace(self.found, at=family.at(family.unknowns(self.orbit)))
+        towards = np.zeros(self.tangent.size)
+        towards[family.n_states :] = self.tangent[family.n_states :]
+        return curve_point(found, self.condition.renewed(found.at), towards, self.arclength)
+
     def reversed(self) -> CurvePoint:
         """The same point of the curve run through the other way."""
         return replace(self, tangent=-self.tangent, arclength=-self.arclength)
@@ -127,11 +151,22 @@ def curve_point(
     length = math.sqrt(float(found.along @ weighted))
     if float(towards @ weighted) < 0.0:
         length = -length
-    return CurvePoint(found, condition.renewed(found.at), found.along / length, arclength)
+    renewed, along = condition.renewed(found.at), found.along
+    if isinstance(renewed, Grazing):  # whose rigid stop is passed where the extreme is now
+        family = found.at.family.past(renewed.passage)
+        found = replace(found, at=Evaluation(family, found.at.point))
+    return CurvePoint(found, renewed, along / length, arclength)
 
 
 def on_chart_plane(a: CurvePoint, b: CurvePoint, which: int, value: float) -> CurvePoint | None:
     """Point of the curve between a and b at which a parameter has a value."""
+    start = a.found.at.family.start
+    a, b = clear_of_nodes(a, b)
+    found = _on_chart_plane(a, b, which, value)
+    return found if found is None or a.found.at.family.start == start else found.shot_from(start)
+
+
+def _on_chart_plane(a: CurvePoint, b: CurvePoint, which: int, value: float) -> CurvePoint | None:
     family = a.found.at.family
     place = family.n_states + which
     if a.point[place] == b.point[place]:
@@ -142,12 +177,23 @@ def on_chart_plane(a: CurvePoint, b: CurvePoint, which: int, value: float) -> Cu
     return _on_plane(a, way, share * (b.arclength - a.arclength), which, target)
 
 
+def clear_of_nodes(a: CurvePoint, b: CurvePoint) -> tuple[CurvePoint, CurvePoint]:
+    """Two neighbours, by their states at other phases where an impact passes one between them."""
+    family = a.found.at.family
+    apart = metric_length(family.metric(a.point), b.point - a.point)
+    if apart < MOST_BENT * abs(b.arclength - a.arclength) or nodes_to_impacts(a.orbit) > NEAR_NODE:
+        return a, b
+    start = start_far_from_impacts(a.orbit)
+    return a.shot_from(start), b.shot_from(start)
+
+
 def passages(points: Iterable[CurvePoint], which: int, value: float) -> Iterator[CurvePoint]:
     """Points behind the first at which a curve has a value of a parameter, two in a step or three.
 
     A step has them where the cubic through its ends, with their tangents, says.
     """
-    for a, b in pairwise(points):
+    for pair in pairwise(points):
+        a, b = clear_of_nodes(*pair)
         family = a.found.at.family
         place, span = family.n_states + which, b.arclength - a.arclength
         target = family.charts[which].coordinate(value)
@@ -339,6 +385,24 @@ def _tangent_behind(at: Evaluation, condition: Condition, grazing: Grazing, deep
     return np.asarray(tangent / math.copysign(math.hypot(by_beside, by_across), by_beside))
 
 
+def _grazes_rigid(here: CurvePoint, least: float, most: float) -> StopReason | None:
+    """The reason to stop, if the slightest impact with a rigid stop, or nearest miss, is so deep.
+
+    Both bounds are shares of the orbit's size; that of a curve of grazings is its own.
+    """
+    condition, orbit = here.condition, here.orbit
+    but = None
+    if isinstance(condition, Grazing):
+
+        def but(stop: int, phase: float) -> bool:
+            return condition.is_of(stop, True, phase, orbit.period)
+
+    found = rigid_grazing(orbit, but)
+    if found is None or not least < found[2] / length_unit(orbit) < most:
+        return None
+    return Ending.GRAZES_RIGID.told(hz=f"{orbit.frequency_hz:.9g}")
+
+
 @dataclass
 class CurveWalk:
     """Iterator over the points of a curve in one direction, as `Stepper` is over a branch's.
@@ -399,10 +463,13 @@ class CurveWalk:
                 yield from last
                 return
             yield there
+            if grazes := _grazes_rigid(there, 0.0, SLIGHTEST):
+                self.stop_reason = grazes
+                return
             if is_torus_curve(there.condition):
                 self._cosine = cosine_near(there.orbit.multipliers, self._cosine)
             curvature = (there.tangent - here.tangent) / (there.arclength - here.arclength)
-            if there.corner:
+            if there.corner or clear_of_nodes(here, there)[0] is not here:
                 curvature = np.zeros(here.tangent.size)
             here = there
             growth = 0.7 * self.options.max_angle / max(angle, 1e-3)
@@ -411,6 +478,28 @@ class CurveWalk:
         self.stop_reason = Ending.MOST_POINTS.told(points=self.options.max_points)
 
     def _advance(
+        self, here: CurvePoint, curvature: Real, step: float, seen: bool
+    ) -> tuple[CurvePoint, float, float] | None:
+        """Next point, also where an impact passes a phase of shooting; see `_straight_on`."""
+        attempt = self._straight_on(here, curvature, step, seen)
+        if attempt is not None and nodes_to_impacts(attempt[0].orbit) > CLEAR_OF_NODES:
+            return attempt
+        if not nodes_to_impacts(here.orbit) < min(NEAR_NODE, FASTEST * step):
+            return attempt
+        try:
+            shot = here.shot_from(start_far_from_impacts(here.orbit))
+            none = np.zeros(here.tangent.size)
+            for share in SHARES:
+                beyond = self._straight_on(shot, none, share * step, seen)
+                if beyond is not None:
+                    there = beyond[0].shot_from(0.0)
+                    if nodes_to_impacts(there.orbit) > CLEAR_OF_NODES:
+                        return there, *beyond[1:]
+        except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
+            pass
+        return attempt
+
+    def _straight_on(
         self, here: CurvePoint, curvature: Real, step: float, seen: bool
     ) -> tuple[CurvePoint, float, float] | None:
         """Next point, its angle to this one and its relative distance from the predictor.
@@ -432,6 +521,8 @@ class CurveWalk:
             self._obstacle = found.failure
             return None
         self._obstacle = "what Newton's method finds is not the next point of the curve"
+        if family.passage is None and loses_impact(found.orbit):
+            return None
         miss = metric_length(weights, found.at.point - predicted) / step
         off = metric_length(weights, found.at.point - straight)
         if miss > self.options.max_miss or off > 0.75 * self.options.max_angle * step:
@@ -467,7 +558,8 @@ class CurveWalk:
             return Ending.CORNER.told()
         if isinstance(here.condition, Held) and here.condition.changes_extreme(here.orbit):
             return Ending.OTHER_EXTREME.told()
-        return Ending.SHORT_STEP.told(step=f"{self.options.min_step:g}", obstacle=self._obstacle)
+        short = Ending.SHORT_STEP.told(step=f"{self.options.min_step:g}", obstacle=self._obstacle)
+        return _grazes_rigid(here, -GRAZES, GRAZES) or short
 
     def _left_at_once(self) -> str:
         """Name of a parameter at the end of its range, beyond which the curve would begin."""

@@ -63,6 +63,81 @@ def rigid_impacts(motion: Trajectory, stop: int) -> RigidImpacts:
     return RigidImpacts(after[hit], rec.phase[after[hit]], speed[hit], rebound[hit])
 
 
+def impacts_in_order(motion: Trajectory) -> list[tuple[int, float]]:
+    """Rigid stop and speed of every impact, also of those that follow within one instant."""
+    flow, system = motion.flow, motion.flow.system
+    found = [rigid_impacts(motion, stop) if isinstance(each, RigidStop) else None
+             for stop, each in enumerate(system.stops)]  # fmt: skip
+    hits = [(int(piece), stop, float(speed)) for stop, hit in enumerate(found) if hit is not None
+            for piece, speed in zip(hit.piece, hit.speed, strict=True)]  # fmt: skip
+    several = {piece for piece, *_ in hits if sum(other == piece for other, *_ in hits) > 1}
+    listed = [(stop, speed) for piece, stop, speed in hits if piece not in several]
+    mobility = flow.rate_rows @ flow._data.force[:, : len(system.stops)]
+    for piece in several:
+        before = motion.states(np.nextafter(motion.record.phase[[piece]], -math.inf))[0]
+        speeds = flow.rate_rows @ before
+        shut = [stop for other, stop, _ in hits if other == piece]
+        while True:
+            hit = max(shut, key=lambda stop: speeds[stop])
+            speed = float(speeds[hit])
+            if speed <= STILL * np.abs(speeds[shut]).max():
+                break
+            listed.append((hit, speed))
+            rigid = system.stops[hit]
+            assert isinstance(rigid, RigidStop)
+            kick = (1.0 + rigid.restitution_at(speed)) * speed / mobility[hit, hit]
+            speeds = speeds - mobility[:, hit] * kick
+    return listed
+
+
+class Series(NamedTuple):
+    """What impacts of one period with a rigid stop have to do with rest on it.
+
+    Parameters
+    ----------
+    follows : (k,)
+        Whether each is a later one of a series that ends in rest.
+    soft : (k,)
+        Whether each is the first of a series before which the body had rested.
+    """
+
+    follows: NDArray[np.bool_]
+    soft: NDArray[np.bool_]
+
+
+def series_to_rest(motion: Trajectory, stop: int, hits: RigidImpacts) -> Series:
+    """Which impacts of one period with a rigid stop belong to series that end in rest.
+
+    In a series the speeds fall. Its end may lie in the next period.
+    """
+    rests = motion.record.depth[:, stop].any(axis=1)
+    follows, soft = np.zeros((2, hits.piece.size), dtype=bool)
+    if not (rests.any() and follows.size):
+        return Series(follows, soft)
+    n, k = rests.size, hits.piece.size
+    ends = np.flatnonzero(np.tile(rests & ~np.roll(rests, 1), 2))
+    pieces = np.concatenate([hits.piece, hits.piece + n])
+    twice = np.tile(rests, 2)
+    for end in ends.tolist():
+        last = int(np.searchsorted(pieces, end, side="right")) - 1
+        while last > 0:
+            if twice[pieces[last - 1] : pieces[last]].any():
+                soft[last % k] = True
+                break
+            if hits.speed[(last - 1) % k] <= hits.speed[last % k]:
+                break
+            follows[last % k] = True
+            last -= 1
+    return Series(follows, soft)
+
+
+def rests_on_rigid_stop(motion: Trajectory) -> bool:
+    """Whether a body rests on a rigid stop for a while in a motion."""
+    stops = motion.flow.system.stops
+    rigid = [i for i, stop in enumerate(stops) if isinstance(stop, RigidStop)]
+    return bool(motion.record.depth[:, rigid].any())
+
+
 def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
     """Forces (k, n_stops) in N of rigid stops on what rests on them; zero for elastic stops.
 

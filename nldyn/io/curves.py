@@ -124,7 +124,7 @@ def _numbers_of(condition: Condition) -> dict[str, Any]:
         Free: (),
         Singular: ("left", "right"),
         BranchPoint: ("left", "right", "unit"),
-        Grazing: ("stop", "is_maximum", "phase", "unit"),
+        Grazing: ("stop", "is_maximum", "phase", "unit", "half", "every"),
         Held: ("target",),
     }[type(condition)]
     return {name: getattr(condition, name) for name in names}
@@ -156,12 +156,17 @@ def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve:
     lengths, steps = group.array("arclength", count), group.array("step", count)
     conditions = _read_conditions(group, family, count, points, monitor)
     found = [
-        Corrected(Evaluation(family, point), condition, step, 0, "")
+        Corrected(Evaluation(_past(family, condition), point), condition, step, 0, "")
         for point, condition, step in zip(points, conditions, steps.tolist(), strict=True)
     ]
     places = group.array("mark_point", len(kinds), size)
     residuals, errors = (group.array(f"mark_{name}", len(kinds)) for name in ("residual", "error"))
     reasons = group.texts("stop_reasons")
+
+    def _nearest(place: Real) -> Condition:
+        """The condition of the point nearest to a mark."""
+        return conditions[int(np.argmin(np.abs(points - place).max(axis=1)))]
+
     if len(reasons) != 2 or not count:
         raise group.fault("attribute", "stop_reasons", "must have two entries, of some points")
     parameters = tuple(chart.parameter for chart in charts)
@@ -172,7 +177,7 @@ def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve:
         tuple(
             LocatedPoint(
                 kind,
-                Evaluation(family, place).make_orbit(error),
+                Evaluation(_past(family, _nearest(place)), place).make_orbit(error),
                 parameters,
                 family.values(place),
                 residual,
@@ -185,6 +190,11 @@ def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve:
         (StopReason(reasons[0]), StopReason(reasons[1])),
         tuple(group.texts("notes")),
     )
+
+
+def _past(family: OrbitFamily, condition: Condition) -> OrbitFamily:
+    """The family with the rigid stop that a grazing passes."""
+    return family.past(condition.passage) if isinstance(condition, Grazing) else family
 
 
 def _read_conditions(
@@ -202,8 +212,13 @@ def _read_conditions(
         return [Singular(of, *borders) for borders in zip(left, right, strict=True)]
     if kind == "Grazing":
         columns = [group.array(x, count) for x in ("stop", "is_maximum", "phase", "unit")]
+        for x in ("half", "every"):  # of rigid stops; files of earlier versions have none
+            columns.append(group.array(x, count) if x in group else np.zeros(count))
         rows = zip(*(column.tolist() for column in columns), strict=True)
-        return [Grazing(int(stop), bool(top), phase, unit) for stop, top, phase, unit in rows]
+        return [
+            Grazing(int(stop), bool(top), phase, unit, half=half, every=every)
+            for stop, top, phase, unit, half, every in rows
+        ]
     if kind != "Held":
         raise group.fault("attribute", "kind", f"names an unknown condition '{kind}'")
     held = MONITORS.get(of.partition(" ")[0], monitor)

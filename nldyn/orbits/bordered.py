@@ -22,6 +22,7 @@ from nldyn.base.errors import ConvergenceError, SystemModelError
 from nldyn.flow.flow_map import FlowMap, Segments
 from nldyn.flow.options import FlowOptions
 from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.passage import Passage, shoot_past
 from nldyn.orbits.shooting import ITERATIONS, ShootingProblem, metric_length
 from nldyn.system.chart import (
     FREQUENCY,
@@ -76,6 +77,10 @@ class OrbitFamily:
         The parameters.
     unfolding : (N,) array, optional
         Direction that is added to the shooting equations, times one more unknown.
+    passage : Passage, optional
+        Where a rigid stop lets the motions pass.
+    start : float
+        Forcing phase of the first state, less than a segment's: orbits have it at zero.
     """
 
     system: System
@@ -86,6 +91,8 @@ class OrbitFamily:
     frequency_hz: float
     charts: tuple[Chart, ...]
     unfolding: Real | None = None
+    passage: Passage | None = None
+    start: float = 0.0
 
     @classmethod
     def around(cls, orbit: Orbit, charts: tuple[Chart, ...]) -> OrbitFamily:
@@ -105,6 +112,10 @@ class OrbitFamily:
         """The family with a direction added to its equations."""
         return replace(self, unfolding=direction)
 
+    def past(self, passage: Passage | None) -> OrbitFamily:
+        """The family of motions past a rigid stop."""
+        return self if passage == self.passage else replace(self, passage=passage)
+
     @property
     def n_states(self) -> int:
         """Number N of states, and of shooting equations."""
@@ -118,6 +129,12 @@ class OrbitFamily:
     def unknowns(self, orbit: Orbit) -> Real:
         """Unknowns (N + m,) of an orbit of the family."""
         nodes = orbit.problem.nodes(orbit.point)
+        if self.start:
+            carried = [
+                _carried(orbit.problem, self.passage, node, phase, phase + self.start, orbit.omega)
+                for node, phase in zip(nodes, orbit.problem.phases.tolist(), strict=False)
+            ]
+            nodes = np.array(carried)
         here, start = orbit.system.linear, self.system.linear
         if here is not start:  # an orbit of the family has coordinates of its own
             nodes = nodes @ (start.left @ here.right).T
@@ -178,7 +195,9 @@ class Evaluation:
         system = family.system
         for chart, value in zip(family.charts, self.values.tolist(), strict=True):
             system = with_value(system, chart.parameter, value)
-        return ShootingProblem(FlowMap(system, family.options), family.period, family.segments)
+        return ShootingProblem(
+            FlowMap(system, family.options), family.period, family.segments, family.start
+        )
 
     @cached_property
     def omega(self) -> float:
@@ -210,7 +229,11 @@ class Evaluation:
         return self._shot(True, exact)
 
     def _shot(self, sensitivities: bool, parameters: Sequence[Parameter] = ()) -> Segments:
-        problem = self.problem
+        problem, passage = self.problem, self.family.passage
+        if passage is not None:
+            return shoot_past(
+                problem, passage, self.nodes, problem.phases, self.omega, sensitivities, parameters
+            )
         found = problem.flow.shoot(
             self.nodes,
             problem.phases,
@@ -283,8 +306,41 @@ class Evaluation:
 
     def make_orbit(self, error: float) -> Orbit:
         """The orbit with an estimate of its relative error."""
+        family = self.family
+        if family.start:
+            return self._at_phase_zero().make_orbit(error)
         point = np.append(self.nodes.ravel(), math.log(self.omega))
-        return Orbit(self.problem, point, self.segments.jacobians, error, self.family.observe)
+        return Orbit(self.problem, point, self.segments.jacobians, error, family.observe)
+
+    def _at_phase_zero(self) -> Evaluation:
+        """The same orbit by its states at the phases that orbits have."""
+        family, phases = self.family, self.problem.phases.tolist()
+        ends = [
+            _carried(self.problem, family.passage, node, first, last - family.start, self.omega)
+            for node, first, last in zip(self.nodes, phases, phases[1:], strict=False)
+        ]
+        point = self.point.copy()
+        point[: family.n_states] = np.roll(self._back(np.array(ends)), 1, axis=0).ravel()
+        return Evaluation(replace(family, start=0.0), point)
+
+
+def _carried(
+    problem: ShootingProblem,
+    passage: Passage | None,
+    state: Real,
+    first: float,
+    last: float,
+    omega: float,
+) -> Real:
+    """State (2n,) at a later phase."""
+    phases = np.array([first, last])
+    if passage is None:
+        found = problem.flow.shoot(state[None], phases, omega, sensitivities=False)
+    else:
+        found = shoot_past(problem, passage, state[None], phases, omega, False)
+    if found.failure:
+        raise ConvergenceError(found.failure)
+    return np.asarray(found.ends[0])
 
 
 class Condition(Protocol):

@@ -24,10 +24,12 @@ from nldyn.orbits.bordered import (
 from nldyn.orbits.extremes import nearest
 from nldyn.orbits.harmonics import line_by_balance
 from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.passage import Passage, peak_past
 from nldyn.orbits.shooting import metric_length
 from nldyn.system.chart import FREQUENCY, Chart
 from nldyn.system.elements import BaseMotion, ConstantForce, HarmonicForce, Stop, Unbalance
 from nldyn.system.parameters import Parameter
+from nldyn.system.rigid_stop import RigidStop
 from nldyn.system.system import System
 
 KINDS = ("LP", "PD", "NS", "BP", "GR")
@@ -35,6 +37,10 @@ KINDS = ("LP", "PD", "NS", "BP", "GR")
 BESIDE = 3e-3  # of an orbit's size: a crossing within it belongs to a turn
 TOUCH = 1e-6  # of an orbit's size: depth of a touch beside its grazing point
 LEVEL, ALIKE = 1e-4, 1e-9  # relative difference of two extremes about to change places, or one
+SAME_EXTREME = 1e-2  # rad between an extreme and itself on a neighbouring orbit
+ALL_GRAZE = 1e-4  # of an orbit's size: depth in each excitation period that grazes in each
+CLEAR = 1e-12  # of an orbit's size: distance to a rigid stop that counts as none, and is no impact
+WIDEST_PASSAGE = 0.5  # rad on either side of a grazing, in which a rigid stop is not there
 SMALLEST_OVERLAP = 1e-3  # of null vectors: it vanishes where a multiplier is double
 
 Monitor = str | Callable[[Orbit], float]
@@ -101,7 +107,12 @@ class Singular:
     @classmethod
     def of(cls, kind: str, orbit: Orbit) -> Singular:
         """The condition with the borders of an orbit."""
-        u, _, vh = np.linalg.svd(critical_matrix(kind, orbit.monodromy))
+        return cls.bordering(kind, orbit.monodromy)
+
+    @classmethod
+    def bordering(cls, kind: str, monodromy: Real) -> Singular:
+        """The condition with the borders of a monodromy matrix."""
+        u, _, vh = np.linalg.svd(critical_matrix(kind, monodromy))
         return cls(kind, u[:, -1], vh[-1])
 
     def value(self, at: Evaluation) -> Real:
@@ -120,7 +131,7 @@ class Singular:
 
     def renewed(self, at: Evaluation) -> Singular:
         """The same with the borders of another orbit, of the same sense."""
-        other = Singular.of(self.kind, at.orbit)
+        other = Singular.bordering(self.kind, at.segments.monodromy)
         left, right = other.left, other.right
         return Singular(
             self.kind,
@@ -180,6 +191,8 @@ class BranchPoint:
 class Grazing:
     """An extreme of a stop's penetration is zero.
 
+    A rigid stop lets the motion pass there: see `nldyn.orbits.passage`.
+
     Parameters
     ----------
     stop : int
@@ -192,6 +205,10 @@ class Grazing:
         Length by which the depth is divided, in m.
     depth : float
         Value of the extreme in that unit, if it is not to be zero.
+    half : float
+        Phase on either side in which a rigid stop is not there; zero for an elastic one.
+    every : float
+        Phase after which that comes again, see `Passage`.
     """
 
     stop: int
@@ -199,6 +216,8 @@ class Grazing:
     phase: float
     unit: float
     depth: float = 0.0
+    half: float = 0.0
+    every: float = 0.0
 
     @classmethod
     def of(cls, orbit: Orbit) -> Grazing:
@@ -213,19 +232,46 @@ class Grazing:
         best, shortest = None, 1e-2 * unit
         for stop in range(len(orbit.system.stops)):
             found = orbit.touches(stop)
+            rigid = isinstance(orbit.system.stops[stop], RigidStop)
             for phase, depth, kind in zip(
                 found.phases, found.values, found.is_maximum, strict=True
             ):
-                if abs(depth) < shortest:
+                if abs(depth) < shortest and (kind or not rigid):
                     shortest = abs(float(depth))
                     best = cls(stop, bool(kind), float(phase), unit)
         if best is None:
             raise SystemModelError(f"the orbit at {orbit.frequency_hz:g} Hz does not graze a stop")
-        return best
+        return best._beside(orbit)
+
+    def _beside(self, orbit: Orbit) -> Grazing:
+        """The same with the width of the passage of a rigid stop."""
+        if not isinstance(orbit.system.stops[self.stop], RigidStop):
+            return self
+        full, found = 2.0 * math.pi * orbit.period, orbit.touches(self.stop)
+        apart = np.abs((found.phases - self.phase + 0.5 * full) % full - 0.5 * full)
+        others = apart[apart > SAME_EXTREME]
+        half = min(0.5 * float(others.min(initial=full)), WIDEST_PASSAGE)
+        slight = found.is_maximum & (np.abs(found.values) < ALL_GRAZE * self.unit)
+        later = (found.phases[slight] - self.phase) % (2.0 * math.pi)
+        alike = int(np.sum(np.minimum(later, 2.0 * math.pi - later) < SAME_EXTREME))
+        every = 2.0 * math.pi if alike == orbit.period else full
+        return replace(self, half=half, every=every)
+
+    @property
+    def passage(self) -> Passage | None:
+        """Where a rigid stop lets the motion pass."""
+        return Passage(self.stop, self.phase, self.half, self.every) if self.half else None
 
     def value(self, at: Evaluation) -> Real:
         """Depth of the extreme, shape (1,)."""
+        if self.half:
+            return np.array([self._past(at)[1] / self.unit - self.depth + CLEAR])
         return np.array([self.extreme(at.orbit)[1] / self.unit - self.depth])
+
+    def _past(self, at: Evaluation) -> tuple[float, float]:
+        """Phase and depth of the extreme beyond a rigid stop."""
+        passage = Passage(self.stop, self.phase, self.half, self.every)
+        return peak_past(at.problem, passage, at.nodes, at.omega)
 
     def reach(self, at: Evaluation) -> float:
         """The depth of an extreme has a continuous derivative also where it is zero."""
@@ -234,6 +280,8 @@ class Grazing:
     def renewed(self, at: Evaluation) -> Grazing:
         """The same with the phase of another orbit."""
         unit = length_unit(at.orbit)
+        if self.half:
+            return replace(self, phase=self._past(at)[0], unit=unit)._beside(at.orbit)
         return replace(self, phase=self.extreme(at.orbit)[0], unit=unit)
 
     def is_of(self, stop: int, is_maximum: bool, phase: float, period: int) -> bool:
@@ -264,9 +312,14 @@ class Grazing:
 
 
 def depth_row(orbit: Orbit) -> Real | None:
-    """Derivative (N + 1,) of the depth of a touch beside its grazing point, None without one."""
+    """Derivative (N + 1,) of the depth of a touch beside its grazing point, None without one.
+
+    None at a rigid stop, where the depth has no derivative.
+    """
     try:
         touch = Grazing.of(orbit)
+        if touch.half:
+            return None
         phase, depth = touch.extreme(orbit)
         return touch.slope(orbit, phase) if abs(depth) <= TOUCH * touch.unit else None
     except (SystemModelError, ConvergenceError):
@@ -525,6 +578,12 @@ def nearest_flip(orbit: Orbit) -> Orbit | None:
     return None if found is None else replace(found.orbit, problem=orbit.problem)
 
 
+def nearest_grazing(orbit: Orbit) -> Orbit | None:
+    """The grazing beside an orbit, by its defining system; without the slight impact."""
+    found = _beside("GR", orbit)
+    return None if found is None else replace(found.orbit, problem=orbit.problem)
+
+
 def _beside(kind: str, orbit: Orbit) -> Corrected | None:
     """The special point of a kind beside an orbit."""
     hz = orbit.frequency_hz
@@ -552,7 +611,8 @@ def defined_by(kind: str, family: OrbitFamily, orbit: Orbit) -> tuple[OrbitFamil
         condition = BranchPoint.of(family.at(guess))
         return family.unfolded(condition.left * family.scale(guess)), condition
     if kind == "GR":
-        return family, Grazing.of(orbit)
+        grazing = Grazing.of(orbit)
+        return family.past(grazing.passage), grazing
     if kind in KINDS:
         if kind == "NS" and orbit.system.size < 2:
             raise SystemModelError("a Neimark-Sacker point needs at least two modes")

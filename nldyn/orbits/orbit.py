@@ -13,7 +13,13 @@ from scipy.optimize import minimize_scalar
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_types, check_whole, numbers
 from nldyn.flow.flow_map import FlowError, FlowMap, Solution, Trajectory, chain
-from nldyn.flow.rigid import rest_forces, rigid_impacts
+from nldyn.flow.rigid import (
+    impacts_in_order,
+    rest_forces,
+    rests_on_rigid_stop,
+    rigid_impacts,
+    series_to_rest,
+)
 from nldyn.orbits.history import History
 from nldyn.orbits.multipliers import (
     COARSE,
@@ -136,8 +142,13 @@ class Orbit:
 
     @classmethod
     def of(cls, problem: ShootingProblem, found: Solution, observe: str) -> Orbit:
-        """Orbit from a solution of its equations."""
-        return cls(problem, found.point, found.jacobians, found.last_step, observe, found.motion)
+        """Orbit from a solution of its equations.
+
+        The motion that comes with it begins each segment as before the last step. That may be a
+        little beside a rigid stop on which the body rests; then it is recorded anew.
+        """
+        motion = None if rests_on_rigid_stop(found.motion) else found.motion
+        return cls(problem, found.point, found.jacobians, found.last_step, observe, motion)
 
     @property
     def system(self) -> System:
@@ -327,21 +338,45 @@ class Orbit:
         offset = stops[output].gap if output < len(stops) else 0.0
         phases, values, kinds = found[:, 0], found[:, 1] - offset, found[:, 2] > 0.0
         if output < len(stops) and isinstance(stops[output], RigidStop):
-            values = self._beyond_rigid_stop(output, phases, values)
+            values, hit = self._beyond_rigid_stop(output, phases, values)
+            free = np.where(hit, ~self._settles(output, phases), ~self._rests(output, phases))
+            phases, values, kinds = phases[free], values[free], kinds[free]
         return Extremes(phases, values, kinds)
 
-    def _beyond_rigid_stop(self, stop: int, phases: Real, values: Real) -> Real:
+    def _settles(self, stop: int, phases: Real) -> NDArray[np.bool_]:
+        """Whether impacts at phases belong to a series that ends in rest."""
+        hits = rigid_impacts(self.trajectory, stop)
+        series = series_to_rest(self.trajectory, stop, hits)
+        of_series = hits.phase[series.follows | series.soft]
+        return np.asarray(np.isclose(phases[:, None], of_series, rtol=0.0, atol=SAME_PHASE).any(1))
+
+    def _rests(self, stop: int, phases: Real) -> NDArray[np.bool_]:
+        """Whether the gap of a rigid stop stays shut at or beside phases: it has no extremes."""
+        record = self.trajectory.record
+        rests = np.asarray(record.depth[:, stop].any(axis=1))
+        found = np.zeros(phases.size, dtype=bool)
+        for near in (phases - SAME_PHASE, phases, phases + SAME_PHASE):
+            piece = np.searchsorted(record.phase, near, side="right") - 1
+            found |= rests[np.clip(piece, 0, None)]
+        return found
+
+    def _beyond_rigid_stop(
+        self, stop: int, phases: Real, values: Real
+    ) -> tuple[Real, NDArray[np.bool_]]:
         """Extremes of the penetration, with the speed over ω for the depth where a body hits.
+
+        And whether it does.
 
         So an impact is no near miss, whatever rounding makes of a gap that is just closed.
         """
         hits = rigid_impacts(self.trajectory, stop)
         full = 2.0 * math.pi * self.period
-        deep = values.copy()
+        deep, hit = values.copy(), np.zeros(phases.size, dtype=bool)
         for phase, speed in zip(hits.phase, hits.speed, strict=True):
             apart = np.abs((phases - phase + 0.5 * full) % full - 0.5 * full)
             deep[apart <= SAME_PHASE] = speed / self.omega
-        return deep
+            hit |= apart <= SAME_PHASE
+        return deep, hit
 
     @cached_property
     def observed_extremes(self) -> Extremes:
@@ -376,8 +411,25 @@ class Orbit:
 
     @cached_property
     def impacts(self) -> int:
-        """Number of contact phases in one period of the orbit, over all stops."""
-        return int(self.trajectory.closings.sum())
+        """Number of contact phases in one period of the orbit, over all stops.
+
+        Impacts with a rigid stop that end in rest count as one.
+        """
+        if not self.rests:
+            return int(self.trajectory.closings.sum())
+        count = 0
+        for index, stop in enumerate(self.system.stops):
+            if isinstance(stop, RigidStop):
+                hits = rigid_impacts(self.trajectory, index)
+                count += int(np.sum(~series_to_rest(self.trajectory, index, hits).follows))
+            else:
+                count += int(self.trajectory.closings[index])
+        return count
+
+    @cached_property
+    def rests(self) -> bool:
+        """Whether a body rests on a rigid stop for a while."""
+        return rests_on_rigid_stop(self.trajectory)
 
     @cached_property
     def impact_list(self) -> tuple[Impact, ...]:
@@ -538,14 +590,13 @@ def contact_damping(flow: FlowMap, motion: Trajectory) -> float:
 
 def impact_contraction(motion: Trajectory) -> float:
     """-Σ ln(e (e + v de/dv)) over the impacts with rigid stops; infinite where a body rests."""
+    if rests_on_rigid_stop(motion):
+        return math.inf
     total = 0.0
-    for index, stop in enumerate(motion.flow.system.stops):
-        if isinstance(stop, RigidStop):
-            if motion.record.depth[:, index].any():
-                return math.inf
-            for speed in rigid_impacts(motion, index).speed.tolist():
-                factor = stop.determinant(speed)
-                total += -math.log(factor) if factor > 0.0 else math.inf
+    for index, speed in impacts_in_order(motion):
+        stop = motion.flow.system.stops[index]
+        factor = stop.determinant(speed) if isinstance(stop, RigidStop) else 1.0
+        total += -math.log(factor) if factor > 0.0 else math.inf
     return total
 
 

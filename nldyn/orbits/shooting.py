@@ -39,16 +39,19 @@ class ShootingProblem:
         Period multiple n: the orbit repeats after n excitation periods.
     segments : int
         Number k of shooting segments.
+    start : float
+        Forcing phase of the first state.
     """
 
     flow: FlowMap
     period: int
     segments: int
+    start: float = 0.0
 
     @cached_property
     def phases(self) -> Real:
         """Forcing phases of the segment ends, shape (k + 1,)."""
-        return np.linspace(0.0, 2.0 * np.pi * self.period, self.segments + 1)
+        return self.start + np.linspace(0.0, 2.0 * np.pi * self.period, self.segments + 1)
 
     @property
     def size(self) -> int:

@@ -28,6 +28,8 @@ from nldyn.flow.kernels.layout import GAP, MOBILITY, RESTITUTION
 from nldyn.flow.kernels.panel import between, lu_apply, lu_apply_vector, lu_factor
 
 ROUNDS = 100  # of impacts within one instant with restitution; then without
+SHUT = 10.0  # roundings of a gap that is shut, and of a rate that is none
+AT_START = 1e5  # the same at the start of a segment, whose state is known less well
 LOW = 10.0  # a body that would rebound no higher than this many roundings of the gap stays
 
 
@@ -95,17 +97,17 @@ def state_rate(fl, w, forces):
 
 
 @inner
-def hit_stop(fl, w, phase, first):
+def hit_stop(fl, w, phase, first, roundings):
     """Rigid stop whose gap is shut and closes fastest, or -1, and that speed.
 
-    That of the stop `first` counts as shut.
+    That of the stop `first` counts as shut. Rates up to so many `roundings` are none.
     """
     hit, fastest = -1, 0.0
     for s in range(fl.stops.shape[0]):
         if is_rigid(fl, s):
             value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
-            shut = s == first or value - fl.stops[s, GAP] >= -10.0 * output_noise(fl, s, w)
-            if shut and speed > max(fastest, 10.0 * rate_noise(fl, s, w)):
+            shut = s == first or value - fl.stops[s, GAP] >= -SHUT * output_noise(fl, s, w)
+            if shut and speed > max(fastest, roundings * rate_noise(fl, s, w)):
                 hit, fastest = s, speed
     return hit, fastest
 
@@ -126,24 +128,24 @@ def impact(fl, first, crossed, phase, t, closed, closings, bounces, with_columns
 
     Sensitivities change by the saltation [Aizerman and Gantmacher 1958; Müller 1995]: an earlier
     instant, by τ, is seen with the rates before it, the jump is differentiated, and the rates after
-    it lead back.
+    it lead back. Of several impacts each has an instant of its own, which moves with its own gap:
+    they stay in this order.
     """
     never_inline()
     n = columns.shape[1] if with_columns else 0
     shift = np.zeros(n)
     forces, pushes = contact_forces(fl, w, phase, closed)
-    _, fast, _, _ = output_derivatives(fl, first, w, phase, 0.0)
-    if with_columns and crossed:
-        depth = output_columns(fl, first, 0, phase, t, columns)
-        for c in range(fl.parameters.shape[0]):
-            if fl.parameters[c, 0] == GAP and fl.parameters[c, 1] == first:
-                depth[columns.shape[0] + c] -= 1.0
-        shift = -depth / fast
-    if with_columns:
-        move(columns, state_rate(fl, w, forces), shift)
     struck = np.zeros(closed.size, dtype=np.bool_)
     for step in range(10 * ROUNDS):
-        hit, speed = hit_stop(fl, w, phase, first if step == 0 else -1)
+        hit, speed = hit_stop(fl, w, phase, first if step == 0 else -1, SHUT)
+        moves = hit if step > 0 else first
+        if with_columns and crossed and moves >= 0:
+            if step > 0:
+                forces, _ = contact_forces(fl, w, phase, closed)
+            rate = state_rate(fl, w, forces)
+            move(columns, rate, -shift)
+            shift = instant_shift(fl, moves, w, phase, t, columns)
+            move(columns, rate, shift)
         if hit < 0:
             break
         restitution, slope = restitution_at(fl, hit, speed)
@@ -153,7 +155,7 @@ def impact(fl, first, crossed, phase, t, closed, closings, bounces, with_columns
         struck[hit] = True
         bounces[hit] += 1
         closings[hit] += 1
-    settle(fl, first, phase, t, shift, closed, struck, with_columns, w, columns)
+    settle(fl, first, phase, t, shift, SHUT, closed, struck, with_columns, w, columns)
     for s in range(closed.size):
         if struck[s] and closed[s] and bounces[s] > 0:
             closings[s] -= bounces[s] - 1
@@ -161,6 +163,17 @@ def impact(fl, first, crossed, phase, t, closed, closings, bounces, with_columns
     if with_columns:
         forces, _ = contact_forces(fl, w, phase, closed)
         move(columns, state_rate(fl, w, forces), -shift)
+
+
+@allocating
+def instant_shift(fl, stop, w, phase, t, columns):
+    """Change (n_columns,) of the instant at which a gap closes."""
+    _, speed, _, _ = output_derivatives(fl, stop, w, phase, 0.0)
+    depth = output_columns(fl, stop, 0, phase, t, columns)
+    for c in range(fl.parameters.shape[0]):
+        if fl.parameters[c, 0] == GAP and fl.parameters[c, 1] == stop:
+            depth[columns.shape[0] + c] -= 1.0
+    return -depth / speed
 
 
 @inner
@@ -205,8 +218,10 @@ def strike(fl, stop, speed, restitution, slope, phase, t, shift, with_columns, w
 
 
 @allocating
-def settle(fl, first, phase, t, shift, closed, struck, with_columns, w, columns):
+def settle(fl, first, phase, t, shift, roundings, closed, struck, with_columns, w, columns):
     """Close the rigid stops on which the body rests now and open the others.
+
+    A gap and a rate of so many `roundings` are none.
 
     Resting is what is shut, does not part and is pushed on, together with all that does: stops
     that would have to pull are left out one by one.
@@ -215,8 +230,8 @@ def settle(fl, first, phase, t, shift, closed, struck, with_columns, w, columns)
         if is_rigid(fl, s):
             value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
             shut = s == first or closed[s] or struck[s]
-            shut = shut or value - fl.stops[s, GAP] >= -10.0 * output_noise(fl, s, w)
-            closed[s] = shut and abs(speed) <= 10.0 * rate_noise(fl, s, w)
+            shut = shut or value - fl.stops[s, GAP] >= -roundings * output_noise(fl, s, w)
+            closed[s] = shut and abs(speed) <= roundings * rate_noise(fl, s, w)
     for _ in range(closed.size):
         forces, _ = contact_forces(fl, w, phase, closed)
         weakest = -1

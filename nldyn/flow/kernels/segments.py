@@ -58,6 +58,8 @@ from nldyn.flow.kernels.layout import (
 from nldyn.flow.kernels.panel import new_panel, panel_columns, same_stops
 from nldyn.flow.kernels.resolution import at_end
 from nldyn.flow.kernels.rigid import (
+    AT_START,
+    SHUT,
     contact_forces,
     departure,
     hit_stop,
@@ -188,14 +190,14 @@ def propagate(
 @allocating
 def begin_on_rigid_stops(fl, phase, closed, closings, bounces, with_columns, w, columns):
     """Let a body that begins at or beyond rigid stops rebound, rest or leave."""
-    hit, _ = hit_stop(fl, w, phase, -1)
+    hit, _ = hit_stop(fl, w, phase, -1, AT_START)
     if hit >= 0:
         impact(
             fl, hit, False, phase, 0.0, closed, closings, bounces, with_columns, w, columns
         )  # fmt: skip
     else:
         struck, shift = np.zeros(closed.size, dtype=np.bool_), np.zeros(columns.shape[1])
-        settle(fl, -1, phase, 0.0, shift, closed, struck, with_columns, w, columns)
+        settle(fl, -1, phase, 0.0, shift, AT_START, closed, struck, with_columns, w, columns)
 
 
 @allocating
@@ -223,8 +225,8 @@ def leave_rigid_stops(fl, event, w, phase, closed, shortest, skips):
     for s in range(closed.size):
         if is_rigid(fl, s) and not closed[s]:
             value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
-            shut = s == event or value - fl.stops[s, GAP] >= -10.0 * output_noise(fl, s, w)
-            if shut and abs(speed) <= 10.0 * rate_noise(fl, s, w):
+            shut = s == event or value - fl.stops[s, GAP] >= -SHUT * output_noise(fl, s, w)
+            if shut and abs(speed) <= SHUT * rate_noise(fl, s, w):
                 skips[s] = departure(fl, s, w, phase, shortest)
 
 

@@ -1,0 +1,40 @@
+"""Where impacts with rigid stops lie between the phases of shooting."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from nldyn.base.arrays import Real
+from nldyn.flow.rigid import rigid_impacts
+from nldyn.orbits.orbit import Orbit
+from nldyn.system.rigid_stop import RigidStop
+
+STARTS = 32  # first phases of shooting among which the one farthest from all impacts is chosen
+
+
+def _impact_phases(orbit: Orbit) -> Real:
+    """Phases of all impacts with rigid stops."""
+    stops = [i for i, stop in enumerate(orbit.system.stops) if isinstance(stop, RigidStop)]
+    phases = [rigid_impacts(orbit.trajectory, stop).phase for stop in stops]
+    return np.concatenate(phases) if phases else np.empty(0)
+
+
+def _to_nodes(phases: Real, start: float, orbit: Orbit) -> float:
+    """Least distance of phases from those of shooting that begins at one."""
+    length = 2.0 * math.pi * orbit.period / orbit.problem.segments
+    apart = np.abs((phases - start + 0.5 * length) % length - 0.5 * length)
+    return float(apart.min(initial=math.inf))
+
+
+def nodes_to_impacts(orbit: Orbit) -> float:
+    """Least distance in rad of impacts with rigid stops from phases of shooting."""
+    return _to_nodes(_impact_phases(orbit), 0.0, orbit)
+
+
+def start_far_from_impacts(orbit: Orbit) -> float:
+    """A first phase of shooting that keeps all of them far from impacts."""
+    phases, length = _impact_phases(orbit), 2.0 * math.pi * orbit.period / orbit.problem.segments
+    starts = length * np.arange(1, STARTS) / STARTS
+    return float(max(starts, key=lambda start: _to_nodes(phases, start, orbit)))

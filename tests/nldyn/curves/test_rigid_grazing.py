@@ -1,0 +1,146 @@
+"""Grazing of rigid stops by its own equations, and curves of orbits with impacts."""
+
+import math
+
+import numpy as np
+import pytest
+from one_impact import OneImpact
+from scipy.optimize import brentq
+
+from nldyn import (
+    ConstantForce,
+    HarmonicForce,
+    RigidStop,
+    System,
+    continue_branch,
+    continue_in,
+    continue_special,
+    load,
+    refine_special,
+    save,
+    solve_orbit,
+)
+from nldyn.branches.endings import Ending
+
+DAMPING, RESTITUTION, GAP = 0.1, 0.8, 0.3
+TURN = 2.0 * math.pi
+
+
+def oscillator(gap=GAP, restitution=RESTITUTION):
+    return System.from_matrices(
+        [[1.0]], [[1.0]], {"x": [1.0]}, damping=[[DAMPING]],
+        stops=[RigidStop("x", restitution, gap)], excitation=[HarmonicForce("x", 1.0)],
+    )  # fmt: skip
+
+
+def exact(gap=GAP, restitution=RESTITUTION):
+    return OneImpact([[1.0]], [[1.0]], [[DAMPING]], [1.0], [1.0], gap, restitution)
+
+
+def amplitude(hz):
+    omega = TURN * np.asarray(hz)
+    return 1.0 / np.abs(1.0 - omega**2 + 1j * DAMPING * omega)
+
+
+@pytest.fixture(scope="module")
+def branch():
+    return continue_branch(solve_orbit(oscillator(), 1.7 / TURN), (0.05, 0.8))
+
+
+def test_grazing_is_solved_from_the_side_with_the_impact_and_from_the_other(branch):
+    touch = brentq(lambda hz: amplitude(hz) - GAP, 0.3, 0.4, xtol=1e-15)
+    calm = continue_branch(solve_orbit(oscillator(), 0.45), (0.3, 0.5)).special_points[0]
+    for special in (branch.special_points[-1], calm):
+        found = refine_special(special)
+        assert found.frequency_hz == pytest.approx(touch, rel=1e-11)
+        assert found.orbit.impacts == 0
+        assert found.residual < 1e-11
+
+
+def test_grazing_in_frequency_and_gap_is_the_resonance_curve(branch, tmp_path):
+    """From the orbit with the slight impact; and again from a file."""
+    curve = continue_special(
+        branch.special_points[-1], ("frequency_hz", "gap"), ((0.25, 0.4), (0.1, 12.0))
+    )
+    hz, gap = curve.values.T
+    assert hz[[0, -1]] == pytest.approx([0.25, 0.4], rel=1e-14)
+    assert np.abs(gap / amplitude(hz) - 1.0).max() < 1e-10
+    assert gap.max() > 3.0 * gap.min()
+    save(curve, tmp_path / "curve.h5")
+    (again,) = load(tmp_path / "curve.h5")
+    assert again.points[5].residual < 1e-10
+
+
+def room(hz, periods):
+    """What the highest flight of the motion with one impact per n periods leaves of the gap."""
+    shape, omega = exact(), TURN * hz
+    motion = shape.motions(omega, periods)[0]
+    phases = motion.phase + np.linspace(0.2, TURN * periods - 0.5, 200)
+    x, v = np.array([shape.state(omega, motion, phase) for phase in phases]).T
+    tops = [k for k in range(199) if v[k] > 0.0 >= v[k + 1]]
+    k = max(tops, key=lambda k: x[k])
+    top = brentq(lambda p: shape.state(omega, motion, p)[1], *phases[k : k + 2], xtol=1e-15)
+    return shape.state(omega, motion, top)[0] - GAP
+
+
+@pytest.mark.parametrize(
+    ("periods", "start_hz", "between"), [(1, 0.27, (0.134, 0.138)), (2, 0.4456, (0.364, 0.368))]
+)
+def test_a_second_impact_grazes_where_the_closed_form_says(periods, start_hz, between):
+    """Of the orbit with one impact per period, and of a subharmonic one."""
+    shape, omega = exact(), TURN * start_hz
+    motion = shape.motions(omega, periods)[0]
+    begin = shape.state(omega, motion, TURN * math.ceil(motion.phase / TURN))
+    orbit = solve_orbit(oscillator(), start_hz, period=periods, guess=begin)
+    branch = continue_branch(orbit, (0.1, start_hz + 0.01))
+    touch = brentq(room, *between, args=(periods,), xtol=1e-14)
+    found = [special.frequency_hz for special in branch.special_points if special.kind == "GR"]
+    assert min(abs(hz / touch - 1.0) for hz in found) < 1e-10
+
+
+@pytest.fixture(scope="module")
+def in_frequency():
+    """The branch again, followed as a curve: the impact passes the shooting phase zero on it."""
+    return continue_in(solve_orbit(oscillator(), 0.27), "frequency_hz", (0.05, 0.8))
+
+
+def test_a_curve_goes_on_where_an_impact_passes_a_phase_of_shooting(branch, in_frequency):
+    marks = [(mark.kind, mark.values[0]) for mark in in_frequency.marks]
+    assert [kind for kind, _ in marks] == ["GR", "PD", "GR"]
+    on_branch = [special.frequency_hz for special in branch.special_points]
+    assert [value for _, value in marks] == pytest.approx(on_branch, rel=1e-10)
+    reasons = [reason.ending for reason in in_frequency.stop_reasons]
+    assert reasons == [Ending.GRAZES_RIGID, Ending.GRAZES_RIGID]
+    assert not in_frequency.notes
+
+
+def test_a_curve_of_folds_is_that_of_the_closed_form():
+    """The subharmonic orbits of period 2: at a fold the gap is the farthest an impact can be."""
+    shape, omega = exact(), 2.8
+    motion = shape.motions(omega, 2)[0]
+    begin = shape.state(omega, motion, TURN * math.ceil(motion.phase / TURN))
+    orbit = solve_orbit(oscillator(), omega / TURN, period=2, guess=begin)
+    branch = continue_branch(orbit, (0.4, 0.7))
+    (fold,) = [special for special in branch.special_points if special.kind == "LP"]
+    edge = brentq(lambda omega: shape.reach(omega, 2) - GAP, 3.4, 3.7, xtol=1e-14)
+    assert fold.frequency_hz == pytest.approx(edge / TURN, rel=1e-10)
+    curve = continue_special(fold, ("frequency_hz", "gap"), ((0.55, 0.58), (0.2, 0.4)))
+    assert len(curve.points) > 4
+    reach = [shape.reach(TURN * hz, 2) for hz in curve.values[:, 0]]
+    assert curve.values[:, 1] == pytest.approx(reach, rel=1e-9)
+
+
+def test_a_body_at_rest_on_a_stop_grazes_nothing():
+    """Pressed on it by twice what shakes it; beyond that it lifts off and lands, each period."""
+    stiffness = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    system = System.from_matrices(
+        np.eye(2), stiffness, {"a": [1.0, 0.0], "b": [0.0, 1.0]}, damping=0.1 * stiffness,
+        stops=[RigidStop("a", 0.3, 0.2)],
+        excitation=[HarmonicForce("a", 0.3), ConstantForce("a", 2.0)],
+    )  # fmt: skip
+    orbit = solve_orbit(system, 0.1)
+    assert orbit.impacts == 0
+    curve = continue_in(orbit, "amplitude", (0.25, 2.2))
+    assert not curve.marks
+    assert not curve.notes
+    assert [point.orbit.impacts for point in (curve.points[0], curve.points[-1])] == [0, 1]
