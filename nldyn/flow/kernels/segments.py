@@ -63,6 +63,7 @@ from nldyn.flow.kernels.rigid import (
     contact_forces,
     departure,
     hit_stop,
+    hold,
     impact,
     settle,
     state_rate,
@@ -288,6 +289,7 @@ def run_pieces(
     start_switch = 0
     skips = np.zeros(n_stops)
     w_end = np.empty(w.size)
+    unmoved = np.zeros(columns.shape[1])  # no instant moves while a body rests, or is let go
     # penetrations that are carried from panel to panel, and their rounding errors
     depth, doubt = np.zeros(n_stops), np.full(n_stops, np.inf)
     bonded = n_stops > 0 and is_bond(fl, n_stops - 1)
@@ -398,6 +400,7 @@ def run_pieces(
             for k in range(w.size):
                 w[k] = w_end[k]
             t = duration if h >= remain else t + h
+            hold(fl, phase + fl.omega * t, t, unmoved, closed, with_columns, w, columns)
             for a in range(n_active):
                 depth[active[a]], doubt[active[a]] = panel.depth[2, a], panel.depth[3, a]
         start_switch = 0

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from event_driven import MOST_HITS, integrate
+from event_driven import MOST_HITS, PiecewiseLinear, integrate
 from scipy.optimize import brentq
 
 from nldyn import (
@@ -94,6 +94,59 @@ def test_random_systems_move_as_an_integrator_with_events_says():
 @pytest.mark.slow
 def test_hundreds_of_random_systems_do():
     assert sum(check_random(seed) for seed in range(25, 500)) > 500
+
+
+def pressed_system(rng):
+    """1 to 8 masses, some pressed on 1 to 6 rigid stops, and what `PiecewiseLinear` needs."""
+    n = int(rng.integers(1, 9))
+    root = rng.normal(size=(n, n))
+    stiffness = root @ root.T / n + 0.3 * np.eye(n)
+    force, constant = np.abs(rng.normal(size=n)), np.abs(rng.normal(size=n)) * (rng.random() < 0.6)
+    stops, plain, used = [], [], set()
+    for _ in range(int(rng.integers(1, 7))):
+        at, direction, other = int(rng.integers(n)), int(rng.choice([-1, 1])), int(rng.integers(n))
+        against = other if rng.random() < 0.3 else at
+        if (at, against, direction) in used or (against, at, -direction) in used:
+            continue
+        used.add((at, against, direction))
+        gap = float(rng.uniform(0.02, 0.5))
+        e = float(rng.choice([0.0, rng.uniform(0.1, 0.6), rng.uniform(0.6, 1.0)]))
+        c = direction * (np.eye(n)[at] - (np.eye(n)[against] if against != at else 0.0))
+        stops.append(RigidStop(f"x{at}", e, gap, direction, None if against == at else f"x{other}"))
+        plain.append((c, gap, e))
+    system = System.from_matrices(
+        np.eye(n), stiffness, {f"x{i}": np.eye(n)[i] for i in range(n)}, damping=0.05 * stiffness,
+        stops=stops, excitation=[HarmonicForce(f"x{i}", float(force[i])) for i in range(n)]
+        + [ConstantForce(f"x{i}", float(constant[i])) for i in range(n)],
+    )  # fmt: skip
+    omega = float(rng.uniform(0.5, 2.0))
+    return (
+        system,
+        PiecewiseLinear(np.eye(n), stiffness, 0.05 * stiffness, force, constant, plain, omega),
+        omega,
+    )
+
+
+def check_pressed(seed):
+    """State to 1e-9 of the growth, and the Jacobian to 1e-6 of differences; the time of rest."""
+    rng = np.random.default_rng(seed)
+    system, exact, omega = pressed_system(rng)
+    n, flow = system.size, FlowMap(system)
+    start = np.concatenate([np.zeros(n), rng.normal(size=n)])
+    rows = np.kron(np.eye(2), np.array([system.participation[f"x{i}"] for i in range(n)]))
+    end, _, rested = exact.run(start, 2.0 * np.pi / omega)
+    state = flow.to_state(np.linalg.solve(rows, start))
+    found = flow.shoot(state[None], PERIOD, omega)
+    assert not found.failure
+    growth = 1.0 + np.abs(found.jacobians).max()
+    assert np.abs(rows @ flow.to_modal(found.ends)[0] - end).max() < 1e-9 * growth
+    by_start, _ = differences(system, state, omega, PERIOD, 1e-7)
+    assert np.abs(found.jacobians[0] - by_start).max() < 1e-6 * growth
+    return rested
+
+
+def test_random_systems_hit_and_rest_as_exponentials_say():
+    assert sum(check_pressed(seed) > 0.0 for seed in range(10)) > 2
 
 
 def differences(system, start, omega, phases, step=1e-6):
