@@ -132,7 +132,7 @@ class PiecewiseLinear:
                 first, last = (depth @ expm(rates * x) @ y for x in (low, top))
                 if first < 0.0 <= last:
                     found.append((self.root(rates, y, depth, low, top), s))
-                elif first >= 0.0 and speed @ y >= 0.0:
+                elif first >= 0.0 and speed @ y > 1e-13:
                     found.append((0.0, s))
             if found:
                 after, event = min(found)

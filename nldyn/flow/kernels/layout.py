@@ -24,6 +24,7 @@ DECAY, FADED = 8.0, 40.0
 # below this exponent a slope sets in almost at once: there nodes at the switch count, and less than
 # the usual tail is accepted
 ROUND, SHARP_TAIL = 1.5, 0.1
+REST_TAIL = 0.01  # the same where a body rests: the error of a force that acts at once goes with it
 CREEP = 100.0  # such an exponent over an elastic contact: the damping alone decides the speed
 # an orbit closes to this share of its size, or to this one times the largest entry of its segments'
 # Jacobians, which is what rounding costs; a short step of Newton's method does not tell

@@ -15,6 +15,7 @@ from nldyn.flow.kernels.layout import (
     HALF_CONTACT,
     KICK,
     MOBILITY,
+    REST_TAIL,
     ROUND,
     SHARP_TAIL,
 )
@@ -138,6 +139,8 @@ def resolved(fl, tab, kind, h, noise, panel):
         goal = fl.tail if panel.decay[1, a] <= DECAY else 0.01 * fl.tail  # see `hold`
         if 1.0 < fl.stops[panel.active[a], EXPONENT] < ROUND:
             goal *= SHARP_TAIL
+        if is_rigid(fl, panel.active[a]):
+            goal *= REST_TAIL
         floor = 20.0 * noise[a] / deepest
         tail = max(goal * fl.tail / forced[a], floor)
         shake = 0.0  # of the force by rounding: terms of a bond cancel where it is at rest
