@@ -125,3 +125,9 @@ def test_no_modules_import_each_other_in_a_circle():
         for name in ground:
             del arrows[name]
     assert sorted(arrows) == []
+
+
+@pytest.mark.parametrize("package", ["fem", "cms", "nldyn"])
+def test_a_package_tells_that_it_has_types(package):
+    """Without the file, mypy takes all of it for Any in the code of users."""
+    assert (ROOT / package / "py.typed").is_file()
