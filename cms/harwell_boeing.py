@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from cms.errors import ReductionError
+from cms.triangles import mirrored
 
 KIND = re.compile(r"[RCP][SUHZR][AE]", re.IGNORECASE)
 FORMAT = re.compile(r"\(\s*(?:\d+P\s*,?\s*)?(\d*)\s*[IEDFG]\s*(\d+)", re.IGNORECASE)
@@ -51,9 +52,7 @@ def read_harwell_boeing(path: Path) -> sparse.csc_array[np.float64]:
         values = _fields(file, entries, widths[2])
     matrix = sparse.csc_array((values, places, starts), shape=(rows, columns))
     matrix.check_format(full_check=True)
-    if kind != "RSA":
-        return matrix
-    return sparse.csc_array(matrix + matrix.T - sparse.diags_array(matrix.diagonal()))
+    return matrix if kind != "RSA" else mirrored(matrix)
 
 
 def _fields(file: TextIO, count: int, width: int) -> NDArray[np.float64]:

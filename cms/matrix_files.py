@@ -20,6 +20,7 @@ from cms.file_entries import chosen_entry
 from cms.harwell_boeing import is_harwell_boeing, read_harwell_boeing
 from cms.punch import read_punch
 from cms.reduction import Matrices
+from cms.triangles import check_one_triangle, mirrored
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -382,13 +383,16 @@ def _from_text(path: Path, name: str | None) -> FileMatrix:
 
 
 def _from_matrix_market(path: Path) -> FileMatrix:
-    rows, columns, _, form, field, _ = io.mminfo(path)
+    rows, columns, _, form, field, symmetry = io.mminfo(path)
     if field == "pattern":
         raise ReductionError("is a pattern without numbers")
     most = MOST_ROWS if form == "coordinate" else MOST_DENSE_ROWS
     if max(rows, columns) > most:
         raise ReductionError(f"has more than {most} rows")
-    return _from_array(path, io.mmread(path, spmatrix=False))
+    found = io.mmread(path, spmatrix=False)
+    if form == "coordinate" and symmetry != "general":
+        check_one_triangle(found)
+    return _from_array(path, found)
 
 
 def _from_entries(path: Path) -> FileMatrix:
@@ -405,7 +409,7 @@ def _from_entries(path: Path) -> FileMatrix:
     if size > MOST_ROWS:
         raise ReductionError(f"has more than {MOST_ROWS} rows")
     places = (indices[:, 0] - 1, indices[:, 1] - 1)
-    entries = _mirrored(sparse.csc_array((table[:, 2], places), shape=(size, size)))
+    entries = mirrored(sparse.csc_array((table[:, 2], places), shape=(size, size)))
     return FileMatrix(entries, str(path), _calculix_labels(path, size))
 
 
@@ -447,16 +451,7 @@ def _labelled(path: Path, rows: IntArray, columns: IntArray, values: FloatArray)
     size = labels.shape[0]
     half = values.size
     entries = sparse.csc_array((values, (place[:half], place[half:])), shape=(size, size))
-    return FileMatrix(_mirrored(entries), str(path), labels)
-
-
-def _mirrored(matrix: SparseMatrix) -> SparseMatrix:
-    """The symmetric matrix of which a file holds each pair of entries once."""
-    off = sparse.csc_array(matrix - sparse.diags_array(matrix.diagonal()))
-    off.eliminate_zeros()
-    pattern = sparse.csc_array((np.ones(off.nnz), off.indices, off.indptr), shape=off.shape)
-    twice = pattern.multiply(pattern.T).nnz
-    return matrix if twice else sparse.csc_array(matrix + off.T)
+    return FileMatrix(mirrored(entries), str(path), labels)
 
 
 def _one_triangle(matrix: Any) -> bool:

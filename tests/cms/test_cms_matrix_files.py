@@ -38,6 +38,17 @@ RSA                        3             3             5             0
   2.000000000000D+00 -1.000000000000D+00  2.000000000000D+00
  -1.000000000000D+00  2.000000000000D+00
 """
+HARWELL_BOEING_OF_BOTH_TRIANGLES = """Stiffness of a chain
+             6             1             1             4             0
+RSA                        3             3             7             0
+(4I8)           (7I8)           (2D20.12)
+       1       3       6       8
+       1       2       1       2       3       2       3
+  2.000000000000D+00 -1.000000000000D+00
+ -1.000000000000D+00  2.000000000000D+00
+ -1.000000000000D+00 -1.000000000000D+00
+  2.000000000000D+00
+"""
 HARWELL_BOEING_MASS = """Mass of a chain
              3             1             1             1             0
 RSA                        3             3             3             0
@@ -79,6 +90,7 @@ def files(tmp_path):
         "job.mas": DIAGONAL,
         "job.dof": "12.1\n12.2\n31.1\n",
         "ansys_K.matrix": HARWELL_BOEING,
+        "ansys_both.matrix": HARWELL_BOEING_OF_BOTH_TRIANGLES,
         "ansys_M.matrix": HARWELL_BOEING_MASS,
         "nastran.pch": f"$TITLE = CHAIN\n{PUNCH}",
     }
@@ -96,6 +108,7 @@ def files(tmp_path):
 
 
 PAIRS = [
+    ("ansys_both.matrix", "ansys_M.matrix"),
     ("K.mtx", "M.mtx"),
     ("dense_K.mtx", "dense_M.mtx"),
     ("K.npy", "M.npy"),
@@ -120,7 +133,7 @@ def test_the_chain_has_its_frequencies_from_every_format(files, stiffness, mass)
     assert omega**2 == pytest.approx(SQUARES, rel=1e-9)
 
 
-@pytest.mark.parametrize("pair", [PAIRS[7], PAIRS[9], PAIRS[11]])
+@pytest.mark.parametrize("pair", [PAIRS[8], PAIRS[10], PAIRS[12]])
 def test_interfaces_by_nodes(files, pair):
     read = cms.read_matrices(files / pair[0], files / pair[1])
     load = read.at_node(12, "y")
@@ -173,6 +186,13 @@ BAD = {
             "%%MatrixMarket matrix array real general\n900000000 900000000\n"
         ),
         "more than 20000 rows",
+    ),
+    "twice.mtx": (
+        lambda path: path.write_text(
+            "%%MatrixMarket matrix coordinate real symmetric\n"
+            "2 2 4\n1 1 3.0\n2 1 -1.0\n1 2 -1.0\n2 2 4.0\n"
+        ),
+        "entry \\(2, 1\\) twice.*one triangle",
     ),
     "cut.matrix": (lambda path: path.write_text(HARWELL_BOEING[:-50]), "ends before"),
     "half.npz": (lambda path: path.write_bytes(b"PK\x03\x04 and no more"), "cannot be read"),
