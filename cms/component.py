@@ -195,7 +195,9 @@ def symmetric_matrix(matrix: Any, what: str) -> SparseMatrix:
     if bad.size:
         row = int(array.indices[bad[0]])
         value = array.data[bad[0]]
-        raise ReductionError(f"the {what} matrix has the entry {value} in row {row}")
+        raise ReductionError(
+            f"the {what} matrix has the entry {value} in row {row}, counted from 0"
+        )
     largest = float(abs(array).max())
     difference = float(abs(array - array.T).max())
     if difference > SYMMETRY_TOLERANCE * largest:
@@ -315,5 +317,5 @@ def check_diagonal(matrix: SparseMatrix, what: str) -> None:
     if diagonal[worst] < 0.0:
         raise ReductionError(
             f"the {what} matrix is not positive: its diagonal has {diagonal[worst]:.3g} "
-            f"in row {worst}"
+            f"in row {worst}, counted from 0"
         )

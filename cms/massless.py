@@ -59,8 +59,8 @@ def massless_directions(mass: Any, rounding: float) -> FloatArray:
     if off > 0.0:
         row = int(np.flatnonzero(~has)[np.argmax(np.abs(scaled[~has]).max(axis=1))])
         raise ReductionError(
-            f"the mass matrix is not positive: its diagonal is zero in row {row}, which has "
-            "other entries"
+            f"the mass matrix is not positive: its diagonal is zero in row {row}, counted from 0, "
+            "which has other entries"
         )
     if np.all(has) and least_eigenvalue(scaled) > CERTAIN + 10.0 * rounding * scaled.shape[0]:
         return np.zeros((scaled.shape[0], 0))
@@ -70,7 +70,8 @@ def massless_directions(mass: Any, rounding: float) -> FloatArray:
         worst = int(np.argmax(np.abs(vectors[:, 0])))
         raise ReductionError(
             f"the mass matrix is not positive: scaled to a unit diagonal it has the eigenvalue "
-            f"{values[0]:.3g}, mostly in row {worst}, where rounding explains {limit:.1g}"
+            f"{values[0]:.3g}, mostly in row {worst}, counted from 0, where rounding explains "
+            f"{limit:.1g}"
         )
     return np.asarray(scale[:, None] * vectors[:, values <= limit])
 
