@@ -10,6 +10,7 @@ import textwrap
 
 EGL_VARIABLE = "VTK_DEFAULT_OPENGL_WINDOW"
 EGL_WINDOW = "vtkEGLRenderWindow"
+WINDOWLESS = (EGL_WINDOW, "vtkOSOpenGLRenderWindow")
 ADVICE = (
     "pictures of the frame need a GL library, which this machine lacks: on Debian or Ubuntu, "
     "install libegl1 and libgl1-mesa-dri (apt-get install libegl1 libgl1-mesa-dri)"
@@ -94,6 +95,11 @@ def renders(window: str) -> bool:
     except (OSError, subprocess.TimeoutExpired):
         return False
     return run.returncode == 0 and b"rendered" in run.stdout
+
+
+def on_screen() -> bool:
+    """Whether VTK, after `gl_available`, opens windows that can be seen."""
+    return os.environ.get(EGL_VARIABLE) not in WINDOWLESS
 
 
 def require_gl() -> None:

@@ -1,6 +1,8 @@
 """Pictures and animations of deflected frames and structures with their true sections.
 
-Everything here renders off-screen with pyvista, which is imported when the first picture is made.
+A function with a path writes that file off-screen; without one it gives the pyvista plotter, not
+yet shown: ``plotter.show()`` opens a window, or the picture in a notebook. pyvista is imported when
+the first picture is made.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -22,12 +24,15 @@ from fem.errors import ModelError
 from fem.files import draft_of
 from fem.frame import Component
 from fem.frame_surface import FrameSurface, frame_surface
-from fem.gl import RenderError, gl_available, require_gl
+from fem.gl import RenderError, gl_available, on_screen, require_gl
 from fem.mesh import FloatArray
 from fem.scenery import Block, StopSphere, mass_blocks, stop_solids, support_solids
 from fem.structure_assembly import StructureComponent
 from fem.structure_scenery import Cube, mass_cubes, stop_bodies, support_marks
 from fem.structure_surface import StructureSurface, structure_surface, without_mirror
+
+if TYPE_CHECKING:
+    import pyvista
 
 __all__ = [
     "RenderError",
@@ -42,7 +47,7 @@ __all__ = [
 AnyComponent = Component | StructureComponent
 Surface = FrameSurface | StructureSurface
 Image = npt.NDArray[np.uint8]
-Plotter = Any  # pyvista.Plotter, which is imported late
+Plotter = Any  # pyvista.Plotter while it is drawn in
 
 TEXT = "#202020"
 GHOST = "#6b7785"
@@ -69,10 +74,38 @@ SHEET_FIELD = (0.05, 0.84, 0.94)
 """Where the frame goes: from this part of the field's height to that, and of its width."""
 
 
+@overload
+def render_shape(
+    component: AnyComponent,
+    u: FloatArray,
+    path: None = None,
+    *,
+    title: str = ...,
+    scale: float | None = ...,
+    stop: StopSphere | None = ...,
+    mirror: str | None = ...,
+    colour: str = ...,
+    view: str = ...,
+    size: tuple[int, int] = ...,
+) -> pyvista.Plotter: ...
+@overload
 def render_shape(
     component: AnyComponent,
     u: FloatArray,
     path: str | os.PathLike[str],
+    *,
+    title: str = ...,
+    scale: float | None = ...,
+    stop: StopSphere | None = ...,
+    mirror: str | None = ...,
+    colour: str = ...,
+    view: str = ...,
+    size: tuple[int, int] = ...,
+) -> float: ...
+def render_shape(
+    component: AnyComponent,
+    u: FloatArray,
+    path: str | os.PathLike[str] | None = None,
     *,
     title: str = "",
     scale: float | None = None,
@@ -81,7 +114,7 @@ def render_shape(
     colour: str = "displacement",
     view: str = "oblique",
     size: tuple[int, int] = (1600, 900),
-) -> float:
+) -> pyvista.Plotter | float:
     """Picture of a deflected frame or structure, coloured by its displacement or stress.
 
     Drawn with it: the same at rest in grey, supports, point masses as blocks of steel of that
@@ -95,7 +128,7 @@ def render_shape(
     u
         Displacements of the free degrees of freedom in m, shape (N,).
     path
-        The .png to write, whole or not at all.
+        The .png to write, whole or not at all; without it the plotter is returned.
     title
         Text above the picture.
     scale
@@ -114,8 +147,9 @@ def render_shape(
 
     Returns
     -------
-    float
-        The factor on the deflection.
+    float or pyvista.Plotter
+        The factor on the deflection; without a path the plotter, not yet shown. Its ``show()``
+        opens a window where there is a screen, and draws in a notebook.
 
     Raises
     ------
@@ -135,31 +169,52 @@ def render_shape(
     >>> u = np.linspace(0.0, 1e-3, len(component.free))
     >>> if gl_available()[0]:
     ...     factor = render_shape(component, u, "arm.png", title="An arm")
+    ...     render_shape(component, u, title="An arm").show()
     """
-    target = named(path, (".png",))
+    target = None if path is None else named(path, (".png",))
     drawing = surface_of(component, mirror)
     states = checked_states(component, u, 1)
     factor = automatic_scale(drawing, states) if scale is None else checked_scale(scale)
     require_gl()
-    with plotter_of(size) as plotter:
+    with picture(target, size) as plotter:
         moving = add_deflected(plotter, drawing, states[0], factor, colour)
         compose(plotter, moving, states, stop, title, size, checked_view(view))
         add_note(plotter, scale_note(factor, stop), size)
-        image = plotter.screenshot(None, return_img=True)
-    write_image(target, image)
-    return factor
+    return plotter if target is None else factor
 
 
+@overload
+def render_modes(
+    component: AnyComponent,
+    shapes: npt.ArrayLike,
+    titles: Sequence[str],
+    path: None = None,
+    *,
+    mirror: str | None = ...,
+    view: str = ...,
+    size: tuple[int, int] | None = ...,
+) -> pyvista.Plotter: ...
+@overload
 def render_modes(
     component: AnyComponent,
     shapes: npt.ArrayLike,
     titles: Sequence[str],
     path: str | os.PathLike[str],
     *,
+    mirror: str | None = ...,
+    view: str = ...,
+    size: tuple[int, int] | None = ...,
+) -> None: ...
+def render_modes(
+    component: AnyComponent,
+    shapes: npt.ArrayLike,
+    titles: Sequence[str],
+    path: str | os.PathLike[str] | None = None,
+    *,
     mirror: str | None = None,
     view: str = "oblique",
     size: tuple[int, int] | None = None,
-) -> None:
+) -> pyvista.Plotter | None:
     """Picture with one mode in each field, all drawn with the same largest displacement.
 
     Parameters
@@ -171,13 +226,18 @@ def render_modes(
     titles
         k texts, one above each mode.
     path
-        The .png to write, whole or not at all.
+        The .png to write, whole or not at all; without it the plotter is returned.
     mirror
         A point on a plane of symmetry, to draw a half model whole.
     view
         From where, as for `render_shape`.
     size
         Width and height in pixels; by default what k fields need.
+
+    Returns
+    -------
+    None or pyvista.Plotter
+        Without a path the plotter, not yet shown, as by `render_shape`.
 
     Raises
     ------
@@ -197,7 +257,7 @@ def render_modes(
     >>> if gl_available()[0]:
     ...     render_modes(component, np.eye(len(component.free))[:, :2], ["one", "two"], "arm.png")
     """
-    target = named(path, (".png",))
+    target = None if path is None else named(path, (".png",))
     drawing = surface_of(component, mirror)
     modes = checked_states(component, np.asarray(shapes, dtype=np.float64).T, 2)
     if len(titles) != len(modes):
@@ -206,7 +266,7 @@ def render_modes(
     window = size or (900 * columns if columns > 1 else 1400, 390 * rows + BAR_ROW)
     require_gl()
     field = (window[0] // columns, (window[1] - BAR_ROW) // rows)
-    with plotter_of(window, (rows, columns), BAR_ROW / field[1]) as plotter:
+    with picture(target, window, (rows, columns), BAR_ROW / field[1]) as plotter:
         for index, (mode, title) in enumerate(zip(modes, titles, strict=True)):
             plotter.subplot(*divmod(index, columns))
             moving = add_mode(plotter, drawing, mode, title, field, checked_view(view))
@@ -214,21 +274,44 @@ def render_modes(
         drawn = f"{moving.factor * 1e3:.3g} mm"
         label = f"displacement relative to each mode's largest, which is drawn as {drawn}"
         add_scalar_bar(plotter, moving, label, window[0], BAR_ROW)
-        image = plotter.screenshot(None, return_img=True)
-    write_image(target, image)
+    return plotter if target is None else None
 
 
+@overload
+def render_comparison(
+    component: AnyComponent,
+    full: FloatArray,
+    reduced: FloatArray,
+    path: None = None,
+    *,
+    title: str = ...,
+    scale: float | None = ...,
+    mirror: str | None = ...,
+    size: tuple[int, int] = ...,
+) -> pyvista.Plotter: ...
+@overload
 def render_comparison(
     component: AnyComponent,
     full: FloatArray,
     reduced: FloatArray,
     path: str | os.PathLike[str],
     *,
+    title: str = ...,
+    scale: float | None = ...,
+    mirror: str | None = ...,
+    size: tuple[int, int] = ...,
+) -> float: ...
+def render_comparison(
+    component: AnyComponent,
+    full: FloatArray,
+    reduced: FloatArray,
+    path: str | os.PathLike[str] | None = None,
+    *,
     title: str = "",
     scale: float | None = None,
     mirror: str | None = None,
     size: tuple[int, int] = (1600, 900),
-) -> float:
+) -> pyvista.Plotter | float:
     """Picture of two deflections of one component: of the full and of a reduced model.
 
     The surface is the full one, coloured by the distance between the two; red lines are the sharp
@@ -245,15 +328,16 @@ def render_comparison(
 
     Returns
     -------
-    float
-        The largest distance over the largest displacement of the full model.
+    float or pyvista.Plotter
+        The largest distance over the largest displacement of the full model, which the picture
+        says, too; without a path the plotter, not yet shown, as by `render_shape`.
 
     Raises
     ------
     RenderError, ModelError
         As for `render_shape`.
     """
-    target = named(path, (".png",))
+    target = None if path is None else named(path, (".png",))
     drawing = surface_of(component, mirror)
     states = checked_states(component, np.stack([full, reduced]), 2)
     factor = automatic_scale(drawing, states) if scale is None else checked_scale(scale)
@@ -261,7 +345,7 @@ def render_comparison(
     largest = float(drawing.place(states[0])[1].max())
     share = float(apart.max()) / largest if largest > 0.0 else 0.0
     require_gl()
-    with plotter_of(size) as plotter:
+    with picture(target, size) as plotter:
         moving = add_deflected(plotter, drawing, states[0], factor)
         other, _ = drawing.place(states[1], factor)
         _, lines = polydata(drawing, other)
@@ -273,9 +357,7 @@ def render_comparison(
         add_scalar_bar(plotter, moving, f"distance between the two in {unit}", *size)
         note = f"deflection drawn × {factor:g};  red lines: reduced model, off by {share:.2g}"
         add_note(plotter, note + " of the largest displacement", size)
-        image = plotter.screenshot(None, return_img=True)
-    write_image(target, image)
-    return share
+    return plotter if target is None else share
 
 
 def animate(
@@ -351,7 +433,7 @@ def animate(
     factor = automatic_scale(drawing, states) if scale is None else checked_scale(scale)
     check_video(target)
     require_gl()
-    with plotter_of(size) as plotter:
+    with contextlib.closing(plotter_of(size, True)) as plotter:
         moving = add_deflected(plotter, drawing, states[0], factor, colour)
         compose(plotter, moving, states, stop, title, size, checked_view(view))
         images = []
@@ -509,10 +591,32 @@ class Moving:
 
 
 @contextlib.contextmanager
-def plotter_of(
-    size: tuple[int, int], shape: tuple[int, int] | None = None, bar_row: float = 0.0
+def picture(
+    target: Path | None,
+    size: tuple[int, int],
+    shape: tuple[int, int] | None = None,
+    bar_row: float = 0.0,
 ) -> Iterator[Plotter]:
-    """A white off-screen plotter, closed at the end.
+    """A plotter to draw in, which is then written and closed, or without a target left open."""
+    with contextlib.ExitStack() as stack:
+        off_screen = target is not None or not on_screen()
+        plotter = stack.enter_context(
+            contextlib.closing(plotter_of(size, off_screen or None, shape, bar_row))
+        )
+        yield plotter
+        if target is None:
+            stack.pop_all()
+        else:
+            write_image(target, plotter.screenshot(None, return_img=True))
+
+
+def plotter_of(
+    size: tuple[int, int],
+    off_screen: bool | None,
+    shape: tuple[int, int] | None = None,
+    bar_row: float = 0.0,
+) -> Plotter:
+    """A white plotter, off-screen or as pyvista is set.
 
     With a shape (rows, columns) it has these fields and below them one for the bar of colours,
     ``bar_row`` times as high as the others.
@@ -529,13 +633,10 @@ def plotter_of(
         layout = {"shape": (rows + 1, columns), "row_weights": [1.0] * rows + [bar_row]}
         layout["groups"] = [(rows, slice(None))] if columns > 1 else None
     plotter = pyvista.Plotter(
-        off_screen=True, window_size=list(size), border=False, theme=theme, **layout
+        off_screen=off_screen, window_size=list(size), border=False, theme=theme, **layout
     )
-    try:
-        plotter.enable_anti_aliasing("ssaa")
-        yield plotter
-    finally:
-        plotter.close()
+    plotter.enable_anti_aliasing("ssaa")
+    return plotter
 
 
 def polydata(drawing: Surface, points: FloatArray) -> tuple[Any, Any]:

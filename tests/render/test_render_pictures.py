@@ -8,11 +8,19 @@ import subprocess
 import imageio.v3 as iio
 import numpy as np
 import pytest
+import pyvista
 
 import fem
 from fem import gl, render
 from fem.frame_surface import frame_surface
-from fem.render import RenderError, StopSphere, animate, render_modes, render_shape
+from fem.render import (
+    RenderError,
+    StopSphere,
+    animate,
+    render_comparison,
+    render_modes,
+    render_shape,
+)
 from fem.scenery import mass_blocks, stop_solids
 
 
@@ -91,6 +99,35 @@ def test_modes(with_gl, half_beam, tmp_path, count):
     assert colours(image[600 - render.BAR_ROW :]) > 3000
 
 
+def unit(ways):
+    return ways / np.linalg.norm(ways)
+
+
+@pytest.mark.parametrize(
+    "draw, texts",
+    [
+        (lambda c, u, *to: render_shape(c, u, *to, title="Sag"), {"title", "note", "unit"}),
+        (lambda c, u, *to: render_comparison(c, u, 0.9 * u, *to), {"title", "note", "unit"}),
+        (lambda c, u, *to: render_modes(c, u[:, None], ["Sag"], *to), {"title"}),
+    ],
+)
+def test_without_a_path_a_plotter_shows_what_a_file_has(
+    with_gl, half_beam, sagging, tmp_path, monkeypatch, draw, texts
+):
+    monkeypatch.setattr(pyvista, "OFF_SCREEN", True)
+    draw(half_beam, sagging, tmp_path / "a.png")
+    plotter = draw(half_beam, sagging)
+    actors = plotter.renderers[0].actors
+    assert texts <= set(actors)
+    at_rest, _ = frame_surface(half_beam).place(0.0 * sagging)
+    way = unit(frame_surface(half_beam).place(sagging)[0] - at_rest)
+    bodies = [a.mapper.dataset.points for a in actors.values() if isinstance(a, pyvista.Actor)]
+    ways = [unit(points - at_rest) for points in bodies if len(points) == len(at_rest)]
+    assert max(np.vdot(w, way) for w in ways) == pytest.approx(1.0, abs=1e-6), "not deflected"
+    shown = plotter.show(screenshot=True, return_img=True)
+    np.testing.assert_array_equal(shown, iio.imread(tmp_path / "a.png"))
+
+
 def states_of_one_period(u, count):
     times = np.arange(count) / count / 25.0
     return np.sin(2 * np.pi * 25.0 * times)[:, None] * u, times
@@ -134,7 +171,7 @@ def test_without_gl_one_sentence_says_what_to_install(without_gl, half_beam, sag
     assert "\n" not in advice
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(RenderError):
-        render_modes(half_beam, sagging[:, None], ["one"], tmp_path / "a.png")
+        render_modes(half_beam, sagging[:, None], ["one"])
     with pytest.raises(RenderError):
         animate(half_beam, sagging[None], tmp_path / "a.gif", times=[0.0])
 
@@ -172,6 +209,9 @@ def test_egl_is_tried_where_there_is_no_display(monkeypatch):
     assert gl.candidate_windows() == ["", "vtkEGLRenderWindow"]
     monkeypatch.setenv(gl.EGL_VARIABLE, "vtkOSOpenGLRenderWindow")
     assert gl.candidate_windows() == ["vtkOSOpenGLRenderWindow"]
+    assert not gl.on_screen()
+    monkeypatch.delenv(gl.EGL_VARIABLE)
+    assert gl.on_screen()
 
 
 def test_failed_write_leaves_the_old_picture(tmp_path, monkeypatch):
