@@ -463,6 +463,8 @@ def check_joints(components: Mapping[str, ReducedModel], joints: Sequence[Joint]
     """Raise ReductionError where a joint cannot be made."""
     seen = set()
     for joint in joints:
+        if not isinstance(joint, Joint):
+            raise ReductionError(f"a joint is a cms.Joint, not {joint!r}"[:200])
         ends = [joint.a] if joint.b is None else [joint.a, joint.b]
         for component, interface in ends:
             if component not in components:

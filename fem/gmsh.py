@@ -21,7 +21,7 @@ from meshio.gmsh.common import _gmsh_to_meshio_type
 from fem.errors import ModelError
 from fem.mesh import FloatArray, IntArray
 
-VERSIONS = {"2": "2.2", "2.2": "2.2", "4": "4.1", "4.1": "4.1"}
+VERSIONS = {"2": "2.2", "2.2": "2.2", "4.1": "4.1"}  # Gmsh writes 4 for 4.0
 _DIMENSIONS = {"vert": 0, "line": 1, "tria": 2, "quad": 2}  # by the beginning of a kind's name
 DIMENSION = {kind: _DIMENSIONS.get(kind[:4], 3) for kind in _gmsh_to_meshio_type.values()}
 NODES = {
@@ -141,6 +141,8 @@ def read_gmsh(path: Path) -> meshio.Mesh:
     'vertex'
     """
     content = path.read_bytes()
+    if content.startswith(b"$NOD"):
+        raise ModelError(f"{path}: is a Gmsh file of version 1; export it as 4.1 or 2.2")
     if b"$MeshFormat" not in content:
         raise ModelError(f"{path}: is not a Gmsh file (there is no $MeshFormat)")
     if b"$EndElements" not in content:
@@ -150,13 +152,13 @@ def read_gmsh(path: Path) -> meshio.Mesh:
 
 def _mesh(content: bytes) -> meshio.Mesh:
     sections = _sections(content)
-    for name in ("MeshFormat", "Nodes", "Elements"):
-        if name not in sections:
-            raise ValueError(f"there is no ${name}")
+    version, binary, size_type = _header(sections["MeshFormat"])
     unknown = sorted(set(sections) - {*READ, *WITHOUT_CELLS})
     if unknown:
         raise ValueError(f"its section ${unknown[0]} is not understood")
-    version, binary, size_type = _header(sections["MeshFormat"])
+    for name in ("Nodes", "Elements"):
+        if name not in sections:
+            raise ValueError(f"there is no ${name}")
     nodes, elements, entities = (
         _Numbers(sections.get(name, b""), binary, size_type)
         for name in ("Nodes", "Elements", "Entities")

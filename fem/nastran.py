@@ -45,6 +45,8 @@ LEFT_OUT = {
 }
 """Why a card does not matter."""
 REASONS = {card: why for why, cards in LEFT_OUT.items() for card in cards}
+MECHANICAL = ("", "SMECH")
+"""What a PSOLID says in its seventh field where its elements are solids."""
 REAL = re.compile(r"([+-]?(?:\d+\.\d*|\.\d+))(?:[ED]?([+-]?\d+))?", re.IGNORECASE)
 
 
@@ -116,6 +118,8 @@ def read_nastran(path: Path) -> tuple[meshio.Mesh, list[LeftOut]]:
             kind, nodes = _cell(path, card, label)
             cells.setdefault(kind, []).append(nodes)
             owners.setdefault(kind, []).append(_whole(path, card, 1))
+        elif card.name == "PSOLID" and (field := [*card.fields, *[""] * 7][6]) not in MECHANICAL:
+            raise _fail(path, card, f"is of a fluid or another field ({field}), no solid")
         else:
             (left if card.name in REASONS else refused).setdefault(card.name, []).append(card.line)
     if refused:

@@ -127,7 +127,12 @@ def read_vtk(path: Path) -> meshio.Mesh:
         _check_each_once([unquote(name) for name in LEGACY_ARRAY.findall(arrays)], path)
     try:
         content = _without_warning(meshio.vtk.read, path)
-    except (meshio.ReadError, KeyError) as error:
+    except KeyError as error:
+        raise ModelError(
+            f"{path}: holds numbers of the type {error}, which are not read of VTK legacy files;"
+            " save it as '.vtu'"
+        ) from error
+    except meshio.ReadError as error:
         raise ModelError(
             f"{path}: is cut off, or holds what is not read of VTK legacy files"
             f" ({_reason(error)}); save it as '.vtu'"

@@ -188,6 +188,7 @@ def test_three_components_in_a_ring_of_joints():
         ([cms.Joint(("a", "cut"), ("c", "cut"))], "no component 'c'"),
         ([cms.Joint(("a", "cut"), ("b", "nose"))], "'b' has no interface 'nose'"),
         ([cms.Joint(("a", "cut"), ("a", "cut"))], "joins an interface with itself"),
+        ([("a.cut", "b.cut")], r"a joint is a cms.Joint, not \('a.cut', 'b.cut'\)"),
         ([JOINT, cms.Joint(("b", "cut"), ("a", "cut"))], "is given twice"),
         ([cms.Joint(("a", "cut"), ("b", "cut"), stiffness=-1.0)], "not negative"),
         ([cms.Joint(("a", "cut"), ("b", "cut"), damping=1.0)], "is rigid, so that its damping"),

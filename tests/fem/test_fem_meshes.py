@@ -345,12 +345,18 @@ def test_a_file_that_is_cut_off_is_refused(tmp_path, name):
             fem.read_mesh(path)
 
 
+GMSH = b"$MeshFormat\n%s 0 8\n$EndMeshFormat\n%s\n0\n$EndNodes\n$Elements\n0\n$EndElements\n"
+
+
 @pytest.mark.parametrize(
     ("name", "content", "sentence"),
     [
         ("a.vtu", b"", "the mesh file is empty"),
         ("a.vtu", b'<VTKFile type="UnstructuredGrid">', "damaged or cut off"),
         ("a.msh", b"<VTKFile>", r"is not a Gmsh file \(there is no \$MeshFormat\)"),
+        ("a.msh", b"$NOD\n1\n1 0 0 0\n$ENDNOD\n", "of version 1; export it as 4.1 or 2.2"),
+        ("a.msh", GMSH % (b"4", b"$Nodes"), r"its version is 4; export it as 4\.1 or 2\.2"),
+        ("a.msh", GMSH % (b"2.2", b"$New\n0\n$EndNew\n$Nodes"), r"its section \$New is not under"),
         ("a.inp", b"<VTKFile>", r"is not an Abaqus input file with nodes \(there is no \*NODE\)"),
         ("a.inp", b"*NODE\n1,0\n*NSET, NSET=q, GENERATE\n1,9999999999\n", "'q' cannot run from 1"),
         ("a.inp", b"*NODE\n1,0\n*NSET, NSET=q, GENERATE\n1,2,0\n", "cannot run from 1 to 2 by 0"),

@@ -95,6 +95,7 @@ BRICK = bulk(fem.box_mesh("body", (1.0, 1.0, 1.0), (1, 1, 1), kind="hexahedron")
         ("CHEXA,1,2", "CHEXA,1,x", "line 19: CHEXA: 'x' is not a whole number"),
         ("GRID,1,,0.", "GRID,1,,z0.", "line 11: GRID: 'z0.*' is not a real number"),
         ("BEGIN BULK", "BEGIN BULK\n,1,2", "line 5 goes on with a card that is not there"),
+        ("PARAM", "PSOLID,2,1,,,,,PFLUID\nPARAM", r"PSOLID: is of a fluid .*\(PFLUID\), no solid"),
         ("CHEXA", "$CHEXA", "is no Nastran bulk data with solids|line"),
     ],
 )  # fmt: skip
