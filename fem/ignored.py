@@ -68,7 +68,9 @@ def without_cells(
 
 
 def _known(content: meshio.Mesh) -> list[str]:
-    names = [str(name).removeprefix(TYPE_PREFIX) for name in content.cell_sets]
+    """Names of groups and types that hold cells."""
+    sets = [name for name, blocks in content.cell_sets.items() if any(len(at) for at in blocks)]
+    names = [str(name).removeprefix(TYPE_PREFIX) for name in sets]
     names += [n.removeprefix(SET_PREFIX) for n in content.cell_data if n.startswith(SET_PREFIX)]
     return list(dict.fromkeys(names))
 

@@ -8,7 +8,7 @@ import meshio
 import numpy as np
 
 from fem.abaqus.attached import Gathered
-from fem.abaqus.deck import Body, Deck, Label
+from fem.abaqus.deck import Body, Deck, Label, bare
 from fem.abaqus.keywords import Keyword
 from fem.abaqus.sets import Resolver
 from fem.abaqus.surfaces import Surfaces
@@ -111,6 +111,17 @@ def _surfaces_of(body: Body) -> list[Keyword]:
     return [keyword for keyword in body.later() if keyword.name == "SURFACE"]
 
 
+def _check_ignored(deck: Deck, elements: dict[str, list[Label]], cells: Cells) -> None:
+    """Refuse to ignore a set of which masses, springs or dampers would stay."""
+    for name in (name for name in elements if bare(name) in deck.ignore):
+        stay = [label for label in elements[name] if label not in cells.index]
+        if stay:
+            raise deck.fail(
+                f"{name!r} is to be ignored, but {len(stay)} of its elements (the first is"
+                f" {stay[0][1]}) are masses, springs or dampers; take those out of the file"
+            )
+
+
 def content_of(
     deck: Deck,
     cells: Cells,
@@ -126,6 +137,7 @@ def content_of(
     _check_centres(deck, dict(blocks), points, cells)
     nodes = named_sets(deck, gathered.resolver, "NSET", surfaces) | gathered.sets
     elements = named_sets(deck, gathered.resolver, "ELSET")
+    _check_ignored(deck, elements, cells)
     cell_sets = {name: _by_kind(kinds, cells, labels) for name, labels in elements.items()}
     for name, found in cells.types.items():
         cell_sets[TYPE_PREFIX + name] = [

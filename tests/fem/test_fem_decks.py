@@ -537,6 +537,23 @@ def test_what_is_refused_can_be_ignored_by_name(tmp_path):
         fem.read_mesh(path, ignore=["GAPUNI", "CONTACT PAIR", "*GAP", "*ROTTEN"])
 
 
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("PLATE", r"'PLATE' is to be ignored, but 1 of its .*the first is 50\) are mas"),
+        ("LUMP", "'LUMP' is to be ignored, but 1 of its"),
+        ("MASS", "no cell of 'MASS' to ignore; there are [^L]*'PLATE', "),
+    ],
+)
+def test_a_mass_of_a_set_to_be_ignored_does_not_stay_in_silence(tmp_path, name, sentence):
+    text = cantilever_deck() + (
+        "*ELEMENT, TYPE=MASS, ELSET=LUMP\n50, 11\n*MASS, ELSET=LUMP\n2.0\n"
+        "*ELSET, ELSET=PLATE\n50, 10\n"
+    )
+    with pytest.raises(fem.ModelError, match=sentence):
+        fem.read_structure(deck(tmp_path, text), ignore=[name])
+
+
 def test_what_is_left_out_by_intention_is_listed(tmp_path):
     text = (
         cantilever_deck() + "*BOUNDARY\n1, 1, 6\n*STEP\n*FREQUENCY\n3\n*BOUNDARY\n2, 1\n*END STEP\n"
