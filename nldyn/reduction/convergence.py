@@ -38,6 +38,7 @@ LONGEST_SEARCH = 600.0  # s of processor time for the orbit with which a harmoni
 EIGENFREQUENCIES = 3
 SPECIAL_KINDS = ("LP", "PD")
 ONE_MODE = 4.0  # part of the cost of a branch that does not grow with its modes, in modes
+EXACT = 1e-6  # relative difference of frequencies that are the same but for rounding
 MATCH = 0.02  # special points of one kind farther apart are not the same
 INVISIBLE = 1e-9
 FULL = "full"
@@ -104,6 +105,10 @@ class Measured:
         """Mesh and method."""
         return " ".join(filter(None, (self.mesh, self.method)))
 
+    def __repr__(self) -> str:
+        """One line: mesh, method and how many modes are kept."""
+        return f"<Measured {self.label}, {counted_modes(self)}>"
+
 
 @dataclass(frozen=True, eq=False)
 class Errors:
@@ -118,7 +123,8 @@ class Errors:
     peak_hz, peak_m : float
         Frequency and height of the highest resonance peak.
     fold_flip : float
-        Largest error of a fold's or flip's frequency, of those that both models have.
+        Largest error of a fold's or flip's frequency, of those that both models have; nan if there
+        are none.
     counts : (int, int) or None
         Folds and flips of the reference that the model lacks, and the other way round; None if
         it has no branch.
@@ -155,7 +161,8 @@ class ConvergenceStudy:
         The model whose branch is that of reference.
     reference_error : float
         Bound, but for rounding, of the reference's own error: of the receptance without damping,
-        relative as in `Errors`. 0 for the full model.
+        relative as in `Errors`. 0 for the full model; inf if a mode left out may resonate in the
+        range.
     """
 
     setting: LoadCase
@@ -192,45 +199,52 @@ class ConvergenceStudy:
         return found
 
     def enough(self, quantity: str, tolerance: float, indices: Sequence[int]) -> Measured | None:
-        """First model of a series from which on an error stays below a tolerance."""
+        """First model of a series from which on an error stays below a tolerance.
+
+        The model that is the reference of a quantity proves nothing, unless it is exact.
+        """
         found = None
         for index in reversed(indices):
+            if self.is_own_reference(index, quantity):
+                continue
             if not getattr(self.errors[index], quantity) <= tolerance:
                 break
             found = self.models[index]
         return found
+
+    def is_exact(self, model: Measured) -> bool:
+        """Whether a model leaves nothing out: it has all modes of the full one."""
+        own, known = model.frequencies_hz, self.reference.frequencies_hz
+        return (
+            self.reference.method == FULL
+            and own.size == known.size
+            and np.allclose(own, known, rtol=EXACT, atol=0.0)
+        )
+
+    def is_own_reference(self, index: int, quantity: str) -> bool:
+        """Whether a model, which is not exact, has an error of 0 by comparison with itself."""
+        others = ("force", "contact") if self.reference.orbit else ()
+        with_best = quantity not in ("eigenfrequency", "receptance", *others)
+        return with_best and self.models[index] is self.best and not self.is_exact(self.best)
 
     def report(self) -> str:
         """The study as a table and a few sentences."""
         head = ("label", "dofs", "modes", "size", "eigenf.", "recept.", "peak Hz", "peak m",
                 "LP/PD", "lacks", "extra", "force", "contact", "ms/orbit", "branch s")  # fmt: skip
         rows: list[tuple[str, ...]] = [head]
-        for model, error in zip(self.models, self.errors, strict=True):
-            numbers = (error.eigenfrequency, error.receptance, error.peak_hz, error.peak_m,
-                       error.fold_flip)  # fmt: skip
+        for index, (model, error) in enumerate(zip(self.models, self.errors, strict=True)):
+            *numbers, force, contact = (self.shown(index, quantity) for quantity in QUANTITIES)
             rows.append((
-                model.label, str(model.dofs), str(model.modes), str(model.size),
-                *map(shown_error, numbers),
-                *map(str, error.counts or ("-", "-")), shown_error(error.force),
-                shown_error(error.contact), f"{1e3 * model.seconds_per_orbit:.3g}",
-                f"{model.seconds:.3g}",
+                model.label, str(model.dofs), str(model.modes), str(model.size), *numbers,
+                *map(str, error.counts or ("-", "-")), force, contact,
+                f"{1e3 * model.seconds_per_orbit:.3g}", f"{model.seconds:.3g}",
             ))  # fmt: skip
         widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
         lines = [
             "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
             for row in rows
         ]
-        whole = f"the full model ({self.reference.size} modes)"
-        if self.reference.method != FULL:
-            whole = (
-                f"rubin with {counted_modes(self.reference)} (its undamped receptance is within "
-                f"{self.reference_error:.1e} of the full model's but for rounding)"
-            )
-        lines.append(
-            f"reference: {whole} for eigenfrequencies and "
-            f"receptance{' and the orbit' if self.reference.orbit else ''}, {self.best.label} with "
-            f"{counted_modes(self.best)} for the rest; orbits at {self.at_hz:g} Hz"
-        )
+        lines.append(self.said_of_references())
         known = self.reference.orbit or self.best.orbit
         if known is not None and largest_force(known) == 0.0:
             lines.append(
@@ -246,6 +260,38 @@ class ConvergenceStudy:
             notes.setdefault(model.note, []).append(f"{model.label}, {counted_modes(model)}")
         lines += [f"note: {'; '.join(names)}: {note}" for note, names in notes.items() if note]
         return "\n".join(lines)
+
+    def shown(self, index: int, quantity: str) -> str:
+        """An error in the table: "-" if unknown, "ref" if that of the reference itself."""
+        error = getattr(self.errors[index], quantity)
+        if np.isnan(error):
+            return "-"
+        return "ref" if self.is_own_reference(index, quantity) else f"{error:.1e}"
+
+    def said_of_references(self) -> str:
+        """What the models are compared with, and how wrong that is itself."""
+        orbit = " and the orbit" if self.reference.orbit else ""
+        largest = f"{self.best.label} with {counted_modes(self.best)}"
+        if self.is_exact(self.best):
+            own = f"{largest} leaves nothing out: the interfaces see no other modes"
+        else:
+            own = f"how wrong {largest} is itself, only a study with more modes can say"
+        return (
+            f"reference: {self._whole()} for eigenfrequencies and receptance{orbit}, {largest} for "
+            f"the rest; orbits at {self.at_hz:g} Hz\n{own}"
+        )
+
+    def _whole(self) -> str:
+        if self.reference.method == FULL:
+            return f"the full model ({counted_modes(self.reference)})"
+        if np.isfinite(self.reference_error):
+            own = (
+                f"its undamped receptance is within {self.reference_error:.1e} of the full model's "
+                "but for rounding"
+            )
+        else:
+            own = "without a bound of its error: a mode that it leaves out may lie in the range"
+        return f"rubin with {counted_modes(self.reference)} ({own})"
 
     def said_of(
         self, label: str, indices: Sequence[int], size: Callable[[Measured], str]
@@ -270,6 +316,8 @@ class ConvergenceStudy:
         found: Measured | None = None
         followed = [index for index in indices if self.models[index].special_hz is not None]
         for index in reversed(followed):
+            if self.is_own_reference(index, "fold_flip"):
+                continue
             if self.errors[index].counts != (0, 0):
                 break
             found = self.models[index]
@@ -711,6 +759,8 @@ def errors_of(model: Measured, reference: Measured, best: Measured, full: bool) 
     if model.special_hz is not None and best.special_hz is not None:
         fold_flip, *lacking = matched(model.special_hz, best.special_hz)
         counts = (lacking[0], lacking[1])
+        if lacking[0] == sum(map(len, best.special_hz.values())):
+            fold_flip = np.nan
     orbit = reference.orbit if full else best.orbit
     return Errors(
         eigenfrequency,
@@ -778,8 +828,3 @@ def matched(
         missing += len(left)
         extra += len(right)
     return worst, missing, extra
-
-
-def shown_error(value: float) -> str:
-    """An error in a table."""
-    return "-" if np.isnan(value) else f"{value:.1e}"

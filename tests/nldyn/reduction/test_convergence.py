@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -30,6 +31,7 @@ from nldyn.reduction import convergence
 from nldyn.reduction.convergence import (
     contact_time,
     distance,
+    errors_of,
     harmonic_branch,
     largest_force,
     massless_receptance,
@@ -154,28 +156,80 @@ def test_files(study, tmp_path):
         assert (folder / name).stat().st_size > 0
 
 
+AT_TIP = LoadCase(
+    (30.0, 40.0),
+    stops=(Stop("tip", stiffness=1e8),),
+    excitation=(Unbalance("tip", 1e-4),),
+    dampers=(Damper("tip", 1.0),),
+    modal_damping=0.02,
+)
+
+
+def cantilever(count):
+    mesh = fem.frame_mesh({"root": (0, 0), "tip": (0.5, 0)}, [("arm", "root", "tip", count)])
+    part = fem.BeamPart(fem.Material(2.1e11, 7800.0), fem.RectangularSection(0.02, 0.01))
+    model = fem.FrameModel(
+        mesh,
+        {"arm": part},
+        supports=[fem.Support("root", ("x", "y", "rotation"))],
+        interfaces={"tip": fem.Interface("tip", "y")},
+    )
+    return fem.assemble(model)
+
+
+@pytest.fixture(scope="module")
+def small():
+    """Two elements, of whose six modes the tip sees the four that bend."""
+    return convergence_study(cantilever(2), AT_TIP, modes=(2, 3, 6), full=True)
+
+
+def test_where_all_modes_are_kept_the_report_says_that_nothing_is_left_out(small):
+    """Against the orbit of the full model, found on its own."""
+    assert [small.is_exact(model) for model in small.models] == [False, True, True, True]
+    assert all(error.force < 1e-9 and error.contact < 1e-9 for error in small.errors[1:])
+    said = small.report()
+    assert "rubin with 6 modes leaves nothing out: the interfaces see no other modes" in said
+    assert "rubin, peak height: 1 % from 3 modes, 0.01 % from 3 modes" in said
+    assert not re.search(r"\binf\b|not reached|\bref\b", said)
+
+
+def test_a_model_is_no_proof_of_itself(small):
+    """With two modes the contact force is wrong by more than 1 %, of which two cannot know."""
+    assert small.errors[0].force > 0.01
+    two, full = small.models[0], replace(small.models[-1], orbit=None)
+    errors = tuple(errors_of(model, full, two, False) for model in (two, two, full))
+    alone = replace(small, models=(replace(two, modes=1), two, full), errors=errors, best=two)
+    said = alone.report()
+    assert "how wrong rubin with 2 modes is itself, only a study with more modes can say" in said
+    assert alone.enough("force", 0.01, [1]) is None
+    assert said.splitlines()[2].split()[6:13] == ["-", "-", "ref", "0", "0", "ref", "ref"]
+
+
+def test_special_points_of_which_none_is_matched_have_no_error(small):
+    other = replace(small.models[0], special_hz={"LP": (1.0,), "PD": ()})
+    errors = errors_of(other, small.reference, small.best, True)
+    assert np.isnan(errors.fold_flip)
+    assert errors.counts == (sum(map(len, small.best.special_hz.values())), 1)
+
+
+def test_a_reference_without_a_bound_is_told_in_words(small):
+    """The range has the second mode in it, which the reference leaves out."""
+    wide = replace(AT_TIP, range_hz=(30.0, 1000.0))
+    whole = cms.reduce(cantilever(2), modes=1)
+    linear = measured_linear("", "reference", whole, wide)
+    bound = receptance_bound(cantilever(2), whole, linear, wide)
+    assert bound == np.inf
+    models = (*small.models[:-1], replace(linear, orbit=small.reference.orbit))
+    said = replace(small, models=models, reference_error=bound).report()
+    assert "rubin with 1 mode (without a bound of its error: a mode that it leaves out may" in said
+    assert "inf" not in said
+
+
 @pytest.fixture(scope="module")
 def meshes():
     """A cantilever of 2 to 16 elements, by Rubin's and MacNeal's methods."""
-    components = {}
-    for count in (2, 4, 8, 16):
-        mesh = fem.frame_mesh({"root": (0, 0), "tip": (0.5, 0)}, [("arm", "root", "tip", count)])
-        part = fem.BeamPart(fem.Material(2.1e11, 7800.0), fem.RectangularSection(0.02, 0.01))
-        model = fem.FrameModel(
-            mesh,
-            {"arm": part},
-            supports=[fem.Support("root", ("x", "y", "rotation"))],
-            interfaces={"tip": fem.Interface("tip", "y")},
-        )
-        components[f"{count} elements"] = fem.assemble(model)
-    setting = LoadCase(
-        (30.0, 40.0),
-        stops=(Stop("tip", stiffness=1e8),),
-        excitation=(Unbalance("tip", 1e-4),),
-        dampers=(Damper("tip", 1.0),),
-        modal_damping=0.02,
-    )
-    return convergence_study(components, setting, modes=(3,), methods=("rubin", "macneal"))
+    components = {f"{count} elements": cantilever(count) for count in (2, 4, 8, 16)}
+    return convergence_study(components, AT_TIP, modes=(3,), methods=("rubin", "macneal"))
 
 
 def test_errors_of_a_beam_fall_with_the_fourth_power_of_its_elements(meshes):
