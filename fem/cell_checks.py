@@ -95,7 +95,8 @@ def _check_middles(source: str, kind: str, cells: IntArray, points: FloatArray) 
         cell = cell_at(kind, bad[0], points[cells[bad[0]]])
         raise ModelError(
             f"{source}: the nodes on the edges of {cell} are not near the middle of their edges"
-            f" ({len(bad)} such cells; they must be in the order of meshio and VTK)"
+            f" ({len(bad)} such cells): they are badly curved, or in another order than that of"
+            " the file's format"
         )
 
 
