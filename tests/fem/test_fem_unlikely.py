@@ -3,6 +3,7 @@
 import warnings
 from dataclasses import replace
 
+import meshio
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -130,3 +131,33 @@ def test_a_beam_that_is_thicker_than_long_is_told():
     arm = {"arm": fem.BeamPart(STEEL, fem.RectangularSection(40.0, 20.0))}  # in mm
     with pytest.warns(fem.UnlikelyWarning, match=r"'arm' is 28.3 m thick and in all as"):
         fem.assemble(fem.FrameModel(frame, arm, [fem.Support("a", ("x", "y", "rotation"))]))
+
+
+def test_beams_along_others_are_told_and_those_in_line_are_not():
+    members = [("bar", "a", "b", 4), ("bar", "b", "c", 2)]
+    points = {"a": (0.0, 0.0), "b": (1.0, 0.0), "c": (2.0, 0.0)}
+    part = fem.BeamPart(fem.Material(2.1e11, 7800.0), fem.RectangularSection(0.02, 0.01))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", fem.UnlikelyWarning)
+        fem.assemble(fem.FrameModel(fem.frame_mesh(points, members), {"bar": part}))
+    mesh = fem.frame_mesh(points, [*members, ("bar", "a", "b", 1)])
+    with pytest.warns(fem.UnlikelyWarning, match=r"beams lie upon others \(2 times; .* at \(0, 0"):
+        frame = fem.assemble(fem.FrameModel(mesh, {"bar": part}))
+    assert fem.mass_properties(frame).mass == pytest.approx(7800.0 * 2e-4 * 3.0)  # 1 m twice
+
+
+def test_facets_of_shells_upon_others_are_told_and_walls_at_a_fold_are_not():
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [0, 1, 1]], float)
+    wall = fem.ShellPart(fem.Material(2.1e11, 7800.0, 0.3), 0.01)
+
+    def shell(*blocks):
+        sets = {"wall": [np.arange(len(cells)) for _, cells in blocks]}
+        content = meshio.Mesh(corners, list(blocks), cell_sets=sets)
+        return fem.assemble(fem.StructureModel(fem.structure_from_meshio(content), {"wall": wall}))
+
+    walls = ("quad", [[0, 1, 2, 3], [0, 3, 5, 4]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", fem.UnlikelyWarning)
+        shell(walls)
+    with pytest.warns(fem.UnlikelyWarning, match=r"facets of shells lie upon others \(4 times"):
+        shell(walls, ("triangle", [[0, 1, 2], [0, 2, 3]]))
