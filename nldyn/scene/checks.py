@@ -377,6 +377,9 @@ def _check_interface_names(scene: Scene, report: Report) -> None:
             known = [*scene.interface_names, *scene.load_names]
             raise report(key, unknown_name(name, known, "an interface or load vector"))
     for number, table in enumerate(scene.excitation):
+        if table.kind == "base" and table.at in scene.interface_names:
+            fault = f"'{table.at}' is an interface, and a base needs a load vector M r of the whole"
+            raise report(("excitation", number, "at"), fault)
         if table.load is None:
             continue
         if scene.components:

@@ -135,13 +135,18 @@ def _measured(scene: Scene, number: int, at: str, table: ExcitationTable) -> Mea
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, ValueError) as error:
         raise scene_error(scene.file, key, f"names {path}, which {unreadable(error)}") from None
-    samples = []
+    samples: list[float] = []
+    hole = 0  # the last blank line since a sample
     for place, line in enumerate(lines, 1):
-        text = line.split("#")[0].strip().rstrip(",;")
+        text = line.split("#")[0].strip()
         if not text:
+            hole = place if samples and "#" not in line else hole
             continue
+        if hole:
+            fault = f"{path}, line {hole}: is blank between samples, as if one were left out"
+            raise scene_error(scene.file, key, fault, sep=": ")
         try:
-            samples.append(float(text))
+            samples.append(float(text.rstrip(",;")))
         except ValueError:
             fault = f"{path}, line {place}: must be one number, the force in N, not '{line[:40]}'"
             raise scene_error(scene.file, key, fault, sep=": ") from None

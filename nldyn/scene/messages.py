@@ -45,6 +45,11 @@ WORDS = {  # that users try for a table, and what there is
     "simulation": "a simulation is not part of a scene; there is nldyn.simulate in Python",
     "gyroscopic": "a gyroscopic matrix is a key of [matrices]",
 }
+ORDERS = (
+    "all [[excitation]] acts at multiples 'harmonic' of one frequency, that of the continuation: "
+    "where half orders act let it be that of the whole cycle, and of two frequencies one of which "
+    "both are multiples, nearly (5 and 7 for a ratio of 1.4)"
+)
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -185,7 +190,8 @@ def _fault(model: type[BaseModel], detail: ErrorDetails) -> str:
         return f"must be written with a name: [{format_key(detail['loc'])}.NAME]"
     if kind == "model_type":
         return f"must be a table: [{format_key(detail['loc'])}]"
-    return f"must be {_wanted(kind, context)}, not {show(given)}"
+    wanted = f"must be {_wanted(kind, context)}, not {show(given)}"
+    return f"{wanted}: {ORDERS}" if detail["loc"][-1] == "harmonic" else wanted
 
 
 def _wanted(kind: str, context: Mapping[str, Any]) -> str:
@@ -230,6 +236,8 @@ def _unknown_key(model: type[BaseModel], key: KeyPath) -> str:
         return f"is not a table of a scene: {hint}"
     if key[0] == "springs" and name in ("between", "to", "from"):
         return f"is not a known key: {BETWEEN}"
+    if key[0] == "excitation" and name.startswith("frequency"):
+        return f"is not a known key: {ORDERS}"
     known = list(here.model_fields) if here else []
     guess = nearest(name, known)
     if guess:

@@ -648,7 +648,8 @@ def _check_excitation(at: str, name: str, value: float, phase_deg: float, harmon
         raise SystemModelError(
             f"{owner}: harmonic must be a whole number from 1 to {MOST_HARMONIC}, got "
             f"{shown(harmonic)}; where half orders act, let the excitation frequency be that of "
-            "the whole cycle; a frequency that is no multiple of it has no periodic response"
+            "the whole cycle; two frequencies without a common period have no periodic response: "
+            "take a lower one of which both are multiples, nearly (5 and 7 for a ratio of 1.4)"
         )
 
 

@@ -720,6 +720,10 @@ class System:
                         continue
                     if kind == "excitation" and name in self.loads:
                         continue
+                    if isinstance(element, BaseMotion):
+                        given = ", ".join(self.loads) or "none"
+                        fault = f"'{name}' is not a load vector M r, which a base needs"
+                        raise SystemModelError(f"excitation: {fault}; there are: {given}")
                     if name in self.rides:
                         raise SystemModelError(f"{kind} {end} '{name}', which is only observed")
                     if name not in self.participation:

@@ -157,7 +157,10 @@ def test_what_is_left_out_of_a_measured_force_is_told():
         ('kind = "constant"\nat = "x"\nforce = 1.0', "constant: nothing moves"),
         ('kind = "constant"\nat = "y"\nforce = 1.0', "interface or load vector"),
         ('kind = "harmonic"\nat = "x"\namplitude = 1.0\nharmonic = 0', "harmonic"),
+        ('kind = "harmonic"\nat = "x"\namplitude = 1.0\nharmonic = 1.5', "1.5: all .* whole cycle"),
+        ('kind = "harmonic"\nat = "x"\namplitude = 1.0\nfrequency_hz = 2.0', "both are multiples"),
         ('kind = "harmonic"\nat = "x"\namplitude = 1.0\nforce = 2.0', "not a key of kind"),
+        ('kind = "base"\nat = "x"\namplitude = 1.0', "'x' is an interface, .* load vector M r"),
         ('kind = "weight"\nacceleration = [0.0, -9.81]', "needs a .mesh.; give 'loads'"),
         ('kind = "base"\namplitude = 1.0', "needs 'direction'.* or 'at' naming a load vector"),
         ('kind = "base"\ndirection = "x"\namplitude = 1.0', "needs a .mesh."),
@@ -176,3 +179,21 @@ def test_weight_out_of_a_plane_frame_is_refused(tmp_path):
     more = '[[excitation]]\nkind = "weight"\nacceleration = [0.0, 0.0, -9.81]\n'
     with pytest.raises(SceneError, match="out of its plane"):
         build_system(beam(tmp_path, FRAME, 1, more))
+
+
+def test_a_sample_left_out_of_a_measured_force_is_told(tmp_path):
+    """A hole would move all that follows: the mean of a cosine would no longer be zero."""
+    measured = '[[excitation]]\nkind = "measured"\nat = "x"\nfile = "force.csv"\nharmonics = 5\n'
+    (tmp_path / "gear.toml").write_text(GEAR + measured)
+    lines = [f"{value:.15g}" for value in np.cos(2 * np.pi * np.arange(32) / 32.0)]
+
+    def sources(lines: list[str]):
+        (tmp_path / "force.csv").write_text("# force in N\n\n" + "\n".join(lines) + "\n\n")
+        return build_system(load_scene(tmp_path / "gear.toml")).excitation
+
+    (cosine,) = sources([*lines[:7], "# a quarter", *lines[7:]])
+    assert (cosine.harmonic, cosine.phasor) == (1, pytest.approx(1.0, abs=1e-13))
+    with pytest.raises(SceneError, match="line 10: is blank between samples"):
+        sources([*lines[:7], "", *lines[8:]])
+    with pytest.raises(SceneError, match="line 10: must be one number"):
+        sources([*lines[:7], ",", *lines[8:]])

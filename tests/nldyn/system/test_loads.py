@@ -259,6 +259,13 @@ def test_sources_that_make_no_sense(make_source, words):
         make_source()
 
 
+def test_a_base_does_not_move_by_the_vector_of_an_interface():
+    with pytest.raises(SystemModelError, match=r"'y' is not a load vector M r.*there are: base"):
+        System.from_matrices(
+            [[3.0]], [[1.0]], {"y": [1.0]}, loads={"base": [3.0]}, excitation=[BaseMotion("y", 1.0)]
+        )
+
+
 def test_load_vectors_are_no_interfaces():
     with pytest.raises(SystemModelError, match="stop at unknown interface 'weight'"):
         make("held", stops=[Stop("weight", 1.0)])
