@@ -126,9 +126,15 @@ def _searched(
     """The orbit that a motion from rest leads to, here or at more damping."""
     try:
         return first_orbit(problem, _simulated(problem, omega, pieces, limit), omega, observe)
-    except ConvergenceError:
+    except ConvergenceError as failure:
         by_damping = problem.period == 1
-        orbit = _by_more_damping(problem, omega, observe, pieces, limit) if by_damping else None
+        try:
+            orbit = _by_more_damping(problem, omega, observe, pieces, limit) if by_damping else None
+        except OutOfTimeError:
+            raise ConvergenceError(
+                f"{failure}; the time was spent on ways from more damping, and more `seconds` of "
+                "solve_orbit may find one"
+            ) from None
         if orbit is None:
             raise
         return orbit

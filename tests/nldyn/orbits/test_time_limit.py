@@ -3,7 +3,16 @@
 import pytest
 from problems import make_one_dof
 
-from nldyn import ConvergenceError, SystemModelError, solve_orbit
+from nldyn import (
+    ConvergenceError,
+    HarmonicForce,
+    PolynomialSpring,
+    System,
+    SystemModelError,
+    solve_orbit,
+)
+from nldyn.orbits import solve
+from nldyn.orbits.time_limit import OutOfTimeError
 
 
 def test_a_search_without_time_tells_what_it_was_at():
@@ -34,3 +43,18 @@ def test_a_time_that_is_none_is_refused(seconds):
 def test_a_progress_that_cannot_be_called_is_refused():
     with pytest.raises(SystemModelError, match="progress"):
         solve_orbit(make_one_dof(), 30.0, progress=3)
+
+
+def test_why_the_motion_failed_is_told_where_more_damping_spends_the_time(monkeypatch):
+    """A force of twice the stiffness pushes u'' + u - u³ over its hilltop at u = 1."""
+    softening = System.from_matrices(
+        [[1.0]], [[1.0]], {"x": [1.0]}, damping=[[0.05]], excitation=[HarmonicForce("x", 2.0)],
+        springs=[PolynomialSpring("x", [0.0, 0.0, -1.0])],
+    )  # fmt: skip
+
+    def too_slow(*_):
+        raise OutOfTimeError("a way back")
+
+    monkeypatch.setattr(solve, "_by_more_damping", too_slow)
+    with pytest.raises(ConvergenceError, match="the motion runs away along a spring that softens"):
+        solve_orbit(softening, 0.15)
