@@ -382,9 +382,10 @@ def _check_held(scene: Scene, reduced: cms.ReducedModel) -> None:
     rigid = reduced.frequencies_hz == 0.0
     ends = [(stop.at, stop.against) for stop in scene.stops]
     ends += [(spring.at, spring.against) for spring in scene.interface_springs.values()]
-    felt = np.array([_stretch(reduced, *pair)[rigid] for pair in ends])
+    seen = [_stretch(reduced, *pair) for pair in ends]
+    felt = np.array([row[rigid] / np.abs(row).max() for row in seen if row.any()])
     count = np.count_nonzero(rigid)
-    loose = count - (np.linalg.matrix_rank(felt) if felt.size else 0)
+    loose = count - (np.linalg.matrix_rank(felt, tol=1e-9) if felt.size else 0)
     if loose > 0:
         motions = "motion" if loose == 1 else "motions"
         fault = f"float: {loose} rigid-body {motions} of the whole, which no support, joint, spring"

@@ -1,6 +1,7 @@
 """The verbs of the command line, their output and their exit codes."""
 
 import csv
+import math
 import subprocess
 import sys
 from dataclasses import replace
@@ -12,7 +13,8 @@ from fakes import diagram
 import nldyn.paper
 import nldyn.runtime.progress
 import nldyn.scene.run
-from nldyn.app.cli import main
+from nldyn import System
+from nldyn.app.cli import main, static_flexibility
 from nldyn.base.resources import example, mesh
 from nldyn.branches.arclength import Stepper
 from nldyn.io.branches import load_branches, load_diagram, load_exploration, save_branches
@@ -355,3 +357,10 @@ def test_help_imports_nothing_heavy_of_its_own():
     ).stdout.split()
     heavy = {"numba", "scipy", "matplotlib", "pyvista", "skfem", "pydantic"}
     assert heavy.isdisjoint(loaded)
+
+
+def test_a_free_motion_that_an_interface_sees_by_rounding_only_leaves_its_flexibility():
+    """One spring of (2 pi)² N/m, beside a free motion of which rounding shows 1e-14."""
+    free = System.from_modal([0.0, 1.0], {"tip": [1e-14, 1.0], "far": [0.5, 1.0]})
+    assert static_flexibility(free, "tip") == pytest.approx(1.0 / (2.0 * math.pi) ** 2, rel=1e-12)
+    assert static_flexibility(free, "far") == math.inf

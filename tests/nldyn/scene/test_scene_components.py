@@ -256,6 +256,15 @@ def test_a_whole_that_floats_is_told(tmp_path):
         build_system(halves(tmp_path, FORCE + DAMPED + spring))
 
 
+def test_a_whole_free_along_its_axis_is_told_although_rounding_moves_its_interfaces(tmp_path):
+    """Joined across and in rotation only, the outer half is free along the beam."""
+    across = '[[joints]]\nat = "inner.y"\nagainst = "outer.y"\n'
+    stop = '[[stops]]\nat = "outer.tip"\nlaw = "linear"\nstiffness = 1.0e5\ngap = 0.01\n'
+    joints = across + across.replace("y", "turn") + stop
+    with pytest.raises(SceneError, match="components float: 1 rigid-body motion of the whole"):
+        build_system(halves(tmp_path, FORCE + DAMPED + joints))
+
+
 def test_the_example_has_the_modes_of_its_whole():
     """All degrees of freedom of the frame beside those of the absorber, as one eigenproblem."""
     scene = load_scene(example("portal_with_absorber.toml"))
