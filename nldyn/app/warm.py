@@ -34,18 +34,17 @@ class Warmth:
 def warm() -> Warmth:
     """Compile the kernels that orbits, branches, special points and simulations need."""
     before = compilations.seconds()
-    system = System.from_matrices(
-        [[2.48]],
-        [[16877.0]],
-        {"middle": [1.0]},
+    system = System.from_modal(  # with pairs of multipliers, which one coordinate does not have
+        [13.118, 125.3],
+        {"middle": [0.634, 0.681]},
         modal_damping=0.0142,
         stops=[Stop("middle", stiffness=5.17e9)],
         excitation=[Unbalance("middle", 4.92e-6)],
     )
-    branch = continue_branch(solve_orbit(system, frequency_hz=33.5), (33.5, 33.8))
+    branch = continue_branch(solve_orbit(system, frequency_hz=30.0), (29.5, 30.5))
     for orbit in branch.points:
         _ = orbit.max_abs_displacement, orbit.liouville_error
-    simulate(system, frequency_hz=33.5, periods=2)
-    lyapunov_exponents(system, frequency_hz=33.5, periods=32)
+    simulate(system, frequency_hz=30.0, periods=2)
+    lyapunov_exponents(system, frequency_hz=30.0, periods=32)
     cache = getattr(newton, "_cache", None)
     return Warmth(compilations.seconds() - before, Path(getattr(cache, "cache_path", "")))
