@@ -307,9 +307,12 @@ def report(
     with plain_errors():
         from nldyn.report.again import report_again
         from nldyn.runtime.progress import progress_line
+        from nldyn.runtime.result_directory import OutputError
         from nldyn.scene.read import load_scene
 
         loaded = None if scene is None else load_scene(scene, mesh_folders)
+        if loaded is not None and says_something_else(directory, loaded, ("title", "mesh")):
+            raise OutputError(f"{scene}: says something else than {directory / 'scene.toml'}")
         with progress_line(quiet) as line:
             notes = report_again(directory, loaded, mesh_folders, line)
         for note in notes:
@@ -764,18 +767,24 @@ def check_same_scene(out: Path, scene: Scene) -> None:
     """Refuse a directory with the results of another scene: titles and comments do not count."""
     from nldyn.runtime.result_directory import OutputError
 
-    def asked(text: str) -> dict[str, object]:
-        return {key: value for key, value in tomllib.loads(text).items() if key != "title"}
-
-    try:
-        before = asked((out / "scene.toml").read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError):
-        return
-    if before != asked(scene.text):
+    if says_something_else(out, scene, ("title",)):
         raise OutputError(
             f"{out}: holds the results of a scene that says something else; choose another "
             "directory, or replace them with --replace"
         )
+
+
+def says_something_else(out: Path, scene: Scene, apart_from: tuple[str, ...]) -> bool:
+    """Whether a scene differs from the copy in a directory of results, if there is one."""
+
+    def asked(text: str) -> dict[str, object]:
+        return {key: value for key, value in tomllib.loads(text).items() if key not in apart_from}
+
+    try:
+        before = asked((out / "scene.toml").read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError):
+        return False
+    return before != asked(scene.text)
 
 
 def describe(diagram: Diagram, seconds: float, out: Path) -> str:

@@ -211,6 +211,19 @@ def test_a_scene_of_other_results_is_refused(results):
     assert result.exit_code == 2 and "has other modes than the results" in result.stderr
 
 
+def test_results_are_not_shown_with_the_stop_of_another_scene(results, tmp_path):
+    """Its modes are the same: nothing but the text tells the scenes apart."""
+    text = example("one_dof.toml").read_text(encoding="utf-8")
+    other = tmp_path / "other.toml"
+    other.write_text(text.replace("gap = 0.0", "gap = 1e-4"), encoding="utf-8")
+    (tmp_path / "branches.h5").write_bytes((results / "branches.h5").read_bytes())
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    result = report(tmp_path, "--scene", other)
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert f"{other}: says something else than {tmp_path / 'scene.toml'}" in result.stderr
+    assert not (tmp_path / "report.html").exists()
+
+
 def test_damaged_tables_are_one_sentence(results, tmp_path):
     for name in ("branches.h5", "branches.csv", "special_points.csv", "ends.csv", ".nldyn.json"):
         (tmp_path / name).write_bytes((results / name).read_bytes())
