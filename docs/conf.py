@@ -43,3 +43,4 @@ html_copy_source = False
 html_theme_options = {"sidebar_hide_name": False}
 html_static_path = ["_site/static"]
 html_css_files = ["site.css"]
+html_js_files = ["site.js"]
