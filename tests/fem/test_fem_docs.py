@@ -52,7 +52,7 @@ def test_examples_of_structures_run_in_order(monkeypatch, tmp_path):
         "errors",
         "files",
         "links",
-        "joints",
+        "mechanisms",
         "membranes",
         "mesh",
         "model",
