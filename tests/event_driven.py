@@ -12,10 +12,11 @@ from scipy.optimize import brentq
 MOST_HITS = 25  # after which a motion is left where it is
 
 
-def integrate(mass, stiffness, damping, force, stops, state, duration):
+def integrate(mass, stiffness, damping, force, stops, state, duration, max_step=0.2):
     """State (2n,) after a duration, impacts per stop, and the least speed of an impact.
 
     ``force(t)`` (n,) acts; stops are (vector, gap, restitution) with the gap closed at c x = gap.
+    What reaches beyond a stop and back within one step of at most `max_step` is not seen.
     """
     n = len(mass)
     inverse = np.linalg.inv(mass)
@@ -37,7 +38,7 @@ def integrate(mass, stiffness, damping, force, stops, state, duration):
     while t < duration and hits.sum() <= MOST_HITS:
         found = solve_ivp(
             rate, (t, duration), y, method="DOP853", events=events, rtol=1e-12, atol=1e-13,
-            max_step=0.2,
+            max_step=max_step,
         )  # fmt: skip
         t, y = float(found.t[-1]), found.y[:, -1]
         if found.status == 0:
