@@ -48,11 +48,7 @@ def entry_digits(entries: FloatArray) -> int | None:
 
     Rounded numbers differ from exact ones, such as 2 or 16877, in that many of them use all digits.
     """
-    counts = digits_of(entries)
-    if not counts.size or not FEWEST_DIGITS <= counts.max() <= MOST_DIGITS:
-        return None
-    full = np.count_nonzero(counts >= counts.max() - 1)
-    return int(counts.max()) if full >= max(FEWEST_VALUES, SHARE * counts.size) else None
+    return _shown_digits(entries, FEWEST_DIGITS, MOST_DIGITS, FEWEST_VALUES)
 
 
 def doubtful_digits(entries: FloatArray) -> int | None:
@@ -60,11 +56,16 @@ def doubtful_digits(entries: FloatArray) -> int | None:
 
     A quarter of the numbers, and at least two, use all of 4 to 14 digits.
     """
+    return _shown_digits(entries, FEWEST_IN_DOUBT, MOST_DIGITS - 1, FEWEST_VALUES - 1)
+
+
+def _shown_digits(entries: FloatArray, fewest: int, most: int, values: int) -> int | None:
+    """Digits, from fewest to most, that a share of the numbers, and so many, use; else None."""
     counts = digits_of(entries)
-    if not counts.size or not FEWEST_IN_DOUBT <= counts.max() < MOST_DIGITS:
+    if not counts.size or not fewest <= counts.max() <= most:
         return None
     full = np.count_nonzero(counts >= counts.max() - 1)
-    return int(counts.max()) if full >= max(FEWEST_VALUES - 1, SHARE * counts.size) else None
+    return int(counts.max()) if full >= max(values, SHARE * counts.size) else None
 
 
 def relative_rounding(digits: int | None) -> float:

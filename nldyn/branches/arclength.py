@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -76,15 +76,17 @@ class StepperState:
     count: int
 
 
-def _grazes_rigid(point: BranchPoint, least: float, most: float) -> StopReason | None:
+def grazes_rigid(
+    orbit: Orbit, least: float, most: float, but: Callable[[int, float], bool] | None = None
+) -> StopReason | None:
     """The reason to stop, if the slightest impact with a rigid stop, or nearest miss, is so deep.
 
-    Both bounds are shares of the orbit's size.
+    Both bounds are shares of the orbit's size; `but` is as for `rigid_grazing`.
     """
-    found = rigid_grazing(point.orbit)
-    if found is None or not least < found[2] / length_unit(point.orbit) < most:
+    found = rigid_grazing(orbit, but)
+    if found is None or not least < found[2] / length_unit(orbit) < most:
         return None
-    return Ending.GRAZES_RIGID.told(hz=f"{point.orbit.frequency_hz:.9g}")
+    return Ending.GRAZES_RIGID.told(hz=f"{orbit.frequency_hz:.9g}")
 
 
 def loses_impact(orbit: Orbit) -> bool:
@@ -183,7 +185,8 @@ class Stepper:
             here, step, behind = self.stride.here, self.stride.step, self.stride.behind
             attempt = self._shortened(problem, behind, here, step)
             if attempt is None:
-                self.stop_reason = _grazes_rigid(here, -GRAZES, GRAZES) or Ending.SHORT_STEP.told(
+                grazes = grazes_rigid(here.orbit, -GRAZES, GRAZES)
+                self.stop_reason = grazes or Ending.SHORT_STEP.told(
                     step=f"{self.options.min_step:g}", obstacle=self._obstacle
                 )
                 return
@@ -209,7 +212,7 @@ class Stepper:
                 )
                 yield end
                 return
-            grazes = _grazes_rigid(point, 0.0, SLIGHTEST)
+            grazes = grazes_rigid(point.orbit, 0.0, SLIGHTEST)
             if grazes:
                 self.stop_reason = grazes
                 yield point
@@ -299,14 +302,14 @@ class Stepper:
         self._obstacle = "what Newton's method finds is not the next point of the branch"
         if _jumped(problem, here.orbit.point, straight, found.point):
             return None
-        if loses_impact(Orbit.of(problem, found, here.orbit.observe)):
+        orbit = Orbit.of(problem, found, here.orbit.observe)
+        if loses_impact(orbit):
             return None
         miss = metric_length(weights, found.point - cubic) / step
         # a linear stop that is touched bends the branch; a force that jumps does where the phase of
         # a switch passes one of shooting, as the state there has a corner
         if step <= KINK and miss < 1.0:
-            orbit = Orbit.of(problem, found, here.orbit.observe)
-            if orbit.impacts != here.orbit.impacts and _grazes_rigid(here, -GRAZES, GRAZES):
+            if orbit.impacts != here.orbit.impacts and grazes_rigid(here.orbit, -GRAZES, GRAZES):
                 return None  # the branch with the impact and that without meet in a corner
             if problem.flow.system.jumps or orbit.impacts != here.orbit.impacts:
                 tangent = problem.tangent(found, direction)
@@ -323,7 +326,6 @@ class Stepper:
         angle = math.acos(min(max(cosine, -1.0), 1.0))
         if angle > self.options.max_angle:
             return None
-        orbit = Orbit.of(problem, found, here.orbit.observe)
         if step > self.options.grazing_step and orbit.impacts != here.orbit.impacts:
             return None
         meets = passed_flip(here.orbit, orbit)

@@ -23,7 +23,7 @@ from nldyn.orbits.conditions import MONITORS, Held, driving_source
 from nldyn.orbits.orbit import Orbit, check_observe
 from nldyn.orbits.shooting import shooting_problem
 from nldyn.system.chart import FREQUENCY, Chart
-from nldyn.system.parameters import SOURCES, Parameter
+from nldyn.system.parameters import Parameter, strength_name
 from nldyn.system.system import System, same_system
 
 SAMPLES = 512  # of a free motion, as a guess
@@ -96,8 +96,7 @@ def phase_resonance(
         raise SystemModelError(
             "phase resonance is not followed against rigid stops: give one a high stiffness"
         )
-    name = next(name for name in SOURCES if hasattr(source, name))
-    strength = Parameter(name, index)
+    strength = Parameter(strength_name(source), index)
     if not same_system(start.system, flow.system):
         charts = Chart.of(Parameter(FREQUENCY), range_hz), Chart.of(strength, amplitudes)
         start = _forced(flow, start, charts)
@@ -169,8 +168,7 @@ def strength_of(system: System, free: Orbit) -> float:
     if not reached > 0.0:
         raise SystemModelError(f"the free motion does not move '{source.at}', where the force acts")
     force = 2.0 * taken / (free.omega * reached)
-    name = next(name for name in SOURCES if hasattr(source, name))
-    unit: dict[str, Any] = {name: 1.0}
+    unit: dict[str, Any] = {strength_name(source): 1.0}
     return force / (abs(replace(source, **unit).phasor) * free.omega**source.power)
 
 

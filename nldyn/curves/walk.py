@@ -13,8 +13,7 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError
 from nldyn.bifurcations.period_doubling import passed_flip
-from nldyn.bifurcations.touching import rigid_grazing
-from nldyn.branches.arclength import GRAZES, SLIGHTEST, loses_impact
+from nldyn.branches.arclength import GRAZES, SLIGHTEST, grazes_rigid, loses_impact
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.options import ContinuationOptions
 from nldyn.curves.events import codimension_tests, cosine_near, is_torus, torus_cosine
@@ -26,7 +25,6 @@ from nldyn.orbits.bordered import (
     Free,
     correct,
     gradient,
-    length_unit,
     nearest_depth,
     tangent_surface,
 )
@@ -397,10 +395,7 @@ def _grazes_rigid(here: CurvePoint, least: float, most: float) -> StopReason | N
         def but(stop: int, phase: float) -> bool:
             return condition.is_of(stop, True, phase, orbit.period)
 
-    found = rigid_grazing(orbit, but)
-    if found is None or not least < found[2] / length_unit(orbit) < most:
-        return None
-    return Ending.GRAZES_RIGID.told(hz=f"{orbit.frequency_hz:.9g}")
+    return grazes_rigid(orbit, least, most, but)
 
 
 @dataclass

@@ -135,7 +135,7 @@ def rests_on_rigid_stop(motion: Trajectory) -> bool:
     """Whether a body rests on a rigid stop for a while in a motion."""
     stops = motion.flow.system.stops
     rigid = [i for i, stop in enumerate(stops) if isinstance(stop, RigidStop)]
-    return bool(motion.record.depth[:, rigid].any())
+    return bool(rigid) and bool(motion.record.depth[:, rigid].any())
 
 
 def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:

@@ -230,20 +230,9 @@ class Evaluation:
 
     def _shot(self, sensitivities: bool, parameters: Sequence[Parameter] = ()) -> Segments:
         problem, passage = self.problem, self.family.passage
-        if passage is not None:
-            return shoot_past(
-                problem, passage, self.nodes, problem.phases, self.omega, sensitivities, parameters
-            )
-        found = problem.flow.shoot(
-            self.nodes,
-            problem.phases,
-            self.omega,
-            sensitivities=sensitivities,
-            parameters=parameters,
+        return shoot_past(
+            problem, passage, self.nodes, problem.phases, self.omega, sensitivities, parameters
         )
-        if found.failure:
-            raise ConvergenceError(found.failure)
-        return found
 
     def _back(self, ends: Real) -> Real:
         """Vectors (k, 2n) in the coordinates of the family's system."""
@@ -334,13 +323,7 @@ def _carried(
 ) -> Real:
     """State (2n,) at a later phase."""
     phases = np.array([first, last])
-    if passage is None:
-        found = problem.flow.shoot(state[None], phases, omega, sensitivities=False)
-    else:
-        found = shoot_past(problem, passage, state[None], phases, omega, False)
-    if found.failure:
-        raise ConvergenceError(found.failure)
-    return np.asarray(found.ends[0])
+    return np.asarray(shoot_past(problem, passage, state[None], phases, omega, False).ends[0])
 
 
 class Condition(Protocol):

@@ -264,13 +264,14 @@ class Grazing:
 
     def value(self, at: Evaluation) -> Real:
         """Depth of the extreme, shape (1,)."""
-        if self.half:
-            return np.array([self._past(at)[1] / self.unit - self.depth + CLEAR])
-        return np.array([self.extreme(at.orbit)[1] / self.unit - self.depth])
+        clear = CLEAR if self.half else 0.0
+        return np.array([self._reached(at)[1] / self.unit - self.depth + clear])
 
-    def _past(self, at: Evaluation) -> tuple[float, float]:
-        """Phase and depth of the extreme beyond a rigid stop."""
-        passage = Passage(self.stop, self.phase, self.half, self.every)
+    def _reached(self, at: Evaluation) -> tuple[float, float]:
+        """Phase and depth of the extreme, also beyond a rigid stop."""
+        passage = self.passage
+        if passage is None:
+            return self.extreme(at.orbit)
         return peak_past(at.problem, passage, at.nodes, at.omega)
 
     def reach(self, at: Evaluation) -> float:
@@ -279,10 +280,8 @@ class Grazing:
 
     def renewed(self, at: Evaluation) -> Grazing:
         """The same with the phase of another orbit."""
-        unit = length_unit(at.orbit)
-        if self.half:
-            return replace(self, phase=self._past(at)[0], unit=unit)._beside(at.orbit)
-        return replace(self, phase=self.extreme(at.orbit)[0], unit=unit)
+        renewed = replace(self, phase=self._reached(at)[0], unit=length_unit(at.orbit))
+        return renewed._beside(at.orbit) if self.half else renewed
 
     def is_of(self, stop: int, is_maximum: bool, phase: float, period: int) -> bool:
         """Whether an extreme near a phase is this one."""

@@ -85,14 +85,15 @@ class Passage:
 
 def shoot_past(
     problem: ShootingProblem,
-    passage: Passage,
+    passage: Passage | None,
     nodes: Real,
     phases: Real,
     omega: float,
     sensitivities: bool,
     parameters: Sequence[Parameter] = (),
 ) -> Segments:
-    """What `FlowMap.shoot` gives for states (k, 2n) at phases (k + 1,) of a problem, past a stop.
+    """What `FlowMap.shoot` gives for states (k, 2n) at phases (k + 1,), past a stop if there is a
+    passage.
 
     Raises
     ------
@@ -100,6 +101,8 @@ def shoot_past(
         If the flow map fails.
     """
     flow = problem.flow
+    if passage is None:
+        return _shot(flow, nodes, phases, omega, sensitivities, parameters)
     open_flow = passage.opened(flow, float(np.abs(nodes).max()))
     found = []
     for node, first, last in zip(nodes, phases[:-1].tolist(), phases[1:].tolist(), strict=True):
@@ -117,6 +120,21 @@ def shoot_past(
     )
 
 
+def _shot(
+    flow: FlowMap,
+    nodes: Real,
+    phases: Real,
+    omega: float,
+    sensitivities: bool,
+    parameters: Sequence[Parameter],
+) -> Segments:
+    """What `FlowMap.shoot` gives, unless it fails."""
+    found = flow.shoot(nodes, phases, omega, sensitivities=sensitivities, parameters=parameters)
+    if found.failure:
+        raise ConvergenceError(found.failure)
+    return found
+
+
 def _chained(
     open_flow: FlowMap,
     flow: FlowMap,
@@ -130,15 +148,8 @@ def _chained(
     """One segment, piece by piece."""
     whole: Segments | None = None
     for first, last, inside in zip(phases[:-1], phases[1:], within, strict=True):
-        piece = (open_flow if inside else flow).shoot(
-            node[None],
-            np.array([first, last]),
-            omega,
-            sensitivities=sensitivities,
-            parameters=parameters,
-        )
-        if piece.failure:
-            raise ConvergenceError(piece.failure)
+        across, phases_here = open_flow if inside else flow, np.array([first, last])
+        piece = _shot(across, node[None], phases_here, omega, sensitivities, parameters)
         node = piece.ends[0]
         if whole is None:
             whole = piece
@@ -172,10 +183,7 @@ def peak_past(
     j = min(int(np.searchsorted(phases, begin, side="right")) - 1, problem.segments - 1)
     state = nodes[j]
     if begin > phases[j]:
-        found = flow.shoot(state[None], np.array([phases[j], begin]), omega, sensitivities=False)
-        if found.failure:
-            raise ConvergenceError(found.failure)
-        state = found.ends[0]
+        state = _shot(flow, state[None], np.array([phases[j], begin]), omega, False, ()).ends[0]
     open_flow = passage.opened(flow, float(np.abs(nodes).max()))
     motion = open_flow.trajectory(state[None], np.array([begin, begin + 2.0 * passage.half]), omega)
     if motion.failure:

@@ -11,16 +11,18 @@ import numpy as np
 import cms
 from nldyn.base.resources import example
 from nldyn.branches.branch import Branch
+from nldyn.branches.continuation import continue_branch
 from nldyn.branches.options import ContinuationOptions
 from nldyn.branches.predictor import predicted
 from nldyn.flow.flow_map import Trajectory, flow_of
 from nldyn.longterm.attractors import AttractorOptions, classify
 from nldyn.orbits.multipliers import floquet_spectrum
 from nldyn.orbits.orbit import check_observe
+from nldyn.orbits.solve import solve_orbit
 from nldyn.orbits.starts import orbit_near
 from nldyn.paper.kept import kept_diagram
 from nldyn.paper.starts import LOST, is_at, keep_numbers, read_starts
-from nldyn.paper.workers import Task
+from nldyn.paper.workers import Task, side_by_side
 from nldyn.runtime.compilation import compilations
 from nldyn.runtime.progress import Progress, silent
 from nldyn.scene.build import build_system
@@ -296,11 +298,18 @@ def _joined(parts: Sequence[Diagram]) -> Diagram:
     )
 
 
+def compile_all(quiet: bool) -> None:
+    """Compile the kernels once, for all processes, in two."""
+    side_by_side((compile_kernels, compile_beside), quiet)
+
+
 def compile_kernels(quiet: bool = False) -> None:
-    """Compute a little of all kinds, so that the kernels are compiled once, for all processes."""
+    """Compute a little of all kinds, so that the kernels are compiled."""
     with compilations.silenced(quiet):
         system = scene_system("one_dof")
         diagram(system, (33.0, 34.5), (1, 2), search_points=1)
+        two = scene_system("two_dof_xi_0.01")  # has pairs of multipliers, which one mode has not
+        continue_branch(solve_orbit(two, 30.0), (29.5, 30.5))
         classify(system, 36.0, options=AttractorOptions(periods=32))
 
 

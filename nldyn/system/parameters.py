@@ -15,9 +15,14 @@ OF_SPRINGS = tuple(f"k{power}" for power in range(1, LARGEST_DEGREE + 1))
 SOURCES = ("amplitude", "mass_times_radius", "force")
 
 
+def strength_name(source: Excitation) -> str:
+    """Name of the number that says how strong a source of excitation is."""
+    return next(name for name in SOURCES if hasattr(source, name))
+
+
 def strength(source: Excitation) -> float:
     """How strong a source of excitation is, in the unit of its kind."""
-    return float(next(getattr(source, name) for name in SOURCES if hasattr(source, name)))
+    return float(getattr(source, strength_name(source)))
 
 
 @dataclass(frozen=True)
