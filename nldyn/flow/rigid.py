@@ -40,6 +40,14 @@ class RigidImpacts(NamedTuple):
         return (self.speed + self.rebound) / mobility
 
 
+def states_before(motion: Trajectory, pieces: NDArray[np.intp]) -> Real:
+    """States z (k, 2n) at the ends of what comes before some pieces of a motion.
+
+    Those of the record: solved anew, an impact may come a rounding earlier, and be over.
+    """
+    return motion.recorded_states(np.nextafter(motion.record.phase[pieces], -math.inf))
+
+
 def rigid_impacts(motion: Trajectory, stop: int) -> RigidImpacts:
     """The impacts of a motion with one of its rigid stops.
 
@@ -50,7 +58,7 @@ def rigid_impacts(motion: Trajectory, stop: int) -> RigidImpacts:
     after = 1 + np.flatnonzero(np.isin(rec.event[:-1], np.flatnonzero(rigid)))
     if not after.size:
         return RigidImpacts(after, *np.empty((3, 0)))
-    before = motion.states(np.nextafter(rec.phase[after], -math.inf))
+    before = states_before(motion, after)
     row, rate = flow.rows[stop], flow.rate_rows[stop]
     gap = flow.system.stops[stop].gap
     depth = rec.start[after] @ row - gap
@@ -74,7 +82,7 @@ def impacts_in_order(motion: Trajectory) -> list[tuple[int, float]]:
     listed = [(stop, speed) for piece, stop, speed in hits if piece not in several]
     mobility = flow.rate_rows @ flow._data.force[:, : len(system.stops)]
     for piece in several:
-        before = motion.states(np.nextafter(motion.record.phase[[piece]], -math.inf))[0]
+        before = states_before(motion, np.array([piece]))[0]
         speeds = flow.rate_rows @ before
         shut = [stop for other, stop, _ in hits if other == piece]
         while True:

@@ -650,6 +650,10 @@ def contact_panel(
             elif -0.5 * h < dh < h and (dh < 0.0 or h < h_max):
                 h = min(h + dh, h_max)
                 continue
+            elif event < 0 and dh == np.inf and not closed[aim] and h < 1e-2 * tried:
+                keep_profile(fl, tab, kind, kind, 10.0, panel, guess)  # it is farther off than seen
+                h *= 10.0
+                continue
             elif dh > 0.0 and fine:  # the contact goes on
                 return OK, kind, h, -1
         elif fine and not lost:

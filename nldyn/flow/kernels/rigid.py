@@ -30,6 +30,7 @@ from nldyn.flow.kernels.panel import between, lu_apply, lu_apply_vector, lu_fact
 ROUNDS = 100  # of impacts within one instant with restitution; then without
 SHUT = 10.0  # roundings of a gap that is shut, and of a rate that is none
 AT_START = 1e5  # the same at the start of a segment, whose state is known less well
+SLOW = 1e-7  # share of the first speed below which impacts of one instant are no longer told apart
 LOW = 10.0  # a body that would rebound no higher than this many roundings of the gap stays
 
 
@@ -129,16 +130,21 @@ def impact(fl, first, crossed, phase, t, closed, closings, bounces, with_columns
     Sensitivities change by the saltation [Aizerman and Gantmacher 1958; Müller 1995]: an earlier
     instant, by τ, is seen with the rates before it, the jump is differentiated, and the rates after
     it lead back. Of several impacts each has an instant of its own, which moves with its own gap:
-    they stay in this order.
+    they stay in this order. A body at rest on a stop strikes it at the very instant at which
+    another impact drives it on.
     """
     never_inline()
     n = columns.shape[1] if with_columns else 0
     shift = np.zeros(n)
     forces, pushes = contact_forces(fl, w, phase, closed)
     struck = np.zeros(closed.size, dtype=np.bool_)
+    still, fastest = closed.copy(), 0.0
     for step in range(10 * ROUNDS):
         hit, speed = hit_stop(fl, w, phase, first if step == 0 else -1, SHUT)
         moves = hit if step > 0 else first
+        fastest = max(fastest, speed)
+        if step > 0 and hit >= 0 and (still[hit] or speed < SLOW * fastest):
+            moves = -1
         if with_columns and crossed and moves >= 0:
             if step > 0:
                 forces, _ = contact_forces(fl, w, phase, closed)
@@ -153,6 +159,8 @@ def impact(fl, first, crossed, phase, t, closed, closings, bounces, with_columns
             restitution, slope = 0.0, 0.0
         strike(fl, hit, speed, restitution, slope, phase, t, shift, with_columns, w, columns)
         struck[hit] = True
+        still[hit] = restitution == 0.0
+        leave_parting(fl, w, phase, still)
         bounces[hit] += 1
         closings[hit] += 1
     settle(fl, first, phase, t, shift, SHUT, closed, struck, with_columns, w, columns)
@@ -163,6 +171,15 @@ def impact(fl, first, crossed, phase, t, closed, closings, bounces, with_columns
     if with_columns:
         forces, _ = contact_forces(fl, w, phase, closed)
         move(columns, state_rate(fl, w, forces), -shift)
+
+
+@inner
+def leave_parting(fl, w, phase, still):
+    """Leave out of the stops on which a body is at rest those that it parts from."""
+    for s in range(still.size):
+        if still[s]:
+            _, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
+            still[s] = speed >= -SHUT * rate_noise(fl, s, w)
 
 
 @allocating
