@@ -11,7 +11,6 @@ import math
 import os
 import sys
 import time
-import tomllib
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -56,6 +55,9 @@ mesh_option = click.option(
     type=any_path,
     metavar="DIR",
     help="Folder from which the mesh may come, beside those of the scene and the current one.",
+)
+replace_option = click.option(
+    "--replace", is_flag=True, help="Replace results of another scene in DIR."
 )
 quiet_option = click.option("--quiet", is_flag=True, help="Show no progress.")
 jobs_option = click.option(
@@ -180,7 +182,7 @@ def main() -> None:
 @out_option
 @mesh_option
 @click.option("--log", is_flag=True, help="Draw the displacement on a logarithmic axis.")
-@click.option("--replace", is_flag=True, help="Replace results of another scene in DIR.")
+@replace_option
 @json_option
 @quiet_option
 @jobs_option
@@ -200,14 +202,11 @@ def run(
     """
     with plain_errors():
         from nldyn.runtime.progress import progress_line
-        from nldyn.runtime.result_directory import check_directory
         from nldyn.scene.read import load_scene
 
         start = time.perf_counter()
         loaded = load_scene(scene, mesh_folders)
-        check_directory(out)
-        if not replace:
-            check_same_scene(out, loaded)
+        check_results(out, loaded, replace)
         from nldyn.io.checkpoint import CheckpointFile
         from nldyn.report.again import drawn_of
         from nldyn.report.results import write_results
@@ -307,11 +306,11 @@ def report(
     with plain_errors():
         from nldyn.report.again import report_again
         from nldyn.runtime.progress import progress_line
-        from nldyn.runtime.result_directory import OutputError
+        from nldyn.runtime.result_directory import OutputError, says_something_else
         from nldyn.scene.read import load_scene
 
         loaded = None if scene is None else load_scene(scene, mesh_folders)
-        if loaded is not None and says_something_else(directory, loaded, ("title", "mesh")):
+        if loaded is not None and says_something_else(directory, loaded.text, ("title", "mesh")):
             raise OutputError(f"{scene}: says something else than {directory / 'scene.toml'}")
         with progress_line(quiet) as line:
             notes = report_again(directory, loaded, mesh_folders, line)
@@ -414,6 +413,7 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
     help="Directory for the table, the picture and the page for a browser; else only a table.",
 )
 @mesh_option
+@replace_option
 @drawn_modes_option
 @view_option
 @click.option(
@@ -429,6 +429,7 @@ def modes(
     scene: Path,
     out: Path | None,
     mesh_folders: tuple[Path, ...],
+    replace: bool,
     modes: list[int] | None,
     view: str,
     against: Path | None,
@@ -445,14 +446,13 @@ def modes(
         from nldyn.report.modes import check_modes, mode_table
         from nldyn.report.render import render_modes_of
         from nldyn.runtime.progress import messages_shown
-        from nldyn.runtime.result_directory import check_directory
         from nldyn.scene.build import build_structure
         from nldyn.scene.read import load_scene
 
         loaded = load_scene(scene, mesh_folders)
         other = None if against is None else load_scene(against, mesh_folders)
         if out is not None:
-            check_directory(out)
+            check_results(out, loaded, replace)
         compared = None
         with messages_shown():
             structure = build_structure(loaded)
@@ -505,6 +505,7 @@ def open_page(page: Path) -> None:
 @scene_argument
 @out_option
 @mesh_option
+@replace_option
 @click.option(
     "--mode",
     type=click.IntRange(1, 100_000),
@@ -529,6 +530,7 @@ def backbone(
     scene: Path,
     out: Path,
     mesh_folders: tuple[Path, ...],
+    replace: bool,
     mode: int,
     amplitude_m: float,
     forced: bool,
@@ -541,11 +543,10 @@ def backbone(
     """
     with plain_errors():
         from nldyn.runtime.progress import progress_line
-        from nldyn.runtime.result_directory import check_directory
         from nldyn.scene.read import load_scene
 
         loaded = load_scene(scene, mesh_folders)
-        check_directory(out)
+        check_results(out, loaded, replace)
         from nldyn.report.backbone import write_backbone
         from nldyn.scene.backbone import backbone_of, phase_resonance_of
 
@@ -583,6 +584,7 @@ def print_json(content: Mapping[str, object]) -> None:
 @scene_argument
 @out_option
 @mesh_option
+@replace_option
 @drawn_modes_option
 @view_option
 @click.option(
@@ -611,6 +613,7 @@ def render(
     scene: Path,
     out: Path,
     mesh_folders: tuple[Path, ...],
+    replace: bool,
     modes: list[int] | None,
     view: str,
     frequency_hz: float | None,
@@ -628,11 +631,10 @@ def render(
         raise click.UsageError("'--period' needs '--frequency-hz'")
     with plain_errors():
         from nldyn.runtime.progress import progress_line
-        from nldyn.runtime.result_directory import check_directory
         from nldyn.scene.read import load_scene
 
         loaded = load_scene(scene, mesh_folders)
-        check_directory(out)
+        check_results(out, loaded, replace)
         from fem.gl import RenderError
         from nldyn.report.render import render_scene
 
@@ -670,6 +672,7 @@ def render(
 @scene_argument
 @out_option
 @mesh_option
+@replace_option
 @click.option(
     "--modes",
     callback=number_list,
@@ -703,6 +706,7 @@ def converge(
     scene: Path,
     out: Path,
     mesh_folders: tuple[Path, ...],
+    replace: bool,
     modes: list[int] | None,
     methods: str,
     refinements: list[int] | None,
@@ -718,11 +722,10 @@ def converge(
     """
     with plain_errors():
         from nldyn.runtime.progress import progress_line
-        from nldyn.runtime.result_directory import check_directory
         from nldyn.scene.read import load_scene
 
         loaded = load_scene(scene, mesh_folders)
-        check_directory(out)
+        check_results(out, loaded, replace)
         from nldyn.report.convergence import write_study
         from nldyn.scene.convergence import convergence_study_of
 
@@ -738,9 +741,10 @@ def converge(
                 progress=report,
                 jobs=jobs,
             )
-        write_study(study, out, loaded.title)
+        write_study(study, out, loaded.title, loaded.text)
         click.echo(study.report())
-        click.echo(f"written to {out}")
+        page = out / "convergence.html"
+        click.echo(f"written to {out}; {page} is a page for a browser")
 
 
 @main.command()
@@ -763,28 +767,19 @@ def paper(out: Path, atlas: bool, jobs: int, quiet: bool) -> None:
                 nldyn.paper.main(out, jobs, quiet=quiet)
 
 
-def check_same_scene(out: Path, scene: Scene) -> None:
-    """Refuse a directory with the results of another scene: titles and comments do not count."""
-    from nldyn.runtime.result_directory import OutputError
+def check_results(out: Path, scene: Scene, replace: bool) -> None:
+    """Refuse a directory that cannot be written, or, unless wanted, with another scene's results.
 
-    if says_something_else(out, scene, ("title",)):
+    Titles and comments do not count.
+    """
+    from nldyn.runtime.result_directory import OutputError, check_directory, says_something_else
+
+    check_directory(out)
+    if not replace and says_something_else(out, scene.text):
         raise OutputError(
             f"{out}: holds the results of a scene that says something else; choose another "
             "directory, or replace them with --replace"
         )
-
-
-def says_something_else(out: Path, scene: Scene, apart_from: tuple[str, ...]) -> bool:
-    """Whether a scene differs from the copy in a directory of results, if there is one."""
-
-    def asked(text: str) -> dict[str, object]:
-        return {key: value for key, value in tomllib.loads(text).items() if key not in apart_from}
-
-    try:
-        before = asked((out / "scene.toml").read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError):
-        return False
-    return before != asked(scene.text)
 
 
 def describe(diagram: Diagram, seconds: float, out: Path) -> str:

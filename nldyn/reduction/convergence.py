@@ -259,7 +259,57 @@ class ConvergenceStudy:
         for model in self.models:
             notes.setdefault(model.note, []).append(f"{model.label}, {counted_modes(model)}")
         lines += [f"note: {'; '.join(names)}: {note}" for note, names in notes.items() if note]
-        return "\n".join(lines)
+        return "\n".join(lines + self.advice())
+
+    def advice(self, tolerance: float = 0.01) -> list[str]:
+        """How many modes suffice, one sentence for each mesh and method with several counts.
+
+        A number of modes suffices if with it, and with every larger one of the study, the linear
+        receptance and what is told of the harmonic branch, its contacts included, differ by less
+        than the tolerance from the reference. Eigenfrequencies are left out: those of residual
+        modes are none of the structure.
+
+        Parameters
+        ----------
+        tolerance : float
+            Relative difference that is small enough.
+        """
+        return [
+            self._advised(label, indices, tolerance)
+            for label, indices in self.series().items()
+            if len(indices) > 1
+        ]
+
+    def _advised(self, label: str, indices: Sequence[int], tolerance: float) -> str:
+        told = [
+            quantity
+            for quantity in QUANTITIES
+            if quantity != "eigenfrequency"
+            and any(np.isfinite(getattr(self.errors[i], quantity)) for i in indices)
+        ]
+        found = {quantity: self.enough(quantity, tolerance, indices) for quantity in told}
+        lacking = [QUANTITIES[quantity] for quantity, model in found.items() if model is None]
+        share = f"{100 * tolerance:g} %"
+        if lacking:
+            wrong = ", ".join(lacking)
+            return f"advice: {label}: no count of this study suffices for {share} in {wrong}"
+        modes = {quantity: model.modes for quantity, model in found.items() if model}
+        last, most = max(modes.items(), key=lambda each: each[1])
+        first = next(self.models[i] for i in indices if self.models[i].modes == most)
+        said = (
+            f"advice: {label}: {counted_modes(first)} suffice{'s' if most == 1 else ''} for "
+            f"{share} in {', '.join(QUANTITIES[quantity] for quantity in told)}"
+        )
+        if len(set(modes.values())) > 1:
+            said += f", of which {QUANTITIES[last]} needs most"
+        same = self.same_special_points(indices)
+        if same is None:
+            said += "; no count has exactly the folds and flips of the reference"
+        elif same.modes > most:
+            said += f"; for the same folds and flips as the reference {counted_modes(same)}"
+        if not self.is_exact(self.best) and self.best.modes < 2 * most:
+            said += f". To be sure, repeat with up to {2 * most} modes"
+        return said
 
     def shown(self, index: int, quantity: str) -> str:
         """An error in the table: "-" if unknown, "ref" if that of the reference itself."""
@@ -313,7 +363,19 @@ class ConvergenceStudy:
         self, label: str, indices: Sequence[int], size: Callable[[Measured], str]
     ) -> list[str]:
         """From what size on a series has exactly the reference's folds and flips."""
-        found: Measured | None = None
+        if all(self.models[index].special_hz is None for index in indices):
+            return []
+        found = self.same_special_points(indices)
+        if found is None:
+            return [f"{label}: no model has the same folds and flips as the reference"]
+        return [f"{label}: the same folds and flips as the reference from {size(found)}"]
+
+    def same_special_points(self, indices: Sequence[int]) -> Measured | None:
+        """First model of a series from which on there are exactly the reference's special points.
+
+        As for `enough`, the reference itself proves nothing unless it is exact.
+        """
+        found = None
         followed = [index for index in indices if self.models[index].special_hz is not None]
         for index in reversed(followed):
             if self.is_own_reference(index, "fold_flip"):
@@ -321,11 +383,7 @@ class ConvergenceStudy:
             if self.errors[index].counts != (0, 0):
                 break
             found = self.models[index]
-        if not followed:
-            return []
-        if found is None:
-            return [f"{label}: no model has the same folds and flips as the reference"]
-        return [f"{label}: the same folds and flips as the reference from {size(found)}"]
+        return found
 
 
 def counted_modes(model: Measured) -> str:

@@ -13,7 +13,8 @@ import numpy as np
 from nldyn.base.errors import SceneError, SystemModelError
 from nldyn.branches.branch import Branch
 from nldyn.io.store import load
-from nldyn.report.page import Drawn, Table, write_page
+from nldyn.report.offline import Table
+from nldyn.report.page import Drawn, write_page
 from nldyn.report.results import FILES, summary, tables_of
 from nldyn.runtime.progress import Progress, silent
 from nldyn.runtime.result_directory import OutputError, result_directory

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -11,28 +11,23 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from nldyn.plot.diagram import MARKERS, PERIOD_COLOURS, new_axes, save_figure
-from nldyn.reduction.convergence import (
-    QUANTITIES,
-    ConvergenceStudy,
-    contact_time,
-    counted_modes,
-    largest_force,
-)
-from nldyn.report.results import if_known, write_table
+from nldyn.reduction.convergence import QUANTITIES, ConvergenceStudy, counted_modes
+from nldyn.report.convergence_page import write_study_page
+from nldyn.report.convergence_tables import study_tables
+from nldyn.report.results import write_table
 from nldyn.runtime.result_directory import result_directory
 
-COLUMNS = (
-    "label", "dofs", "modes", "size", "peak_hz", "peak_m", "force_n", "contact_s", "folds", "flips",
-    "seconds_per_orbit", "branch_seconds",
-    *(f"{quantity}_error" for quantity in QUANTITIES), "missing", "extra", "note",
-)  # fmt: skip
 SMALLEST = 1e-14
 
 Series = Mapping[str, Sequence[int]]
 
 
-def write_study(study: ConvergenceStudy, directory: str | Path, title: str = "") -> Path:
-    """Write ``convergence.csv``, ``special_points_by_model.csv``, ``report.txt`` and pictures.
+def write_study(
+    study: ConvergenceStudy, directory: str | Path, title: str = "", text: str = ""
+) -> Path:
+    """Write ``convergence.html``, a page for a browser, tables, ``report.txt`` and pictures.
+
+    With the text of the scene also ``scene.toml``.
 
     Raises
     ------
@@ -40,12 +35,12 @@ def write_study(study: ConvergenceStudy, directory: str | Path, title: str = "")
         If the directory holds only other people's files or cannot be written.
     """
     with result_directory(directory, "converge") as folder:
-        write_table(folder / "convergence.csv", COLUMNS, model_rows(study))
-        write_table(
-            folder / "special_points_by_model.csv",
-            ("label", "modes", "type", "frequency_hz"),
-            special_rows(study),
-        )
+        tables = study_tables(study)
+        write_table(folder / "convergence.csv", *tables["models"])
+        write_table(folder / "special_points_by_model.csv", *tables["folds and flips"])
+        write_study_page(study, folder / "convergence.html", tables, title, text)
+        if text:
+            (folder / "scene.toml").write_text(text, encoding="utf-8")
         (folder / "report.txt").write_text(study.report() + "\n", encoding="utf-8")
         if counts_vary(study):
             save_figure(plot_errors(study, title), folder / "convergence")
@@ -59,38 +54,6 @@ def write_study(study: ConvergenceStudy, directory: str | Path, title: str = "")
 def counts_vary(study: ConvergenceStudy) -> bool:
     """Whether there are models that differ in nothing but their number of modes."""
     return any(len(indices) > 1 for indices in study.series().values())
-
-
-def model_rows(study: ConvergenceStudy) -> Iterator[tuple[object, ...]]:
-    """Rows of ``convergence.csv``, empty where nothing is known; the reference comes last."""
-    for model, error in zip(study.models, study.errors, strict=True):
-        peak, orbit, special = model.peak, model.orbit, model.special_hz
-        row = (
-            model.label,
-            model.dofs,
-            model.modes,
-            model.size,
-            peak.frequency_hz if peak else math.nan,
-            peak.max_abs_displacement if peak else math.nan,
-            largest_force(orbit) if orbit else math.nan,
-            contact_time(orbit) if orbit else math.nan,
-            len(special["LP"]) if special else "",
-            len(special["PD"]) if special else "",
-            model.seconds_per_orbit,
-            model.seconds,
-            *(getattr(error, quantity) for quantity in QUANTITIES),
-            *(error.counts or ("", "")),
-            model.note,
-        )
-        yield tuple(map(if_known, row))
-
-
-def special_rows(study: ConvergenceStudy) -> Iterator[tuple[object, ...]]:
-    """Rows of ``special_points_by_model.csv``."""
-    for model in study.models:
-        for kind, places in (model.special_hz or {}).items():
-            for hz in places:
-                yield model.label, model.modes, kind, hz
 
 
 def plot_errors(study: ConvergenceStudy, title: str = "") -> Axes:

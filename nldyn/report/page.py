@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 import html
-import json
-import platform
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 import numpy.typing as npt
-from plotly.offline import get_plotlyjs
 
-from nldyn.base.version import software_version
 from nldyn.branches.branch import Branch
 from nldyn.plot.diagram import (
     MARKER_NAMES,
@@ -30,6 +23,7 @@ from nldyn.plot.diagram import (
     stability_runs,
 )
 from nldyn.report.deflection import surface_content
+from nldyn.report.offline import Table, as_table, versions, write_html
 from nldyn.report.orbit_content import (
     ChosenOrbit,
     chosen_orbits,
@@ -48,12 +42,8 @@ if TYPE_CHECKING:
     from nldyn.orbits.orbit import Orbit
     from nldyn.scene.schema import Scene
 
-TEMPLATE = Path(__file__).with_name("page.html")
 MOST_POINTS = 10_000  # of all branches together that are drawn and listed
 LINE = 62  # letters in a line of what is shown at the pointer
-PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "plotly")
-
-Table = tuple[Sequence[str], Sequence[Sequence[object]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,30 +98,7 @@ def write_page(
         Scale of the displacement axis at first.
     """
     content = page_content(diagram, tables, summary, scene, drawn, notes, yscale)
-    template = TEMPLATE.read_text(encoding="utf-8")
-    before, rest = template.replace("__TITLE__", html.escape(content["title"])).split("__PLOTLY__")
-    between, after = rest.split("__DATA__")
-    script = get_plotlyjs().replace("</script", "<\\/script")
-    path.write_text("".join([before, script, between, packed(content), after]), encoding="utf-8")
-
-
-def packed(content: Mapping[str, Any]) -> str:
-    """The content of a page as JSON, compressed by gzip, in base64; the same on every run."""
-    text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return base64.b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode("ascii")
-
-
-def unpacked(page: str) -> dict[str, Any]:
-    """The content of a page that `write_page` wrote, from its text.
-
-    Examples
-    --------
-    >>> unpacked('<script id="data" type="text/plain">' + packed({"unit": "mm"}) + "</script>")
-    {'unit': 'mm'}
-    """
-    data = page.split('<script id="data" type="text/plain">')[1].split("<")[0]
-    found: dict[str, Any] = json.loads(gzip.decompress(base64.b64decode(data)))
-    return found
+    write_html(path, "page.html", content)
 
 
 def page_content(
@@ -171,7 +138,7 @@ def page_content(
             "points": as_table(kept_rows(tables["points"], branches, kept)),
         },
         "errors": error_table(diagram, tables, summary, orbits),
-        "versions": [["nldyn", software_version()], *versions()],
+        "versions": versions(),
         "system": repr(branches[0].points[0].system) if branches else "",
         "scene": scene.text if scene else "",
     }
@@ -363,17 +330,6 @@ def thinned(values: np.ndarray[Any, Any], step: int) -> np.ndarray[Any, Any]:
     return values if step == 1 else np.append(values[:-1:step], values[-1])
 
 
-def as_table(table: Table) -> dict[str, Any]:
-    """A table for JSON."""
-    columns, rows = table
-    return {"columns": list(columns), "rows": [list(map(plain, row)) for row in rows]}
-
-
-def plain(value: object) -> object:
-    """A cell for JSON: None, a text or a finite number, with all its digits."""
-    return value if value is None or isinstance(value, int | float) else str(value)
-
-
 def kept_rows(table: Table, branches: Sequence[Branch], kept: Sequence[Sequence[int]]) -> Table:
     """The rows of the points that are drawn, of a table that has all points branch by branch."""
     columns, rows = table
@@ -484,14 +440,3 @@ def largest(values: npt.ArrayLike) -> float | None:
     """
     array = np.asarray(values, dtype=float)
     return known(float(np.max(array))) if array.size else None
-
-
-def versions() -> list[list[str]]:
-    """The versions of what the numbers rest on."""
-    found = [["Python", platform.python_version()]]
-    for name in PACKAGES:
-        try:
-            found.append([name, version(name)])
-        except PackageNotFoundError:
-            continue
-    return found

@@ -140,6 +140,7 @@ def render_scene(
     shares.end("orbit")
     with result_directory(directory, "render") as folder:
         write_table(folder / "modes.csv", table.columns(), table.rows())
+        (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
         if orbit is not None:
             save_orbit(orbit, folder)
         tell = shares.part("pictures")
@@ -243,6 +244,7 @@ def render_modes_of(
     check_modes(scene, modes, len(table.frequencies_hz))
     with result_directory(directory, "modes") as folder:
         write_table(folder / "modes.csv", table.columns(), table.rows())
+        (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
         if against is not None:
             write_table(folder / "mac.csv", against.columns(), against.rows())
             save_mac(against, folder)

@@ -20,7 +20,8 @@ from nldyn.branches.endings import Ending
 from nldyn.branches.tables import at_known, orbit_columns
 from nldyn.io.store import save
 from nldyn.plot.diagram import save_diagram
-from nldyn.report.page import Table, write_page
+from nldyn.report.offline import Table
+from nldyn.report.page import write_page
 from nldyn.runtime.result_directory import result_directory
 from nldyn.search.exploration import Exploration
 

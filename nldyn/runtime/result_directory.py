@@ -13,6 +13,7 @@ import re
 import secrets
 import shutil
 import stat
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -23,6 +24,7 @@ except ImportError:  # Windows: drafts of a killed run stay there
     fcntl = None  # type: ignore[assignment]
 
 MANIFEST = ".nldyn.json"
+SCENE = "scene.toml"  # the copy of the scene whose results a directory holds
 ATTEMPTS = 100  # to make a folder whose parents other processes make and remove
 
 
@@ -132,7 +134,8 @@ def result_directory(directory: str | Path, kind: str) -> Iterator[Path]:
         Where the results shall be.
     kind : str
         Name of what is written. Files that the same kind left before are replaced; all others
-        in a directory of results are kept.
+        in a directory of results are kept, unless they are results of a scene that says something
+        else than the ``scene.toml`` that is written.
 
     Yields
     ------
@@ -173,6 +176,9 @@ def _complete(new: Path, target: Path, kind: str) -> None:
     """Write the manifest, and carry over what is not replaced."""
     manifest = _read_manifest(target)
     written = sorted(entry.name for entry in new.iterdir())
+    scene = new / SCENE
+    if scene.is_file() and says_something_else(target, scene.read_text(encoding="utf-8")):
+        manifest = {kind: [name for names in manifest.values() for name in names]}
     replaced = {MANIFEST, *written, *manifest.get(kind, [])}
     if target.is_dir():
         for entry in target.iterdir():
@@ -180,6 +186,29 @@ def _complete(new: Path, target: Path, kind: str) -> None:
                 _link(entry, new / entry.name)
     kept = {other: [n for n in names if n not in written] for other, names in manifest.items()}
     (new / MANIFEST).write_text(json.dumps({**kept, kind: written}, indent=1) + "\n")
+
+
+def says_something_else(
+    directory: Path, text: str, apart_from: tuple[str, ...] = ("title",)
+) -> bool:
+    """Whether a scene differs from the copy in a directory of results, if there is one.
+
+    Comments and the tables or keys ``apart_from`` do not count.
+
+    Examples
+    --------
+    >>> says_something_else(Path("nowhere"), "[[stops]]")
+    False
+    """
+
+    def asked(told: str) -> dict[str, object]:
+        return {key: value for key, value in tomllib.loads(told).items() if key not in apart_from}
+
+    try:
+        before = asked((directory / SCENE).read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError):
+        return False
+    return before != asked(text.removeprefix("\ufeff"))
 
 
 def written_files(directory: str | Path, kind: str) -> list[str]:

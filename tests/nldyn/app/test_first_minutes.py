@@ -10,6 +10,7 @@ from click.testing import CliRunner
 import nldyn.scene.run
 from nldyn.app.cli import main
 from nldyn.base.resources import copy_example, example, example_titles
+from nldyn.runtime.result_directory import result_directory
 from nldyn.scene.component import build_component
 from nldyn.scene.read import load_scene
 
@@ -103,6 +104,36 @@ def test_results_of_another_scene_are_not_replaced_without_a_word(tmp_path, monk
     replaced = ["run", str(scene), "--out", str(out), "--replace"]
     with pytest.raises(pytest.fail.Exception, match="computed"):
         CliRunner().invoke(main, replaced, catch_exceptions=False)
+
+
+@pytest.mark.parametrize(
+    "command", [["modes"], ["render"], ["backbone", "--amplitude-m", "1e-3"], ["converge"]]
+)
+def test_no_command_mixes_the_results_of_two_scenes(tmp_path, command):
+    out, scene = tmp_path / "out", tmp_path / "scene.toml"
+    scene.write_text(ONE_DOF.read_text())
+    assert invoke("modes", scene, "--out", out).exit_code == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    scene.write_text(ONE_DOF.read_text().replace("gap = 0.0", "gap = 1e-4"))
+    result = invoke(*command, scene, "--out", out)
+    assert result.exit_code == 2 and result.stderr.count("\n") == 1
+    assert "holds the results of a scene that says something else" in result.stderr
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
+def test_what_replaces_another_scene_leaves_nothing_of_it(tmp_path):
+    out, scene = tmp_path / "out", tmp_path / "scene.toml"
+    scene.write_text(ONE_DOF.read_text())
+    assert invoke("modes", scene, "--out", out).exit_code == 0
+    with result_directory(out, "run") as folder:
+        (folder / "branches.csv").write_text("of the first scene")
+    (out / "mine.txt").write_text("mine")
+    scene.write_text(ONE_DOF.read_text().replace("gap = 0.0", "gap = 1e-4"))
+    result = invoke("modes", scene, "--out", out, "--replace")
+    assert result.exit_code == 0, result.stderr
+    assert {path.name for path in out.iterdir()} == {
+        ".nldyn.json", "mine.txt", "modes.csv", "scene.toml"
+    }  # fmt: skip
 
 
 def test_the_shell_completes_commands():

@@ -29,6 +29,7 @@ from nldyn.app.cli import main
 from nldyn.base.resources import example
 from nldyn.reduction import convergence
 from nldyn.reduction.convergence import (
+    QUANTITIES,
     contact_time,
     distance,
     errors_of,
@@ -41,6 +42,8 @@ from nldyn.reduction.convergence import (
     receptance_bound,
 )
 from nldyn.report.convergence import write_study
+from nldyn.report.convergence_page import panels
+from nldyn.report.offline import unpacked
 from nldyn.scene.component import build_component
 from nldyn.scene.convergence import convergence_study_of, with_mesh
 from nldyn.scene.read import load_scene
@@ -154,6 +157,42 @@ def test_files(study, tmp_path):
     assert not any(value in ("nan", "inf") for row in rows for value in row.values())
     for name in ("convergence.png", "speed_against_error.svg", "special_points_by_model.csv"):
         assert (folder / name).stat().st_size > 0
+    page = unpacked((folder / "convergence.html").read_text(encoding="utf-8"))
+    force = next(panel for panel in page["panels"] if panel["name"] == "contact force")
+    assert [value for row in force["values"] for value in row] == pytest.approx(
+        [float(row["force_n"]) for row in rows]
+    )
+    assert force["reference"] == force["values"][-1]  # the full model's orbit
+    flips = page["models"][0]["special"]["PD"]
+    assert (len(flips), len(page["exact"]["PD"])) == (int(rows[0]["flips"]), int(rows[3]["flips"]))
+    assert [row[0] for row in page["tables"]["models"]["rows"]] == [row["label"] for row in rows]
+
+
+def test_the_band_of_a_reference_holds_the_models_with_half_its_modes(study):
+    """The next smaller one alone would hide a mode that the interface hardly sees."""
+    best = study.best
+    assert (best.label, best.modes) == ("rubin", 15)
+    height = next(panel for panel in panels(study) if panel["name"] == "peak height")
+    seven, most = (study.models[i].peak.max_abs_displacement for i in study.series()["rubin"][2:])
+    low, high = height["span"]
+    assert high / low == pytest.approx(max(seven, most) / min(seven, most))
+
+
+def test_advice_is_kept_by_all_larger_models(study):
+    rubin = study.series()["rubin"]
+    (said,) = [line for line in study.advice(0.05) if line.startswith("advice: rubin: ")]
+    enough = int(re.search(r"(\d+) modes? suffice", said)[1])
+    worst = {
+        study.models[i].modes: max(
+            error
+            for quantity in QUANTITIES
+            if quantity != "eigenfrequency"
+            and np.isfinite(error := getattr(study.errors[i], quantity))
+        )
+        for i in rubin
+    }
+    assert all((modes >= enough) == (error <= 0.05) for modes, error in worst.items())
+    assert study.advice(1e-15)[0].startswith("advice: rubin: no count of this study suffices")
 
 
 AT_TIP = LoadCase(

@@ -15,9 +15,11 @@ from nldyn import Stop, System, Unbalance, diagram, load
 from nldyn.app.cli import main
 from nldyn.base.resources import example
 from nldyn.io.branches import save_branches
+from nldyn.report import offline
 from nldyn.report import page as pages
 from nldyn.report.deflection import surface_content
-from nldyn.report.page import Drawn, kept_points, unpacked
+from nldyn.report.offline import unpacked
+from nldyn.report.page import Drawn, kept_points
 from nldyn.report.results import write_results
 from nldyn.scene.build import build_structure
 from nldyn.scene.read import load_scene
@@ -128,7 +130,8 @@ def test_a_motion_without_contact_is_the_linear_one(tmp_path):
 def test_the_page_loads_nothing_and_has_plotly_once(results):
     text = (results / "report.html").read_text(encoding="utf-8")
     assert text.count("* plotly.js v") == 1 and len(text) < 10_000_000
-    template = pages.TEMPLATE.read_text(encoding="utf-8")
+    files = ("page.html", "convergence.html", "common.css", "common.js")
+    template = "".join((offline.HERE / name).read_text(encoding="utf-8") for name in files)
     assert re.findall(r"""(?:src|href)\s*=\s*["'](?!data:)""", template) == []
     assert "http" not in template
 

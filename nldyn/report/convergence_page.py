@@ -1,0 +1,176 @@
+"""A convergence study as one page for a browser: numbers over the modes, bands, advice, tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from nldyn.orbits.orbit import Orbit
+from nldyn.plot.diagram import length_unit
+from nldyn.reduction.convergence import (
+    EIGENFREQUENCIES,
+    QUANTITIES,
+    ConvergenceStudy,
+    Measured,
+    contact_time,
+    counted_modes,
+    largest_force,
+)
+from nldyn.report.offline import Table, as_table, versions, write_html
+from nldyn.report.orbit_content import known
+
+TOLERANCE = 0.01  # of the advice and of the light band
+
+
+def write_study_page(
+    study: ConvergenceStudy,
+    path: Path,
+    tables: Mapping[str, Table],
+    title: str = "",
+    text: str = "",
+) -> None:
+    """Write one HTML file that shows a convergence study in a browser, without a network.
+
+    Parameters
+    ----------
+    study : ConvergenceStudy
+        What to show.
+    path : Path
+        The file.
+    tables : dict of str to (columns, rows)
+        What `study_tables` gives.
+    title, text : str
+        Title and text of the scene.
+    """
+    write_html(path, "convergence.html", study_content(study, tables, title, text))
+
+
+def study_content(
+    study: ConvergenceStudy, tables: Mapping[str, Table], title: str, text: str
+) -> dict[str, Any]:
+    """What the page shows, ready for JSON; the parameters are those of `write_study_page`."""
+    low, high = study.setting.range_hz
+    return {
+        "title": title or "Convergence study",
+        "subtitle": f"harmonic branch from {low:g} to {high:g} Hz; contacts at {study.at_hz:g} Hz",
+        "advice": [line.removeprefix("advice: ") for line in study.advice(TOLERANCE)],
+        "reference": study.said_of_references().splitlines(),
+        "notes": list(dict.fromkeys(model.note for model in study.models if model.note)),
+        "tolerance": TOLERANCE,
+        "bound": known(study.reference_error) or 0.0,
+        "views": views(study),
+        "models": [
+            {"name": f"{model.label}, {counted_modes(model)}", "special": model.special_hz or {}}
+            for model in study.models
+        ],
+        "panels": panels(study),
+        "exact": study.best.special_hz or {},
+        "errors": {
+            name: [positive(getattr(error, quantity)) for error in study.errors]
+            for quantity, name in QUANTITIES.items()
+        },
+        "tables": {name: as_table(table) for name, table in tables.items()},
+        "versions": versions(),
+        "scene": text,
+    }
+
+
+def views(study: ConvergenceStudy) -> list[dict[str, Any]]:
+    """Over what the numbers are drawn: kept modes, and of several meshes their size."""
+
+    def view(
+        along: str, log: bool, x: Iterable[int], series: Mapping[str, Sequence[int]]
+    ) -> dict[str, Any]:
+        shown = [{"label": label, "models": list(models)} for label, models in series.items()]
+        return {"along": along, "log": log, "x": list(x), "series": shown}
+
+    found = [view("kept modes", False, (m.modes for m in study.models), study.series())]
+    if by_mesh := study.mesh_series():
+        found.append(view("degrees of freedom", True, (m.dofs for m in study.models), by_mesh))
+    return found
+
+
+def panels(study: ConvergenceStudy) -> list[dict[str, Any]]:
+    """The numbers of all models, of the reference, and the span of the larger half of models."""
+    contact = study.reference.orbit or study.best.orbit
+    metre, length = length_unit(
+        max((m.peak.max_abs_displacement for m in study.models if m.peak), default=1.0)
+    )
+    asked: list[tuple[str, str, Callable[[Measured], Sequence[float]], Sequence[float]]] = [
+        ("eigenfrequencies", "Hz", eigenfrequencies, eigenfrequencies(study.reference)),
+        ("peak frequency", "Hz", of_peak(lambda orbit: orbit.frequency_hz), ()),
+        ("peak height", length, of_peak(lambda orbit: orbit.max_abs_displacement / metre), ()),
+        ("contact force", "N", of_orbit(largest_force), of(largest_force, contact)),
+        ("contact duration", "s", of_orbit(contact_time), of(contact_time, contact)),
+    ]
+    found = []
+    for name, unit, number, exact in asked:
+        values = [list(number(model)) for model in study.models]
+        if not any(value > 0.0 for row in values for value in row):
+            continue
+        span = [values[i] for i in larger_half(study)]
+        found.append(
+            {
+                "name": name,
+                "unit": unit,
+                "values": values,
+                "reference": list(exact or number(study.best)),
+                "span": [] if name == "eigenfrequencies" else ends(span),
+            }
+        )
+    return found
+
+
+def eigenfrequencies(model: Measured) -> list[float]:
+    """The lowest that an interface sees."""
+    return [float(hz) for hz in model.frequencies_hz[:EIGENFREQUENCIES]]
+
+
+def of(number: Callable[[Orbit], float], orbit: Orbit | None) -> list[float]:
+    """A number of an orbit, if there is one."""
+    return [] if orbit is None else [float(number(orbit))]
+
+
+def of_peak(number: Callable[[Orbit], float]) -> Callable[[Measured], list[float]]:
+    """A number of the orbit at the top of the resonance peak."""
+    return lambda model: of(number, model.peak)
+
+
+def of_orbit(number: Callable[[Orbit], float]) -> Callable[[Measured], list[float]]:
+    """A number of the orbit at the frequency of the study."""
+    return lambda model: of(number, model.orbit)
+
+
+def larger_half(study: ConvergenceStudy) -> list[int]:
+    """The models like the best one that have at least half as many modes, with it."""
+    best = study.best
+    return [
+        index
+        for index, model in enumerate(study.models)
+        if (model.mesh, model.method) == (best.mesh, best.method) and model.modes >= best.modes // 2
+    ]
+
+
+def ends(values: Iterable[Sequence[float]]) -> list[float]:
+    """The least and the largest of some numbers, if there are two.
+
+    Examples
+    --------
+    >>> ends([[1.0], [3.0], [2.0], []]), ends([[1.0]])
+    ([1.0, 3.0], [])
+    """
+    given = [value for row in values for value in row]
+    return [min(given), max(given)] if len(given) > 1 else []
+
+
+def positive(error: float) -> float | None:
+    """An error for a logarithmic axis: None where it is zero or unknown.
+
+    Examples
+    --------
+    >>> positive(0.1), positive(0.0), positive(math.inf)
+    (0.1, None, None)
+    """
+    return error if 0.0 < error < math.inf else None
