@@ -151,4 +151,6 @@ def _measured(scene: Scene, number: int, at: str, table: ExcitationTable) -> Mea
             fault = f"{path}, line {place}: must be one number, the force in N, not '{line[:40]}'"
             raise scene_error(scene.file, key, fault, sep=": ") from None
     with told_as(scene, key, SystemModelError):
-        return measured_force(at, np.array(samples), table.harmonics or 20)
+        return measured_force(
+            at, np.array(samples), table.harmonics or 20, closed=table.closed
+        )

@@ -673,7 +673,7 @@ _EXCITATION_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "unbalance": (("at", "mass_times_radius"), ("phase_deg", "harmonic")),
     "harmonic": (("at", "amplitude"), ("phase_deg", "harmonic")),
     "constant": (("at", "force"), ()),
-    "measured": (("at", "file"), ("harmonics",)),
+    "measured": (("at", "file"), ("harmonics", "closed")),
     "weight": (("acceleration",), ()),
     "base": (("amplitude",), ("at", "direction", "quantity", "phase_deg", "harmonic")),
 }
@@ -702,6 +702,8 @@ class ExcitationTable(Table):
     harmonics leave out is told."""
     harmonics: Annotated[int, Field(ge=1, le=MOST_HARMONIC)] | None = None
     """How many harmonics of a measured force are taken; 20 unless given."""
+    closed: bool | None = None
+    """Whether the last sample is the first one again, at T. Needed where the two are equal."""
     acceleration: Annotated[list[Number], Field(min_length=2, max_length=3)] | None = None
     """[m/s²] Of the weight: `[0.0, -9.81]` in a plane frame, three components else."""
     direction: Literal["x", "y", "z"] | None = None

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nldyn.base.errors import SystemModelError, check_whole, numbers
+from nldyn.base.arrays import Real
+from nldyn.base.errors import SystemModelError, check_types, check_whole, numbers
 from nldyn.system.elements import ConstantForce, Excitation, HarmonicForce
 
 NONE_LEFT = 1e-14  # share of the largest amplitude that rounding of the samples may be
+SAME = 1e-9  # share of the largest deviation from the mean below which two samples are equal
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,9 @@ class MeasuredForce:
         )
 
 
-def measured_force(at: str, samples: ArrayLike, harmonics: int = 20) -> MeasuredForce:
+def measured_force(
+    at: str, samples: ArrayLike, harmonics: int = 20, *, closed: bool | None = None
+) -> MeasuredForce:
     """Periodic force from its values at equal distances over one period of the excitation.
 
     The coefficients are those of the discrete Fourier transform.
@@ -50,15 +54,18 @@ def measured_force(at: str, samples: ArrayLike, harmonics: int = 20) -> Measured
     at : str
         Interface, or load vector.
     samples : (n,) array_like
-        Force in N at the times 0, T/n, ..., (n - 1) T/n; the value at T, which is that at 0, is
-        left out.
+        Force in N at the times 0, T/n, ..., (n - 1) T/n.
     harmonics : int
         How many harmonics to take, less than n/2; those of rounding's size are left out.
+    closed : bool, optional
+        Whether the last sample is that at T, the first one again, which then is left out. Needed
+        where the two are equal, which does not tell it.
 
     Raises
     ------
     SystemModelError
-        For too few samples, or ones that are no finite numbers.
+        For too few samples, ones that are no finite numbers, or a last one that equals the first
+        where nothing says whether it is that again.
 
     Examples
     --------
@@ -71,6 +78,8 @@ def measured_force(at: str, samples: ArrayLike, harmonics: int = 20) -> Measured
     """
     values = numbers(f"samples of the force at '{at}'", samples)
     check_whole("harmonics", harmonics, 1)
+    check_types(closed=(closed, bool, None))
+    values = _one_period(at, values, closed)
     if values.ndim != 1 or values.size <= 2 * harmonics:
         raise SystemModelError(
             f"the force at '{at}' needs more than {2 * harmonics} samples of one period for "
@@ -90,3 +99,17 @@ def measured_force(at: str, samples: ArrayLike, harmonics: int = 20) -> Measured
     return MeasuredForce(
         tuple(sources), float(np.abs(values - sum_).max()), float(np.abs(values - mean).max())
     )
+
+
+def _one_period(at: str, values: Real, closed: bool | None) -> Real:
+    """The samples without a last one that is the first one again."""
+    if values.ndim != 1 or values.size < 2:
+        return values
+    apart, size = abs(values[-1] - values[0]), np.abs(values - values.mean()).max()
+    if closed is None and size > 0.0 and apart <= SAME * size:
+        raise SystemModelError(
+            f"the last of {values.size} samples of the force at '{at}' equals the first: say "
+            "closed = true if it is that again, a whole period later, and closed = false if the "
+            "period ends one step after it"
+        )
+    return values[:-1] if closed else values

@@ -197,3 +197,24 @@ def test_a_sample_left_out_of_a_measured_force_is_told(tmp_path):
         sources([*lines[:7], "", *lines[8:]])
     with pytest.raises(SceneError, match="line 10: must be one number"):
         sources([*lines[:7], ",", *lines[8:]])
+
+
+def test_a_last_sample_that_repeats_the_first_is_asked_about(tmp_path):
+    """Left in, it would give the cosine a mean of 1/33."""
+    measured = '[[excitation]]\nkind = "measured"\nat = "x"\nfile = "force.csv"\nharmonics = 5\n'
+    cosine = np.cos(2 * np.pi * np.arange(33) / 32.0)
+    (tmp_path / "force.csv").write_text("\n".join(f"{value:.6f}" for value in cosine))
+
+    def sources(more: str = ""):
+        (tmp_path / "gear.toml").write_text(GEAR + measured + more)
+        return build_system(load_scene(tmp_path / "gear.toml")).excitation
+
+    with pytest.raises(SceneError, match=r"last of 33 samples .* equals the first: say closed"):
+        sources()
+    one, *_ = sources("closed = true")
+    assert one.harmonic == 1 and one.phasor == pytest.approx(1.0, abs=1e-6)
+    mean, *_ = sources("closed = false")
+    assert mean.force == pytest.approx(1 / 33, abs=1e-6)
+    with pytest.raises(SceneError, match="'closed', which is not a key of kind 'constant'"):
+        build_system(parse_scene(GEAR + '[[excitation]]\nkind = "constant"\nat = "x"\n'
+                                 "force = 1.0\nclosed = true\n"))  # fmt: skip
