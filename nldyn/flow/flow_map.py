@@ -6,6 +6,7 @@ the contact forces. See ``docs/explanation/theory.md``.
 
 from __future__ import annotations
 
+import copy
 import itertools
 import math
 from collections.abc import Sequence
@@ -53,7 +54,7 @@ from nldyn.system.elements import Stop
 from nldyn.system.linear import ForcedResponse
 from nldyn.system.parameters import Parameter
 from nldyn.system.ride import Ride
-from nldyn.system.system import System, same_system
+from nldyn.system.system import Clock, System, same_system
 
 __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
 
@@ -183,6 +184,9 @@ class FlowMap:
         What to propagate.
     options : FlowOptions, optional
         Accuracy.
+    clock : Clock, optional
+        Of a system with forces of frequencies of their own: where in time the phases from 0 to 2π
+        lie. Without it they are refused.
 
     Examples
     --------
@@ -202,14 +206,31 @@ class FlowMap:
         """One line: the system and the accuracy."""
         return f"<FlowMap to {self.options.rtol:g} of {self.system!r}>"
 
-    def __init__(self, system: System, options: FlowOptions | None = None) -> None:
+    def __init__(
+        self, system: System, options: FlowOptions | None = None, clock: Clock | None = None
+    ) -> None:
         check_types(system=(system, System), options=(options, FlowOptions, None))
         self.system = system
         self.options = options or FlowOptions()
+        self.clock = clock
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what defines the map alone: a compiled law has another address elsewhere."""
-        return FlowMap, (self.system, self.options)
+        return FlowMap, (self.system, self.options, self.clock)
+
+    def at(self, omega: float, start: float) -> FlowMap:
+        """The map of the period from a time in s on, where forces have frequencies of their own.
+
+        Without such forces it is this map.
+        """
+        if not self.system.tones:
+            return self
+        _ = self._unforced  # which both share
+        other = copy.copy(self)
+        for name in ("_data", "_forcing"):
+            vars(other).pop(name, None)
+        other.clock = Clock(omega, start)
+        return other
 
     @cached_property
     def tables(self) -> GaussTables:
@@ -264,7 +285,25 @@ class FlowMap:
         return self.system.linear.times_block(self.rows)
 
     @cached_property
+    def _forcing(self) -> tuple[Real, Complex]:
+        """Orders and drive, see `System.forcing`."""
+        return self.system.forcing(self.clock)
+
+    def response(self, omega: float) -> ForcedResponse:
+        """Response of the linear part at ω (rad/s), see `System.response`."""
+        orders, drive = self._forcing
+        powers = np.array([1.0, omega, omega * omega])
+        return self.system.linear.response(orders, powers @ drive, omega)
+
+    @cached_property
     def _data(self) -> SystemData:
+        """What the kernels need to know of the system."""
+        orders, drive = self._forcing
+        return self._unforced._replace(orders=orders, drive=drive)
+
+    @cached_property
+    def _unforced(self) -> SystemData:
+        """The same without what excites it."""
         s, linear = self.system, self.system.linear
         vectors = self._pushed
         accelerations = linear.times_block(self.rate_rows)
@@ -288,8 +327,8 @@ class FlowMap:
             np.array([self.rows, self.rate_rows, accelerations]),
             bounds,
             self.force_columns,
-            s.orders,
-            s.drive,
+            np.ones(1),
+            np.zeros((1, 3, 2 * s.size), dtype=complex),
             np.hstack([np.array(stops, dtype=float).reshape(-1, len(StopRow._fields)), powers]),
             np.array([law_address(e.law) for e in s.stops] + [0] * len(s.bonds), dtype=np.int64),
             self.options.panel_tail,
@@ -554,7 +593,8 @@ class FlowMap:
 
     @cached_property
     def _no_parameters(self) -> tuple[NDArray[np.int64], Complex]:
-        return parameter_tables(self.system, ())
+        drive = self._unforced.drive
+        return np.zeros((0, 2), dtype=np.int64), np.zeros((0, *drive.shape), dtype=complex)
 
     def _motion(
         self, omega: float, rec: Record, closings: NDArray[np.int64], failure: str
@@ -613,9 +653,18 @@ def relative_error(value: Real, reference: Real) -> float:
     return float(np.linalg.norm(value - reference)) / (size or 1.0)
 
 
-def flow_of(system: System | FlowMap) -> FlowMap:
-    """The flow map itself, or that of a system at the default accuracy."""
-    return system if isinstance(system, FlowMap) else FlowMap(system)
+def flow_of(system: System | FlowMap, *, periodic: bool = True) -> FlowMap:
+    """The flow map itself, or that of a system at the default accuracy.
+
+    Raises
+    ------
+    SystemModelError
+        If a force has a frequency of its own where motions must be `periodic`.
+    """
+    flow = system if isinstance(system, FlowMap) else FlowMap(system)
+    if periodic:
+        flow.system.check_periodic()
+    return flow
 
 
 def same_flow(a: FlowMap, b: FlowMap) -> bool:
@@ -731,9 +780,7 @@ class Trajectory:
         check_whole("output", output, 0, len(flow.rows) - 1)
         row, ride = flow.rows[output], flow.ride(output, self.omega)
         forced = np.append(self._response.amplitudes @ row, ride.amplitudes)
-        return self._evaluate(
-            local_extremes, row, flow.rate_rows[output], forced, more=ride.orders
-        )
+        return self._evaluate(local_extremes, row, flow.rate_rows[output], forced, more=ride.orders)
 
     def with_exact_values(self, found: Real, output: int, wanted: NDArray[np.bool_]) -> Real:
         """Extremes (k, 3) of an output, those wanted (k,) with the values of the flow map."""
@@ -757,7 +804,7 @@ class Trajectory:
     @cached_property
     def _response(self) -> ForcedResponse:
         """Response to the excitation."""
-        return self.flow.system.response(self.omega)
+        return self.flow.response(self.omega)
 
     def _evaluate(self, kernel: Any, *arguments: object, more: Real | None = None) -> Real:
         """Call a kernel of `_sample` on the recorded pieces, perhaps with more orders of terms."""

@@ -302,7 +302,7 @@ def classify(
     flow = flow_of(system)
     check_types(options=(options, AttractorOptions, None))
     check_frequency("frequency_hz", frequency_hz)
-    check_bounded(flow.system, 2.0 * math.pi * frequency_hz)
+    check_bounded(flow, 2.0 * math.pi * frequency_hz)
     name = check_observe(flow.system, observe)
     state = starting_state(flow, start)
     return attractor_from(flow, frequency_hz, name, options or AttractorOptions(), state)
@@ -634,7 +634,7 @@ def find_attractors(
     check_execution(executor, progress)
     check_frequency("frequency_hz", frequency_hz)
     omega = 2.0 * math.pi * frequency_hz
-    check_bounded(flow.system, omega)
+    check_bounded(flow, omega)
     name = check_observe(flow.system, observe)
     check_whole("seed", seed, 0)
     if isinstance(starts, np.ndarray | list | tuple):

@@ -527,7 +527,7 @@ def basins(
     check_execution(executor, progress)
     check_frequency("frequency_hz", frequency_hz)
     omega = 2.0 * math.pi * frequency_hz
-    check_bounded(flow.system, omega)
+    check_bounded(flow, omega)
     if flow.system.conservative:
         raise SystemModelError("basins: a system without damping has no attractors")
     name = check_observe(flow.system, observe)

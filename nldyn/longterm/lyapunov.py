@@ -15,7 +15,13 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_whole, numbers
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.longterm.lyapunov_kernels import growth_rates
-from nldyn.longterm.simulation import MOST_PERIODS, cases_at, is_list, transient_end
+from nldyn.longterm.simulation import (
+    MOST_PERIODS,
+    cases_at,
+    is_list,
+    periods_at_once,
+    transient_end,
+)
 from nldyn.orbits.orbit import contact_damping
 from nldyn.runtime.executors import check_execution, values_of
 from nldyn.system.system import System
@@ -225,7 +231,7 @@ def lyapunov_exponents(
     I. Shimada, T. Nagashima (1979), *Prog. Theor. Phys.* 61, 1605-1616;
     H. Flyvbjerg, H. G. Petersen (1989), *J. Chem. Phys.* 91, 461-466.
     """
-    flow = flow_of(system)
+    flow = flow_of(system, periodic=False)
     check_execution(executor, progress)
     check_whole("transient", transient, 0, MOST_PERIODS)
     check_whole("periods", periods, 2 * FEWEST_BLOCKS, MOST_PERIODS)
@@ -245,15 +251,18 @@ def _spectrum_after(
     state, failure = transient_end(flow, start, omega, transient)
     if state is None:
         raise ConvergenceError(f"the simulation at {frequency_hz:g} Hz failed: {failure}")
-    return spectrum_from(flow, state, omega, periods)
+    return spectrum_from(flow, state, omega, periods, transient)
 
 
-def spectrum_from(flow: FlowMap, state: Real, omega: float, periods: int) -> LyapunovSpectrum:
-    """Lyapunov exponents of the motion from a state z at phase zero, without a transient."""
+def spectrum_from(
+    flow: FlowMap, state: Real, omega: float, periods: int, before: int = 0
+) -> LyapunovSpectrum:
+    """Lyapunov exponents of the motion from a state z, some periods after the beginning."""
     parts = segments_per_period(flow.system, omega)
     basis = np.eye(state.size)
-    state, _, _ = _grown(flow, state, omega, max(periods // 10, 1), parts, basis)
-    state, stretches, viscous = _grown(flow, state, omega, periods, parts, basis)
+    turning = max(periods // 10, 1)
+    state, _, _ = _grown(flow, state, omega, before, turning, parts, basis)
+    state, stretches, viscous = _grown(flow, state, omega, before + turning, periods, parts, basis)
     rates = stretches * (omega / (2.0 * math.pi))
     order = np.argsort(-rates.mean(axis=0), kind="stable")
     divergence = -float(np.trace(flow.system.total_damping))
@@ -281,22 +290,24 @@ def segments_per_period(system: System, omega: float) -> int:
 
 
 def _grown(
-    flow: FlowMap, state: Real, omega: float, periods: int, parts: int, basis: Real
+    flow: FlowMap, state: Real, omega: float, before: int, periods: int, parts: int, basis: Real
 ) -> tuple[Real, Real, float]:
     """Last state, stretches per period (periods, 2n) and ∫ of the stops' damping, in blocks."""
     lossy = flow.system.loses_by_speed
     stretches = np.empty((periods, state.size))
     viscous = 0.0
-    for first in range(0, periods, BLOCK):
-        count = min(BLOCK, periods - first)
+    at_once = periods_at_once(flow, BLOCK)
+    for first in range(0, periods, at_once):
+        count = min(at_once, periods - first)
         phases = np.linspace(0.0, 2.0 * np.pi * count, count * parts + 1)
-        found = flow.shoot(state[None], phases, omega, chained=True)
+        here = flow.at(omega, (before + first) * 2.0 * math.pi / omega)
+        found = here.shoot(state[None], phases, omega, chained=True)
         if found.failure:
             hz = omega / (2.0 * math.pi)
             raise ConvergenceError(f"the simulation at {hz:g} Hz failed: {found.failure}")
         if lossy:
-            motion = flow.trajectory(state[None], phases, omega, chained=True)
-            viscous += contact_damping(flow, motion)
+            motion = here.trajectory(state[None], phases, omega, chained=True)
+            viscous += contact_damping(here, motion)
         grown = growth_rates(found.jacobians, basis)
         stretches[first : first + count] = grown.reshape(count, parts, -1).sum(axis=1)
         state = found.ends[-1]

@@ -231,7 +231,7 @@ def brute_force(
         raise SystemModelError("brute_force needs a direction or random starts")
     frequencies = np.linspace(low, high, points).tolist()
     for hz in frequencies:
-        check_bounded(flow.system, 2.0 * math.pi * hz)
+        check_bounded(flow, 2.0 * math.pi * hz)
     tasks: list[tuple[Direction, list[float]]] = [
         (direction, frequencies if direction == "up" else frequencies[::-1])
         for direction in directions

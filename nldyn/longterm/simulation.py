@@ -367,7 +367,7 @@ def simulate(
     >>> len(motion.strobe)
     11
     """
-    flow = flow_of(system)
+    flow = flow_of(system, periodic=False)
     check_execution(executor, progress)
     check_whole("periods", periods, 1, MOST_RECORDED)
     check_whole("transient", transient, 0, MOST_PERIODS)
@@ -395,7 +395,8 @@ def cases_at(
         raise SystemModelError("frequency_hz must name at least one frequency, got an empty list")
     for hz in frequencies:
         check_frequency("frequency_hz", hz)
-        check_bounded(flow.system, 2.0 * math.pi * hz)
+        omega = 2.0 * math.pi * hz
+        check_bounded(flow.at(omega, 0.0), omega)
     return list(zip(map(float, frequencies), _starts(flow, start, len(frequencies)), strict=True))
 
 
@@ -417,7 +418,7 @@ def _simulated(flow: FlowMap, periods: int, transient: int, case: tuple[float, R
     if before is None:
         raise ConvergenceError(f"the transient at {frequency_hz:g} Hz failed: {failure}")
     stretches = []
-    for trajectory in _blocks(flow, before, omega, periods):
+    for trajectory in _blocks(flow, before, omega, transient, periods):
         failure = trajectory.failure
         if trajectory.record.phase.size:
             stretches.append(trajectory)
@@ -425,7 +426,8 @@ def _simulated(flow: FlowMap, periods: int, transient: int, case: tuple[float, R
             break
     if not stretches:
         raise ConvergenceError(f"the motion at {frequency_hz:g} Hz failed at once: {failure}")
-    turns = transient + np.minimum(BLOCK * np.arange(len(stretches) + 1.0), periods)
+    block = periods_at_once(flow, BLOCK)
+    turns = transient + np.minimum(block * np.arange(len(stretches) + 1.0), periods)
     lost = stretches[-1]
     if lost.failure:
         turns[-1] = turns[-2] + (end_phase(lost) - lost.record.phase[0]) / (2.0 * math.pi)
@@ -451,25 +453,33 @@ def transient_end(
     flow: FlowMap, state: Real, omega: float, periods: int
 ) -> tuple[Real | None, str]:
     """State z after some periods from phase zero on, or None and why there is none."""
-    while periods > 0:
-        count = min(periods, PIECE)
-        found = flow.strobe(state, omega, count)
+    at_once = periods_at_once(flow, PIECE)
+    for done in range(0, periods, at_once):
+        count = min(periods - done, at_once)
+        found = flow.at(omega, done * 2.0 * math.pi / omega).strobe(state, omega, count)
         if found.failure:
             return None, found.failure
         state = found.ends[-1]
-        periods -= count
     return state, ""
 
 
-def _blocks(flow: FlowMap, state: Real, omega: float, periods: int) -> Iterator[Trajectory]:
-    """Recorded motions of up to `BLOCK` periods, one after the other."""
-    while periods > 0:
-        count = min(periods, BLOCK)
+def periods_at_once(flow: FlowMap, most: int) -> int:
+    """How many periods one flow map serves: one where forces have frequencies of their own."""
+    return 1 if flow.system.tones else most
+
+
+def _blocks(
+    flow: FlowMap, state: Real, omega: float, before: int, periods: int
+) -> Iterator[Trajectory]:
+    """Recorded motions of some periods, one after the other, after those `before`."""
+    at_once = periods_at_once(flow, BLOCK)
+    for done in range(0, periods, at_once):
+        count = min(periods - done, at_once)
         phases = np.linspace(0.0, 2.0 * np.pi * count, count + 1)
-        trajectory = flow.trajectory(state[None], phases, omega, chained=True)
+        here = flow.at(omega, (before + done) * 2.0 * math.pi / omega)
+        trajectory = here.trajectory(state[None], phases, omega, chained=True)
         yield trajectory
         state = end_state(trajectory)
-        periods -= count
 
 
 @overload
@@ -560,7 +570,7 @@ def sweep(
     >>> len(hz)
     46
     """
-    flow = flow_of(system)
+    flow = flow_of(system, periodic=False)
     check_execution(executor, progress)
     given: Any = range_hz
     several = is_list(given) and len(given) > 0 and all(map(is_list, given))
@@ -590,11 +600,12 @@ def _swept(
     failure = ""
     for k in range(len(times) - 1):
         omega = (phases[k + 1] - phases[k]) / (times[k + 1] - times[k])
-        turn = 2.0 * math.pi * math.floor(phases[k] / (2.0 * math.pi))
         # the phase goes with a parabola whose mean lies this much above its chord
         above = -math.pi * slope * (times[k + 1] - times[k]) ** 2 / 6.0
-        step = np.array([phases[k], phases[k + 1]]) - turn + above
-        trajectory = flow.trajectory(state[None], step, float(omega))
+        step = np.array([phases[k], phases[k + 1]]) + above
+        step -= 2.0 * math.pi * math.floor(step[0] / (2.0 * math.pi))
+        here = flow.at(float(omega), times[k] - step[0] / omega)
+        trajectory = here.trajectory(state[None], step, float(omega))
         failure = trajectory.failure
         if trajectory.record.phase.size:
             stretches.append(trajectory)

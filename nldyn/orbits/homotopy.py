@@ -85,7 +85,7 @@ class Homotopy:
         omega = 2.0 * math.pi * orbit.frequency_hz
         try:
             flow = self.flow(share)
-            check_bounded(flow.system, omega)
+            check_bounded(flow, omega)
             problem = shooting_problem(flow, orbit.period, segments)
             nodes = guessed_nodes(problem, guess[:-1].reshape(segments, -1), omega)
             return first_orbit(problem, [nodes], omega, orbit.observe)

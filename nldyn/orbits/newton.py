@@ -9,7 +9,7 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, numbers
-from nldyn.flow.flow_map import Trajectory
+from nldyn.flow.flow_map import FlowMap, Trajectory
 from nldyn.orbits.orbit import Orbit, minimal_period
 from nldyn.orbits.shooting import ShootingProblem
 from nldyn.system.system import System
@@ -59,10 +59,10 @@ def first_orbit(
     raise failure
 
 
-def check_bounded(system: System, omega: float) -> None:
+def check_bounded(flow: FlowMap, omega: float) -> None:
     """Refuse the resonance of an undamped mode where no stop can limit the motion."""
-    if not system.stops and not system.bonds:
-        system.steady(omega)
+    if not flow.system.stops and not flow.system.bonds:
+        flow.response(omega).steady(omega)
 
 
 def _touches_only(system: System, motion: Trajectory, omega: float) -> bool:

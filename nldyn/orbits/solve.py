@@ -100,7 +100,7 @@ def solve_orbit(
     observe = check_observe(flow.system, observe)
     problem = shooting_problem(flow, period, segments)
     omega = 2.0 * math.pi * frequency_hz
-    check_bounded(flow.system, omega)
+    check_bounded(flow, omega)
     if flow.system.conservative and not flow.system.driven:
         raise ConvergenceError(
             "nothing excites the system and nothing damps it, so that its free motions are a "

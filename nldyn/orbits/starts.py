@@ -341,7 +341,7 @@ def find_orbits(
     """
     flow = flow_of(system)
     check_frequency("frequency_hz", frequency_hz)
-    check_bounded(flow.system, 2.0 * math.pi * frequency_hz)
+    check_bounded(flow, 2.0 * math.pi * frequency_hz)
     options = options or SearchOptions()
     strobe = simulate_strobe(flow, frequency_hz, options)
     if not strobe.runs:

@@ -114,6 +114,12 @@ def check_computable(scene: Scene, file: Path) -> None:
     if not any(table.kind not in ("constant", "weight") for table in scene.excitation):
         fault = "is missing" if not scene.excitation else "is constant"
         raise scene_error(file, ("excitation",), f"{fault}: nothing moves the structure")
+    for number, table in enumerate(scene.excitation):
+        if table.frequency_hz is not None:
+            fault = "leaves no motion a period, so that no branch can be followed: simulate the "
+            wanted = "build_system(load_scene(...)) in Python, or let both be multiples 'harmonic' "
+            rest = "of a lower frequency, nearly (5 and 7 for a ratio of 1.4)"
+            raise scene_error(file, ("excitation", number, "frequency_hz"), fault + wanted + rest)
     if scene.continuation is None:
         fault = "is missing: give the frequency range, range_hz = [lowest, highest]"
         raise scene_error(file, ("continuation",), fault)

@@ -123,7 +123,7 @@ def _excitation_at(
     assert table.amplitude is not None
     if table.kind == "base":
         return (BaseMotion(at, table.amplitude, table.quantity or "displacement", phase, harmonic),)
-    return (HarmonicForce(at, table.amplitude, phase, harmonic),)
+    return (HarmonicForce(at, table.amplitude, phase, harmonic, table.frequency_hz),)
 
 
 def _measured(scene: Scene, number: int, at: str, table: ExcitationTable) -> MeasuredForce:
@@ -151,6 +151,4 @@ def _measured(scene: Scene, number: int, at: str, table: ExcitationTable) -> Mea
             fault = f"{path}, line {place}: must be one number, the force in N, not '{line[:40]}'"
             raise scene_error(scene.file, key, fault, sep=": ") from None
     with told_as(scene, key, SystemModelError):
-        return measured_force(
-            at, np.array(samples), table.harmonics or 20, closed=table.closed
-        )
+        return measured_force(at, np.array(samples), table.harmonics or 20, closed=table.closed)

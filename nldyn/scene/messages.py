@@ -48,7 +48,8 @@ WORDS = {  # that users try for a table, and what there is
 ORDERS = (
     "all [[excitation]] acts at multiples 'harmonic' of one frequency, that of the continuation: "
     "where half orders act let it be that of the whole cycle, and of two frequencies one of which "
-    "both are multiples, nearly (5 and 7 for a ratio of 1.4)"
+    "both are multiples, nearly (5 and 7 for a ratio of 1.4); a harmonic force with a "
+    "'frequency_hz' of its own can be simulated in Python"
 )
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 

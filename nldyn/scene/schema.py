@@ -671,7 +671,7 @@ class StopTable(Table):
 # what each kind of excitation needs, and what it may have
 _EXCITATION_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "unbalance": (("at", "mass_times_radius"), ("phase_deg", "harmonic")),
-    "harmonic": (("at", "amplitude"), ("phase_deg", "harmonic")),
+    "harmonic": (("at", "amplitude"), ("phase_deg", "harmonic", "frequency_hz")),
     "constant": (("at", "force"), ()),
     "measured": (("at", "file"), ("harmonics", "closed")),
     "weight": (("acceleration",), ()),
@@ -697,6 +697,9 @@ class ExcitationTable(Table):
     harmonic: Annotated[int, Field(ge=1, le=MOST_HARMONIC)] | None = None
     """Multiple m of the frequency, a whole number up to 1000; 1 unless given. Where half orders
     act, the frequency is that of the whole cycle."""
+    frequency_hz: Frequency | None = None
+    """[Hz] A frequency of its own of a harmonic force, instead of `harmonic`: the scene is then for
+    [simulations](../how-to/simulation.md#two-frequencies) in Python, as no motion has a period."""
     file: str | None = None
     """Samples at 0, T/n, ..., (n − 1) T/n, beside the scene; `#` begins a remark. What the
     harmonics leave out is told."""
@@ -725,6 +728,8 @@ class ExcitationTable(Table):
         for key in needed:
             if getattr(self, key) is None:
                 raise ValueError(f"needs '{key}' for kind '{self.kind}'")
+        if self.harmonic is not None and self.frequency_hz is not None:
+            raise ValueError("has both 'harmonic' and 'frequency_hz'; keep one")
         if self.kind == "base" and (self.at is None) == (self.direction is None):
             raise ValueError(
                 "needs 'direction' for kind 'base' of a mesh, or 'at' naming a load vector"

@@ -12,7 +12,13 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import SystemModelError, check_types, is_finite, shown
+from nldyn.base.errors import (
+    SystemModelError,
+    check_frequency,
+    check_types,
+    is_finite,
+    shown,
+)
 from nldyn.system.contact_law import ContactLaw, check_law, power_law
 
 LARGEST_EXPONENT = 4.0
@@ -464,7 +470,7 @@ class Damper:
 
 @dataclass(frozen=True)
 class HarmonicForce:
-    """Force ``amplitude * cos(m ωt + phase)`` at an interface.
+    """Force ``amplitude * cos(m ωt + phase)`` at an interface, or one of a frequency of its own.
 
     Parameters
     ----------
@@ -477,6 +483,10 @@ class HarmonicForce:
     harmonic : int
         Multiple m of the excitation frequency, from 1 to 1000. Where half orders act, as in a
         four-stroke engine, the excitation frequency is that of the whole cycle.
+    frequency_hz : float, optional
+        A frequency of its own in Hz, which does not change with that of the excitation: two without
+        a common period have no periodic response, so that such a force can only be simulated. The
+        time counts from the start of the simulation.
 
     Examples
     --------
@@ -488,11 +498,18 @@ class HarmonicForce:
     amplitude: float
     phase_deg: float = 0.0
     harmonic: int = 1
+    frequency_hz: float | None = None
 
     power: ClassVar[int] = 0  # the force is Re(phasor (mω)**power e^{i m ωt})
 
     def __post_init__(self) -> None:
         _check_excitation(self.at, "amplitude", self.amplitude, self.phase_deg, self.harmonic)
+        if self.frequency_hz is None:
+            return
+        owner = f"excitation at '{self.at}'"
+        check_frequency(f"{owner}: frequency_hz", self.frequency_hz)
+        if self.harmonic != 1:
+            raise SystemModelError(f"{owner}: give either harmonic or frequency_hz")
 
     @property
     def phasor(self) -> complex:
@@ -649,7 +666,8 @@ def _check_excitation(at: str, name: str, value: float, phase_deg: float, harmon
             f"{owner}: harmonic must be a whole number from 1 to {MOST_HARMONIC}, got "
             f"{shown(harmonic)}; where half orders act, let the excitation frequency be that of "
             "the whole cycle; two frequencies without a common period have no periodic response: "
-            "take a lower one of which both are multiples, nearly (5 and 7 for a ratio of 1.4)"
+            "simulate them, one as frequency_hz of a HarmonicForce, or take a lower one of which "
+            "both are multiples, nearly (5 and 7 for a ratio of 1.4)"
         )
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 import scipy.linalg as sla
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import SystemModelError, is_finite, numbers, shown
-from nldyn.system.elements import BaseMotion, Damper, Excitation, Stop
+from nldyn.system.elements import BaseMotion, Damper, Excitation, HarmonicForce, Stop
 from nldyn.system.linear import (
     ForcedResponse,
     LinearPart,
@@ -32,6 +33,21 @@ Element = TypeVar("Element")
 AnySpring = Spring | PolynomialSpring
 AnyDamper = Damper | CubicDamper
 LARGEST_PARTICIPATION = 1e50  # its square is the mobility of a stop, and its fourth power occurs
+
+
+class Clock(NamedTuple):
+    """Where in time a piece of a simulation lies, in which forces of two frequencies act.
+
+    Parameters
+    ----------
+    omega : float
+        Excitation frequency in rad/s.
+    start : float
+        Time in s at which its phase was last zero.
+    """
+
+    omega: float
+    start: float
 
 
 class ReducedModelLike(Protocol):
@@ -512,10 +528,56 @@ class System:
         return np.asarray(self.linear.left[:, self.size :] @ phi)
 
     @cached_property
+    def tones(self) -> tuple[HarmonicForce, ...]:
+        """The forces that have a frequency of their own."""
+        sources = self.excitation
+        return tuple(s for s in sources if isinstance(s, HarmonicForce) and s.frequency_hz)
+
+    def check_periodic(self) -> None:
+        """Refuse forces that have a frequency of their own.
+
+        Raises
+        ------
+        SystemModelError
+            If there is one.
+        """
+        for tone in self.tones:
+            raise SystemModelError(
+                f"excitation at '{tone.at}' has a frequency of its own, {tone.frequency_hz:g} Hz, "
+                "so that no motion has a period: simulate it (nldyn.simulate, sweep, "
+                "lyapunov_exponents), or take a lower excitation frequency of which both are "
+                "multiples, nearly (5 and 7 for a ratio of 1.4)"
+            )
+
+    @cached_property
+    def _without_tones(self) -> System:
+        others = (source for source in self.excitation if source not in self.tones)
+        return self.with_elements(excitation=tuple(others))
+
+    @cached_property
     def orders(self) -> Real:
         """Multiples of the excitation frequency at which something acts: 1, then the others."""
+        self.check_periodic()
         others = {source.harmonic for source in self.excitation} - {1}
         return np.array([1.0, *sorted(others)])
+
+    def forcing(self, clock: Clock | None = None) -> tuple[Real, Complex]:
+        """`orders` and `drive`, with the forces of frequencies of their own if a clock is given.
+
+        These have as orders what their frequencies are beside that of the clock.
+        """
+        if clock is None or not self.tones:
+            return self.orders, self.drive
+        orders, drive = self._without_tones.forcing()
+        for tone in self.tones:
+            assert tone.frequency_hz is not None
+            pace = 2.0 * np.pi * tone.frequency_hz
+            turned = math.remainder(tone.frequency_hz * clock.start, 1.0)
+            column = self.force_column(self.load_vector(tone.at))
+            row = np.zeros((1, *drive.shape[1:]), dtype=complex)
+            row[0, 0] = tone.phasor * np.exp(2j * np.pi * turned) * column
+            orders, drive = np.append(orders, pace / clock.omega), np.concatenate([drive, row])
+        return orders, drive
 
     @cached_property
     def drive(self) -> Complex:

@@ -158,7 +158,12 @@ def test_what_is_left_out_of_a_measured_force_is_told():
         ('kind = "constant"\nat = "y"\nforce = 1.0', "interface or load vector"),
         ('kind = "harmonic"\nat = "x"\namplitude = 1.0\nharmonic = 0', "harmonic"),
         ('kind = "harmonic"\nat = "x"\namplitude = 1.0\nharmonic = 1.5', "1.5: all .* whole cycle"),
-        ('kind = "harmonic"\nat = "x"\namplitude = 1.0\nfrequency_hz = 2.0', "both are multiples"),
+        ('kind = "harmonic"\nat = "x"\namplitude = 1.0\nfrequency_hz = 2.0', "be multiples 'harm"),
+        (
+            'kind = "harmonic"\nat = "x"\namplitude = 1.0\nfrequency_hz = 2.0\nharmonic = 2',
+            "has both 'harmonic' and 'frequency_hz'",
+        ),
+        ('kind = "base"\nat = "table"\namplitude = 1.0\nfrequency_hz = 2.0', "not a key of kind"),
         ('kind = "harmonic"\nat = "x"\namplitude = 1.0\nforce = 2.0', "not a key of kind"),
         ('kind = "base"\nat = "x"\namplitude = 1.0', "'x' is an interface, .* load vector M r"),
         ('kind = "weight"\nacceleration = [0.0, -9.81]', "needs a .mesh.; give 'loads'"),
