@@ -385,6 +385,7 @@ def _check_interface_names(scene: Scene, report: Report) -> None:
     for number, table in enumerate(scene.excitation):
         if table.kind == "base" and table.at in scene.interface_names:
             fault = f"'{table.at}' is an interface, and a base needs a load vector M r of the whole"
+            fault += "; a single stop that moves is three loads (docs/how-to/loads.md)"
             raise report(("excitation", number, "at"), fault)
         if table.load is None:
             continue

@@ -784,7 +784,10 @@ class System:
                         continue
                     if isinstance(element, BaseMotion):
                         given = ", ".join(self.loads) or "none"
-                        fault = f"'{name}' is not a load vector M r, which a base needs"
+                        fault = (
+                            f"'{name}' is not a load vector M r, which a base needs (a single stop "
+                            "that moves is three loads, see docs/how-to/loads.md)"
+                        )
                         raise SystemModelError(f"excitation: {fault}; there are: {given}")
                     if name in self.rides:
                         raise SystemModelError(f"{kind} {end} '{name}', which is only observed")

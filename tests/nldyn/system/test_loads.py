@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from independent import Motion, exact_flight
+from scipy.integrate import solve_ivp
 
 from nldyn import (
     BaseMotion,
@@ -325,3 +326,36 @@ def test_a_tube_lies_in_its_baffle_with_the_force_of_beam_theory():
     reaction = (sag - 3e-4) / (1.8**3 / (48 * bending) + 1e-6)
     ((number, _, force),) = closed_at_rest(system, rest(system))
     assert (number, force) == (1, pytest.approx(reaction, rel=1e-9))
+
+
+def test_a_stop_that_moves_is_three_loads():
+    """The documented system in the coordinates of the ground, where the stop moves, by scipy."""
+    M, C = np.diag([2.0, 1.0]), np.diag([1.0, 0.6])
+    K, r = np.array([[900.0, -400.0], [-400.0, 600.0]]), np.array([1.0, 0.0])
+    a, hz, gap, k = 2e-3, 3.2, 1e-3, 2e4
+    omega = 2 * np.pi * hz
+    system = System.from_matrices(
+        M, K, {"x1": [1.0, 0.0], "x2": [0.0, 1.0]}, damping=C,
+        stops=[Stop.linear("x1", k, gap=gap)],
+        loads={"M r": M @ r, "C r": C @ r, "K r": K @ r},
+        excitation=[
+            BaseMotion("M r", a), BaseMotion("C r", a, "velocity"), HarmonicForce("K r", a, 180.0),
+        ],
+    ).with_absolute("x1", {"M r": 1.0})  # fmt: skip
+    orbit = solve_orbit(system, hz)
+
+    def rates(t, x):
+        depth = x[0] - a * np.cos(omega * t) - gap
+        push = np.array([k * max(depth, 0.0), 0.0])
+        return np.append(x[2:], np.linalg.solve(M, -C @ x[2:] - K @ x[:2] - push))
+
+    def at(phase: float) -> np.ndarray:
+        state, turn = orbit.states(np.array([phase])), np.array([phase])
+        pairs = [system.displacement(n, state, turn, omega) for n in ("x1 absolute", "x2")]
+        return np.array(pairs)[:, :, 0].T.ravel()
+
+    ways = [solve_ivp(rates, (0.0, t), at(0.0), rtol=1e-11, atol=1e-13, max_step=1e-3).y[:, -1]
+            for t in (0.4 / hz, 1.0 / hz)]  # fmt: skip
+    assert orbit.max_penetration > 1e-4
+    for end, phase in zip(ways, (0.8 * np.pi, 0.0), strict=True):
+        assert end == pytest.approx(at(phase), abs=1e-8 * np.abs(end).max())
