@@ -4,28 +4,175 @@ from __future__ import annotations
 
 import cmath
 import math
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import scipy.linalg as sla
-from scipy.integrate import solve_ivp
+from numba import njit
+from scipy.integrate import DOP853, solve_ivp
 
 from nldyn import CubicDamper, PolynomialSpring, Spring, Stop, System
 
+TABLEAU = DOP853.A, DOP853.B, DOP853.C, DOP853.E3, DOP853.E5  # of order 8, with two estimates
+RTOL = 2e-13
 
-def contact(stop: Stop, depth: float, speed: float) -> tuple[float, float, float]:
-    """Force k δ^p (1 + a δ') + c δ' and its derivatives, or what the stop's own law gives."""
+
+@njit(cache=True)
+def contact(depth, speed, k, p, a, c, pulls):
+    """Force k δ^p (1 + a δ') + c δ' and its derivatives, nothing where the stop is open."""
     if depth <= 0.0:
         return 0.0, 0.0, 0.0
-    if stop.law is not None:
-        return stop.law(depth, speed)
-    k, p, a, c = stop.stiffness, stop.exponent, stop.dissipation, stop.dashpot
-    lossy = 1.0 + a * speed
-    force = k * depth**p * lossy + c * speed
-    if force < 0.0 and not stop.pulls:
+    return pressed(depth, speed, k, p, a, c, pulls)
+
+
+@njit(cache=True)
+def pressed(depth, speed, k, p, a, c, pulls):
+    """The same, and a linear law also goes on behind the place where the stop opens."""
+    if depth <= 0.0 and p != 1.0:
         return 0.0, 0.0, 0.0
-    return force, p * k * depth ** (p - 1.0) * lossy, a * k * depth**p + c
+    slope, lossy = k * p * depth ** (p - 1.0), 1.0 + a * speed
+    spring = slope * depth / p
+    force = spring * lossy + c * speed
+    if force < 0.0 and not pulls:
+        return 0.0, 0.0, 0.0
+    return force, slope * lossy, a * spring + c
+
+
+@njit(cache=True)
+def rate(phase, y, omega, size, terms, closed, out):
+    """Derivatives by the phase of a state and of the columns (if any) that are carried with it.
+
+    Stops are open (0), closed (1), or as their depths say (2).
+    """
+    A, stops, sources, springs, dampers = terms
+    n, columns = size // 2, y.size // size - 1
+    J = A.copy()
+    for i in range(size):
+        out[i] = 0.0
+        for j in range(size):
+            out[i] += A[i, j] * y[j]
+    for source in sources:
+        turn = source[2 * n] * phase
+        for i in range(n):
+            out[n + i] += source[i] * math.cos(turn) - source[n + i] * math.sin(turn)
+    for kind, rows in enumerate((stops, springs, dampers)):
+        for place in range(rows.shape[0]):
+            row = rows[place]
+            u = v = 0.0
+            for i in range(n):
+                u += row[i] * y[i]
+                v += row[i] * y[n + i]
+            force = by_u = by_v = 0.0
+            if kind == 0:
+                if closed[place] > 0:
+                    k, p, a, c, pulls = row[n + 1 : n + 6]
+                    if u > row[n] or closed[place] == 1:
+                        force, by_u, by_v = pressed(u - row[n], v, k, p, a, c, pulls)
+            elif kind == 1:
+                for power in range(row.size - n, 0, -1):
+                    k = row[n + power - 1]
+                    force += k * u**power
+                    by_u += power * k * u ** (power - 1)
+            elif row[n + 1] > 0.0:
+                force, by_v = row[n] * v**3, 3.0 * row[n] * v * v
+            else:
+                force, by_u, by_v = row[n] * v * u * u, 2.0 * row[n] * v * u, row[n] * u * u
+            for i in range(n):
+                out[n + i] -= row[i] * force
+                for j in range(n):
+                    J[n + i, j] -= row[i] * by_u * row[j]
+                    J[n + i, n + j] -= row[i] * by_v * row[j]
+    for i in range(size):
+        out[i] /= omega
+        for column in range(columns):
+            total = 0.0
+            for j in range(size):
+                total += J[i, j] * y[size + j * columns + column]
+            out[size + i * columns + column] = total / omega
+
+
+@njit(cache=True)
+def stepped(phase, y, h, omega, size, terms, closed, tableau, atol, K, new):
+    """Put a Runge-Kutta step into `new`; its error in the measure of the tolerances."""
+    A, B, C, E3, E5 = tableau
+    for i in range(13):
+        for m in range(y.size):
+            new[m] = y[m]
+            for j in range(i):
+                new[m] += h * (A[i, j] if i < 12 else B[j]) * K[j, m]
+        rate(phase + (C[i] if i < 12 else 1.0) * h, new, omega, size, terms, closed, K[i])
+    fifth = third = 0.0
+    for i in range(y.size):
+        scale = atol[i] + RTOL * max(abs(y[i]), abs(new[i]))
+        e3 = e5 = 0.0
+        for j in range(13):
+            e3 += E3[j] * K[j, i]
+            e5 += E5[j] * K[j, i]
+        third += (e3 / scale) ** 2
+        fifth += (e5 / scale) ** 2
+    if fifth == 0.0:
+        return 0.0
+    return h * fifth / math.sqrt((fifth + 0.01 * third) * y.size)
+
+
+@njit(cache=True)
+def switched(y, stops, size, closed, now):
+    """Put into `now` which stops are closed; how many are not as they were."""
+    n, count = size // 2, 0
+    for s in range(closed.size):
+        depth = -stops[s, n]
+        for i in range(n):
+            depth += stops[s, i] * y[i]
+        now[s] = 1 if depth > 0.0 else 0
+        count += now[s] != closed[s]
+    return count
+
+
+@njit(cache=True)
+def followed(y, first, last, omega, size, terms, tableau, atol, max_step):
+    """State and columns at the last phase, and how often each stop closes.
+
+    No step holds the beginning or the end of a contact, where a Hertz force is not smooth.
+    """
+    stops = terms[1]
+    closed, now = np.zeros((2, stops.shape[0]), dtype=np.int64)
+    switched(y, stops, size, closed, closed)
+    closings = np.zeros_like(closed)
+    K, new = np.empty((13, y.size)), np.empty(y.size)
+    phase, h = first, 0.01 * max_step
+    while phase < last:
+        h = min(h, max_step, last - phase)
+        ends = phase + h >= last
+        error = stepped(phase, y, h, omega, size, terms, closed, tableau, atol, K, new)
+        if not error <= 1.0:
+            if h < 1e-15 * last:
+                raise ValueError("the steps get too short")
+            h *= max(0.2, 0.9 * error**-0.125)
+            continue
+        longer = h * min(10.0, 0.9 * max(error, 1e-9) ** -0.125)
+        if switched(new, stops, size, closed, now):
+            low, high, middle = 0.0, h, 0.5 * h
+            while low < middle < high:
+                stepped(phase, y, middle, omega, size, terms, closed, tableau, atol, K, new)
+                if switched(new, stops, size, closed, now):
+                    high = middle
+                else:
+                    low = middle
+                if high - low < 1e-16 * (last - first):
+                    break
+                middle = 0.5 * (low + high)
+            stepped(phase, y, high, omega, size, terms, closed, tableau, atol, K, new)
+            switched(new, stops, size, closed, now)
+            for s in range(closed.size):
+                closings[s] += now[s] > closed[s]
+                closed[s] = now[s]
+            ends, h, longer = ends and high == h, high, h
+        phase += h
+        for m in range(y.size):
+            y[m] = new[m]
+        if ends:
+            break
+        h = longer
+    return y, closings
 
 
 class Motion:
@@ -43,55 +190,39 @@ class Motion:
         self.A[n:, n:] = -system.damping
         if system.circulatory is not None:
             self.A[n:, :n] -= system.circulatory
-        self.springs, self.dampers = [], []
+        stops, springs, dampers = [], [], []
+        for stop in system.stops:
+            assert isinstance(stop, Stop) and stop.law is None
+            numbers = stop.gap, stop.stiffness, stop.exponent, stop.dissipation, stop.dashpot
+            stops.append([*system.stop_vector(stop), *numbers, stop.pulls])
         for element in (*system.springs, *system.dampers):
             c = system.participation[element.at].copy()
             if element.against is not None:
                 c -= system.participation[element.against]
             if isinstance(element, PolynomialSpring):
-                self.springs.append((c, element.coefficients))
+                springs.append([*c, *element.coefficients, *[0.0] * 9][: n + 9])
             elif isinstance(element, CubicDamper):
-                self.dampers.append((c, element))
+                dampers.append([*c, element.coefficient, element.by == "speed"])
             elif isinstance(element, Spring):
                 self.A[n:, :n] -= element.stiffness * np.outer(c, c)
             else:
                 self.A[n:, n:] -= element.coefficient * np.outer(c, c)
-        self.stops = [(system.stop_vector(s), s) for s in system.stops]
+        rows = (stops, n + 6), (springs, n + 9), (dampers, n + 2)
+        self.elements = [np.array(r, dtype=float).reshape(-1, width) for r, width in rows]
         self.sources = [(system.load_vector(e.at), e) for e in system.excitation]
 
-    def rate(self, phase: float, x: np.ndarray, omega: float) -> np.ndarray:
-        """Time derivative of the state."""
-        dx = self.A @ x
-        for shape, source in self.sources:
-            amplitude = source.phasor * (source.harmonic * omega) ** source.power
-            dx[self.n :] += shape * (amplitude * np.exp(1j * source.harmonic * phase)).real
-        for c, stop in self.stops:
-            dx[self.n :] -= c * contact(stop, c @ x[: self.n] - stop.gap, c @ x[self.n :])[0]
-        for c, coefficients in self.springs:
-            u = c @ x[: self.n]
-            dx[self.n :] -= c * sum(k * u**j for j, k in enumerate(coefficients, 1))
-        for c, damper in self.dampers:
-            u, v = c @ x[: self.n], c @ x[self.n :]
-            dx[self.n :] -= c * damper.coefficient * v * (v if damper.by == "speed" else u) ** 2
-        return dx
-
-    def tangent_matrix(self, x: np.ndarray) -> np.ndarray:
-        """Derivative of the rate with respect to the state."""
-        J = self.A.copy()
-        for c, stop in self.stops:
-            _, stiff, viscous = contact(stop, c @ x[: self.n] - stop.gap, c @ x[self.n :])
-            J[self.n :, : self.n] -= stiff * np.outer(c, c)
-            J[self.n :, self.n :] -= viscous * np.outer(c, c)
-        for c, coefficients in self.springs:
-            u = c @ x[: self.n]
-            slope = sum(j * k * u ** (j - 1) for j, k in enumerate(coefficients, 1))
-            J[self.n :, : self.n] -= slope * np.outer(c, c)
-        for c, damper in self.dampers:
-            u, v = c @ x[: self.n], c @ x[self.n :]
-            by_u, by_v = (0.0, 3.0 * v * v) if damper.by == "speed" else (2.0 * u * v, u * u)
-            J[self.n :, : self.n] -= damper.coefficient * by_u * np.outer(c, c)
-            J[self.n :, self.n :] -= damper.coefficient * by_v * np.outer(c, c)
-        return J
+    def terms(self, omega: float) -> tuple[np.ndarray, ...]:
+        """All numbers of the equations at a frequency."""
+        amplitudes = [s.phasor * (s.harmonic * omega) ** s.power for _, s in self.sources]
+        sources = np.array(
+            [
+                [*(shape * a.real), *(shape * a.imag), source.harmonic]
+                for (shape, source), a in zip(self.sources, amplitudes, strict=True)
+            ],
+            dtype=float,
+        ).reshape(-1, 2 * self.n + 1)
+        stops, springs, dampers = self.elements
+        return self.A, stops, sources, springs, dampers
 
     def run(
         self,
@@ -101,79 +232,46 @@ class Motion:
         *,
         tangent: bool = True,
         max_step: float = 0.05,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """End state and its derivative with respect to the start, good to 1e-12 and 5e-11.
+    ) -> tuple[np.ndarray, np.ndarray, list[int]]:
+        """End state, its derivative by the start, good to 1e-12 and 5e-11, and closings of stops.
 
-        The steps (radians of the forcing phase) must be shorter than every contact. None holds the
-        beginning or the end of a contact, where the derivative of a Hertz force is not smooth.
+        The steps (radians of the forcing phase) must be shorter than every contact.
         """
+        assert not tangent or all(self.elements[0][:, -1])  # a force that ends is no smooth one
         size = 2 * self.n
-        y = np.concatenate([state, (np.eye(size) if tangent else np.zeros((size, 0))).ravel()])
-        atol = self._tolerances(state, omega)[: y.size]
-        passed = self._integrated(state, phases, omega, atol[:size], max_step).t_events
-        switches = sorted(float(phase) for of_stop in passed for phase in of_stop)
-        for piece in pairwise([phases[0], *switches, phases[1]]):
-            y = self._integrated(y, piece, omega, atol, max_step).y[:, -1]
-        return y[:size], y[size:].reshape(size, -1)
+        y = np.concatenate([state, np.eye(size).ravel()] if tangent else [state]).astype(float)
+        fastest = max(np.abs(np.linalg.eigvals(self.A)).max(), omega)
+        length = max(np.abs(state[: self.n]).max(), np.abs(state[self.n :]).max() / fastest)
+        scale = np.repeat([length, length * fastest], self.n)
+        atol = 1e-14 * np.concatenate([scale, (scale[:, None] / scale).ravel()])
+        first, last = map(float, phases)
+        y, closings = followed(
+            y, first, last, omega, size, self.terms(omega), TABLEAU, atol, max_step
+        )
+        return y[:size], y[size:].reshape(size, -1), closings.tolist()
 
     def stiff_end(
         self, state: np.ndarray, phases: tuple[float, float], omega: float, atol: float = 1e-19
     ) -> np.ndarray:
         """End state where a stop damps fast, by Radau's method of order 5."""
+        size, terms = 2 * self.n, self.terms(omega)
+        by_depth = np.full(len(terms[1]), 2)
+
+        def rates(phase: float, x: np.ndarray, *columns: np.ndarray) -> np.ndarray:
+            y = np.concatenate([x, *columns])
+            out = np.empty(y.size)
+            rate(phase, y, omega, size, terms, by_depth, out)
+            return out
+
         return solve_ivp(
-            lambda time, x: self.rate(omega * time, x, omega),
-            np.array(phases) / omega,
+            rates,
+            phases,
             state,
             method="Radau",
             rtol=1e-12,
             atol=atol,
-            jac=lambda _, x: self.tangent_matrix(x),
+            jac=lambda phase, x: rates(phase, x, np.eye(size).ravel())[size:].reshape(size, size),
         ).y[:, -1]
-
-    def closings(
-        self, state: np.ndarray, phases: tuple[float, float], omega: float, max_step: float = 0.05
-    ) -> list[int]:
-        """How often each stop closes: its depth turns positive from one step to the next."""
-        atol = self._tolerances(state, omega)[: 2 * self.n]
-        q = self._integrated(state, phases, omega, atol, max_step).y[: self.n]
-        depths = [c @ q - stop.gap for c, stop in self.stops]
-        return [int(np.sum((d[:-1] <= 0.0) & (d[1:] > 0.0))) for d in depths]
-
-    def _tolerances(self, state: np.ndarray, omega: float) -> np.ndarray:
-        """Errors allowed in the state, then in its derivative."""
-        fastest = max(np.abs(np.linalg.eigvals(self.A)).max(), omega)
-        length = max(np.abs(state[: self.n]).max(), np.abs(state[self.n :]).max() / fastest)
-        scale = np.repeat([length, length * fastest], self.n)
-        return 1e-14 * np.concatenate([scale, (scale[:, None] / scale).ravel()])
-
-    def _integrated(
-        self,
-        y: np.ndarray,
-        phases: tuple[float, float],
-        omega: float,
-        atol: np.ndarray,
-        max_step: float,
-    ) -> Any:
-        """State and, if it is given, its derivative, by steps; and where stops open or close."""
-        size = 2 * self.n
-
-        def extended(phase: float, y: np.ndarray) -> np.ndarray:
-            x, X = y[:size], y[size:].reshape(size, -1)
-            dx = self.rate(phase, x, omega) / omega
-            return np.concatenate([dx, (self.tangent_matrix(x) @ X).ravel() / omega])
-
-        return solve_ivp(
-            extended,
-            phases,
-            y,
-            method="DOP853",
-            rtol=2e-13,
-            atol=atol,
-            max_step=max_step,
-            events=[
-                lambda _, y, c=c, stop=stop: c @ y[: self.n] - stop.gap for c, stop in self.stops
-            ],
-        )
 
 
 def exact_flight(

@@ -1,4 +1,7 @@
-"""The same input gives the same bits: again, in another process, with any number of workers."""
+"""The same input gives the same bits: again, in another process, with any number of workers.
+
+These tests are slow; in the gate test_faults_machine.py has another process on one core.
+"""
 
 import os
 import subprocess
@@ -20,6 +23,7 @@ from nldyn.scene.read import load_scene
 START = "from nldyn.app.command import main; main()"
 
 
+@pytest.mark.slow
 def test_two_processes_give_the_same_bytes(tmp_path):
     """With another order of sets and dictionaries, and other numbers of threads."""
     text = example("bilinear_modal.toml").read_text()
@@ -101,7 +105,8 @@ def response(system):
     return {"size": float(np.abs(found.amplitudes).sum())}
 
 
-@pytest.mark.parametrize("workers", [2, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 3))])
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2, 3])
 def test_a_study_is_the_same_with_any_number_of_workers(workers):
     values = {
         "excitation.0.amplitude": [0.1, 0.2, 0.3],

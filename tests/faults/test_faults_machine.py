@@ -64,7 +64,7 @@ def full(*_, **__):
     [
         (output, "write_table"),
         pytest.param(output, "save_diagram", marks=pytest.mark.slow),
-        (os, "fsync"),
+        pytest.param(os, "fsync", marks=pytest.mark.slow),
     ],
 )
 def test_a_disk_that_is_full_at_the_end_keeps_what_was_computed(
@@ -85,6 +85,7 @@ def test_a_disk_that_is_full_at_the_end_keeps_what_was_computed(
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_on_the_way_does_not_end_the_computation(
     scene, whole, tmp_path, monkeypatch
 ):
@@ -118,6 +119,7 @@ main()
 """
 
 
+@pytest.mark.slow
 def test_files_that_the_system_refuses_to_grow(scene, tmp_path):
     arguments = ["run", str(scene), "--out", str(tmp_path / "out"), "--quiet"]
     end = subprocess.run(
@@ -161,13 +163,18 @@ def test_a_read_only_folder_for_compiled_code(scene, tmp_path):
     assert end.stderr.count("\n") <= 1
 
 
-# --- one core ------------------------------------------------------------------------------------
+# --- another process -----------------------------------------------------------------------------
 
 
-def test_one_core_gives_the_same_results(scene, whole, tmp_path):
+def test_another_process_on_one_core_gives_the_same_bytes(scene, whole, tmp_path):
+    """With another order of sets and dictionaries, and other numbers of threads."""
     code = f"import os; os.sched_setaffinity(0, [min(os.sched_getaffinity(0))]); {START}"
     arguments = ["run", str(scene), "--out", str(tmp_path / "out"), "--quiet"]
-    subprocess.run([sys.executable, "-c", code, *arguments], check=True, timeout=300)
+    threads = {f"{name}_NUM_THREADS": "2" for name in ("OPENBLAS", "OMP", "NUMBA")}
+    environment = {**os.environ, "PYTHONHASHSEED": "2", **threads}
+    subprocess.run(
+        [sys.executable, "-c", code, *arguments], check=True, timeout=300, env=environment
+    )
     same_results(tmp_path / "out", whole)
 
 
@@ -199,10 +206,7 @@ STAGES = {
 
 @pytest.mark.parametrize(
     "stage",
-    [
-        pytest.param(stage, marks=[pytest.mark.slow] * (stage in ("search", "picture")))
-        for stage in STAGES
-    ],
+    [pytest.param(stage, marks=[pytest.mark.slow] * (stage != "walk")) for stage in STAGES],
 )
 def test_ctrl_c_at_every_stage(scene, whole, tmp_path, monkeypatch, stage):
     place, name, call, kept = STAGES[stage]
@@ -243,7 +247,7 @@ def ticks_of_session(session):
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
 @pytest.mark.parametrize(
-    "seconds", [0.3, 2.0, *(pytest.param(more, marks=pytest.mark.slow) for more in (1.0, 4.0))]
+    "seconds", [0.3, *(pytest.param(more, marks=pytest.mark.slow) for more in (1.0, 2.0, 4.0))]
 )
 def test_ctrl_c_from_the_terminal(tmp_path, seconds):
     """At any time from the first second of the process on, also within compiled code."""
@@ -262,13 +266,11 @@ def test_ctrl_c_from_the_terminal(tmp_path, seconds):
     check_whole(out)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
 @pytest.mark.parametrize(
     "arguments",
-    [
-        pytest.param(["hard", "--only", "continuation at low damping"], marks=pytest.mark.slow),
-        ["bench"],
-    ],
+    [["hard", "--only", "continuation at low damping"], ["bench"]],
     ids=["hard", "bench"],
 )
 def test_ctrl_c_while_a_suite_is_computed(tmp_path, arguments):

@@ -16,7 +16,7 @@ from nldyn.scene.build import build_system
 from nldyn.scene.component import build_component
 from nldyn.scene.read import load_scene
 
-QUICK, FULL = 50, 4000
+QUICK, FULL = 20, 4000
 
 PART = "{ youngs_modulus = 2e11, density = 7800, width = 0.03, height = 0.01 }"
 GMSH = f"""

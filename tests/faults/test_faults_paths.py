@@ -129,7 +129,7 @@ def test_results_go_nowhere_but_into_the_folder_asked_for(tmp_path, monkeypatch)
     """Names and titles that look like paths are not used as such."""
     monkeypatch.chdir(tmp_path)
     text = MODAL.partition("[[subharmonics]]")[0].replace("two modes", "../../x/$(touch y)")
-    text = text.replace("[5.0, 90.0]", "[30.0, 31.0]").replace("[1, 2]", "[1]")
+    text = text.replace("[5.0, 90.0]", "[30.0, 30.3]").replace("[1, 2]", "[1]")
     text = text.replace("participation.middle", 'participation."../out"')
     text = text.replace('"middle"', '"../out"')
     (tmp_path / "scene.toml").write_text(text)

@@ -14,7 +14,7 @@ from small_meshes import fuzz, write_meshes
 
 from nldyn.app.cli import main
 
-QUICK, FULL = 4, 150
+QUICK, FULL = 2, 150
 SOON = 2  # s of processor time
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")

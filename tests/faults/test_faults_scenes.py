@@ -17,7 +17,7 @@ from nldyn.scene.build import build_system
 from nldyn.scene.component import build_component
 from nldyn.scene.read import load_scene
 
-QUICK, FULL = 50, 4000
+QUICK, FULL = 20, 4000
 KEYS = {name: tomllib.loads(text) for name, text in TEXTS.items()}
 
 
@@ -147,7 +147,7 @@ def garbled(draw):
     return bytes(content)
 
 
-@fuzz(QUICK // 3)
+@fuzz(QUICK // 2)
 @given(content=garbled())
 def test_a_garbled_file_is_told_in_one_sentence_or_right(folder, content):
     judge(folder, content)

@@ -238,7 +238,7 @@ def test_neimark_sacker_pair_under_runge_kutta(torus_branch):
     for point in torus_points(torus_branch):
         orbit = point.orbit
         start = orbit.states(np.array([0.0]))[0]
-        _, jacobian = Motion(torus_system()).run(start, (0.0, 2 * np.pi), orbit.omega)
+        _, jacobian, _ = Motion(torus_system()).run(start, (0.0, 2 * np.pi), orbit.omega)
         moduli = np.abs(np.linalg.eigvals(jacobian))
         assert np.sort(np.abs(moduli - 1.0))[1] < 1e-6
 
@@ -302,7 +302,7 @@ def test_neimark_sacker_point_close_to_a_fold_is_found(lightly_damped):
     assert sorted(s.kind for s in close) == ["LP", "NS"]
     orbit = next(s.orbit for s in close if s.kind == "NS")
     start = orbit.states(np.array([0.0]))[0]
-    _, jacobian = Motion(system).run(start, (0.0, 2 * np.pi), orbit.omega)
+    _, jacobian, _ = Motion(system).run(start, (0.0, 2 * np.pi), orbit.omega)
     pair = max(np.linalg.eigvals(jacobian), key=lambda mu: mu.imag)
     assert pair.imag > 0.1
     assert abs(pair) == pytest.approx(1.0, abs=1e-5)

@@ -126,7 +126,7 @@ def test_monodromy_at_a_flip_agrees_with_runge_kutta(one_dof, harmonic_branch, i
     """-1 is an eigenvalue of the variational equations too, integrated without the flow map."""
     orbit = of_kind(harmonic_branch, "PD")[index].orbit
     start = orbit.states(np.array([0.0]))[0]
-    _, jacobian = Motion(one_dof).run(start, (0.0, 2 * np.pi), orbit.omega)
+    _, jacobian, _ = Motion(one_dof).run(start, (0.0, 2 * np.pi), orbit.omega)
     assert np.abs(np.linalg.eigvals(jacobian) + 1.0).min() < 1e-7
 
 

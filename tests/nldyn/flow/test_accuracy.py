@@ -173,7 +173,7 @@ def test_a_soft_contact_resolves_the_fast_mode_that_it_starts(duration):
     flow, omega, phases = FlowMap(system), 100.0, np.array([0.0, 100.0 * duration])
     start = np.array([6.3e-4, 0.0, 0.081, 0.0])
     shot = flow.shoot(flow.to_state(start)[None], phases, omega)
-    end, tangent = Motion(system).run(start, (0.0, phases[1]), omega)
+    end, tangent, _ = Motion(system).run(start, (0.0, phases[1]), omega)
     basis = system.linear
     own = np.array([1e-3, 1e-3, 0.1, 0.1])  # m and m/s
     assert np.abs((flow.to_modal(shot.ends)[0] - end) / own).max() < 1e-9

@@ -69,7 +69,7 @@ def test_motions_and_derivatives_are_those_of_runge_kutta(name):
     modal = 0.4 * np.cos(np.arange(2.0 * system.size))
     phases = (0.3, 0.3 + (2.0 if system.stops else 4.0) * math.pi)
     step = 0.01 if system.stops else 0.05
-    state, tangent = Motion(system).run(modal, phases, omega, max_step=step)
+    state, tangent, _ = Motion(system).run(modal, phases, omega, max_step=step)
     found = flow.shoot(flow.to_state(modal)[None], np.array(phases), omega)
     assert not found.failure
     assert bool(found.closings.sum()) == bool(system.stops)
@@ -181,7 +181,7 @@ def test_growth_over_a_chaotic_stretch_and_the_sum_of_the_exponents():
     """Singular values of the tangent of ten periods; the sum is minus the damping, exactly."""
     system = one(0.0, 0.15, springs=[WELLS])
     start = np.array([0.5, 0.0])
-    _, tangent = Motion(system).run(start, (0.0, 20.0 * math.pi), 1.0)
+    _, tangent, _ = Motion(system).run(start, (0.0, 20.0 * math.pi), 1.0)
     flow = FlowMap(system)
     found = flow.shoot(flow.to_state(start)[None], np.array([0.0, 20.0 * math.pi]), 1.0)
     J = system.linear.right @ found.jacobians[0] @ system.linear.left

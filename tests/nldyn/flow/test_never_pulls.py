@@ -139,7 +139,7 @@ def test_with_a_nonlinear_spring_beside_it():
         excitation=[HarmonicForce("x", 1.0), HarmonicForce("x", 4.0, harmonic=5)],
     )  # fmt: skip
     flow, start = FlowMap(system), np.array([0.1, 0.3])
-    state, _ = Motion(system).run(start, (0.0, 12.0), 1.1, tangent=False, max_step=0.01)
+    state, *_ = Motion(system).run(start, (0.0, 12.0), 1.1, tangent=False, max_step=0.01)
     here = flow.to_state(start)
     found = flow.shoot(here[None], np.array([0.0, 12.0]), 1.1)
     assert found.closings.sum() > 1

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from branches_alike import assert_same_branches
-from problems import RANGE_HZ
 
 from nldyn import (
     Branch,
@@ -33,7 +32,7 @@ from nldyn.io.branches import load_branches
 from nldyn.runtime import keeper
 from nldyn.runtime.result_directory import OutputError
 
-AT = (12.2, 26.0, 45.0)
+RANGE_HZ, AT = (11.0, 40.0), (12.2, 26.0, 33.0)
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +77,7 @@ def picture(one_dof):
 # --- extension -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("count", [2, 420])
+@pytest.mark.parametrize("count", [2, 250])
 def test_a_run_stopped_after_some_points_goes_on_as_if_uninterrupted(start, whole, tmp_path, count):
     part = continue_branch(start, RANGE_HZ, options=ContinuationOptions(max_points=count), at=AT)
     assert len(part.nodes) < len(whole.nodes)
@@ -87,7 +86,7 @@ def test_a_run_stopped_after_some_points_goes_on_as_if_uninterrupted(start, whol
     assert_same_branches(continue_branch(loaded, options=ContinuationOptions()), whole)
 
 
-@pytest.mark.parametrize("range_hz", [(26.0, 31.0), (11.9, 60.0)])
+@pytest.mark.parametrize("range_hz", [(26.0, 31.0), (11.9, 33.0)])
 def test_a_wider_range_gives_the_points_of_one_continuation(start, whole, tmp_path, range_hz):
     part = continue_branch(start, range_hz)
     save(part, tmp_path / "part.h5")
@@ -98,7 +97,7 @@ def test_a_wider_range_gives_the_points_of_one_continuation(start, whole, tmp_pa
 
 def test_extension_in_many_small_pieces(start, whole):
     branch = continue_branch(start, (25.0, 27.0))
-    for width in (1.1, 1.15, 1.9, 2.5, 3.3):
+    for width in (1.1, 1.15, 1.4):
         branch = continue_branch(branch, (25.0 / width, 27.0 * width))
     assert_same_branches(continue_branch(branch, RANGE_HZ, at=AT), whole)
 
@@ -131,10 +130,8 @@ def test_a_branch_that_closes_in_a_wider_range_is_kept_once(picture):
 
 
 def test_extensions_that_make_no_sense_are_refused(whole):
-    with pytest.raises(
-        SystemModelError, match=r"must contain the range of the branch, \(5.7, 90\)"
-    ):
-        continue_branch(whole, (6.0, 80.0))
+    with pytest.raises(SystemModelError, match=r"must contain the range of the branch, \(11, 40\)"):
+        continue_branch(whole, (12.0, 38.0))
     with pytest.raises(SystemModelError, match="at: 95 Hz lies outside"):
         continue_branch(whole, at=[95.0])
     bare = Branch("bare", 1, whole.nodes, (), whole.stop_reasons)
@@ -146,7 +143,7 @@ def test_extensions_that_make_no_sense_are_refused(whole):
 
 
 @pytest.mark.parametrize(
-    "count", [2, 500, *(pytest.param(other, marks=pytest.mark.slow) for other in (0, 150))]
+    "count", [2, 250, *(pytest.param(other, marks=pytest.mark.slow) for other in (0, 150))]
 )
 def test_an_interrupted_run_loses_nothing(start, whole, tmp_path, count):
     path = tmp_path / "run.h5"
@@ -203,13 +200,13 @@ KILLED = """
 import os, signal
 from nldyn import CheckpointFile, continue_branch, solve_orbit
 from nldyn.runtime import keeper
-from problems import RANGE_HZ, make_one_dof
+from problems import make_one_dof
 
 keeper.PAUSE = keeper.SHARE = 0.0
 seen = iter(range(25))
 die = lambda _: next(seen, None) is None and os.kill(os.getpid(), signal.SIGKILL)
 kept = CheckpointFile("run.h5")
-continue_branch(solve_orbit(make_one_dof(), 26.0), RANGE_HZ, progress=die, checkpoint=kept)
+continue_branch(solve_orbit(make_one_dof(), 26.0), (11.0, 40.0), progress=die, checkpoint=kept)
 """
 
 

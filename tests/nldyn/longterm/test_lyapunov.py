@@ -140,7 +140,7 @@ def test_growth_over_a_chaotic_motion_of_a_bilinear_oscillator_agrees_with_anoth
     logs = []
     transform = system.linear.left
     for k in range(periods + 3):  # a tenth of the periods turns the basis first
-        x, tangent = other.run(x, (0.0, 2.0 * np.pi), omega)
+        x, tangent, _ = other.run(x, (0.0, 2.0 * np.pi), omega)
         jacobian = transform @ tangent @ np.linalg.inv(transform)
         basis, triangle = np.linalg.qr(jacobian @ basis)
         if k >= 3:

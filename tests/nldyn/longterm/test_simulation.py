@@ -39,7 +39,7 @@ def test_simulation_agrees_with_adaptive_integration():
     system = make_one_dof()
     start = np.array([-1e-4, 1e-2])
     motion = simulate(system, 26.0, periods=6, start=start)
-    x, _ = Independent(system).run(start, (0.0, 12.0 * np.pi), 2.0 * np.pi * 26.0, tangent=False)
+    x, *_ = Independent(system).run(start, (0.0, 12.0 * np.pi), 2.0 * np.pi * 26.0, tangent=False)
     assert len(impacts(motion)) >= 4
     scale = np.abs(motion.strobe).max(axis=0)
     assert np.all(np.abs(motion.end - x) < 1e-8 * scale)
@@ -135,7 +135,7 @@ def test_permanent_contact_is_no_impact():
 
 def chirp_end(system: System, first: float, last: float, rate: float) -> np.ndarray:
     """State at the end of a sweep whose frequency changes at every instant."""
-    stops, (phi, source) = Independent(system).stops, Independent(system).sources[0]
+    (phi, source), stops = Independent(system).sources[0], Independent(system).elements[0]
     slope = np.copysign(rate, last - first)
     spring, damping = system.natural_frequencies[0] ** 2, system.total_damping[0, 0]
 
@@ -143,8 +143,8 @@ def chirp_end(system: System, first: float, last: float, rate: float) -> np.ndar
         omega = 2.0 * np.pi * (first + slope * t)
         phase = 2.0 * np.pi * (first * t + 0.5 * slope * t * t)
         push = phi[0] * source.phasor.real * omega**source.power * np.cos(phase)
-        for c, stop in stops:
-            push -= c[0] * contact(stop, c[0] * x[0] - stop.gap, c[0] * x[1])[0]
+        for c, gap, *law in stops:
+            push -= c * contact(c * x[0] - gap, c * x[1], *law)[0]
         return [x[1], push - spring * x[0] - damping * x[1]]
 
     span = (0.0, abs(last - first) / rate)

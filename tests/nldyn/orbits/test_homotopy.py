@@ -25,7 +25,7 @@ def two_modes() -> System:
 def runge_kutta_gap(orbit: Orbit, system: System) -> float:
     """How far from closing an orbit of one period is by another integration, relative."""
     start = orbit.states([0.0])[0]
-    end, _ = Motion(system).run(start, (0.0, 2.0 * np.pi), orbit.omega, tangent=False)
+    end, *_ = Motion(system).run(start, (0.0, 2.0 * np.pi), orbit.omega, tangent=False)
     scale = np.repeat([1.0, orbit.omega], 2) * np.abs(start[:2]).max()
     return float(np.abs((end - start) / scale).max())
 

@@ -53,7 +53,7 @@ def test_subharmonic_returns_under_runge_kutta_after_its_period_only(one_dof):
     orbit = next(o for o in find_orbits(one_dof, 62.2, 5) if o.stable)
     states = orbit.states(2 * np.pi * np.arange(5))
     scale = np.abs(orbit.history(500).modal).max() * np.array([1.0, orbit.omega])
-    x, _ = Motion(one_dof).run(states[0], (0.0, 10 * np.pi), orbit.omega, tangent=False)
+    x, *_ = Motion(one_dof).run(states[0], (0.0, 10 * np.pi), orbit.omega, tangent=False)
     assert np.abs((x - states[0]) / scale).max() < 1e-7
     for other in states[1:]:
         assert np.abs((other - states[0]) / scale).max() > 1e-2

@@ -102,7 +102,7 @@ def test_contacts_are_those_of_a_runge_kutta_method(kind):
     system = make(kind, stops=STOPS)
     flow, x0 = FlowMap(system, EXACT), start_of(system)
     found = flow.shoot(flow.to_state(x0)[None], np.array([0.4, 0.4 + 2 * np.pi]), OMEGA)
-    end, _ = Motion(system).run(x0, (0.4, 0.4 + 2 * np.pi), OMEGA, tangent=False, max_step=0.01)
+    end, *_ = Motion(system).run(x0, (0.4, 0.4 + 2 * np.pi), OMEGA, tangent=False, max_step=0.01)
     assert found.closings.sum() > 0
     assert flow.to_modal(found.ends[0]) == pytest.approx(end, abs=1e-9 * np.abs(end).max())
 
@@ -310,7 +310,7 @@ def test_an_example_under_loads_is_periodic_by_a_runge_kutta_method(name, hz):
     orbit = solve_orbit(system, hz)
     assert orbit.max_penetration > 0.0
     start = orbit.states(np.zeros(1))[0]
-    end, _ = Motion(system).run(
+    end, *_ = Motion(system).run(
         start, (0.0, 2 * np.pi), 2 * np.pi * hz, tangent=False, max_step=2e-3
     )
     sizes = np.abs(orbit.states(np.linspace(0.0, 2 * np.pi, 50))).max(axis=0)

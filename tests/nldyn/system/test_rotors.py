@@ -110,7 +110,7 @@ def test_rubbing_orbits_are_those_of_runge_kutta():
     assert orbit.impacts >= 2
     flow = orbit.problem.flow
     start = flow.to_modal(orbit.problem.nodes(orbit.point)[0])
-    end, tangent = Motion(system).run(start, (0.0, 2.0 * np.pi), orbit.omega, max_step=0.005)
+    end, tangent, _ = Motion(system).run(start, (0.0, 2.0 * np.pi), orbit.omega, max_step=0.005)
     assert end == pytest.approx(start, abs=1e-8)
     exact = np.linalg.eigvals(tangent)
     for multiplier in orbit.multipliers:
@@ -219,7 +219,7 @@ def test_a_disc_is_followed_in_its_speed_as_the_closed_form_says(tmp_path):
         IT * np.eye(2), K * np.eye(2), PLACES, damping=C * np.eye(2), stops=[stop],
         gyroscopic=beyond.omega * IP * SKEW, excitation=system.excitation,
     )  # fmt: skip
-    end, tangent = Motion(turned).run(start, (0.0, 2.0 * np.pi), beyond.omega, max_step=0.02)
+    end, tangent, _ = Motion(turned).run(start, (0.0, 2.0 * np.pi), beyond.omega, max_step=0.02)
     assert end == pytest.approx(start, abs=1e-8)
     exact_multipliers = np.linalg.eigvals(tangent)
     for multiplier in beyond.multipliers:

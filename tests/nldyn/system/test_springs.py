@@ -275,7 +275,7 @@ def test_the_beam_with_two_wells_rests_where_beam_theory_says():
     assert found == pytest.approx([-tip, tip], rel=1e-7)
     assert tip == pytest.approx(0.0101721, abs=5e-8)
     flow, start = FlowMap(system), np.array([1e-3, 0.0, 0.0, 0.0, 0.02, 0.0, 0.0, 0.0])
-    end, _ = Motion(system).run(start, (0.0, 2.0 * np.pi), 25.0, tangent=False)
+    end, *_ = Motion(system).run(start, (0.0, 2.0 * np.pi), 25.0, tangent=False)
     here = flow.to_state(start)[None]
     end_found = flow.shoot(here, np.array([0.0, 2.0 * np.pi]), 25.0).ends[0]
     row = system.participation["tip"]
