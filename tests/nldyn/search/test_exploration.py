@@ -272,18 +272,6 @@ def test_a_round_without_news_is_the_last():
     assert "branches up to period 2 that the rounds added: 1, 0" in found.report()
 
 
-def test_rounds_go_on_from_the_first_one():
-    effort = ExploreOptions(spacing=0.06, starts=1, unstable_period=0)
-    first, all_rounds = (
-        explore(system_of("one_dof"), (36.0, 38.0), 1, effort=replace(effort, rounds=n))
-        for n in (1, 3)
-    )
-    assert len(all_rounds.new_branches) > 1
-    assert first.new_branches == all_rounds.new_branches[:1]
-    places = [{c.frequency_hz for c in found.coverage} for found in (first, all_rounds)]
-    assert places[0] < places[1]
-
-
 def test_a_round_at_work_does_not_count_in_the_estimate(whole):
     begun = np.vstack([whole.stage.met, np.ones((1, whole.stage.branches), dtype=bool)])
     going_on = replace(whole, stage=replace(whole.stage, met=begun))
