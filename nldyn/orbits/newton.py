@@ -18,9 +18,10 @@ from nldyn.system.system import System
 # counts as untouched
 TOUCH = 1e-7
 NOT_HELD = "the structure is free to move in a way that no stop limits, and nothing tells its place"
+TOUCH_ONE = "give a guess that touches one"
 NO_PLACE = (
     "the structure is free to move as a whole, and where the motion touches no stop, nothing tells "
-    "its place; give a guess that touches one"
+    "its place"
 )
 
 
@@ -93,7 +94,7 @@ def refine(
     where = f"no orbit of period {problem.period} found at {omega / (2 * math.pi):g} Hz"
     drifts = problem.flow.system.free_modes > 0
     if drifts and _touches_only(problem.flow.system, found.motion, omega):
-        raise ConvergenceError(f"{where}: {NO_PLACE}")
+        raise ConvergenceError(f"{where}: {NO_PLACE}; {TOUCH_ONE}")
     if not found.converged:
         contact = np.any(found.motion.record.kind >= 0)
         fault = None if contact else problem.flow.system.response(omega).unbounded(omega)
@@ -104,7 +105,7 @@ def refine(
         if drifts and problem.flow.system.left_free:
             raise ConvergenceError(f"{where}: {NOT_HELD}")
         if not contact and drifts:
-            raise ConvergenceError(f"{where}: {NO_PLACE}")
+            raise ConvergenceError(f"{where}: {NO_PLACE}; {TOUCH_ONE}")
         step = f", last relative step {found.last_step:.1e}" if found.last_step < math.inf else ""
         raise ConvergenceError(
             f"{where}: {found.failure}{step} after {found.iterations} "

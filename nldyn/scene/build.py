@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -208,8 +209,27 @@ def join(scene: Scene, parts: Mapping[str, AnyComponent] | None = None) -> cms.R
         cms.Joint(place(joint.at), None if joint.against is None else place(joint.against))
         for joint in scene.joints
     ]
+    _tell_of_crossed_joints(scene)
     with told_as(scene, ("joints",), cms.ReductionError):
         return cms.couple(models, joints)
+
+
+def _tell_of_crossed_joints(scene: Scene) -> None:
+    """Warn of joints that make displacements along different axes equal."""
+    for joint in scene.joints:
+        along = {}
+        for end in joint.ends:
+            component, name = place(end)
+            interface = scene.components[component].interfaces.get(name)
+            if interface is not None:
+                along[end] = interface.direction
+        if len(set(along.values())) > 1:
+            (one, axis), (other, across) = along.items()
+            warnings.warn(
+                f"joint of '{one}', along {axis}, with '{other}', along {across}: they move as one "
+                "all the same, which is right only if the meshes have axes of their own",
+                stacklevel=2,
+            )
 
 
 def place(interface: str) -> tuple[str, str]:

@@ -9,6 +9,7 @@ from nldyn.branches.options import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.options import FlowOptions
 from nldyn.io.checkpoint import CheckpointFile
+from nldyn.orbits.newton import NOT_HELD
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.scene.build import Structure, build_structure, build_system
 from nldyn.scene.checks import check_computable, range_remark
@@ -193,6 +194,9 @@ def _to_follow(scene: Scene, structure: Structure) -> tuple[FlowMap, Continuatio
     system = build_system(scene, structure.reduced)
     table = scene.continuation
     assert table is not None
+    if system.left_free and system.circulatory is None:
+        fault = f"{NOT_HELD}: hold it by a support, a spring or a stop, or simulate it"
+        raise scene_error(scene.file, (), fault)
     with told_as(scene, ("continuation",), SystemModelError):
         if system.bonds:  # searches start where it rests
             rest_positions(system)

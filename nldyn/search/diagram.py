@@ -43,6 +43,7 @@ from nldyn.branches.options import ContinuationOptions
 from nldyn.branches.tables import Part, to_pandas, to_xarray
 from nldyn.flow.ahead import Ahead, Task, computing_ahead
 from nldyn.flow.flow_map import FlowMap, flow_of, same_flow
+from nldyn.orbits.newton import NO_PLACE
 from nldyn.orbits.orbit import Orbit, check_observe, minimal_period, stroboscopic
 from nldyn.orbits.solve import solve_orbit
 from nldyn.orbits.starts import (
@@ -631,6 +632,8 @@ def diagram(
         if not any(branch.period == period for branch in box.branches):
             tried = f"{search_points} frequenc{'y' if search_points == 1 else 'ies'}"
             box.notes.append(f"no orbit of period {period} found by simulation at {tried}")
+    if not box.branches and flow.system.free_modes:
+        box.notes.append(NO_PLACE)
     if _contact_is_missing(box):
         box.notes.append(
             "no orbit that touches a stop was found; there may be some all the same: try a range "

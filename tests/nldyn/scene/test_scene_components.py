@@ -238,6 +238,15 @@ def test_a_rotation_is_not_joined_to_a_displacement(tmp_path):
         halves(tmp_path, wrong)
 
 
+def test_a_joint_of_displacements_along_different_axes_is_told(tmp_path):
+    crossed = '[[joints]]\nat = "inner.y"\nagainst = "outer.x"\n'
+    turn = "[[joints]]" + JOINTS.rsplit("[[joints]]", 1)[1]
+    held = '[[stops]]\nat = "outer.tip"\nlaw = "linear"\nstiffness = 1.0\n'
+    scene = halves(tmp_path, crossed + turn + held)
+    with pytest.warns(UserWarning, match=r"'inner.y', along y, with 'outer.x', along x: they move"):
+        build_reduced(scene)
+
+
 def test_a_list_of_components_and_joints_of_nothing_are_told():
     with pytest.raises(SceneError, match=r"with a name: \[components.NAME\]"):
         parse_scene('[[components]]\nname = "a"\n')

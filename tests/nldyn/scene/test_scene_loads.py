@@ -11,6 +11,7 @@ from nldyn.scene.build import build_reduced, build_system
 from nldyn.scene.checks import check_computable
 from nldyn.scene.component import build_component
 from nldyn.scene.read import load_scene, parse_scene
+from nldyn.scene.run import compute
 from nldyn.system.measured import measured_force
 from nldyn.system.rest import rest
 
@@ -223,3 +224,15 @@ def test_a_last_sample_that_repeats_the_first_is_asked_about(tmp_path):
     with pytest.raises(SceneError, match="'closed', which is not a key of kind 'constant'"):
         build_system(parse_scene(GEAR + '[[excitation]]\nkind = "constant"\nat = "x"\n'
                                  "force = 1.0\nclosed = true\n"))  # fmt: skip
+
+
+def test_a_body_that_nothing_holds_ends_with_the_reason():
+    shaken = '[[excitation]]\nkind = "base"\nat = "table"\namplitude = 1e-3\n'
+    free = parse_scene(GEAR.split("[[stops]]")[0] + shaken)
+    with pytest.raises(SceneError, match=r"free to move .* nothing tells its place: hold it by"):
+        compute(free)
+    held = GEAR.replace("gap = 1.0", "gap = 0.2").replace("damping = [[0.1]]", "")
+    once = "range_hz = [0.05, 0.2]\nperiods = [1]\nsearch_points = 1"
+    between = parse_scene(held.replace("range_hz = [0.05, 0.2]", once) + shaken)
+    notes = compute(between).notes
+    assert any("where the motion touches no stop, nothing" in note for note in notes)
