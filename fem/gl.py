@@ -97,6 +97,12 @@ def renders(window: str) -> bool:
     return run.returncode == 0 and b"rendered" in run.stdout
 
 
+def has_screen() -> bool:
+    """Whether a window can be opened: there is a display, and VTK draws on it."""
+    there = not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY"))
+    return there and gl_available()[0] and on_screen()
+
+
 def on_screen() -> bool:
     """Whether VTK, after `gl_available`, opens windows that can be seen."""
     return os.environ.get(EGL_VARIABLE) not in WINDOWLESS

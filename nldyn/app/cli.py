@@ -26,6 +26,7 @@ from nldyn.runtime.interruption import STOPPED, interrupted
 
 if TYPE_CHECKING:
     from nldyn.base.arrays import Real
+    from nldyn.scene.build import Structure
     from nldyn.scene.schema import Scene
     from nldyn.search.diagram import Diagram
     from nldyn.system.rigid_stop import AnyStop
@@ -424,6 +425,12 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
 )
 @click.option("--animate", "animated", is_flag=True, help="Draw each mode as a GIF, too.")
 @click.option("--open", "opened", is_flag=True, help="Open the page where there is a screen.")
+@click.option(
+    "--window/--no-window",
+    default=None,
+    help="Show the modes in a window that can be turned; by default at a terminal with a screen, "
+    "without --out.",
+)
 @json_option
 def modes(
     scene: Path,
@@ -435,6 +442,7 @@ def modes(
     against: Path | None,
     animated: bool,
     opened: bool,
+    window: bool | None,
     as_json: bool,
 ) -> None:
     """Tell and draw the modes of a scene: frequencies, effective masses, participation."""
@@ -487,6 +495,27 @@ def modes(
         sys.exit(NO_GRAPHICS)
     if opened and out is not None:
         open_page(out / "mode_shapes.html")
+    asked = sys.stdout.isatty() and out is None and not as_json and loaded.mesh is not None
+    if window or (window is None and asked):
+        show_window(loaded, structure, modes or [], view, wanted=bool(window))
+
+
+def show_window(
+    scene: Scene, structure: Structure, modes: list[int], view: str, *, wanted: bool
+) -> None:
+    """Show modes in a window until it is closed, or say where none can be opened, if wanted."""
+    from fem.gl import has_screen
+    from nldyn.report.render import modes_in_window
+
+    if has_screen():
+        with plain_errors():
+            modes_in_window(scene, structure, modes, view).show()
+    elif wanted:
+        click.echo(
+            "nldyn: no window can be opened here; '--out DIR' writes pictures and a page for a "
+            "browser",
+            err=True,
+        )
 
 
 def open_page(page: Path) -> None:

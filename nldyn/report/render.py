@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 DRAWN_RADIUS = 0.005
 FRAMES = 60
+WINDOW = (1280, 720)  # in pixels, of modes on a screen
 
 
 @dataclass(frozen=True)
@@ -254,6 +255,30 @@ def render_modes_of(
         drawing = Drawing(scene, component, structure.reduced, folder, silent, tuple(modes), view)
         drawing.mode_page()
         return drawing.mode_picture(against, animated)
+
+
+def modes_in_window(
+    scene: Scene, structure: Structure, modes: Sequence[int] = (), view: str = "oblique"
+) -> Any:
+    """The modes of a scene as a pyvista plotter, which opens a window by its ``show()``.
+
+    The parameters are those of `render_modes_of`.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no mesh.
+    """
+    from fem.render import render_modes
+
+    if scene.mesh is None or structure.reduced is None:
+        raise SceneError(f"{scene.file}: only a mesh can be drawn")
+    component: Any = structure.component
+    drawing = Drawing(scene, component, structure.reduced, Path(), silent, tuple(modes), view)
+    shapes = structure.reduced.basis[:, drawing.chosen]
+    return render_modes(
+        component, shapes, drawing.mode_titles, mirror=_mirror(scene), view=view, size=WINDOW
+    )
 
 
 def save_mac(against: Comparison, folder: Path) -> None:

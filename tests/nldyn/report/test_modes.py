@@ -101,3 +101,25 @@ def test_a_view_looks_along_its_direction(view):
     assert abs(up @ back) < 1e-12
     assert (up[1] > 0.0) if view != "top" else np.allclose(np.cross(up, back), (1.0, 0.0, 0.0))
     plotter.close()
+
+
+def test_a_window_is_opened_where_there_is_a_screen(monkeypatch):
+    shown = []
+
+    class Window:
+        def show(self):
+            shown.append(self)
+
+    def drawn(_component, shapes, titles, **kinds):
+        assert shapes.shape[1] == len(titles) == 2 and kinds["view"] == "top"
+        return Window()
+
+    monkeypatch.setattr("fem.render.render_modes", drawn)
+    asked = ("modes", BEAM, "--modes", "1,3", "--view", "top")
+    for screen, windows in ((True, 1), (False, 0)):
+        shown.clear()
+        monkeypatch.setattr("fem.gl.has_screen", lambda there=screen: there)
+        result = invoke(*asked, "--window")
+        assert (result.exit_code, len(shown)) == (0, windows)
+        assert ("no window can be opened here" in result.stderr) == (not screen)
+        assert invoke(*asked).exit_code == 0 and len(shown) == windows  # no terminal, no window
