@@ -1,14 +1,14 @@
 """Component mode synthesis: reduce a linear component to a few modal coordinates."""
 
-from cms.accuracy import Accuracy, accuracy
-from cms.checks import Checks, check, mac
-from cms.component import ComponentLike
-from cms.coupled_accuracy import CoupledAccuracy, coupled_accuracy
-from cms.coupling import Joint, couple
-from cms.errors import ReductionError
-from cms.matrix_files import ReadMatrices, read_matrices
-from cms.model import ReducedModel
-from cms.reduction import METHODS, Matrices, keep_modes, reduce
+from cms.base.errors import ReductionError
+from cms.checks.accuracy import Accuracy, accuracy
+from cms.checks.checks import Checks, check, mac
+from cms.checks.coupled_accuracy import CoupledAccuracy, coupled_accuracy
+from cms.component.component import ComponentLike, Matrices
+from cms.files.matrix_files import ReadMatrices, read_matrices
+from cms.reduction.coupling import Joint, couple
+from cms.reduction.model import ReducedModel
+from cms.reduction.reduction import METHODS, keep_modes, reduce
 
 __all__ = [
     "METHODS",

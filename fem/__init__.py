@@ -1,8 +1,15 @@
 """Frames and structures: from a mesh to stiffness, mass and interfaces."""
 
-from fem.abaqus import read_abaqus
-from fem.assemble import assemble
-from fem.attachments import (
+from fem.assembly.assemble import assemble
+from fem.assembly.frame import Component
+from fem.assembly.structure import DistortionWarning, LockingWarning, StructureComponent
+from fem.assembly.summary import MassProperties, mass_properties, summary
+from fem.base.errors import JointWarning, ModelError
+from fem.checks.unlikely import UnlikelyWarning
+from fem.formats.abaqus import read_abaqus
+from fem.formats.read import from_meshio, read_mesh, read_structure, structure_from_meshio
+from fem.formats.write import write_mesh
+from fem.mesh.attachments import (
     Attachments,
     Coupling,
     LeftOut,
@@ -11,37 +18,23 @@ from fem.attachments import (
     PointMass,
     PointSpring,
 )
-from fem.calibrate import Calibration, calibrate
-from fem.errors import JointWarning, ModelError
-from fem.frame import Component
-from fem.mesh import FrameMesh, frame_mesh
-from fem.model import (
-    BeamPart,
-    FrameModel,
-    Hinge,
-    Interface,
-    Material,
-    Support,
-    TrussPart,
-)
-from fem.pieces import Pieces, pieces_of
-from fem.places import node_at, nodes_inside
-from fem.read import from_meshio, read_mesh, read_structure, structure_from_meshio
-from fem.refine import refined
-from fem.sections import (
+from fem.mesh.frame_mesh import FrameMesh, frame_mesh
+from fem.mesh.pieces import Pieces, pieces_of
+from fem.mesh.places import node_at, nodes_inside
+from fem.mesh.refine import refined
+from fem.mesh.structure_mesh import StructureMesh, box_mesh, joined, structure_mesh
+from fem.model.calibrate import Calibration, calibrate
+from fem.model.frame import FrameModel
+from fem.model.parts import BeamPart, Material, ShellPart, SolidPart, TrussPart
+from fem.model.sections import (
     CircularSection,
     CrossSection,
     RectangularSection,
     Section,
     TaperedSection,
 )
-from fem.shells import ShellPart
-from fem.structure import Foundation, SolidPart, StructureModel, symmetry
-from fem.structure_assembly import DistortionWarning, LockingWarning, StructureComponent
-from fem.structure_mesh import StructureMesh, box_mesh, joined, structure_mesh
-from fem.summary import MassProperties, mass_properties, summary
-from fem.unlikely import UnlikelyWarning
-from fem.write import write_mesh
+from fem.model.structure import StructureModel, symmetry
+from fem.model.supports import Foundation, Hinge, Interface, Support
 
 __all__ = [
     "Attachments",

@@ -16,7 +16,7 @@ HERE = Path(__file__).parent
 # need none; then the longest files, so that no worker is left alone with one.
 COMPILES = ("nldyn/orbits/test_multipliers.py",)
 SCENES = "nldyn/scene/test_scene_errors.py", "nldyn/scene/test_scene_documented.py"
-NEEDS_NO_KERNELS = ("cms", "fem", *SCENES)
+NEEDS_NO_KERNELS = ("cms", "fem", "test_layers.py", "test_links.py", *SCENES)
 LONGEST = (
     "nldyn/search/test_exploration.py",
     "nldyn/curves/test_curves.py",

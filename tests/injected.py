@@ -62,17 +62,17 @@ FAULTS = [
     ),
     Fault(
         "all physical groups of a Gmsh file but the first are lost",
-        "fem/gmsh.py",
+        "fem/formats/gmsh.py",
         "        for group in np.unique(block.groups[block.groups != 0]):\n            name",
         "        for group in np.unique(block.groups[block.groups != 0])[:1]:\n            name",
-        "fem/test_fem_meshes.py",
+        "fem/formats/test_fem_meshes.py",
     ),
     Fault(
         "the last node of a generated Abaqus set is lost",
-        "fem/abaqus/sets.py",
+        "fem/formats/abaqus/sets.py",
         "range(first, last + 1, step)",
         "range(first, last, step)",
-        "fem/test_fem_meshes.py",
+        "fem/formats/test_fem_meshes.py",
     ),
     Fault(
         "multipliers are paired with the moduli of others",
@@ -83,17 +83,17 @@ FAULTS = [
     ),
     Fault(
         "mass is lost where solid cells share a node",
-        "fem/structure_assembly.py",
+        "fem/assembly/structure.py",
         "np.add.at(mass, at, M.ravel())",
         "mass[at] += M.ravel()",
-        "fem/test_fem_structures.py",
+        "fem/assembly/test_fem_structures.py",
     ),
     Fault(
         "the residual flexibility has a mode that is kept",
-        "cms/reduction.py",
+        "cms/reduction/reduction.py",
         "residual_flexibility(pencil, shifted, kept.vectors)",
         "residual_flexibility(pencil, shifted, kept.vectors[:, 1:])",
-        "cms/test_cms_methods.py",
+        "cms/reduction/test_cms_methods.py",
     ),
     Fault(
         "the test function of a flip has no sign",
@@ -118,10 +118,10 @@ FAULTS = [
     ),
     Fault(
         "damping is lost where components are coupled",
-        "cms/coupling.py",
+        "cms/reduction/coupling.py",
         "if model.damping is None else model.damping",
         "if True else model.damping",
-        "cms/test_cms_coupling.py",
+        "cms/reduction/test_cms_coupling.py",
     ),
     Fault(
         "explore does not search again where the indices do not add up",
@@ -146,18 +146,18 @@ FAULTS = [
     ),
     Fault(
         "wedges of a file are left out",
-        "fem/read.py",
+        "fem/formats/read.py",
         "        blocks = cells.setdefault(block.type, [])",
         '        if block.type == "wedge":\n            continue\n'
         "        blocks = cells.setdefault(block.type, [])",
-        "fem/test_fem_cell_orders.py",
+        "fem/formats/test_fem_cell_orders.py",
     ),
     Fault(
         "a point mass of a frame is half as heavy in y",
-        "fem/frame.py",
+        "fem/assembly/frame.py",
         "(lump.mass, lump.mass, about_z)",
         "(lump.mass, 0.5 * lump.mass, about_z)",
-        "fem/test_fem_structures.py",
+        "fem/assembly/test_fem_structures.py",
     ),
     Fault(
         "Hertz's law has the exponent 1.4",
@@ -204,10 +204,10 @@ FAULTS = [
     ),
     Fault(
         "the last interface or load vector has no residual mode",
-        "cms/residual.py",
+        "cms/reduction/residual.py",
         "residual = without_modes(static, modes, pencil)\n    basis",
         "residual = without_modes(static[:, :-1], modes, pencil)\n    basis",
-        "cms/test_cms_methods.py",
+        "cms/reduction/test_cms_methods.py",
     ),
 ]
 

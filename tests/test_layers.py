@@ -1,4 +1,4 @@
-"""The rooms of nldyn: a room imports rooms to its right only."""
+"""The rooms of nldyn, fem and cms: a room imports rooms below it only."""
 
 from __future__ import annotations
 
@@ -10,12 +10,18 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 # from the roof to the ground; rooms on one floor do not know each other
-FLOORS = (
-    ("app",), ("paper",), ("report",), ("plot", "scene"), ("longterm", "reduction", "io"),
-    ("search",), ("curves",), ("branches",), ("bifurcations",), ("orbits",), ("flow",),
-    ("runtime", "system"), ("base",),
-)  # fmt: skip
-FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
+FLOORS = {
+    "nldyn": "app paper report plot|scene longterm|reduction|io search curves branches bifurcations"
+    " orbits flow runtime|system base",
+    "fem": "render assembly checks elements formats|model mesh base",
+    "cms": "checks reduction solvers|files component base",
+}
+FLOOR = {
+    package: {room: number for number, floor in enumerate(floors.split())
+              for room in floor.split("|")}
+    for package, floors in FLOORS.items()
+}  # fmt: skip
+ROOMS = [(package, room) for package, floors in FLOOR.items() for room in floors]
 # who may import what of others
 KEPT_TO = {
     "fem": {"reduction", "scene", "report", "paper", "app"},
@@ -27,7 +33,7 @@ KEPT_TO = {
     "pydantic": {"scene"},
 }
 ABOVE_IMPORTS_IN_FUNCTIONS = {"scene", "report", "paper", "app", "plot"}
-DOORS = {"__init__", "__main__"}  # of the package: the face and ``python -m nldyn``
+DOORS = {*FLOORS, "nldyn.__main__"}  # the faces of the packages and ``python -m nldyn``
 
 
 def modules(package: str) -> dict[str, ast.Module]:
@@ -39,11 +45,8 @@ def modules(package: str) -> dict[str, ast.Module]:
     return found
 
 
-NLDYN = {
-    name: tree
-    for name, tree in modules("nldyn").items()
-    if name.split(".")[1:2] not in (["bench"], ["hard"])
-}
+TREES = {package: modules(package) for package in FLOORS}
+NLDYN = TREES["nldyn"]
 
 
 def imports(tree: ast.AST, within: bool = False) -> Iterator[tuple[str, bool]]:
@@ -57,27 +60,41 @@ def imports(tree: ast.AST, within: bool = False) -> Iterator[tuple[str, bool]]:
         yield from imports(node, inside)
 
 
-def room_of(name: str) -> str | None:
-    """The room of a name of nldyn; none for the face."""
+def room_of(name: str, package: str = "nldyn") -> str | None:
+    """The room of a name of a package; none for its face and for other packages."""
     words = name.split(".")
-    return words[1] if words[0] == "nldyn" and len(words) > 1 and words[1] in FLOOR else None
+    at_home = words[0] == package and len(words) > 1 and words[1] in FLOOR[package]
+    return words[1] if at_home else None
 
 
-def test_every_module_is_in_a_room():
-    outside = [name for name in NLDYN if name != "nldyn" and room_of(name) is None]
-    assert [name for name in outside if name.split(".")[-1] not in DOORS] == []
+@pytest.mark.parametrize("package", FLOORS)
+def test_every_module_is_in_a_room(package):
+    outside = [name for name in TREES[package] if room_of(name, package) is None]
+    assert [name for name in outside if name not in DOORS] == []
 
 
-@pytest.mark.parametrize("room", FLOOR)
-def test_a_room_imports_rooms_below_only(room):
+@pytest.mark.parametrize(("package", "room"), ROOMS)
+def test_a_room_imports_rooms_below_only(package, room):
+    floor = FLOOR[package]
     up = [
         f"{name} imports {other}"
-        for name, tree in NLDYN.items()
-        if room_of(name) == room
+        for name, tree in TREES[package].items()
+        if room_of(name, package) == room
         for other, _ in imports(tree)
-        if (theirs := room_of(other)) not in (None, room) and FLOOR[theirs] <= FLOOR[room]
+        if (theirs := room_of(other, package)) not in (None, room) and floor[theirs] <= floor[room]
     ]
     assert up == []
+
+
+@pytest.mark.parametrize("package", ["fem", "cms"])
+def test_no_room_imports_the_face_of_its_package(package):
+    above = [
+        name
+        for name, tree in TREES[package].items()
+        if name != package and any(other.rpartition(".")[0] in ("", package) and
+                                   other.split(".")[0] == package for other, _ in imports(tree))
+    ]  # fmt: skip
+    assert above == []
 
 
 def test_below_the_scene_no_import_hides_in_a_function():
@@ -106,13 +123,13 @@ def test_what_only_some_rooms_import(package):
     ("package", "unknown"), [("fem", ("cms", "nldyn")), ("cms", ("fem", "nldyn"))]
 )
 def test_what_a_package_does_not_know(package, unknown):
-    for name, tree in modules(package).items():
+    for name, tree in TREES[package].items():
         known = {other.split(".")[0] for other, _ in imports(tree)}
         assert not known & set(unknown), name
 
 
 def test_no_modules_import_each_other_in_a_circle():
-    trees = {**NLDYN, **modules("fem"), **modules("cms")}
+    trees = {name: tree for package in TREES.values() for name, tree in package.items()}
     arrows = {
         name: {
             other if other in trees else other.rpartition(".")[0]
@@ -127,7 +144,7 @@ def test_no_modules_import_each_other_in_a_circle():
     assert sorted(arrows) == []
 
 
-@pytest.mark.parametrize("package", ["fem", "cms", "nldyn"])
+@pytest.mark.parametrize("package", FLOORS)
 def test_a_package_tells_that_it_has_types(package):
     """Without the file, mypy takes all of it for Any in the code of users."""
     assert (ROOT / package / "py.typed").is_file()

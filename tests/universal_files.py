@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import fem
-from fem.cells import KINDS
+from fem.mesh.cells import KINDS
 
 UNV_NUMBERS = {"line": 21, "line3": 24, "triangle": 91, "triangle6": 92, "quad": 94, "quad8": 95}
 UNV_NUMBERS |= {"tetra": 111, "tetra10": 118, "wedge": 112, "wedge15": 113, "hexahedron": 115}

@@ -664,7 +664,7 @@ def render(
 
         loaded = load_scene(scene, mesh_folders)
         check_results(out, loaded, replace)
-        from fem.gl import RenderError
+        from fem.render import RenderError
         from nldyn.report.render import render_scene
 
         try:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import cms
-from cms.component import checked_pencil
+from cms.component.component import checked_pencil
 from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import ConvergenceError, SystemModelError
 from nldyn.branches.branch import Branch

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import cms
-from fem.page import packed, triangles
-from fem.render import AUTO_FRACTION, AnyComponent, extent, surface_of
+from fem.render.page import packed, triangles
+from fem.render.pictures import AUTO_FRACTION, AnyComponent, extent, surface_of
 
 MOST_NUMBERS = 2_000_000  # of 16 bits, that the motion of the surface may take
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fem.page import packed
+from fem.render.page import packed
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError
 from nldyn.branches.branch import Branch

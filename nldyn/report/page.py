@@ -38,7 +38,7 @@ from nldyn.search.diagram import Diagram
 
 if TYPE_CHECKING:
     import cms
-    from fem.render import AnyComponent
+    from fem.render.pictures import AnyComponent
     from nldyn.orbits.orbit import Orbit
     from nldyn.scene.schema import Scene
 

@@ -116,7 +116,7 @@ def render_scene(
     >>> scene = load_scene(example("two_dof_xi_0.01.toml"))
     >>> made = render_scene(scene, tempfile.mkdtemp(), frequency_hz=23.0)   # doctest: +SKIP
     """
-    from fem.render import check_video
+    from fem.render.pictures import check_video
 
     if scene.mesh is None:
         if scene.components:
@@ -379,7 +379,7 @@ class Drawing:
 
     def mode_page(self) -> None:
         """Write the modes as a page for a browser."""
-        from fem.page import write_page
+        from fem.render import write_page
 
         write_page(
             self.component,
@@ -392,7 +392,7 @@ class Drawing:
 
     def pages(self, orbit: Orbit | None) -> None:
         """Write the modes, and the stress at the deepest contact, as pages for a browser."""
-        from fem.page import write_page
+        from fem.render import write_page
 
         self.mode_page()
         if orbit is None:
@@ -434,7 +434,8 @@ class Drawing:
         """Draw the modes, and beside each the other's mode that is most like it."""
         import imageio.v3 as iio
 
-        from fem.render import render_modes, write_image
+        from fem.render import render_modes
+        from fem.render.pictures import write_image
 
         other: Any = against.structure
         partners = [against.partners[number] for number in self.chosen]
@@ -500,7 +501,7 @@ class Drawing:
         self, state: NDArray[np.float64], penetration: float, stop: StopSphere | None
     ) -> float:
         """Factor on the deflection at which the stop is not drowned in what it dents."""
-        from fem.render import automatic_scale, round_number, surface_of
+        from fem.render.pictures import automatic_scale, round_number, surface_of
 
         factor = automatic_scale(surface_of(self.component, _mirror(self.scene)), state[None])
         if stop is None or penetration == 0.0:

@@ -14,7 +14,7 @@ from scipy.sparse.linalg import spsolve
 
 import cms
 import fem
-from cms.doubt import check_unreduced
+from cms.reduction.doubt import check_unreduced
 from nldyn.base.arrays import Real
 from nldyn.base.errors import LARGEST_DENSE, ConvergenceError, SystemModelError
 from nldyn.reduction.candidates import Candidates, candidate_modes

@@ -9,7 +9,14 @@ import numpy as np
 from scipy import sparse
 
 import cms
-from cms.matrix_files import FileMatrix, joined, read_matrix, read_skew, read_vector, split_source
+from cms.files.matrix_files import (
+    FileMatrix,
+    joined,
+    read_matrix,
+    read_skew,
+    read_vector,
+    split_source,
+)
 from nldyn.base.arrays import Real
 from nldyn.scene.component import readable_path
 from nldyn.scene.faults import told_as

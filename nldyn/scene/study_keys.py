@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from cms.matrix_files import split_source
+from cms.files.matrix_files import split_source
 from nldyn.base.errors import SystemModelError, shown
 
 PLAIN = (bool, int, float, complex, str, bytes, np.generic, PurePath, range, slice)

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import HealthCheck, settings
 
 import fem
-from fem.structure_mesh import box_mesh, joined, structure_mesh
+from fem.mesh.structure_mesh import box_mesh, joined, structure_mesh
 
 
 def frame() -> fem.FrameMesh:

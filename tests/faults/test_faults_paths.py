@@ -11,7 +11,7 @@ from scene_mutations import FRAME, MODAL
 from small_meshes import write_meshes
 
 import fem
-from fem.page import write_page
+from fem.render import write_page
 from nldyn.base.errors import SceneError
 from nldyn.scene.component import build_component
 from nldyn.scene.read import load_scene, parse_scene

@@ -13,7 +13,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 import fem
-from fem.attachments import Attachments
+from fem.mesh.attachments import Attachments
 
 Label = int
 CLAMP = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")

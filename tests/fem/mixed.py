@@ -4,8 +4,8 @@ import numpy as np
 from scipy.sparse.linalg import spsolve
 
 import fem
-from fem.cells import CUBE, KINDS
-from fem.structure_mesh import _UNIT_CORNERS, PYRAMID, TETRAHEDRON, WEDGE
+from fem.mesh.cells import CUBE, KINDS
+from fem.mesh.structure_mesh import _UNIT_CORNERS, PYRAMID, TETRAHEDRON, WEDGE
 
 FAMILIES = {
     "first order": ("hexahedron", "wedge", "pyramid", "tetra"),

@@ -16,7 +16,7 @@ MODULES = [
 
 
 def test_modules_with_examples_are_found():
-    assert {"cms.reduction", "nldyn.orbits.orbit", "nldyn.scene.build"} < set(MODULES)
+    assert {"cms.reduction.reduction", "nldyn.orbits.orbit", "nldyn.scene.build"} < set(MODULES)
 
 
 @pytest.mark.parametrize("name", MODULES)

@@ -12,7 +12,7 @@ import cms
 import fem
 import nldyn
 from cms import ReducedModel
-from fem.store import load_model, load_structure
+from fem.model.store import load_model, load_structure
 from nldyn import CheckpointFile, diagram, parameter_study
 from nldyn.app.cli import main
 from nldyn.base.resources import example

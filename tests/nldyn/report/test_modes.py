@@ -94,8 +94,8 @@ def test_a_view_looks_along_its_direction(view):
     pyvista = pytest.importorskip("pyvista")
     plotter = pyvista.Plotter(off_screen=True)
     plotter.add_mesh(pyvista.Box((0.0, 3.0, 0.0, 2.0, 0.0, 1.0)))
-    back = fem.render.checked_view(view)
-    fem.render.fit_camera(plotter, (800, 600), back)
+    back = fem.render.pictures.checked_view(view)
+    fem.render.pictures.fit_camera(plotter, (800, 600), back)
     eye, focus, up = map(np.array, plotter.camera_position)
     np.testing.assert_allclose((eye - focus) / np.linalg.norm(eye - focus), back, atol=1e-12)
     assert abs(up @ back) < 1e-12

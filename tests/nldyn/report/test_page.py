@@ -155,7 +155,7 @@ def test_the_moves_of_modes_add_up_to_the_deflected_surface():
         quantum * numbers(move, "<i2").reshape(-1, 3)
         for quantum, move in zip(shown["quanta"], shown["moves"], strict=True)
     ]
-    drawing = fem.render.surface_of(structure.component, "middle")
+    drawing = fem.render.pictures.surface_of(structure.component, "middle")
     deflected, size = drawing.place(structure.reduced.expand(state))
     rest = numbers(shown["points"]).reshape(-1, 3)
     np.testing.assert_allclose(

@@ -114,7 +114,7 @@ def test_pictures_show_the_stop_of_the_deepest_contact(tmp_path, monkeypatch):
     for stop in (options["stop"], drawn["motion.gif"][2]["stop"]):
         assert (stop.point, stop.direction, stop.gap) == ("middle", (0.0, -1.0), 0.0)
     assert -component.interfaces["middle"] @ u == pytest.approx(depth[2], rel=1e-6)
-    within_stop = fem.render.round_number(2.0 * options["stop"].radius / depth[2])
+    within_stop = fem.render.pictures.round_number(2.0 * options["stop"].radius / depth[2])
     assert options["scale"] == pytest.approx(within_stop)
 
 

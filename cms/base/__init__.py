@@ -1,0 +1,1 @@
+"""What all of cms rests on: names of arrays, the one exception, threads."""

@@ -1,0 +1,11 @@
+"""Names of arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32 | np.int64]
+SparseMatrix = sparse.csc_array[np.float64]

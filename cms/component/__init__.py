@@ -1,0 +1,1 @@
+"""A component's matrices, checked; how many digits they have, and what has no mass."""

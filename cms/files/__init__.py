@@ -1,0 +1,1 @@
+"""Matrices from files of other programs."""

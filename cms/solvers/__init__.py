@@ -1,0 +1,1 @@
+"""Factors of large matrices, and lowest modes."""

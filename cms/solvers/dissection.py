@@ -1,0 +1,274 @@
+"""Order a sparse symmetric matrix for elimination, by nested dissection of its graph."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from cms.base.arrays import FloatArray, IntArray, SparseMatrix
+from cms.component.component import times
+
+LEAF = 200  # rows that are eliminated together without being cut once more
+LANDMARKS = 20
+SMOOTHINGS = 40
+CUTS = (0.5, 0.47, 0.53)  # shares of a part on one side of the cuts that are tried
+LONG = 0.6  # axes along which a part is this long, relative to its longest, are tried
+
+
+@dataclass(frozen=True, eq=False)
+class Front:
+    """Rows that are eliminated together.
+
+    Attributes
+    ----------
+    start, stop : int
+        Their places in the order of elimination.
+    border : (b,) array
+        Later places that their elimination touches, ascending.
+    children : tuple of int
+        Numbers of the fronts whose borders reach into this one first.
+    """
+
+    start: int
+    stop: int
+    border: IntArray
+    children: tuple[int, ...]
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return self.stop - self.start
+
+
+@dataclass(frozen=True, eq=False)
+class Elimination:
+    """How a matrix is eliminated.
+
+    Attributes
+    ----------
+    order : (N,) array
+        Row of the matrix at each place.
+    fronts : tuple of Front
+        Children before their parents.
+    """
+
+    order: IntArray
+    fronts: tuple[Front, ...]
+
+    @property
+    def entries(self) -> int:
+        """Numbers that the factor keeps."""
+        return sum(f.rows * (f.rows + f.border.size) for f in self.fronts)
+
+    @property
+    def most_numbers(self) -> int:
+        """Most numbers in memory at one time, with what fronts hand on."""
+        kept = handed = most = 0
+        for f in self.fronts:
+            s, b = f.rows, f.border.size
+            panel, update = s * (s + b), b * b
+            most = max(most, kept + handed + 2 * panel + update)
+            kept += panel
+            handed += update - sum(self.fronts[child].border.size ** 2 for child in f.children)
+        return most
+
+
+def dissected(matrix: SparseMatrix) -> Elimination:
+    """The order of elimination of a symmetric matrix, by nested dissection.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse array
+        Symmetric in its pattern, with a full diagonal.
+
+    Returns
+    -------
+    Elimination
+
+    Notes
+    -----
+    Rows of one pattern (those of a node) are one vertex of the graph. Its vertices get coordinates
+    from their distances to a few landmarks far from each other [1]_; the graph is cut across the
+    longest extent, the smaller of the two boundaries is the separator, and so on with both halves
+    [2]_.
+
+    References
+    ----------
+    .. [1] de Silva, V. and Tenenbaum, J.B. (2004) Sparse multidimensional scaling using landmark
+       points. Technical report, Stanford University.
+    .. [2] George, A. (1973) Nested dissection of a regular finite element mesh. SIAM Journal on
+       Numerical Analysis 10(2), 345-363.
+    """
+    vertex = vertices(matrix)
+    graph = quotient_graph(matrix, vertex)
+    weights = np.bincount(vertex)
+    groups, children = cut(graph, weights, landmark_coordinates(graph))
+    places = np.concatenate(groups)
+    by_vertex = np.argsort(vertex, kind="stable")
+    starts = np.concatenate([[0], np.cumsum(weights)])
+    order = by_vertex[ranges(starts[places], weights[places])]
+    return Elimination(order, tuple(fronts_of(graph, weights, groups, children)))
+
+
+def vertices(matrix: SparseMatrix) -> IntArray:
+    """Number of the vertex of every row (N,); rows with one and the same pattern share one."""
+    size = matrix.shape[0]
+    ones = (np.ones(matrix.nnz), matrix.indices, matrix.indptr)
+    marks = np.random.default_rng(0).random((size, 3))
+    keys = times(sparse.csc_array(sparse.csr_array(ones, shape=matrix.shape)), marks)
+    return np.asarray(np.unique(keys, axis=0, return_inverse=True)[1]).ravel()
+
+
+def quotient_graph(matrix: SparseMatrix, vertex: IntArray) -> SparseMatrix:
+    """Adjacency of the vertices, without the diagonal."""
+    count = int(vertex.max()) + 1
+    first = np.unique(vertex, return_index=True)[1]
+    lengths = np.diff(matrix.indptr)[first]
+    neighbours = vertex[matrix.indices[ranges(matrix.indptr[first], lengths)]]
+    owners = np.repeat(np.arange(count), lengths)
+    away = neighbours != owners
+    graph = sparse.coo_array(
+        (np.ones(np.count_nonzero(away)), (owners[away], neighbours[away])), shape=(count, count)
+    )
+    return sparse.csc_array(graph + graph.T)
+
+
+def ranges(starts: IntArray, lengths: IntArray) -> IntArray:
+    """The numbers from each start on, one range after the other."""
+    ends = np.cumsum(lengths)
+    total = int(ends[-1]) if ends.size else 0
+    return np.asarray(np.arange(total) + np.repeat(starts - (ends - lengths), lengths))
+
+
+def distances(graph: SparseMatrix, source: int) -> FloatArray:
+    """Number of edges from a vertex to every other; infinite where there is no way."""
+    order, before = csgraph.breadth_first_order(graph, source, directed=True)
+    place = np.zeros(graph.shape[0], dtype=np.intp)
+    place[order] = np.arange(order.size)
+    came = place[before[order[1:]]]
+    found = np.full(graph.shape[0], np.inf)
+    found[source] = 0.0
+    start, stop, level = 0, 1, 0
+    while stop < order.size:
+        start, stop = stop, 1 + int(np.searchsorted(came, stop))
+        level += 1
+        found[order[start:stop]] = level
+    return found
+
+
+def landmark_coordinates(graph: SparseMatrix) -> FloatArray:
+    """Coordinates (n, 3) in which near vertices are near, by scaling of distances to landmarks.
+
+    Each landmark is the vertex farthest from those before.
+    """
+    count = graph.shape[0]
+    source = int(np.argmax(np.nan_to_num(distances(graph, 0), posinf=count)))
+    landmarks: list[int] = []
+    squares: list[FloatArray] = []
+    nearest = np.full(count, np.inf)
+    for _ in range(min(LANDMARKS, count)):
+        found = np.nan_to_num(distances(graph, source), posinf=count)
+        landmarks.append(source)
+        squares.append(found**2)
+        nearest = np.minimum(nearest, found)
+        source = int(np.argmax(nearest))
+    between = np.array(squares)[:, landmarks]
+    mean = between.mean(axis=0)
+    values, vectors = np.linalg.eigh(-0.5 * (between - mean - mean[:, None] + mean.mean()))
+    values, vectors = values[::-1][:3], vectors[:, ::-1][:, :3]
+    scale = np.sqrt(np.maximum(values, 1e-12 * max(values[0], 1e-300)))
+    return smoothed(graph, -0.5 * (np.array(squares).T - mean) @ (vectors / scale))
+
+
+def smoothed(graph: SparseMatrix, coordinates: FloatArray) -> FloatArray:
+    """Coordinates with those of each vertex drawn to the mean of its neighbours'."""
+    ones = sparse.csc_array((np.ones(graph.nnz), graph.indices, graph.indptr), shape=graph.shape)
+    degree = np.maximum(np.diff(graph.indptr), 1)[:, None]
+    for _ in range(SMOOTHINGS):
+        coordinates = 0.5 * (coordinates + times(ones, coordinates) / degree)
+    return coordinates
+
+
+def cut(
+    graph: SparseMatrix, weights: IntArray, coordinates: FloatArray
+) -> tuple[list[IntArray], list[tuple[int, ...]]]:
+    """Vertices of every front, children first, and the numbers of each front's children."""
+    groups: list[IntArray] = []
+    children: list[tuple[int, ...]] = []
+    side = np.full(graph.shape[0], -1, dtype=np.int8)
+
+    def parted(part: IntArray) -> tuple[int, ...]:
+        """Append the fronts of a part; the numbers of its topmost ones."""
+        if weights[part].sum() <= LEAF or part.size == 1:
+            groups.append(part)
+            children.append(())
+            return (len(groups) - 1,)
+        left, right, between = halves(graph, part, coordinates[part], side)
+        below = tuple(n for half in (left, right) if half.size for n in parted(half))
+        if not between.size:
+            return below
+        groups.append(between)
+        children.append(below)
+        return (len(groups) - 1,)
+
+    parted(np.arange(graph.shape[0]))
+    return groups, children
+
+
+def halves(
+    graph: SparseMatrix, part: IntArray, coordinates: FloatArray, side: NDArray[np.int8]
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Two halves of a part without edges between them, and what lies between."""
+    lengths = graph.indptr[part + 1] - graph.indptr[part]
+    near = graph.indices[ranges(graph.indptr[part], lengths)]
+    owner = np.repeat(part, lengths)
+    extent = np.ptp(coordinates, axis=0)
+    best = np.inf
+    found = (part[:0], part, part[:0])
+    for axis in np.flatnonzero(extent >= LONG * extent.max()):
+        along = np.argsort(coordinates[:, axis], kind="stable")
+        for share in CUTS:
+            middle = max(1, int(share * part.size))
+            side[part] = 0
+            side[part[along[middle:]]] = 1
+            crossing = (side[owner] == 0) & (side[near] == 1)
+            low, high = np.unique(owner[crossing]), np.unique(near[crossing])
+            between = low if low.size <= high.size else high
+            worth = between.size / (share * (1.0 - share))
+            if worth < best:
+                best = worth
+                side[between] = 2
+                found = (part[side[part] == 0], part[side[part] == 1], between)
+    side[part] = -1
+    return found
+
+
+def fronts_of(
+    graph: SparseMatrix,
+    weights: IntArray,
+    groups: list[IntArray],
+    children: list[tuple[int, ...]],
+) -> list[Front]:
+    """The fronts with their borders, counted in rows."""
+    order = np.concatenate(groups)
+    place = np.empty(order.size, dtype=np.intp)
+    place[order] = np.arange(order.size)
+    row = np.concatenate([[0], np.cumsum(weights[order])])
+    borders: list[IntArray] = []
+    fronts: list[Front] = []
+    start = 0
+    for group, below in zip(groups, children, strict=True):
+        stop = start + group.size
+        lengths = graph.indptr[group + 1] - graph.indptr[group]
+        near = place[graph.indices[ranges(graph.indptr[group], lengths)]]
+        touched = np.unique(np.concatenate([near, *(borders[child] for child in below)]))
+        border = touched[np.searchsorted(touched, stop) :]
+        borders.append(border)
+        rows = ranges(row[border], row[border + 1] - row[border])
+        fronts.append(Front(int(row[start]), int(row[stop]), rows, below))
+        start = stop
+    return fronts

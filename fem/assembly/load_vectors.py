@@ -1,0 +1,69 @@
+"""Load vectors of what acts on a whole component: weight, and motions of the base."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import replace
+from typing import Self
+
+import numpy as np
+
+from fem.base.arrays import FloatArray
+from fem.base.errors import ModelError
+
+
+class InertiaLoads:
+    """What the dataclass of a component needs to be loaded by its own mass."""
+
+    interfaces: Mapping[str, FloatArray]
+    inertia: FloatArray
+    load_vectors: tuple[str, ...]
+
+    def with_load(self, name: str, acceleration: Sequence[float]) -> Self:
+        """The component with a load vector: its weight under an acceleration.
+
+        It is an interface of this name that nothing can be joined to, so that a reduction keeps
+        its static deflection exact.
+
+        Parameters
+        ----------
+        name
+            Of the load vector.
+        acceleration
+            Components (x, y, z) in m/s², z being 0 in a plane frame; a load is a factor of it.
+
+        Raises
+        ------
+        ModelError
+            If there is an interface of this name, or no mass is moved that way.
+        """
+        vector = inertia_load(self.inertia, self.interfaces, name, acceleration)
+        return replace(  # type: ignore[type-var]  # of a dataclass
+            self,
+            interfaces={**self.interfaces, name: vector},
+            load_vectors=(*self.load_vectors, name),
+        )
+
+
+def inertia_load(
+    inertia: FloatArray, names: Container[str], name: str, acceleration: Sequence[float]
+) -> FloatArray:
+    """Load vector (N,) of an acceleration, by the ``inertia`` (N, 2 or 3) of a component.
+
+    Raises
+    ------
+    ModelError
+        If the name is among those in use, or no mass is moved that way.
+    """
+    if name in names:
+        raise ModelError(f"there is an interface named '{name}' already")
+    axes = inertia.shape[1]
+    along = np.zeros(3)
+    along[: len(acceleration)] = acceleration
+    if np.any(along[axes:]):
+        raise ModelError("a plane frame cannot be accelerated along z, out of its plane")
+    vector = inertia @ along[:axes]
+    if not np.any(vector):
+        raise ModelError(f"nothing moves along the acceleration {along.tolist()}")
+    vector.setflags(write=False)
+    return np.asarray(vector)

@@ -1,0 +1,1 @@
+"""Matrices of elements, and sparse sums of them."""

@@ -1,0 +1,285 @@
+"""Beams: from material and section to the matrices of elements in the plane and in space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem.base.arrays import FloatArray
+from fem.base.errors import ModelError
+from fem.elements.straight_beams import (
+    bending_matrices,
+    bending_numbers,
+    congruent,
+    mean,
+    stretching_matrices,
+)
+from fem.elements.trusses import plane_truss_matrices
+from fem.model.parts import BeamPart, TrussPart
+from fem.model.sections import (
+    CircularSection,
+    SectionRun,
+    TaperedSection,
+    section_number,
+    shear_areas,
+)
+
+UPRIGHT = np.array([0, 0, 1.0])
+IN_PLANE = np.array([1, 5, 7, 11])
+OUT_OF_PLANE = np.array([2, 4, 8, 10])
+TURNED_SIGNS = np.array([1.0, -1.0, 1.0, -1.0])
+"""A positive rotation about the local y lowers w along x."""
+
+
+@dataclass(frozen=True)
+class Bending:
+    """Numbers of bending in one plane: EI in N m², kGA in N or None, rho I in kg m or None.
+
+    Of a tapered part they are arrays (e, q) at the places of integration.
+    """
+
+    stiffness: float | FloatArray
+    shear_stiffness: float | FloatArray | None
+    inertia_per_length: float | FloatArray | None
+
+    def matrices(
+        self, lengths: FloatArray, mass_per_length: float | FloatArray, axial_force: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Stiffness and mass (e, 4, 4) of elements of these lengths (e,)."""
+
+        def or_none(value: float | FloatArray | None) -> FloatArray | None:
+            return None if value is None else each(value, lengths)
+
+        return bending_matrices(
+            lengths,
+            each(self.stiffness, lengths),
+            each(mass_per_length, lengths),
+            or_none(self.shear_stiffness),
+            or_none(self.inertia_per_length),
+            or_none(axial_force or None),
+        )
+
+
+def each(value: float | FloatArray, lengths: FloatArray) -> FloatArray:
+    """A number for every element, shape (e,); those at places along it, (e, q), as they are."""
+    return value if isinstance(value, np.ndarray) else np.full(len(lengths), value)
+
+
+def plane_bending(part: BeamPart, what: str) -> Bending:
+    """Bending along the height of the section."""
+    stiffness = part.material.youngs_modulus * part.section.second_moment
+    if part.theory == "euler-bernoulli":
+        return Bending(stiffness, None, None)
+    areas = shear_areas(part.section, part.material.poissons_ratio_for(what), what, 1)
+    inertia = part.material.density * part.section.second_moment
+    return Bending(stiffness, shear_modulus(part, what) * areas[0], inertia)
+
+
+def across_bending(part: BeamPart, what: str) -> Bending:
+    """Bending along the width of the section."""
+    second_moment = section_number(part.section, "second_moment_across", what)
+    stiffness = part.material.youngs_modulus * second_moment
+    if part.theory == "euler-bernoulli":
+        return Bending(stiffness, None, None)
+    areas = shear_areas(part.section, part.material.poissons_ratio_for(what), what)
+    inertia = part.material.density * second_moment
+    return Bending(stiffness, shear_modulus(part, what) * areas[1], inertia)
+
+
+def shear_modulus(part: BeamPart, what: str) -> float:
+    """G = E / (2 (1 + nu)) in N/m²."""
+    return part.material.youngs_modulus / (2.0 * (1.0 + part.material.poissons_ratio_for(what)))
+
+
+def plane_matrices(
+    part: BeamPart | TrussPart, lengths: FloatArray, what: str
+) -> tuple[FloatArray, FloatArray]:
+    """Stiffness and mass (e, 6, 6) along the axis, for (u, w, rotation) at both ends."""
+    if isinstance(part, TrussPart):
+        return plane_truss_matrices(part, lengths)
+    pairs = _stretching(part, lengths), _bending(part, lengths, plane_bending(part, what))
+    return _composed(6, [(np.array([0, 3]), pairs[0]), (np.array([1, 2, 4, 5]), pairs[1])])
+
+
+def spatial_matrices(
+    part: BeamPart, lengths: FloatArray, what: str
+) -> tuple[FloatArray, FloatArray]:
+    """Stiffness and mass (e, 12, 12) in local axes.
+
+    The degrees of freedom are (u, v, w) and the rotations about x, y and z at the first end, then
+    at the second; x runs along the beam, y along the height of the section and z along its width.
+    Torsion is Saint-Venant's: GJ, and rho (Iy + Iz) as inertia; warping is free.
+    """
+    across = _bending(part, lengths, across_bending(part, what))
+    signs = TURNED_SIGNS[:, None] * TURNED_SIGNS
+    material, section = part.material, part.section
+    torsion = shear_modulus(part, what) * section_number(section, "torsion_constant", what)
+    polar = section.second_moment + section_number(section, "second_moment_across", what)
+    return _composed(
+        12,
+        [
+            (np.array([0, 6]), _stretching(part, lengths)),
+            (IN_PLANE, _bending(part, lengths, plane_bending(part, what))),
+            (OUT_OF_PLANE, (across[0] * signs, across[1] * signs)),
+            (
+                np.array([3, 9]),
+                stretching_matrices(
+                    lengths, each(torsion, lengths), each(material.density * polar, lengths)
+                ),
+            ),
+        ],
+    )
+
+
+def plane_rows(
+    part: BeamPart | TrussPart, lengths: FloatArray, what: str
+) -> tuple[FloatArray, FloatArray]:
+    """Rows (e, 4, 4) of the natural form and their stiffness (e, 4), see `natural.line_rows`.
+
+    Along the axis, for (u2 - u1, w2 - w1) and the rotations of both ends.
+    """
+    if isinstance(part, TrussPart):
+        only = np.zeros((len(lengths), 4))
+        only[:, 0] = part.material.youngs_modulus * part.area / lengths
+        return np.tile(np.diag([1.0, 0.0, 0.0, 0.0]), (len(lengths), 1, 1)), only
+    bending, stiffness = bending_rows(plane_bending(part, what), lengths, part.axial_force)
+    stretching = part.material.youngs_modulus * mean(each(part.section.area, lengths)) / lengths
+    rows = np.zeros((len(lengths), 4, 4))
+    rows[:, 0, 0] = 1.0
+    rows[:, 1:, 1:] = bending
+    return rows, np.column_stack([stretching, stiffness])
+
+
+def spatial_rows(part: BeamPart, lengths: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
+    """The same in space, (e, 8, 9) and (e, 8), for (u, v, w)2 - (u, v, w)1 and six rotations."""
+    constant = section_number(part.section, "torsion_constant", what)
+    torsion = shear_modulus(part, what) * mean(each(constant, lengths))
+    stretching = part.material.youngs_modulus * mean(each(part.section.area, lengths))
+    upright, first = bending_rows(plane_bending(part, what), lengths, part.axial_force)
+    across, second = bending_rows(across_bending(part, what), lengths, part.axial_force)
+    rows = np.zeros((len(lengths), 8, 9))
+    rows[:, 0, 0] = 1.0
+    rows[:, 1, [3, 6]] = -1.0, 1.0
+    rows[:, 2:5, [1, 5, 8]] = upright
+    rows[:, 5:, [2, 4, 7]] = across * np.array([1.0, -1.0, -1.0])
+    return rows, np.column_stack([stretching / lengths, torsion / lengths, first, second])
+
+
+def bending_rows(
+    numbers: Bending, lengths: FloatArray, axial_force: float
+) -> tuple[FloatArray, FloatArray]:
+    """Rows (e, 3, 3) for (w2 - w1, r1, r2) in which bending is diagonal, and its numbers (e, 3).
+
+    The rows are r1 - r2, r1 + r2 less twice the chord's turn c, and c. With p as in
+    `straight_beams.bending_matrices` and the axial force P the numbers are EI/L + PL/12,
+    3 EI/(L (1 + p)) + PL/(20 (1 + p)²) and PL. A taper mixes the first two; the first row then
+    takes so much of the second that they do not mix.
+    """
+    first, mixed, odd = bending_numbers(lengths, each(numbers.stiffness, lengths))
+    tension = axial_force * lengths
+    sheared, leaning = np.ones(len(lengths)), np.zeros(len(lengths))
+    if numbers.shear_stiffness is not None:
+        carried = mean(each(numbers.shear_stiffness, lengths)) * lengths
+        sheared = 1.0 / (1.0 + 4.0 * odd / carried)
+        leaning = 4.0 * mixed / carried * sheared
+    even = first - leaning * mixed + tension / 12.0 + tension / 20.0 * leaning**2
+    mixed = mixed * sheared - tension / 20.0 * sheared * leaning
+    odd = odd * sheared + tension / 20.0 * sheared**2
+    rows = np.zeros((len(lengths), 3, 3))
+    rows[:, 0] = 0.0, 1.0, -1.0
+    rows[:, 1] = 0.0, 1.0, 1.0
+    rows[:, 1, 0], rows[:, 2, 0] = -2.0 / lengths, 1.0 / lengths
+    rows[:, 0] += (mixed / even)[:, None] * rows[:, 1]
+    return rows, np.column_stack([even, odd - mixed**2 / even, tension])
+
+
+def _stretching(part: BeamPart, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    material, area = part.material, each(part.section.area, lengths)
+    return stretching_matrices(lengths, material.youngs_modulus * area, material.density * area)
+
+
+def _bending(
+    part: BeamPart, lengths: FloatArray, numbers: Bending
+) -> tuple[FloatArray, FloatArray]:
+    return numbers.matrices(lengths, part.material.density * part.section.area, part.axial_force)
+
+
+def _composed(
+    size: int, pieces: list[tuple[FloatArray, tuple[FloatArray, FloatArray]]]
+) -> tuple[FloatArray, FloatArray]:
+    count = len(pieces[0][1][0])
+    stiffness, mass = np.zeros((count, size, size)), np.zeros((count, size, size))
+    for dofs, pair in pieces:
+        at = np.ix_(np.arange(count), dofs, dofs)
+        stiffness[at], mass[at] = pair
+    return stiffness, mass
+
+
+def local_axes(part: BeamPart, spans: FloatArray, what: str) -> FloatArray:
+    """Unit vectors x, y, z of the elements as rows, shape (e, 3, 3), from their spans (e, 3).
+
+    Raises
+    ------
+    ModelError
+        If the orientation lies along an element, or is missing for one along z.
+    """
+    x = spans / np.linalg.norm(spans, axis=1)[:, None]
+    if part.orientation is None:
+        z = UPRIGHT - x * x[:, 2:]
+        section = part.section.taper if isinstance(part.section, SectionRun) else part.section
+        section = section.start if isinstance(section, TaperedSection) else section
+        if isinstance(section, CircularSection) and not any(part.offset):
+            z[np.linalg.norm(z, axis=1) < 1e-6] = (1.0, 0.0, 0.0)  # round: any direction will do
+        fault = "runs along z, so it needs an orientation (the direction of the section's height)"
+    else:
+        z = np.cross(x, np.asarray(part.orientation) / np.linalg.norm(part.orientation))
+        fault = f"runs along its orientation {part.orientation}"
+    size = np.linalg.norm(z, axis=1)
+    along = np.flatnonzero(size < 1e-6)
+    if len(along):
+        raise ModelError(f"{what}: line {along[0]} {fault}")
+    z = z / size[:, None]
+    return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def to_nodes(part: BeamPart, axes: FloatArray) -> FloatArray:
+    """The matrices (e, 12, 12) from the nodes' displacements to those of the axis, in local axes.
+
+    The nodes have (ux, uy, uz) and the rotations about x, y and z at the first end, then at the
+    second; the axis lies off the line between them by the part's offset.
+    """
+    offset = np.einsum("i,eij->ej", np.array([0.0, *part.offset]), axes)
+    T = np.zeros((len(axes), 12, 12))
+    for first in (0, 6):
+        T[:, first : first + 3, first : first + 3] = axes
+        T[:, first + 3 : first + 6, first + 3 : first + 6] = axes
+        T[:, first : first + 3, first + 3 : first + 6] = axes @ -cross_matrix(offset)
+    return T
+
+
+def cross_matrix(vectors: FloatArray) -> FloatArray:
+    """The matrices [a]x of vectors a (..., 3), so that [a]x b is the cross product of a and b."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    zero = np.zeros_like(x)
+    return np.stack(
+        [np.stack(row, axis=-1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))], axis=-2
+    )
+
+
+def element_rows(part: BeamPart, spans: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
+    """Rows (e, 8, 9) of the natural form for the nodes' displacements, and stiffness (e, 8)."""
+    rows, stiffness = spatial_rows(part, np.linalg.norm(spans, axis=1), what)
+    T = to_nodes(part, local_axes(part, spans, what))
+    relative = np.zeros((len(spans), 9, 9))
+    relative[:, :3, :3] = T[:, :3, :3]
+    relative[:, :3, 3:6], relative[:, :3, 6:] = -T[:, :3, 3:6], T[:, :3, 3:6]
+    relative[:, 3:6, 3:6] = relative[:, 6:, 6:] = T[:, 3:6, 3:6]
+    return rows @ relative, stiffness
+
+
+def element_matrices(part: BeamPart, spans: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
+    """Stiffness and mass (e, 12, 12) of beams in space for their nodes' displacements."""
+    T = to_nodes(part, local_axes(part, spans, what))
+    stiffness, mass = spatial_matrices(part, np.linalg.norm(spans, axis=1), what)
+    return congruent(stiffness, T), congruent(mass, T)

@@ -1,0 +1,132 @@
+"""Read input files of Abaqus and CalculiX: cells, names, and what is attached to them.
+
+meshio 5.3 has a reader of its own, but it loses or mixes up sets in ordinary files, and passes
+over what it does not know. This one takes what bears on stiffness, mass and connection, names what
+it leaves out by intention (`fem.abaqus.known`), and refuses all else at once.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import meshio
+
+from fem.formats.abaqus.assembly import read_scopes
+from fem.formats.abaqus.attached import Gathered, read_point_elements, read_transforms
+from fem.formats.abaqus.deck import Deck, bare
+from fem.formats.abaqus.joints import Joints
+from fem.formats.abaqus.keywords import Reading
+from fem.formats.abaqus.mesh import collected_cells, content_of, numbered_nodes
+from fem.formats.abaqus.sections import described_parts
+from fem.formats.abaqus.sets import Resolver
+from fem.formats.abaqus.surfaces import Surfaces
+from fem.mesh.attachments import Attachments, LeftOut
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AbaqusFile:
+    """What an input file holds.
+
+    Parameters
+    ----------
+    content
+        Cells, cell sets and point sets. The cells of each element type are a cell set, too, whose
+        name is "abaqus:" and the type.
+    attachments
+        Masses, springs, dashpots, couplings and equations.
+    described
+        Material and section by the name of the element set, as keys of a part of a scene; with
+        the key "refused" and a reason where they cannot be taken.
+    left_out
+        Keywords that are left out by intention.
+    notes
+        Sentences on what means more than it says.
+    ignored
+        What of the names to ignore was met, in capitals and without blanks and asterisk.
+    """
+
+    content: meshio.Mesh
+    attachments: Attachments = field(default_factory=Attachments)
+    described: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    left_out: tuple[LeftOut, ...] = ()
+    notes: tuple[str, ...] = ()
+    ignored: frozenset[str] = frozenset()
+
+    def __repr__(self) -> str:
+        cells = ", ".join(f"{len(block.data)} {block.type}" for block in self.content.cells)
+        points = len(self.content.points)
+        return f"<AbaqusFile: {points} points, {cells}; {self.attachments!r}>"
+
+
+def _no_cells(deck: Deck) -> str:
+    kinds = Counter(e.type.name for body in deck.bodies.values() for _, e in body.elements())
+    told = ", ".join(f"{count} of type {name}" for name, count in kinds.items()) or "none"
+    return f"the mesh has no line elements, surfaces or volumes (its elements: {told})"
+
+
+def read_abaqus(
+    path: str | Path,
+    include_folders: Iterable[str | Path] = (),
+    ignore: Iterable[str] = (),
+) -> AbaqusFile:
+    """Read an input file of Abaqus or CalculiX.
+
+    Parameters
+    ----------
+    path
+        Input file. Upper and lower case are the same, and a set keeps the spelling of its first
+        occurrence. ``docs/reference/decks.md`` lists the keywords and elements.
+    include_folders
+        Folders below which included files may be, beside that of the file.
+    ignore
+        Keywords and element types that are not read, such as ``GAPUNI`` or ``*CONTACT PAIR``, and
+        that are left out instead of refused; other names in it have no effect here.
+
+    Returns
+    -------
+    AbaqusFile
+        The mesh as meshio has it, and what is attached to it.
+
+    Raises
+    ------
+    ModelError
+        For a keyword or an element type that is not read (all of them in one sentence), a number
+        defined twice, a name or a number that is not defined, words that are no numbers, an
+        element with too few or too many nodes, or an included file in another folder.
+
+    Examples
+    --------
+    >>> read_abaqus("meshes/half_beam.inp").content.cells[0].type
+    'line'
+    """
+    folders = [Path(path).parent, *map(Path, include_folders)]
+    reading = Reading(Path(path), [folder.resolve() for folder in folders])
+    deck = Deck(Path(path), ignore=frozenset(map(bare, ignore)))
+    read_scopes(deck, reading.keywords())
+    position, places = numbered_nodes(deck)
+    if not position:
+        deck.raise_problems()
+        raise deck.fail("is not an Abaqus input file with nodes (there is no *NODE)")
+    deck.raise_problems()
+    resolver = Resolver(deck)
+    surfaces = Surfaces(resolver)
+    gathered = Gathered(deck, resolver)
+    cells = collected_cells(deck, resolver, position)
+    deck.raise_problems()
+    if not cells.nodes:
+        raise deck.fail(_no_cells(deck))
+    read_transforms(gathered)
+    read_point_elements(gathered)
+    Joints(gathered, surfaces, places).read()
+    deck.raise_problems()
+    return AbaqusFile(
+        content_of(deck, cells, gathered, position, places, surfaces),
+        gathered.attachments,
+        described_parts(deck, resolver),
+        tuple(LeftOut(p.what, p.count, p.place, p.advice) for p in deck.left_out.values()),
+        tuple(surfaces.notes()),
+        frozenset(deck.ignored),
+    )

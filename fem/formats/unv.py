@@ -1,0 +1,216 @@
+"""Read universal files (UNV), as Salome, Gmsh and I-deas write them, with their groups."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import meshio
+import numpy as np
+
+from fem.base.arrays import IntArray
+from fem.base.errors import ModelError
+from fem.formats.abaqus.keywords import decoded
+from fem.mesh.cells import KINDS as CELLS
+
+NODES, ELEMENTS, UNITS, GROUPS = 2411, 2412, 164, (2435, 2452, 2467, 2477)
+LEFT_OUT = (55, 56, 57, 58, 151, 2400, 2414, 2420)
+"""Datasets of results, headers and systems of axes, none of which move a node."""
+KINDS = {
+    **dict.fromkeys((11, 21, 22), "line"),
+    24: "line3",
+    **dict.fromkeys((41, 51, 91), "triangle"),
+    **dict.fromkeys((42, 52, 92), "triangle6"),
+    **dict.fromkeys((44, 54, 94), "quad"),
+    **dict.fromkeys((45, 55, 95), "quad8"),
+    111: "tetra", 112: "wedge", 113: "wedge15",
+    115: "hexahedron", 116: "hexahedron20", 118: "tetra10",
+}  # fmt: skip
+"""Kinds of cells by the number of the element: beams, plane elements, shells and solids."""
+BEAMS = (11, 21, 22, 24)
+ORDERS = {
+    "line3": (0, 2, 1),
+    "triangle6": (0, 2, 4, 1, 3, 5),
+    "quad8": (0, 2, 4, 6, 1, 3, 5, 7),
+    "tetra10": (0, 2, 4, 9, 1, 3, 5, 6, 7, 8),
+    "wedge15": (0, 2, 4, 9, 11, 13, 1, 3, 5, 10, 12, 14, 6, 7, 8),
+    "hexahedron20": (0, 2, 4, 6, 12, 14, 16, 18, 1, 3, 5, 7, 13, 15, 17, 19, 8, 9, 10, 11),
+}
+"""Where VTK's nodes are in a file, which goes around each face from corner to corner."""
+PER_METRE = {1.0: "m", 100.0: "cm", 1000.0: "mm", 39.37: "inch"}
+"""Units of length by how many there are in a metre, to four digits."""
+NODE, ELEMENT = 7, 8
+"""Kinds of members of a group."""
+
+
+@dataclass
+class Dataset:
+    """A dataset of a universal file: its number, its lines, and the number of the first of them."""
+
+    number: int
+    lines: list[str]
+    first: int
+
+
+def read_unv(path: Path) -> meshio.Mesh:
+    """Read the nodes, elements and groups of a universal file.
+
+    Parameters
+    ----------
+    path
+        With datasets 2411 (nodes), 2412 (elements), 2467 or an older one (groups), 164 (units).
+
+    Returns
+    -------
+    meshio.Mesh
+        One block for each kind of cell; groups as cell sets and point sets. Its ``info`` is the
+        unit that the file states.
+
+    Raises
+    ------
+    ModelError
+        For datasets and elements that are not read, by their numbers, how many there are and the
+        line of the first; for labels that stand twice or are not there.
+
+    References
+    ----------
+    *SDRC I-DEAS universal file format*, https://www.ceas3.uc.edu/sdrluff.
+    """
+    points: dict[int, list[float]] = {}
+    cells: dict[str, dict[int, list[int]]] = {}
+    groups: list[tuple[str, list[tuple[int, int]]]] = []
+    unit = ""
+    unread: dict[str, list[int]] = {}
+    for data in _datasets(path):
+        try:
+            if data.number == NODES:
+                _read_nodes(path, data, points)
+            elif data.number == ELEMENTS:
+                _read_elements(path, data, cells, unread)
+            elif data.number in GROUPS:
+                groups += _read_groups(data)
+            elif data.number == UNITS:
+                per_metre = float(data.lines[1].replace("D", "E").split()[0])
+                unit = PER_METRE.get(float(f"{per_metre:.4g}"), f"{1 / per_metre:g} m")
+            elif data.number not in LEFT_OUT:
+                unread.setdefault(f"dataset {data.number}", []).append(data.first)
+        except (IndexError, ValueError) as error:
+            raise ModelError(
+                f"{path}: dataset {data.number} from line {data.first} on is cut off or damaged"
+                f" ({error})"
+            ) from error
+    if unread:
+        told = ", ".join(
+            f"{what} ({len(at)}, first in line {at[0]})" for what, at in unread.items()
+        )
+        raise ModelError(f"{path}: holds what is not read: {told}")
+    if not points or not cells:
+        raise ModelError(f"{path}: is no universal file with nodes (2411) and elements (2412)")
+    content = _content(path, points, cells, groups)
+    content.info = unit
+    return content
+
+
+def _datasets(path: Path) -> Iterator[Dataset]:
+    lines = decoded(path.read_bytes()).splitlines()
+    marks = [i for i, line in enumerate(lines) if line.strip() == "-1"]
+    if len(marks) % 2:
+        raise ModelError(f"{path}: the dataset that begins in line {marks[-1] + 1} has no end")
+    for begin, end in zip(marks[::2], marks[1::2], strict=True):
+        word = lines[begin + 1].strip()
+        if not word.isdigit():
+            raise ModelError(f"{path}: line {begin + 2}: {word!r} is no number of a dataset")
+        yield Dataset(int(word), lines[begin + 2 : end], begin + 3)
+
+
+def _read_nodes(path: Path, data: Dataset, points: dict[int, list[float]]) -> None:
+    for i in range(0, len(data.lines), 2):
+        label = int(data.lines[i].split()[0])
+        if label in points:
+            raise ModelError(f"{path}: line {data.first + i}: node {label} is defined twice")
+        x, y, z = data.lines[i + 1].replace("D", "E").replace("d", "e").split()
+        points[label] = [float(x), float(y), float(z)]
+
+
+def _read_elements(
+    path: Path,
+    data: Dataset,
+    cells: dict[str, dict[int, list[int]]],
+    unread: dict[str, list[int]],
+) -> None:
+    i = 0
+    while i < len(data.lines):
+        line = data.first + i
+        label, number, _, _, _, count = (int(word) for word in data.lines[i].split())
+        i += 2 if number in BEAMS else 1
+        nodes: list[int] = []
+        while len(nodes) < count:
+            nodes += [int(word) for word in data.lines[i].split()]
+            i += 1
+        kind = KINDS.get(number)
+        if kind is None:
+            unread.setdefault(f"element {number} of {count} nodes", []).append(line)
+            continue
+        if any(label in of_kind for of_kind in cells.values()):
+            raise ModelError(f"{path}: line {line}: element {label} is defined twice")
+        order = ORDERS.get(kind, range(CELLS[kind].node_count))
+        if len(nodes) != len(order):
+            raise ModelError(
+                f"{path}: line {line}: element {label} has {len(nodes)} nodes where {len(order)}"
+                " are needed"
+            )
+        cells.setdefault(kind, {})[label] = [nodes[at] for at in order]
+
+
+def _read_groups(data: Dataset) -> Iterator[tuple[str, list[tuple[int, int]]]]:
+    """Name of each group with the kind and label of its members."""
+    i = 0
+    while i < len(data.lines):
+        count, name = int(data.lines[i].split()[7]), data.lines[i + 1].strip()
+        i += 2
+        words: list[int] = []
+        while len(words) < 4 * count:
+            words += [int(word) for word in data.lines[i].split()]
+            i += 1
+        yield name, list(zip(words[::4], words[1::4], strict=True))
+
+
+def _content(
+    path: Path,
+    points: dict[int, list[float]],
+    cells: dict[str, dict[int, list[int]]],
+    groups: list[tuple[str, list[tuple[int, int]]]],
+) -> meshio.Mesh:
+    place = {label: at for at, label in enumerate(points)}
+    used = (node for of_kind in cells.values() for nodes in of_kind.values() for node in nodes)
+    missing = next((node for node in used if node not in place), None)
+    if missing is not None:
+        raise ModelError(f"{path}: an element has the node {missing}, which is not defined")
+    blocks = [
+        (kind, np.array([[place[node] for node in nodes] for nodes in of_kind.values()]))
+        for kind, of_kind in cells.items()
+    ]
+    where = [{label: at for at, label in enumerate(of_kind)} for of_kind in cells.values()]
+    known = {NODE: place, ELEMENT: {label for at in where for label in at}}
+    cell_sets: dict[str, list[IntArray]] = {}
+    point_sets: dict[str, IntArray] = {}
+    for name, members in groups:
+        bad = next(((k, n) for k, n in members if n not in known.get(k, ())), None)
+        if bad is not None:
+            raise ModelError(
+                f"{path}: group {name!r} has member {bad[1]} of kind {bad[0]}, which is not defined"
+                f" ({NODE} are nodes and {ELEMENT} elements; others are not read)"
+            )
+        elements = [n for k, n in members if k == ELEMENT]
+        nodes = [place[n] for k, n in members if k == NODE]
+        for sets, found in ((cell_sets, elements), (point_sets, nodes)):
+            if found and name in sets:
+                raise ModelError(f"{path}: has two groups of the name {name!r}")
+        if elements:
+            cell_sets[name] = [np.array([at[n] for n in elements if n in at]) for at in where]
+        if nodes:
+            point_sets[name] = np.unique(nodes)
+    return meshio.Mesh(
+        np.array(list(points.values())), blocks, point_sets=point_sets, cell_sets=cell_sets
+    )

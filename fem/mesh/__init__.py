@@ -1,0 +1,1 @@
+"""Meshes: points, cells and names, and what is attached to points."""

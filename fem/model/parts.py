@@ -1,0 +1,234 @@
+"""What a part of a mesh is made of: its material, and what it is beside."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from fem.base.errors import ModelError, check_positive, is_finite, quoted
+from fem.mesh.attachments import vector
+from fem.model.sections import CircularSection, CrossSection, SectionRun, TaperedSection
+
+THEORIES = ("euler-bernoulli", "timoshenko")
+PLANES = ("stress", "strain")
+SHEAR_FACTOR = 5.0 / 6.0
+
+
+@dataclass(frozen=True)
+class Material:
+    """A linear elastic material.
+
+    Parameters
+    ----------
+    youngs_modulus
+        E in N/m².
+    density
+        rho in kg/m³.
+    poissons_ratio
+        nu; solids, Timoshenko beams and beams in space need it.
+
+    Examples
+    --------
+    >>> Material(2.1e11, 7746.0).density
+    7746.0
+    """
+
+    youngs_modulus: float
+    density: float
+    poissons_ratio: float | None = None
+
+    def __post_init__(self) -> None:
+        check_positive("material", youngs_modulus=self.youngs_modulus, density=self.density)
+        nu = self.poissons_ratio
+        if nu is not None and not (is_finite(nu) and -1.0 < nu < 0.5):
+            raise ModelError(f"material: poissons_ratio must be above -1 and below 0.5, not {nu!r}")
+
+    def poissons_ratio_for(self, what: str) -> float:
+        """Poisson's ratio, or a ModelError that says what needs it."""
+        if self.poissons_ratio is None:
+            raise ModelError(f"{what}: its material needs a poissons_ratio")
+        return self.poissons_ratio
+
+
+@dataclass(frozen=True)
+class BeamPart:
+    """Material and cross-section of a part of the mesh, and how it acts as a beam.
+
+    Parameters
+    ----------
+    material, section
+        What it is made of; the section is a `CrossSection` or a `TaperedSection`.
+    theory
+        "euler-bernoulli", or "timoshenko" with shear deformation and rotary inertia.
+    axial_force
+        In N, positive for tension: a preload, which adds its geometric stiffness.
+    orientation
+        In space: direction of the section's height, any vector not along the beam; only its part
+        across the beam counts. By default the height lies in planes z = constant as in a plane
+        frame, which beams along z cannot do.
+    offset
+        In space: place (along the height, along the width) in m of the beam's axis as seen from
+        the line between its nodes, for eccentric connections.
+    """
+
+    material: Material
+    section: Any
+    theory: str = "euler-bernoulli"
+    axial_force: float = 0.0
+    orientation: Sequence[float] | None = None
+    offset: Sequence[float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.material, Material):
+            raise ModelError(f"part: material must be a Material, not {self.material!r}")
+        if not isinstance(self.section, TaperedSection | SectionRun):
+            self._check_section(self.section)
+        if self.theory not in THEORIES:
+            raise ModelError(f"part: theory must be one of {quoted(THEORIES)}, not {self.theory!r}")
+        if not is_finite(self.axial_force):
+            raise ModelError(f"part: axial_force must be finite, not {self.axial_force!r}")
+        object.__setattr__(self, "offset", vector("part: offset", self.offset, 2))
+        if self.orientation is not None:
+            object.__setattr__(
+                self, "orientation", vector("part: orientation", self.orientation, 3)
+            )
+            if not any(self.orientation):
+                raise ModelError("part: orientation must not be the zero vector")
+
+    @staticmethod
+    def _check_section(section: CrossSection) -> None:
+        if not (hasattr(section, "area") and hasattr(section, "second_moment")):
+            raise ModelError(
+                f"part: section must have an area and a second_moment, not be {section!r}"
+            )
+        check_positive("section", area=section.area, second_moment=section.second_moment)
+
+
+@dataclass(frozen=True)
+class TrussPart:
+    """A part of the mesh that is a truss: its lines stretch, and neither bend nor twist.
+
+    Its nodes have no rotation. A line of three nodes has a quadratic displacement; its middle node
+    is held across it by nothing.
+
+    Parameters
+    ----------
+    material
+        What it is made of; a Poisson's ratio is not needed.
+    area
+        Of the cross-section, in m².
+
+    Examples
+    --------
+    >>> TrussPart(Material(2.1e11, 7800.0), area=1e-4).section
+    CircularSection(diameter=0.011283791670955126, bore=0.0)
+    """
+
+    material: Material
+    area: float
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.material, Material):
+            raise ModelError(f"part: material must be a Material, not {self.material!r}")
+        check_positive("truss part", area=self.area)
+
+    @property
+    def section(self) -> CircularSection:
+        """The round bar of this area, as which it is drawn."""
+        return CircularSection(2.0 * math.sqrt(self.area / math.pi))
+
+
+@dataclass(frozen=True)
+class SolidPart:
+    """A part of the mesh that is a solid body.
+
+    Parameters
+    ----------
+    material
+        With a Poisson's ratio.
+    plane
+        None for tetrahedra, pyramids, wedges and hexahedra; for triangles and quadrilaterals in
+        the x-y plane, "stress" (a sheet) or "strain" (a slice of a long body).
+    thickness
+        In m, of a plane part.
+
+    Examples
+    --------
+    >>> steel = Material(2.1e11, 7800.0, poissons_ratio=0.3)
+    >>> SolidPart(steel).plane is None, SolidPart(steel, "stress", 0.05).thickness
+    (True, 0.05)
+    """
+
+    material: Material
+    plane: str | None = None
+    thickness: float | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.material, Material):
+            raise ModelError(f"part: material must be a Material, not {self.material!r}")
+        self.material.poissons_ratio_for("solid part")
+        if self.plane is None and self.thickness is None:
+            return
+        if self.plane not in PLANES:
+            raise ModelError(
+                f"solid part: a thickness goes with plane {quoted(PLANES)}, not {self.plane!r}"
+            )
+        check_positive("solid part in the plane", thickness=self.thickness)
+
+    @property
+    def lame(self) -> tuple[float, float]:
+        """Lamé's constants in N/m², the first one as plane stress needs it where it applies."""
+        E, nu = self.material.youngs_modulus, self.material.poissons_ratio_for("solid part")
+        mu = E / (2.0 * (1.0 + nu))
+        first = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+        if self.plane == "stress":
+            first = 2.0 * first * mu / (first + 2.0 * mu)
+        return first, mu
+
+
+@dataclass(frozen=True)
+class ShellPart:
+    """A part of the mesh that is a shell: triangles and quadrilaterals with a thickness.
+
+    Parameters
+    ----------
+    material
+        With a Poisson's ratio.
+    thickness
+        In m.
+    offset
+        Place in m of the middle surface as seen from the nodes, along the normal of the cells:
+        right-handed about it their nodes are in order.
+
+    Examples
+    --------
+    >>> ShellPart(Material(2.1e11, 7800.0, poissons_ratio=0.3), thickness=0.001).offset
+    0.0
+    """
+
+    material: Material
+    thickness: float
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.material, Material):
+            raise ModelError(f"part: material must be a Material, not {self.material!r}")
+        self.material.poissons_ratio_for("shell part")
+        check_positive("shell part", thickness=self.thickness)
+        if not is_finite(self.offset):
+            raise ModelError(f"shell part: offset must be finite, not {self.offset!r}")
+
+    @property
+    def stretching(self) -> float:
+        """E t / (1 - nu²) in N/m."""
+        nu = self.material.poissons_ratio_for("shell part")
+        return self.material.youngs_modulus * self.thickness / (1.0 - nu**2)
+
+    @property
+    def shearing(self) -> float:
+        """5/6 G t in N/m."""
+        nu = self.material.poissons_ratio_for("shell part")
+        modulus = self.material.youngs_modulus / (2.0 * (1.0 + nu))
+        return SHEAR_FACTOR * modulus * self.thickness

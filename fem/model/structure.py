@@ -1,0 +1,416 @@
+"""What a structure is made of: solids, shells and beams, and what joins them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from fem.base.arrays import FloatArray, IntArray
+from fem.base.errors import ModelError, by_name, listed, quoted
+from fem.mesh.attachments import Attachments, Coupling, PointMass, PointSpring
+from fem.mesh.cells import KINDS, SPANS, all_facets, facet_keys
+from fem.mesh.doubled import check_no_doubles
+from fem.mesh.element_types import check_family, counted
+from fem.mesh.frame_mesh import FrameMesh
+from fem.mesh.lost import check_nothing_lost
+from fem.mesh.shell_facets import facets_of, shell_kinds
+from fem.mesh.structure_mesh import StructureMesh, structure_mesh
+from fem.model.parts import BeamPart, ShellPart, SolidPart, TrussPart
+from fem.model.supports import Foundation, Hinge, Interface, Support
+
+AXES = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")
+"""The six directions of a node, in the order of `StructureComponent.shape`."""
+IN_PLANE = ("x", "y", "rotation_z")
+
+
+def axis_index(direction: str) -> int:
+    """Position of a direction among the six of a node; "rotation" is about z.
+
+    Examples
+    --------
+    >>> axis_index("y"), axis_index("rotation")
+    (1, 5)
+    """
+    return AXES.index("rotation_z" if direction == "rotation" else direction)
+
+
+Part = BeamPart | TrussPart | SolidPart | ShellPart
+
+LISTS = {
+    "supports": Support,
+    "point_masses": PointMass,
+    "springs": PointSpring,
+    "hinges": Hinge,
+    "couplings": Coupling,
+    "foundations": Foundation,
+}
+TABLES: tuple[tuple[str, object, str], ...] = (
+    ("parts", Part, "BeamPart, TrussPart, SolidPart and ShellPart"),
+    ("interfaces", Interface, "Interface"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class StructureModel:
+    """A structure of solids, shells and beams: a mesh and everything attached to it.
+
+    Parameters
+    ----------
+    mesh
+        A mesh with all kinds of cells; of a `FrameMesh` the lines are taken.
+    parts
+        By the name of the group of cells: `SolidPart` for bodies, `ShellPart` for triangles and
+        quadrilaterals in space, `BeamPart` and `TrussPart` for lines. With plane solids everything
+        lies and moves in the plane: x, y and the rotation about z.
+    supports, point_masses, springs, hinges
+        As in a `FrameModel`, in up to six directions. The point of a support may be a face.
+    couplings
+        Faces joined to points, for beams, masses, springs, supports and interfaces on solids.
+    foundations
+        Elastic foundations.
+    interfaces
+        The named directions that a reduction keeps and a load may act on.
+    separate
+        Whether nodes at one place may belong to pieces that nothing joins, and cells lie against
+        each other without having the same nodes. Else `fem.assemble` refuses both: as a rule they
+        were to be joined.
+    pinned
+        Names of parts that are meant to meet solids in nodes or edges about which they turn. Of
+        others a `JointWarning` tells.
+
+    Raises
+    ------
+    ModelError
+        If something is not of its kind, a name is not in the mesh, a cell of the highest
+        dimension belongs to no part or one to two, or anything holds, loads or joins what is not
+        there or is held or joined already.
+
+    Examples
+    --------
+    >>> import fem
+    >>> model = fem.StructureModel(
+    ...     fem.box_mesh("bar", (1.0, 0.1, 0.1), (4, 1, 1)),
+    ...     parts={"bar": fem.SolidPart(fem.Material(2.1e11, 7800.0, 0.3))},
+    ...     supports=[fem.Support("x0", ("x", "y", "z"))],
+    ...     couplings=[fem.Coupling("tip", "x1", "averaging")],
+    ...     interfaces={"tip": fem.Interface("tip", "y")},
+    ... )
+    >>> fem.assemble(model).stiffness.shape
+    (144, 144)
+    """
+
+    mesh: StructureMesh
+    parts: Mapping[str, Part]
+    supports: Sequence[Support] = ()
+    point_masses: Sequence[PointMass] = ()
+    springs: Sequence[PointSpring] = ()
+    hinges: Sequence[Hinge] = ()
+    couplings: Sequence[Coupling] = ()
+    foundations: Sequence[Foundation] = ()
+    interfaces: Mapping[str, Interface] = field(default_factory=dict)
+    separate: bool = False
+    pinned: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        if isinstance(self.mesh, FrameMesh):
+            object.__setattr__(self, "mesh", structure_mesh(self.mesh))
+        if not isinstance(self.mesh, StructureMesh):
+            raise ModelError(f"model: mesh must be a StructureMesh, not {self.mesh!r}")
+        for name, kind in LISTS.items():
+            given = getattr(self, name)
+            object.__setattr__(self, name, listed(self.mesh.source, name, given, kind))
+        for name, sort, words in TABLES:
+            given, what = getattr(self, name), f"by name, of {words}"
+            object.__setattr__(self, name, by_name(self.mesh.source, name, given, sort, what))
+        self._check_parts()
+        self._check_pinned()
+        object.__setattr__(self, "mesh", self._with_coupled_points())
+        self._check_plane()
+        self._check_names()
+
+    @property
+    def is_plane(self) -> bool:
+        """Whether the structure lies and moves in the x-y plane, because a part does."""
+        return any(isinstance(part, SolidPart) and part.plane for part in self.parts.values())
+
+    @cached_property
+    def beams(self) -> dict[str, tuple[BeamPart, IntArray]]:
+        """Beam parts with the node pairs (e, 2) of their lines; one of three nodes is two beams."""
+        return {
+            name: (part, self._spans(name))
+            for name, part in self.parts.items()
+            if isinstance(part, BeamPart)
+        }
+
+    def _spans(self, name: str) -> IntArray:
+        pairs = [
+            self.mesh.cells[kind][at][:, list(ends)]
+            for kind, at in self.mesh.part(name).items()
+            for ends in SPANS[kind]
+        ]
+        return np.concatenate(pairs)
+
+    @property
+    def solids(self) -> dict[str, tuple[SolidPart, dict[str, IntArray]]]:
+        """Solid parts with the nodes (e, b) of their cells by kind."""
+        return {
+            name: (part, {k: self.mesh.cells[k][at] for k, at in self.mesh.part(name).items()})
+            for name, part in self.parts.items()
+            if isinstance(part, SolidPart)
+        }
+
+    @cached_property
+    def attached(self) -> Attachments:
+        """Masses, links, couplings and equations: of the mesh's file, and the model's own."""
+        own = Attachments(self.point_masses, couplings=self.couplings)
+        return self.mesh.attachments + own
+
+    @cached_property
+    def trusses(self) -> dict[str, tuple[TrussPart, dict[str, IntArray]]]:
+        """Truss parts with the nodes (e, 2) and (e, 3) of their lines by kind."""
+        return {
+            name: (part, {k: self.mesh.cells[k][at] for k, at in self.mesh.part(name).items()})
+            for name, part in self.parts.items()
+            if isinstance(part, TrussPart)
+        }
+
+    @cached_property
+    def shells(self) -> dict[str, tuple[ShellPart, dict[str, IntArray]]]:
+        """Shell parts with the nodes (e, 3) and (e, 4) of their facets by kind."""
+        return {
+            name: (
+                part,
+                facets_of({k: self.mesh.cells[k][at] for k, at in self.mesh.part(name).items()}),
+            )
+            for name, part in self.parts.items()
+            if isinstance(part, ShellPart)
+        }
+
+    @property
+    def links(self) -> IntArray:
+        """Pairs of nodes that cells of parts, couplings, springs or equations join, (m, 2)."""
+        pairs = [
+            np.stack([np.repeat(cells[:, 0], cells.shape[1]), cells.ravel()], axis=1)
+            for cells in self._part_cells()
+        ]
+        for coupling in self.attached.couplings:
+            nodes = self.mesh.nodes(coupling.face)
+            point = np.full(len(nodes), self.mesh.node(coupling.point))
+            pairs.append(np.stack([point, nodes], axis=1))
+        names = [link.points for link in self.attached.links]
+        names += [equation.points for equation in self.attached.equations]
+        for points in names:
+            joined = [self.mesh.node(point) for point in points]
+            pairs.append(np.array([[joined[0], node] for node in joined], dtype=np.int64))
+        return np.concatenate(pairs)
+
+    @cached_property
+    def facets(self) -> dict[str, IntArray]:
+        """Faces (in the plane: edges) of solids that no second cell shares, (f, k) by kind."""
+        found = all_facets(cells for _, cells in self.solids.values())
+        return {kind: once(facets, kind) for kind, facets in found.items()}
+
+    def facets_on(self, name: str) -> dict[str, IntArray]:
+        """The outer facets, and those of shells, all of whose nodes are in a point set or group."""
+        inside = np.zeros(len(self.mesh.points), dtype=np.bool_)
+        inside[self.mesh.nodes(name)] = True
+        found: dict[str, list[IntArray]] = {}
+        for kinds in (self.facets, *(kinds for _, kinds in self.shells.values())):
+            for kind, facets in kinds.items():
+                found.setdefault(kind, []).append(facets[inside[facets].all(axis=1)])
+        on = {kind: np.concatenate(blocks) for kind, blocks in found.items()}
+        return {kind: facets for kind, facets in on.items() if len(facets)}
+
+    def _check_parts(self) -> None:
+        mesh = self.mesh
+        owners = {kind: np.zeros(len(cells), dtype=np.int64) for kind, cells in mesh.cells.items()}
+        for name, part in self.parts.items():
+            group = mesh.part(name)
+            wanted = self._kinds_for(part)
+            wrong = sorted(set(group) - wanted)
+            if wrong or not group:
+                raise ModelError(
+                    f"{mesh.source}: part {name!r} is a {type(part).__name__} and needs cells out"
+                    f" of {quoted(sorted(wanted))}, but has {quoted(wrong)}"
+                )
+            for kind, cells in group.items():
+                owners[kind][cells] += 1
+                types = {t: at[kind] for t, at in mesh.element_types.items() if kind in at}
+                check_family(f"{mesh.source}: part {name!r}", part, counted(types, cells))
+        highest = max(KINDS[kind].dimension for kind in mesh.cells if kind in KINDS)
+        for kind, count in owners.items():
+            bare = np.flatnonzero(count == 0)
+            if len(bare) and (kind not in KINDS or KINDS[kind].dimension == highest > 0):
+                if kind == "vertex":
+                    continue
+                raise ModelError(
+                    f"{mesh.source}: {kind} {bare[0]} is in no part of the model, whose parts are"
+                    f" {quoted(self.parts)} (the mesh has {quoted(mesh.groups)})"
+                )
+            if count.max() > 1:
+                raise ModelError(
+                    f"{mesh.source}: {kind} {np.argmax(count > 1)} is in more than one part"
+                )
+        check_nothing_lost(mesh, {k: n > 0 for k, n in owners.items() if k in KINDS})
+        self._check_doubles()
+        for name, (_, lines) in self.beams.items():
+            spans = mesh.points[lines[:, 1]] - mesh.points[lines[:, 0]]
+            short = np.flatnonzero(np.linalg.norm(spans, axis=1) <= 1e-12 * mesh.size)
+            if len(short):
+                raise ModelError(f"{mesh.source}: line {short[0]} of {name!r} has zero length")
+
+    def _check_pinned(self) -> None:
+        given = self.pinned
+        if isinstance(given, str) or not all(isinstance(name, str) for name in given):
+            raise ModelError(f"{self.mesh.source}: pinned must be names of parts, not {given!r}")
+        object.__setattr__(self, "pinned", tuple(given))
+        wrong = [name for name in self.pinned if name not in self.parts]
+        if wrong:
+            raise ModelError(
+                f"{self.mesh.source}: {wrong[0]!r} of 'pinned' is no part; there are"
+                f" {quoted(self.parts)}"
+            )
+
+    def _check_doubles(self) -> None:
+        """No part, and no two of solids, may hold a cell twice; beams may lie side by side."""
+        solids: dict[str, list[IntArray]] = {}
+        for name, part in self.parts.items():
+            for kind, at in self.mesh.part(name).items():
+                if isinstance(part, SolidPart):
+                    solids.setdefault(kind, []).append(at)
+                else:
+                    check_no_doubles(self.mesh.source, self.mesh.points, kind, at, self.mesh.cells)
+        for kind, blocks in solids.items():
+            at = np.concatenate(blocks)
+            check_no_doubles(self.mesh.source, self.mesh.points, kind, at, self.mesh.cells)
+
+    @staticmethod
+    def _kinds_for(part: Part) -> set[str]:
+        if isinstance(part, BeamPart | TrussPart):
+            return set(SPANS)
+        if isinstance(part, ShellPart):
+            return shell_kinds()
+        dimension = 2 if part.plane else 3
+        return {name for name, kind in KINDS.items() if kind.dimension == dimension}
+
+    def _with_coupled_points(self) -> StructureMesh:
+        """The mesh with a node for every coupled point that is not in it."""
+        mesh = self.mesh
+        for coupling in self.couplings:
+            owner = f"{mesh.source}: coupling of {coupling.face!r} to {coupling.point!r}"
+            if coupling.point in mesh.names:
+                if coupling.at is not None:
+                    raise ModelError(f"{owner}: the mesh has a point of this name; leave out 'at'")
+                mesh.node(coupling.point)
+                continue
+            place = coupling.at or self._centre(mesh, coupling.face)
+            points = np.vstack([mesh.points, np.asarray(place)])
+            sets = {**mesh.point_sets, coupling.point: np.array([len(points) - 1])}
+            mesh = replace(mesh, points=points, point_sets=sets)
+        return mesh
+
+    @staticmethod
+    def _centre(mesh: StructureMesh, face: str) -> FloatArray:
+        """Middle of the box around a face."""
+        points = mesh.points[mesh.nodes(face)]
+        return np.asarray((points.min(axis=0) + points.max(axis=0)) / 2.0, dtype=np.float64)
+
+    def _check_plane(self) -> None:
+        if not self.is_plane:
+            return
+        if self.shells:
+            raise ModelError(
+                f"{self.mesh.source}: shells and solids in the plane do not mix; make the plane"
+                " part a shell, too"
+            )
+        solid = [part for part in self.parts.values() if isinstance(part, SolidPart)]
+        if not all(part.plane for part in solid):
+            raise ModelError(f"{self.mesh.source}: plane and three-dimensional parts do not mix")
+        used = np.unique(np.concatenate([n.ravel() for n in self._part_cells()]))
+        z = self.mesh.points[used, 2]
+        if np.ptp(z) > 1e-9 * self.mesh.size:
+            raise ModelError(
+                f"{self.mesh.source}: a plane structure needs one z at all nodes, but z runs from"
+                f" {z.min():g} to {z.max():g}"
+            )
+        named = [(f"support at {s.point!r}", d) for s in self.supports for d in s.directions]
+        named += [(f"spring at {spring.point!r}", spring.direction) for spring in self.springs]
+        named += [(f"interface {name!r}", i.direction) for name, i in self.interfaces.items()]
+        for owner, direction in named:
+            if AXES[axis_index(direction)] not in IN_PLANE:
+                raise ModelError(
+                    f"{self.mesh.source}: {owner}: a plane structure has no direction"
+                    f" {direction!r}; it moves along x and y and turns about z"
+                )
+
+    def _part_cells(self) -> list[IntArray]:
+        cells = [lines for _, lines in self.beams.values()]
+        bodies = (*self.trusses.values(), *self.solids.values(), *self.shells.values())
+        return cells + [nodes for _, kinds in bodies for nodes in kinds.values()]
+
+    def _check_names(self) -> None:
+        for support in self.supports:
+            self.mesh.nodes(support.point)
+        points = [item.point for item in self.attached.point_masses]
+        points += [p for item in self.attached.links for p in item.points]
+        points += [p for item in self.attached.equations for p in item.points]
+        points += [item.point for item in self.springs]
+        points += [item.point for item in self.hinges]
+        points += [item.point for item in self.interfaces.values()]
+        for name in points:
+            self.mesh.node(name)
+        for name in [c.face for c in self.attached.couplings] + [f.face for f in self.foundations]:
+            self.mesh.nodes(name)
+        for hinge in self.hinges:
+            if hinge.part not in self.beams:
+                raise ModelError(
+                    f"{self.mesh.source}: hinge at {hinge.point!r}: {hinge.part!r} is no beam part"
+                )
+            if self.mesh.node(hinge.point) not in self.beams[hinge.part][1]:
+                raise ModelError(
+                    f"{self.mesh.source}: no line of part {hinge.part!r} meets the hinge at"
+                    f" {hinge.point!r}"
+                )
+
+
+def once(facets: IntArray, kind: str) -> IntArray:
+    """The facets (f, k) of a kind that occur once, told apart by their three lowest corners.
+
+    Examples
+    --------
+    >>> once(np.array([[0, 1], [2, 1], [1, 0]]), "line")
+    array([[2, 1]])
+    """
+    first, count = occurrences(facets[:, : len(KINDS[kind].corners)])
+    return np.asarray(facets[np.sort(first[count == 1])], dtype=np.int64)
+
+
+def occurrences(corners: IntArray) -> tuple[IntArray, IntArray]:
+    """Where each facet (f, k) first is, and how often, told apart by their three lowest corners.
+
+    Examples
+    --------
+    >>> occurrences(np.array([[0, 1], [2, 1], [1, 0]]))
+    (array([0, 1]), array([2, 1]))
+    """
+    keys = facet_keys(np.sort(corners, axis=1)[:, :3])
+    _, first, count = np.unique(keys, return_index=True, return_counts=True)
+    return first, count
+
+
+def symmetry(point: str, normal: str) -> Support:
+    """The support of the nodes on a plane of symmetry with its normal along "x", "y" or "z".
+
+    It holds the translation along the normal and the rotations about the other two axes.
+
+    Examples
+    --------
+    >>> symmetry("middle", "x").directions
+    ('x', 'rotation_y', 'rotation_z')
+    """
+    if normal not in ("x", "y", "z"):
+        raise ModelError(f"symmetry at {point!r}: normal must be 'x', 'y' or 'z', not {normal!r}")
+    return Support(point, (normal, *(f"rotation_{axis}" for axis in "xyz" if axis != normal)))

@@ -1,0 +1,898 @@
+"""Pictures and animations of deflected frames and structures with their true sections.
+
+A function with a path writes that file off-screen; without one it gives the pyvista plotter, not
+yet shown: ``plotter.show()`` opens a window, or the picture in a notebook. pyvista is imported when
+the first picture is made.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import math
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from fem.assembly.frame import Component
+from fem.assembly.structure import StructureComponent
+from fem.base.arrays import FloatArray
+from fem.base.errors import ModelError
+from fem.base.files import draft_of
+from fem.render.colouring import surface_values
+from fem.render.frame_scenery import Block, StopSphere, mass_blocks, stop_solids, support_solids
+from fem.render.frame_surface import FrameSurface, frame_surface
+from fem.render.gl import RenderError, on_screen, require_gl
+from fem.render.structure_scenery import Cube, mass_cubes, stop_bodies, support_marks
+from fem.render.structure_surface import StructureSurface, structure_surface, without_mirror
+
+if TYPE_CHECKING:
+    import pyvista
+
+
+AnyComponent = Component | StructureComponent
+Surface = FrameSurface | StructureSurface
+Image = npt.NDArray[np.uint8]
+Plotter = Any  # pyvista.Plotter while it is drawn in
+
+TEXT = "#202020"
+GHOST = "#6b7785"
+STEEL = "#55606e"
+STOP = "#c0392b"
+COLOURS = "viridis"
+BLOCK = "#8a8f98"
+PLANE = "#3a78b5"
+AUTO_FRACTION = 0.06
+BAR_ROW = 110
+GHOST_SHRINKAGE = 0.97
+"""Makes the frame at rest a little thinner, so that it hides inside the other where they agree."""
+VIEWS = {
+    "oblique": (0.20, 0.42, 1.0),
+    "front": (0.0, 0.0, 1.0),
+    "top": (0.0, 1.0, 0.0),
+    "side": (1.0, 0.0, 0.0),
+    "isometric": (1.0, 1.0, 1.0),
+}
+"""From where the frame is looked at: y is up, but from the top x is to the right."""
+TRIAD = 110  # pixels
+FIELD = (0.20, 0.85, 0.94)
+SHEET_FIELD = (0.05, 0.84, 0.94)
+"""Where the frame goes: from this part of the field's height to that, and of its width."""
+
+
+@overload
+def render_shape(
+    component: AnyComponent,
+    u: FloatArray,
+    path: None = None,
+    *,
+    title: str = ...,
+    scale: float | None = ...,
+    stop: StopSphere | None = ...,
+    mirror: str | None = ...,
+    colour: str = ...,
+    view: str = ...,
+    size: tuple[int, int] = ...,
+) -> pyvista.Plotter: ...
+@overload
+def render_shape(
+    component: AnyComponent,
+    u: FloatArray,
+    path: str | os.PathLike[str],
+    *,
+    title: str = ...,
+    scale: float | None = ...,
+    stop: StopSphere | None = ...,
+    mirror: str | None = ...,
+    colour: str = ...,
+    view: str = ...,
+    size: tuple[int, int] = ...,
+) -> float: ...
+def render_shape(
+    component: AnyComponent,
+    u: FloatArray,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    title: str = "",
+    scale: float | None = None,
+    stop: StopSphere | None = None,
+    mirror: str | None = None,
+    colour: str = "displacement",
+    view: str = "oblique",
+    size: tuple[int, int] = (1600, 900),
+) -> pyvista.Plotter | float:
+    """Picture of a deflected frame or structure, coloured by its displacement or stress.
+
+    Drawn with it: the same at rest in grey, supports, point masses as blocks of steel of that
+    mass, and the stop at its true place (its gap scaled as the deflection is). The factor on the
+    deflection is stated in the picture.
+
+    Parameters
+    ----------
+    component
+        The assembled frame.
+    u
+        Displacements of the free degrees of freedom in m, shape (N,).
+    path
+        The .png to write, whole or not at all; without it the plotter is returned.
+    title
+        Text above the picture.
+    scale
+        Factor on the deflection; by default a round one that makes it well visible.
+    stop
+        The stop to draw.
+    mirror
+        A point on a plane of symmetry, to draw half a frame whole.
+    colour
+        "displacement"; "stress": von Mises' in solids, that of the outermost fibre in beams; or
+        "moment": the bending moment of beams.
+    view
+        From where: one of `VIEWS`. Axes in a corner show the directions.
+    size
+        Width and height in pixels.
+
+    Returns
+    -------
+    float or pyvista.Plotter
+        The factor on the deflection; without a path the plotter, not yet shown. Its ``show()``
+        opens a window where there is a screen, and draws in a notebook.
+
+    Raises
+    ------
+    RenderError
+        If this machine cannot render, with what to install, or the name does not end in .png.
+    ModelError
+        If u has the wrong shape or is not finite, or a point is not in the mesh.
+
+    Examples
+    --------
+    >>> import fem, numpy as np
+    >>> from fem.render import gl_available, render_shape
+    >>> mesh = fem.frame_mesh({"root": (0, 0), "tip": (1, 0)}, [("arm", "root", "tip", 4)])
+    >>> arm = fem.BeamPart(fem.Material(2e11, 7800.0), fem.RectangularSection(0.1, 0.02))
+    >>> component = fem.assemble(fem.FrameModel(
+    ...     mesh, {"arm": arm}, [fem.Support("root", ("x", "y", "rotation"))]))
+    >>> u = np.linspace(0.0, 1e-3, len(component.free))
+    >>> if gl_available()[0]:
+    ...     factor = render_shape(component, u, "arm.png", title="An arm")
+    ...     render_shape(component, u, title="An arm").show()
+    """
+    target = None if path is None else named(path, (".png",))
+    drawing = surface_of(component, mirror)
+    states = checked_states(component, u, 1)
+    factor = automatic_scale(drawing, states) if scale is None else checked_scale(scale)
+    require_gl()
+    with picture(target, size) as plotter:
+        moving = add_deflected(plotter, drawing, states[0], factor, colour)
+        compose(plotter, moving, states, stop, title, size, checked_view(view))
+        add_note(plotter, scale_note(factor, stop), size)
+    return plotter if target is None else factor
+
+
+@overload
+def render_modes(
+    component: AnyComponent,
+    shapes: npt.ArrayLike,
+    titles: Sequence[str],
+    path: None = None,
+    *,
+    mirror: str | None = ...,
+    view: str = ...,
+    size: tuple[int, int] | None = ...,
+) -> pyvista.Plotter: ...
+@overload
+def render_modes(
+    component: AnyComponent,
+    shapes: npt.ArrayLike,
+    titles: Sequence[str],
+    path: str | os.PathLike[str],
+    *,
+    mirror: str | None = ...,
+    view: str = ...,
+    size: tuple[int, int] | None = ...,
+) -> None: ...
+def render_modes(
+    component: AnyComponent,
+    shapes: npt.ArrayLike,
+    titles: Sequence[str],
+    path: str | os.PathLike[str] | None = None,
+    *,
+    mirror: str | None = None,
+    view: str = "oblique",
+    size: tuple[int, int] | None = None,
+) -> pyvista.Plotter | None:
+    """Picture with one mode in each field, all drawn with the same largest displacement.
+
+    Parameters
+    ----------
+    component
+        The assembled frame.
+    shapes
+        Shape (N, k): one mode in each column, such as ``reduced.basis``.
+    titles
+        k texts, one above each mode.
+    path
+        The .png to write, whole or not at all; without it the plotter is returned.
+    mirror
+        A point on a plane of symmetry, to draw a half model whole.
+    view
+        From where, as for `render_shape`.
+    size
+        Width and height in pixels; by default what k fields need.
+
+    Returns
+    -------
+    None or pyvista.Plotter
+        Without a path the plotter, not yet shown, as by `render_shape`.
+
+    Raises
+    ------
+    RenderError
+        If this machine cannot render, with what to install, or the name does not end in .png.
+    ModelError
+        If the shapes do not belong to the component or there is not one title for each.
+
+    Examples
+    --------
+    >>> import fem, numpy as np
+    >>> from fem.render import gl_available, render_modes
+    >>> mesh = fem.frame_mesh({"root": (0, 0), "tip": (1, 0)}, [("arm", "root", "tip", 4)])
+    >>> arm = fem.BeamPart(fem.Material(2e11, 7800.0), fem.RectangularSection(0.1, 0.02))
+    >>> component = fem.assemble(fem.FrameModel(
+    ...     mesh, {"arm": arm}, [fem.Support("root", ("x", "y", "rotation"))]))
+    >>> if gl_available()[0]:
+    ...     render_modes(component, np.eye(len(component.free))[:, :2], ["one", "two"], "arm.png")
+    """
+    target = None if path is None else named(path, (".png",))
+    drawing = surface_of(component, mirror)
+    modes = checked_states(component, np.asarray(shapes, dtype=np.float64).T, 2)
+    if len(titles) != len(modes):
+        raise ModelError(f"there are {len(modes)} modes to draw, but {len(titles)} titles")
+    rows, columns = fields(len(modes))
+    window = size or (900 * columns if columns > 1 else 1400, 390 * rows + BAR_ROW)
+    require_gl()
+    field = (window[0] // columns, (window[1] - BAR_ROW) // rows)
+    with picture(target, window, (rows, columns), BAR_ROW / field[1]) as plotter:
+        for index, (mode, title) in enumerate(zip(modes, titles, strict=True)):
+            plotter.subplot(*divmod(index, columns))
+            moving = add_mode(plotter, drawing, mode, title, field, checked_view(view))
+        plotter.subplot(rows, 0)
+        drawn = f"{moving.factor * 1e3:.3g} mm"
+        label = f"displacement relative to each mode's largest, which is drawn as {drawn}"
+        add_scalar_bar(plotter, moving, label, window[0], BAR_ROW)
+    return plotter if target is None else None
+
+
+@overload
+def render_comparison(
+    component: AnyComponent,
+    full: FloatArray,
+    reduced: FloatArray,
+    path: None = None,
+    *,
+    title: str = ...,
+    scale: float | None = ...,
+    mirror: str | None = ...,
+    size: tuple[int, int] = ...,
+) -> pyvista.Plotter: ...
+@overload
+def render_comparison(
+    component: AnyComponent,
+    full: FloatArray,
+    reduced: FloatArray,
+    path: str | os.PathLike[str],
+    *,
+    title: str = ...,
+    scale: float | None = ...,
+    mirror: str | None = ...,
+    size: tuple[int, int] = ...,
+) -> float: ...
+def render_comparison(
+    component: AnyComponent,
+    full: FloatArray,
+    reduced: FloatArray,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    title: str = "",
+    scale: float | None = None,
+    mirror: str | None = None,
+    size: tuple[int, int] = (1600, 900),
+) -> pyvista.Plotter | float:
+    """Picture of two deflections of one component: of the full and of a reduced model.
+
+    The surface is the full one, coloured by the distance between the two; red lines are the sharp
+    edges of the reduced one.
+
+    Parameters
+    ----------
+    component
+        The assembled component.
+    full, reduced
+        Displacements of the free degrees of freedom in m, each of shape (N,).
+    path, title, scale, mirror, size
+        As for `render_shape`.
+
+    Returns
+    -------
+    float or pyvista.Plotter
+        The largest distance over the largest displacement of the full model, which the picture
+        says, too; without a path the plotter, not yet shown, as by `render_shape`.
+
+    Raises
+    ------
+    RenderError, ModelError
+        As for `render_shape`.
+    """
+    target = None if path is None else named(path, (".png",))
+    drawing = surface_of(component, mirror)
+    states = checked_states(component, np.stack([full, reduced]), 2)
+    factor = automatic_scale(drawing, states) if scale is None else checked_scale(scale)
+    apart = drawing.place(states[0] - states[1])[1]
+    largest = float(drawing.place(states[0])[1].max())
+    share = float(apart.max()) / largest if largest > 0.0 else 0.0
+    require_gl()
+    with picture(target, size) as plotter:
+        moving = add_deflected(plotter, drawing, states[0], factor)
+        other, _ = drawing.place(states[1], factor)
+        _, lines = polydata(drawing, other)
+        plotter.add_mesh(lines, color=STOP, line_width=3.0)
+        compose(plotter, moving, states, None, title, size, checked_view("oblique"))
+        unit, per_metre = length_unit(float(apart.max()))
+        moving.colour_by(per_metre, float(apart.max()))
+        moving.surface.point_data["colour"][:] = apart * per_metre
+        add_scalar_bar(plotter, moving, f"distance between the two in {unit}", *size)
+        note = f"deflection drawn × {factor:g};  red lines: reduced model, off by {share:.2g}"
+        add_note(plotter, note + " of the largest displacement", size)
+    return plotter if target is None else share
+
+
+def animate(
+    component: AnyComponent,
+    displacements: npt.ArrayLike,
+    path: str | os.PathLike[str],
+    *,
+    times: npt.ArrayLike,
+    scale: float | None = None,
+    stop: StopSphere | None = None,
+    mirror: str | None = None,
+    colour: str = "displacement",
+    title: str = "",
+    view: str = "oblique",
+    fps: float = 25.0,
+    size: tuple[int, int] = (1120, 540),
+) -> float:
+    """Animation of a moving frame, repeated without end.
+
+    Parameters
+    ----------
+    component
+        The assembled frame.
+    displacements
+        In m, shape (m, N): one state for each picture. For one period of an orbit leave out
+        the last instant, which is the first again.
+    path
+        A .gif, or an .mp4 where imageio-ffmpeg is installed; written whole or not at all.
+    times
+        Instants in s, shape (m,), shown in the pictures.
+    scale, stop, mirror, colour, title, view
+        As for `render_shape`; one scale and one range of colours for all pictures.
+    fps
+        Pictures per second.
+    size
+        Width and height in pixels.
+
+    Returns
+    -------
+    float
+        The factor on the deflection.
+
+    Raises
+    ------
+    RenderError
+        If this machine cannot render or cannot write .mp4, with what to install.
+    ModelError
+        If the displacements do not belong to the component or there is not one time for each.
+
+    Examples
+    --------
+    >>> import fem, numpy as np
+    >>> from fem.render import animate, gl_available
+    >>> mesh = fem.frame_mesh({"root": (0, 0), "tip": (1, 0)}, [("arm", "root", "tip", 4)])
+    >>> arm = fem.BeamPart(fem.Material(2e11, 7800.0), fem.RectangularSection(0.1, 0.02))
+    >>> component = fem.assemble(fem.FrameModel(
+    ...     mesh, {"arm": arm}, [fem.Support("root", ("x", "y", "rotation"))]))
+    >>> times = np.arange(5) / 5
+    >>> states = np.outer(np.sin(2 * np.pi * times), np.linspace(0, 1e-3, len(component.free)))
+    >>> if gl_available()[0]:
+    ...     factor = animate(component, states, "arm.gif", times=times)
+    """
+    target = named(path, (".gif", ".mp4"))
+    drawing = surface_of(component, mirror)
+    states = checked_states(component, displacements, 2)
+    instants = np.asarray(times, dtype=np.float64)
+    if instants.shape != (len(states),):
+        raise ModelError(
+            f"there are {len(states)} states to draw, but times has shape {instants.shape}"
+        )
+    if not (math.isfinite(fps) and fps > 0.0):
+        raise ModelError(f"fps must be positive, not {fps}")
+    factor = automatic_scale(drawing, states) if scale is None else checked_scale(scale)
+    check_video(target)
+    require_gl()
+    with contextlib.closing(plotter_of(size, True)) as plotter:
+        moving = add_deflected(plotter, drawing, states[0], factor, colour)
+        compose(plotter, moving, states, stop, title, size, checked_view(view))
+        images = []
+        for state, instant in zip(states, instants, strict=True):
+            moving.move(state)
+            add_note(plotter, f"t = {instant * 1e3:.2f} ms;  {scale_note(factor, stop)}", size)
+            plotter.render()
+            images.append(plotter.screenshot(None, return_img=True))
+    write_video(target, images, fps)
+    return factor
+
+
+# What is asked for
+
+
+def named(path: str | os.PathLike[str], endings: tuple[str, ...]) -> Path:
+    """The path, or RenderError where its name has another ending or its folder is missing."""
+    target = Path(path)
+    if target.suffix.lower() not in endings:
+        raise RenderError(f"{target}: the name must end in {' or '.join(endings)}")
+    if not target.parent.is_dir():
+        raise RenderError(f"{target}: there is no folder {target.parent}")
+    return target
+
+
+def checked_states(component: AnyComponent, states: npt.ArrayLike, dimensions: int) -> FloatArray:
+    """The states as (m, N) floats, or ModelError."""
+    array = np.asarray(states, dtype=np.float64)
+    count = len(component.free)
+    if array.ndim != dimensions or array.shape[-1] != count or array.size == 0:
+        raise ModelError(
+            f"{component.model.mesh.source}: displacements to draw have shape {array.shape},"
+            f" but the component has {count} degrees of freedom"
+        )
+    if not np.all(np.isfinite(array)):
+        raise ModelError(
+            f"{component.model.mesh.source}: displacements to draw are not all finite numbers"
+        )
+    return array.reshape(-1, count)
+
+
+def checked_scale(scale: float) -> float:
+    """The scale as a float, or ModelError."""
+    if not math.isfinite(scale):
+        raise ModelError(f"scale must be a finite number, not {scale}")
+    return float(scale)
+
+
+def check_video(target: Path) -> None:
+    """Raise RenderError where the file is to be an .mp4 and nothing here can write one."""
+    if target.suffix.lower() == ".mp4" and importlib.util.find_spec("imageio_ffmpeg") is None:
+        raise RenderError(
+            f"{target}: writing .mp4 needs imageio-ffmpeg (pip install imageio-ffmpeg); "
+            ".gif needs nothing more"
+        )
+
+
+# Scale and units
+
+
+def extent(points: FloatArray) -> float:
+    """Diagonal of the box around points (P, 3), in m."""
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def automatic_scale(drawing: Surface, states: FloatArray) -> float:
+    """A factor 1, 2 or 5 times a power of ten that makes the largest deflection visible."""
+    at_rest, _ = drawing.place(np.zeros(states.shape[1]))
+    largest = max(float(drawing.place(state)[1].max()) for state in states)
+    return round_number(AUTO_FRACTION * extent(at_rest) / largest) if largest > 0.0 else 1.0
+
+
+def round_number(value: float) -> float:
+    """The largest of 1, 2 or 5 times a power of ten that is not above a positive value.
+
+    Examples
+    --------
+    >>> round_number(37.0), round_number(0.6), round_number(1e-3)
+    (20.0, 0.5, 0.001)
+    """
+    power = math.floor(math.log10(value) + 1e-12)
+    lead = max(step for step in (1, 2, 5) if step <= value / 10.0**power * (1 + 1e-9))
+    return float(f"{lead}e{power}")
+
+
+def quantity_unit(colour: str, largest: float) -> tuple[str, float]:
+    """What the bar of colours says, and the factor on the quantity.
+
+    Examples
+    --------
+    >>> quantity_unit("stress", 2.3e8)
+    ('stress in MPa', 1e-06)
+    """
+    if colour == "displacement":
+        unit, factor = length_unit(largest)
+    elif colour == "stress":
+        unit, factor = next(
+            (u, f)
+            for u, f in (("MPa", 1e-6), ("kPa", 1e-3), ("Pa", 1.0))
+            if largest * f >= 0.1 or f == 1.0
+        )
+    else:
+        unit, factor = "N m", 1.0
+    return f"{'bending moment' if colour == 'moment' else colour} in {unit}", factor
+
+
+def length_unit(largest: float) -> tuple[str, float]:
+    """A unit in which a length in m reads well, and how many of it make a metre."""
+    for unit, per_metre in (("m", 1.0), ("mm", 1e3), ("µm", 1e6)):
+        if largest * per_metre >= 0.5:
+            return unit, per_metre
+    return ("nm", 1e9) if largest > 0.0 else ("mm", 1e3)
+
+
+def scale_note(factor: float, stop: StopSphere | None) -> str:
+    """What the picture says about its scale."""
+    return f"deflection drawn × {factor:g};  grey: at rest" + (";  red: stop" if stop else "")
+
+
+# What is drawn
+
+
+@dataclass(eq=False)
+class Moving:
+    """The deflected frame in a plotter; the only thing that changes from picture to picture."""
+
+    drawing: Surface
+    factor: float
+    surface: Any
+    edges: Any
+    actor: Any
+    blocks: Sequence[Block | Cube] = ()
+    colour: str = "displacement"
+    factor_on_colour: float = 1.0
+    largest: float = 0.0
+
+    def move(self, u: FloatArray) -> None:
+        """Draw another state."""
+        points, _ = self.drawing.place(u, self.factor)
+        self.surface.points[:] = points
+        self.edges.points[:] = points
+        values = surface_values(self.drawing, u, self.colour)
+        self.surface.point_data["colour"][:] = values * self.factor_on_colour
+        self.surface.Modified()
+        self.edges.Modified()
+        shape = self.drawing.component.shape(u)
+        for block in self.blocks:
+            block.move(shape, self.factor)
+
+    def colour_by(self, factor: float, largest: float) -> None:
+        """Set the factor on the colours and their range, 0 to ``largest`` in SI units."""
+        self.surface.point_data["colour"][:] *= factor / self.factor_on_colour
+        self.factor_on_colour = factor
+        self.actor.mapper.scalar_range = (0.0, largest * factor or 1.0)
+
+
+@contextlib.contextmanager
+def picture(
+    target: Path | None,
+    size: tuple[int, int],
+    shape: tuple[int, int] | None = None,
+    bar_row: float = 0.0,
+) -> Iterator[Plotter]:
+    """A plotter to draw in, which is then written and closed, or without a target left open."""
+    with contextlib.ExitStack() as stack:
+        off_screen = target is not None or not on_screen()
+        plotter = stack.enter_context(
+            contextlib.closing(plotter_of(size, off_screen or None, shape, bar_row))
+        )
+        yield plotter
+        if target is None:
+            stack.pop_all()
+        else:
+            write_image(target, plotter.screenshot(None, return_img=True))
+
+
+def plotter_of(
+    size: tuple[int, int],
+    off_screen: bool | None,
+    shape: tuple[int, int] | None = None,
+    bar_row: float = 0.0,
+) -> Plotter:
+    """A white plotter, off-screen or as pyvista is set.
+
+    With a shape (rows, columns) it has these fields and below them one for the bar of colours,
+    ``bar_row`` times as high as the others.
+    """
+    import pyvista
+
+    theme = pyvista.themes.DocumentTheme()
+    theme.font.family = "arial"
+    theme.font.color = TEXT
+    theme.background = "white"
+    layout: dict[str, Any] = {}
+    if shape is not None:
+        rows, columns = shape
+        layout = {"shape": (rows + 1, columns), "row_weights": [1.0] * rows + [bar_row]}
+        layout["groups"] = [(rows, slice(None))] if columns > 1 else None
+    plotter = pyvista.Plotter(
+        off_screen=off_screen, window_size=list(size), border=False, theme=theme, **layout
+    )
+    plotter.enable_anti_aliasing("ssaa")
+    return plotter
+
+
+def polydata(drawing: Surface, points: FloatArray) -> tuple[Any, Any]:
+    """The surface and its sharp edges as pyvista meshes on the same points."""
+    import pyvista
+
+    def cells(arrays: list[Any]) -> Any:
+        rows = [np.insert(array, 0, array.shape[1], axis=1).ravel() for array in arrays]
+        return np.concatenate(rows)
+
+    surface = pyvista.PolyData(points.copy(), faces=cells(drawing.faces()))
+    edges = pyvista.PolyData(points.copy(), lines=cells(drawing.edges()))
+    return surface, edges
+
+
+def surface_of(component: AnyComponent, mirror: str | None = None) -> Surface:
+    """The surface of a frame or a structure; only a frame can be mirrored."""
+    if isinstance(component, StructureComponent):
+        without_mirror(component, mirror)
+        return structure_surface(component)
+    return frame_surface(component, mirror)
+
+
+def add_deflected(
+    plotter: Plotter,
+    drawing: Surface,
+    u: FloatArray,
+    factor: float,
+    colour: str = "displacement",
+) -> Moving:
+    """Draw the deflected frame and, in grey, the frame at rest."""
+    rest, _ = drawing.place(np.zeros_like(u), shrinkage=GHOST_SHRINKAGE)
+    ghost, ghost_edges = polydata(drawing, rest)
+    plotter.add_mesh(ghost, color=GHOST, opacity=0.16, lighting=False, show_scalar_bar=False)
+    plotter.add_mesh(ghost_edges, color=GHOST, opacity=0.55, line_width=1.5)
+    points, _ = drawing.place(u, factor)
+    surface, edges = polydata(drawing, points)
+    values = surface_values(drawing, u, colour)
+    surface.point_data["colour"] = values
+    actor = plotter.add_mesh(
+        surface,
+        scalars="colour",
+        cmap=COLOURS,
+        show_scalar_bar=False,
+        ambient=0.35,
+        diffuse=0.75,
+        specular=0.1,
+    )
+    plotter.add_mesh(edges, color=TEXT, opacity=0.6, line_width=1.5)
+    return Moving(
+        drawing, factor, surface, edges, actor, colour=colour, largest=float(values.max())
+    )
+
+
+def compose(
+    plotter: Plotter,
+    moving: Moving,
+    states: FloatArray,
+    stop: StopSphere | None,
+    title: str,
+    size: tuple[int, int],
+    view: FloatArray,
+) -> None:
+    """Put everything around the deflected frame, with one range of colours for all states."""
+    drawing = moving.drawing
+    moving.blocks = add_surroundings(plotter, drawing, moving.factor, stop)
+    keep_room(plotter, drawing, states, moving.factor)
+    largest = max(float(surface_values(drawing, u, moving.colour).max()) for u in states)
+    label, on_colour = quantity_unit(moving.colour, largest)
+    moving.colour_by(on_colour, largest)
+    moving.move(states[0])
+    add_scalar_bar(plotter, moving, label, *size)
+    add_text(plotter, title, "title", (0.5, 0.92), 1.4 * text_height(size[1]), size[0])
+    fit_camera(plotter, size, view)
+    add_triad(plotter, size)
+
+
+def add_note(plotter: Plotter, text: str, size: tuple[int, int]) -> None:
+    """The line of small text below the title."""
+    letters = 0.9 * text_height(size[1])
+    add_text(plotter, text, "note", (0.5, 0.875), letters, size[0])
+
+
+def add_surroundings(
+    plotter: Plotter,
+    drawing: Surface,
+    factor: float,
+    stop: StopSphere | None,
+) -> list[Block | Cube]:
+    """Draw supports, the stop and the masses; the masses are returned, because they move."""
+    marks, stops, blocks = surroundings(drawing, factor, stop)
+    for solid, plane in marks:
+        if plane:
+            plotter.add_mesh(solid, color=PLANE, opacity=0.25, lighting=False)
+        else:
+            add_solid(plotter, solid, STEEL)
+    for solid in stops:
+        add_solid(plotter, solid, STOP, smooth=solid.n_cells > 100)
+    for block in blocks:
+        add_solid(plotter, block.solid, BLOCK)
+    return blocks
+
+
+def surroundings(
+    drawing: Surface, factor: float, stop: StopSphere | None
+) -> tuple[list[tuple[Any, bool]], list[Any], list[Block | Cube]]:
+    """Marks of the supports, bodies of the stop, and the masses."""
+    if isinstance(drawing, StructureSurface):
+        stops = [] if stop is None else stop_bodies(drawing, stop, factor)
+        return list(support_marks(drawing)), stops, [*mass_cubes(drawing, stop)]
+    stops = [] if stop is None else stop_solids(drawing, stop, factor)
+    return list(support_solids(drawing)), stops, [*mass_blocks(drawing, stop)]
+
+
+def add_solid(plotter: Plotter, solid: Any, colour: str, smooth: bool = False) -> None:
+    """Draw a solid body with its sharp edges."""
+    plotter.add_mesh(
+        solid,
+        color=colour,
+        ambient=0.35,
+        diffuse=0.7,
+        smooth_shading=smooth,
+        split_sharp_edges=smooth,
+    )
+
+
+def keep_room(plotter: Plotter, drawing: Surface, states: FloatArray, factor: float) -> None:
+    """Make the picture large enough for all states."""
+    import pyvista
+
+    boxes = [drawing.place(state, factor)[0] for state in states]
+    low = np.min([points.min(axis=0) for points in boxes], axis=0)
+    high = np.max([points.max(axis=0) for points in boxes], axis=0)
+    plotter.add_mesh(pyvista.PolyData(np.array([low, high])), opacity=0.0, point_size=1.0)
+
+
+def add_scalar_bar(plotter: Plotter, moving: Moving, title: str, width: int, height: int) -> None:
+    """A horizontal bar of colours at the bottom of a field of this size, its title above it."""
+    letters = 20.0 if height > 300 else 17.0
+    plotter.add_scalar_bar(
+        title=" ",
+        mapper=moving.actor.mapper,
+        n_labels=5,
+        fmt="%.3g",
+        position_x=0.30,
+        position_y=8.0 / height,
+        width=0.40,
+        height=3.0 * letters / height,
+        label_font_size=round(letters),
+        color=TEXT,
+    )
+    add_text(plotter, title, "unit", (0.5, (8.0 + 3.4 * letters) / height), letters, width)
+
+
+def text_height(height: float) -> float:
+    """Size of letters in pixels for a field of this height."""
+    return float(np.clip(0.028 * height, 17.0, 28.0))
+
+
+def add_text(
+    plotter: Plotter,
+    text: str,
+    name: str,
+    where: tuple[float, float],
+    letters: float,
+    width: float,
+) -> None:
+    """Text at a place given in parts of the field, made smaller where it would not fit."""
+    import pyvista
+
+    fitting = min(letters, 1.75 * 0.94 * width / max(len(text), 1))
+    label = pyvista.Text(text, position=where, name=name)
+    label.prop.font_family = "arial"
+    label.prop.font_size = max(round(fitting), 6)
+    label.prop.color = TEXT
+    label.prop.justification_horizontal = "center"
+    label.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
+    plotter.add_actor(label, name=name, reset_camera=False, render=False)
+
+
+def add_triad(plotter: Plotter, size: tuple[int, int]) -> None:
+    """Axes x, y and z in a corner of a field of so many pixels, as they lie in the picture."""
+    wide, high = TRIAD / size[0], TRIAD / size[1]
+    plotter.add_axes(line_width=2, color=TEXT, viewport=(0.0, 0.0, wide, high), interactive=False)
+
+
+def checked_view(view: str) -> FloatArray:
+    """The unit vector towards the eye, or ModelError."""
+    if view not in VIEWS:
+        raise ModelError(f"view must be one of {', '.join(VIEWS)}, not {view!r}")
+    towards = np.array(VIEWS[view])
+    return np.asarray(towards / np.linalg.norm(towards))
+
+
+def fit_camera(
+    plotter: Plotter,
+    size: tuple[int, int],
+    back: FloatArray,
+    field: tuple[float, float, float] = FIELD,
+) -> None:
+    """Look at the frame from a direction, without perspective, as large as fits."""
+    box = np.array(plotter.bounds).reshape(3, 2)
+    corners = np.stack(np.meshgrid(*box, indexing="ij"), axis=-1).reshape(-1, 3)
+    right = np.cross([0.0, 1.0, 0.0], back)
+    right = right / np.linalg.norm(right) if right.any() else np.array([1.0, 0.0, 0.0])
+    up = np.cross(back, right)
+    across, above = corners @ right, corners @ up
+    half_width, half_height = np.ptp(across) / 2, np.ptp(above) / 2
+    low, high, wide = field
+    scale = max(half_height / (high - low), half_width / wide * size[1] / size[0])
+    centre = (across.max() + across.min()) / 2 * right + (above.max() + above.min()) / 2 * up
+    centre = centre + corners.mean(axis=0) @ back * back
+    focus = centre - (low + high - 1.0) * scale * up
+    distance = 10.0 * float(np.linalg.norm(np.ptp(corners, axis=0)))
+    plotter.camera_position = [tuple(focus + distance * back), tuple(focus), tuple(up)]
+    plotter.enable_parallel_projection()
+    plotter.camera.parallel_scale = scale
+    plotter.reset_camera_clipping_range()
+
+
+def add_mode(
+    plotter: Plotter,
+    drawing: Surface,
+    mode: FloatArray,
+    title: str,
+    size: tuple[int, int],
+    view: FloatArray,
+) -> Moving:
+    """One field of the sheet of modes."""
+    largest = float(drawing.place(mode)[1].max())
+    unit = mode / largest if largest > 0.0 else mode
+    factor = AUTO_FRACTION * extent(drawing.place(np.zeros_like(mode))[0])
+    moving = add_deflected(plotter, drawing, unit, factor)
+    moving.blocks = add_surroundings(plotter, drawing, factor, None)
+    moving.colour_by(1.0, 1.0)
+    moving.move(unit)
+    add_text(plotter, title, "title", (0.5, 0.89), 22.0, size[0])
+    fit_camera(plotter, size, view, SHEET_FIELD)
+    add_triad(plotter, size)
+    return moving
+
+
+def fields(count: int) -> tuple[int, int]:
+    """Rows and columns of the sheet for a number of modes."""
+    columns = 1 if count <= 3 else 2
+    return math.ceil(count / columns), columns
+
+
+# Files
+
+
+def write_image(target: Path, image: Image) -> None:
+    """Write a .png."""
+    import imageio.v3 as iio
+
+    with draft_of(target) as draft:
+        iio.imwrite(draft, image)
+
+
+def write_video(target: Path, images: Sequence[Image], fps: float) -> None:
+    """Write a .gif that repeats without end, or an .mp4."""
+    import imageio.v3 as iio
+
+    with draft_of(target) as draft:
+        if target.suffix.lower() == ".gif":
+            iio.imwrite(draft, np.stack(images), duration=1000.0 / fps, loop=0)
+        else:
+            iio.imwrite(draft, np.stack(images), fps=fps, plugin="FFMPEG", macro_block_size=2)

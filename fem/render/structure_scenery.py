@@ -1,0 +1,134 @@
+"""What stands around a drawn structure: held faces and points, lumped masses, the stop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fem.base.arrays import FloatArray, IntArray
+from fem.mesh.cells import KINDS
+from fem.render.frame_scenery import BLOCK_DENSITY, MARK_FRACTION, StopSphere, sphere_on_post
+from fem.render.structure_surface import StructureSurface
+
+LIFT = 1e-3
+"""Held faces are drawn this part of the structure's size off its surface."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cube:
+    """A lumped mass drawn as a cube that moves and turns with its node."""
+
+    node: int
+    pivot: FloatArray
+    at_rest: FloatArray
+    solid: Any
+
+    def move(self, shape: FloatArray, scale: float) -> None:
+        """Shift and turn the cube with the node's six displacements from ``shape`` (n, 6)."""
+        moved, turned = scale * shape[self.node, :3], scale * shape[self.node, 3:]
+        arm = self.at_rest - self.pivot
+        angle = float(np.linalg.norm(turned))
+        if angle > 0.0:
+            axis = turned / angle
+            angle = math.atan(angle)
+            along = np.outer(arm @ axis, axis)
+            arm = along + math.cos(angle) * (arm - along) + math.sin(angle) * np.cross(axis, arm)
+        self.solid.points = self.pivot + arm + moved
+
+
+def size_of(drawing: StructureSurface) -> float:
+    """Diagonal of the box around the structure, in m."""
+    return float(np.linalg.norm(np.ptp(drawing.component.model.mesh.points, axis=0)))
+
+
+def support_marks(drawing: StructureSurface) -> Iterator[tuple[Any, bool]]:
+    """A patch on each held face, a cube at each held point; with each whether one axis is held."""
+    import pyvista
+
+    model = drawing.component.model
+    mark = MARK_FRACTION * size_of(drawing)
+    for support in model.supports:
+        translations = {"x", "y", "z"} & set(support.directions)
+        facets = {} if model.is_plane else model.facets_on(support.point)
+        if facets:
+            for patch in _patches(drawing, facets):
+                yield patch, len(translations) == 1
+        elif len(translations) > 1 and len(model.mesh.nodes(support.point)) == 1:
+            for node in model.mesh.nodes(support.point):
+                centre = model.mesh.points[node]
+                yield (
+                    pyvista.Cube(center=centre, x_length=mark, y_length=mark, z_length=mark),
+                    False,
+                )
+
+
+def _patches(drawing: StructureSurface, facets: dict[str, IntArray]) -> Iterator[Any]:
+    import pyvista
+
+    points = drawing.component.model.mesh.points
+    middle = points.mean(axis=0)
+    for kind, cells in facets.items():
+        corners = points[cells]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        outward = np.sum(normal * (corners.mean(axis=1) - middle), axis=1)
+        normal = normal * np.where(outward < 0.0, -1.0, 1.0)[:, None]
+        normal = normal / np.linalg.norm(normal, axis=1)[:, None]
+        lifted = corners + LIFT * size_of(drawing) * normal[:, None, :]
+        index = np.arange(lifted[..., 0].size).reshape(cells.shape)
+        ring = list(range(len(KINDS[kind].corners)))
+        faces = np.insert(index[:, ring], 0, len(ring), axis=1).ravel()
+        yield pyvista.PolyData(lifted.reshape(-1, 3), faces=faces)
+
+
+def mass_cubes(drawing: StructureSurface, stop: StopSphere | None) -> list[Cube]:
+    """A cube of steel for each lumped mass, with its centre where the mass has it.
+
+    One without an offset at the point that hits the stop stands on the side away from it.
+    """
+    import pyvista
+
+    model = drawing.component.model
+    cubes = []
+    for lump in model.point_masses:
+        if lump.mass > 0.0:
+            node = model.mesh.node(lump.point)
+            edge = (lump.mass / BLOCK_DENSITY) ** (1 / 3)
+            centre = model.mesh.points[node] + np.asarray(lump.offset)
+            if stop is not None and model.mesh.node(stop.point) == node and not any(lump.offset):
+                away = -direction_of(stop)
+                centre = centre + (reach_along(drawing, centre, away) + edge / 2.0) * away
+            solid = pyvista.Cube(center=centre, x_length=edge, y_length=edge, z_length=edge)
+            at_rest = np.array(solid.points, dtype=np.float64)
+            cubes.append(Cube(node, model.mesh.points[node], at_rest, solid))
+    return cubes
+
+
+def stop_bodies(drawing: StructureSurface, stop: StopSphere, scale: float) -> list[Any]:
+    """The sphere at the surface plus ``scale`` times the gap, and the post that holds it."""
+    mesh = drawing.component.model.mesh
+    point = mesh.points[mesh.node(stop.point)]
+    towards = direction_of(stop)
+    surface = reach_along(drawing, point, towards) + scale * stop.gap
+    centre = point + (surface + stop.radius) * towards
+    post = max(1.6 * MARK_FRACTION * size_of(drawing), 4.0 * stop.radius)
+    return sphere_on_post(centre, towards, stop.radius, post)
+
+
+def direction_of(stop: StopSphere) -> FloatArray:
+    """Unit vector (3,) from the structure to the stop."""
+    way = np.array([*stop.direction, 0.0][:3], dtype=np.float64)
+    return way / float(np.linalg.norm(way))
+
+
+def reach_along(drawing: StructureSurface, point: FloatArray, towards: FloatArray) -> float:
+    """How far the surface at rest reaches from a point along a unit vector, in m."""
+    surface, _ = drawing.place(np.zeros(len(drawing.component.free)))
+    arm = surface - point
+    along = arm @ towards
+    aside = np.linalg.norm(arm - along[:, None] * towards, axis=1)
+    near = aside <= aside.min() + 0.25 * MARK_FRACTION * size_of(drawing)
+    return max(float(along[near].max()), 0.0)

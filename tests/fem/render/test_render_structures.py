@@ -1,0 +1,238 @@
+"""Pictures and pages of structures: right surfaces, right colours, drawn in a real browser."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+from scipy.sparse.linalg import spsolve
+
+import fem
+from fem import render
+from fem.render import (
+    RenderError,
+    StopSphere,
+    render_comparison,
+    render_modes,
+    render_shape,
+    write_page,
+)
+from fem.render.colouring import surface_values
+from fem.render.frame_surface import frame_surface
+from fem.render.structure_surface import structure_surface
+
+STEEL = fem.Material(2.0e11, 8000.0, 0.3)
+CLAMP = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")
+BROWSER = next(
+    (found for name in ("chromium", "google-chrome") if (found := shutil.which(name))), ""
+)
+
+
+@pytest.fixture
+def with_gl():
+    available, advice = render.gl_available()
+    if not available:
+        pytest.skip(advice)
+
+
+@pytest.fixture
+def bar():
+    """A bar of solids with a mass at its tip, bent by 100 N along y."""
+    component = fem.assemble(
+        fem.StructureModel(
+            fem.box_mesh("bar", (0.5, 0.02, 0.03), (10, 1, 1), origin=(0.0, -0.01, -0.015)),
+            {"bar": fem.SolidPart(fem.Material(2.0e11, 8000.0, 0.0))},
+            supports=[fem.Support("x0", ("x", "y", "z"))],
+            couplings=[fem.Coupling("tip", "x1", "averaging")],
+            point_masses=[fem.PointMass("tip", 0.1, offset=(0.02, 0.0, 0.0))],
+            interfaces={"tip": fem.Interface("tip", "y")},
+        )
+    )
+    return component, spsolve(component.stiffness.tocsc(), 100.0 * component.interfaces["tip"])
+
+
+def beam(direction, **options):
+    end = tuple(0.5 * np.array(direction) / np.linalg.norm(direction))
+    mesh = fem.frame_mesh({"root": (0, 0, 0), "tip": end}, [("arm", "root", "tip", 5)])
+    section = fem.RectangularSection(width=0.03, height=0.02)
+    return fem.assemble(
+        fem.StructureModel(
+            mesh,
+            {"arm": fem.BeamPart(STEEL, section, **options)},
+            [fem.Support("root", CLAMP)],
+            interfaces={name: fem.Interface("tip", name) for name in CLAMP},
+        )
+    )
+
+
+def test_the_stress_of_a_bent_bar_is_that_of_beam_theory(bar):
+    component, u = bar
+    drawing = structure_surface(component)
+    points, _ = drawing.place(np.zeros_like(u))
+    found = surface_values(drawing, u, "stress")
+    middle = np.abs(points[:, 0] - 0.25) < 1e-9
+    second = 0.03 * 0.02**3 / 12
+    wanted = 100.0 * 0.25 * np.abs(points[middle, 1]) / second
+    outer = wanted > 0.0
+    np.testing.assert_allclose(found[middle][outer], wanted[outer], rtol=0.01)
+    assert found[middle][~outer].max() < 0.1 * wanted.max()
+
+
+@pytest.mark.parametrize("direction", [(1, 0, 0), (1, 2, 0.5), (0, 0, 1)])
+def test_moment_and_stress_of_a_beam_in_space_are_those_of_statics(direction):
+    component = beam(direction, orientation=(0.3, 0.9, 0.1))
+    drawing = structure_surface(component)
+    x = np.array(direction) / np.linalg.norm(direction)
+    z = np.cross(x, (0.3, 0.9, 0.1))
+    z /= np.linalg.norm(z)
+    y = np.cross(z, x)
+    for axis, depth, second in ((y, 0.01, 0.03 * 0.02**3 / 12), (z, 0.015, 0.02 * 0.03**3 / 12)):
+        load = 100.0 * sum(axis[i] * component.interfaces[name] for i, name in enumerate("xyz"))
+        u = spsolve(component.stiffness.tocsc(), load)
+        moment = surface_values(drawing, u, "moment")
+        points, _ = drawing.place(np.zeros_like(u))
+        np.testing.assert_allclose(moment, 100.0 * (0.5 - points @ x), atol=1e-6)
+        stress = surface_values(drawing, u, "stress")
+        np.testing.assert_allclose(stress, moment * depth / second, atol=1.0)
+
+
+def test_the_moment_of_a_frame_is_that_of_statics(half_beam):
+    u = np.linalg.solve(half_beam.stiffness.toarray(), 100.0 * half_beam.interfaces["middle"])
+    drawing = frame_surface(half_beam)
+    moment = surface_values(drawing, u, "moment")
+    points, _ = drawing.place(np.zeros_like(u))
+    along = points[np.abs(points[:, 1]) < 0.006]
+    values = moment[np.abs(points[:, 1]) < 0.006]
+    # the shear force of 100 N all along the beam: the moment changes by 100 N times the length
+    ends = [values[np.argmin(np.abs(along[:, 0] - x))] for x in (0.66, 0.33)]
+    assert ends[0] - ends[1] == pytest.approx(33.0, rel=1e-6)
+
+
+def test_a_twisted_beam_turns_its_section():
+    component = beam((1, 0, 0))
+    turning = component.interfaces["rotation_x"]
+    u = spsolve(component.stiffness.tocsc(), turning)
+    u = u / (turning @ u)
+    drawing = structure_surface(component)
+    rest, _ = drawing.place(np.zeros_like(u))
+    moved, _ = drawing.place(u, 0.01)
+    tip = np.abs(rest[:, 0] - 0.5) < 1e-9
+    turn = 0.01 * np.stack([0 * rest[tip, 0], -rest[tip, 2], rest[tip, 1]], axis=1)
+    np.testing.assert_allclose(moved[tip] - rest[tip], turn, atol=2e-6)
+
+
+def test_the_surface_of_a_block_is_closed(bar):
+    drawing = structure_surface(bar[0])
+    points, _ = drawing.place(np.zeros_like(bar[1]))
+    faces = [face for array in drawing.faces() for face in array]
+    edges = {frozenset(pair) for f in faces for pair in zip(f, np.roll(f, -1), strict=True)}
+    assert len(points) - len(edges) + len(faces) == 2
+    low, high = points.min(axis=0), points.max(axis=0)
+    sharp = np.concatenate(drawing.edges())
+    for a, b in sharp:
+        on_side = np.isclose(points[[a, b]], low) | np.isclose(points[[a, b]], high)
+        assert (on_side.all(axis=0)).sum() >= 2
+
+
+def colours(image):
+    return int(np.count_nonzero(np.ptp(image[..., :3].astype(int), axis=-1) > 40))
+
+
+def test_pictures_of_solids_and_sheets(with_gl, bar, tmp_path):
+    component, u = bar
+    stop = StopSphere("tip", 0.005, (0.0, 1.0, 0.0))
+    for colour in ("displacement", "stress"):
+        path = tmp_path / f"{colour}.png"
+        render_shape(component, u, path, stop=stop, colour=colour, size=(640, 360))
+        assert colours(iio.imread(path)) > 3_000
+    render_modes(component, np.stack([u, -u], axis=1), ["one", "other"], tmp_path / "modes.png")
+    sheet = fem.assemble(
+        fem.StructureModel(
+            fem.box_mesh("sheet", (1.0, 0.4), (4, 2)),
+            {"sheet": fem.SolidPart(STEEL, "stress", 0.01)},
+            [fem.Support("x0", ("x", "y"))],
+        )
+    )
+    shape = np.sin(np.arange(len(sheet.free)))
+    render_shape(sheet, shape, tmp_path / "sheet.png", size=(640, 360))
+    assert colours(iio.imread(tmp_path / "sheet.png")) > 10_000
+
+
+def test_a_comparison_says_how_far_the_two_are_apart(with_gl, bar, tmp_path):
+    component, u = bar
+    share = render_comparison(component, u, 0.9 * u, tmp_path / "two.png", size=(640, 360))
+    assert share == pytest.approx(0.1, rel=1e-6)
+    assert colours(iio.imread(tmp_path / "two.png")) > 3_000
+
+
+def test_what_cannot_be_drawn_is_one_sentence(bar, half_beam, tmp_path):
+    component, u = bar
+    with pytest.raises(fem.ModelError, match="only frames are drawn with a mirror"):
+        render_shape(component, u, tmp_path / "a.png", mirror="tip")
+    with pytest.raises(fem.ModelError, match="no colouring 'heat'; there are 'displacement'"):
+        surface_values(structure_surface(component), u, "heat")
+    with pytest.raises(fem.ModelError, match=r"a\.htm: the name must end in \.html"):
+        write_page(component, u[:, None], ["one"], tmp_path / "a.htm")
+    with pytest.raises(fem.ModelError, match="there are 1 shapes to draw, but 2 titles"):
+        write_page(component, u[:, None], ["one", "two"], tmp_path / "a.html")
+    with pytest.raises(RenderError, match="must end in"):
+        render_comparison(component, u, u, tmp_path / "a.gif")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_page_holds_its_text_and_nothing_from_elsewhere(bar, tmp_path):
+    component, u = bar
+    path = tmp_path / "bar.html"
+    title = "</script><b>one</b> & more"
+    write_page(component, u[:, None], [title], path, heading="A <bar>", relative=False)
+    text = path.read_text(encoding="utf-8")
+    assert not re.search(r"(src|href)=|https?://", text)
+    assert text.count("</script>") == 2
+    assert "<title>A &lt;bar&gt;</title>" in text
+
+
+TURNING = """
+<script>
+find("moving").checked = false;
+draw(0);
+const before = canvas.toDataURL();
+canvas.setPointerCapture = () => {};
+for (const [kind, x] of [["pointerdown", 200], ["pointermove", 300], ["pointerup", 300]])
+  canvas.dispatchEvent(new PointerEvent(kind, { clientX: x, clientY: 200, pointerId: 1 }));
+draw(0);
+const pixels = new Uint8Array(4 * canvas.width * canvas.height);
+gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+let coloured = 0;
+for (let i = 0; i < pixels.length; i += 4) {
+  const [r, g, b] = pixels.slice(i, i + 3);
+  if (Math.max(r, g, b) - Math.min(r, g, b) > 40) coloured += 1;
+}
+document.body.dataset.turned = canvas.toDataURL() !== before;
+document.body.dataset.coloured = coloured;
+</script>
+"""
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium on this machine")
+def test_a_browser_draws_the_page_and_turns_it(bar, tmp_path):
+    component, u = bar
+    path = tmp_path / "bar.html"
+    write_page(component, u[:, None], ["bent"], path)
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("</body>", TURNING + "</body>"), encoding="utf-8")
+    run = subprocess.run(
+        [BROWSER, "--headless=new", "--no-sandbox", "--use-angle=swiftshader",
+         "--enable-unsafe-swiftshader", f"--user-data-dir={tmp_path / 'profile'}",
+         "--window-size=700,500", "--virtual-time-budget=5000", "--dump-dom", path.as_uri()],
+        capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    body = re.search(r"<body[^>]*>", run.stdout)[0]
+    if 'data-state="no WebGL 2"' in body:
+        pytest.skip("this Chromium has no WebGL 2")
+    assert 'data-state="drawn"' in body
+    assert 'data-turned="true"' in body
+    assert int(re.search(r'data-coloured="(\d+)"', body)[1]) > 3_000
