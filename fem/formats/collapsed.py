@@ -96,7 +96,7 @@ def uncollapsed(
     >>> cells = {"quad": np.array([[0, 1, 2, 2]])}
     >>> found, groups, notes = uncollapsed(np.eye(3), cells, {"sheet": {"quad": [0]}}, "mesh")
     >>> found["triangle"], groups["sheet"]["triangle"], notes
-    (array([[0, 1, 2]]), array([0]), ["mesh: 1 quad with repeated nodes is taken as 1 triangle"])
+    (array([[0, 1, 2]]), array([0]), ['mesh: 1 quad with repeated nodes is taken as 1 triangle'])
     """
     kept: dict[str, list[IntArray]] = {}
     origin: dict[str, list[tuple[str, IntArray]]] = {}

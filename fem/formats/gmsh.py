@@ -138,7 +138,7 @@ def read_gmsh(path: Path) -> meshio.Mesh:
     Examples
     --------
     >>> read_gmsh(Path("meshes/half_beam.msh")).cells[0].type
-    'vertex'
+    'line'
     """
     content = path.read_bytes()
     if content.startswith(b"$NOD"):
