@@ -2,7 +2,7 @@
 
 meshio 5.3 has a reader of its own, but it loses or mixes up sets in ordinary files, and passes
 over what it does not know. This one takes what bears on stiffness, mass and connection, names what
-it leaves out by intention (`fem.abaqus.known`), and refuses all else at once.
+it leaves out by intention (`known.py`), and refuses all else at once.
 """
 
 from __future__ import annotations

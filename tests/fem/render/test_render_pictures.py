@@ -11,11 +11,12 @@ import pytest
 import pyvista
 
 import fem
-from fem import gl, render
 from fem.render import (
     RenderError,
     StopSphere,
     animate,
+    gl,
+    pictures,
     render_comparison,
     render_modes,
     render_shape,
@@ -26,7 +27,7 @@ from fem.render.frame_surface import frame_surface
 
 @pytest.fixture
 def with_gl():
-    available, advice = render.gl_available()
+    available, advice = gl.gl_available()
     if not available:
         pytest.skip(advice)
 
@@ -93,10 +94,10 @@ def test_modes(with_gl, half_beam, tmp_path, count):
     rows = -(-count // columns)
     for index in range(count):
         row, column = divmod(index, columns)
-        height, width = (600 - render.BAR_ROW) // rows, 800 // columns
+        height, width = (600 - pictures.BAR_ROW) // rows, 800 // columns
         field = image[row * height : (row + 1) * height, column * width : (column + 1) * width]
         assert colours(field) > 500
-    assert colours(image[600 - render.BAR_ROW :]) > 3000
+    assert colours(image[600 - pictures.BAR_ROW :]) > 3000
 
 
 def unit(ways):
@@ -162,7 +163,7 @@ def test_mp4_without_ffmpeg_says_what_to_install(half_beam, sagging, tmp_path, m
 
 
 def test_without_gl_one_sentence_says_what_to_install(without_gl, half_beam, sagging, tmp_path):
-    available, advice = render.gl_available()
+    available, advice = gl.gl_available()
     assert not available
     with pytest.raises(RenderError) as caught:
         render_shape(half_beam, sagging, tmp_path / "a.png")
@@ -194,7 +195,7 @@ def test_probe_is_made_once(monkeypatch):
     monkeypatch.setattr(gl, "renders", lambda window: calls.append(window) or False)
     gl.working_window.cache_clear()
     try:
-        assert render.gl_available() == render.gl_available() == (False, gl.ADVICE)
+        assert gl.gl_available() == gl.gl_available() == (False, gl.ADVICE)
         assert len(calls) == len(gl.candidate_windows())
     finally:
         gl.working_window.cache_clear()
@@ -223,7 +224,7 @@ def test_failed_write_leaves_the_old_picture(tmp_path, monkeypatch):
 
     monkeypatch.setattr(iio, "imwrite", fails)
     with pytest.raises(OSError, match="disk full"):
-        render.write_image(path, np.zeros((4, 4, 3), dtype=np.uint8))
+        pictures.write_image(path, np.zeros((4, 4, 3), dtype=np.uint8))
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
 
@@ -292,10 +293,10 @@ def test_mass_is_a_block_of_steel_away_from_the_stop(half_beam):
 
 
 def test_scales_are_round_and_units_readable():
-    assert [render.round_number(x) for x in (1.0, 0.199, 4.99, 5.0, 9.9e4)] == [
+    assert [pictures.round_number(x) for x in (1.0, 0.199, 4.99, 5.0, 9.9e4)] == [
         1.0, 0.1, 2.0, 5.0, 5e4,
     ]  # fmt: skip
-    assert render.length_unit(4e-6) == ("µm", 1e6)
-    assert render.length_unit(0.9e-3) == ("mm", 1e3)
-    assert render.length_unit(0.7) == ("m", 1.0)
-    assert render.length_unit(3e-9) == ("nm", 1e9)
+    assert pictures.length_unit(4e-6) == ("µm", 1e6)
+    assert pictures.length_unit(0.9e-3) == ("mm", 1e3)
+    assert pictures.length_unit(0.7) == ("m", 1.0)
+    assert pictures.length_unit(3e-9) == ("nm", 1e9)

@@ -12,10 +12,10 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 import fem
-from fem import render
 from fem.render import (
     RenderError,
     StopSphere,
+    gl_available,
     render_comparison,
     render_modes,
     render_shape,
@@ -34,7 +34,7 @@ BROWSER = next(
 
 @pytest.fixture
 def with_gl():
-    available, advice = render.gl_available()
+    available, advice = gl_available()
     if not available:
         pytest.skip(advice)
 
