@@ -504,7 +504,7 @@ def show_window(
     scene: Scene, structure: Structure, modes: list[int], view: str, *, wanted: bool
 ) -> None:
     """Show modes in a window until it is closed, or say where none can be opened, if wanted."""
-    from fem.gl import has_screen
+    from fem.render.gl import has_screen
     from nldyn.report.render import modes_in_window
 
     if has_screen():
