@@ -118,7 +118,7 @@ def test_a_window_is_opened_where_there_is_a_screen(monkeypatch):
     asked = ("modes", BEAM, "--modes", "1,3", "--view", "top")
     for screen, windows in ((True, 1), (False, 0)):
         shown.clear()
-        monkeypatch.setattr("fem.gl.has_screen", lambda there=screen: there)
+        monkeypatch.setattr("fem.render.gl.has_screen", lambda there=screen: there)
         result = invoke(*asked, "--window")
         assert (result.exit_code, len(shown)) == (0, windows)
         assert ("no window can be opened here" in result.stderr) == (not screen)
