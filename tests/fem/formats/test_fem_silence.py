@@ -17,8 +17,8 @@ import fem.formats.read
 
 pytestmark = pytest.mark.filterwarnings("ignore::fem.LockingWarning")
 
-QUICK, FULL = 50, 2500
-"""Cases for each of the four formats: 200 in the gate, 10,000 in the long run."""
+QUICK, FULL = 15, 2500
+"""Cases for each of the four formats: 60 in the gate, 10,000 in the long run."""
 
 
 def read(draft: Draft, path):

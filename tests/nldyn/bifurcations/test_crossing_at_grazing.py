@@ -138,7 +138,7 @@ def branch_point(grazing, share):
         (5.2824, 3e-10, True),
         pytest.param(5.285, 1e-11, True, marks=pytest.mark.slow),
         pytest.param(5.287, 1e-11, True, marks=pytest.mark.slow),
-        (5.32, 1e-11, False),
+        pytest.param(5.32, 1e-11, False, marks=pytest.mark.slow),
     ],
 )
 def test_grazing_and_branch_point_are_both_where_the_piecewise_solution_has_them(
@@ -163,7 +163,7 @@ def test_grazing_and_branch_point_are_both_where_the_piecewise_solution_has_them
         assert any("lie so close together" in note for note in branch.notes) == together
 
 
-@pytest.mark.parametrize("force", [5.28234, 5.28235])
+@pytest.mark.parametrize("force", [5.28234, pytest.param(5.28235, marks=pytest.mark.slow)])
 def test_a_grazing_point_beside_a_branch_point_is_found_once(by_force, force):
     """1e-7 to 6e-6 Hz before the touch, where both lie in steps of their own or in one."""
     whole = continue_branch(by_force.at("amplitude", force)[0], RANGE_HZ)

@@ -102,7 +102,14 @@ def crossed():
     return special
 
 
-@pytest.mark.parametrize(("beside", "step"), [(9e-6, 0.01), (2e-6, 0.05), (-5e-6, 0.01)])
+@pytest.mark.parametrize(
+    ("beside", "step"),
+    [
+        (9e-6, 0.01),
+        pytest.param(2e-6, 0.05, marks=pytest.mark.slow),
+        pytest.param(-5e-6, 0.01, marks=pytest.mark.slow),
+    ],
+)
 def test_a_fold_beyond_a_branch_point_beside_the_start_is_told(crossed, beside, step):
     """There the tangent may be of both branches, and its sign that of no fold."""
     special = crossed
@@ -166,7 +173,7 @@ def test_transcritical_points_are_followed_where_y_can_stay_zero(branch):
         continue_special(special, ("frequency_hz", gap), ((0.4, 0.6), (-1.1, -0.9)))
 
 
-@pytest.mark.parametrize("beside", [3.2e-7, -5e-7])
+@pytest.mark.parametrize("beside", [3.2e-7, pytest.param(-5e-7, marks=pytest.mark.slow)])
 def test_a_branch_begun_beside_a_branch_point_has_it_once(beside):
     """There rounding decides the sign of the branch point's test, in both directions."""
     special = branch_without_y().special_points[1]
@@ -184,7 +191,8 @@ def test_a_branch_begun_beside_a_branch_point_has_it_once(beside):
 @pytest.mark.parametrize(
     ("preload_y", "beside"),
     [
-        *((1.0, -3e-5), (1.0, 1e-4), (1e-3, 5e-7)),
+        *((1.0, -3e-5), (1e-3, 5e-7)),
+        pytest.param(1.0, 1e-4, marks=pytest.mark.slow),
         *(
             pytest.param(preload_y, beside, marks=pytest.mark.slow)
             for preload_y in (1.0, 1e-3)
@@ -208,7 +216,9 @@ def test_a_walk_begun_beside_the_point_stays_on_its_branch_and_finds_it(preload_
         assert (min(ends) > 1e-6) == has_y == (max(ends) > 1e-9)
 
 
-@pytest.mark.parametrize(("end", "longest"), [(0.52, 0.05), (0.504, 0.3)])
+@pytest.mark.parametrize(
+    ("end", "longest"), [(0.52, 0.05), pytest.param(0.504, 0.3, marks=pytest.mark.slow)]
+)
 def test_two_branch_points_within_one_of_the_last_steps_are_both_found(end, longest):
     """There y and -y are alike: stops that bend the same way put pitchforks at the same places."""
     hz, bend = 0.45, 0.1

@@ -59,7 +59,7 @@ def both(scale: float, sides: tuple[int, ...] = (1, -1), force: float = 1.0) -> 
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("scale", [1e-4, 1e-6])
+@pytest.mark.parametrize("scale", [pytest.param(1e-4, marks=pytest.mark.slow), 1e-6])
 def test_a_branch_never_jumps_to_its_close_mirror_image(scale):
     """The halves of a broken symmetry of y, and the symmetric branch, are `scale` apart."""
     symmetric = continue_branch(solve_orbit(oscillator(), 1.0), (0.5, 1.0))

@@ -57,7 +57,7 @@ def test_no_piece_of_a_crossing_branch_is_missing_beside_the_branch_point():
         assert index_sum(found.diagram.branches, frequency, 1) == 1
 
 
-@pytest.mark.parametrize("first_step", [0.007, 0.02])
+@pytest.mark.parametrize("first_step", [pytest.param(0.007, marks=pytest.mark.slow), 0.02])
 def test_there_is_no_gap_beside_the_pitchforks_of_a_broken_symmetry(first_step):
     """The index of the branch that leaves there to one side does not change."""
     stops = [Stop.linear("m", 1e6, gap=1e-3, direction=side) for side in (1, -1)]
