@@ -12,7 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from nldyn.base.arrays import Complex, Real
-from nldyn.base.errors import LocateError, SystemModelError, check_positive, check_types
+from nldyn.base.errors import (
+    ConvergenceError,
+    LocateError,
+    SystemModelError,
+    check_positive,
+    check_types,
+)
 from nldyn.bifurcations.critical import (
     CoefficientError,
     Coefficients,
@@ -27,13 +33,15 @@ from nldyn.bifurcations.critical import (
     torus,
 )
 from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special
+from nldyn.bifurcations.rigid_grazing import rigid_grazing_form
+from nldyn.orbits.conditions import Grazing
 from nldyn.orbits.orbit import Orbit, minimal_period
 from nldyn.orbits.shooting import asymmetry, metric_length
 from nldyn.system.naming import stop_name
-from nldyn.system.rigid_stop import RigidStop
 
 CLOSE = 1e-3  # relative distance in frequency of a special point that counts as close
 NEAR_RESONANCE_DEG = 5.0
+GRAZING_ERROR = 1e-6  # relative, of the numbers of a rigid grazing
 UNCHANGED = 1e-3  # relative change of a null vector that is none
 SIDES = {1: "above", -1: "below"}
 LOST = "the coefficient is lost in its error"
@@ -49,16 +57,18 @@ class NormalForm:
     name : str
         ``fold``, ``supercritical flip``, ``subcritical flip``, ``supercritical torus``,
         ``subcritical torus``, ``supercritical pitchfork``, ``subcritical pitchfork``,
-        ``transcritical``, ``new contact`` or ``split contact``; ``flip``, ``torus``, ``pitchfork``
-        or ``branch point`` where the coefficient does not tell more.
+        ``transcritical``, ``new contact``, ``split contact`` or ``rigid grazing``; ``flip``,
+        ``torus``, ``pitchfork`` or ``branch point`` where the coefficient does not tell more.
     sentence : str
         The same in plain words.
     coefficient : Estimate, optional
         Of the normal form, for ξ in units of the orbit's size (see
         `nldyn.bifurcations.critical`): a of a fold, c of a flip or pitchfork, the first Lyapunov
-        coefficient of a torus, ⟨p, B(q, q)⟩ of a transcritical point.
+        coefficient of a torus, ⟨p, B(q, q)⟩ of a transcritical point; of a rigid grazing the
+        product in m/s of the speed of the slight impact and the multiplier that it makes grow.
     frequency_shift : Estimate, optional
-        (f - f₀)/(f₀ ξ²) of the orbits that meet or are born here.
+        (f - f₀)/(f₀ ξ²) of the orbits that meet or are born here; of a rigid grazing
+        (f - f₀)/(f₀ v) in s/m with the speed v of the slight impact.
     side : int
         +1 where these exist above the frequency of the point, -1 below, 0 on both sides or unknown.
     stable : bool, optional
@@ -429,12 +439,16 @@ def _step_off(special: SpecialPoint, direction: Real, amplitude: float) -> Branc
 
 def _grazing(special: SpecialPoint, others: Sequence[SpecialPoint]) -> NormalForm:
     orbit, hz = special.orbit, _hz(special)
+    try:
+        nearest = Grazing.of(orbit)
+    except SystemModelError:
+        nearest = None
+    if nearest and nearest.half:
+        return _rigid_grazing(special, nearest)
     touches = touching(orbit)
     if not touches:
         return NormalForm("new contact", f"Grazing at {hz}: the system has no stop.")
     output, phase, is_maximum = touches[0]
-    if isinstance(orbit.system.stops[output], RigidStop):
-        return _rigid_grazing(special, output, phase)
     states = special.point.tangent[:-1].reshape(orbit.problem.segments, -1)
     try:
         along, by_parameter = output_change(orbit, output, phase, states)
@@ -456,30 +470,45 @@ def _grazing(special: SpecialPoint, others: Sequence[SpecialPoint]) -> NormalFor
     return NormalForm(name, sentence, side=side, stable=orbit.stable)
 
 
-def _rigid_grazing(special: SpecialPoint, stop: int, phase: float) -> NormalForm:
+def _rigid_grazing(special: SpecialPoint, grazing: Grazing) -> NormalForm:
     """Grazing of a rigid stop, by the root of the distance in the map of the motion behind it.
 
     References
     ----------
     A. B. Nordmark (1991), *J. Sound Vib.* 145, 279-297; W. Chin, E. Ott, H. E. Nusse, C. Grebogi
-    (1994), *Phys. Rev. E* 50, 4427-4444.
+    (1994), *Phys. Rev. E* 50, 4427-4444; M. H. Fredriksson and A. B. Nordmark (1997),
+    *Proc. R. Soc. A* 453, 1261-1276.
     """
-    orbit = special.orbit
-    begins = (
-        f"Grazing at {_hz(special)}: rigid {_stop_name(orbit, stop, phase)} is just touched, with "
-        "zero speed. With impacts a multiplier goes to infinity with the inverse of their speed."
-    )
+    orbit, hz = special.orbit, _hz(special)
+    stop = _stop_name(orbit, grazing.stop, grazing.phase)
+    touched = f"Grazing at {hz}: rigid {stop} is just touched"
+    try:
+        form = rigid_grazing_form(orbit, grazing)
+    except (CoefficientError, ConvergenceError, SystemModelError, np.linalg.LinAlgError) as error:
+        return NormalForm("rigid grazing", f"{touched}: no coefficient can be given, {error}.")
+    side = int(np.sign(form.speed_change))
+    rest = int(np.sign(form.height_change))
+    ends = "where the one without ends" if side == rest else "on the same side as the one without"
     largest = orbit.largest_multiplier
     if abs(largest) >= 1.0:
-        follows = "Without them the orbit is unstable"
-    elif largest.imag != 0.0 or largest.real <= 0.0:
+        follows = "Without impacts the orbit is unstable"
+    elif not form.lowers:
         follows = (
-            "The largest multiplier without them is not real and positive: no attractor with "
-            "slight impacts is to be expected, the motion jumps"
+            "An impact raises the motion in a later period: no attractor with slight impacts is to "
+            "be expected, the motion jumps"
         )
     else:
-        follows = f"With them {_behind_grazing(largest.real)}"
-    return NormalForm("rigid grazing", f"{begins} {follows}.", stable=orbit.stable)
+        follows = f"An impact lowers all that follows: {_behind_grazing(abs(largest))}"
+    sentence = (
+        f"{touched}. An orbit with one impact more exists {SIDES[side]} {hz}, {ends}; with the "
+        f"speed v of that impact a multiplier goes to infinity, as {form.growth:.4g} m/s / v. "
+        f"{follows}."
+    )
+    return NormalForm(
+        "rigid grazing", sentence, Estimate(form.growth, GRAZING_ERROR * abs(form.growth)),
+        Estimate(1.0 / form.speed_change, GRAZING_ERROR / abs(form.speed_change)), side,
+        orbit.stable,
+    )  # fmt: skip
 
 
 def _behind_grazing(multiplier: float) -> str:

@@ -250,12 +250,16 @@ class Orbit:
 
     @property
     def stability(self) -> Stability:
-        """The multiplier that decides stability, how far from the unit circle, and how sure."""
-        return Stability(
-            self.largest_multiplier,
-            float(self.log_moduli[0]),
-            float(self.log_modulus_uncertainties[0]),
-        )
+        """The multiplier that decides stability, how far from the unit circle, and how sure.
+
+        Where all multipliers are zero, at rest, it is sure if errors cannot make one as large as 1.
+        """
+        largest, uncertainty = self.log_moduli[0], self.log_modulus_uncertainties[0]
+        if largest == -math.inf:
+            norms = np.linalg.norm(self.jacobians, 2, axis=(1, 2))
+            error = 10.0 * max(self.problem.flow.options.rtol, self.error)
+            uncertainty = 0.0 if error * len(norms) * np.prod(norms) < 1.0 else math.inf
+        return Stability(self.largest_multiplier, float(largest), float(uncertainty))
 
     @property
     def largest_multiplier(self) -> complex:

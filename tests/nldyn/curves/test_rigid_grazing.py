@@ -16,6 +16,7 @@ from nldyn import (
     continue_in,
     continue_special,
     load,
+    normal_form,
     refine_special,
     save,
     solve_orbit,
@@ -144,3 +145,48 @@ def test_a_body_at_rest_on_a_stop_grazes_nothing():
     assert not curve.marks
     assert not curve.notes
     assert [point.orbit.impacts for point in (curve.points[0], curve.points[-1])] == [0, 1]
+
+
+TWO = np.eye(2), np.array([[2.0, -1.0], [-1.0, 3.0]]), np.array([[0.1, -0.05], [-0.05, 0.15]])
+NORMAL_FORMS = {
+    "jumps": (([[1.0]], [[1.0]], [[0.1]]), [1.0], 0.45, "where the one without ends"),
+    "overdamped": (([[1.0]], [[1.0]], [[2.5]]), [1.0], 0.3, "periods that grow by one follow"),
+    "of two masses": (TWO, [1.0, 0.3], 0.5, "on the same side as the one without"),
+}
+
+
+@pytest.mark.parametrize("name", NORMAL_FORMS)
+def test_the_normal_form_of_grazing_is_the_limit_of_the_closed_form(name):
+    """Multiplier times speed of the slight impact, and change of the frequency over that speed.
+
+    Orbits without impacts exist above the frequency of each.
+    """
+    matrices, force, hz, words = NORMAL_FORMS[name]
+    n = len(force)
+    system = System.from_matrices(
+        matrices[0], matrices[1], {f"x{i}": np.eye(n)[i] for i in range(n)}, damping=matrices[2],
+        stops=[RigidStop("x0", RESTITUTION, GAP)],
+        excitation=[HarmonicForce(f"x{i}", force[i]) for i in range(n)],
+    )  # fmt: skip
+    calm = continue_branch(solve_orbit(system, hz), (0.05, 1.1 * hz))
+    special = calm.special_points[0]
+    form = normal_form(special)
+    assert (special.kind, form.name) == ("GR", "rigid grazing")
+    shape = OneImpact(*matrices, force, np.eye(n)[0], GAP, RESTITUTION)
+    step, omega = form.side * 1e-5, TURN * special.frequency_hz
+    near = []
+    for change in (step, 2.0 * step):
+        motion = shape.motions(omega * math.exp(change), 1)[-1]
+        largest = motion.multipliers[np.argmax(np.abs(motion.multipliers))]
+        near.append((largest.real * motion.speed, change / motion.speed))
+    growth, change = 2.0 * np.array(near[0]) - near[1]  # to speed zero
+    assert form.coefficient.value == pytest.approx(growth, rel=1e-6)
+    assert form.frequency_shift.value == pytest.approx(change, rel=1e-6)
+    assert words in form.sentence
+
+
+def test_an_orbit_that_loses_all_directions_at_rest_is_stable():
+    """Long chatter ends in rest in each period."""
+    orbit = solve_orbit(oscillator(), 0.02)
+    assert np.abs(orbit.multipliers).max() == 0.0
+    assert orbit.stability.verdict == "stable"
