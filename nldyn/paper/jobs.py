@@ -21,7 +21,7 @@ from nldyn.orbits.orbit import check_observe
 from nldyn.orbits.solve import solve_orbit
 from nldyn.orbits.starts import orbit_near
 from nldyn.paper.kept import kept_diagram
-from nldyn.paper.starts import LOST, is_at, keep_numbers, read_starts
+from nldyn.paper.starts import LOST, Start, is_at, keep_numbers, read_starts
 from nldyn.paper.workers import Task, side_by_side
 from nldyn.runtime.compilation import compilations
 from nldyn.runtime.progress import Progress, silent
@@ -38,11 +38,39 @@ HERTZ_STIFFNESS = 5.17e9  # N/m^1.5, half of what sections 2 and 3 print for the
 PART = ", period "  # between the name of a job and what of it is computed
 LOWEST_HZ = 5.0
 WIDE_HZ = 4.0  # width of the subharmonic branches that the figures show
+NEAR_HZ = 0.005  # of a start to the frequency by which it is called
 
 FINE = ContinuationOptions()
 # Steps as long as smooth curves and the special points allow. A branch that is cut off by
 # max_points would be found and followed again from the next orbit.
 COARSE = ContinuationOptions(max_angle=0.3, max_miss=0.2, grazing_step=0.02, max_points=8000)
+
+
+@dataclass(frozen=True)
+class Follow:
+    """Kept starts whose branches are followed.
+
+    Parameters
+    ----------
+    period : int
+        Their period multiple.
+    weight : float
+        Seconds that it takes, as measured.
+    near_hz : tuple of float
+        Their frequencies in Hz, within `NEAR_HZ`; all of this period if there are none.
+    """
+
+    period: int
+    weight: float
+    near_hz: tuple[float, ...] = ()
+
+    def starts(self, name: str) -> list[Start]:
+        """Those of a model."""
+        found = [start for start in read_starts(name) if start.period == self.period]
+        return [start for start in found if not self.near_hz or self._wants(start)]
+
+    def _wants(self, start: Start) -> bool:
+        return any(abs(start.frequency_hz - hz) < NEAR_HZ for hz in self.near_hz)
 
 
 @dataclass(frozen=True)
@@ -67,12 +95,11 @@ class Job:
         Step control.
     quarters_hz : float, optional
         Frequency from which on flips of wide 1/2 branches are followed to 1/4 branches.
-    starts : tuple of (int, float, float)
-        Period multiples, and for each the frequency in Hz from which on kept starts are followed
-        (in the range; the harmonic branches reach down to `LOWEST_HZ`), and the time that it takes
-        in proportion to others. If there are any, nothing is searched.
+    starts : tuple of Follow
+        Kept starts; the harmonic branches reach down to `LOWEST_HZ`. If there are any, nothing is
+        searched.
     weight : float
-        Time that it takes otherwise. All these are seconds, as measured.
+        Seconds that it takes otherwise, as measured.
     """
 
     name: str
@@ -83,7 +110,7 @@ class Job:
     search_points: int = 12
     options: ContinuationOptions = FINE
     quarters_hz: float | None = None
-    starts: tuple[tuple[int, float, float], ...] = ()
+    starts: tuple[Follow, ...] = ()
     weight: float = 1.0
 
 
@@ -133,7 +160,11 @@ JOBS: tuple[Job, ...] = (
         _scene("four_dof_xi_0.001"),
         (18.0, 90.0),
         options=COARSE,
-        starts=((1, 18.0, 70.0), (2, 36.0, 80.0), (3, 49.0, 37.0)),
+        starts=(
+            Follow(1, 70.0),
+            Follow(2, 60.0, (36.788, 52.152, 81.744)),
+            Follow(3, 20.0, (58.997,)),
+        ),
         quarters_hz=44.0,
     ),
     Job(
@@ -141,7 +172,11 @@ JOBS: tuple[Job, ...] = (
         _scene("four_dof_xi_0.01"),
         (15.0, 90.0),
         options=COARSE,
-        starts=((1, 15.0, 34.0), (2, 28.0, 21.0), (3, 42.0, 9.0)),
+        starts=(
+            Follow(1, 34.0),
+            Follow(2, 16.0, (35.158, 35.496, 51.389, 79.713)),
+            Follow(3, 5.0, (59.590,)),
+        ),
         quarters_hz=40.0,
     ),
     Job(
@@ -149,7 +184,11 @@ JOBS: tuple[Job, ...] = (
         _scene("two_dof_xi_0.001"),
         (18.0, 90.0),
         options=COARSE,
-        starts=((1, 18.0, 28.0), (2, 20.0, 20.0), (3, 20.0, 70.0)),
+        starts=(
+            Follow(1, 28.0),
+            Follow(2, 16.0, (36.618, 39.248, 50.928, 84.695)),
+            Follow(3, 25.0, (29.078, 35.156, 36.980, 64.262)),
+        ),
         quarters_hz=40.0,
     ),
     Job(
@@ -157,7 +196,11 @@ JOBS: tuple[Job, ...] = (
         _scene("two_dof_xi_0.01"),
         (15.0, 90.0),
         options=COARSE,
-        starts=((1, 15.0, 7.0), (2, 20.0, 26.0), (3, 20.0, 33.0)),
+        starts=(
+            Follow(1, 7.0),
+            Follow(2, 20.0, (36.867, 37.382, 51.284, 84.883)),
+            Follow(3, 14.0, (29.991, 31.869, 34.017, 39.190, 63.391, 64.515)),
+        ),
         quarters_hz=36.0,
     ),
     Job("one_dof.listed", _scene("one_dof"), (5.0, 90.0), (), LISTED, weight=10.0),
@@ -210,7 +253,7 @@ def tasks_of(jobs: Sequence[Job], folder: Path) -> tuple[Task, ...]:
     return tuple(
         Task(f"{job.name}{PART}{period}", run_job, (job.name, period, folder), weight)
         for job in jobs
-        for period, _, weight in job.starts or ((0, 0.0, job.weight),)
+        for period, weight in [(s.period, s.weight) for s in job.starts] or [(0, job.weight)]
     )
 
 
@@ -261,8 +304,7 @@ def follow_kept(job: Job, period: int, system: System, progress: Progress) -> Di
     low, high = LOWEST_HZ if period == 1 else job.range_hz[0], job.range_hz[1]
     flow, observe = flow_of(system), check_observe(system, None)
     box = Collector(flow, (low, high), observe, job.options, progress)
-    lowest = next(hz for n, hz, _ in job.starts if n == period)
-    starts = [s for s in read_starts(job.name) if s.period == period and s.frequency_hz >= lowest]
+    (starts,) = (follow.starts(job.name) for follow in job.starts if follow.period == period)
     for number, start in enumerate(starts):
         box.done = number / len(starts)
         orbit = orbit_near(flow, start.state, start.period, start.omega, observe)

@@ -16,6 +16,7 @@ from nldyn.paper.jobs import (
     COARSE,
     JOBS,
     LOWEST_HZ,
+    Follow,
     compile_beside,
     diagrams_of,
     is_wide,
@@ -33,10 +34,11 @@ NAME = "two_dof_xi_0.001"
 def short_job(monkeypatch):
     """The harmonic branches of a model near their peak, and one of period 2."""
     job = replace(
-        job_named(NAME), range_hz=(42.0, 44.0), starts=((1, 21.0, 1.0), (2, 42.0, 1.0)),
+        job_named(NAME), range_hz=(42.0, 44.0), starts=(Follow(1, 1.0), Follow(2, 1.0)),
         quarters_hz=None,
     )  # fmt: skip
-    starts = [s for s in read_starts(NAME) if 21.0 <= s.frequency_hz <= 22.0 or s.period == 2]
+    wanted = (21.4537, 42.7222)
+    starts = [s for s in read_starts(NAME) if round(s.frequency_hz, 4) in wanted]
     monkeypatch.setattr("nldyn.paper.jobs.JOBS", (job,))
     monkeypatch.setattr("nldyn.paper.jobs.read_starts", lambda name: starts)
     return job
@@ -60,12 +62,11 @@ def test_what_is_compiled_beside_is_what_branches_call(kernels):
     assert [len(kernel.signatures) for kernel in compiled] == before
 
 
-def test_every_period_of_a_job_has_starts_within_its_range():
+def test_every_start_that_a_job_names_is_kept_and_within_its_range():
     for job in JOBS:
-        for period, lowest, _ in job.starts:
-            chosen = [s for s in read_starts(job.name) if s.period == period]
-            chosen = [s for s in chosen if s.frequency_hz >= lowest]
-            assert chosen
+        for follow in job.starts:
+            chosen = follow.starts(job.name)
+            assert len(chosen) == len(follow.near_hz) or (chosen and not follow.near_hz)
             assert all(job.range_hz[0] <= s.frequency_hz <= job.range_hz[1] for s in chosen)
 
 
