@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -78,7 +78,7 @@ def write_figures(results: Results, folder: Path, chaos: Chaos | None = None) ->
     for name, jobs in SHOWN.items():
         ax = _diagram(shown(name, results), title(name, results))
         if chaos is not None:
-            shade_ranges(ax, chaos.ranges(name))
+            _shade(ax, chaos.ranges(name))
         if name in DASHED:
             _dashed(ax, (2, 3, 4, 5))
         if name == "figure_7":
@@ -94,6 +94,14 @@ def _diagram(branches: Iterable[Branch], heading: str) -> Axes:
     ax.set_xlim(0.0, 90.0)
     ax.set_title(heading)
     return ax
+
+
+def _shade(ax: Axes, ranges: Sequence[tuple[float, float]]) -> None:
+    """Shade chaotic ranges, and say so beside the diagram."""
+    shade_ranges(ax, ranges)
+    if ranges:
+        text = "shaded: a motion\nis chaotic"
+        ax.text(1.015, 0.01, text, fontsize="small", transform=ax.transAxes)
 
 
 def _dashed(ax: Axes, orders: Iterable[int]) -> None:
