@@ -18,7 +18,8 @@ fig, ax = plt.subplots()
 for orbit in family.orbits[::3]:
     history = orbit.history(400)
     ax.plot(history.displacement["x"], history.modal_velocity[:, 0], color="tab:blue")
-ax.axvline(0.0, color="0.6")
+ax.axvline(0.0, color="0.6", label="spring")
+ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
 ax.set(xlabel="displacement (m)", ylabel="velocity (m/s)", aspect="equal")
 
 known = 2 * 1 * 2 / (1 + 2) / (2 * np.pi)

@@ -15,8 +15,9 @@ motion = simulate(oscillator, 1.0, 12, start=[1.0, 0.0])
 history = motion.history(4000)
 
 fig, ax = plt.subplots()
-ax.plot(history.time, history.displacement["x"])
-ax.plot(history.time, np.exp(-ratio * 2 * np.pi * history.time), "0.6", ls="--")
+ax.plot(history.time, history.displacement["x"], label="computed")
+ax.plot(history.time, np.exp(-ratio * 2 * np.pi * history.time), "0.6", ls="--", label="exp(-ζωt)")
+ax.legend()
 ax.set(xlabel="time (s)", ylabel="displacement (m)", title="Damping ratio 0.03")
 
 period = 1 / np.sqrt(1 - ratio**2)

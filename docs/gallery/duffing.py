@@ -29,6 +29,8 @@ peak = max(branch.points, key=lambda orbit: orbit.max_abs_displacement)
 found = peak.max_abs_displacement
 known = brentq(lambda a: damping * np.sqrt(1 + 0.75 * cubic * a**2) * a - force, 0.1, 10)
 ax.axhline(known, color="0.7", zorder=0)
+ax.text(0.25, known, "by one harmonic", ha="right", va="bottom", fontsize="small")
+ax.set_ylim(top=1.12 * known)
 print([f"{p.kind} {p.frequency_hz:.6f} Hz" for p in branch.special_points])
 print(f"peak {found:.5f}, by one harmonic {known:.5f}")
 assert [point.kind for point in branch.special_points] == ["LP", "LP"]

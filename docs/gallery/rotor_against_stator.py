@@ -25,7 +25,7 @@ for orbit in (branch.points[0], branch.points[-1]):
     ax.plot(1e3 * moved["y"], -1e3 * moved["x"], label=label)
 ax.axhline(-0.4, color="0.6", label="lower pad")
 ax.set(xlabel="to the side (mm)", ylabel="upwards (mm)", aspect="equal", title="Path of the disc")
-ax.legend()
+ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
 
 
 def left(hz):
