@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.errors import SceneError
-from nldyn.scene.messages import KeyPath, scene_error, show, unknown_name
+from nldyn.scene.messages import KeyPath, joined, scene_error, show, unknown_name
 from nldyn.scene.schema import Matrix, Scene
 
 Report = Callable[[KeyPath, str], SceneError]
@@ -73,10 +73,10 @@ def check_mesh_names(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
     """Check that the scene and the mesh agree on the names of parts and points."""
     assert scene.mesh is not None
     source = scene.mesh.file
-    _check_parts_known(scene, mesh.parts, file)
+    what = f"a point set of the mesh {source}"
+    _check_known(scene, mesh.parts, _points_used(scene), mesh.point_sets, what, file)
     _check_parts_complete(scene, mesh, file)
     for key, name in _points_used(scene):
-        _require(name, mesh.point_sets, f"a point set of the mesh {source}", file, key)
         count = len(mesh.point_sets[name])
         if count == 0 or (count > 1 and key[0] != "supports"):
             fault = f"'{name}' must be a single point, but holds {count} nodes of the mesh {source}"
@@ -89,24 +89,34 @@ def check_mesh_names(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
         _require(hinge.part, mesh.parts, f"a part of the mesh {source}", file, key)
 
 
-def _check_parts_known(scene: Scene, known: Mapping[str, object], file: Path) -> None:
+def _check_known(
+    scene: Scene,
+    parts: Mapping[str, object],
+    used: Iterable[tuple[KeyPath, str]],
+    known: Mapping[str, object],
+    what: str,
+    file: Path,
+) -> None:
+    """Refuse all names that the mesh does not have: of parts, and of what is used of it."""
     assert scene.mesh is not None
+    source = scene.mesh.file
+    faults: list[tuple[KeyPath, str]] = []
     for name in scene.parts:
-        if name not in known:
-            fault = _not_in_mesh(name, known, f"a part of the mesh {scene.mesh.file}")
-            raise scene_error(file, ("parts", name), fault.removeprefix(f"'{name}' "))
+        if name not in parts:
+            fault = _not_in_mesh(name, parts, f"a part of the mesh {source}")
+            faults.append((("parts", name), fault.removeprefix(f"'{name}' ")))
+    faults += [(key, _not_in_mesh(name, known, what)) for key, name in used if name not in known]
+    if faults:
+        raise scene_error(file, *joined(faults))
 
 
 def check_structure_names(scene: Scene, mesh: TaggedStructure, file: Path) -> None:
     """Check that the scene of a structure and its mesh agree on the names of parts and places."""
     assert scene.mesh is not None
-    source = scene.mesh.file
-    _check_parts_known(scene, mesh.groups, file)
     known = dict.fromkeys([*mesh.names, *(coupling.at for coupling in scene.couplings)])
-    for key, name in (*_points_used(scene), *_faces_used(scene)):
-        _require(
-            name, known, f"a point or face of the mesh {source} or of [[couplings]]", file, key
-        )
+    used = (*_points_used(scene), *_faces_used(scene))
+    what = f"a point or face of the mesh {scene.mesh.file} or of [[couplings]]"
+    _check_known(scene, mesh.groups, used, known, what, file)
 
 
 def check_computable(scene: Scene, file: Path) -> None:
@@ -371,17 +381,14 @@ def _check_length(values: list[float], count: int, unit: str, key: KeyPath, repo
 
 
 def _check_interface_names(scene: Scene, report: Report) -> None:
-    for key, name in _interfaces_used(scene):
-        if name in scene.interface_names:
-            continue
-        if key[0] != "excitation" or not scene.load_names:
-            fault = unknown_name(name, scene.interface_names, "an interface")
-            at_mesh = key[0] == "springs" and scene.mesh is not None
-            hint = "; a spring at a point of the mesh needs a 'direction'" if at_mesh else ""
-            raise report(key, fault + hint)
-        if name not in scene.load_names:
-            known = [*scene.interface_names, *scene.load_names]
-            raise report(key, unknown_name(name, known, "an interface or load vector"))
+    faults = [
+        (key, _not_an_interface(scene, key, name))
+        for key, name in _interfaces_used(scene)
+        if name not in scene.interface_names
+        and not (key[0] == "excitation" and name in scene.load_names)
+    ]
+    if faults:
+        raise report(*joined(faults))
     for number, table in enumerate(scene.excitation):
         if table.kind == "base" and table.at in scene.interface_names:
             fault = f"'{table.at}' is an interface, and a base needs a load vector M r of the whole"
@@ -397,6 +404,15 @@ def _check_interface_names(scene: Scene, report: Report) -> None:
             raise report(("excitation", number, "kind"), f"'{table.kind}' needs {wanted}")
         if table.load in scene.interfaces:
             raise report(("interfaces", table.load), "is the name of a load vector; rename it")
+
+
+def _not_an_interface(scene: Scene, key: KeyPath, name: str) -> str:
+    if key[0] == "excitation" and scene.load_names:
+        known = [*scene.interface_names, *scene.load_names]
+        return unknown_name(name, known, "an interface or load vector")
+    at_mesh = key[0] == "springs" and scene.mesh is not None
+    hint = "; a spring at a point of the mesh needs a 'direction'" if at_mesh else ""
+    return unknown_name(name, scene.interface_names, "an interface") + hint
 
 
 def _check_load_of_all(scene: Scene, number: int, load: str, report: Report) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
 
@@ -138,9 +138,13 @@ def from_validation(file: Path, model: type[BaseModel], error: ValidationError) 
         key = _own_steps(model, detail["loc"])
         if detail["type"] == "extra_forbidden" or key[:-1] not in misspelt:
             told.setdefault(key, _fault(model, detail))
-    first, *others = list(told.items())[:MOST_SHOWN]
-    sentence = "".join([first[1], *(f"; also {format_key(key)} {fault}" for key, fault in others)])
-    return scene_error(file, first[0], sentence)
+    return scene_error(file, *joined(list(told.items())))
+
+
+def joined(faults: Sequence[tuple[KeyPath, str]]) -> tuple[KeyPath, str]:
+    """The key of the first of some faults, and one sentence with all of them."""
+    (key, first), *others = faults[:MOST_SHOWN]
+    return key, "".join([first, *(f"; also {format_key(key)} {fault}" for key, fault in others)])
 
 
 def _own_steps(model: type[BaseModel], key: KeyPath) -> KeyPath:

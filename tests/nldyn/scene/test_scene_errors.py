@@ -339,7 +339,9 @@ def test_fault_in_modal_scene(tmp_path, old, new, sentence):
         (
             "[interfaces.middle]",
             "[interfaces.center]",
-            "dampers[0].at 'middle' is not an interface; known: 'center'",
+            "dampers[0].at 'middle' is not an interface; known: 'center'; also stops[0].at "
+            "'middle' is not an interface; known: 'center'; also excitation[0].at 'middle' is "
+            "not an interface; known: 'center'",
         ),
         (
             "[mesh]",
@@ -526,3 +528,14 @@ def test_all_faults_are_told_in_one_line(tmp_path):
         "'base', not 'unbalanced'; also continuation.range_hz must run from the lower to the "
         "higher frequency, not [90.0, 5.0]"
     )
+
+
+def test_all_unknown_names_are_told_at_once(tmp_path):
+    two = MODAL.replace('at = "middle"', 'at = "midle"')
+    found = check(tmp_path, two)
+    assert "stops[0].at 'midle' is not an interface; did you mean 'middle'?" in found
+    assert "; also excitation[0].at 'midle' is not an interface" in found
+    names = BEAM.replace("[parts.leaf]", "[parts.lief]").replace('at = "foot"', 'at = "foto"')
+    found = check(tmp_path, names)
+    assert "parts.lief is not a part of the mesh" in found and "did you mean 'leaf'?" in found
+    assert "'foto' is not a point set of the mesh" in found and "did you mean 'foot'?" in found
