@@ -25,6 +25,7 @@ from sphinx.writers.html5 import HTML5Translator
 import nldyn
 
 log = logging.getLogger(__name__)
+DOCS = Path(__file__).resolve().parents[1]
 PUBLIC = re.compile(r"```\{public\} ([\w.]+)\n```\n")
 LISTED = re.compile(r"^\*\*([\w ]+)\*\*:(.*?)(?:\n\n|\Z)", flags=re.M | re.S)
 FRONT = '<!doctype html><meta http-equiv="refresh" content="0; url=README.html">'
@@ -99,12 +100,13 @@ def notebook(script: str) -> str:
 
 
 def without_far_links(text: str, folder: Path) -> str:
-    """The text without links to folders and to programs, which are no part of the site."""
+    """The text without links to folders, programs and other files that are no part of the site."""
 
     def kept(link: re.Match[str]) -> str:
         target = folder / link[2]
         program = target.suffix == ".py" and target.parent.name != "gallery"
-        return link[1] if target.is_dir() or program else link[0]
+        outside = DOCS not in target.resolve().parents
+        return link[1] if target.is_dir() or program or outside else link[0]
 
     return re.sub(r"(?<!!)\[([^\]]*)\]\(([\w./-]+)\)", kept, text)
 
