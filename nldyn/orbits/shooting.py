@@ -7,7 +7,7 @@ the equations say that each segment ends where the next one starts.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,6 +24,7 @@ MOST_SEGMENTS = 10**5
 TOLERANCE = 1e-11  # relative length of a Newton step after which to stop
 ITERATIONS = 12  # most Newton steps
 FROM_NEAR = 8  # the same from a point that was predicted or nearly found: more mean it went astray
+LOOSE = 1e-3  # relative length of a last step from which on nothing shows that there is an orbit
 AT_REST = 1e-6  # size of an orbit, relative to the guess, that may be rounding
 
 
@@ -128,6 +129,9 @@ class ShootingProblem:
             if not finer.converged and self.scale(found.point) < AT_REST * self.scale(guess):
                 break
             guess, found = found.point, finer
+        if found.converged and found.last_step > LOOSE:
+            largest = float(np.abs(found.jacobians).max())
+            return replace(found, failure=f"Jacobians of {largest:.1e} make too much of rounding")
         return found
 
     def _weight(self, point: Real) -> float:

@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 
 from nldyn import (
     ConstantForce,
+    ConvergenceError,
     HarmonicForce,
     RigidStop,
     System,
@@ -190,3 +191,18 @@ def test_an_orbit_that_loses_all_directions_at_rest_is_stable():
     orbit = solve_orbit(oscillator(), 0.02)
     assert np.abs(orbit.multipliers).max() == 0.0
     assert orbit.stability.verdict == "stable"
+
+
+@pytest.mark.parametrize("hz", [18.5, 20.0, 20.5, 21.5])
+def test_steps_as_long_as_the_motion_are_no_orbit(hz):
+    """Without loss slight impacts make Jacobians of 1e12, whose rounding is as large as it."""
+    system = System.from_modal(
+        [13.1, 125.3], {"x": [0.4, 1.0]}, modal_damping=0.01, stops=[RigidStop("x", 1.0)],
+        excitation=[HarmonicForce("x", 1.0)],
+    )  # fmt: skip
+    try:
+        error = solve_orbit(system, hz, seconds=5.0).error
+    except ConvergenceError as failure:
+        error = 0.0
+        assert "no orbit of period 1" in str(failure)
+    assert error < 1e-3
