@@ -8,7 +8,7 @@ from nldyn.base.errors import SystemModelError as SystemModelError
 
 # bifurcations
 from nldyn.bifurcations.normal_forms import NormalForm as NormalForm
-from nldyn.bifurcations.normal_forms import describe as describe
+from nldyn.bifurcations.normal_forms import describe_special as describe_special
 from nldyn.bifurcations.normal_forms import normal_form as normal_form
 from nldyn.bifurcations.point import SpecialPoint as SpecialPoint
 from nldyn.bifurcations.switching import switch_branch as switch_branch
@@ -25,7 +25,7 @@ from nldyn.branches.options import ContinuationOptions as ContinuationOptions
 # curves
 from nldyn.curves.curves import Curve as Curve
 from nldyn.curves.curves import continue_constant as continue_constant
-from nldyn.curves.curves import continue_in as continue_in
+from nldyn.curves.curves import continue_orbit as continue_orbit
 from nldyn.curves.curves import continue_special as continue_special
 from nldyn.curves.marks import refine_special as refine_special
 from nldyn.curves.phase_resonance import phase_resonance as phase_resonance
@@ -42,11 +42,13 @@ from nldyn.io.store import save as save
 
 # longterm
 from nldyn.longterm.attractors import Attractor as Attractor
-from nldyn.longterm.attractors import classify as classify
+from nldyn.longterm.attractors import classify_attractor as classify_attractor
 from nldyn.longterm.attractors import find_attractors as find_attractors
 from nldyn.longterm.basins import Basins as Basins
-from nldyn.longterm.basins import Plane as Plane
+from nldyn.longterm.basins import StatePlane as StatePlane
 from nldyn.longterm.basins import basins as basins
+from nldyn.longterm.contact_measures import contact_measures as contact_measures
+from nldyn.longterm.contact_measures import spectra_map as spectra_map
 from nldyn.longterm.impacts import impacts as impacts
 from nldyn.longterm.lifetimes import chaos_lifetime as chaos_lifetime
 from nldyn.longterm.lyapunov import lyapunov_exponents as lyapunov_exponents
@@ -58,8 +60,6 @@ from nldyn.longterm.poincare import stroboscopic_section as stroboscopic_section
 from nldyn.longterm.simulation import Motion as Motion
 from nldyn.longterm.simulation import simulate as simulate
 from nldyn.longterm.simulation import sweep as sweep
-from nldyn.longterm.wear import contact_measures as contact_measures
-from nldyn.longterm.wear import spectra_map as spectra_map
 
 # orbits
 from nldyn.orbits.harmonics import Harmonics as Harmonics
@@ -68,7 +68,7 @@ from nldyn.orbits.history import History as History
 from nldyn.orbits.multipliers import Stability as Stability
 from nldyn.orbits.orbit import Orbit as Orbit
 from nldyn.orbits.solve import solve_orbit as solve_orbit
-from nldyn.orbits.starts import SearchOptions as SearchOptions
+from nldyn.orbits.starts import OrbitSearchOptions as OrbitSearchOptions
 from nldyn.orbits.starts import find_orbits as find_orbits
 
 # reduction
@@ -86,7 +86,7 @@ from nldyn.scene.study import parameter_study as parameter_study
 
 # search
 from nldyn.search.diagram import Diagram as Diagram
-from nldyn.search.diagram import Seed as Seed
+from nldyn.search.diagram import SubharmonicSeed as SubharmonicSeed
 from nldyn.search.diagram import diagram as diagram
 from nldyn.search.exploration import Exploration as Exploration
 from nldyn.search.exploration import ExploreOptions as ExploreOptions

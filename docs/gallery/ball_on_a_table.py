@@ -9,7 +9,7 @@ $a/g = \\sqrt{(\\pi(1-e)/(1+e))^2 + (2(1+e^2)/(1+e)^2)^2}$
 import matplotlib.pyplot as plt
 import numpy as np
 
-from nldyn import ConstantForce, HarmonicForce, RigidStop, System, continue_in, solve_orbit
+from nldyn import ConstantForce, HarmonicForce, RigidStop, System, continue_orbit, solve_orbit
 from nldyn.plot import plot_orbit_curve
 
 gravity, hz, e, shaken = 9.81, 10.0, 0.5, 1.2 * 9.81
@@ -26,7 +26,7 @@ phase = -np.arcsin(gravity * period * (1 - e) / (2 * (1 + e)) * omega / shaken)
 later = -phase / omega
 height = gravity * later * (period - later) / 2 - shaken / omega**2 * (1 - np.cos(phase))
 orbit = solve_orbit(ball, hz, guess=[height, gravity * (period / 2 - later)])
-curve = continue_in(orbit, "amplitude", (1.1 * gravity, 1.8 * gravity))
+curve = continue_orbit(orbit, "amplitude", (1.1 * gravity, 1.8 * gravity))
 fig, ax = plt.subplots()
 plot_orbit_curve(curve, ax)
 ax.set_title("Ball on a shaking table, restitution 0.5")

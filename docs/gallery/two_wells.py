@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from nldyn import HarmonicForce, Plane, PolynomialSpring, System, basins
+from nldyn import HarmonicForce, PolynomialSpring, StatePlane, System, basins
 from nldyn.longterm.attractors import AttractorOptions
 from nldyn.plot import plot_basins
 
@@ -21,7 +21,9 @@ wells = System.from_matrices(
     springs=[PolynomialSpring("x", [-1.0, 0.0, 1.0])],
     excitation=[HarmonicForce("x", force)],
 )
-plane = Plane.at_interface(wells, displacement=(-2.0, 2.0), velocity=(-2.0, 2.0), origin=[0, 0])
+plane = StatePlane.at_interface(
+    wells, displacement=(-2.0, 2.0), velocity=(-2.0, 2.0), origin=[0, 0]
+)
 short = AttractorOptions(periods=64)
 found = basins(wells, hz, plane, shape=(25, 25), starts=6, checks=4, options=short)
 fig, ax = plt.subplots()

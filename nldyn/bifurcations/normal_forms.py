@@ -83,7 +83,7 @@ class NormalForm:
     stable: bool | None = None
 
 
-def describe(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> str:
+def describe_special(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> str:
     """Say in one or two sentences what happens at a special point.
 
     Parameters
@@ -104,14 +104,14 @@ def describe(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> str:
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])
     >>> branch = continue_branch(solve_orbit(system, 33.0), (32.0, 34.0))
-    >>> describe(branch.special_points[0])[:49]
+    >>> describe_special(branch.special_points[0])[:49]
     'Flip at 33.6544 Hz, supercritical: a stable orbit'
     """
     return normal_form(special, others).sentence
 
 
 def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> NormalForm:
-    """Normal form of a special point; the parameters are those of `describe`.
+    """Normal form of a special point; the parameters are those of `describe_special`.
 
     Returns
     -------
@@ -127,10 +127,12 @@ def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> N
     ----------
     Yu. A. Kuznetsov (2004), *Elements of Applied Bifurcation Theory*, 3rd ed., section 5.4.
     """
-    check_special("describe", special, of_branch=getattr(special, "kind", "") in ("GR", "BP"))
+    check_special(
+        "describe_special", special, of_branch=getattr(special, "kind", "") in ("GR", "BP")
+    )
     check_types(others=(others, Sequence))
     for other in others:
-        check_special("describe: others", other, of_branch=False)
+        check_special("describe_special: others", other, of_branch=False)
     if special.kind == "GR":
         return _grazing(special, others)
     kinds = {"LP": _fold, "PD": _flip, "NS": _torus, "BP": _branch_point}

@@ -26,8 +26,8 @@ from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_at
 from nldyn.branches.endings import Ending, StopReason, StopReasons
 from nldyn.branches.leg import Leg, LegBuilder
 from nldyn.branches.options import ContinuationOptions
-from nldyn.flow.ahead import Ahead
 from nldyn.flow.flow_map import FlowMap
+from nldyn.flow.prefetch import Ahead
 from nldyn.orbits.orbit import Orbit, check_minimal
 from nldyn.orbits.shooting import shifts
 from nldyn.runtime.threads import one_thread

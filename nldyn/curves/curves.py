@@ -239,7 +239,7 @@ def _column_name(parameter: Parameter) -> str:
     return f"{parameter.name}_{parameter.index}" if parameter.index else parameter.name
 
 
-def continue_in(
+def continue_orbit(
     orbit: Orbit,
     parameter: str | Parameter,
     limits: tuple[float, float],
@@ -284,7 +284,7 @@ def continue_in(
     >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
     ...     stops=[Stop("middle", stiffness=5.17e9, gap=2e-6)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])
-    >>> curve = continue_in(solve_orbit(system, 20.0), "gap", (1e-6, 1e-5))
+    >>> curve = continue_orbit(solve_orbit(system, 20.0), "gap", (1e-6, 1e-5))
     >>> [f"{value:.6g}" for value in curve.values[[0, -1], 0]]
     ['1e-06', '1e-05']
     """

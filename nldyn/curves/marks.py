@@ -14,7 +14,7 @@ from nldyn.bifurcations.point import check_special
 from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.sign_changes import leaves_circle
 from nldyn.bifurcations.touching import Touch, touching_extremes
-from nldyn.curves.events import is_torus, torus_pair
+from nldyn.curves.codimension_two import is_torus, torus_pair
 from nldyn.curves.walk import (
     UNFOLDED,
     CurvePoint,
@@ -24,7 +24,7 @@ from nldyn.curves.walk import (
     is_torus_curve,
 )
 from nldyn.orbits.bordered import Condition, Free, OrbitFamily, correct, length_unit
-from nldyn.orbits.conditions import Both, BranchPoint, Grazing, Singular, defined_by
+from nldyn.orbits.conditions import Both, BranchPointCondition, Grazing, Singular, defined_by
 from nldyn.orbits.orbit import Orbit
 from nldyn.system.chart import FREQUENCY, Chart, checked_parameter, value_of
 from nldyn.system.parameters import Parameter
@@ -247,7 +247,7 @@ def _met_at_touch(name: str, chord: CurveChord, touch: Touch) -> tuple[float, Lo
     sigma = float((found.at.point - a.point) @ (weights * way) / (way @ (weights * way)))
     if not (found.converged and 0.0 <= sigma <= 1.0):
         return None
-    if isinstance(a.condition, BranchPoint) and abs(found.at.point[-1]) > UNFOLDED:
+    if isinstance(a.condition, BranchPointCondition) and abs(found.at.point[-1]) > UNFOLDED:
         return None
     parameters = tuple(chart.parameter for chart in family.charts)
     values, residual = found.at.values, found.residual(both)
@@ -296,7 +296,7 @@ def _changes_of_sign(
 def _touch_name(condition: Condition) -> str:
     if isinstance(condition, Grazing):
         return "GRGR"
-    if isinstance(condition, BranchPoint):
+    if isinstance(condition, BranchPointCondition):
         return "GRBP"
     return f"GR{condition.kind}" if isinstance(condition, Singular) else "GR"
 

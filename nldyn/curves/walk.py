@@ -16,7 +16,7 @@ from nldyn.bifurcations.period_doubling import passed_flip
 from nldyn.branches.arclength import GRAZES, SLIGHTEST, grazes_rigid, loses_impact
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.options import ContinuationOptions
-from nldyn.curves.events import codimension_tests, cosine_near, is_torus, torus_cosine
+from nldyn.curves.codimension_two import codimension_tests, cosine_near, is_torus, torus_cosine
 from nldyn.orbits.bordered import (
     SHORTEST_DIFFERENCE,
     Condition,
@@ -28,7 +28,7 @@ from nldyn.orbits.bordered import (
     nearest_depth,
     tangent_surface,
 )
-from nldyn.orbits.conditions import Both, BranchPoint, Grazing, Held, Singular
+from nldyn.orbits.conditions import Both, BranchPointCondition, Grazing, Held, Singular
 from nldyn.orbits.extremes import nearest
 from nldyn.orbits.impact_phases import nodes_to_impacts, start_far_from_impacts
 from nldyn.orbits.orbit import Orbit
@@ -549,7 +549,7 @@ class CurveWalk:
         """Why no step is short enough."""
         if extremes_meet(here):
             return Ending.EXTREME_VANISHES.told()
-        if isinstance(here.condition, BranchPoint) and nearest_depth(here.orbit) < MEETS:
+        if isinstance(here.condition, BranchPointCondition) and nearest_depth(here.orbit) < MEETS:
             return Ending.CORNER.told()
         if isinstance(here.condition, Held) and here.condition.changes_extreme(here.orbit):
             return Ending.OTHER_EXTREME.told()
@@ -611,7 +611,7 @@ class CurveWalk:
                 self.stop_reason = Ending.NO_ORBIT_AT_RANGE_END.told(parameter=name)
                 return []
             return [end]
-        if isinstance(here.condition, BranchPoint) and abs(there.point[-1]) > UNFOLDED:
+        if isinstance(here.condition, BranchPointCondition) and abs(there.point[-1]) > UNFOLDED:
             self.stop_reason = Ending.DISSOLVED.told()
             return []
         if passed_flip(here.orbit, there.orbit):

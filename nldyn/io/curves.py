@@ -25,7 +25,7 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.io.flow import STATE_UNIT, Laws, checked_laws, read_flow, write_flow
 from nldyn.io.hdf5 import Group, new_file, opened, put, set_attribute
 from nldyn.orbits.bordered import Condition, Corrected, Evaluation, Free, OrbitFamily
-from nldyn.orbits.conditions import MONITORS, BranchPoint, Grazing, Held, Singular
+from nldyn.orbits.conditions import MONITORS, BranchPointCondition, Grazing, Held, Singular
 from nldyn.orbits.orbit import Orbit
 from nldyn.system.chart import UNITS as PARAMETER_UNITS
 from nldyn.system.chart import Chart, checked_parameter
@@ -104,7 +104,8 @@ def _write_curve(group: Any, curve: Curve) -> None:
     put(group, "arclength", [point.arclength for point in points], "1")
     put(group, "step", [point.found.step for point in points], "1")
     condition = group.create_group("condition")
-    set_attribute(condition, "kind", type(points[0].condition).__name__)
+    name = type(points[0].condition).__name__
+    set_attribute(condition, "kind", name.removesuffix("Condition"))
     rows = [_numbers_of(point.condition) for point in points]
     for name in rows[0]:
         put(condition, name, np.array([row[name] for row in rows], dtype=float), "relative or SI")
@@ -123,7 +124,7 @@ def _numbers_of(condition: Condition) -> dict[str, Any]:
     names = {
         Free: (),
         Singular: ("left", "right"),
-        BranchPoint: ("left", "right", "unit"),
+        BranchPointCondition: ("left", "right", "unit"),
         Grazing: ("stop", "is_maximum", "phase", "unit", "half", "every"),
         Held: ("target",),
     }[type(condition)]
@@ -206,7 +207,7 @@ def _read_conditions(
         return [Free()] * count
     if kind == "BranchPoint":
         left, unit = group.array("left", count, n), group.array("unit", count, n + 1)
-        return list(map(BranchPoint, left, group.array("right", count, 2, n + 1), unit))
+        return list(map(BranchPointCondition, left, group.array("right", count, 2, n + 1), unit))
     if kind == "Singular":
         left, right = group.array("left", count, -1), group.array("right", count, -1)
         return [Singular(of, *borders) for borders in zip(left, right, strict=True)]

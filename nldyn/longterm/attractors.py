@@ -55,7 +55,7 @@ LONGEST = 8  # a motion that has not decided itself is followed this much longer
 
 @dataclass(frozen=True)
 class AttractorOptions:
-    """Effort of `classify`.
+    """Effort of `classify_attractor`.
 
     Parameters
     ----------
@@ -81,11 +81,11 @@ class AttractorOptions:
     confirmations: int = 1
 
     def __post_init__(self) -> None:
-        check_whole("classify: confirmations", self.confirmations, 0, MOST_CONFIRMATIONS)
-        check_whole("classify: max_period", self.max_period, 1, LONGEST_PERIOD)
-        check_whole("classify: periods", self.periods, 32, MOST_AVERAGED)
+        check_whole("classify_attractor: confirmations", self.confirmations, 0, MOST_CONFIRMATIONS)
+        check_whole("classify_attractor: max_period", self.max_period, 1, LONGEST_PERIOD)
+        check_whole("classify_attractor: periods", self.periods, 32, MOST_AVERAGED)
         if self.transient is not None:
-            check_whole("classify: transient", self.transient, 0, MOST_PERIODS)
+            check_whole("classify_attractor: transient", self.transient, 0, MOST_PERIODS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ class Attractor:
     frequency_hz : float
         Excitation frequency in Hz.
     kind : {"periodic", "quasi-periodic", "chaotic", "drifting", "undecided", "failed"}
-        See `classify`.
+        See `classify_attractor`.
     states : (k, 2n)
         Stroboscopic states z on it: all of a periodic orbit, else some of the motion.
     orbit : Orbit, optional
@@ -242,7 +242,7 @@ def _exponent_text(found: LyapunovSpectrum) -> str:
     return f"{found.largest:.4g} ± {found.largest_error:.2g} 1/s over {found.periods} periods"
 
 
-def classify(
+def classify_attractor(
     system: System | FlowMap,
     frequency_hz: float,
     *,
@@ -292,11 +292,11 @@ def classify(
 
     Examples
     --------
-    >>> from nldyn import Stop, System, Unbalance, classify
+    >>> from nldyn import Stop, System, Unbalance, classify_attractor
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])
-    >>> classify(system, frequency_hz=50.0).name
+    >>> classify_attractor(system, frequency_hz=50.0).name
     'period 2'
     """
     flow = flow_of(system)
@@ -311,7 +311,7 @@ def classify(
 def attractor_from(
     flow: FlowMap, frequency_hz: float, observe: str, options: AttractorOptions, state: Real
 ) -> Attractor:
-    """As `classify`, from a state z."""
+    """As `classify_attractor`, from a state z."""
     omega = 2.0 * math.pi * frequency_hz
     transient = options.transient
     if transient is None:
@@ -601,7 +601,7 @@ def find_attractors(
     seed : int
         Of the random states.
     observe, options
-        As for `classify`.
+        As for `classify_attractor`.
     executor : concurrent.futures.Executor, optional
         Where to compute; here unless given.
     progress : callable, optional

@@ -48,7 +48,7 @@ UNDECIDED = -1
 
 
 @dataclass(frozen=True, eq=False)
-class Plane:
+class StatePlane:
     """A rectangle in the space of initial states at forcing phase zero.
 
     Parameters
@@ -79,7 +79,7 @@ class Plane:
     def __repr__(self) -> str:
         """One line: what is on the axes, and how far they reach."""
         (a, b), (c, d) = self.x_range, self.y_range
-        return f"<Plane: {self.x_label} {a:g} to {b:g}, {self.y_label} {c:g} to {d:g}>"
+        return f"<StatePlane: {self.x_label} {a:g} to {b:g}, {self.y_label} {c:g} to {d:g}>"
 
     def __post_init__(self) -> None:
         for name in ("origin", "x", "y"):
@@ -106,7 +106,7 @@ class Plane:
         *,
         interface: str | None = None,
         origin: Real | None = None,
-    ) -> Plane:
+    ) -> StatePlane:
         """Displacement (m) and velocity (m/s) of an interface, as from a blow there.
 
         The modes take part as a blow at the interface moves them, in proportion to their
@@ -131,7 +131,7 @@ class Plane:
         Examples
         --------
         >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]})
-        >>> plane = Plane.at_interface(system, (-1e-4, 1e-4), (-0.1, 0.1))
+        >>> plane = StatePlane.at_interface(system, (-1e-4, 1e-4), (-0.1, 0.1))
         >>> plane.states((3, 3)).shape
         (3, 3, 2)
         """
@@ -213,7 +213,7 @@ class Basins:
 
     Parameters
     ----------
-    plane : Plane
+    plane : StatePlane
         The initial states.
     frequency_hz : float
         Excitation frequency in Hz.
@@ -233,7 +233,7 @@ class Basins:
         How many simulations failed, and why.
     """
 
-    plane: Plane
+    plane: StatePlane
     frequency_hz: float
     attractors: tuple[Attractor, ...]
     labels: NDArray[np.int64]
@@ -442,7 +442,7 @@ def _settle_one(
 def basins(
     system: System | FlowMap,
     frequency_hz: float,
-    plane: Plane,
+    plane: StatePlane,
     *,
     shape: tuple[int, int] = (100, 100),
     attractors: Sequence[Attractor] = (),
@@ -468,7 +468,7 @@ def basins(
         What to simulate.
     frequency_hz : float
         Excitation frequency in Hz.
-    plane : Plane
+    plane : StatePlane
         The initial states.
     shape : (int, int)
         Numbers of cells (ny, nx).
@@ -483,7 +483,7 @@ def basins(
     seed : int
         Of the cells that are picked.
     observe, options
-        As for `nldyn.classify`.
+        As for `nldyn.classify_attractor`.
     executor : concurrent.futures.Executor, optional
         Where to compute; here unless given.
     progress : callable, optional
@@ -505,11 +505,11 @@ def basins(
 
     Examples
     --------
-    >>> from nldyn import Plane, Stop, System, Unbalance, basins
+    >>> from nldyn import StatePlane, Stop, System, Unbalance, basins
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])
-    >>> plane = Plane.at_interface(system, (-2e-4, 0.0), (-0.05, 0.05))
+    >>> plane = StatePlane.at_interface(system, (-2e-4, 0.0), (-0.05, 0.05))
     >>> found = basins(system, 50.0, plane, shape=(6, 6), checks=4)
     >>> found.wrong, found.undecided
     (0, 0.0)
@@ -521,7 +521,7 @@ def basins(
     """
     flow = flow_of(system)
     check_types(
-        plane=(plane, Plane), options=(options, AttractorOptions, None),
+        plane=(plane, StatePlane), options=(options, AttractorOptions, None),
         attractors=(attractors, Sequence),
     )  # fmt: skip
     check_execution(executor, progress)

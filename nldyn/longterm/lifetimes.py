@@ -140,14 +140,14 @@ def chaos_lifetime(
     rate, as for the failures in a test of lifetimes [Epstein and Sobel 1953].
 
     Every 250 periods Newton's method looks for a stable orbit that a motion has reached, as
-    `nldyn.classify` does: shorter lifetimes are not resolved. At the end a motion is chaotic still
-    if its largest Lyapunov exponent over the last 500 periods, or up to 4000 more where that does
-    not decide, is positive by three standard errors.
+    `classify_attractor` does: shorter lifetimes are not resolved. At the end a motion is
+    chaotic still if its largest Lyapunov exponent over the last 500 periods, or up to 4000 more
+    where that does not decide, is positive by three standard errors.
 
     Parameters
     ----------
     attractor : Attractor
-        One of kind ``"chaotic"``, such as `nldyn.classify` gives.
+        One of kind ``"chaotic"``, such as `nldyn.classify_attractor` gives.
     states : int
         Number of motions, from states evenly spread over those kept of the attractor.
     periods : int
@@ -170,11 +170,11 @@ def chaos_lifetime(
 
     Examples
     --------
-    >>> from nldyn import Stop, System, Unbalance, chaos_lifetime, classify
+    >>> from nldyn import Stop, System, Unbalance, chaos_lifetime, classify_attractor
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])
-    >>> found = chaos_lifetime(classify(system, 36.0), states=2, periods=1000)
+    >>> found = chaos_lifetime(classify_attractor(system, 36.0), states=2, periods=1000)
     >>> found.lasting, found.settled
     (2, 0)
 

@@ -12,7 +12,7 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.flow.flow_map import FlowMap
-from nldyn.longterm.basins import UNDECIDED, Basins, Plane, Target, settle, target_of
+from nldyn.longterm.basins import UNDECIDED, Basins, StatePlane, Target, settle, target_of
 from nldyn.orbits.orbit import Orbit, same_orbit, stroboscopic
 from nldyn.orbits.starts import near_returns, orbit_near
 from nldyn.runtime.executors import check_execution, values_of
@@ -27,7 +27,7 @@ MARGIN = 1.0  # how far beyond the plane a manifold is followed, in units of its
 
 def stable_manifold(
     orbit: Orbit,
-    plane: Plane,
+    plane: StatePlane,
     *,
     resolution: float = 0.005,
     max_points: int = 20000,
@@ -46,8 +46,8 @@ def stable_manifold(
     ----------
     orbit : Orbit
         With one multiplier outside the unit circle and one inside.
-    plane : Plane
-        Displacement and velocity, such as `Plane.at_interface` gives.
+    plane : StatePlane
+        Displacement and velocity, such as `StatePlane.at_interface` gives.
     resolution : float
         Largest distance of neighbouring points, in units of the sides of the plane.
     max_points : int
@@ -71,16 +71,16 @@ def stable_manifold(
 
     Examples
     --------
-    >>> from nldyn import Plane, Stop, System, Unbalance, solve_orbit, stable_manifold
+    >>> from nldyn import StatePlane, Stop, System, Unbalance, solve_orbit, stable_manifold
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])
     >>> saddle = solve_orbit(system, frequency_hz=50.0)
-    >>> plane = Plane.at_interface(system, (-2e-4, 0.0), (-0.05, 0.05))
+    >>> plane = StatePlane.at_interface(system, (-2e-4, 0.0), (-0.05, 0.05))
     >>> len(stable_manifold(saddle, plane, max_points=100))
     2
     """
-    check_types(orbit=(orbit, Orbit), plane=(plane, Plane))
+    check_types(orbit=(orbit, Orbit), plane=(plane, StatePlane))
     check_execution(executor, progress)
     flow = orbit.problem.flow
     if flow.system.size != 1:
@@ -109,7 +109,7 @@ def stable_manifold(
 
 
 def _piece(
-    flow: FlowMap, omega: float, count: int, plane: Plane, resolution: float, budget: int,
+    flow: FlowMap, omega: float, count: int, plane: StatePlane, resolution: float, budget: int,
     begin: tuple[Real, float],
 ) -> Real:  # fmt: skip
     """The piece of a stable manifold on one side of a saddle's state z."""
@@ -127,7 +127,7 @@ def _piece(
 class _Inverse:
     """The map over some periods and its inverse, in coordinates from 0 to 1 within a plane."""
 
-    def __init__(self, flow: FlowMap, omega: float, periods: int, plane: Plane) -> None:
+    def __init__(self, flow: FlowMap, omega: float, periods: int, plane: StatePlane) -> None:
         self.flow, self.omega, self.plane = flow, omega, plane
         self.phases = np.linspace(0.0, 2.0 * np.pi * periods, periods + 1)
         (x0, x1), (y0, y1) = plane.x_range, plane.y_range

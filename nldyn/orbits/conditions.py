@@ -141,7 +141,7 @@ class Singular:
 
 
 @dataclass(frozen=True, eq=False)
-class BranchPoint:
+class BranchPointCondition:
     """[R_u, R_p] has lost a rank (Moore 1980): with a left border ψ and right borders c₁, c₂
 
     ψᵀ[R_u, R_p] + h₁c₁ᵀ + h₂c₂ᵀ = 0 with ψᵀb = 1 gives h₁ = h₂ = 0. The equations are unfolded,
@@ -162,7 +162,7 @@ class BranchPoint:
     unit: Real
 
     @classmethod
-    def of(cls, at: Evaluation) -> BranchPoint:
+    def of(cls, at: Evaluation) -> BranchPointCondition:
         """The condition with the borders of a point, by the states and the first parameter."""
         n = at.family.n_states
         unit = 1.0 / np.sqrt(at.family.metric(at.point)[: n + 1])
@@ -182,9 +182,9 @@ class BranchPoint:
         """Not across a grazing."""
         return reach_of_grazing(at)
 
-    def renewed(self, at: Evaluation) -> BranchPoint:
+    def renewed(self, at: Evaluation) -> BranchPointCondition:
         """The same with the borders of another point."""
-        return BranchPoint.of(at)
+        return BranchPointCondition.of(at)
 
 
 @dataclass(frozen=True, eq=False)
@@ -607,7 +607,7 @@ def defined_by(kind: str, family: OrbitFamily, orbit: Orbit) -> tuple[OrbitFamil
     """
     if kind == "BP":
         guess = family.unknowns(orbit)
-        condition = BranchPoint.of(family.at(guess))
+        condition = BranchPointCondition.of(family.at(guess))
         return family.unfolded(condition.left * family.scale(guess)), condition
     if kind == "GR":
         grazing = Grazing.of(orbit)

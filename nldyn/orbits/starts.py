@@ -37,7 +37,7 @@ FREQUENCY_SHIFT = 0.05  # how far the frequency may go, relative
 
 
 @dataclass(frozen=True)
-class SearchOptions:
+class OrbitSearchOptions:
     """How long to simulate and how many candidates to try.
 
     Parameters
@@ -89,7 +89,7 @@ class Strobe:
     failures: tuple[str, ...]
 
 
-def simulate_strobe(flow: FlowMap, frequency_hz: float, options: SearchOptions) -> Strobe:
+def simulate_strobe(flow: FlowMap, frequency_hz: float, options: OrbitSearchOptions) -> Strobe:
     """Simulate from rest and from random states and record once per excitation period.
 
     The random states are up to ten times as large as the linear response, the size of resonant
@@ -161,7 +161,7 @@ def reach(system: System) -> float:
 
 
 def orbits_from_strobe(
-    flow: FlowMap, strobe: Strobe, period: int, observe: str, options: SearchOptions
+    flow: FlowMap, strobe: Strobe, period: int, observe: str, options: OrbitSearchOptions
 ) -> list[Orbit]:
     """Orbits of one minimal period that Newton's method finds from near returns."""
     problem = shooting_problem(flow, period)
@@ -296,7 +296,7 @@ def find_orbits(
     period: int,
     *,
     observe: str | None = None,
-    options: SearchOptions | None = None,
+    options: OrbitSearchOptions | None = None,
 ) -> list[Orbit]:
     """Orbits of period multiple n at one frequency, started from time simulations.
 
@@ -314,7 +314,7 @@ def find_orbits(
         Period multiple n; orbits whose true period is shorter are left out.
     observe : str, optional
         Interface whose displacement is reported.
-    options : SearchOptions, optional
+    options : OrbitSearchOptions, optional
         Effort.
 
     Returns
@@ -342,7 +342,7 @@ def find_orbits(
     flow = flow_of(system)
     check_frequency("frequency_hz", frequency_hz)
     check_bounded(flow, 2.0 * math.pi * frequency_hz)
-    options = options or SearchOptions()
+    options = options or OrbitSearchOptions()
     strobe = simulate_strobe(flow, frequency_hz, options)
     if not strobe.runs:
         raise ConvergenceError(

@@ -15,7 +15,7 @@ from nldyn.branches.continuation import continue_branch
 from nldyn.branches.options import ContinuationOptions
 from nldyn.branches.predictor import predicted
 from nldyn.flow.flow_map import Trajectory, flow_of
-from nldyn.longterm.attractors import AttractorOptions, classify
+from nldyn.longterm.attractors import AttractorOptions, classify_attractor
 from nldyn.orbits.multipliers import floquet_spectrum
 from nldyn.orbits.orbit import check_observe
 from nldyn.orbits.solve import solve_orbit
@@ -28,7 +28,7 @@ from nldyn.runtime.progress import Progress, silent
 from nldyn.scene.build import build_system
 from nldyn.scene.component import build_component
 from nldyn.scene.read import load_scene
-from nldyn.search.diagram import Collector, Diagram, Seed, diagram
+from nldyn.search.diagram import Collector, Diagram, SubharmonicSeed, diagram
 from nldyn.system.elements import Stop
 from nldyn.system.system import System
 
@@ -87,7 +87,7 @@ class Job:
         Frequencies.
     periods : tuple of int
         Period multiples wanted everywhere in the range.
-    seeds : tuple of Seed
+    seeds : tuple of SubharmonicSeed
         Further orbits to look for.
     search_points : int
         Frequencies searched.
@@ -106,7 +106,7 @@ class Job:
     system: Callable[[], System]
     range_hz: tuple[float, float]
     periods: tuple[int, ...] = (1,)
-    seeds: tuple[Seed, ...] = ()
+    seeds: tuple[SubharmonicSeed, ...] = ()
     search_points: int = 12
     options: ContinuationOptions = FINE
     quarters_hz: float | None = None
@@ -149,9 +149,12 @@ def _scene(name: str) -> Callable[[], System]:
 
 
 # The subharmonics of the 1-DOF model that section 3 lists, beside the main 1/2 and 1/3.
-LISTED = (
-    Seed(3, 37.1), Seed(5, 62.2), Seed(2, 16.1), Seed(4, 33.0), Seed(7, 58.0),
-    Seed(10, 83.0), Seed(3, 18.4), Seed(5, 31.0), Seed(9, 56.0), Seed(13, 81.0),
+LISTED = tuple(
+    SubharmonicSeed(period, near_hz)
+    for period, near_hz in (
+        (3, 37.1), (5, 62.2), (2, 16.1), (4, 33.0), (7, 58.0),
+        (10, 83.0), (3, 18.4), (5, 31.0), (9, 56.0), (13, 81.0),
+    )
 )  # fmt: skip
 
 JOBS: tuple[Job, ...] = (
@@ -209,7 +212,7 @@ JOBS: tuple[Job, ...] = (
         _scene("one_dof"),
         (5.0, 90.0),
         (1, 2),
-        (Seed(3, 76.0),),
+        (SubharmonicSeed(3, 76.0),),
         quarters_hz=36.0,
         weight=13.0,
     ),
@@ -228,7 +231,7 @@ JOBS: tuple[Job, ...] = (
         _scene("two_dof_xi_0.001"),
         (50.0, 65.0),
         (),
-        (Seed(14, 56.75), Seed(14, 57.0)),
+        (SubharmonicSeed(14, 56.75), SubharmonicSeed(14, 57.0)),
         options=ContinuationOptions(max_points=150),
         weight=8.0,
     ),
@@ -352,7 +355,7 @@ def compile_kernels(quiet: bool = False) -> None:
         diagram(system, (33.0, 34.5), (1, 2), search_points=1)
         two = scene_system("two_dof_xi_0.01")  # has pairs of multipliers, which one mode has not
         continue_branch(solve_orbit(two, 30.0), (29.5, 30.5))
-        classify(system, 36.0, options=AttractorOptions(periods=32))
+        classify_attractor(system, 36.0, options=AttractorOptions(periods=32))
 
 
 def compile_beside(quiet: bool = False) -> None:

@@ -110,7 +110,7 @@ def plot_orbit_curve(curve: Curve, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     curve : Curve
-        From `continue_in`.
+        From `continue_orbit`.
     ax : Axes, optional
         Where to draw; a new figure unless given.
 
@@ -125,11 +125,11 @@ def plot_orbit_curve(curve: Curve, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from nldyn import Stop, System, Unbalance, continue_in, solve_orbit
+    >>> from nldyn import Stop, System, Unbalance, continue_orbit, solve_orbit
     >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
     ...     stops=[Stop("middle", stiffness=5.17e9, gap=2e-6)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])
-    >>> ax = plot_orbit_curve(continue_in(solve_orbit(system, 20.0), "gap", (1e-6, 1e-5)))
+    >>> ax = plot_orbit_curve(continue_orbit(solve_orbit(system, 20.0), "gap", (1e-6, 1e-5)))
     >>> ax.get_xlabel(), ax.get_ylabel()
     ('gap (µm)', 'max |y| at middle (µm)')
     """

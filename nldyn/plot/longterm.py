@@ -18,10 +18,10 @@ from nldyn.base.errors import SystemModelError, check_choice, check_types, is_fi
 from nldyn.branches.branch import Branch, check_branches
 from nldyn.longterm.attractors import Attractor
 from nldyn.longterm.basins import UNDECIDED, Basins
+from nldyn.longterm.contact_measures import UNITS as MEASURE_UNITS
+from nldyn.longterm.contact_measures import SpectraMap
 from nldyn.longterm.poincare import BruteForce, Column, impact_section, stroboscopic_section
 from nldyn.longterm.simulation import Motion
-from nldyn.longterm.wear import UNITS as MEASURE_UNITS
-from nldyn.longterm.wear import SpectraMap
 from nldyn.orbits.orbit import check_observe, stroboscopic
 from nldyn.plot.diagram import (
     PERIOD_COLOURS,
@@ -349,7 +349,7 @@ def plot_wear(
     Examples
     --------
     >>> from nldyn import Stop, System, Unbalance, brute_force
-    >>> from nldyn.longterm.wear import measures_table
+    >>> from nldyn.longterm.contact_measures import measures_table
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])

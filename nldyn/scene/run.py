@@ -16,7 +16,7 @@ from nldyn.scene.checks import check_computable, range_remark
 from nldyn.scene.faults import told_as
 from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import ContinuationTable, Scene
-from nldyn.search.diagram import Diagram, Seed, diagram
+from nldyn.search.diagram import Diagram, SubharmonicSeed, diagram
 from nldyn.search.exploration import Exploration, ExploreOptions
 from nldyn.search.explore import explore
 from nldyn.system.rest import rest_positions
@@ -90,7 +90,7 @@ def compute(
             flow,
             (table.range_hz[0], table.range_hz[1]),
             table.periods,
-            seeds=[Seed(seed.period, seed.near_hz) for seed in scene.subharmonics],
+            seeds=[SubharmonicSeed(seed.period, seed.near_hz) for seed in scene.subharmonics],
             search_points=table.search_points,
             doublings=table.follow_doublings,
             options=ContinuationOptions(max_step=table.max_step),

@@ -29,9 +29,9 @@ from nldyn.base.errors import (
 from nldyn.base.version import software_version
 from nldyn.runtime.executors import as_finished, check_execution
 from nldyn.scene.build import build_system
+from nldyn.scene.case_keys import case_keys
 from nldyn.scene.read import load_scene, scene_from_tables
 from nldyn.scene.schema import Scene
-from nldyn.scene.study_keys import case_keys
 from nldyn.system.system import System
 
 if TYPE_CHECKING:

@@ -41,14 +41,14 @@ from nldyn.branches.continuation import (
 from nldyn.branches.endings import Ending
 from nldyn.branches.options import ContinuationOptions
 from nldyn.branches.tables import Part, to_pandas, to_xarray
-from nldyn.flow.ahead import Ahead, Task, computing_ahead
 from nldyn.flow.flow_map import FlowMap, flow_of, same_flow
+from nldyn.flow.prefetch import Ahead, Task, computing_ahead
 from nldyn.orbits.newton import NO_PLACE
 from nldyn.orbits.orbit import Orbit, check_observe, minimal_period, stroboscopic
 from nldyn.orbits.solve import solve_orbit
 from nldyn.orbits.starts import (
     MOST_COUNT,
-    SearchOptions,
+    OrbitSearchOptions,
     orbit_near,
     orbits_from_strobe,
     reach,
@@ -70,7 +70,7 @@ MORE_STARTS = 4  # times as many in the second search, which looks for orbits wi
 
 
 @dataclass(frozen=True)
-class Seed:
+class SubharmonicSeed:
     """A frequency at which to look for orbits of one period by simulation.
 
     Parameters
@@ -90,8 +90,8 @@ class Seed:
     near_hz: float
 
     def __post_init__(self) -> None:
-        check_whole("Seed: period", self.period, 1)
-        check_frequency("Seed: near_hz", self.near_hz)
+        check_whole("SubharmonicSeed: period", self.period, 1)
+        check_frequency("SubharmonicSeed: near_hz", self.near_hz)
 
 
 @dataclass(frozen=True, eq=False)
@@ -502,12 +502,12 @@ def diagram(
     range_hz: tuple[float, float],
     periods: Sequence[int] = (1, 2, 3),
     *,
-    seeds: Sequence[Seed] = (),
+    seeds: Sequence[SubharmonicSeed] = (),
     search_points: int = 12,
     doublings: int = 0,
     observe: str | None = None,
     options: ContinuationOptions | None = None,
-    search: SearchOptions | None = None,
+    search: OrbitSearchOptions | None = None,
     progress: Progress | None = None,
     checkpoint: BranchFile | None = None,
     jobs: int = 1,
@@ -530,7 +530,7 @@ def diagram(
         Frequencies in Hz, ascending.
     periods : sequence of int
         Period multiples wanted; may be empty when there are seeds.
-    seeds : sequence of Seed
+    seeds : sequence of SubharmonicSeed
         Further frequencies at which to look for a period (which need not be in `periods`).
     search_points : int
         Number of frequencies searched, equally spaced on a logarithmic axis.
@@ -566,11 +566,12 @@ def diagram(
 
     Examples
     --------
-    >>> from nldyn import SearchOptions, Stop, System, Unbalance, diagram
+    >>> from nldyn import OrbitSearchOptions, Stop, System, Unbalance, diagram
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])
-    >>> found = diagram(system, (8.5, 9.0), (1, 2), search_points=1, search=SearchOptions(starts=1))
+    >>> one = OrbitSearchOptions(starts=1)
+    >>> found = diagram(system, (8.5, 9.0), (1, 2), search_points=1, search=one)
     >>> sorted(branch.period for branch in found.branches)
     [1, 2]
     """
@@ -580,13 +581,13 @@ def diagram(
         periods=(periods, Sequence),
         seeds=(seeds, Sequence),
         options=(options, ContinuationOptions, None),
-        search=(search, SearchOptions, None),
+        search=(search, OrbitSearchOptions, None),
         progress=(progress, Callable, None),
         executor=(executor, Executor, None),
     )
     check_whole("jobs", jobs, 1, MOST_JOBS)
     for seed in seeds:
-        check_types(**{"seeds: each": (seed, Seed)})
+        check_types(**{"seeds: each": (seed, SubharmonicSeed)})
     for period in periods:
         check_whole("periods: each", period, 1)
     wanted = sorted(set(periods))
@@ -608,7 +609,7 @@ def diagram(
     )
     box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flow, (low, high))
     with box.checkpoint, computing_ahead(flow, jobs, executor) as box.ahead:
-        effort = search or SearchOptions()
+        effort = search or OrbitSearchOptions()
         box.outlook = Outlook(wanted, search_points if wanted else 0, len(seeds))
         edges = np.geomspace(low, high, search_points + 1)
         places = np.sqrt(edges[:-1] * edges[1:])[::-1].tolist() if wanted else []
@@ -643,7 +644,7 @@ def diagram(
 
 
 def _search(
-    box: Collector, frequencies: Sequence[float], periods: Sequence[int], effort: SearchOptions
+    box: Collector, frequencies: Sequence[float], periods: Sequence[int], effort: OrbitSearchOptions
 ) -> None:
     """Follow what simulations at some frequencies come near, one period after the other."""
     found = _searched(box, frequencies, periods, effort)
@@ -663,7 +664,7 @@ def _search(
 
 
 def _searched(
-    box: Collector, frequencies: Sequence[float], periods: Sequence[int], effort: SearchOptions
+    box: Collector, frequencies: Sequence[float], periods: Sequence[int], effort: OrbitSearchOptions
 ) -> list[Found]:
     """What simulations at some frequencies come near, on all processes."""
     ahead = box.ahead or Ahead(box.flow)
@@ -691,7 +692,7 @@ def search_at(
     frequency_hz: float,
     periods: Sequence[int],
     observe: str,
-    effort: SearchOptions,
+    effort: OrbitSearchOptions,
     look: Callable[[], None] | None = None,
 ) -> Found:
     """Why simulations at a frequency failed, and the orbits of some periods that others pass."""
@@ -701,7 +702,7 @@ def search_at(
 
 
 def _note_failures(
-    box: Collector, frequency_hz: float, failures: Sequence[str], effort: SearchOptions
+    box: Collector, frequency_hz: float, failures: Sequence[str], effort: OrbitSearchOptions
 ) -> None:
     for reason, count in Counter(failures).items():
         box.notes.append(
@@ -715,7 +716,7 @@ def _contact_is_missing(box: Collector) -> bool:
     return reach(box.flow.system) > 0.0 and all(orbit.max_penetration == 0.0 for orbit in orbits)
 
 
-def _follow_seed(box: Collector, seed: Seed, effort: SearchOptions) -> None:
+def _follow_seed(box: Collector, seed: SubharmonicSeed, effort: OrbitSearchOptions) -> None:
     """Look around a seed's frequency, nearest first, until a new branch turns up."""
     for shift in (0.0, 0.005, -0.005, 0.01, -0.01, 0.02, -0.02, 0.03, -0.03):
         frequency = seed.near_hz * (1.0 + shift)
@@ -733,7 +734,7 @@ def _follow_seed(box: Collector, seed: Seed, effort: SearchOptions) -> None:
 
 
 def _seed_task(
-    box: Collector, seed: Seed, frequency_hz: float, effort: SearchOptions
+    box: Collector, seed: SubharmonicSeed, frequency_hz: float, effort: OrbitSearchOptions
 ) -> tuple[Hashable, tuple[Any, ...]]:
     given = (frequency_hz, (seed.period,), box.observe, effort)
     return ("search", *given), given

@@ -23,8 +23,8 @@ from nldyn.base.errors import (
 from nldyn.branches.branch import Branch
 from nldyn.branches.checkpoint import Checkpoint
 from nldyn.branches.options import ContinuationOptions
-from nldyn.flow.ahead import computing_ahead
 from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.flow.prefetch import computing_ahead
 from nldyn.orbits.deflation import deflated_orbit
 from nldyn.orbits.orbit import Orbit, check_observe, same_orbit, stroboscopic
 from nldyn.orbits.shooting import LONGEST_PERIOD

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from killing import same_results
 
-from nldyn import Plane, basins, parameter_study, simulate, sweep
+from nldyn import StatePlane, basins, parameter_study, simulate, sweep
 from nldyn.base.resources import example
 from nldyn.paper.jobs import JOBS, diagrams_of, tasks_of
 from nldyn.paper.workers import worker_processes
@@ -78,7 +78,7 @@ def executors():
 def test_motions_and_basins_are_the_same_with_any_executor():
     """To the last bit, alone, with threads and with processes."""
     system = build_system(load_scene(example("one_dof.toml")))
-    corner = Plane(
+    corner = StatePlane(
         np.zeros(2), np.array([1e-3, 0.0]), np.array([0.0, 0.1]), (-1.0, 1.0), (-1.0, 1.0)
     )
 

@@ -12,7 +12,7 @@ from nldyn import (
     ConvergenceError,
     ExploreOptions,
     HarmonicForce,
-    Plane,
+    StatePlane,
     Stop,
     System,
     Unbalance,
@@ -140,7 +140,7 @@ def rigid_stop(stiffness=1e50, unbalance=4.92e-6):
 @pytest.mark.filterwarnings("error")
 def test_basins_say_why_no_cell_leads_anywhere():
     system = rigid_stop()
-    plane = Plane.at_interface(system, displacement=(-4e-4, 5e-5), velocity=(-0.06, 0.06))
+    plane = StatePlane.at_interface(system, displacement=(-4e-4, 5e-5), velocity=(-0.06, 0.06))
     found = basins(system, 22.8, plane, shape=(4, 4), starts=4, checks=2)
     assert np.all(found.labels == -1)
     assert sum(int(note.split()[0]) for note in found.notes) == 4
@@ -151,7 +151,7 @@ def test_basins_say_why_no_cell_leads_anywhere():
 def test_basins_say_why_single_cells_fail():
     """Beside an orbit of 1e30 m the cells lie at rest, and begin with too many contacts."""
     system = rigid_stop(5.17e9, 1e30)
-    plane = Plane.at_interface(system, displacement=(-4e-4, 5e-5), velocity=(-0.06, 0.06))
+    plane = StatePlane.at_interface(system, displacement=(-4e-4, 5e-5), velocity=(-0.06, 0.06))
     shares = find_attractors(system, 20.0, starts=3)
     known = [share.attractor for share in shares if share.attractor.kind == "periodic"]
     found = basins(system, 20.0, plane, attractors=known, shape=(3, 3), starts=1, checks=0)

@@ -24,9 +24,9 @@ from nldyn import (
     cascade,
     continue_branch,
     continue_constant,
-    continue_in,
+    continue_orbit,
     continue_special,
-    describe,
+    describe_special,
     diagram,
     explore,
     find_orbits,
@@ -81,7 +81,7 @@ def flip(harmonic_branch):
     [
         (switch_at_flip, ()),
         (switch_at_branch_point, ()),
-        (describe, ()),
+        (describe_special, ()),
         (normal_form, ()),
         (cascade, ()),
         (refine_special, ()),
@@ -92,7 +92,7 @@ def flip(harmonic_branch):
 def test_what_is_no_special_point_is_refused(function, arguments):
     halves = (SimpleNamespace(kind="PD"), SimpleNamespace(kind="PD", orbit=3))
     said = refused(lambda junk: function(junk, *arguments), *JUNK, *halves)
-    name = "describe" if function is normal_form else function.__name__
+    name = "describe_special" if function is normal_form else function.__name__
     check_named(said, f"{name} needs a special point, got")
 
 
@@ -118,7 +118,7 @@ def test_arguments_of_curves_are_named(name, call, orbit, flip):
     if call == "in":
         good = {"orbit": orbit, "parameter": "gap", "limits": (-1e-6, 1e-6)}
         function, name = (
-            continue_in,
+            continue_orbit,
             {"parameters": "parameter", "ranges": "limits"}.get(name, name),
         )
     else:
@@ -188,7 +188,9 @@ def test_sizes_of_steps_off_a_branch_are_checked(flip):
     check_named(refused(lambda junk: refine_special(flip, junk)), "unknown parameter")
     said = refused(lambda junk: refine_special(flip, max_iterations=junk))
     check_named(said, "max_iterations must be a whole number")
-    said = refused(lambda junk: describe(flip, junk), None, 3, math.nan, object(), [3], ["LP"])
+    said = refused(
+        lambda junk: describe_special(flip, junk), None, 3, math.nan, object(), [3], ["LP"]
+    )
     check_named(said, "others")
 
 
@@ -197,7 +199,7 @@ def test_a_point_of_a_curve_does_not_know_the_branch(flip):
     mark = refine_special(flip)
     assert switch_at_flip(mark).orbit.period == 2
     with pytest.raises(SystemModelError, match="a special point of a branch, which knows"):
-        describe(SimpleNamespace(kind="GR", orbit=mark.orbit, frequency_hz=1.0))
+        describe_special(SimpleNamespace(kind="GR", orbit=mark.orbit, frequency_hz=1.0))
 
 
 def test_what_is_no_branch_or_curve_cannot_be_drawn(harmonic_branch, orbit):
@@ -205,7 +207,7 @@ def test_what_is_no_branch_or_curve_cannot_be_drawn(harmonic_branch, orbit):
     check_named(refused(plot_diagram, *junk), "diagram must be a list of branches")
     check_named(refused(cascades_in, *junk), "branches must be a list of branches")
     check_named(refused(plot_curves), "plot_curves needs")
-    curve = continue_in(orbit, "frequency_hz", (25.5, 26.5))
+    curve = continue_orbit(orbit, "frequency_hz", (25.5, 26.5))
     check_named(refused(lambda x: plot_curves([curve, x])), "plot_curves needs")
     axes = [x for x in JUNK if x is not None]
     said = refused(lambda x: plot_diagram([harmonic_branch], x), *axes)
@@ -281,7 +283,7 @@ def test_other_arguments_of_a_wrong_kind_are_named(one_dof, orbit, harmonic_bran
         said = refused(lambda x, kind=kind: kind(x, 1e9), 3, [], math.nan)
         check_named(said, f"{name}: at must be a str")
     curve = tmp_path / "curve.h5"
-    save(continue_in(orbit, "frequency_hz", (25.5, 26.5)), curve)
+    save(continue_orbit(orbit, "frequency_hz", (25.5, 26.5)), curve)
     for name in ("laws", "monitor"):
         said = refused(lambda x, name=name: load_curves(curve, **{name: x}), 3, "text", [1])
         check_named(said, f"{name} must be")
@@ -294,7 +296,9 @@ def test_ranges_in_which_there_are_no_systems_are_refused(orbit):
         ("exponent", (0.5, 2.0)), ("stiffness", (-1.0, 1e10)), ("modal_damping", (-0.1, 0.1)),
         ("mass_times_radius", (-1.0, 1e-5)), ("exponent", (1.0, 9.0)),
     ):  # fmt: skip
-        check_named(refused(lambda x, n=name: continue_in(orbit, n, x), limits), f"range of {name}")
+        check_named(
+            refused(lambda x, n=name: continue_orbit(orbit, n, x), limits), f"range of {name}"
+        )
 
 
 def test_places_of_which_the_branches_do_not_tell_are_refused(harmonic_branch, flip):
@@ -323,7 +327,7 @@ def test_an_orbit_run_through_twice_is_not_continued(flip):
     end = born.nodes[0 if born.stop_reasons[0].startswith("joins") else -1].orbit
     for call in (
         lambda: continue_branch(end, window),
-        lambda: continue_in(end, "gap", (-1e-6, 1e-6)),
+        lambda: continue_orbit(end, "gap", (-1e-6, 1e-6)),
     ):
         with pytest.raises(SystemModelError, match="is one of period 1, run through 2 times"):
             call()
@@ -353,6 +357,6 @@ def test_element_that_a_system_does_not_have_is_told_apart_from_none_at_all():
         ("gap", 3, "there is no stop 3; there are 1, counted from 0"),
     ):
         with pytest.raises(SystemModelError, match=told):
-            continue_in(orbit, Parameter(name, index), (1.0, 2.0))
+            continue_orbit(orbit, Parameter(name, index), (1.0, 2.0))
     with pytest.raises(SystemModelError, match="continue_branch: an orbit needs a range_hz"):
         continue_branch(orbit, None)

@@ -15,9 +15,9 @@ from nldyn import (
     Damper,
     FlowOptions,
     HarmonicForce,
-    SearchOptions,
-    Seed,
+    OrbitSearchOptions,
     Stop,
+    SubharmonicSeed,
     System,
     SystemModelError,
     Unbalance,
@@ -254,7 +254,7 @@ def orbit(one_dof):
 def test_frequency(one_dof, value):
     sentence(lambda: solve_orbit(one_dof, value), "frequency_hz must be positive")
     sentence(lambda: find_orbits(one_dof, value, 1), "frequency_hz must be positive")
-    sentence(lambda: Seed(2, value), "Seed: near_hz must be positive")
+    sentence(lambda: SubharmonicSeed(2, value), "SubharmonicSeed: near_hz must be positive")
 
 
 @pytest.mark.parametrize("period", [0, -1, 1.5, math.nan])
@@ -262,7 +262,7 @@ def test_period(one_dof, period):
     sentence(lambda: solve_orbit(one_dof, 26.0, period), "period must be", "from 1 to 10000")
     sentence(lambda: find_orbits(one_dof, 26.0, period), "period must be", "from 1 to 10000")
     sentence(lambda: diagram(one_dof, (20.0, 30.0), periods=[period]), "periods", "at least 1")
-    sentence(lambda: Seed(period, 50.0), "Seed: period", "at least 1")
+    sentence(lambda: SubharmonicSeed(period, 50.0), "SubharmonicSeed: period", "at least 1")
 
 
 def test_observed_interface(one_dof):
@@ -325,7 +325,7 @@ def test_continuation_options(options):
     ],
 )  # fmt: skip
 def test_search_options(options):
-    sentence(lambda: SearchOptions(**options), "search:", next(iter(options)))
+    sentence(lambda: OrbitSearchOptions(**options), "search:", next(iter(options)))
 
 
 @pytest.mark.parametrize(
@@ -344,7 +344,9 @@ def test_diagram(one_dof):
     sentence(lambda: diagram(one_dof, (20.0, 30.0), search_points=0), "search_points")
     sentence(lambda: diagram(one_dof, (20.0, 30.0), doublings=-1), "doublings")
     sentence(
-        lambda: diagram(one_dof, (20.0, 30.0), seeds=[Seed(2, 40.0)]), "near_hz = 40", "outside"
+        lambda: diagram(one_dof, (20.0, 30.0), seeds=[SubharmonicSeed(2, 40.0)]),
+        "near_hz = 40",
+        "outside",
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from bilinear import Bilinear
 
-from nldyn import HarmonicForce, Stop, System, continue_branch, continue_in, solve_orbit
+from nldyn import HarmonicForce, Stop, System, continue_branch, continue_orbit, solve_orbit
 
 SAMPLES = 20000
 GAP, STIFFNESS, DAMPING, NATURAL_HZ = 2e-4, 2e5, 0.03, 10.0
@@ -34,7 +34,7 @@ def by_force():
     guess = np.random.default_rng(0).normal(size=2) * [3e-4, 3e-2]
     start = solve_orbit(between_stops(3.0), 8.4, guess=guess)
     on_branch = continue_branch(start, (7.0, 10.0)).at(8.81599)[1]
-    return continue_in(on_branch, "amplitude", (2.5, 6.0))
+    return continue_orbit(on_branch, "amplitude", (2.5, 6.0))
 
 
 @dataclass(frozen=True)

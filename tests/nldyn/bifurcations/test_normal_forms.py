@@ -20,7 +20,7 @@ from nldyn import (
     Unbalance,
     cascade,
     continue_branch,
-    describe,
+    describe_special,
     diagram,
     normal_form,
     solve_orbit,
@@ -281,7 +281,7 @@ def test_doubled_branch_is_where_the_flip_says(harmonic_branch, index):
 
 def test_flip_is_told_in_plain_words(harmonic_branch):
     special = of_kind(harmonic_branch, "PD")[-1]
-    assert describe(special) == (
+    assert describe_special(special) == (
         "Flip at 33.6544 Hz, supercritical: a stable orbit of twice the period (59.43 ms) exists "
         "above 33.6544 Hz."
     )
@@ -371,7 +371,7 @@ def test_torus_has_the_size_that_the_lyapunov_coefficient_says(torus_points, ind
 
 
 def test_torus_is_told_with_its_angle(torus_points):
-    said = describe(torus_points[0])
+    said = describe_special(torus_points[0])
     assert "supercritical: a stable torus" in said and "exists above 11.4727 Hz" in said
     mu = max(torus_points[0].orbit.multipliers, key=lambda value: value.imag)
     assert f"{math.degrees(cmath.phase(mu)):.4g} degrees per period" in said
@@ -539,8 +539,8 @@ def test_multipliers_are_continuous_at_a_grazing_point(harmonic_branch):
 
 def test_special_point_close_to_a_grazing_point_is_named(harmonic_branch):
     special = min(of_kind(harmonic_branch, "GR"), key=lambda s: s.frequency_hz)
-    assert "LP at 5.7461 Hz" in describe(special, harmonic_branch.special_points)
-    assert "close by" not in describe(special)
+    assert "LP at 5.7461 Hz" in describe_special(special, harmonic_branch.special_points)
+    assert "close by" not in describe_special(special)
 
 
 def test_kind_without_a_normal_form(harmonic_branch):

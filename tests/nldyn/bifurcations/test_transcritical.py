@@ -26,7 +26,7 @@ from nldyn import (
     SystemModelError,
     continue_branch,
     continue_special,
-    describe,
+    describe_special,
     refine_special,
     solve_orbit,
 )
@@ -140,7 +140,7 @@ def test_branch_points_are_where_a_multiplier_of_mathieus_equation_is_one(preloa
         assert np.abs(multipliers_of_y(special.frequency_hz) - 1.0).min() < 1e-8
         refined = refine_special(special)
         assert refined.frequency_hz == pytest.approx(special.frequency_hz, rel=1e-9)
-        assert "transcritical" in describe(special)
+        assert "transcritical" in describe_special(special)
 
 
 @pytest.mark.parametrize("index", [0, 1])

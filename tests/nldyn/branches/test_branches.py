@@ -15,7 +15,7 @@ from nldyn import (
     ConvergenceError,
     FlowMap,
     HarmonicForce,
-    SearchOptions,
+    OrbitSearchOptions,
     Stop,
     System,
     SystemModelError,
@@ -441,7 +441,9 @@ def test_branch_notes_where_special_points_may_be_missing(one_dof, monkeypatch, 
     pieces = (1 if middle_fails else 16) * (len(branch.points) - 1)
     assert len(branch.notes) == pieces
     assert branch.notes[0].endswith("Hz may be missing: no root found")
-    found = diagram(one_dof, (32.9, 33.1), [1], search_points=1, search=SearchOptions(starts=1))
+    found = diagram(
+        one_dof, (32.9, 33.1), [1], search_points=1, search=OrbitSearchOptions(starts=1)
+    )
     assert any(
         note.startswith("branch 01 harmonic: special points between 3") for note in found.notes
     )

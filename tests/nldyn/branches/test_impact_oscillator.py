@@ -13,7 +13,7 @@ from nldyn import (
     RigidStop,
     System,
     continue_branch,
-    describe,
+    describe_special,
     impacts,
     load,
     lyapunov_exponents,
@@ -111,12 +111,12 @@ def test_a_branch_ends_where_it_grazes(branch):
     assert last.kind == "GR"
     assert branch.stop_reasons[1].ending is Ending.GRAZES_RIGID
     assert last.frequency_hz == pytest.approx(exact, rel=1e-10)
-    assert "multiplier goes to infinity" in describe(last)
+    assert "multiplier goes to infinity" in describe_special(last)
     calm = continue_branch(solve_orbit(oscillator(), 0.45), (0.05, 0.8))
     first = calm.special_points[0]
     assert first.kind == "GR"
     assert first.frequency_hz == pytest.approx(exact, rel=1e-10)
-    assert "jumps" in describe(first)
+    assert "jumps" in describe_special(first)
 
 
 def test_branches_come_back_from_files(branch, tmp_path):

@@ -14,7 +14,7 @@ from nldyn import (
     Unbalance,
     cascade,
     continue_branch,
-    continue_in,
+    continue_orbit,
     impacts,
     solve_orbit,
 )
@@ -40,7 +40,7 @@ def test_the_impacting_orbit_of_recipes_for_continuation():
     assert 0.8 * hits.speed == pytest.approx([1.36], abs=0.005)
     assert np.radians(hits.phase_deg) == pytest.approx([0.076], abs=0.0005)
     assert orbit.states(np.array([math.pi]))[0] == pytest.approx([-0.98, -0.29], abs=0.005)
-    curve = continue_in(orbit, "amplitude", (0.01, 1.05))
+    curve = continue_orbit(orbit, "amplitude", (0.01, 1.05))
     assert [mark.kind for mark in curve.marks] == ["GR", "LP"]
     shape = OneImpact([[1.0]], [[1.0]], [[0.1]], [1.0], [1.0], 1.0, 0.8)
     graze, fold = (mark.values[0] for mark in curve.marks)

@@ -25,7 +25,7 @@ from nldyn import (
     Unbalance,
     continue_branch,
     continue_constant,
-    continue_in,
+    continue_orbit,
     continue_special,
     normal_form,
     refine_special,
@@ -36,7 +36,7 @@ from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.branches.endings import Ending
 from nldyn.branches.leg import trace
 from nldyn.curves import events as codimension
-from nldyn.curves.events import along_tori, flip_coefficient, is_torus
+from nldyn.curves.codimension_two import along_tori, flip_coefficient, is_torus
 from nldyn.orbits.bordered import OrbitFamily
 from nldyn.orbits.conditions import Singular, bialternate, max_abs_displacement, peak_force
 from nldyn.orbits.orbit import Orbit
@@ -51,7 +51,7 @@ MASS, NATURAL, RATIO = 2.0, 2.0 * math.pi * 10.0, 0.03
 def test_a_curve_that_begins_at_the_end_of_a_range_ends_there():
     """A stop without dissipation: beyond the end there are no systems."""
     orbit = solve_orbit(make_one_dof(), 25.3)
-    curve = continue_in(orbit, "dissipation", (0.0, 1.0))
+    curve = continue_orbit(orbit, "dissipation", (0.0, 1.0))
     assert curve.stop_reasons == ("end of the range of dissipation",) * 2
     assert curve.values[[0, -1], 0].tolist() == [0.0, 1.0]
 
@@ -204,7 +204,7 @@ def test_bialternate_product_has_the_products_of_eigenvalues():
 
 
 def test_continuation_in_frequency_is_the_branch(one_dof, harmonic_branch):
-    curve = continue_in(solve_orbit(one_dof, 26.0), "frequency_hz", (11.0, 36.0))
+    curve = continue_orbit(solve_orbit(one_dof, 26.0), "frequency_hz", (11.0, 36.0))
     expected = [s for s in harmonic_branch.special_points if 11.0 < s.frequency_hz < 36.0]
     assert [m.kind for m in curve.marks] == [s.kind for s in expected]
     for mark, special in zip(curve.marks, expected, strict=True):
@@ -241,7 +241,7 @@ def test_end_of_a_continuation_is_the_orbit_of_the_changed_system(parameter, val
     system = two_modes()
     start = solve_orbit(system, 20.0)
     old = value_of(system, 20.0, parameter)
-    curve = continue_in(start, parameter, (min(old, value), max(old, value)))
+    curve = continue_orbit(start, parameter, (min(old, value), max(old, value)))
     end = curve.orbits[0 if value < old else -1]
     assert value_of(end.system, end.frequency_hz, parameter) == pytest.approx(value, rel=1e-14)
     changed = with_value(system, parameter, value)
@@ -256,7 +256,7 @@ def test_a_range_may_end_where_the_parameter_does(name):
     least = 1.0 if name == "exponent" else 0.0
     start = solve_orbit(two_modes(), 20.0)
     value = value_of(start.system, 20.0, Parameter(name))
-    curve = continue_in(start, name, (least, value))
+    curve = continue_orbit(start, name, (least, value))
     assert least in curve.values[[0, -1], 0]
     assert curve.residuals.max() < 1e-11
 
@@ -308,7 +308,7 @@ def first_touch():
     """Where the linear oscillator at 8 Hz first touches its stop as the gap closes."""
     orbit = solve_orbit(linear_stop(), 8.0)
     assert orbit.impacts == 0
-    curve = continue_in(orbit, "gap", (0.8 * amplitude(8.0), 2e-3))
+    curve = continue_orbit(orbit, "gap", (0.8 * amplitude(8.0), 2e-3))
     (mark,) = [m for m in curve.marks if m.kind == "GR"]
     assert mark.values[0] == pytest.approx(amplitude(8.0), rel=1e-11)
     return mark
@@ -752,18 +752,27 @@ WINDOW = ((20.0, 30.0), (-1e-6, 1e-6))
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda o: continue_in(o, "mass", (1.0, 2.0)), "unknown parameter 'mass'; there are"),
-        (lambda o: continue_in(o, Parameter("gap", 3), (0.0, 1.0)), "no stop 3; there are 1"),
-        (lambda o: continue_in(o, Parameter("modal_damping", 4), (0, 1)), "no mode 4; there are 1"),
-        (lambda o: continue_in(o, "coefficient", (0.0, 1.0)), "no damper 0; the system has none"),
-        (lambda o: continue_in(o, "amplitude", (0.0, 1.0)), "excitation 0 has no amplitude"),
-        (lambda o: continue_in(o, "gap", (1e-6, 2e-6)), "the start has gap = 0, outside"),
-        (lambda o: continue_in(o, "gap", (1e-6, math.nan)), "two finite numbers, ascending"),
-        (lambda o: continue_in(o, "gap", (1e-6, -1e-6)), "two finite numbers, ascending"),
-        (lambda o: continue_in(o, "gap", 1.0), "must be two numbers, got 1.0"),
-        (lambda o: continue_in(o, "frequency_hz", (-1.0, 30.0)), "must be positive"),
-        (lambda o: continue_in(o, "stiffness", (0.0, 6e9)), "must begin above zero, got (0.0, 6"),
-        (lambda o: continue_in(o, "stiffness", (-1.0, 6e9)), "must be 0 at least, got (-1.0, 6"),
+        (lambda o: continue_orbit(o, "mass", (1.0, 2.0)), "unknown parameter 'mass'; there are"),
+        (lambda o: continue_orbit(o, Parameter("gap", 3), (0.0, 1.0)), "no stop 3; there are 1"),
+        (
+            lambda o: continue_orbit(o, Parameter("modal_damping", 4), (0, 1)),
+            "no mode 4; there are 1",
+        ),
+        (
+            lambda o: continue_orbit(o, "coefficient", (0.0, 1.0)),
+            "no damper 0; the system has none",
+        ),
+        (lambda o: continue_orbit(o, "amplitude", (0.0, 1.0)), "excitation 0 has no amplitude"),
+        (lambda o: continue_orbit(o, "gap", (1e-6, 2e-6)), "the start has gap = 0, outside"),
+        (lambda o: continue_orbit(o, "gap", (1e-6, math.nan)), "two finite numbers, ascending"),
+        (lambda o: continue_orbit(o, "gap", (1e-6, -1e-6)), "two finite numbers, ascending"),
+        (lambda o: continue_orbit(o, "gap", 1.0), "must be two numbers, got 1.0"),
+        (lambda o: continue_orbit(o, "frequency_hz", (-1.0, 30.0)), "must be positive"),
+        (
+            lambda o: continue_orbit(o, "stiffness", (0.0, 6e9)),
+            "must begin above zero, got (0.0, 6",
+        ),
+        (lambda o: continue_orbit(o, "stiffness", (-1.0, 6e9)), "must be 0 at least, got (-1.0, 6"),
         (
             lambda o: continue_constant(o, "torque", ("frequency_hz", "gap"), WINDOW),
             "unknown monitor 'torque'; there are: peak_force",
@@ -888,7 +897,9 @@ def test_each_of_two_parameters_of_one_name_has_its_own_orbits():
 
 def test_a_curve_has_no_other_parameters_than_its_own(one_dof):
     options = ContinuationOptions(max_points=2)
-    curve = continue_in(solve_orbit(one_dof, 26.0), "frequency_hz", (25.0, 27.0), options=options)
+    curve = continue_orbit(
+        solve_orbit(one_dof, 26.0), "frequency_hz", (25.0, 27.0), options=options
+    )
     assert curve.stop_reasons == ("2 points", "2 points")
     with pytest.raises(SystemModelError, match="no parameter 'gap'; there are: frequency_hz"):
         curve.at("gap", 0.0)

@@ -16,7 +16,7 @@ from nldyn import (
     System,
     SystemModelError,
     continue_branch,
-    continue_in,
+    continue_orbit,
     continue_special,
     solve_orbit,
 )
@@ -113,7 +113,7 @@ def test_a_closed_curve_has_each_orbit_once_at_a_value():
 
 
 def test_orbits_over_a_parameter_are_drawn_with_their_special_points():
-    curve = continue_in(solve_orbit(bilinear(), 12.2), "gap", (3e-4, 3e-3))
+    curve = continue_orbit(solve_orbit(bilinear(), 12.2), "gap", (3e-4, 3e-3))
     kinds = {mark.kind for mark in curve.marks}
     assert "LP" in kinds
     ax = plot_orbit_curve(curve)

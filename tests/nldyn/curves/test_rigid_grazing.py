@@ -14,7 +14,7 @@ from nldyn import (
     RigidStop,
     System,
     continue_branch,
-    continue_in,
+    continue_orbit,
     continue_special,
     load,
     normal_form,
@@ -103,7 +103,7 @@ def test_a_second_impact_grazes_where_the_closed_form_says(periods, start_hz, be
 @pytest.fixture(scope="module")
 def in_frequency():
     """The branch again, followed as a curve: the impact passes the shooting phase zero on it."""
-    return continue_in(solve_orbit(oscillator(), 0.27), "frequency_hz", (0.05, 0.8))
+    return continue_orbit(solve_orbit(oscillator(), 0.27), "frequency_hz", (0.05, 0.8))
 
 
 def test_a_curve_goes_on_where_an_impact_passes_a_phase_of_shooting(branch, in_frequency):
@@ -142,7 +142,7 @@ def test_a_body_at_rest_on_a_stop_grazes_nothing():
     )  # fmt: skip
     orbit = solve_orbit(system, 0.1)
     assert orbit.impacts == 0
-    curve = continue_in(orbit, "amplitude", (0.25, 2.2))
+    curve = continue_orbit(orbit, "amplitude", (0.25, 2.2))
     assert not curve.marks
     assert not curve.notes
     assert [point.orbit.impacts for point in (curve.points[0], curve.points[-1])] == [0, 1]

@@ -234,7 +234,9 @@ def test_what_makes_no_sense_is_refused():
     with pytest.raises(SystemModelError, match="coefficient must be positive"):
         CubicDamper("a", 0.0)
     with pytest.raises(SystemModelError, match="has no such coefficient"):
-        nldyn.continue_in(nldyn.solve_orbit(SYSTEMS["hardening"], 0.1), Parameter("k4"), (0.0, 1.0))
+        nldyn.continue_orbit(
+            nldyn.solve_orbit(SYSTEMS["hardening"], 0.1), Parameter("k4"), (0.0, 1.0)
+        )
 
 
 def test_a_fold_in_two_parameters_obeys_the_scaling_of_duffings_equation():
@@ -260,7 +262,7 @@ def test_both_wells_hold_an_orbit_and_a_motion_settles_in_one():
     means = sorted(float(orbit.states(phases)[:, 0].mean()) for orbit in orbits)
     assert means[0] < -0.5
     assert means[0] == pytest.approx(-means[-1], abs=1e-8)
-    assert nldyn.classify(system, 1.0 / (2.0 * math.pi)).kind == "periodic"
+    assert nldyn.classify_attractor(system, 1.0 / (2.0 * math.pi)).kind == "periodic"
 
 
 def test_a_motion_comes_to_rest_where_the_terms_of_a_force_cancel():

@@ -8,7 +8,7 @@ from nldyn import (
     FlowMap,
     FlowOptions,
     HarmonicForce,
-    SearchOptions,
+    OrbitSearchOptions,
     Stop,
     System,
     diagram,
@@ -118,7 +118,7 @@ def test_a_motion_may_begin_on_a_stop_that_it_leaves():
 
 
 def test_a_search_that_finds_nothing_says_so():
-    effort = SearchOptions(starts=1, transient=5, recorded=6)
+    effort = OrbitSearchOptions(starts=1, transient=5, recorded=6)
     found = diagram(make_one_dof(), (20.0, 21.0), (7,), search_points=1, search=effort)
     assert found.branches == ()
     assert found.notes == ("no orbit of period 7 found by simulation at 1 frequency",)

@@ -18,7 +18,7 @@ from nldyn import (
     SystemModelError,
     continue_branch,
     continue_constant,
-    continue_in,
+    continue_orbit,
     continue_special,
     save,
     solve_orbit,
@@ -64,7 +64,7 @@ def make(kind):
         return continue_special(found, pair, ranges, options=few)
     start = solve_orbit(one_dof, 26.0)
     if kind == "orbit":
-        return continue_in(start, "frequency_hz", (15.0, 30.0))
+        return continue_orbit(start, "frequency_hz", (15.0, 30.0))
     monitor = {"own": force, "max_abs_displacement": "max_abs_displacement"}[kind]
     window = ((25.0, 27.0), (-1e-7, 1e-7))
     return continue_constant(start, monitor, ("frequency_hz", "gap"), window, options=few)
@@ -139,7 +139,7 @@ def test_an_extended_curve_is_the_curve_through_the_longer_range():
 def test_a_loaded_curve_goes_on(tmp_path):
     few = ContinuationOptions(max_points=3)
     start = solve_orbit(make_one_dof(), 26.0)
-    short = continue_in(start, Parameter("stiffness"), (1e9, 2e10), options=few)
+    short = continue_orbit(start, Parameter("stiffness"), (1e9, 2e10), options=few)
     assert "3 points" in short.stop_reasons
     save(short, tmp_path / "short.h5")
     longer = load_curves(tmp_path / "short.h5")[0].extend([(1e9, 2e10)])
@@ -181,7 +181,7 @@ def test_an_interrupted_curve_is_kept_and_finished(tmp_path, share):
     next_flip = special(make_one_dof(), "PD", (12.0, 20.0), 20.0)
     for other in (
         continue_special(next_flip, pair, ranges, options=few),
-        continue_in(solve_orbit(make_one_dof(), 26.0), "gap", (0.0, 1e-7), options=few),
+        continue_orbit(solve_orbit(make_one_dof(), 26.0), "gap", (0.0, 1e-7), options=few),
     ):
         with pytest.raises(SystemModelError, match="holds another curve, or more of this one"):
             other.extend(
@@ -194,7 +194,7 @@ def test_an_interrupted_curve_is_kept_and_finished(tmp_path, share):
 def test_an_interrupted_closed_curve_closes_where_it_began(tmp_path, monkeypatch, searched):
     """A closed 1/3 branch between two equal stops."""
     orbit = solve_orbit(between_stops(), 11.26, 3, guess=[7.9058e-06, 9.9213e-05])
-    whole = continue_in(orbit, "frequency_hz", (11.0, 12.0))
+    whole = continue_orbit(orbit, "frequency_hz", (11.0, 12.0))
     assert whole.stop_reasons == ("closed curve", "closed curve")
     seen = []
 
@@ -210,7 +210,7 @@ def test_an_interrupted_closed_curve_closes_where_it_began(tmp_path, monkeypatch
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
         if searched:
             patched.setattr(curves, "_marked", stop_search)
-        continue_in(
+        continue_orbit(
             orbit, "frequency_hz", (11.0, 12.0), progress=stop, checkpoint=CheckpointFile(path)
         )
     done = load_curves(path)[0].extend([(11.0, 12.0)])
@@ -226,7 +226,7 @@ def test_an_interrupted_closed_curve_closes_where_it_began(tmp_path, monkeypatch
 
 def test_several_curves_in_one_file_and_what_is_refused(tmp_path):
     path, curve = tmp_path / "curves.h5", make("own")
-    few = continue_in(solve_orbit(make_one_dof(), 26.0), "frequency_hz", (25.9, 26.1))
+    few = continue_orbit(solve_orbit(make_one_dof(), 26.0), "frequency_hz", (25.9, 26.1))
     save_curves(path, [few, few])
     assert [c.kind for c in load_curves(path)] == ["orbit", "orbit"]
     with pytest.raises(SystemModelError, match="is not a file of branches"):

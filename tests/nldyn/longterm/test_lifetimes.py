@@ -9,14 +9,14 @@ import pytest
 from problems import make_one_dof
 from scipy.stats import poisson
 
-from nldyn import SystemModelError, chaos_lifetime, classify
+from nldyn import SystemModelError, chaos_lifetime, classify_attractor
 from nldyn.longterm.attractors import Attractor, AttractorOptions
 from nldyn.longterm.lifetimes import LOOK, ChaosLifetime, _ended
 
 
 @pytest.fixture(scope="module")
 def lasting() -> Attractor:
-    return classify(make_one_dof(), 36.0)
+    return classify_attractor(make_one_dof(), 36.0)
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def passing() -> Attractor:
     """
     short = AttractorOptions(transient=200, periods=200, confirmations=0)
     starts = ([s * 1e-6, 0.0] for s in range(40))
-    runs = (classify(make_one_dof(), 35.38, start=s, options=short) for s in starts)
+    runs = (classify_attractor(make_one_dof(), 35.38, start=s, options=short) for s in starts)
     return next(found for found in runs if found.kind == "chaotic")
 
 
@@ -47,7 +47,7 @@ def test_transient_chaos_ends_and_says_when(passing):
             for _ in range(int(ended) // LOOK):  # in the same pieces: chaos shows their rounding
                 later = passing.flow.strobe(later, 2.0 * np.pi * 35.38, LOOK).ends[-1]
             start = passing.flow.to_modal(later)
-            assert classify(passing.flow, 35.38, start=start).kind == "periodic"
+            assert classify_attractor(passing.flow, 35.38, start=start).kind == "periodic"
 
 
 def _states(attractor: Attractor, count: int) -> np.ndarray:
@@ -77,7 +77,7 @@ def test_lifetimes_drawn_at_a_known_rate_are_covered_by_the_bound():
 
 
 def test_what_has_settled_is_found_settled(lasting):
-    orbit = classify(make_one_dof(), 50.0)
+    orbit = classify_attractor(make_one_dof(), 50.0)
     assert _ended(orbit.flow, 50.0, 1000, orbit.states[0]) == 250
 
 
@@ -89,7 +89,10 @@ def test_what_has_settled_is_found_settled(lasting):
         (lambda a: chaos_lifetime(a, states=10**6), "whole number from 1 to 1000, got 1000000"),
         (lambda a: chaos_lifetime(a, periods=10), "periods must be a whole number from 1000"),
         (lambda a: chaos_lifetime(a, executor=3), "executor must be an Executor or None"),
-        (lambda a: chaos_lifetime(classify(make_one_dof(), 50.0)), "the one at 50 Hz is period 2"),
+        (
+            lambda a: chaos_lifetime(classify_attractor(make_one_dof(), 50.0)),
+            "the one at 50 Hz is period 2",
+        ),
     ],
 )
 def test_bad_input_is_one_sentence(lasting, call, said):

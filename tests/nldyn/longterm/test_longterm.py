@@ -15,15 +15,15 @@ from nldyn import (
     ExploreOptions,
     FlowMap,
     HarmonicForce,
-    Plane,
-    SearchOptions,
+    OrbitSearchOptions,
+    StatePlane,
     Stop,
     System,
     SystemModelError,
     basin_edge,
     basins,
     brute_force,
-    classify,
+    classify_attractor,
     contact_measures,
     continue_branch,
     find_attractors,
@@ -40,8 +40,8 @@ from nldyn import (
 from nldyn.base.errors import ConvergenceError
 from nldyn.longterm.attractors import Attractor, AttractorOptions, zero_one_test
 from nldyn.longterm.basins import settle, target_of
+from nldyn.longterm.contact_measures import measures_table, power_spectrum, spectra_table
 from nldyn.longterm.poincare import BruteForce, Column
-from nldyn.longterm.wear import measures_table, power_spectrum, spectra_table
 from nldyn.plot.longterm import (
     plot_basins,
     plot_brute_force,
@@ -59,8 +59,8 @@ def one_dof() -> System:
 
 
 @pytest.fixture(scope="module")
-def plane(one_dof) -> Plane:
-    return Plane.at_interface(one_dof, (-3e-4, 0.4e-4), (-0.05, 0.05))
+def plane(one_dof) -> StatePlane:
+    return StatePlane.at_interface(one_dof, (-3e-4, 0.4e-4), (-0.05, 0.05))
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,7 @@ def at_50_hz(one_dof, plane):
 
 @pytest.mark.parametrize(("hz", "name"), [(25.3, "period 1"), (50.0, "period 2")])
 def test_periodic_attractors_are_the_stable_orbits(one_dof, hz, name):
-    found = classify(one_dof, hz)
+    found = classify_attractor(one_dof, hz)
     assert found.name == name
     assert found.orbit is not None and found.orbit.stable
     value, error = found.largest_exponent
@@ -83,7 +83,7 @@ def test_periodic_attractors_are_the_stable_orbits(one_dof, hz, name):
 
 
 def test_chaos_is_found_by_two_independent_tests(one_dof):
-    found = classify(one_dof, 36.0)
+    found = classify_attractor(one_dof, 36.0)
     assert found.kind == "chaotic"
     assert found.exponents is not None and found.exponents.chaotic
     assert found.zero_one > 0.8
@@ -100,7 +100,7 @@ def free_body() -> System:
 
 @pytest.mark.parametrize("speed", [1e-3, -2.0])
 def test_a_free_body_that_moves_on_is_drifting(speed):
-    found = classify(free_body(), 20.0, start=[0.0, 0.0, speed, 0.0])
+    found = classify_attractor(free_body(), 20.0, start=[0.0, 0.0, speed, 0.0])
     assert found.name == "drifting" and "rigid-body mode" in found.evidence
     place = found.flow.to_modal(found.states)[:, 0]
     way = speed * (len(place) - 1) / 20.0
@@ -108,19 +108,19 @@ def test_a_free_body_that_moves_on_is_drifting(speed):
 
 
 def test_a_free_body_that_stays_is_not_drifting():
-    assert classify(free_body(), 20.0).kind == "undecided"
+    assert classify_attractor(free_body(), 20.0).kind == "undecided"
 
 
 def test_basins_of_a_system_without_damping_are_refused():
     system = System.from_modal([13.0], {"a": [0.6]}, stops=[Stop("a", 1e9, gap=1e-4)])
-    plane = Plane.at_interface(system, (-1e-3, 1e-4), (-0.05, 0.05))
+    plane = StatePlane.at_interface(system, (-1e-3, 1e-4), (-0.05, 0.05))
     with pytest.raises(SystemModelError, match="system without damping has no attractors"):
         basins(system, 20.0, plane, shape=(4, 4))
 
 
 def test_free_vibration_under_forcing_is_quasi_periodic():
     system = System.from_modal([10.0], {"tip": [1.0]}, excitation=[HarmonicForce("tip", 1.0)])
-    found = classify(system, 10.0 * (1.0 + math.sqrt(5.0)), start=[1e-3, 0.0])
+    found = classify_attractor(system, 10.0 * (1.0 + math.sqrt(5.0)), start=[1e-3, 0.0])
     assert found.kind == "quasi-periodic" and "power of the time" in found.evidence
     assert found.zero_one < 0.2
 
@@ -130,7 +130,7 @@ def test_a_torus_of_a_damped_structure_is_quasi_periodic():
     from nldyn.scene.build import build_system
     from nldyn.scene.read import load_scene
 
-    found = classify(build_system(load_scene(example("four_dof_xi_0.01.toml"))), 62.0)
+    found = classify_attractor(build_system(load_scene(example("four_dof_xi_0.01.toml"))), 62.0)
     assert found.kind == "quasi-periodic"
     value, error = found.largest_exponent
     assert abs(value) < 3.0 * error
@@ -146,7 +146,7 @@ def lightly_damped(ratio: float, **changes) -> System:
 def test_a_slow_transient_is_followed_to_the_orbit_that_newton_finds(ratio, name):
     system = lightly_damped(ratio)
     hz = 7.0 * math.sqrt(2.0)
-    found = classify(system, hz)
+    found = classify_attractor(system, hz)
     assert found.name == name
     value, _ = found.largest_exponent
     assert value == pytest.approx(-ratio * 20.0 * math.pi, rel=1e-4)
@@ -158,7 +158,7 @@ def test_a_slow_transient_is_followed_to_the_orbit_that_newton_finds(ratio, name
 def test_a_transient_too_slow_to_end_is_undecided_and_told(ratio):
     system = lightly_damped(ratio)
     hz = 7.0 * math.sqrt(2.0)
-    found = classify(system, hz)
+    found = classify_attractor(system, hz)
     assert found.kind == "undecided"
     assert found.largest_exponent[0] == pytest.approx(-ratio * 20.0 * math.pi, rel=1e-2)
     assert "slow transient to the stable orbit of period 1" in found.evidence
@@ -180,7 +180,7 @@ def test_rest_is_the_attractor_of_a_damped_motion_without_forcing(gap):
 @pytest.mark.parametrize(("start", "after"), [([0.0, 0.0], 1), ([1e-2, 0.0], 2)])
 def test_a_motion_that_repeats_but_attracts_nothing_is_not_quasi_periodic(start, after):
     system = System.from_modal([15.0], {"tip": [1.0]})
-    found = classify(system, 10.0, start=start)
+    found = classify_attractor(system, 10.0, start=start)
     assert found.kind == "undecided"
     assert f"repeats after {after} period" in found.evidence
 
@@ -188,14 +188,16 @@ def test_a_motion_that_repeats_but_attracts_nothing_is_not_quasi_periodic(start,
 def test_chaos_that_ends_is_told_as_a_transient_of_the_orbit_after_it(one_dof):
     """From a third of the starts it ends sooner than it is seen to be chaos."""
     starts = ([s * 1e-6, 0.0] for s in range(24))
-    found = next(a for a in (classify(one_dof, 35.38, start=s) for s in starts) if a.chaotic_runs)
+    found = next(
+        a for a in (classify_attractor(one_dof, 35.38, start=s) for s in starts) if a.chaotic_runs
+    )
     assert found.orbit is not None and found.orbit.stable
     assert found.chaotic_runs[0].chaotic
     assert "a chaotic transient before" in found.evidence
 
 
 def test_chaos_that_lasts_is_confirmed_by_a_second_run(one_dof):
-    found = classify(one_dof, 36.0)
+    found = classify_attractor(one_dof, 36.0)
     assert found.exponents is not None
     (first,) = found.chaotic_runs
     apart = abs(first.largest - found.exponents.largest)
@@ -332,7 +334,7 @@ def test_two_stable_orbits_share_the_plane_and_unstable_ones_sit_on_the_edge():
     from nldyn.scene.read import load_scene
 
     system = build_system(load_scene(example("two_dof_xi_0.01.toml")))
-    plane = Plane.at_interface(system, (-3e-5, 1e-5), (-0.006, 0.006))
+    plane = StatePlane.at_interface(system, (-3e-5, 1e-5), (-0.006, 0.006))
     told = []
     found = basins(
         system, 22.8, plane, shape=(10, 10), starts=12, checks=10,
@@ -371,7 +373,7 @@ def test_of_the_two_stable_branches_below_23_hz_one_is_left_at_23_hz(ratio):
 
 
 def test_neighbourhood_of_an_orbit_leads_to_it(one_dof):
-    attractor = classify(one_dof, 25.3)
+    attractor = classify_attractor(one_dof, 25.3)
     target = target_of(attractor)
     assert target.shapes is not None
     flow = attractor.flow
@@ -665,12 +667,24 @@ def test_a_sweep_is_labelled_with_the_rate_it_was_asked_for(one_dof):
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: AttractorOptions(periods=10**29), "classify: periods must be a whole number"),
-        (lambda: AttractorOptions(max_period=10**15), "classify: max_period must be a whole"),
-        (lambda: AttractorOptions(transient=10**29), "classify: transient must be a whole"),
-        (lambda: AttractorOptions(confirmations=10**29), "classify: confirmations must be"),
-        (lambda: SearchOptions(starts=10**15), "search: starts must be a whole number"),
-        (lambda: SearchOptions(transient=10**15), "search: transient must be a whole number"),
+        (
+            lambda: AttractorOptions(periods=10**29),
+            "classify_attractor: periods must be a whole number",
+        ),
+        (
+            lambda: AttractorOptions(max_period=10**15),
+            "classify_attractor: max_period must be a whole",
+        ),
+        (
+            lambda: AttractorOptions(transient=10**29),
+            "classify_attractor: transient must be a whole",
+        ),
+        (
+            lambda: AttractorOptions(confirmations=10**29),
+            "classify_attractor: confirmations must be",
+        ),
+        (lambda: OrbitSearchOptions(starts=10**15), "search: starts must be a whole number"),
+        (lambda: OrbitSearchOptions(transient=10**15), "search: transient must be a whole number"),
         (lambda: ExploreOptions(starts=10**15), "explore: starts must be a whole number"),
         (lambda: ExploreOptions(unstable_period=10**15), "explore: unstable_period must be"),
         (lambda: ExploreOptions(doubled_points=10**15), "explore: doubled_points must be"),
@@ -689,7 +703,7 @@ def test_a_system_without_stops_is_told_so(take):
 
 
 def small_plane(system):
-    return Plane.at_interface(system, (-2e-4, 0.0), (-0.05, 0.05))
+    return StatePlane.at_interface(system, (-2e-4, 0.0), (-0.05, 0.05))
 
 
 @pytest.mark.parametrize(
@@ -698,11 +712,20 @@ def small_plane(system):
         (lambda s: brute_force(s, (40.0, 30.0)), "range"),
         (lambda s: brute_force(s, (30.0, 40.0), directions=["left"]), "must be one of up, down"),
         (lambda s: brute_force(s, (30.0, 40.0), directions=[]), "needs a direction or random"),
-        (lambda s: Plane.at_interface(s, (1.0, 0.0), (0.0, 1.0)), "x_range must be two ascending"),
-        (lambda s: Plane.at_interface(s, (0, 1), (0, 1), interface="top"), "unknown interface"),
-        (lambda s: Plane(np.zeros(2), np.ones(2), np.ones(2), (0, 1), (0, 1)), "parallel"),
+        (
+            lambda s: StatePlane.at_interface(s, (1.0, 0.0), (0.0, 1.0)),
+            "x_range must be two ascending",
+        ),
+        (
+            lambda s: StatePlane.at_interface(s, (0, 1), (0, 1), interface="top"),
+            "unknown interface",
+        ),
+        (lambda s: StatePlane(np.zeros(2), np.ones(2), np.ones(2), (0, 1), (0, 1)), "parallel"),
         (lambda s: stable_manifold(solve_orbit(s, 25.3), small_plane(s)), "no saddle: 0 of its"),
-        (lambda s: stable_manifold(solve_orbit(s, 25.3), None), "plane must be a Plane, got None"),
+        (
+            lambda s: stable_manifold(solve_orbit(s, 25.3), None),
+            "plane must be a StatePlane, got None",
+        ),
         (lambda s: basin_edge(None), "found must be a Basins, got None"),
         (lambda s: measures_table([None]), "entry 0 must be an Orbit or a Motion or an Attractor"),
         (lambda s: measures_table([simulate(s, 20.0, 1)], stop=1), "stop must be a whole number"),
@@ -711,11 +734,11 @@ def small_plane(system):
         (lambda s: brute_force(s, (30.0, 40.0), directions=None), "directions must be a Sequence"),
         (lambda s: brute_force(s, (30.0, 40.0), executor=2), "executor must be an Executor"),
         (lambda s: find_attractors(s, 25.3, executor=2), "executor must be an Executor"),
-        (lambda s: classify(s, 25.3, options={}), "options must be an AttractorOptions"),
+        (lambda s: classify_attractor(s, 25.3, options={}), "options must be an AttractorOptions"),
         (lambda s: impacts(None), "motion must be a Motion or an Orbit, got None"),
-        (lambda s: Plane.at_interface(s, 1.0, (0.0, 1.0)), "displacement must be a Sequence"),
-        (lambda s: Plane.at_interface(s, (0.0, 1.0), None), "velocity must be a Sequence"),
-        (lambda s: basins(s, 50.0, None), "plane must be a Plane, got None"),
+        (lambda s: StatePlane.at_interface(s, 1.0, (0.0, 1.0)), "displacement must be a Sequence"),
+        (lambda s: StatePlane.at_interface(s, (0.0, 1.0), None), "velocity must be a Sequence"),
+        (lambda s: basins(s, 50.0, None), "plane must be a StatePlane, got None"),
         (lambda s: basins(s, 50.0, small_plane(s), shape=5), "basins: shape must be a Sequence"),
         (lambda s: small_plane(s).states(4), "plane: shape must be a Sequence"),
         (lambda s: basins(s, 50.0, small_plane(s), executor=2), "executor must be an Executor"),
@@ -734,7 +757,7 @@ def test_bad_input_is_one_sentence(one_dof, call, said):
 
 def test_basins_take_attractors_of_their_own_system_and_frequency_only(one_dof):
     def of(system, hz):
-        found = classify(make_one_dof(**system), hz)
+        found = classify_attractor(make_one_dof(**system), hz)
         return basins(
             one_dof, 50.0, small_plane(one_dof), shape=(2, 2), starts=1, checks=1,
             attractors=[found],

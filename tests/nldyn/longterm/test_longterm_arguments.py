@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nldyn import (
-    Plane,
+    StatePlane,
     System,
     SystemModelError,
     basin_edge,
@@ -29,8 +29,8 @@ from nldyn import (
     sweep,
 )
 from nldyn.longterm.attractors import AttractorOptions, zero_one_test
+from nldyn.longterm.contact_measures import measures_table, power_spectrum
 from nldyn.longterm.lyapunov import standard_errors
-from nldyn.longterm.wear import measures_table, power_spectrum
 from nldyn.plot.longterm import (
     plot_basins,
     plot_brute_force,
@@ -43,7 +43,7 @@ JUNK = (None, "nonsense", {"a": 1}, math.nan, -1, 10**400, object(), np.zeros(3)
 
 
 def at_50(system):
-    plane = Plane.at_interface(system, (-2e-4, 0.0), (-0.05, 0.05))
+    plane = StatePlane.at_interface(system, (-2e-4, 0.0), (-0.05, 0.05))
     return plane, basins(system, 50.0, plane, shape=(3, 3), checks=1, starts=1)
 
 
@@ -137,7 +137,7 @@ def test_what_is_no_result_cannot_be_drawn(draw):
 def test_one_direction_of_a_plane_of_a_wrong_length_is_refused(name):
     vectors = {"x": [1.0, 0.0], "y": [0.0, 1.0], name: [1.0, 2.0, 3.0]}
     with pytest.raises(SystemModelError, match="origin, x and y must be vectors of one length"):
-        Plane([0.0, 0.0], **vectors, x_range=(0.0, 1.0), y_range=(0.0, 1.0))
+        StatePlane([0.0, 0.0], **vectors, x_range=(0.0, 1.0), y_range=(0.0, 1.0))
 
 
 def test_an_empty_list_of_initial_states_and_a_huge_plane_are_refused(given):

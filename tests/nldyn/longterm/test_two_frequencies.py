@@ -15,7 +15,7 @@ from nldyn import (
     System,
     SystemModelError,
     basins,
-    classify,
+    classify_attractor,
     diagram,
     find_orbits,
     impacts,
@@ -24,7 +24,7 @@ from nldyn import (
     solve_orbit,
     sweep,
 )
-from nldyn.longterm.basins import Plane
+from nldyn.longterm.basins import StatePlane
 from nldyn.scene.build import build_system
 from nldyn.scene.read import parse_scene
 
@@ -115,12 +115,12 @@ def test_motions_at_stops_are_those_of_two_orders_of_a_lower_frequency():
 
 def test_what_needs_a_period_refuses_in_one_sentence():
     system = make(FIRST, HarmonicForce("b", 1.5, frequency_hz=OTHER), stops=STOPS[:1])
-    plane = Plane(np.zeros(4), np.eye(4)[0], np.eye(4)[2], (-1.0, 1.0), (-1.0, 1.0))
+    plane = StatePlane(np.zeros(4), np.eye(4)[0], np.eye(4)[2], (-1.0, 1.0), (-1.0, 1.0))
     for compute in (
         lambda: solve_orbit(system, 3.0),
         lambda: find_orbits(system, 3.0, 2),
         lambda: diagram(system, (2.0, 3.0)),
-        lambda: classify(system, 3.0),
+        lambda: classify_attractor(system, 3.0),
         lambda: basins(system, 3.0, plane),
     ):
         with pytest.raises(

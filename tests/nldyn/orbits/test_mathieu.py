@@ -23,7 +23,7 @@ from nldyn import (
     System,
     continue_branch,
     continue_special,
-    describe,
+    describe_special,
     refine_special,
     solve_orbit,
 )
@@ -108,8 +108,10 @@ def test_flips_and_branch_points_of_a_branch_are_where_mathieu_has_them():
             mu = mathieu_multipliers(omega_of(special), force, damping)
             assert np.abs(mu - target).min() < 1e-8
             # the motion of x is half-wave symmetric; what breaks is y = 0, of a system that is not
-            assert ("pitchfork" in describe(special)) == (kind == "BP")
-            assert "mirror" not in describe(special) and "x(t + T/2)" not in describe(special)
+            assert ("pitchfork" in describe_special(special)) == (kind == "BP")
+            assert "mirror" not in describe_special(
+                special
+            ) and "x(t + T/2)" not in describe_special(special)
 
 
 def test_no_neimark_sacker_point_where_a_coordinate_has_no_damping():

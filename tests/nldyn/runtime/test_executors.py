@@ -18,13 +18,13 @@ from problems import make_one_dof
 
 from nldyn import (
     FlowMap,
-    Plane,
+    StatePlane,
     Stop,
     SystemModelError,
     basin_edge,
     basins,
     brute_force,
-    classify,
+    classify_attractor,
     contact_measures,
     find_attractors,
     impacts,
@@ -36,7 +36,7 @@ from nldyn import (
     sweep,
 )
 from nldyn.base.resources import example
-from nldyn.longterm.wear import measures_table
+from nldyn.longterm.contact_measures import measures_table
 from nldyn.runtime import executors
 from nldyn.runtime.executors import TaskError, as_finished
 from nldyn.scene.build import build_system
@@ -73,7 +73,9 @@ def exponents(executor, progress):
 
 
 def measured(executor, progress):
-    attractors = [classify(make_one_dof(), hz) for hz in (36.0, 50.0)]  # chaos and an orbit
+    attractors = [
+        classify_attractor(make_one_dof(), hz) for hz in (36.0, 50.0)
+    ]  # chaos and an orbit
     sources = [*attractors, *simulate(make_one_dof(), HERTZ[:3], 50)]
     table = measures_table(sources, periods=50, executor=executor, progress=progress)
     return [column.astype(str) for column in table.values()]
@@ -82,7 +84,7 @@ def measured(executor, progress):
 def manifold(executor, progress):
     system = make_one_dof()
     saddle = solve_orbit(system, 50.0)
-    plane = Plane.at_interface(system, (-2e-4, 0.0), (-0.05, 0.05))
+    plane = StatePlane.at_interface(system, (-2e-4, 0.0), (-0.05, 0.05))
     return stable_manifold(saddle, plane, max_points=60, executor=executor, progress=progress)
 
 
@@ -106,7 +108,7 @@ def alone():
 
 @pytest.fixture(scope="module")
 def plane():
-    return Plane.at_interface(make_one_dof(), (-3e-4, 0.4e-4), (-0.05, 0.05))
+    return StatePlane.at_interface(make_one_dof(), (-3e-4, 0.4e-4), (-0.05, 0.05))
 
 
 @pytest.fixture(scope="module")
@@ -273,7 +275,7 @@ def test_a_law_of_ones_own_goes_to_another_process_and_back():
     """Its machine code lies elsewhere there: what is sent must not hold its address."""
     stop = Stop("middle", 5e7, 1.0, law=cluster_tasks.lossy_spring)
     system = make_one_dof(stops=[stop])
-    here = classify(system, 50.0)
+    here = classify_attractor(system, 50.0)
     contact_measures(here)  # compiles the law
     with processes(1) as pool:
         [there] = [
@@ -391,7 +393,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(compute, alone, cl
 @pytest.mark.slow
 def test_points_on_the_edge_of_basins_do_not_depend_on_the_executor():
     system = build_system(load_scene(example("two_dof_xi_0.01.toml")))
-    plane = Plane.at_interface(system, (-3e-5, 1e-5), (-0.006, 0.006))
+    plane = StatePlane.at_interface(system, (-3e-5, 1e-5), (-0.006, 0.006))
     found = basins(system, 22.8, plane, shape=(6, 6), starts=8, checks=2)
     points, saddles = basin_edge(found, 4)
     with ThreadPoolExecutor(2) as pool:

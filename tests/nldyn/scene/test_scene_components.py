@@ -16,8 +16,8 @@ from nldyn.app.cli import main
 from nldyn.base.resources import example
 from nldyn.scene.backbone import undamped
 from nldyn.scene.build import build_parts, build_reduced, build_system
+from nldyn.scene.case_keys import case_keys
 from nldyn.scene.read import load_scene, parse_scene
-from nldyn.scene.study_keys import case_keys
 from nldyn.system.rest import rest
 
 E, RHO, B, H, L = 2.1e11, 7800.0, 0.03, 0.01, 0.75

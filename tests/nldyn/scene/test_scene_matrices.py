@@ -13,8 +13,8 @@ from scipy import io, sparse
 from nldyn import SceneError, solve_orbit
 from nldyn.app.cli import main
 from nldyn.scene.build import build_system
+from nldyn.scene.case_keys import case_keys
 from nldyn.scene.read import load_scene, parse_scene
-from nldyn.scene.study_keys import case_keys
 
 COUNT = 60
 REST = """

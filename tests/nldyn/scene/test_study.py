@@ -12,7 +12,7 @@ import pytest
 
 from nldyn import FlowMap, SceneError, Stop, SystemModelError, parameter_study
 from nldyn.base.resources import example
-from nldyn.scene.study_keys import case_keys
+from nldyn.scene.case_keys import case_keys
 
 GAPS = [0.0, 5e-4, 1e-3]
 

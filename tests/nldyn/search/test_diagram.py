@@ -17,9 +17,9 @@ from nldyn import (
     Damper,
     Diagram,
     FlowMap,
-    SearchOptions,
-    Seed,
+    OrbitSearchOptions,
     Stop,
+    SubharmonicSeed,
     System,
     SystemModelError,
     Unbalance,
@@ -98,7 +98,7 @@ def test_flow_map_serves_as_well_as_the_system(one_dof):
 def test_period_that_does_not_exist_gives_an_empty_list(one_dof):
     """A linear system has its forced orbit only."""
     linear = make_one_dof(stops=[])
-    assert find_orbits(linear, 26.0, 2, options=SearchOptions(starts=2)) == []
+    assert find_orbits(linear, 26.0, 2, options=OrbitSearchOptions(starts=2)) == []
     assert len(find_orbits(linear, 26.0, 1)) == 1
 
 
@@ -114,7 +114,7 @@ def test_diagram_finds_the_doubled_branch_between_two_flips(one_dof):
 
 
 def test_doublings_are_followed_whatever_other_periods_are_wanted(one_dof):
-    effort = SearchOptions(starts=1)
+    effort = OrbitSearchOptions(starts=1)
     for doublings, count in ((1, 0), (2, 1)):
         found = diagram(
             one_dof, (8.0, 11.0), [1, 3], search_points=1, doublings=doublings, search=effort
@@ -127,7 +127,7 @@ def test_branch_that_was_broken_off_is_not_followed_twice():
     """Pieces of few points from several frequencies overlap by no more than the last step."""
     found = diagram(
         make_one_dof(stops=[]), (20.0, 30.0), [1], search_points=3,
-        search=SearchOptions(starts=1, transient=200),
+        search=OrbitSearchOptions(starts=1, transient=200),
         options=ContinuationOptions(max_points=20, first_step=1e-2, max_step=1e-2),
     )  # fmt: skip
     reasons = [reason for branch in found.branches for reason in branch.stop_reasons]
@@ -168,12 +168,12 @@ def test_diagram_says_which_orbit_it_could_not_follow(monkeypatch):
 def test_diagram_says_what_it_did_not_find(one_dof):
     found = diagram(
         make_one_dof(stops=[]), (20.0, 30.0), periods=(1,), search_points=1,
-        seeds=[Seed(2, 26.0)], search=SearchOptions(starts=1, transient=200),
+        seeds=[SubharmonicSeed(2, 26.0)], search=OrbitSearchOptions(starts=1, transient=200),
     )  # fmt: skip
     assert [b.period for b in found.branches] == [1]
     assert found.notes == ("no 1/2 orbit found near 26 Hz",)
     with pytest.raises(SystemModelError, match="near_hz = 95 lies outside"):
-        diagram(one_dof, (84.0, 88.0), seeds=[Seed(2, 95.0)])
+        diagram(one_dof, (84.0, 88.0), seeds=[SubharmonicSeed(2, 95.0)])
 
 
 @pytest.fixture
@@ -194,7 +194,7 @@ def test_simulations_that_fail_are_told():
         solve_orbit(system, 26.0)
     with pytest.raises(ConvergenceError, match="every simulation at 26 Hz failed: too many"):
         find_orbits(system, 26.0, 1)
-    effort = SearchOptions(starts=3)
+    effort = OrbitSearchOptions(starts=3)
     found = diagram(system, (25.0, 27.0), [1], search_points=1, search=effort)
     assert found.notes[0] == "3 of 3 simulations at 25.9808 Hz failed: too many contacts"
 
@@ -224,7 +224,7 @@ def test_orbits_that_hit_a_stop_are_found_beside_those_that_miss_it():
     branch = continue_branch(solve_orbit(system, 13.0), (12.0, 22.0))
     (hitting,) = [orbit for orbit in branch.at(20.5) if orbit.stable and orbit.impacts]
     for seed in (1, 2, 3):
-        effort = SearchOptions(starts=2, seed=seed)
+        effort = OrbitSearchOptions(starts=2, seed=seed)
         found = diagram(system, (20.0, 30.0), [1], search=effort)
         assert any(branch.contains(hitting) for branch in found.branches)
         assert found.notes == ()

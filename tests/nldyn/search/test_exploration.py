@@ -24,7 +24,7 @@ from nldyn import (
     SystemModelError,
     Unbalance,
     continue_branch,
-    describe,
+    describe_special,
     diagram,
     explore,
     find_orbits,
@@ -656,7 +656,7 @@ def test_where_a_doubled_branch_comes_to_its_flip_the_other_one_has_half_the_per
     end = SpecialPoint("BP", doubled.nodes[0], 0.0)
     with pytest.raises(LocateError, match="is one of period 1: solve for its orbits"):
         switch_at_branch_point(end)
-    assert "is one of period 1, at a flip of a branch of that period" in describe(end)
+    assert "is one of period 1, at a flip of a branch of that period" in describe_special(end)
     box.from_branch_point(end)
     assert box.branches == [harmonic, doubled] and not box.notes
     other.take([doubled], [])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from problems import RANGE_HZ
 
-from nldyn import ContinuationOptions, SearchOptions, continue_branch, find_orbits, solve_orbit
+from nldyn import ContinuationOptions, OrbitSearchOptions, continue_branch, find_orbits, solve_orbit
 from nldyn.paper.jobs import scene_system
 
 STARTS = {
@@ -22,7 +22,7 @@ def start(system, period, number):
     hz = float(STARTS[period][number])
     if period == 1:
         return solve_orbit(system, hz)
-    return find_orbits(system, hz, period, options=SearchOptions(starts=4, seed=number))[0]
+    return find_orbits(system, hz, period, options=OrbitSearchOptions(starts=4, seed=number))[0]
 
 
 def special_points(branch):

@@ -159,7 +159,7 @@ def test_what_makes_no_sense_is_refused():
         (lambda: system.with_absolute("mass", {"floor": 1.0}), "'floor' is not a load vector"),
         (lambda: shaken(stops=[Stop("mass absolute", 1e5)]), "unknown interface"),
         (lambda: system.with_elements(stops=(Stop("mass absolute", 1e5),)), "is only observed"),
-        (lambda: nldyn.Plane.at_interface(system, (-1, 1), (-1, 1)), "rides on a base"),
+        (lambda: nldyn.StatePlane.at_interface(system, (-1, 1), (-1, 1)), "rides on a base"),
         (lambda: modal_row(system, "mass absolute"), "only a relative displacement"),
     ):
         with pytest.raises(SystemModelError, match=words):

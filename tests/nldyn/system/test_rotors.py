@@ -194,7 +194,7 @@ def test_a_disc_is_followed_in_its_speed_as_the_closed_form_says(tmp_path):
     stop = Stop.linear("x", 40.0, gap=0.03)
     system = disc(1.6, [stop])
     exact = touching(0.03) / (2.0 * np.pi)
-    curve = nldyn.continue_in(
+    curve = nldyn.continue_orbit(
         nldyn.solve_orbit(system, system.spin.hz), "speed_hz", (0.25, exact + 1e-5)
     )
     assert len(curve.points) > 2
@@ -236,7 +236,7 @@ def test_the_speed_ends_where_internal_damping_lets_the_whirl_grow():
     onset = np.sqrt(K / (n / c * (n / c - IP))) / (2.0 * np.pi)
     system = disc(0.9 * 2.0 * np.pi * onset, circulatory=n * SKEW, c=c)
     limits = (0.8 * onset, 1.2 * onset)
-    curve = nldyn.continue_in(nldyn.solve_orbit(system, system.spin.hz), "spin_hz", limits)
+    curve = nldyn.continue_orbit(nldyn.solve_orbit(system, system.spin.hz), "spin_hz", limits)
     assert curve.values.max() == pytest.approx(onset, rel=1e-6)
     assert curve.values.min() == pytest.approx(0.8 * onset, rel=1e-9)
 
@@ -283,9 +283,9 @@ def test_spins_that_make_no_sense_are_refused():
     with pytest.raises(
         SystemModelError, match=r"spins at 0\.19.* Hz, but the excitation"
     ):
-        nldyn.continue_in(start, "speed_hz", (0.1, 0.2))
+        nldyn.continue_orbit(start, "speed_hz", (0.1, 0.2))
     still = nldyn.solve_orbit(rotor(excitation=[Unbalance("x", 0.02)]), 0.1)
     with pytest.raises(SystemModelError, match="'spin_hz': the system has no spin"):
-        nldyn.continue_in(still, "spin_hz", (0.1, 0.2))
+        nldyn.continue_orbit(still, "spin_hz", (0.1, 0.2))
     with pytest.raises(SceneError, match=r"matrices.spin.gyroscopic must be skew"):
         parse_scene(SPINNING.replace("-0.4", "0.4"))

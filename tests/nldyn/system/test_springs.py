@@ -117,7 +117,7 @@ def test_a_spring_is_a_parameter():
         excitation=[HarmonicForce("a", 1.0)],
     )  # fmt: skip
     orbit = nldyn.solve_orbit(system, 1.0 / (2.0 * np.pi))
-    family = nldyn.continue_in(orbit, Parameter("spring_stiffness"), (1.5, 2.5))
+    family = nldyn.continue_orbit(orbit, Parameter("spring_stiffness"), (1.5, 2.5))
     k = np.array([point.system.springs[0].stiffness for point in family.orbits])
     size = np.array([point.max_abs_displacement for point in family.orbits])
     assert k.min() == pytest.approx(1.5) and k.max() == pytest.approx(2.5)

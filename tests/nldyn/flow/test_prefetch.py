@@ -13,7 +13,7 @@ from nldyn import (
     CheckpointFile,
     ExploreOptions,
     FlowMap,
-    SearchOptions,
+    OrbitSearchOptions,
     Stop,
     System,
     SystemModelError,
@@ -21,13 +21,13 @@ from nldyn import (
     diagram,
     explore,
 )
-from nldyn.flow.ahead import Ahead, computing_ahead
+from nldyn.flow.prefetch import Ahead, computing_ahead
 
 WANTED = {
     "range_hz": (30.0, 60.0),
     "periods": [1, 2],
     "search_points": 3,
-    "search": SearchOptions(starts=4),
+    "search": OrbitSearchOptions(starts=4),
 }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import ConvergenceError
 from nldyn.orbits.bordered import Condition, Evaluation, nearest_depth
-from nldyn.orbits.conditions import BranchPoint, Grazing, Singular
+from nldyn.orbits.conditions import BranchPointCondition, Grazing, Singular
 from nldyn.orbits.critical_functions import branch_point_test, flip_test, torus_test
 from nldyn.orbits.orbit import Orbit
 
@@ -51,7 +51,7 @@ def codimension_tests(
         if at.family.start:  # the borders are of other phases than the orbit's
             return {name: tests[name] for name in tests if name not in ("CP", "GPD")}
         return tests
-    if isinstance(condition, BranchPoint):
+    if isinstance(condition, BranchPointCondition):
         return along_branch_points(mu)
     tests = {"PD": flip_test(mu), "NS": torus_test(mu) if mu.size > 2 else 1.0}
     if parameter_tangent is None:

@@ -178,7 +178,7 @@ def measures_table(
     Returns
     -------
     dict of str to (k,) array
-        Units are in `nldyn.longterm.wear.UNITS`; ``pandas.DataFrame`` takes it as it is.
+        Units are in `UNITS` of its module; ``pandas.DataFrame`` takes it as it is.
 
     Raises
     ------
