@@ -35,7 +35,7 @@ from nldyn.base.resources import example
 from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.branches.endings import Ending
 from nldyn.branches.leg import trace
-from nldyn.curves import events as codimension
+from nldyn.curves import codimension_two as codimension
 from nldyn.curves.codimension_two import along_tori, flip_coefficient, is_torus
 from nldyn.orbits.bordered import OrbitFamily
 from nldyn.orbits.conditions import Singular, bialternate, max_abs_displacement, peak_force
