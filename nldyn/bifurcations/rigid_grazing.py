@@ -98,7 +98,7 @@ def rigid_grazing_form(orbit: Orbit, grazing: Grazing) -> RigidGrazing:
     if first == 0.0:
         raise CoefficientError("an impact leaves no trace over a period")
     return RigidGrazing(
-        growth=-loss * deceleration * float(row @ jacobian @ kick),
+        growth=float(-loss * deceleration * (row @ jacobian @ kick)),
         speed_change=float(height_change / (loss * first)),
         height_change=float(height_change),
         lowers=_lowers(jacobian, row, kick),
