@@ -21,12 +21,10 @@ LONGEST = (
     "nldyn/search/test_exploration.py",
     "nldyn/curves/test_curves.py",
     "nldyn/branches/test_close_branches.py",
-    "faults/test_faults_machine.py",
     "nldyn/runtime/test_executors.py",
     "nldyn/io/test_resume.py",
     "nldyn/flow/test_contacts.py",
     "nldyn/longterm/test_longterm.py",
-    "hard/test_hard_cases.py",
     "nldyn/paper/test_paper_starts.py",
 )
 

@@ -138,7 +138,7 @@ FAULTS = [
         "nldyn/search/test_exploration.py",
     ),
     Fault(
-        "explore does not look beside short motions",
+        "explore does not look beside motions",
         "nldyn/search/explore.py",
         "self._beside(runs, known)",
         "pass",

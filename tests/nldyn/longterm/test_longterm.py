@@ -227,12 +227,12 @@ def test_many_starts_lead_to_distinct_attractors(one_dof):
 
 @pytest.fixture(scope="module")
 def from_35_to_40(one_dof):
-    return brute_force(one_dof, (35.0, 40.0), points=11, starts=1, recorded=48)
+    return brute_force(one_dof, (35.0, 40.0), points=6, starts=1, recorded=48)
 
 
 def test_peaks_of_periodic_columns_lie_on_their_orbits(from_35_to_40):
     periodic = [c for c in from_35_to_40.columns if c.attractor.orbit is not None]
-    assert len(periodic) > 5
+    assert len(periodic) > 3
     for column in periodic:
         orbit = column.attractor.orbit
         assert column.peaks.max() == pytest.approx(orbit.max_abs_displacement, rel=1e-6)
@@ -243,10 +243,10 @@ def test_chaotic_ranges_hold_their_frequencies(from_35_to_40):
     chaotic = {c.frequency_hz for c in from_35_to_40.columns if c.attractor.kind == "chaotic"}
     assert 36.0 in chaotic
     ranges = from_35_to_40.ranges()
-    for hz in np.linspace(35.0, 40.0, 11):
+    for hz in np.linspace(35.0, 40.0, 6):
         assert any(a <= hz <= b for a, b in ranges) == (hz in chaotic)
     count, total = from_35_to_40.share(35.0, 40.0)
-    assert (count, total) == (len(chaotic), 11)
+    assert (count, total) == (len(chaotic), 6)
 
 
 def test_ranges_join_neighbours_only(one_dof):
@@ -320,9 +320,9 @@ def test_points_of_a_stable_manifold_lie_on_the_edge_between_the_phases(one_dof,
         ends = simulate(one_dof, 50.0, periods=2, start=start, transient=300).strobe
         return bool(ends[0, 0] > ends[1, 0])
 
-    for piece in stable_manifold(solve_orbit(one_dof, 50.0), plane, max_points=1200):
-        assert len(piece) == 600
-        for k in range(10, 599, 40):
+    for piece in stable_manifold(solve_orbit(one_dof, 50.0), plane, max_points=600):
+        assert len(piece) == 300
+        for k in range(10, 299, 40):
             along = (piece[k + 1] - piece[k - 1]) / width
             across = np.array([-along[1], along[0]]) / np.linalg.norm(along) * width
             assert phase(piece[k] + 1e-8 * across) != phase(piece[k] - 1e-8 * across)

@@ -200,6 +200,15 @@ def test_linear_system_has_one_branch_on_which_everything_settles():
     assert found.report().startswith("8 to 14 Hz: 1 branch (1 harmonic)\n")
 
 
+def test_unstable_orbits_are_found_beside_motions(monkeypatch):
+    """At 50 Hz motions settle on the 1/2 orbit; the harmonic one is unstable there."""
+    monkeypatch.setattr(survey._Survey, "_deflate", lambda *_: None)
+    effort = ExploreOptions(spacing=0.02, starts=2, **NOTHING_MORE)
+    found = explore(system_of("one_dof"), (49.5, 50.5), 1, effort=effort)
+    (harmonic,) = found.diagram.of_period(1)
+    assert not harmonic.stable.any()
+
+
 def test_deflation_leaves_a_known_orbit_for_another_one():
     """Two modes at 23 Hz have several harmonic orbits; with one known, Newton finds others."""
     flow = FlowMap(system_of("two_dof_xi_0.01"))
