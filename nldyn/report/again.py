@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 from nldyn.base.errors import SceneError, SystemModelError
 from nldyn.branches.branch import Branch
 from nldyn.io.store import load
-from nldyn.report.offline import Table
+from nldyn.report.offline import Table, unpacked
 from nldyn.report.page import Drawn, write_page
 from nldyn.report.results import FILES, summary, tables_of
 from nldyn.runtime.progress import Progress, silent
@@ -80,6 +80,9 @@ def report_again(
     if scene is None and copy.is_file() and finished:
         scene = load_scene(copy, mesh_folders)
     drawn, notes = drawn_again(scene, diagram)
+    shown = kept_surface(folder / "report.html", diagram) if drawn is None and notes else drawn
+    if shown is not None:
+        notes = []
     if not finished:
         notes = [UNFINISHED, *notes]
     progress("tables", 0.0, 0.3)
@@ -88,8 +91,22 @@ def report_again(
     progress("orbits", 0.0, 0.6)
     with result_directory(directory, "report") as new:
         page = new / "report.html"
-        write_page(diagram, page, tables, told, scene=scene, drawn=drawn, notes=notes)
+        write_page(diagram, page, tables, told, scene=scene, drawn=shown, notes=notes)
     return notes
+
+
+def kept_surface(page: Path, diagram: Diagram) -> Mapping[str, Any] | None:
+    """The structure that the page before shows, if it moves by the modes of a diagram.
+
+    The mesh is not among the results, and the copy of the scene may not find it.
+    """
+    try:
+        surface = unpacked(page.read_text(encoding="utf-8")).get("surface")
+    except (OSError, ValueError, IndexError):
+        return None
+    modes = diagram.branches[0].points[0].system.size
+    found: Mapping[str, Any] | None = surface
+    return found if found and len(found.get("moves", ())) == modes else None
 
 
 def as_diagram(found: object) -> Diagram:

@@ -98,12 +98,18 @@ def panels(study: ConvergenceStudy) -> list[dict[str, Any]]:
     metre, length = length_unit(
         max((m.peak.max_abs_displacement for m in study.models if m.peak), default=1.0)
     )
+    durations = [contact_time(m.orbit) for m in study.models if m.orbit]
+    second, time = time_unit(max(durations, default=0.0))
+
+    def duration(orbit: Orbit) -> float:
+        return contact_time(orbit) / second
+
     asked: list[tuple[str, str, Callable[[Measured], Sequence[float]], Sequence[float]]] = [
         ("eigenfrequencies", "Hz", eigenfrequencies, eigenfrequencies(study.reference)),
         ("peak frequency", "Hz", of_peak(lambda orbit: orbit.frequency_hz), ()),
         ("peak height", length, of_peak(lambda orbit: orbit.max_abs_displacement / metre), ()),
         ("contact force", "N", of_orbit(largest_force), of(largest_force, contact)),
-        ("contact duration", "s", of_orbit(contact_time), of(contact_time, contact)),
+        ("contact duration", time, of_orbit(duration), of(duration, contact)),
     ]
     found = []
     for name, unit, number, exact in asked:
@@ -141,6 +147,18 @@ def of_peak(number: Callable[[Orbit], float]) -> Callable[[Measured], list[float
 def of_orbit(number: Callable[[Orbit], float]) -> Callable[[Measured], list[float]]:
     """A number of the orbit at the frequency of the study."""
     return lambda model: of(number, model.orbit)
+
+
+def time_unit(longest: float) -> tuple[float, str]:
+    """A unit of time in s, and its name.
+
+    Examples
+    --------
+    >>> time_unit(2.0), time_unit(1.3e-3), time_unit(2e-5)
+    ((1.0, 's'), (0.001, 'ms'), (1e-06, 'µs'))
+    """
+    units = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"))
+    return next((unit for unit in units if longest >= 0.5 * unit[0]), units[-1])
 
 
 def larger_half(study: ConvergenceStudy) -> list[int]:

@@ -72,7 +72,7 @@ def write_page(
     summary: Mapping[str, Any],
     *,
     scene: Scene | None = None,
-    drawn: Drawn | None = None,
+    drawn: Drawn | Mapping[str, Any] | None = None,
     notes: Iterable[str] = (),
     yscale: Literal["linear", "log"] = "linear",
 ) -> None:
@@ -90,8 +90,8 @@ def write_page(
         What `nldyn.report.results.summary` says of the diagram.
     scene : Scene, optional
         Its text and its title are shown.
-    drawn : Drawn, optional
-        The structure, if there is one to be shown deflected.
+    drawn : Drawn or dict, optional
+        The structure, if there is one to be shown deflected; or what `surface_content` gave for it.
     notes : iterable of str
         What is to be said beside the notes of the diagram.
     yscale : {"linear", "log"}
@@ -106,7 +106,7 @@ def page_content(
     tables: Mapping[str, Table],
     summary: Mapping[str, Any],
     scene: Scene | None = None,
-    drawn: Drawn | None = None,
+    drawn: Drawn | Mapping[str, Any] | None = None,
     notes: Iterable[str] = (),
     yscale: Literal["linear", "log"] = "linear",
 ) -> dict[str, Any]:
@@ -143,7 +143,9 @@ def page_content(
         "scene": scene.text if scene else "",
     }
     if drawn is not None:
-        content["surface"] = surface_content(drawn.component, drawn.reduced, drawn.mirror)
+        if isinstance(drawn, Drawn):
+            drawn = surface_content(drawn.component, drawn.reduced, drawn.mirror)
+        content["surface"] = drawn
         for shown, each in zip(orbits, chosen, strict=True):
             if "fault" not in shown:
                 time, modal = modal_motion(each.orbit)

@@ -54,7 +54,7 @@ def test_the_panels_show_the_numbers_of_the_study(browser, study):
         for indices in study.series().values()
     ]
     assert shapes == 3  # within 1 %, the reference, the error band
-    assert {"eigenfrequencies (Hz)", "peak height (mm)", "contact duration (s)"} < set(shown)
+    assert {"eigenfrequencies (Hz)", "peak height (mm)", "contact duration (ms)"} < set(shown)
 
 
 def test_hover_names_the_model_and_how_far_it_is_off(browser):

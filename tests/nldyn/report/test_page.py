@@ -17,6 +17,7 @@ from nldyn.base.resources import example
 from nldyn.io.branches import save_branches
 from nldyn.report import offline
 from nldyn.report import page as pages
+from nldyn.report.again import kept_surface
 from nldyn.report.deflection import surface_content
 from nldyn.report.offline import unpacked
 from nldyn.report.page import Drawn, kept_points
@@ -237,3 +238,15 @@ def test_damaged_tables_are_one_sentence(results, tmp_path):
     (tmp_path / "summary.json").write_text(json.dumps({}))
     (tmp_path / "branches.csv").write_text("branch,point\na\n")
     assert "branches.csv: cannot be read" in report(tmp_path).stderr
+
+
+def test_the_structure_of_the_page_before_is_kept_where_the_mesh_is_not_found(results, tmp_path):
+    """It is shown again if it moves by as many modes as the results have."""
+    found, page = load(results / "branches.h5"), tmp_path / "report.html"
+    for moves, kept in ((["of one mode"], True), (["of one", "of two"], False)):
+        text = offline.packed({"surface": {"moves": moves}})
+        page.write_text(f'<script id="data" type="text/plain">{text}</script>', encoding="utf-8")
+        assert (kept_surface(page, found) is not None) == kept
+    assert kept_surface(tmp_path / "nowhere.html", found) is None
+    page.write_text("no page of ours", encoding="utf-8")
+    assert kept_surface(page, found) is None
