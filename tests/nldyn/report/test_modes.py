@@ -72,7 +72,7 @@ def test_modes_that_are_not_there_and_other_views_are_refused(tmp_path):
 
 def test_a_scene_without_a_mesh_has_a_table_only(tmp_path):
     result = invoke("modes", example("one_dof.toml"), "--out", tmp_path / "out")
-    assert result.exit_code == 0 and result.stdout.endswith(": modes.csv\n")
+    assert result.exit_code == 0 and result.stdout.endswith(": modes.csv, scene.toml\n")
 
 
 def test_check_and_run_tell_numbers_as_json(tmp_path):

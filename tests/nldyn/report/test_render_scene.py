@@ -37,7 +37,7 @@ def test_without_graphics_the_rest_is_written(tmp_path, monkeypatch):
     assert result.exit_code == 3
     assert result.stderr == "nldyn: install libegl1\n"
     pages = {"mode_shapes.html", "deepest_contact.html"}
-    assert names(out) == {"modes.csv", "orbit.png", "orbit.svg"} | pages
+    assert names(out) == {"modes.csv", "scene.toml", "orbit.png", "orbit.svg"} | pages
     with (out / "modes.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [row["mode"] for row in rows] == ["1", "2"]
