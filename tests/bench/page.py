@@ -28,9 +28,17 @@ NOTES = {
         "The same beam with more modes, one impact per period at 38 Hz, default options. Errors "
         "against the tightest options."
     ),
+    "Impacts with many modes": (
+        "A tube on two supports that knocks on both sides of a third one, at 5.2 Hz, a hundred "
+        "periods after rest: the time of a period with monodromy matrix and derivative by "
+        "frequency over its number of impacts, flights included."
+    ),
+    "Searches in vain": "`solve_orbit` on the same tube, whose motion does not settle.",
     "Branches": (
         "Whole harmonic branches with all special points, warm. `error` is the largest relative "
-        "difference of a special point's frequency to the same branch at the tightest options. "
+        "difference of a special point's frequency to the same branch at the tightest options; "
+        "`times a flow at each point` is the time over the number of points and that of one flow "
+        "with monodromy matrix, the mean of every tenth point. "
         "AUTO-07p's times are from another 2-core machine; see tests/bench/data/README.md."
     ),
     "Special points": (
@@ -46,6 +54,9 @@ NOTES = {
         "is better counts as it is. Empty: the error is not reached."
     ),
     "Plain simulation": "The settings behind it, from coarse to the first below 1e-8.",
+    "Plain simulation at the resonance": (
+        "Of the 4-DOF model, forcing periods per second of processor time, default options."
+    ),
     "Threads": (
         "Simulations on threads of one process, the fastest of three runs by the wall clock. "
         "Below one busy core per thread other programs had the rest; the last column compares "

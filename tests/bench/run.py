@@ -16,7 +16,15 @@ from bench.measure import Sample, measure_engine, setting_label
 from bench.models import MODELS, load_flip
 from bench.page import Row, write_page
 from bench.studies import BranchTime
-from bench.targets import all_targets, fastest_rows, ratio_rows, throughput_targets
+from bench.targets import (
+    all_targets,
+    fastest_rows,
+    impact_target,
+    ratio_rows,
+    resonance_target,
+    search_targets,
+    throughput_targets,
+)
 from nldyn.flow.options import FlowOptions
 from nldyn.runtime.result_directory import check_directory, result_directory
 
@@ -57,7 +65,11 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
         tell(f"branch of {task.model}")
         branches.append(studies.time_branch(task))
         profiles[task.model] = studies.profile_branch(task)
+    tell("impacts with many modes, searches in vain")
+    impacts = studies.impact_times()
+    searches = studies.vain_searches()
     tell("plain simulation, threads")
+    resonance = throughput.resonance_rates()
     plain = [r for model in models if model in throughput.MODELS for r in throughput.measure(model)]
     scaling = throughput.scaling()
     tell("first call")
@@ -65,6 +77,7 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
     default = setting_label(FlowOptions())
     targets = all_targets(samples, default, branches, modes, grazing, profiles["one_dof"], first)
     targets += throughput_targets(plain)
+    targets += [resonance_target(resonance), impact_target(impacts), *search_targets(searches)]
     rivals = [e.name for e in ENGINES if e.has_monodromy]
     tables: dict[str, Sequence[Row]] = {
         "Targets": [vars(t) for t in targets],
@@ -79,6 +92,18 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
                 "error": f"{m.error:.1e}",
             }
             for m in modes
+        ],
+        "Impacts with many modes": [
+            {
+                "modes": str(i.modes),
+                "ms for an impact": f"{1e3 * i.seconds:.3g}",
+                "times the first": f"{i.seconds / impacts[0].seconds:.3g}",
+                "impacts in ten periods": str(i.closings),
+            }
+            for i in impacts
+        ],
+        "Searches in vain": [
+            {"modes": str(s.modes), "seconds": f"{s.seconds:.1f}", "says": s.said} for s in searches
         ],
         "Branches": [*map(branch_row, branches), *auto_times()],
         "Special points": special_point_rows(branches[0]),
@@ -98,6 +123,9 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
         ],
         "Plain simulation at equal error": throughput.equal_error_table(plain),
         "Plain simulation": throughput.settings_table(plain),
+        "Plain simulation at the resonance": [
+            {"Hz": f"{hz:g}", "periods per second": f"{rate:.0f}"} for hz, rate in resonance.items()
+        ],
         "Threads": throughput.scaling_table(scaling),
         "First call": [
             {"what": what.replace("_", " "), "seconds": f"{seconds:.2f}"}
@@ -149,6 +177,7 @@ def branch_row(run: BranchTime) -> Row:
         "range in Hz": f"{low:g}-{high:g}",
         "points": str(run.points),
         "seconds": f"{run.seconds:.2f}",
+        "times a flow at each point": f"{run.flows:.2f}",
         "special points": str(run.special),
         "unmatched": str(run.unmatched),
         "error": f"{run.error:.1e}",
@@ -165,6 +194,7 @@ def auto_times() -> list[Row]:
             "range in Hz": row["range_hz"],
             "points": row["points"],
             "seconds": row["seconds"],
+            "times a flow at each point": "",
             "special points": "",
             "unmatched": "",
             "error": "",

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import cProfile
+import math
 import os
 import pstats
 import re
+import statistics
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,17 +24,21 @@ from bench.engines import flow_map
 from bench.measure import errors, median_seconds
 from bench.models import Case, Sensitivities, load_case, load_grazing
 from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError
 from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import continue_branch
 from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.options import FlowOptions
+from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
+from nldyn.system.elements import HarmonicForce, Stop
 from nldyn.system.system import System
 
 DEFAULT = FlowOptions()
 TIGHT = FlowOptions(rtol=1e-13)
 MODES = (4, 8, 16, 32, 64)
 MODES_HZ = 38.0
+EACH = 10  # of so many points of a branch one flow is timed
 
 
 @dataclass(frozen=True)
@@ -68,6 +76,8 @@ class BranchTime:
         Largest relative difference of their frequencies otherwise.
     located : tuple of (str, float)
         Kind and frequency in Hz of each special point.
+    flows : float
+        Time of the walk over that of one flow with derivatives for each point.
     """
 
     task: BranchTask
@@ -77,6 +87,7 @@ class BranchTime:
     unmatched: int
     error: float
     located: tuple[tuple[str, float], ...]
+    flows: float = math.nan
 
 
 def harmonic(system: System, task: BranchTask, options: FlowOptions = DEFAULT) -> Branch:
@@ -92,7 +103,18 @@ def time_branch(task: BranchTask) -> BranchTime:
     seconds, _ = median_seconds(lambda: harmonic(system, task), calm=1.0)
     unmatched, error = compare_special_points(branch, harmonic(system, task, TIGHT))
     located = tuple((p.kind, p.frequency_hz) for p in branch.special_points)
-    return BranchTime(task, seconds, len(branch.points), len(located), unmatched, error, located)
+    points = branch.points
+    flows = seconds / (len(points) * statistics.mean(map(flow_seconds, points[::EACH])))
+    return BranchTime(task, seconds, len(points), len(located), unmatched, error, located, flows)
+
+
+def flow_seconds(orbit: Orbit) -> float:
+    """Median time of one flow over an orbit with its monodromy matrix and frequency derivative."""
+    problem = orbit.problem
+    nodes = problem.nodes(orbit.point)
+    return median_seconds(
+        lambda: problem.flow.shoot(nodes, problem.phases, orbit.omega), 5, calm=0.0
+    )[0]
 
 
 def compare_special_points(branch: Branch, finer: Branch) -> tuple[int, float]:
@@ -200,6 +222,82 @@ def _time_case(case: Case, options: FlowOptions, modes: int) -> ModesTime:
     flow = FlowMap(case.system, options)
     error = max(errors(case, native.sensitivities(flow, case.start, case.omega)))
     return ModesTime(modes, seconds, native.closings(flow, case), error)
+
+
+# Impacts with many modes
+
+TUBE_MODES = (4, 20)
+TUBE_HZ = 5.2
+
+
+@dataclass(frozen=True)
+class ImpactTime:
+    """Median of the time of a period with derivatives over its number of impacts."""
+
+    modes: int
+    seconds: float
+    closings: int
+
+
+def tube(modes: int) -> System:
+    """A tube on two supports that knocks on both sides of a third one, loosely held."""
+    length, bending, mass = 4.0, 2.1e11 * 3e-8, 1.5
+    n = np.arange(1, modes + 1)
+    shapes = {
+        name: np.sqrt(2.0 / (mass * length)) * np.sin(n * np.pi * place)
+        for name, place in (("support", 0.5), ("drive", 0.37))
+    }
+    return System.from_modal(
+        (n * np.pi / length) ** 2 * np.sqrt(bending / mass) / (2.0 * np.pi),
+        shapes,
+        modal_damping=0.01,
+        stops=[Stop("support", 5e6, 1.0, gap=1e-4, direction=side) for side in (1, -1)],
+        excitation=[HarmonicForce("drive", 20.0)],
+    )
+
+
+def impact_times() -> list[ImpactTime]:
+    """The impacts of ten periods, a hundred after the tube began at rest."""
+    found = []
+    for modes in TUBE_MODES:
+        flow, omega = FlowMap(tube(modes)), 2.0 * np.pi * TUBE_HZ
+        states = flow.strobe(np.zeros(2 * modes), omega, 110).ends[100:]
+        times, closings = [], 0
+        for state in states:
+            period = partial(flow.shoot, state[None], native.PERIOD, omega)
+            hits = int(period().closings.sum())
+            times.append(median_seconds(period, calm=0.0)[0] / hits)
+            closings += hits
+        found.append(ImpactTime(modes, statistics.median(times), closings))
+    return found
+
+
+# Searches in vain
+
+
+@dataclass(frozen=True)
+class VainSearch:
+    """Processor time of a `solve_orbit`, whether it finds none, and what it says."""
+
+    modes: int
+    seconds: float
+    vain: bool
+    said: str
+
+
+def vain_searches() -> list[VainSearch]:
+    """The tube where its motion is chaotic: no orbit of period 1 lies near a motion from rest."""
+    found = []
+    for modes in TUBE_MODES:
+        system = tube(modes)
+        start = time.process_time()
+        try:
+            solve_orbit(system, TUBE_HZ)
+            vain, said = False, "found one"
+        except ConvergenceError as error:
+            vain, said = True, str(error)
+        found.append(VainSearch(modes, time.process_time() - start, vain, said))
+    return found
 
 
 # Grazing

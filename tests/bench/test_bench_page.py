@@ -16,11 +16,21 @@ from bench.studies import (
     BranchTime,
     FirstCall,
     GrazingError,
+    ImpactTime,
     ModesTime,
+    VainSearch,
     pair_up,
     profile_branch,
 )
-from bench.targets import all_targets, fastest_rows, ratio_rows, throughput_targets
+from bench.targets import (
+    all_targets,
+    fastest_rows,
+    impact_target,
+    ratio_rows,
+    resonance_target,
+    search_targets,
+    throughput_targets,
+)
 from bench.throughput import (
     Row,
     Threads,
@@ -36,6 +46,10 @@ from nldyn.runtime.result_directory import OutputError
 ENGINES = ("nldyn", "solve_ivp DOP853", "solve_ivp DOP853 in numpy")
 
 
+IMPACTS = [ImpactTime(4, 1e-4, 220), ImpactTime(20, 5e-4, 220)]
+SEARCHES = [VainSearch(4, 4.9, True, "none"), VainSearch(20, 6.0, True, "none")]
+
+
 def made_up_samples():
     return [
         Sample(model, engine, f"{k}", 1e-5 * factor * k, 3, 10.0**-k, 10.0**-k, 10.0**-k, 10.0**-k)
@@ -47,8 +61,8 @@ def made_up_samples():
 
 @pytest.fixture
 def verdicts():
-    branch = BranchTime(BRANCHES[0], 0.2, 10, 2, 0, 1e-10, (("PD", 33.0),))
-    slow = BranchTime(BRANCHES[1], 0.7, 10, 2, 1, 1e-10, ())
+    branch = BranchTime(BRANCHES[0], 0.2, 10, 2, 0, 1e-10, (("PD", 33.0),), 2.4)
+    slow = BranchTime(BRANCHES[1], 0.7, 10, 2, 1, 1e-10, (), 2.6)
     targets = all_targets(
         made_up_samples(),
         "8",
@@ -67,10 +81,13 @@ def test_verdicts_follow_from_the_numbers(verdicts):
         return found
 
     assert of("one_dof", "numpy") == "met"
-    assert of("one_dof", "compiled") == "missed"
     assert of("four_dof", "compiled") == "met"
+    assert of("sixteen_dof", "compiled") == "not measured"
+    assert of("two_dof", "heyoka") == "not measured"
     assert of("one_dof", ", warm") == "met"
     assert of("four_dof", ", warm") == "missed"
+    assert of("one_dof", "for each point") == "met"
+    assert of("four_dof", "for each point") == "missed"
     assert of("one_dof", "1e-9") == "met"
     assert of("four_dof", "1e-9") == "missed"
     assert of("grazing") == "met"
@@ -160,6 +177,9 @@ def stub_measurements(monkeypatch):
     monkeypatch.setattr(
         studies, "time_branch", lambda task: BranchTime(task, 0.2, 10, 2, 0, 1e-10, (("PD", 33.0),))
     )
+    monkeypatch.setattr(studies, "impact_times", lambda: IMPACTS)
+    monkeypatch.setattr(studies, "vain_searches", lambda: SEARCHES)
+    monkeypatch.setattr(run.throughput, "resonance_rates", lambda: {20.0: 3000.0})
     monkeypatch.setattr(studies, "profile_branch", lambda task: {"flow map": 0.6, "walk": 0.4})
 
 
@@ -183,6 +203,14 @@ def test_rates_are_compared_at_equal_error():
     assert [row["flow map over it"] for row in table] == ["1", "500", "1", ""]
     verdicts = {t.what: t.verdict for t in throughput_targets(rows)}
     assert list(verdicts.values()) == ["met", "missed"]
+
+
+def test_verdicts_on_impacts_searches_and_the_resonance_follow_from_the_numbers():
+    assert impact_target(IMPACTS).verdict == "missed"
+    assert [t.verdict for t in search_targets(SEARCHES)] == ["met", "missed"]
+    assert search_targets([VainSearch(4, 1.0, False, "")])[0].verdict == "not measured"
+    assert resonance_target({20.0: 15000.0, 25.0: 20000.0}).verdict == "met"
+    assert resonance_target({20.0: 14000.0, 25.0: 20000.0}).verdict == "missed"
 
 
 def test_threads_are_compared_with_one():

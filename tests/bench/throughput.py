@@ -31,6 +31,7 @@ from nldyn.system.system import System
 WANTED = 1e-8  # error over a period
 STATES = 12  # along the motion, from which errors are measured
 MODELS = ("one_dof", "two_dof", "four_dof")
+RESONANCE_HZ = (20.0, 21.0, 22.0, 23.0, 24.0, 25.0)
 FLOW_SETTINGS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 IVP_SETTINGS = (1e-6, 1e-8, 1e-10, 1e-12)
 FIXED_STEPS = (1000, 4000, 16000, 64000)
@@ -269,6 +270,13 @@ def _plain_rate(system: System, omega: float, rtol: float, seconds: float = 0.5)
         state = flow.shoot(state, phases, omega, sensitivities=False, chained=True).ends[-1:]
         count += 64
     return count / (time.process_time() - start)
+
+
+def resonance_rates() -> dict[float, float]:
+    """Periods per second of the 4-DOF model by frequency in Hz, default options."""
+    system = load_case("four_dof").system
+    rtol = FlowOptions().rtol
+    return {hz: _plain_rate(system, 2.0 * math.pi * hz, rtol) for hz in RESONANCE_HZ}
 
 
 @dataclass(frozen=True)
