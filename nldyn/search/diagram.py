@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import math
+import time
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from concurrent.futures import Executor
@@ -57,6 +59,7 @@ from nldyn.orbits.starts import (
 from nldyn.runtime.progress import Progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.search.outlook import Outlook
+from nldyn.system.rest import at_rest, rest
 from nldyn.system.system import System
 
 if TYPE_CHECKING:
@@ -65,7 +68,14 @@ if TYPE_CHECKING:
 
 Found = tuple[tuple[str, ...], dict[int, list[Orbit]]]  # failures, and orbits by their periods
 
+logger = logging.getLogger("nldyn")
 MOST_JOBS = 1000
+# of a search by default: flights and panels times coordinates squared, some minutes of work; then
+# it is shortened to no fewer motions of no fewer periods
+MOST_WORK, FEWEST_STARTS, FEWEST_RECORDED = 1e9, 2, 40
+PROBED = 5  # periods flown before the one whose work is counted
+TRIED = 20  # flights through the period in an attempt of Newton's method that leads nowhere
+TOLD = 60.0  # s of a search from which on its time is told at its beginning
 MORE_STARTS = 4  # times as many in the second search, which looks for orbits with contact
 
 
@@ -610,11 +620,20 @@ def diagram(
     box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flow, (low, high))
     with box.checkpoint, computing_ahead(flow, jobs, executor) as box.ahead:
         effort = search or OrbitSearchOptions()
+        if search is None and wanted:
+            effort = shortened(flow, effort, (low * high) ** 0.5, search_points, wanted)
+        whole = search is not None or effort == OrbitSearchOptions()
+        if not whole:
+            box.notes.append(
+                f"periods take many contacts of {flow.system.size} modes: the search was shortened "
+                f"to {effort.starts} motions of {effort.recorded} periods at each frequency; "
+                "nldyn.diagram(..., search=OrbitSearchOptions()) does all of it"
+            )
         box.outlook = Outlook(wanted, search_points if wanted else 0, len(seeds))
         edges = np.geomspace(low, high, search_points + 1)
         places = np.sqrt(edges[:-1] * edges[1:])[::-1].tolist() if wanted else []
         _search(box, places, wanted, effort)
-        if places and _contact_is_missing(box):
+        if places and whole and _contact_is_missing(box):
             more = replace(effort, starts=MORE_STARTS * effort.starts, seed=effort.seed + 1)
             _search(box, places, wanted, more)
         for number, seed in enumerate(seeds, 1):
@@ -708,6 +727,45 @@ def _note_failures(
         box.notes.append(
             f"{count} of {effort.starts} simulations at {frequency_hz:.6g} Hz failed: {reason}"
         )
+
+
+def shortened(
+    flow: FlowMap, effort: OrbitSearchOptions, hz: float, points: int, periods: Sequence[int]
+) -> OrbitSearchOptions:
+    """The effort of a search that takes minutes where the whole one would take hours.
+
+    Its work goes with the flights and contact panels of a period, counted at one frequency in Hz,
+    and the square of the number of coordinates.
+    """
+    omega = 2.0 * math.pi * hz
+    start = flow.to_state(at_rest(rest(flow.system)))
+    before = flow.strobe(start, omega, PROBED)
+    begun = time.process_time()
+    probe = flow.trajectory(before.ends[-1:], np.array([0.0, 2.0 * np.pi]), omega)
+    seconds = time.process_time() - begun
+    if before.failure or probe.failure:
+        return effort
+    each = probe.record.phase.size * (2.0 * flow.system.size) ** 2
+
+    def flown(effort: OrbitSearchOptions) -> int:
+        """Periods of simulation and of Newton's method."""
+        tried = effort.candidates * TRIED * sum(periods)
+        return points * effort.starts * (effort.transient + effort.recorded + tried)
+
+    while each * flown(effort) > MOST_WORK and effort.starts > FEWEST_STARTS:
+        effort = replace(
+            effort,
+            starts=max(effort.starts // 2, FEWEST_STARTS),
+            recorded=max(effort.recorded // 2, FEWEST_RECORDED),
+            candidates=max(effort.candidates // 2, 1),
+        )
+    if seconds * flown(effort) > TOLD:
+        logger.info(
+            f"a period takes {probe.record.phase.size} flights and contacts of {flow.system.size} "
+            f"modes, {seconds:.2g} s: the search takes up to {seconds * flown(effort) / 60.0:.0f} "
+            "minutes of processor time, and fewer search_points or periods = [1] less"
+        )
+    return effort
 
 
 def _contact_is_missing(box: Collector) -> bool:

@@ -17,6 +17,7 @@ from nldyn import (
     Damper,
     Diagram,
     FlowMap,
+    HarmonicForce,
     OrbitSearchOptions,
     Stop,
     SubharmonicSeed,
@@ -31,6 +32,7 @@ from nldyn import (
 from nldyn.branches.continuation import open_ends
 from nldyn.orbits.orbit import minimal_period, same_orbit, stroboscopic
 from nldyn.orbits.starts import orbit_beside, orbit_near
+from nldyn.search.diagram import shortened
 
 # where the paper's text sees subharmonics: 1/3 near 37.1, 1/5 near 62.2, 1/7 near 58, 1/13 near 81
 PLACES = [(3, 37.1), (5, 62.2), (7, 58.0), (13, 80.19), (2, 50.6), (3, 76.0)]
@@ -253,3 +255,23 @@ def test_a_diagram_as_one_table(harmonic_branch):
     assert np.array_equal(data["multipliers"][count:], data["multipliers"][:count])
     with pytest.raises(SystemModelError, match="the diagram has no branch"):
         Diagram((), (5.0, 90.0), "middle").to_xarray()
+
+
+def test_a_search_that_would_take_hours_is_shortened():
+    """A string of 25 modes that lies on three stops, and the same with one mode."""
+
+    def held(modes: int) -> FlowMap:
+        numbers = np.arange(1, modes + 1)
+        places = {f"p{k}": np.sin(numbers * np.pi * k / 7.0) for k in (1, 2, 3)}
+        stops = [Stop.linear(at, 1e6, gap=-1e-5) for at in places]
+        force = HarmonicForce("p2", 30.0)
+        return FlowMap(
+            System.from_modal(
+                20.0 * numbers, places, modal_damping=0.01, stops=stops, excitation=[force]
+            )
+        )
+
+    whole = OrbitSearchOptions()
+    large = shortened(held(25), whole, 25.0, 12, (1, 2, 3))
+    assert (large.starts, large.candidates, large.recorded) == (2, 1, 43)
+    assert shortened(held(1), whole, 25.0, 12, (1, 2, 3)) == whole
