@@ -207,7 +207,7 @@ def plot_diagram(
     >>> branch = continue_branch(solve_orbit(system, frequency_hz=10.0), (5.0, 20.0))
     >>> ax = plot_diagram([branch])
     >>> ax.get_ylabel()
-    'max |y| (µm)'
+    'max |y| at middle (µm)'
     """
     several = getattr(diagram, "branches", diagram)
     branches = list(several if isinstance(several, Iterable) else [several])
@@ -236,9 +236,8 @@ def plot_diagram(
 
 
 def _observed(branches: Sequence[Branch]) -> str:
-    """Where the displacement is taken, in words, if the structure has several interfaces."""
-    orbits = [branch.nodes[0].orbit for branch in branches]
-    places = {orbit.observe for orbit in orbits if len(orbit.system.interfaces) > 1}
+    """Where the displacement is taken, in words, if that is one interface."""
+    places = {branch.nodes[0].orbit.observe for branch in branches}
     return f" at {places.pop()}" if len(places) == 1 else ""
 
 

@@ -65,7 +65,7 @@ def test_special_points_lie_on_the_drawn_curve():
 def test_diagram_names_units_and_marks():
     ax = plot_diagram(diagram(), yscale="log")
     assert ax.get_xlabel() == "excitation frequency (Hz)"
-    assert ax.get_ylabel() == "max |y| (mm)"
+    assert ax.get_ylabel() == "max |y| at middle (mm)"
     assert ax.get_yscale() == "log"
     texts = [text.get_text() for text in ax.get_legend().get_texts()]
     assert texts == [
@@ -80,7 +80,7 @@ def test_diagram_names_units_and_marks():
     ]
 
 
-def test_the_axis_names_the_interface_where_there_are_several():
+def test_the_axis_names_the_interface_of_all_branches():
     system = System.from_modal(
         [13.1], {"middle": [0.6], "tip": [1.2]}, modal_damping=0.01,
         excitation=[Unbalance("middle", 5e-6)],
@@ -95,7 +95,7 @@ def test_axes_of_the_caller_are_used():
     ax = plot_diagram([resonance()], special_points=())
     assert plot_diagram([resonance()], ax, unit="µm", special_points=()) is ax
     assert len(ax.lines) == 6
-    assert ax.get_ylabel() == "max |y| (µm)"
+    assert ax.get_ylabel() == "max |y| at middle (µm)"
     with pytest.raises(ValueError, match="unit must be one of m, mm, µm, nm"):
         plot_diagram([resonance()], unit="inch")
 
