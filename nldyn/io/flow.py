@@ -79,17 +79,49 @@ def write_flow(group: Any, flow: FlowMap) -> None:
     for key, value in asdict(flow.options).items():
         if value is not None:
             set_attribute(group, key, value)
-    system, linear = flow.system, flow.system.linear
+    system = flow.system
+    _write_modes(group, system)
+    _write_spin(group, system)
+    _write_interfaces(group, system)
+    _write_basis(group, system)
+    _write_rigid_stops(group, system)
+    _write_elastic_stops(group, system.elastic_stops)
+    _write_columns(
+        group.create_group("dampers"),
+        {"at": [d.at for d in system.dampers], **_ends(system.dampers), **_drags(system.dampers)},
+        {"coefficient": ("N s/m", [d.coefficient for d in system.dampers])},
+    )
+    if system.springs:
+        _write_springs(group, system.springs)
+    sources = system.excitation
+    _write_columns(
+        group.create_group("excitation"),
+        {"at": [s.at for s in sources], "kind": [_kind(s) for s in sources]},
+        {
+            "size": ("kg m, N, m, m/s or m/s^2", [strength(s) for s in sources]),
+            "phase_deg": ("degree", [getattr(s, "phase_deg", 0.0) for s in sources]),
+        },
+    )
+
+
+def _write_modes(group: Any, system: System) -> None:
     put(group, "natural_frequencies", system.natural_frequencies, "rad/s")
     put(group, "damping", system.damping, "1/s")
     if system.circulatory is not None:
         put(group, "circulatory", system.circulatory, "1/s^2")
-    if system.spin is not None:
-        spin = group.create_group("spin")
-        set_attribute(spin, "hz", system.spin.hz)
-        for name, unit in _OF_SPIN.items():
-            if getattr(system.spin, name) is not None:
-                put(spin, name, getattr(system.spin, name), unit)
+
+
+def _write_spin(group: Any, system: System) -> None:
+    if system.spin is None:
+        return
+    spin = group.create_group("spin")
+    set_attribute(spin, "hz", system.spin.hz)
+    for name, unit in _OF_SPIN.items():
+        if getattr(system.spin, name) is not None:
+            put(spin, name, getattr(system.spin, name), unit)
+
+
+def _write_interfaces(group: Any, system: System) -> None:
     set_attribute(group, "interfaces", system.interfaces)
     if system.rides:
         set_attribute(group, "rides", json.dumps({k: dict(v) for k, v in system.rides.items()}))
@@ -98,65 +130,45 @@ def write_flow(group: Any, flow: FlowMap) -> None:
     if system.loads:
         set_attribute(group, "load_vectors", tuple(system.loads))
         put(group, "loads", np.array(list(system.loads.values()), dtype=float), "kg^0.5")
-    basis = group.create_group("basis")  # of the states: another computer may choose another one
+
+
+def _write_basis(group: Any, system: System) -> None:
+    """The basis of the states: another computer may choose another one."""
+    linear, basis = system.linear, group.create_group("basis")
     put(basis, "blocks", linear.blocks, "1/s")
     put(basis, "right", linear.right, "kg^-0.5 for displacements")
     put(basis, "left", linear.left, "kg^0.5 for displacements")
     put(basis, "growth", linear.growth, "1")
     set_attribute(basis, "condition", linear.condition)
-    stops = system.elastic_stops
-    _write_rigid_stops(group, system)
-    _write_columns(
-        group.create_group("stops"),
-        {"at": [s.at for s in stops], "against": [s.against or "" for s in stops]},
-        {
-            "stiffness": ("N/m^exponent", [s.stiffness for s in stops]),
-            "exponent": ("1", [s.exponent for s in stops]),
-            "gap": ("m", [s.gap for s in stops]),
-            "direction": ("1", [s.direction for s in stops]),
-            "dissipation": ("s/m", [s.dissipation for s in stops]),
-            **(
-                {"dashpot": ("N s/m", [s.dashpot for s in stops])}
-                if any(s.dashpot for s in stops)
-                else {}
-            ),
-            **(
-                {"pulls": ("1", [s.pulls for s in stops])}
-                if not all(s.pulls for s in stops)
-                else {}
-            ),
-            "is_against": ("1", [s.against is not None for s in stops]),
-            "has_own_law": ("1", [s.law is not None for s in stops]),
-            "law_trials": ("N, N/m, N s/m", [_trials(s) for s in stops]),
-        },
-    )
-    _write_columns(
-        group.create_group("dampers"),
-        {"at": [d.at for d in system.dampers], **_ends(system.dampers), **_drags(system.dampers)},
-        {"coefficient": ("N s/m", [d.coefficient for d in system.dampers])},
-    )
-    if system.springs:
-        _write_columns(
-            group.create_group("springs"),
-            {
-                "at": [s.at for s in system.springs],
-                "kind": ["linear" if isinstance(s, Spring) else "" for s in system.springs],
-                **_ends(system.springs),
-            },
-            {"coefficients": ("N/m, N/m^2, ...", [_coefficients(s) for s in system.springs])},
-        )
-    sources = system.excitation
-    _write_columns(
-        group.create_group("excitation"),
-        {
-            "at": [s.at for s in sources],
-            "kind": [_kind(s) for s in sources],
-        },
-        {
-            "size": ("kg m, N, m, m/s or m/s^2", [strength(s) for s in sources]),
-            "phase_deg": ("degree", [getattr(s, "phase_deg", 0.0) for s in sources]),
-        },
-    )
+
+
+def _write_elastic_stops(group: Any, stops: Sequence[Stop]) -> None:
+    columns: dict[str, tuple[str, list[Any]]] = {
+        "stiffness": ("N/m^exponent", [s.stiffness for s in stops]),
+        "exponent": ("1", [s.exponent for s in stops]),
+        "gap": ("m", [s.gap for s in stops]),
+        "direction": ("1", [s.direction for s in stops]),
+        "dissipation": ("s/m", [s.dissipation for s in stops]),
+    }
+    if any(s.dashpot for s in stops):
+        columns["dashpot"] = ("N s/m", [s.dashpot for s in stops])
+    if not all(s.pulls for s in stops):
+        columns["pulls"] = ("1", [s.pulls for s in stops])
+    columns["is_against"] = ("1", [s.against is not None for s in stops])
+    columns["has_own_law"] = ("1", [s.law is not None for s in stops])
+    columns["law_trials"] = ("N, N/m, N s/m", [_trials(s) for s in stops])
+    names = {"at": [s.at for s in stops], "against": [s.against or "" for s in stops]}
+    _write_columns(group.create_group("stops"), names, columns)
+
+
+def _write_springs(group: Any, springs: Sequence[AnySpring]) -> None:
+    names = {
+        "at": [s.at for s in springs],
+        "kind": ["linear" if isinstance(s, Spring) else "" for s in springs],
+        **_ends(springs),
+    }
+    coefficients = "N/m, N/m^2, ...", [_coefficients(s) for s in springs]
+    _write_columns(group.create_group("springs"), names, {"coefficients": coefficients})
 
 
 def _ends(elements: Sequence[AnyDamper] | Sequence[AnySpring]) -> dict[str, list[str]]:

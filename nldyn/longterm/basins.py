@@ -557,47 +557,72 @@ def basins(
         _add(known, share.attractor)
     failed = Counter({s.attractor.failure: s.count for s in shares if s.attractor.failure})
     notes = _told(failed, len(picked), "simulations that look for attractors")
-    failures = np.full(len(modal), "", dtype=object)
-    states = flow.to_state(modal)
-    labels, phases, periods = (np.full(len(modal), value) for value in (UNDECIDED, 0, 0))
+    ends = _Ends.of(flow.to_state(modal))
     order = rng.permutation(len(modal))  # so that all computations take about as long
     left, done = order, 0
     while len(left) and done < len(known):
         targets = [target_of(attractor) for attractor in known]
-        pieces = [left[k : k + CELLS] for k in range(0, len(left), CELLS)]
-        task = partial(settle, flow, omega, targets, longest)
         stage = count.stage(len(left), more=0 if len(left) == cells else len(left))
-        ends = values_of(task, [states[piece] for piece in pieces], executor, stage)
-        for piece, settled in zip(pieces, ends, strict=True):
-            labels[piece], states[piece] = settled.labels, settled.ends
-            failures[piece] = settled.failures
-            phases[piece] = settled.phases - periods[piece]
-            periods[piece] += settled.periods
+        ends.settle(left, partial(settle, flow, omega, targets, longest), executor, stage)
         done = len(known)
-        left = order[labels[order] == UNDECIDED]
+        left = order[ends.labels[order] == UNDECIDED]
         new = partial(attractor_from, flow, frequency_hz, name, options)
         more = MOTION * len(left[:starts])
         stage = count.stage(more, more=more)
-        for attractor in values_of(new, list(states[left[:starts]]), executor, stage):
+        for attractor in values_of(new, list(ends.states[left[:starts]]), executor, stage):
             _add(known, attractor)
     checked = rng.choice(len(modal), min(checks, len(modal)), replace=False)
     again = partial(_index_of, flow, frequency_hz, name, options, known)
     stage = count.stage(MOTION * len(checked))
     results = values_of(again, [flow.to_state(modal[cell]) for cell in checked], executor, stage)
-    wrong = sum(index != labels[cell] for cell, index in zip(checked, results, strict=True))
+    wrong = sum(index != ends.labels[cell] for cell, index in zip(checked, results, strict=True))
     counts = np.array([max(attractor.period, 1) for attractor in known] + [1])
-    notes += _told(Counter(failures[failures != ""].tolist()), len(modal), "cells")
+    failures = ends.failures[ends.failures != ""]
+    notes += _told(Counter(failures.tolist()), len(modal), "cells")
     return Basins(
         plane,
         frequency_hz,
         tuple(known),
-        labels.reshape(shape),
-        (phases % counts[labels]).reshape(shape),
-        periods.reshape(shape),
+        ends.labels.reshape(shape),
+        (ends.phases % counts[ends.labels]).reshape(shape),
+        ends.periods.reshape(shape),
         len(checked),
         int(wrong),
         tuple(notes),
     )
+
+
+@dataclass
+class _Ends:
+    """Where the cells of a plane lead, as far as they have been followed."""
+
+    states: Real
+    labels: NDArray[np.intp]
+    phases: NDArray[np.intp]
+    periods: NDArray[np.intp]
+    failures: NDArray[np.object_]
+
+    @classmethod
+    def of(cls, states: Real) -> _Ends:
+        """At the beginning."""
+        labels, phases, periods = (np.full(len(states), value) for value in (UNDECIDED, 0, 0))
+        return cls(states, labels, phases, periods, np.full(len(states), "", dtype=object))
+
+    def settle(
+        self,
+        cells: NDArray[np.intp],
+        task: Callable[[Real], Settled],
+        executor: Executor | None,
+        progress: Callable[[int, int], None],
+    ) -> None:
+        """Follow these cells, from where they are, until they have settled or take too long."""
+        pieces = [cells[k : k + CELLS] for k in range(0, len(cells), CELLS)]
+        ends = values_of(task, [self.states[piece] for piece in pieces], executor, progress)
+        for piece, settled in zip(pieces, ends, strict=True):
+            self.labels[piece], self.states[piece] = settled.labels, settled.ends
+            self.failures[piece] = settled.failures
+            self.phases[piece] = settled.phases - self.periods[piece]
+            self.periods[piece] += settled.periods
 
 
 class _Count:
