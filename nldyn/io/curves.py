@@ -8,7 +8,7 @@ software may read and this one does not. Datasets carry their unit as the attrib
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -132,6 +132,30 @@ def _numbers_of(condition: Condition) -> dict[str, Any]:
 
 
 def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve:
+    family = _read_family(group, laws)
+    size = family.n_states + family.n_free
+    corners, reasons = group.texts("corners"), group.texts("stop_reasons")
+    count = len(corners)
+    points, tangents = group.array("point", count, size), group.array("tangent", count, size)
+    lengths, steps = group.array("arclength", count), group.array("step", count)
+    conditions = _read_conditions(group, family, count, points, monitor)
+    found = [
+        Corrected(Evaluation(_past(family, condition), point), condition, step, 0, "")
+        for point, condition, step in zip(points, conditions, steps.tolist(), strict=True)
+    ]
+    if len(reasons) != 2 or not count:
+        raise group.fault("attribute", "stop_reasons", "must have two entries, of some points")
+    return Curve(
+        group.text("kind"),
+        tuple(chart.parameter for chart in family.charts),
+        tuple(map(CurvePoint, found, conditions, tangents, lengths.tolist(), corners)),
+        tuple(_read_marks(group, family, points, conditions)),
+        (StopReason(reasons[0]), StopReason(reasons[1])),
+        tuple(group.texts("notes")),
+    )
+
+
+def _read_family(group: Group, laws: Laws) -> OrbitFamily:
     flow = read_flow(group.group("flow_map"), laws)
     names = group.texts("parameters")
     ranges = group.array("ranges", len(names), 3)
@@ -149,48 +173,23 @@ def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve:
         charts,
     )
     if "unfolding" in group:
-        family = family.unfolded(group.array("unfolding", family.n_states))
-    size = family.n_states + family.n_free
-    corners, kinds = group.texts("corners"), group.texts("marks")
-    count = len(corners)
-    points, tangents = group.array("point", count, size), group.array("tangent", count, size)
-    lengths, steps = group.array("arclength", count), group.array("step", count)
-    conditions = _read_conditions(group, family, count, points, monitor)
-    found = [
-        Corrected(Evaluation(_past(family, condition), point), condition, step, 0, "")
-        for point, condition, step in zip(points, conditions, steps.tolist(), strict=True)
-    ]
-    places = group.array("mark_point", len(kinds), size)
+        return family.unfolded(group.array("unfolding", family.n_states))
+    return family
+
+
+def _read_marks(
+    group: Group, family: OrbitFamily, points: Real, conditions: Sequence[Condition]
+) -> Iterator[LocatedPoint]:
+    """The marks, each with the orbit by the condition of the point of the curve nearest to it."""
+    kinds = group.texts("marks")
+    places = group.array("mark_point", len(kinds), points.shape[1])
     residuals, errors = (group.array(f"mark_{name}", len(kinds)) for name in ("residual", "error"))
-    reasons = group.texts("stop_reasons")
-
-    def _nearest(place: Real) -> Condition:
-        """The condition of the point nearest to a mark."""
-        return conditions[int(np.argmin(np.abs(points - place).max(axis=1)))]
-
-    if len(reasons) != 2 or not count:
-        raise group.fault("attribute", "stop_reasons", "must have two entries, of some points")
-    parameters = tuple(chart.parameter for chart in charts)
-    return Curve(
-        group.text("kind"),
-        parameters,
-        tuple(map(CurvePoint, found, conditions, tangents, lengths.tolist(), corners)),
-        tuple(
-            LocatedPoint(
-                kind,
-                Evaluation(_past(family, _nearest(place)), place).make_orbit(error),
-                parameters,
-                family.values(place),
-                residual,
-                error,
-            )
-            for kind, place, residual, error in zip(
-                kinds, places, residuals.tolist(), errors.tolist(), strict=True
-            )
-        ),
-        (StopReason(reasons[0]), StopReason(reasons[1])),
-        tuple(group.texts("notes")),
-    )
+    parameters = tuple(chart.parameter for chart in family.charts)
+    numbers = zip(kinds, places, residuals.tolist(), errors.tolist(), strict=True)
+    for kind, place, residual, error in numbers:
+        nearest = conditions[int(np.argmin(np.abs(points - place).max(axis=1)))]
+        orbit = Evaluation(_past(family, nearest), place).make_orbit(error)
+        yield LocatedPoint(kind, orbit, parameters, family.values(place), residual, error)
 
 
 def _past(family: OrbitFamily, condition: Condition) -> OrbitFamily:

@@ -596,18 +596,7 @@ def diagram(
         executor=(executor, Executor, None),
     )
     check_whole("jobs", jobs, 1, MOST_JOBS)
-    for seed in seeds:
-        check_types(**{"seeds: each": (seed, SubharmonicSeed)})
-    for period in periods:
-        check_whole("periods: each", period, 1)
-    wanted = sorted(set(periods))
-    if not (wanted or seeds):
-        raise SystemModelError("periods must not be empty when there are no seeds")
-    for seed in seeds:
-        if not low <= seed.near_hz <= high:
-            raise SystemModelError(
-                f"seeds: near_hz = {seed.near_hz:g} lies outside range_hz ({low:g}, {high:g})"
-            )
+    wanted = _checked_periods(periods, seeds, (low, high))
     check_whole("search_points", search_points, 1, MOST_COUNT)
     check_whole("doublings", doublings, 0, MOST_COUNT)
     box = Collector(
@@ -648,18 +637,42 @@ def diagram(
         _follow_branch_points(box)
         for branch in box.branches:  # which become more
             box.from_mirror(branch, box.options)
+    _note_missing(box, wanted, search_points)
+    return Diagram(tuple(box.branches), (low, high), box.observe, tuple(box.notes))
+
+
+def _checked_periods(
+    periods: Sequence[int], seeds: Sequence[SubharmonicSeed], range_hz: tuple[float, float]
+) -> list[int]:
+    """The periods wanted, ascending; seeds must lie in the range."""
+    for seed in seeds:
+        check_types(**{"seeds: each": (seed, SubharmonicSeed)})
+    for period in periods:
+        check_whole("periods: each", period, 1)
+    if not (periods or seeds):
+        raise SystemModelError("periods must not be empty when there are no seeds")
+    low, high = range_hz
+    for seed in seeds:
+        if not low <= seed.near_hz <= high:
+            raise SystemModelError(
+                f"seeds: near_hz = {seed.near_hz:g} lies outside range_hz ({low:g}, {high:g})"
+            )
+    return sorted(set(periods))
+
+
+def _note_missing(box: Collector, wanted: Sequence[int], search_points: int) -> None:
+    """What was looked for and not found."""
     for period in wanted:
         if not any(branch.period == period for branch in box.branches):
             tried = f"{search_points} frequenc{'y' if search_points == 1 else 'ies'}"
             box.notes.append(f"no orbit of period {period} found by simulation at {tried}")
-    if not box.branches and flow.system.free_modes:
+    if not box.branches and box.flow.system.free_modes:
         box.notes.append(NO_PLACE)
     if _contact_is_missing(box):
         box.notes.append(
             "no orbit that touches a stop was found; there may be some all the same: try a range "
             "that begins lower, or more search points"
         )
-    return Diagram(tuple(box.branches), (low, high), box.observe, tuple(box.notes))
 
 
 def _search(
