@@ -129,24 +129,10 @@ def parameter_study(
     })  # fmt: skip
     check_execution(executor, progress)
     scene = scene if isinstance(scene, Scene) else load_scene(scene)
-    names = list(parameters)
-    for name in names:
-        check_types(**{"study: a key of parameters": (name, str)})
-        if not all(name.split(".")):
-            raise SystemModelError(f"study: a key of parameters has an empty part, got '{name}'")
-    if not names:
-        raise SystemModelError("study: name at least one parameter")
+    names = _checked_names(parameters)
     check_whole("study: seed", seed, 0)
     values = _design(parameters, design, samples, seed)
-    base = tomllib.loads(scene.text)
-    if design != "grid":
-        whole = _whole_keys(scene, base, names, values[0])
-        values = [
-            tuple(round(v) if w else v for v, w in zip(row, whole, strict=True)) for row in values
-        ]
-    cases = [_with_values(scene, base, names, row) for row in values]
-    for tables in cases:
-        scene_from_tables(tables, scene.file, mesh_folders=scene.mesh_folders)
+    values, cases = _cases(scene, names, values, rounded=design != "grid")
     label = f"{getattr(measure, '__module__', '')}.{getattr(measure, '__qualname__', measure)}"
     keys, done = [str(k) for k in range(len(cases))], {}
     if keep is not None:
@@ -175,6 +161,32 @@ def parameter_study(
         scene, parameters, design, values, [done[key] for key in keys], label,
         {"design": design, "seed": seed},
     )  # fmt: skip
+
+
+def _checked_names(parameters: Mapping[str, Sequence[Any]]) -> list[str]:
+    for name in parameters:
+        check_types(**{"study: a key of parameters": (name, str)})
+        if not all(name.split(".")):
+            raise SystemModelError(f"study: a key of parameters has an empty part, got '{name}'")
+    if not parameters:
+        raise SystemModelError("study: name at least one parameter")
+    return list(parameters)
+
+
+def _cases(
+    scene: Scene, names: Sequence[str], values: list[tuple[Any, ...]], *, rounded: bool
+) -> tuple[list[tuple[Any, ...]], list[Tables]]:
+    """The values of all cases, whole where their keys are, and the tables, checked as scenes."""
+    base = tomllib.loads(scene.text)
+    if rounded:
+        whole = _whole_keys(scene, base, names, values[0])
+        values = [
+            tuple(round(v) if w else v for v, w in zip(row, whole, strict=True)) for row in values
+        ]
+    cases = [_with_values(scene, base, names, row) for row in values]
+    for tables in cases:
+        scene_from_tables(tables, scene.file, mesh_folders=scene.mesh_folders)
+    return values, cases
 
 
 def _measured(
