@@ -11,7 +11,7 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import LocateError
 from nldyn.bifurcations.branch_crossing import NEIGHBOUR, SHORTEST_CROSSING
 from nldyn.bifurcations.critical import correct_across
-from nldyn.bifurcations.point import BranchPoint
+from nldyn.bifurcations.point import BranchNode
 from nldyn.bifurcations.sign_changes import crosses
 from nldyn.orbits.conditions import TOUCH, depth_row
 from nldyn.orbits.orbit import Orbit
@@ -31,9 +31,9 @@ class Chord:
     σ is the position along the secant; points once computed help to predict the next ones.
     """
 
-    first: BranchPoint
-    last: BranchPoint
-    known: dict[float, BranchPoint] = field(default_factory=dict)
+    first: BranchNode
+    last: BranchNode
+    known: dict[float, BranchNode] = field(default_factory=dict)
 
     @cached_property
     def _secant(self) -> Real:
@@ -59,7 +59,7 @@ class Chord:
                 row = depth
         return np.asarray(row / np.linalg.norm(row))
 
-    def at(self, sigma: float) -> BranchPoint:
+    def at(self, sigma: float) -> BranchNode:
         """Point of the branch on the plane through σ of the chord.
 
         Raises
@@ -96,7 +96,7 @@ class Chord:
         else:
             raise LocateError(found.failure)
         length = a.arclength + sigma * (self.last.arclength - a.arclength)
-        point = BranchPoint(orbit, tangent, length)
+        point = BranchNode(orbit, tangent, length)
         if crosses(self.first, point) and crosses(self.last, point):
             raise LocateError("the branch turns within one step")
         self.known[sigma] = point
@@ -107,11 +107,11 @@ class Chord:
         way = orbit.point - self.first.orbit.point
         return float(self.row @ way) / float(self.row @ self._secant)
 
-    def with_place(self, orbit: Orbit) -> BranchPoint:
+    def with_place(self, orbit: Orbit) -> BranchNode:
         """An orbit with the place and the tangent that the chord gives it."""
         sigma = self.place(orbit)
         length = self.last.arclength - self.first.arclength
-        return BranchPoint(orbit, self.direction(sigma), self.first.arclength + sigma * length)
+        return BranchNode(orbit, self.direction(sigma), self.first.arclength + sigma * length)
 
     def passes(self, orbit: Orbit, off: float) -> bool:
         """Whether an orbit lies on the chord, but for a part of its length."""
@@ -135,7 +135,7 @@ class Chord:
             + x * x * (x - 1.0) * end
         )
 
-    def _nearest(self, sigma: float) -> BranchPoint:
+    def _nearest(self, sigma: float) -> BranchNode:
         """The known point nearest to a position."""
         known = self.known | {0.0: self.first, 1.0: self.last}
         return known[min(known, key=lambda x: abs(x - sigma))]
@@ -179,11 +179,11 @@ class Chord:
         pace = metric_length(self._weights, tangent)
         return self._length > BEND and along < STEEPEST * self._length * pace
 
-    def frequency_slope(self, point: BranchPoint) -> float:
+    def frequency_slope(self, point: BranchNode) -> float:
         """Derivative of ln ω with respect to σ."""
         return float(self._slope(point)[-1])
 
-    def _slope(self, point: BranchPoint) -> Real:
+    def _slope(self, point: BranchNode) -> Real:
         """Derivative of the shooting unknowns with respect to σ."""
         pace = float(self.row @ self._secant) / float(self.row @ point.tangent)
         return np.asarray(pace * point.tangent)

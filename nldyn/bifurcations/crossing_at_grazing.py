@@ -19,7 +19,7 @@ from nldyn.base.errors import ConvergenceError, LocateError
 from nldyn.bifurcations.branch_crossing import CROSSES, NEAR_CRITICAL
 from nldyn.bifurcations.chord import BEND, CROSSING_ERROR, Chord
 from nldyn.bifurcations.critical import correct_across
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.sign_changes import accounted, changed
 from nldyn.bifurcations.touching import Touch, touches_sharply, touching_extremes
@@ -101,7 +101,7 @@ class ByDepth:
         return None
 
 
-def special_points_at_grazing(a: BranchPoint, b: BranchPoint) -> list[SpecialPoint]:
+def special_points_at_grazing(a: BranchNode, b: BranchNode) -> list[SpecialPoint]:
     """The grazing point of a short step beside a branch point, and that point if it is within.
 
     In order. Empty if the step has none, or other points as well, or is longer than 1e-4.

@@ -17,7 +17,7 @@ from nldyn.bifurcations.branch_crossing import (
 )
 from nldyn.bifurcations.chord import BESIDE, Chord
 from nldyn.bifurcations.critical import turns_near_crossing
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.sign_changes import (
     CRITICAL,
@@ -35,7 +35,7 @@ MIXED = 1e-5  # distance from a crossing within which a tangent may be of both b
 VANISHED = 1e-3  # an extreme at its root, relative to those beside it
 
 
-def locate(kind: str, chord: Chord, test: Callable[[BranchPoint], float]) -> SpecialPoint:
+def locate(kind: str, chord: Chord, test: Callable[[BranchNode], float]) -> SpecialPoint:
     """Root of a test function on a chord whose ends have opposite signs.
 
     Raises
@@ -48,7 +48,7 @@ def locate(kind: str, chord: Chord, test: Callable[[BranchPoint], float]) -> Spe
     return SpecialPoint(kind, point, error * abs(chord.frequency_slope(point)) + point.orbit.error)
 
 
-def located_between(a: BranchPoint, b: BranchPoint, depth: int = 0) -> list[SpecialPoint]:
+def located_between(a: BranchNode, b: BranchNode, depth: int = 0) -> list[SpecialPoint]:
     """The special points between two points that their tests tell of, in order.
 
     Each change of sign is followed to its root. Where several happen in one step, or the events do
@@ -114,7 +114,7 @@ def _crossing_at_an_end(chord: Chord) -> Orbit | None:
     return crossing_within(chord.first.orbit, MIXED) or crossing_within(chord.last.orbit, MIXED)
 
 
-def _vanishes(touch: Touch, at: BranchPoint, a: BranchPoint, b: BranchPoint) -> bool:
+def _vanishes(touch: Touch, at: BranchNode, a: BranchNode, b: BranchNode) -> bool:
     """Whether an extreme is nearly zero at a point, not only of different signs beside it.
 
     A touch that is too slight to count as a contact may begin at a distance from its grazing point.
@@ -157,7 +157,7 @@ def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
     orbit = true_crossing(special.orbit)
     if orbit is None or distance(special.orbit, orbit) > NEIGHBOUR:
         return special
-    point = BranchPoint(orbit, special.point.tangent, special.point.arclength)
+    point = BranchNode(orbit, special.point.tangent, special.point.arclength)
     return SpecialPoint("BP", point, special.frequency_error)
 
 

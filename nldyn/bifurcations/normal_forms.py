@@ -32,7 +32,7 @@ from nldyn.bifurcations.critical import (
     loop_of,
     torus,
 )
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special
+from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special
 from nldyn.bifurcations.rigid_grazing import rigid_grazing_form
 from nldyn.orbits.conditions import Grazing
 from nldyn.orbits.orbit import Orbit, minimal_period
@@ -357,7 +357,7 @@ def _breaks_mirror(orbit: Orbit, q: Real) -> bool:
 
 def switch_at_branch_point(
     special: SpecialPoint, amplitude: float = 0.02
-) -> tuple[BranchPoint, BranchPoint]:
+) -> tuple[BranchNode, BranchNode]:
     """First points of the other branch through a branch point, one in either direction.
 
     At a broken symmetry these are the two halves of the new branch; `nldyn.branches.leg.trace`
@@ -372,7 +372,7 @@ def switch_at_branch_point(
 
     Returns
     -------
-    pair of BranchPoint
+    pair of BranchNode
         Their tangents lead away from the branch point.
 
     Raises
@@ -417,7 +417,7 @@ def other_tangent(special: SpecialPoint) -> Real:
     return np.asarray(tangents[int(np.argmin(along))])
 
 
-def _step_off(special: SpecialPoint, direction: Real, amplitude: float) -> BranchPoint:
+def _step_off(special: SpecialPoint, direction: Real, amplitude: float) -> BranchNode:
     """Point of the branch with a tangent at a distance from the branch point.
 
     The distance must be short where a linear stop is just touched beside the branch point: the
@@ -432,7 +432,7 @@ def _step_off(special: SpecialPoint, direction: Real, amplitude: float) -> Branc
         found = problem.correct(orbit.point + size * direction, row, longest=size)
         if found.converged:
             tangent = problem.tangent(found, direction)
-            return BranchPoint(Orbit.of(problem, found, orbit.observe), tangent, 0.0)
+            return BranchNode(Orbit.of(problem, found, orbit.observe), tangent, 0.0)
     raise LocateError(f"no orbit found beside the branch point at {_hz(special)}: {found.failure}")
 
 

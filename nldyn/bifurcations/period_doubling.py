@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from nldyn.base.arrays import Real
 from nldyn.base.errors import LocateError, check_positive
 from nldyn.bifurcations.chord import Chord
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special
+from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special
 from nldyn.orbits.conditions import nearest_flip
 from nldyn.orbits.newton import refine
 from nldyn.orbits.orbit import Orbit, minimal_period
@@ -28,7 +28,7 @@ def passed_flip(a: Orbit, b: Orbit) -> bool:
     return product < -0.8 * float(np.linalg.norm(first) * np.linalg.norm(second))
 
 
-def flip_between(a: BranchPoint, b: BranchPoint) -> BranchPoint:
+def flip_between(a: BranchNode, b: BranchNode) -> BranchNode:
     """The orbit of half the period near the flip between a and b, run through twice.
 
     The shooting equations of the doubled branch are singular at the flip, so the point where the
@@ -63,7 +63,7 @@ def flip_between(a: BranchPoint, b: BranchPoint) -> BranchPoint:
         orbit.error,
         orbit.observe,
     )
-    return BranchPoint(doubled, a.tangent, a.arclength + sigma * (b.arclength - a.arclength))
+    return BranchNode(doubled, a.tangent, a.arclength + sigma * (b.arclength - a.arclength))
 
 
 def half_difference(problem: ShootingProblem, point: Real) -> Real:
@@ -73,7 +73,7 @@ def half_difference(problem: ShootingProblem, point: Real) -> Real:
     return (nodes[:half] - nodes[half:]).ravel()
 
 
-def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoint:
+def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchNode:
     """First point of the doubled branch at a flip, heading away from it.
 
     Parameters
@@ -86,7 +86,7 @@ def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoin
 
     Returns
     -------
-    BranchPoint
+    BranchNode
         An orbit of twice the period.
 
     Raises
@@ -114,7 +114,7 @@ def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoin
     weights = problem.metric(doubled)
     direction /= metric_length(weights, direction)
     row = weights * direction
-    first: BranchPoint | None = None
+    first: BranchNode | None = None
     for share in (1.0, 0.25, 0.05, 0.01, 2e-3, 4e-4):
         size = share * amplitude
         found = problem.correct(doubled + size * direction, row / np.linalg.norm(row))
@@ -122,7 +122,7 @@ def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchPoin
             twin = Orbit.of(problem, found, orbit.observe)
             if minimal_period(twin) < problem.period:
                 continue
-            first = BranchPoint(twin, problem.tangent(found, direction), 0.0)
+            first = BranchNode(twin, problem.tangent(found, direction), 0.0)
             if twin.impacts == 2 * orbit.impacts and np.abs(twin.multipliers - 1.0).min() < 0.3:
                 break
     if first is not None:

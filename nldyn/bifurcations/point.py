@@ -13,7 +13,7 @@ from nldyn.orbits.orbit import Orbit, shifted_alike, stroboscopic
 
 
 @dataclass(frozen=True, eq=False)
-class BranchPoint:
+class BranchNode:
     """An orbit on a branch with the branch's direction there.
 
     Parameters
@@ -35,7 +35,7 @@ class BranchPoint:
 
     def __repr__(self) -> str:
         """One line: the orbit and where it is along the branch."""
-        return f"<BranchPoint at arclength {self.arclength:.4g}: {self.orbit!r}>"
+        return f"<BranchNode at arclength {self.arclength:.4g}: {self.orbit!r}>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,14 +46,14 @@ class SpecialPoint:
     ----------
     kind : {"LP", "PD", "NS", "BP", "GR"}
         Cyclic fold, flip, Neimark-Sacker, branch point, grazing.
-    point : BranchPoint
+    point : BranchNode
         The orbit at which it happens.
     frequency_error : float
         Estimated error of the root in frequency and the last Newton step, relative.
     """
 
     kind: str
-    point: BranchPoint
+    point: BranchNode
     frequency_error: float
 
     def __repr__(self) -> str:
@@ -88,7 +88,7 @@ def check_special(caller: str, special: object, kind: str = "", *, of_branch: bo
         raise SystemModelError(f"{caller} needs a special point, got {shown(special)}")
     if kind and found != kind:
         raise SystemModelError(f"{caller} needs a {kind} point, got {found}")
-    if of_branch and not isinstance(getattr(special, "point", None), BranchPoint):
+    if of_branch and not isinstance(getattr(special, "point", None), BranchNode):
         raise SystemModelError(
             f"{caller} needs a special point of a branch, which knows the branch's direction; "
             f"the {found} point at {orbit.frequency_hz:g} Hz was found otherwise"

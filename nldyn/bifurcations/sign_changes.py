@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nldyn.base.arrays import Complex
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.orbits.critical_functions import (
     branch_point_test,
     flip_test,
@@ -20,7 +20,7 @@ ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
 CRITICAL = {"LP": 1.0, "BP": 1.0, "PD": -1.0}  # multiplier at a special point
 
 
-def tests(point: BranchPoint) -> dict[str, float]:
+def tests(point: BranchNode) -> dict[str, float]:
     """All smooth test functions at a point; LP is the frequency part of the tangent.
 
     Without damping the multipliers of every stable orbit lie on the unit circle and leave it in
@@ -38,7 +38,7 @@ def tests(point: BranchPoint) -> dict[str, float]:
     return point.tests
 
 
-def crosses(a: BranchPoint, b: BranchPoint) -> bool:
+def crosses(a: BranchNode, b: BranchNode) -> bool:
     """Whether a branch crosses another one between two points, or jumps to it.
 
     The determinant of the shooting equations bordered by the tangent keeps its sign along a branch
@@ -98,7 +98,7 @@ def _on_unit_circle(multipliers: Complex) -> bool:
     return bool(abs(mu.imag) > 1e-6 * abs(mu))
 
 
-def changed(a: BranchPoint, b: BranchPoint) -> list[str]:
+def changed(a: BranchNode, b: BranchNode) -> list[str]:
     """Tests that change their sign between two points."""
     before, after = tests(a), tests(b)
     return [kind for kind in before if before[kind] * after[kind] < 0.0]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from nldyn.base.errors import SystemModelError
 from nldyn.bifurcations.normal_forms import switch_at_branch_point
 from nldyn.bifurcations.period_doubling import switch_at_flip
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special
+from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special
 
 
-def switch_branch(special: SpecialPoint) -> list[BranchPoint]:
+def switch_branch(special: SpecialPoint) -> list[BranchNode]:
     """Starting points of the branches that leave a special point.
 
     Parameters
@@ -18,7 +18,7 @@ def switch_branch(special: SpecialPoint) -> list[BranchPoint]:
 
     Returns
     -------
-    list of BranchPoint
+    list of BranchNode
         One at a flip; at a branch point one for each new half-branch. `continue_branch` goes on
         from the ``orbit`` of each.
 

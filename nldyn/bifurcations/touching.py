@@ -10,7 +10,7 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import LocateError
-from nldyn.bifurcations.point import BranchPoint
+from nldyn.bifurcations.point import BranchNode
 from nldyn.orbits.extremes import alone, nearest, sign_changes
 from nldyn.orbits.orbit import Extremes, Orbit
 from nldyn.system.rigid_stop import RigidStop
@@ -27,7 +27,7 @@ class Touch:
     is_maximum: bool
     phase: float
 
-    def depth(self, point: BranchPoint) -> float:
+    def depth(self, point: BranchNode) -> float:
         """Value of the extremum of this kind nearest in phase."""
         found = point.orbit.touches(self.output)
         full = 2.0 * math.pi * point.orbit.period

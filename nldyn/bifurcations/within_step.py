@@ -13,7 +13,7 @@ from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.crossing_at_grazing import special_points_at_grazing
 from nldyn.bifurcations.hidden_pairs import Between
 from nldyn.bifurcations.locate import located_between
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.bifurcations.sign_changes import changed, leaves_circle, tests
 from nldyn.bifurcations.touching import touches_sharply, touching_extremes
 from nldyn.orbits.critical_functions import travel
@@ -31,10 +31,10 @@ DIVES = 8  # points at which to look for a change of sign between two others
 
 
 def special_points_between(
-    a: BranchPoint,
-    b: BranchPoint,
-    before: BranchPoint | None = None,
-    after: BranchPoint | None = None,
+    a: BranchNode,
+    b: BranchNode,
+    before: BranchNode | None = None,
+    after: BranchNode | None = None,
 ) -> list[SpecialPoint]:
     """All special points between two neighbouring points, in order.
 
@@ -65,7 +65,7 @@ def special_points_between(
     return found
 
 
-def passes_node(a: BranchPoint, b: BranchPoint) -> bool:
+def passes_node(a: BranchNode, b: BranchNode) -> bool:
     """Whether an impact with a rigid stop passes a phase of shooting between two points.
 
     The state there jumps to that on the other side of the impact, over a step of no length.
@@ -76,8 +76,8 @@ def passes_node(a: BranchPoint, b: BranchPoint) -> bool:
 
 
 def _inside(
-    z: BranchPoint | None, a: BranchPoint, b: BranchPoint, c: BranchPoint | None
-) -> list[BranchPoint]:
+    z: BranchNode | None, a: BranchNode, b: BranchNode, c: BranchNode | None
+) -> list[BranchNode]:
     """Points between a and b, close enough that a multiplier crosses the circle once at most."""
     several = a.orbit.multipliers.size > 2
     if several and smooth(a, b):
@@ -89,8 +89,8 @@ def _inside(
 
 
 def beside_grazing(
-    before: BranchPoint | None, a: BranchPoint, b: BranchPoint, after: BranchPoint | None
-) -> list[BranchPoint]:
+    before: BranchNode | None, a: BranchNode, b: BranchNode, after: BranchNode | None
+) -> list[BranchNode]:
     """Points between a and b, closer and closer to a grazing point beside them.
 
     Where a stop is touched sharply, multipliers go there with the root of the distance: the ends of
@@ -121,7 +121,7 @@ def _halves(length: float, beside: float) -> list[float]:
 
 
 def _check_dips(
-    before: BranchPoint | None, a: BranchPoint, b: BranchPoint, after: BranchPoint | None
+    before: BranchNode | None, a: BranchNode, b: BranchNode, after: BranchNode | None
 ) -> None:
     """Raise a LocateError unless a branch is found where two special points may hide on a chord."""
     for z, here, c in ((before, a, b), (a, b, after)):
@@ -133,7 +133,7 @@ def _check_dips(
                 Chord(a, b).at(share)
 
 
-def smooth(a: BranchPoint, b: BranchPoint) -> bool:
+def smooth(a: BranchNode, b: BranchNode) -> bool:
     """Whether multipliers may be interpolated between two points, and can cross the circle."""
     if a.orbit.system.conservative or a.orbit.impacts != b.orbit.impacts:
         return False
@@ -141,12 +141,12 @@ def smooth(a: BranchPoint, b: BranchPoint) -> bool:
 
 
 def looked_into(
-    z: BranchPoint | None,
-    a: BranchPoint,
-    b: BranchPoint,
-    c: BranchPoint | None,
+    z: BranchNode | None,
+    a: BranchNode,
+    b: BranchNode,
+    c: BranchNode | None,
     most: int = MOST_LOOKS,
-) -> list[BranchPoint]:
+) -> list[BranchNode]:
     """Points between a and b, so that between neighbours no multiplier crosses the circle twice.
 
     The points z before and c after them count where the number of contacts is the same.
@@ -174,8 +174,8 @@ def looked_into(
 
 
 def resolved(
-    a: BranchPoint, b: BranchPoint, least: int, most: int, far: float
-) -> list[BranchPoint]:
+    a: BranchNode, b: BranchNode, least: int, most: int, far: float
+) -> list[BranchNode]:
     """Points between two others, halved at least so often, until no multiplier moves far."""
     before, after = a.orbit.multipliers, b.orbit.multipliers
     if most == 0 or (least <= 0 and max(travel(before, after), travel(after, before)) <= far):
@@ -185,7 +185,7 @@ def resolved(
     return [*first, middle, *resolved(middle, b, least - 1, most - 1, far)]
 
 
-def insert_dip(points: list[BranchPoint], index: int) -> None:
+def insert_dip(points: list[BranchNode], index: int) -> None:
     """Add a point beside one where a test or an extreme may have changed sign twice unseen."""
     z, a, b = points[index - 1 : index + 2]
     for number, where in enumerate(hidden_dips(z, a, b)):
@@ -200,8 +200,8 @@ def insert_dip(points: list[BranchPoint], index: int) -> None:
 
 
 def turned_over(
-    z: BranchPoint, a: BranchPoint, b: BranchPoint, number: int, where: float
-) -> BranchPoint | None:
+    z: BranchNode, a: BranchNode, b: BranchNode, number: int, where: float
+) -> BranchNode | None:
     """Point between z and b at which a test or an extreme has changed its sign, or None.
 
     It is looked for at an arclength, then where the parabola through the points nearest to that
@@ -234,7 +234,7 @@ def turned_over(
 
 
 @lru_cache(maxsize=8)  # three neighbours are asked about when they are met, and in both steps
-def hidden_dips(z: BranchPoint, a: BranchPoint, b: BranchPoint) -> tuple[float, ...]:
+def hidden_dips(z: BranchNode, a: BranchNode, b: BranchNode) -> tuple[float, ...]:
     """Arclengths between z and b at which a test or an extreme may touch zero unseen.
 
     See `orbits.extremes.dip`; the extremes are those of the stops' penetrations.
@@ -250,6 +250,6 @@ def hidden_dips(z: BranchPoint, a: BranchPoint, b: BranchPoint) -> tuple[float, 
     return tuple(a.arclength + way for way in found)
 
 
-def differs(a: BranchPoint, b: BranchPoint) -> bool:
+def differs(a: BranchNode, b: BranchNode) -> bool:
     """Whether a test or an extreme changes its sign between two points."""
     return bool(changed(a, b) or touching_extremes(a.orbit, b.orbit))

@@ -21,7 +21,7 @@ from nldyn.bifurcations.branch_crossing import (
     lies_on_crossing,
 )
 from nldyn.bifurcations.period_doubling import flip_between, half_difference, passed_flip
-from nldyn.bifurcations.point import BranchPoint
+from nldyn.bifurcations.point import BranchNode
 from nldyn.bifurcations.sign_changes import crosses
 from nldyn.bifurcations.touching import rigid_grazing
 from nldyn.branches.endings import Ending, StopReason
@@ -59,7 +59,7 @@ class StepperState:
 
     Parameters
     ----------
-    here : BranchPoint
+    here : BranchNode
         The last point.
     step : float
         Arclength of the next step.
@@ -70,7 +70,7 @@ class StepperState:
         Steps made.
     """
 
-    here: BranchPoint
+    here: BranchNode
     step: float
     behind: Real
     count: int
@@ -101,7 +101,7 @@ def loses_impact(orbit: Orbit) -> bool:
     return bool(found.failure) or int(found.closings.sum()) != orbit.impacts
 
 
-def _past_impact_at_node(here: BranchPoint) -> tuple[BranchPoint, float, float] | None:
+def _past_impact_at_node(here: BranchNode) -> tuple[BranchNode, float, float] | None:
     """Next point where the phase of an impact with a rigid stop passes one of shooting, or None.
 
     The state there jumps from that before the impact to that behind it, or back. So the orbit is
@@ -130,7 +130,7 @@ def _past_impact_at_node(here: BranchPoint) -> tuple[BranchPoint, float, float] 
                 change = other.max_abs_displacement / orbit.max_abs_displacement - 1.0
                 if other.impacts == orbit.impacts and abs(change) < 100.0 * shift + NEAR_NODE:
                     tangent = problem.tangent(found, by_frequency)
-                    return BranchPoint(other, tangent, here.arclength + shift), 0.0, 0.0
+                    return BranchNode(other, tangent, here.arclength + shift), 0.0, 0.0
     except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
         pass
     return None
@@ -140,12 +140,12 @@ def _past_impact_at_node(here: BranchPoint) -> tuple[BranchPoint, float, float] 
 class Stepper:
     """Iterator over the points of a branch in one direction.
 
-    Yields `BranchPoint`s; when it ends, `stop_reason` says why. The caller may stop between any
+    Yields `BranchNode`s; when it ends, `stop_reason` says why. The caller may stop between any
     two points; asked for points again, the walk goes on where it was.
 
     Parameters
     ----------
-    start : BranchPoint
+    start : BranchNode
         First point, yielded first; its tangent gives the direction.
     range_hz : (float, float)
         Frequencies between which to stay.
@@ -155,26 +155,26 @@ class Stepper:
         Where other branches were broken off: the walk stops at the first of these that it passes.
     stride : StepperState, optional
         Where to go on, if not at the start.
-    visited : list of BranchPoint
+    visited : list of BranchNode
         The points so far.
     """
 
-    start: BranchPoint
+    start: BranchNode
     range_hz: tuple[float, float]
     options: ContinuationOptions
     open_ends: Real | None = None
     stop_reason: StopReason = field(default_factory=Ending.NOT_FINISHED.told)
     stride: StepperState | None = None
-    visited: list[BranchPoint] = field(default_factory=list, repr=False)
+    visited: list[BranchNode] = field(default_factory=list, repr=False)
     _places: Rows | None = field(default=None, init=False, repr=False)  # unknowns of these
     _obstacle: str = field(default="", init=False, repr=False)
-    _depth_row: tuple[BranchPoint, Real | None] | None = field(default=None, init=False, repr=False)
+    _depth_row: tuple[BranchNode, Real | None] | None = field(default=None, init=False, repr=False)
     _met: float = field(default=0.0, init=False, repr=False)  # last step too long to meet a flip
 
     def __post_init__(self) -> None:
-        check_types(start=(self.start, BranchPoint), options=(self.options, ContinuationOptions))
+        check_types(start=(self.start, BranchNode), options=(self.options, ContinuationOptions))
 
-    def __iter__(self) -> Iterator[BranchPoint]:
+    def __iter__(self) -> Iterator[BranchNode]:
         """Walk along the branch."""
         problem = self.start.orbit.problem
         if self.stride is None:
@@ -242,8 +242,8 @@ class Stepper:
         self.stop_reason = Ending.MOST_POINTS.told(points=self.options.max_points)
 
     def _shortened(
-        self, problem: ShootingProblem, behind: Real, here: BranchPoint, step: float
-    ) -> tuple[float, BranchPoint, float, float] | None:
+        self, problem: ShootingProblem, behind: Real, here: BranchNode, step: float
+    ) -> tuple[float, BranchNode, float, float] | None:
         """The longest step up to `step` that leads to a next point, with what `_advance` gives."""
         tried = False
         while step >= self.options.min_step:
@@ -267,10 +267,10 @@ class Stepper:
         self,
         problem: ShootingProblem,
         behind: Real,
-        here: BranchPoint,
+        here: BranchNode,
         step: float,
         crossing: float = 0.0,
-    ) -> tuple[BranchPoint, float, float] | None:
+    ) -> tuple[BranchNode, float, float] | None:
         """Next point, its angle to this one and its relative distance from the predictor.
 
         None when the step must be shorter, as it must be to cross another branch or to meet it:
@@ -313,7 +313,7 @@ class Stepper:
                 return None  # the branch with the impact and that without meet in a corner
             if problem.flow.system.jumps or orbit.impacts != here.orbit.impacts:
                 tangent = problem.tangent(found, direction)
-                return BranchPoint(orbit, tangent, here.arclength + step), 0.0, 0.0
+                return BranchNode(orbit, tangent, here.arclength + step), 0.0, 0.0
         if miss > self.options.max_miss:
             return None
         # a curve that turns by max_angle leaves its tangent by half of that: a longer correction
@@ -332,7 +332,7 @@ class Stepper:
         if meets and step > max(MEETING_STEP, crossing):
             self._met = step
             return None
-        point = BranchPoint(orbit, tangent, here.arclength + step)
+        point = BranchNode(orbit, tangent, here.arclength + step)
         if (
             not meets
             and crosses(here, point)
@@ -351,8 +351,8 @@ class Stepper:
         return orbit.impacts if step > self.options.grazing_step and not orbit.rests else -1
 
     def _across_touch(
-        self, problem: ShootingProblem, here: BranchPoint, step: float
-    ) -> tuple[BranchPoint, float, float] | None:
+        self, problem: ShootingProblem, here: BranchNode, step: float
+    ) -> tuple[BranchNode, float, float] | None:
         """Next point on the other side of a grazing point, as `_advance` gives it, or None.
 
         A stiff stop may bend the branch by more than a right angle within 1e-8, back from every
@@ -376,9 +376,9 @@ class Stepper:
         tangent = problem.tangent(found, here.tangent)
         if float(row @ tangent) * float(row @ here.tangent) < 0.0:
             tangent = -tangent
-        return BranchPoint(orbit, tangent, here.arclength + length), 0.0, 0.0
+        return BranchNode(orbit, tangent, here.arclength + length), 0.0, 0.0
 
-    def _past_crossing(self, here: BranchPoint) -> tuple[BranchPoint, float, float] | None:
+    def _past_crossing(self, here: BranchNode) -> tuple[BranchNode, float, float] | None:
         """Next point from one beside which branches cross, or None.
 
         Its place is some mixture of theirs, and the next orbits may be so ill conditioned that
@@ -398,7 +398,7 @@ class Stepper:
         self._obstacle = obstacle
         return None
 
-    def _range_end(self, a: BranchPoint, b: BranchPoint, end_hz: float) -> BranchPoint | None:
+    def _range_end(self, a: BranchNode, b: BranchNode, end_hz: float) -> BranchNode | None:
         """Point of the branch exactly at an end of the range."""
         p = math.log(2.0 * math.pi * end_hz)
         pa, pb = a.orbit.point[-1], b.orbit.point[-1]
@@ -416,9 +416,9 @@ class Stepper:
         orbit = Orbit.of(problem, found, a.orbit.observe)
         tangent = problem.tangent(found, a.tangent)
         length = a.arclength + share * (b.arclength - a.arclength)
-        return BranchPoint(orbit, tangent, length)
+        return BranchNode(orbit, tangent, length)
 
-    def closes(self, a: BranchPoint, b: BranchPoint) -> bool:
+    def closes(self, a: BranchNode, b: BranchNode) -> bool:
         """Whether the walk from a to b passes the start again, in the same direction.
 
         The orbit may have come back shifted by some of its excitation periods.
@@ -433,7 +433,7 @@ class Stepper:
         step = start.orbit.problem.metric(start.orbit.point) * (b.orbit.point - a.orbit.point)
         return bool((tangents[passed] @ step > 0.0).any())
 
-    def _comes_back(self, a: BranchPoint, b: BranchPoint) -> bool:
+    def _comes_back(self, a: BranchNode, b: BranchNode) -> bool:
         """Whether the walk from a to b passes a point that it has passed before, not the start.
 
         It can, in the same direction, only where it has left its branch for another one on the way.
@@ -470,7 +470,7 @@ class Stepper:
         )
 
 
-def _crossing_ahead(here: BranchPoint) -> BranchPoint | None:
+def _crossing_ahead(here: BranchNode) -> BranchNode | None:
     """Where another branch crosses that of a point right beside there, on its tangent.
 
     It may lie a little behind.
@@ -483,10 +483,10 @@ def _crossing_ahead(here: BranchPoint) -> BranchPoint | None:
     if metric_length(weights, way) > FARTHEST_CROSSING:
         return None
     ahead = float(way @ (weights * here.tangent)) / metric_length(weights, here.tangent)
-    return BranchPoint(crossing, here.tangent, here.arclength + ahead)
+    return BranchNode(crossing, here.tangent, here.arclength + ahead)
 
 
-def _passed(a: BranchPoint, b: BranchPoint, places: Real) -> NDArray[np.bool_]:
+def _passed(a: BranchNode, b: BranchNode, places: Real) -> NDArray[np.bool_]:
     """Which places (m, N + 1) lie beside the step from a to b, nearer than 0.1 of its length."""
     start, step = a.orbit.point, b.orbit.point - a.orbit.point
     weights = a.orbit.problem.metric(start)

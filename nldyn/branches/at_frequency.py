@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from nldyn.base.arrays import Real
 from nldyn.base.errors import LocateError, SystemModelError, check_frequency, shown
 from nldyn.bifurcations.chord import Chord
-from nldyn.bifurcations.point import BranchPoint
+from nldyn.bifurcations.point import BranchNode
 from nldyn.bifurcations.roots import root
 from nldyn.orbits.orbit import Orbit, same_orbit, stroboscopic
 
@@ -29,11 +29,11 @@ class Places:
 
     Parameters
     ----------
-    points : tuple of BranchPoint
+    points : tuple of BranchNode
         In this order.
     """
 
-    points: tuple[BranchPoint, ...]
+    points: tuple[BranchNode, ...]
 
     @cached_property
     def log_frequencies(self) -> Real:
@@ -46,7 +46,7 @@ class Places:
         return np.array([stroboscopic(point.orbit) for point in self.points])
 
 
-def crossings(places: Places, frequency_hz: float) -> list[BranchPoint]:
+def crossings(places: Places, frequency_hz: float) -> list[BranchNode]:
     """Points of a branch at one frequency, one for each passage, in order along the branch.
 
     A passage lies between two neighbours among the computed and the special points, so that on
@@ -95,12 +95,12 @@ def _chords_beside(places: Places, first: NDArray[np.intp], orbit: Orbit) -> NDA
     return near
 
 
-def requested(places: Places, at: Sequence[float]) -> tuple[list[BranchPoint], list[str]]:
+def requested(places: Places, at: Sequence[float]) -> tuple[list[BranchNode], list[str]]:
     """Points of a branch at some frequencies, in order along it.
 
     With notes on passages whose orbit was not found.
     """
-    points: list[BranchPoint] = []
+    points: list[BranchNode] = []
     notes: list[str] = []
     for frequency in at:
         found, lost = _crossings(places, frequency)
@@ -125,16 +125,16 @@ def check_requested(at: Sequence[float], range_hz: tuple[float, float]) -> tuple
     return tuple(float(frequency) for frequency in wanted)
 
 
-def _arclength(point: BranchPoint) -> float:
+def _arclength(point: BranchNode) -> float:
     return point.arclength
 
 
-def _crossings(places: Places, frequency_hz: float) -> tuple[list[BranchPoint], list[str]]:
+def _crossings(places: Places, frequency_hz: float) -> tuple[list[BranchNode], list[str]]:
     check_frequency("frequency_hz", frequency_hz)
     p = math.log(2.0 * math.pi * frequency_hz)
     on, passed = _passages(places, p)
     points, exact = places.points, set(on.tolist())
-    found: list[BranchPoint] = []
+    found: list[BranchNode] = []
     lost: list[str] = []
     for i in np.sort(np.append(on, passed)):
         if i in exact:
@@ -155,11 +155,11 @@ def _passages(places: Places, p: float) -> tuple[NDArray[np.intp], NDArray[np.in
     return np.flatnonzero(on), np.flatnonzero(passed)
 
 
-def _log_frequency(point: BranchPoint) -> float:
+def _log_frequency(point: BranchNode) -> float:
     return float(point.orbit.point[-1])
 
 
-def _crossing(a: BranchPoint, b: BranchPoint, p: float) -> BranchPoint:
+def _crossing(a: BranchNode, b: BranchNode, p: float) -> BranchNode:
     """Point between two neighbours with ln ω = p.
 
     Beside a fold Newton's method at a fixed frequency may miss; then the point is first located
@@ -186,7 +186,7 @@ def _crossing(a: BranchPoint, b: BranchPoint, p: float) -> BranchPoint:
             return point
 
 
-def _held(chord: Chord, sigma: float, guess: Real, p: float) -> BranchPoint:
+def _held(chord: Chord, sigma: float, guess: Real, p: float) -> BranchNode:
     """Point of the branch at a fixed frequency, near a guess at σ of a chord."""
     a, b = chord.first, chord.last
     problem = a.orbit.problem
@@ -203,4 +203,4 @@ def _held(chord: Chord, sigma: float, guess: Real, p: float) -> BranchPoint:
         raise LocateError("Newton's method left the branch")
     length = a.arclength + sigma * (b.arclength - a.arclength)
     orbit = Orbit.of(problem, found, a.orbit.observe)
-    return BranchPoint(orbit, problem.tangent(found, secant), length)
+    return BranchNode(orbit, problem.tangent(found, secant), length)

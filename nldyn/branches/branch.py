@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_choice, check_types, shown
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.branches.at_frequency import Places, crossings, passes
 from nldyn.branches.endings import Ending, StopReasons, has_ending
 from nldyn.branches.tables import Part, point_columns, special_columns, to_pandas, to_xarray
@@ -113,7 +113,7 @@ class Branch:
         Name in tables and legends.
     period : int
         Period multiple n.
-    nodes : tuple of BranchPoint
+    nodes : tuple of BranchNode
         Computed points in order along the branch.
     special_points : tuple of SpecialPoint
         In the same order.
@@ -121,7 +121,7 @@ class Branch:
         Why the continuation stopped at the first and at the last point.
     notes : tuple of str
         What may be missing.
-    requested : tuple of BranchPoint
+    requested : tuple of BranchNode
         Points at the requested frequencies, in order along the branch.
     course : Course, optional
         How it was continued.
@@ -129,11 +129,11 @@ class Branch:
 
     name: str
     period: int
-    nodes: tuple[BranchPoint, ...]
+    nodes: tuple[BranchNode, ...]
     special_points: tuple[SpecialPoint, ...]
     stop_reasons: StopReasons
     notes: tuple[str, ...] = ()
-    requested: tuple[BranchPoint, ...] = ()
+    requested: tuple[BranchNode, ...] = ()
     course: Course | None = None
 
     def __repr__(self) -> str:
@@ -248,7 +248,7 @@ class Branch:
             return special_columns(self.special_points, columns)
         return columns
 
-    def _part(self, part: Part) -> Sequence[BranchPoint]:
+    def _part(self, part: Part) -> Sequence[BranchNode]:
         """The points of which a table is made."""
         if part == "special_points":
             return [special.point for special in self.special_points]

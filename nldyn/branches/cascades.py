@@ -11,7 +11,7 @@ import numpy as np
 from nldyn.base.errors import LocateError, SystemModelError, check_range, check_types, check_whole
 from nldyn.bifurcations.critical import CoefficientError, Estimate, doubled_parameter, flip, loop_of
 from nldyn.bifurcations.period_doubling import switch_at_flip
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint, check_special, is_at
+from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special, is_at
 from nldyn.bifurcations.within_step import special_points_between
 from nldyn.branches.arclength import Stepper
 from nldyn.branches.branch import Branch, check_branches
@@ -217,7 +217,7 @@ def _up_to_flip(
     """The branch born at the last flip, up to the flip where it loses its stability."""
     amplitude, options = _steps(flips, options)
     walk = Stepper(switch_at_flip(flips[-1], amplitude), window, options)
-    nodes: list[BranchPoint] = []
+    nodes: list[BranchNode] = []
     specials: list[SpecialPoint] = []
     following = None
     for point, met in _with_special_points(walk):
@@ -233,9 +233,9 @@ def _up_to_flip(
     return make_branch("", nodes, specials, (first, reason), []), following
 
 
-def _with_special_points(walk: Stepper) -> Iterator[tuple[BranchPoint, list[SpecialPoint]]]:
+def _with_special_points(walk: Stepper) -> Iterator[tuple[BranchNode, list[SpecialPoint]]]:
     """Points of a walk with the special points between each and the one before."""
-    before: BranchPoint | None = None
+    before: BranchNode | None = None
     for point in walk:
         yield point, [] if before is None else special_points_between(before, point)
         before = point

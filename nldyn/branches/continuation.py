@@ -16,7 +16,7 @@ from nldyn.bifurcations.branch_crossing import (
     lies_on_crossing,
     same_crossing,
 )
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.branches.at_frequency import check_requested, requested
 from nldyn.branches.branch import (
     Branch,
@@ -198,7 +198,7 @@ def complete(
     name: str,
     forward: Leg | None,
     backward: Leg | None,
-    start: BranchPoint,
+    start: BranchNode,
     course: Course,
     progress: Callable[[float], None] | None,
     checkpoint: Checkpoint,
@@ -212,7 +212,7 @@ def complete(
         Name of the branch.
     forward, backward : Leg, optional
         What is known.
-    start : BranchPoint
+    start : BranchNode
         Where both began, heading forward.
     course : Course
         Range, options and requested frequencies.
@@ -226,7 +226,7 @@ def complete(
     ahead = ahead or Ahead(start.orbit.problem.flow)
 
     def walked(
-        leg: Leg | None, first: BranchPoint, whole: Callable[[Leg | None], Branch | None]
+        leg: Leg | None, first: BranchNode, whole: Callable[[Leg | None], Branch | None]
     ) -> Leg:
         if leg is not None and not goes_on(leg, course):
             return leg
@@ -266,7 +266,7 @@ def complete(
 
 
 def walked_leg(
-    flow: FlowMap, first: BranchPoint, course: Course, look: Callable[[], None] | None = None
+    flow: FlowMap, first: BranchNode, course: Course, look: Callable[[], None] | None = None
 ) -> Leg:
     """The leg of a branch from a point on, whole; ``look`` is called on the way."""
     leg = Leg([first], [], [], Ending.NOT_FINISHED.told(), None)
@@ -274,7 +274,7 @@ def walked_leg(
     return trail.follow(keep=look)
 
 
-def leg_key(first: BranchPoint, course: Course) -> Hashable:
+def leg_key(first: BranchNode, course: Course) -> Hashable:
     """What a leg depends on, beside the flow map and how orbits are told."""
     orbit = first.orbit
     return (
@@ -285,7 +285,7 @@ def leg_key(first: BranchPoint, course: Course) -> Hashable:
 
 def offer_leg(
     ahead: Ahead,
-    start: BranchPoint,
+    start: BranchNode,
     course: Course,
     *,
     group: Hashable = None,
@@ -297,14 +297,14 @@ def offer_leg(
     ahead.offer(key, walked_leg, start, course, group=group, member=member, first=first)
 
 
-def offer_branch(ahead: Ahead, start: BranchPoint, course: Course, group: Hashable = None) -> None:
+def offer_branch(ahead: Ahead, start: BranchNode, course: Course, group: Hashable = None) -> None:
     """Let both legs of a branch be walked ahead."""
     member = leg_key(start, course)
     for point in (start, _reversed(start)):
         offer_leg(ahead, point, course, group=group, member=member)
 
 
-def start_point(orbit: Orbit, direction: float, range_hz: tuple[float, float]) -> BranchPoint:
+def start_point(orbit: Orbit, direction: float, range_hz: tuple[float, float]) -> BranchNode:
     """Branch point at an orbit, heading up (+1) or down (-1) in frequency.
 
     Beside a flip or a fold, where the frequency hardly tells the orbits of a branch apart, the
@@ -336,13 +336,13 @@ def start_point(orbit: Orbit, direction: float, range_hz: tuple[float, float]) -
             found = again
     if not found.converged:
         raise ConvergenceError(f"no orbit at {orbit.frequency_hz:g} Hz: {found.failure}")
-    here = BranchPoint(orbit, problem.tangent(found, towards), 0.0)
+    here = BranchNode(orbit, problem.tangent(found, towards), 0.0)
     beside = _beside_fold(here, direction)
     low, high = range_hz
     return beside if beside and low <= beside.orbit.frequency_hz <= high else here
 
 
-def _beside_fold(here: BranchPoint, direction: float) -> BranchPoint | None:
+def _beside_fold(here: BranchNode, direction: float) -> BranchNode | None:
     """Point a short way from a fold that is here, where the branch heads up (+1) or down (-1).
 
     None if no fold is here: the branch turns in the middle between the points on both sides.
@@ -362,7 +362,7 @@ def _beside_fold(here: BranchPoint, direction: float) -> BranchPoint | None:
     if abs(first + last) > MIDDLE * abs(first - last):
         return None
     index = int(last * direction > 0.0)
-    return BranchPoint(Orbit.of(problem, sides[index], here.orbit.observe), tangents[index], 0.0)
+    return BranchNode(Orbit.of(problem, sides[index], here.orbit.observe), tangents[index], 0.0)
 
 
 def goes_on(leg: Leg, course: Course) -> bool:
@@ -452,7 +452,7 @@ def split(branch: Branch, course: Course) -> tuple[Leg, Leg | None]:
 
 def make_branch(
     name: str,
-    nodes: list[BranchPoint],
+    nodes: list[BranchNode],
     special: list[SpecialPoint],
     reasons: StopReasons,
     notes: list[str],
@@ -462,15 +462,15 @@ def make_branch(
     return Branch(name, period, tuple(nodes), tuple(special), reasons, tuple(notes))
 
 
-def _reversed(point: BranchPoint) -> BranchPoint:
-    return BranchPoint(point.orbit, -point.tangent, -point.arclength)
+def _reversed(point: BranchNode) -> BranchNode:
+    return BranchNode(point.orbit, -point.tangent, -point.arclength)
 
 
 def _reversed_special(special: SpecialPoint) -> SpecialPoint:
     return SpecialPoint(special.kind, _reversed(special.point), special.frequency_error)
 
 
-def broken_off(branch: Branch) -> list[tuple[BranchPoint, StopReason]]:
+def broken_off(branch: Branch) -> list[tuple[BranchNode, StopReason]]:
     """The ends at which a branch was broken off, and why."""
     ends = zip((branch.nodes[0], branch.nodes[-1]), branch.stop_reasons, strict=True)
     return [(end, why) for end, why in ends if why.broken_off]

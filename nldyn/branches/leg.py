@@ -13,7 +13,7 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, LocateError
 from nldyn.bifurcations.branch_crossing import NEIGHBOUR, distance, same_crossing, without_repeats
 from nldyn.bifurcations.chord import Chord
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.bifurcations.touching import rigid_grazing
 from nldyn.bifurcations.within_step import insert_dip, special_points_between
 from nldyn.branches.arclength import Stepper, StepperState
@@ -46,7 +46,7 @@ class Leg:
         How it would go on.
     """
 
-    nodes: list[BranchPoint]
+    nodes: list[BranchNode]
     special_points: list[SpecialPoint]
     notes: list[str]
     reason: StopReason
@@ -70,7 +70,7 @@ class LegBuilder:
     """
 
     walk: Stepper
-    nodes: list[BranchPoint] = field(default_factory=list)
+    nodes: list[BranchNode] = field(default_factory=list)
     special_points: list[SpecialPoint] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
@@ -186,7 +186,7 @@ class LegBuilder:
         beside = self.nodes[max(after - 1, 0) : after + 1]
         return special.kind == "BP" or min(abs(float(p.tangent[-1])) for p in beside) < FLAT
 
-    def _is_repeated(self, point: BranchPoint) -> bool:
+    def _is_repeated(self, point: BranchNode) -> bool:
         """Whether a point of a closed branch lies where the walk has begun again."""
         here = self._stride.here
         return point.arclength > here.arclength and self.walk.closes(here, point)
@@ -250,7 +250,7 @@ class LegBuilder:
         if len(self.special_points) > known:
             self.special_points = without_repeats(self.special_points)
 
-    def _along_straight_way(self, a: BranchPoint, b: BranchPoint) -> list[SpecialPoint] | None:
+    def _along_straight_way(self, a: BranchNode, b: BranchNode) -> list[SpecialPoint] | None:
         """All special points on a walk with shorter steps, if it leads from a to b straight.
 
         To know b again it must pass it, also at the end of the range. None if any may be missing.
@@ -270,7 +270,7 @@ class LegBuilder:
         return None if lost else found
 
 
-def _grazing_at_end(nodes: Sequence[BranchPoint]) -> SpecialPoint:
+def _grazing_at_end(nodes: Sequence[BranchNode]) -> SpecialPoint:
     """The grazing of a rigid stop at which a walk has ended, solved by its defining system.
 
     Where that fails it is the last point, with what is left of the way to the grazing.
@@ -309,16 +309,16 @@ def not_told_apart(found: Sequence[SpecialPoint]) -> list[str]:
 
 
 def trace(
-    start: BranchPoint,
+    start: BranchNode,
     range_hz: tuple[float, float],
     options: ContinuationOptions | None = None,
     progress: Callable[[float], None] | None = None,
-) -> tuple[list[BranchPoint], list[SpecialPoint], str, list[str]]:
+) -> tuple[list[BranchNode], list[SpecialPoint], str, list[str]]:
     """Walk from a point in the direction of its tangent and collect special points.
 
     Parameters
     ----------
-    start : BranchPoint
+    start : BranchNode
         Where to begin.
     range_hz : (float, float)
         Frequencies in Hz.
@@ -338,8 +338,8 @@ def trace(
 
 
 def _detour(
-    a: BranchPoint, b: BranchPoint, walk: Stepper, range_hz: tuple[float, float]
-) -> list[BranchPoint] | None:
+    a: BranchNode, b: BranchNode, walk: Stepper, range_hz: tuple[float, float]
+) -> list[BranchNode] | None:
     """Points of a walk with shorter steps from a that passes b in its direction, or None."""
     first_step = (b.arclength - a.arclength) / 64.0
     if first_step < max(SHORTEST_DETOUR, walk.options.min_step):
@@ -357,7 +357,7 @@ def _detour(
     return between if ahead > 0.0 else None
 
 
-def _arclength_behind(way: Sequence[BranchPoint], b: BranchPoint) -> float:
+def _arclength_behind(way: Sequence[BranchNode], b: BranchNode) -> float:
     """Arclength of a point that is met behind a way."""
     last = way[-1]
     weights = last.orbit.problem.metric(last.orbit.point)
@@ -365,7 +365,7 @@ def _arclength_behind(way: Sequence[BranchPoint], b: BranchPoint) -> float:
 
 
 def _by_halves(
-    a: BranchPoint, b: BranchPoint, reason: Exception, depth: int = 0
+    a: BranchNode, b: BranchNode, reason: Exception, depth: int = 0
 ) -> tuple[list[SpecialPoint], list[str]]:
     """Special points of a chord on which a correction failed: try again on its halves.
 
@@ -383,7 +383,7 @@ def _by_halves(
 
 
 def _in_pieces(
-    points: Sequence[BranchPoint], depth: int = 0
+    points: Sequence[BranchNode], depth: int = 0
 ) -> tuple[list[SpecialPoint], list[str]]:
     """Special points between some points of a branch, with notes on what could not be searched."""
     found: list[SpecialPoint] = []

@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 
 from nldyn.base.errors import LocateError
 from nldyn.bifurcations.chord import Chord
-from nldyn.bifurcations.point import BranchPoint
+from nldyn.bifurcations.point import BranchNode
 from nldyn.branches.branch import Branch
 from nldyn.orbits.orbit import Orbit
 
@@ -81,7 +81,7 @@ def lowest_orbit(branch: Branch, range_hz: tuple[float, float]) -> Orbit | None:
     return _refined(min(inside, key=lambda pair: pair[0])[1], -1.0) if inside else None
 
 
-def _neighbourhoods(branch: Branch) -> list[tuple[BranchPoint, ...]]:
+def _neighbourhoods(branch: Branch) -> list[tuple[BranchNode, ...]]:
     """Every point between those beside it, which an end has on one side only.
 
     A closed branch has no end: its last point, which lies just beyond its first, is left out.
@@ -93,7 +93,7 @@ def _neighbourhoods(branch: Branch) -> list[tuple[BranchPoint, ...]]:
     return [nodes[max(i - 1, 0) : i + 2] for i in range(len(nodes))]
 
 
-def _refined(around: tuple[BranchPoint, ...], sense: float) -> Orbit:
+def _refined(around: tuple[BranchNode, ...], sense: float) -> Orbit:
     """Highest orbit on the chords between neighbouring points, or the lowest for the sense -1."""
 
     def height(orbit: Orbit) -> float:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from nldyn.base.optional import optional
 from nldyn.base.version import software_version
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.orbits.orbit import Orbit
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def at_known(frequency_hz: float, known_hz: Sequence[float]) -> float:
 
 
 def point_columns(
-    points: Sequence[BranchPoint], known_hz: Sequence[float] = ()
+    points: Sequence[BranchNode], known_hz: Sequence[float] = ()
 ) -> dict[str, NDArray[Any]]:
     """Give the columns of `orbit_columns` and the arclength of points of a branch."""
     columns = orbit_columns([point.orbit for point in points], known_hz)

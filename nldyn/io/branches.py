@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint
+from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.branches.branch import Branch, Course, WalkEnd
 from nldyn.branches.checkpoint import Tally
 from nldyn.branches.continuation import alike
@@ -208,7 +208,7 @@ def _write_options(group: Any, options: ContinuationOptions) -> None:
         set_attribute(group, f"option {name}", value)
 
 
-def _write_points(group: Any, points: Sequence[BranchPoint], problem: ShootingProblem) -> None:
+def _write_points(group: Any, points: Sequence[BranchNode], problem: ShootingProblem) -> None:
     orbits = [point.orbit for point in points]
     length, size, count = problem.segments * problem.size + 1, problem.size, len(points)
 
@@ -315,7 +315,7 @@ def _read_branch(group: Group, flows: Sequence[FlowMap]) -> Branch:
     )
 
 
-def _read_points(group: Group, problem: ShootingProblem, observe: str) -> list[BranchPoint]:
+def _read_points(group: Group, problem: ShootingProblem, observe: str) -> list[BranchNode]:
     arclength = group.array("arclength", -1)
     count, size = arclength.size, problem.size
     point = group.array("point", count, problem.segments * size + 1)
@@ -326,7 +326,7 @@ def _read_points(group: Group, problem: ShootingProblem, observe: str) -> list[B
     # each in memory of its own, as in the run that computed it: some kernels of BLAS sum in an
     # order that depends on where in memory a vector begins
     return [
-        BranchPoint(
+        BranchNode(
             Orbit(
                 problem, point[i].copy(), jacobians[i].copy(), float(error[i]), observe, motions[i]
             ),
@@ -358,7 +358,7 @@ def _read_motions(group: Group, count: int, flow: FlowMap) -> list[Trajectory | 
     return motions
 
 
-def _read_course(group: Group, nodes: Sequence[BranchPoint]) -> Course:
+def _read_course(group: Group, nodes: Sequence[BranchNode]) -> Course:
     low, high = group.pair("range_hz")
     start = group.whole("start")
     if not 0 <= start < len(nodes):

@@ -27,7 +27,7 @@ from nldyn.base.errors import (
 from nldyn.base.rows import Rows
 from nldyn.bifurcations.normal_forms import switch_at_branch_point
 from nldyn.bifurcations.period_doubling import switch_at_flip
-from nldyn.bifurcations.point import BranchPoint, SpecialPoint, is_at
+from nldyn.bifurcations.point import BranchNode, SpecialPoint, is_at
 from nldyn.branches.branch import Branch, Course, check_branches
 from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_of_several
 from nldyn.branches.continuation import (
@@ -209,7 +209,7 @@ class Collector:
     done: float = 0.0  # share of the whole computation
     ahead: Ahead | None = None
     outlook: Outlook = field(default_factory=Outlook)
-    starts: dict[int, tuple[SpecialPoint, BranchPoint | LocateError]] = field(
+    starts: dict[int, tuple[SpecialPoint, BranchNode | LocateError]] = field(
         default_factory=dict
     )  # of the branches born at flips, by the flips' ids
 
@@ -322,22 +322,22 @@ class Collector:
         flips = [special for special in branch.special_points if special.kind == "PD"]
         for special in flips[::2]:
             start = self._start_at(special)
-            if not isinstance(start, BranchPoint) or not self._is_within(start.orbit):
+            if not isinstance(start, BranchNode) or not self._is_within(start.orbit):
                 continue
             if not self.known(start.orbit):
                 offer_branch(self.ahead, start, self._course(start, options))
 
-    def _start_at(self, special: SpecialPoint) -> BranchPoint | LocateError:
+    def _start_at(self, special: SpecialPoint) -> BranchNode | LocateError:
         """The start of the branch that is born at a flip, or why there is none; computed once."""
         if id(special) not in self.starts:
             try:
-                start: BranchPoint | LocateError = switch_at_flip(special)
+                start: BranchNode | LocateError = switch_at_flip(special)
             except LocateError as error:
                 start = error
             self.starts[id(special)] = special, start
         return self.starts[id(special)][1]
 
-    def _course(self, start: BranchPoint, options: ContinuationOptions | None) -> Course:
+    def _course(self, start: BranchNode, options: ContinuationOptions | None) -> Course:
         ends = self._open_ends_like(start.orbit).so_far()
         return Course(self.range_hz, options or self.options, ends)
 
@@ -445,7 +445,7 @@ class Collector:
         for start in starts:
             self.from_start(start, options)
 
-    def from_start(self, start: BranchPoint, options: ContinuationOptions | None = None) -> None:
+    def from_start(self, start: BranchNode, options: ContinuationOptions | None = None) -> None:
         """Follow a branch from a point both ways, unless it is known or out of range."""
         if not self._is_within(start.orbit) or self.known(start.orbit):
             return

@@ -28,7 +28,7 @@ from nldyn import (
 from nldyn.base.errors import LocateError
 from nldyn.base.resources import example
 from nldyn.bifurcations.period_doubling import switch_at_flip
-from nldyn.bifurcations.point import BranchPoint
+from nldyn.bifurcations.point import BranchNode
 from nldyn.bifurcations.within_step import special_points_between
 from nldyn.branches.arclength import Stepper
 from nldyn.branches.continuation import start_point
@@ -455,7 +455,7 @@ def test_no_special_points_between_the_same_two_points_in_either_direction(harmo
     nodes = harmonic_branch.nodes
     i = next(k for k, n in enumerate(nodes) if n.arclength > flip.point.arclength)
     forward = special_points_between(nodes[i - 1], nodes[i])
-    there, here = (BranchPoint(n.orbit, -n.tangent, -n.arclength) for n in nodes[i - 1 : i + 1])
+    there, here = (BranchNode(n.orbit, -n.tangent, -n.arclength) for n in nodes[i - 1 : i + 1])
     backward = special_points_between(here, there)
     assert [s.kind for s in forward] == [s.kind for s in backward] == ["PD"]
     assert forward[0].frequency_hz == pytest.approx(backward[0].frequency_hz, rel=1e-9)

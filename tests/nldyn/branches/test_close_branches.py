@@ -31,7 +31,7 @@ from nldyn.bifurcations import locate as special
 from nldyn.bifurcations.branch_crossing import distance, lies_on_crossing
 from nldyn.bifurcations.normal_forms import is_symmetric, switch_at_branch_point
 from nldyn.bifurcations.period_doubling import switch_at_flip
-from nldyn.bifurcations.point import BranchPoint
+from nldyn.bifurcations.point import BranchNode
 from nldyn.bifurcations.within_step import special_points_between
 from nldyn.branches import arclength as walk
 from nldyn.branches.arclength import BY_TOLERANCE
@@ -328,7 +328,7 @@ def test_a_tangent_that_jumps_beside_a_pitchfork_tells_of_that_and_of_no_fold(fa
     branch = continue_branch(half, (0.99 * pitchfork.frequency_hz, 1.01 * pitchfork.frequency_hz))
     far = next(o for o in branch.points if 5e-3 < distance(half, o) < 5e-2)
     secant, length = far.point - half.point, distance(half, far)
-    first, last = (BranchPoint(o, secant / length, s) for o, s in ((half, 0.0), (far, length)))
+    first, last = (BranchNode(o, secant / length, s) for o, s in ((half, 0.0), (far, length)))
     tests = special.tests
 
     def mixed(point):
