@@ -318,9 +318,9 @@ def write_chaos_figure(chaos: Chaos, folder: Path) -> None:
         for xi, colour in DAMPINGS.items():
             _draw(ax, chaos.swept[f"{model}_xi_{xi}"], f"ξ = {xi}", colour)
         ax.axhline(0.0, color="0.4", linewidth=0.8)
-        ax.set_ylabel("largest exponent (1/s)")
+        ax.set_ylabel("largest Lyapunov exponent (1/s)")
         ax.set_title(name)
-        ax.legend(fontsize="small", loc="upper right")
+        ax.legend(fontsize="small", loc="upper center", title="bars: standard errors")
     axes[-1].set_xlabel("excitation frequency (Hz)")
     axes[-1].set_xlim(RANGE_HZ)
     save_figure(axes[0], folder / FIGURE)

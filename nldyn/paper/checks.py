@@ -18,6 +18,7 @@ from nldyn.paper.evidence import (
     highest_peak,
     main_branch,
     nearest_special,
+    nearest_unstable,
     orbits_at,
     peak_near,
     special,
@@ -484,16 +485,10 @@ def _orbit9(results: Results) -> Finding:
 
 
 def _nearest_with_three(results: Results) -> str:
-    """The unstable harmonic orbit with three impacts that is nearest to 22.5 Hz."""
-    unstable = [
-        orbit
-        for branch in results["four_dof_xi_0.001"].of_period(1)
-        for orbit in branch.points
-        if not orbit.stable and orbit.impacts == 3
-    ]
-    if not unstable:
+    """Where the unstable orbit with three impacts is that Figure 9 would show."""
+    nearest = nearest_unstable(results["four_dof_xi_0.001"], 3, 22.5)
+    if nearest is None:
         return "no unstable harmonic orbit with three impacts at any frequency"
-    nearest = min(unstable, key=lambda orbit: abs(orbit.frequency_hz - 22.5))
     return (
         f"the nearest unstable orbit with three impacts, {1e6 * nearest.max_abs_displacement:.3g} "
         f"µm, is at {nearest.frequency_hz:.4g} Hz"

@@ -114,6 +114,17 @@ def orbits_at(diagram: Diagram, period: int, hz: float) -> list[Orbit]:
     return sorted(found, key=lambda orbit: -orbit.max_abs_displacement)
 
 
+def nearest_unstable(diagram: Diagram, impacts: int, hz: float) -> Orbit | None:
+    """The unstable harmonic orbit with so many impacts that is nearest to a frequency."""
+    found = [
+        orbit
+        for branch in diagram.of_period(1)
+        for orbit in branch.points
+        if not orbit.stable and orbit.impacts == impacts
+    ]
+    return min(found, key=lambda orbit: abs(orbit.frequency_hz - hz), default=None)
+
+
 def describe(orbit: Orbit) -> str:
     """Impacts and stability in words."""
     plural = "s" if orbit.impacts != 1 else ""

@@ -6,21 +6,37 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from matplotlib.axes import Axes
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from nldyn.branches.branch import Branch
 from nldyn.orbits.orbit import Orbit
 from nldyn.paper.chaos import CAPTION, FIGURE, SHADED, Chaos
-from nldyn.paper.evidence import orbits_at
+from nldyn.paper.evidence import nearest_unstable, orbits_at
 from nldyn.paper.jobs import is_wide
-from nldyn.plot.diagram import new_axes_pair, plot_diagram, plot_orbit, save_figure
-from nldyn.plot.longterm import shade_ranges
+from nldyn.plot.diagram import (
+    BESIDE,
+    new_axes_pair,
+    plot_diagram,
+    plot_orbit,
+    save_figure,
+)
+from nldyn.plot.longterm import SHADE, shade_ranges
 from nldyn.search.diagram import Diagram
 
 Results = Mapping[str, Diagram]
 
 SECOND_MODE_HZ = 125.1  # the dashed lines of Figure 4: superharmonics expected at 125.1 Hz / n
 DASHED = ("figure_4", "figure_5")
+
+# Ranges in Hz that are enlarged, and where: left, bottom, width and height of the axes.
+INSETS = {
+    "figure_2": ((28.0, 46.0), (0.03, 0.48, 0.47, 0.45)),
+    "figure_4": ((21.5, 24.5), (0.02, 0.5, 0.16, 0.42)),
+    "figure_5": ((21.5, 24.5), (0.02, 0.5, 0.16, 0.42)),
+    "figure_7": ((24.5, 29.0), (0.02, 0.5, 0.16, 0.42)),
+    "figure_8": ((20.0, 27.0), (0.02, 0.5, 0.16, 0.42)),
+}
 
 CAPTIONS = {
     "figure_2": "Figure 2: 1-DOF model",
@@ -75,18 +91,20 @@ def legend_text(name: str) -> str:
 
 def write_figures(results: Results, folder: Path, chaos: Chaos | None = None) -> None:
     """Write all figures to a folder; those of the larger models with their chaotic ranges."""
-    for name, jobs in SHOWN.items():
-        ax = _diagram(shown(name, results), title(name, results))
+    for name in SHOWN:
+        branches = shown(name, results)
+        ax = _diagram(branches, title(name, results))
         if chaos is not None:
             _shade(ax, chaos.ranges(name))
         if name in DASHED:
             _dashed(ax, (2, 3, 4, 5))
-        if name == "figure_7":
-            _inset(ax, results[jobs[0]].of_period(1), 24.5, 29.0)
+        _inset(ax, branches, *INSETS[name])
         save_figure(ax, folder / name)
     _orbits(orbits_at(results["one_dof"], 1, 25.3)[:1], "figure_3", folder)
     _orbits(orbits_at(results["two_dof_xi_0.001"], 1, 23.0)[:3], "figure_6", folder)
-    _orbits(orbits_at(results["four_dof_xi_0.001"], 1, 22.5)[:3], "figure_9", folder)
+    four = results["four_dof_xi_0.001"]
+    wanted = nearest_unstable(four, 3, 22.5)
+    _orbits([*orbits_at(four, 1, 22.5)[:2], *([wanted] if wanted else [])], "figure_9", folder)
 
 
 def _diagram(branches: Iterable[Branch], heading: str) -> Axes:
@@ -97,11 +115,13 @@ def _diagram(branches: Iterable[Branch], heading: str) -> Axes:
 
 
 def _shade(ax: Axes, ranges: Sequence[tuple[float, float]]) -> None:
-    """Shade chaotic ranges, and say so beside the diagram."""
+    """Shade chaotic ranges, and say so in the legend."""
     shade_ranges(ax, ranges)
-    if ranges:
-        text = "shaded: a motion\nis chaotic"
-        ax.text(1.015, 0.01, text, fontsize="small", transform=ax.transAxes)
+    legend = ax.get_legend()
+    if ranges and legend is not None:
+        handles = [*filter(None, legend.legend_handles), Patch(color=SHADE, alpha=0.6)]
+        texts = [text.get_text() for text in legend.get_texts()]
+        ax.legend(handles, [*texts, "a motion is chaotic"], **BESIDE)
 
 
 def _dashed(ax: Axes, orders: Iterable[int]) -> None:
@@ -113,9 +133,15 @@ def _dashed(ax: Axes, orders: Iterable[int]) -> None:
         ax.text(hz, 0.97, text, color="0.4", fontsize=8, transform=ax.get_xaxis_transform())
 
 
-def _inset(ax: Axes, branches: list[Branch], low: float, high: float) -> None:
-    """Enlarge a range of frequencies in the empty upper left corner."""
-    small = ax.inset_axes((0.02, 0.5, 0.15, 0.42))
+def _inset(
+    ax: Axes,
+    branches: list[Branch],
+    range_hz: tuple[float, float],
+    bounds: tuple[float, float, float, float],
+) -> None:
+    """Enlarge a range of frequencies where the diagram is empty."""
+    low, high = range_hz
+    small = ax.inset_axes(bounds)
     plot_diagram(branches, small, special_points=(), unit="mm", legend=False)
     tops = [
         1e3 * o.max_abs_displacement
@@ -135,12 +161,20 @@ def _inset(ax: Axes, branches: list[Branch], low: float, high: float) -> None:
 
 
 def _orbits(orbits: list[Orbit], name: str, folder: Path) -> None:
-    """One picture for each orbit: ``name.png`` for the first, then ``name_b``, ``name_c``."""
+    """One picture for each orbit: ``name.png`` for the first, then ``name_b``, ``name_c``.
+
+    The title tells the frequency of an orbit that is not at the one in the caption.
+    """
+    caption = CAPTIONS[name].replace("orbits", "orbit")
     for letter, orbit in zip("abc", orbits, strict=False):
         upper, lower = new_axes_pair()
         plot_orbit(orbit, (upper, lower))
         state = "stable" if orbit.stable else "unstable"
         impacts = f"{orbit.impacts} impact{'' if orbit.impacts == 1 else 's'}"
+        deepest = len(orbit.impact_list)
+        peaks = f" with {deepest} peaks" if deepest > orbit.impacts else ""
         which = f"orbit {letter}, " if len(orbits) > 1 else ""
-        upper.set_title(f"{CAPTIONS[name]} ({which}{state}, {impacts})")
+        at = f"{orbit.frequency_hz:.4g} Hz"
+        where = "" if at in caption or at.replace(" Hz", ".0 Hz") in caption else f", at {at}"
+        upper.set_title(f"{caption}\n{which}{state}, {impacts}{peaks}{where}")
         save_figure(upper, folder / (name if letter == "a" else f"{name}_{letter}"))

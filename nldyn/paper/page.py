@@ -31,8 +31,8 @@ def write_page(
         "<h1>The paper's figures and claims, recomputed</h1>",
         f"<p>nldyn {escape(software_version())}; {len(rows)} claims: {verdict_counts(rows)}; "
         f"computed in {seconds:.0f} s. A number agrees if it deviates by no more than 1 % or half "
-        "a unit of the last digit printed. Stable orbits are drawn solid, unstable ones "
-        "dotted.</p>",
+        "a unit of the last digit printed. In the diagrams stable orbits are drawn solid, unstable "
+        "ones dotted.</p>",
         *[_figure(folder, name, title(name, results)) for name in CAPTIONS],
         "<h2>Claims</h2>",
         _claims_table(rows),

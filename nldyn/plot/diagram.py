@@ -36,6 +36,8 @@ PERIOD_COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#5D4E9C", "#8B4513",
     "#777777",
 )  # fmt: skip
+# a legend beside a diagram
+BESIDE: dict[str, Any] = {"fontsize": "small", "loc": "upper left", "bbox_to_anchor": (1.01, 1.0)}
 MARKERS = {"LP": "o", "PD": "s", "NS": "D", "BP": "^", "GR": "x"}
 MARKER_NAMES = {
     "LP": "cyclic fold",
@@ -428,7 +430,7 @@ def draw_legend(
     for kind in marked:
         label = f"{MARKER_NAMES[kind]} ({kind})"
         entries.append(Line2D([], [], label=label, **mark_style(kind)))
-    ax.legend(handles=entries, fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    ax.legend(handles=entries, **BESIDE)
 
 
 def _draw_displacement(

@@ -104,6 +104,7 @@ def test_chaotic_ranges_are_shaded(chaos, tmp_path, monkeypatch):
     assert {name for name, ax in axes.items() if ax.patches} == {
         "figure_4", "figure_5", "figure_7", "figure_8",
     }  # fmt: skip
+    assert axes["figure_4"].get_legend().get_texts()[-1].get_text() == "a motion is chaotic"
     left = [patch.get_x() for patch in axes["figure_4"].patches]
     assert left == [pytest.approx(29.5), pytest.approx(57.5)]
 

@@ -4,6 +4,7 @@ import pytest
 from fakes import FakeDiagram, resonance
 
 import nldyn.paper.figures
+from nldyn.paper.evidence import nearest_unstable
 from nldyn.paper.figures import CAPTIONS, SHOWN, title, write_figures
 from nldyn.paper.page import write_page
 
@@ -39,6 +40,15 @@ def test_figures_and_page_say_what_range_was_computed(results, drawn, tmp_path):
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert all(title(name, results) in page for name in CAPTIONS)
     assert page.count("Dashed lines: f₂/2 to f₂/5 with f₂ = 125.1 Hz") == 2
+
+
+def test_the_orbit_nearest_to_that_of_the_paper_is_unstable():
+    """The fakes are unstable from 30 to 40 Hz, with one impact."""
+    diagram = FakeDiagram([resonance()])
+    nearest = nearest_unstable(diagram, 1, 22.5)
+    unstable = [o.frequency_hz for o in diagram.branches[0].points if not o.stable]
+    assert nearest.frequency_hz == min(unstable)
+    assert nearest_unstable(diagram, 3, 22.5) is None
 
 
 @pytest.mark.parametrize("name", ["figure_4", "figure_5"])
