@@ -82,6 +82,8 @@ def number_list(
         first, _dash, last = piece.strip().partition("-")
         if not first.isdecimal() or (last and not last.isdecimal()):
             raise click.BadParameter(f"'{value}' is not a list of whole numbers such as 1-10,20")
+        if int(last or first) < int(first):
+            raise click.BadParameter(f"'{value}': the range {piece.strip()} runs downwards")
         if int(last or first) - int(first) > 1000:
             raise click.BadParameter(f"'{value}' names more than 1000 numbers")
         found |= set(range(int(first), int(last or first) + 1))

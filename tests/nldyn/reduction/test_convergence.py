@@ -402,6 +402,7 @@ def test_a_setting_without_excitation_is_refused():
     "options, words",
     [
         (["--modes", "one"], "is not a list of whole numbers"),
+        (["--modes", "3-1"], "the range 3-1 runs downwards"),
         (["--methods", "mcneal", "--modes", "1"], "each method must be one of rubin, cr"),
         (["--methods", "macneal", "--modes", "1"], "has a harmonic branch: its interfaces have no"),
         (["--modes", "999"], "999"),
