@@ -345,7 +345,7 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
             build_system,
             join,
         )
-        from nldyn.scene.checks import check_computable, range_remark
+        from nldyn.scene.checks import check_computable, remarks
         from nldyn.scene.faults import told_as
         from nldyn.scene.read import load_scene
 
@@ -370,7 +370,6 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
 
             check_computable(loaded, scene)
             table = mode_table(loaded, Structure(component, reduced))
-            remark = range_remark(loaded, float(system.frequencies_hz.max()))
             print_json(
                 {
                     "scene": str(scene),
@@ -383,7 +382,7 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
                     },
                     "stops": [describe_stop(stop) for stop in system.stops],
                     "at_rest": at_rest,
-                    "notes": [remark] if remark else [],
+                    "notes": remarks(loaded, float(system.frequencies_hz.max())),
                 }
             )
             return
@@ -402,7 +401,7 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
                 f"modes up to {candidates.cutoff_hz:.4g} Hz may matter; of these, 'nldyn run' "
                 f"keeps as many as tolerance = {loaded.reduction.tolerance:g} needs"
             )
-        if remark := range_remark(loaded, float(system.frequencies_hz.max())):
+        for remark in remarks(loaded, float(system.frequencies_hz.max())):
             click.echo(f"note: {remark}")
         click.echo(f"{scene}: no fault found")
 

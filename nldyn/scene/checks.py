@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Protocol
 
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 from nldyn.base.errors import SceneError
 from nldyn.scene.messages import KeyPath, joined, scene_error, show, unknown_name
 from nldyn.scene.schema import Matrix, Scene
+
+SOUND = (10.0, 3e4)  # speeds in m/s, below those of soft rubber and above that of diamond
 
 Report = Callable[[KeyPath, str], SceneError]
 LONGEST_NAME, LONGEST_TITLE = 100, 1000
@@ -135,7 +138,24 @@ def check_computable(scene: Scene, file: Path) -> None:
         raise scene_error(file, ("continuation",), fault)
 
 
-def range_remark(scene: Scene, highest_hz: float) -> str:
+def remarks(scene: Scene, highest_hz: float) -> list[str]:
+    """Say what is possible but looks like a mistake in the units."""
+    beyond = _range_remark(scene, highest_hz)
+    return [*_material_remarks(scene), *([beyond] if beyond else [])]
+
+
+def _material_remarks(scene: Scene) -> Iterator[str]:
+    """Name parts in which sound is slower or faster than in any material."""
+    for name, part in scene.parts.items():
+        speed = math.sqrt(part.youngs_modulus / part.density)
+        if not SOUND[0] < speed < SOUND[1]:
+            yield (
+                f"in [parts.{name}] sound would travel at {speed:.2g} m/s: youngs_modulus is in "
+                "N/m^2, density in kg/m^3"
+            )
+
+
+def _range_remark(scene: Scene, highest_hz: float) -> str:
     """Say that the range goes beyond the modes that are kept; empty if it does not."""
     if scene.reduction is None or scene.continuation is None:
         return ""

@@ -12,7 +12,7 @@ from nldyn.io.checkpoint import CheckpointFile
 from nldyn.orbits.newton import NOT_HELD
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.scene.build import Structure, build_structure, build_system
-from nldyn.scene.checks import check_computable, range_remark
+from nldyn.scene.checks import check_computable, remarks
 from nldyn.scene.faults import told_as
 from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import ContinuationTable, Scene
@@ -204,6 +204,6 @@ def _to_follow(scene: Scene, structure: Structure) -> tuple[FlowMap, Continuatio
 
 
 def _remarked(scene: Scene, flow: FlowMap, found: Diagram) -> Diagram:
-    """A diagram with a note on what the model of the structure is not good for."""
-    remark = range_remark(scene, float(flow.system.frequencies_hz.max()))
-    return replace(found, notes=(*found.notes, remark)) if remark else found
+    """A diagram with notes on what looks like a mistake in the units."""
+    said = remarks(scene, float(flow.system.frequencies_hz.max()))
+    return replace(found, notes=(*found.notes, *said)) if said else found

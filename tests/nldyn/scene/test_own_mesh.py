@@ -110,3 +110,15 @@ def test_run_ends_and_the_stop_is_first_touched_where_the_linear_response_reache
     for hz in grazing:
         size = force * abs(reduced.receptance(hz, interface, interface, modal_damping=ratio))
         assert size == pytest.approx(gap, rel=2e-3)
+
+
+def test_a_material_in_which_sound_is_too_fast_is_told(tmp_path):
+    """Steel in MPa and t/mm^3: sqrt(E / rho) is 5.2e6 instead of 5.2e3 m/s."""
+    text = example("hook.toml").read_text(encoding="utf-8")
+    mesh = example("hook.toml").parents[2] / "meshes" / "hook.msh"
+    text = re.sub(r'file = ".*"', f'file = "{mesh.as_posix()}"', text)
+    text = re.sub(r"youngs_modulus = [\d.e]+", "youngs_modulus = 2.1e5", text, count=1)
+    text = re.sub(r"density = [\d.e]+", "density = 7.85e-9", text, count=1)
+    (tmp_path / "hook.toml").write_text(text, encoding="utf-8")
+    result = CliRunner().invoke(main, ["check", str(tmp_path / "hook.toml")])
+    assert "sound would travel at 5.2e+06 m/s" in result.output
