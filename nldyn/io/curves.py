@@ -204,7 +204,7 @@ def _read_conditions(
     kind, of = group.text("kind"), curve.text("kind")
     if kind == "Free":
         return [Free()] * count
-    if kind == "BranchNode":
+    if kind == "BranchPoint":
         left, unit = group.array("left", count, n), group.array("unit", count, n + 1)
         return list(map(BranchPointCondition, left, group.array("right", count, 2, n + 1), unit))
     if kind == "Singular":
