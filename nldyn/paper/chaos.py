@@ -22,7 +22,7 @@ from nldyn.paper.evidence import Finding, published_claims
 from nldyn.paper.jobs import scene_system
 from nldyn.paper.kept import kept_numbers
 from nldyn.paper.workers import Task
-from nldyn.plot.diagram import save_figure
+from nldyn.plot.diagram import BESIDE, save_figure
 from nldyn.runtime.progress import Progress
 
 Way = Literal["up", "down"]
@@ -320,7 +320,7 @@ def write_chaos_figure(chaos: Chaos, folder: Path) -> None:
         ax.axhline(0.0, color="0.4", linewidth=0.8)
         ax.set_ylabel("largest Lyapunov exponent (1/s)")
         ax.set_title(name)
-        ax.legend(fontsize="small", loc="upper center", title="bars: standard errors")
+        ax.legend(**BESIDE, title="bars: standard\nerrors", title_fontsize="small")
     axes[-1].set_xlabel("excitation frequency (Hz)")
     axes[-1].set_xlim(RANGE_HZ)
     save_figure(axes[0], folder / FIGURE)
