@@ -227,8 +227,7 @@ class FlowMap:
             return self
         _ = self._unforced  # which both share
         other = copy.copy(self)
-        for name in ("_data", "_forcing"):
-            vars(other).pop(name, None)
+        vars(other).pop("_data", None)
         other.clock = Clock(omega, start)
         return other
 
@@ -284,21 +283,14 @@ class FlowMap:
         """Rows of the outputs' velocities in flight."""
         return self.system.linear.times_block(self.rows)
 
-    @cached_property
-    def _forcing(self) -> tuple[Real, Complex]:
-        """Orders and drive, see `System.forcing`."""
-        return self.system.forcing(self.clock)
-
     def response(self, omega: float) -> ForcedResponse:
         """Response of the linear part at ω (rad/s), see `System.response`."""
-        orders, drive = self._forcing
-        powers = np.array([1.0, omega, omega * omega])
-        return self.system.linear.response(orders, powers @ drive, omega)
+        return self.system.response(omega, self.clock)
 
     @cached_property
     def _data(self) -> SystemData:
         """What the kernels need to know of the system."""
-        orders, drive = self._forcing
+        orders, drive = self.system.forcing(self.clock)
         return self._unforced._replace(orders=orders, drive=drive)
 
     @cached_property

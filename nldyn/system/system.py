@@ -598,11 +598,10 @@ class System:
         """Whether something swings: any excitation but constant forces."""
         return bool(np.any(self.drive[self.orders > 0.0]))
 
-    def response(self, omega: float) -> ForcedResponse:
-        """Linear response at ω (rad/s), near or at a resonance, too."""
-        return self.linear.response(
-            self.orders, np.array([1.0, omega, omega * omega]) @ self.drive, omega
-        )
+    def response(self, omega: float, clock: Clock | None = None) -> ForcedResponse:
+        """Linear response at ω (rad/s), near or at a resonance, too; the clock as for `forcing`."""
+        orders, drive = self.forcing(clock)
+        return self.linear.response(orders, np.array([1.0, omega, omega * omega]) @ drive, omega)
 
     def steady(self, omega: float, phase: float = 0.0) -> Real:
         """State z (2n,) of the steady linear response at ω (rad/s) and a forcing phase.
