@@ -160,10 +160,11 @@ def test_lyapunov_exponents_see_impacts():
     assert found.sum_error < 1e-8
 
 
-def test_any_start_gives_one_set_of_special_points(branch):
+@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])
+def test_any_start_gives_one_set_of_special_points(branch, every):
     """From orbits all along the branch, also right beside the impact at a phase of shooting."""
     told = [(special.kind, special.frequency_hz) for special in branch.special_points]
-    for start in branch.points[:: max(len(branch.points) // 10, 1)][1:10:3]:
+    for start in branch.points[:: max(len(branch.points) // 10, 1)][1:10:every]:
         again = continue_branch(start, (0.05, 0.8))
         found = sorted(again.special_points, key=lambda special: special.frequency_hz)
         assert [special.kind for special in found] == [kind for kind, _ in told]
