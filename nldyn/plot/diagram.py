@@ -132,11 +132,22 @@ def length_unit(largest: float) -> tuple[float, str]:
     >>> length_unit(2.3e-4)
     (1e-06, 'µm')
     """
+    return axis_unit(largest, PREFIXES)
+
+
+def axis_unit(largest: float, units: Sequence[tuple[float, str]]) -> tuple[float, str]:
+    """Choose one of some units, the largest first, for an axis that reaches up to a value.
+
+    Examples
+    --------
+    >>> axis_unit(1.3e-3, ((1.0, "s"), (1e-3, "ms")))
+    (0.001, 'ms')
+    """
     size = abs(largest)
-    for factor, name in PREFIXES:
+    for factor, name in units:
         if size >= 0.5 * factor:
             return factor, name
-    return PREFIXES[-1] if 0.0 < size < math.inf else PREFIXES[0]
+    return units[-1] if 0.0 < size < math.inf else units[0]
 
 
 def mark_size(count: int) -> float:

@@ -80,8 +80,10 @@ def report_again(
     if scene is None and copy.is_file() and finished:
         scene = load_scene(copy, mesh_folders)
     drawn, notes = drawn_again(scene, diagram)
-    shown = kept_surface(folder / "report.html", diagram) if drawn is None and notes else drawn
-    if shown is not None:
+    surface: Mapping[str, Any] | None = drawn.surface if drawn else None
+    if surface is None and notes:
+        surface = kept_surface(folder / "report.html", diagram)
+    if surface is not None:
         notes = []
     if not finished:
         notes = [UNFINISHED, *notes]
@@ -91,7 +93,7 @@ def report_again(
     progress("orbits", 0.0, 0.6)
     with result_directory(directory, "report") as new:
         page = new / "report.html"
-        write_page(diagram, page, tables, told, scene=scene, drawn=shown, notes=notes)
+        write_page(diagram, page, tables, told, scene=scene, surface=surface, notes=notes)
     return notes
 
 

@@ -104,3 +104,17 @@ function sortable(table, name, orbitOf) {
   holder.append(box, bar);
   return holder;
 }
+function showTables(orbitOf = {}) {
+  const names = Object.keys(data.tables);
+  const open = (name) => {
+    for (const button of find("tabs").children) button.setAttribute("aria-pressed", String(button.dataset.tab === name));
+    find("table").replaceChildren(sortable(data.tables[name], name.replaceAll(" ", "_"), orbitOf[name]));
+  };
+  for (const name of names) {
+    const button = element("button", `${name} (${data.tables[name].rows.length})`, { type: "button", "data-tab": name });
+    button.addEventListener("click", () => open(name));
+    find("tabs").append(button);
+  }
+  open(names[0]);
+  find("versions").append(sortable({ columns: ["package", "version"], rows: data.versions }, "versions"));
+}

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from nldyn.orbits.orbit import Orbit
-from nldyn.plot.diagram import length_unit
+from nldyn.plot.diagram import axis_unit, length_unit
 from nldyn.reduction.convergence import (
     EIGENFREQUENCIES,
     QUANTITIES,
@@ -22,6 +22,7 @@ from nldyn.report.offline import Table, as_table, versions, write_html
 from nldyn.report.orbit_content import known
 
 TOLERANCE = 0.01  # of the advice and of the light band
+TIMES = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"))
 
 
 def write_study_page(
@@ -99,7 +100,7 @@ def panels(study: ConvergenceStudy) -> list[dict[str, Any]]:
         max((m.peak.max_abs_displacement for m in study.models if m.peak), default=1.0)
     )
     durations = [contact_time(m.orbit) for m in study.models if m.orbit]
-    second, time = time_unit(max(durations, default=0.0))
+    second, time = axis_unit(max(durations, default=0.0), TIMES)
 
     def duration(orbit: Orbit) -> float:
         return contact_time(orbit) / second
@@ -147,18 +148,6 @@ def of_peak(number: Callable[[Orbit], float]) -> Callable[[Measured], list[float
 def of_orbit(number: Callable[[Orbit], float]) -> Callable[[Measured], list[float]]:
     """A number of the orbit at the frequency of the study."""
     return lambda model: of(number, model.orbit)
-
-
-def time_unit(longest: float) -> tuple[float, str]:
-    """A unit of time in s, and its name.
-
-    Examples
-    --------
-    >>> time_unit(2.0), time_unit(1.3e-3), time_unit(2e-5)
-    ((1.0, 's'), (0.001, 'ms'), (1e-06, 'µs'))
-    """
-    units = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"))
-    return next((unit for unit in units if longest >= 0.5 * unit[0]), units[-1])
 
 
 def larger_half(study: ConvergenceStudy) -> list[int]:

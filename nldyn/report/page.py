@@ -64,6 +64,11 @@ class Drawn:
     reduced: cms.ReducedModel
     mirror: str | None = None
 
+    @property
+    def surface(self) -> dict[str, Any]:
+        """What the page shows of it, see `surface_content`."""
+        return surface_content(self.component, self.reduced, self.mirror)
+
 
 def write_page(
     diagram: Diagram,
@@ -72,7 +77,7 @@ def write_page(
     summary: Mapping[str, Any],
     *,
     scene: Scene | None = None,
-    drawn: Drawn | Mapping[str, Any] | None = None,
+    surface: Mapping[str, Any] | None = None,
     notes: Iterable[str] = (),
     yscale: Literal["linear", "log"] = "linear",
 ) -> None:
@@ -90,14 +95,14 @@ def write_page(
         What `nldyn.report.results.summary` says of the diagram.
     scene : Scene, optional
         Its text and its title are shown.
-    drawn : Drawn or dict, optional
-        The structure, if there is one to be shown deflected; or what `surface_content` gave for it.
+    surface : dict, optional
+        What `surface_content` gives of the structure, if there is one to be shown deflected.
     notes : iterable of str
         What is to be said beside the notes of the diagram.
     yscale : {"linear", "log"}
         Scale of the displacement axis at first.
     """
-    content = page_content(diagram, tables, summary, scene, drawn, notes, yscale)
+    content = page_content(diagram, tables, summary, scene, surface, notes, yscale)
     write_html(path, "page.html", content)
 
 
@@ -106,7 +111,7 @@ def page_content(
     tables: Mapping[str, Table],
     summary: Mapping[str, Any],
     scene: Scene | None = None,
-    drawn: Drawn | Mapping[str, Any] | None = None,
+    surface: Mapping[str, Any] | None = None,
     notes: Iterable[str] = (),
     yscale: Literal["linear", "log"] = "linear",
 ) -> dict[str, Any]:
@@ -142,10 +147,8 @@ def page_content(
         "system": repr(branches[0].points[0].system) if branches else "",
         "scene": scene.text if scene else "",
     }
-    if drawn is not None:
-        if isinstance(drawn, Drawn):
-            drawn = surface_content(drawn.component, drawn.reduced, drawn.mirror)
-        content["surface"] = drawn
+    if surface is not None:
+        content["surface"] = surface
         for shown, each in zip(orbits, chosen, strict=True):
             if "fault" not in shown:
                 time, modal = modal_motion(each.orbit)

@@ -140,7 +140,8 @@ def write_results(
         if scene is not None:
             (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
         page = folder / "report.html"
-        write_page(diagram, page, tables, told, scene=scene, drawn=drawn, yscale=yscale)
+        surface = drawn.surface if drawn else None
+        write_page(diagram, page, tables, told, scene=scene, surface=surface, yscale=yscale)
     return Path(directory)
 
 
